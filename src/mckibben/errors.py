@@ -1,0 +1,68 @@
+"""Errors that a person can act on: what is wrong, where, and what to do about it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+
+class MckibbenError(Exception):
+    """Base of every error that this package raises on purpose.
+
+    The command line prints it as one paragraph and leaves with exit code 2.
+    """
+
+
+class DataError(MckibbenError, ValueError):
+    """A recording, or a file with one, that cannot be used as it is.
+
+    Parameters
+    ----------
+    problem : str
+        What is wrong, as a phrase without a final stop.
+    file : path, optional
+        The file it was found in.
+    channel : str, optional
+        The channel or column it was found in.
+    row : int, optional
+        The row it was found in: the line of a text file as an editor counts it, or the
+        sample counted from 1 where there is no text.
+    remedy : str
+        What to do about it, as a phrase without a final stop.
+    """
+
+    def __init__(
+        self,
+        problem: str,
+        *,
+        remedy: str,
+        file: str | Path | None = None,
+        channel: str | None = None,
+        row: int | None = None,
+    ) -> None:
+        self.problem = problem
+        self.remedy = remedy
+        self.file = None if file is None else Path(file)
+        self.channel = channel
+        self.row = row
+        super().__init__(problem)
+
+    def __str__(self) -> str:
+        where = [] if self.file is None else [str(self.file)]
+        if self.channel is not None:
+            where.append(f"channel {self.channel!r}")
+        if self.row is not None:
+            where.append(f"row {self.row}")
+        place = f"{', '.join(where)}: " if where else ""
+        return f"{place}{self.problem}. Remedy: {self.remedy}."
+
+
+class ModelError(MckibbenError, ValueError):
+    """A model, or a file with one, that cannot do what was asked; the text ends with a remedy."""
+
+
+class DataWarning(UserWarning):
+    """Something assumed or mended while reading a recording."""
+
+
+class ModelWarning(UserWarning):
+    """Something a model did that its user should know, such as clipping a reference."""

@@ -1,0 +1,242 @@
+"""A recording: named channels with units on one uniform time grid, and what is known about them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mckibben.errors import DataError
+
+Array = NDArray[np.float64]
+
+STANDARD_UNITS: Mapping[str, str] = MappingProxyType(
+    {
+        "pressure": "bar",
+        "voltage": "V",
+        "displacement": "mm",
+        "length": "mm",
+        "contraction": "",
+        "force": "N",
+        "velocity": "mm/s",
+        "angle": "rad",
+        "temperature": "degC",
+    }
+)
+"""Units of the standard channels; ``pressure_2`` and ``pressure_extensor`` follow ``pressure``."""
+
+
+def standard_unit(channel: str) -> str | None:
+    """Return the unit that a channel of this name has throughout the package, or None.
+
+    >>> standard_unit("pressure_extensor"), standard_unit("displacement_model")
+    ('bar', 'mm')
+    """
+    return STANDARD_UNITS.get(channel.partition("_")[0])
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """Samples of one run, on a uniform time grid.
+
+    Parameters
+    ----------
+    channels : mapping of str to array_like, shape (n,)
+        The samples; finite, all of the same length, at least two. Copied, and read-only after.
+    sample_time : float or None
+        Time between samples [s], positive; None where the recording has no time, which only
+        rate-independent models accept.
+    units : mapping of str to str, optional
+        Unit of every channel; standard channels need none, unknown ones without are dimensionless.
+    start_time : float, default 0.0
+        Time of the first sample [s].
+    meta : mapping, optional
+        What else is known: rig, muscle geometry, load, notes, source file. Anything that JSON holds.
+
+    Raises
+    ------
+    DataError
+        On channels of unequal length, fewer than two samples, values that are not finite, a
+        standard channel in another unit than the package's, or a sample time that is not positive.
+    """
+
+    channels: Mapping[str, Array]
+    sample_time: float | None = None
+    units: Mapping[str, str] = field(default_factory=dict)
+    start_time: float = 0.0
+    meta: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        channels = {name: _frozen(name, samples) for name, samples in self.channels.items()}
+        if not channels:
+            raise DataError("a recording needs at least one channel", remedy="name a column to read")
+        lengths = {name: samples.size for name, samples in channels.items()}
+        if len(set(lengths.values())) > 1:
+            raise DataError(
+                f"channels differ in length: {lengths}", remedy="record all channels on one grid"
+            )
+        if min(lengths.values()) < 2:
+            raise DataError(
+                f"{min(lengths.values())} sample(s) are too few", remedy="give at least two samples"
+            )
+        if self.sample_time is not None and not (0 < self.sample_time < np.inf):
+            raise DataError(
+                f"a sample time of {self.sample_time} s is impossible",
+                remedy="give a positive time in seconds, or None where time is unknown",
+            )
+        if not np.isfinite(self.start_time):
+            raise DataError("the start time is not finite", remedy="give a time in seconds")
+        units = {name: self.units.get(name, standard_unit(name) or "") for name in channels}
+        for name, unit in units.items():
+            expected = standard_unit(name)
+            if expected is not None and unit != expected:
+                raise DataError(
+                    f"a recording holds this channel in {expected or 'no unit'}, not {unit!r}",
+                    channel=name,
+                    remedy="convert it, or read the file with mckibben.read, which converts",
+                )
+        strangers = set(self.units) - set(channels)
+        if strangers:
+            raise DataError(
+                f"units are given for absent channels {sorted(strangers)}", remedy="drop them"
+            )
+        object.__setattr__(self, "channels", MappingProxyType(channels))
+        object.__setattr__(self, "units", MappingProxyType(units))
+        object.__setattr__(self, "meta", MappingProxyType(dict(self.meta)))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Rebuild from plain dicts, so that worker processes can be handed recordings."""
+        plain = (dict(self.channels), self.sample_time, dict(self.units))
+        return Recording, (*plain, self.start_time, dict(self.meta))
+
+    def __repr__(self) -> str:
+        listed = ", ".join(f"{name} [{self.units[name] or '-'}]" for name in self.channels)
+        grid = "no time" if self.sample_time is None else f"{self.sample_time:g} s apart"
+        return f"Recording({self.name}: {self.n_samples} samples {grid}; {listed})"
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Recording):
+            return NotImplemented
+        return (
+            self.sample_time == other.sample_time
+            and self.start_time == other.start_time
+            and dict(self.units) == dict(other.units)
+            and dict(self.meta) == dict(other.meta)
+            and list(self.channels) == list(other.channels)
+            and all(np.array_equal(self[name], other[name]) for name in self.channels)
+        )
+
+    __hash__ = None  # type: ignore[assignment]  # equal by content, and content is too large to hash
+
+    def __len__(self) -> int:
+        return self.n_samples
+
+    def __contains__(self, channel: object) -> bool:
+        return channel in self.channels
+
+    def __getitem__(self, channel: str) -> Array:
+        """Return the samples of one channel, shape (n,), read-only."""
+        if channel not in self.channels:
+            raise DataError(
+                f"there is no channel {channel!r}; there are {', '.join(self.channels)}",
+                file=self.source,
+                remedy=f"name one of them, or map a column with --column {channel}=COLUMN",
+            )
+        return self.channels[channel]
+
+    @property
+    def n_samples(self) -> int:
+        """Number of samples."""
+        return next(iter(self.channels.values())).size
+
+    @property
+    def time(self) -> Array:
+        """Time of every sample [s], shape (n,); sample numbers where the recording has no time."""
+        step = 1.0 if self.sample_time is None else self.sample_time
+        return self.start_time + step * np.arange(self.n_samples)
+
+    @property
+    def duration(self) -> float | None:
+        """Time from the first sample to the last [s], or None without time."""
+        return None if self.sample_time is None else self.sample_time * (self.n_samples - 1)
+
+    @property
+    def source(self) -> str | None:
+        """The file it was read from, or None."""
+        file = self.meta.get("file")
+        return None if file is None else str(file)
+
+    @property
+    def name(self) -> str:
+        """A short name to show: ``meta["name"]``, or the stem of the source file."""
+        given = self.meta.get("name")
+        if given is not None:
+            return str(given)
+        return "recording" if self.source is None else Path(self.source).stem
+
+    def matrix(self, channels: Iterable[str]) -> Array:
+        """Return several channels side by side, shape (n, number of channels)."""
+        return np.column_stack([self[name] for name in channels])
+
+    def with_channels(self, units: Mapping[str, str] | None = None, /, **samples: ArrayLike) -> Recording:
+        """Return a recording with channels added or replaced."""
+        added = {name: np.asarray(values, dtype=float) for name, values in samples.items()}
+        kept = {name: unit for name, unit in self.units.items() if name not in added}
+        return replace(self, channels={**self.channels, **added}, units=kept | dict(units or {}))
+
+    def with_meta(self, **meta: Any) -> Recording:
+        """Return a recording with entries of ``meta`` added or replaced."""
+        return replace(self, meta={**self.meta, **meta})
+
+    def select(self, channels: Sequence[str]) -> Recording:
+        """Return a recording of some channels only, in the order given."""
+        return replace(
+            self,
+            channels={name: self[name] for name in channels},
+            units={name: self.units[name] for name in channels},
+        )
+
+    def slice(self, start: int, stop: int) -> Recording:
+        """Return samples ``start`` up to, not including, ``stop``, counted from 0."""
+        if not 0 <= start < stop <= self.n_samples:
+            raise DataError(
+                f"samples {start}:{stop} are not within 0:{self.n_samples}",
+                file=self.source,
+                remedy="cut inside the recording",
+            )
+        return replace(
+            self,
+            channels={name: samples[start:stop] for name, samples in self.channels.items()},
+            start_time=float(self.time[start]),
+        )
+
+    def continues(self, other: Recording) -> bool:
+        """Tell whether this recording begins one sample time after ``other`` ends."""
+        step = self.sample_time
+        if step is None or other.sample_time is None:
+            return False
+        same_grid = abs(step - other.sample_time) <= 1e-3 * step
+        return same_grid and abs(self.start_time - float(other.time[-1]) - step) <= 0.1 * step
+
+
+def _frozen(name: str, samples: ArrayLike) -> Array:
+    values = np.array(samples, dtype=np.float64)
+    if values.ndim != 1:
+        raise DataError(
+            f"samples have shape {values.shape}", channel=name, remedy="give one value a sample"
+        )
+    bad = np.flatnonzero(~np.isfinite(values))
+    if bad.size:
+        raise DataError(
+            f"the value is {values[bad[0]]}, and {bad.size} of {values.size} are not finite",
+            channel=name,
+            row=int(bad[0]) + 1,
+            remedy="cut those samples out, or read the file with --gaps split or interpolate",
+        )
+    values.flags.writeable = False
+    return values

@@ -1,0 +1,85 @@
+"""Every plug-in of the package, one line each: group, name, and where it lives.
+
+A plug-in is imported when it is first asked for, never before. Packages outside this one join by
+entry points in the groups ``mckibben.blocks``, ``mckibben.estimators`` and so on.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from importlib import import_module
+from importlib.metadata import entry_points
+from typing import Any
+
+from mckibben.errors import ModelError
+
+PLUGINS: dict[str, dict[str, str]] = {
+    "blocks": {
+        "affine": "mckibben.blocks.affine:Affine",
+        "eupi": "mckibben.blocks.eupi:EUPI",
+        "eupi-inverse": "mckibben.blocks.eupi:EUPIInverse",
+        "gpi": "mckibben.blocks.gpi:GPI",
+        "gpi-inverse": "mckibben.blocks.gpi:GPIInverse",
+        "parallel": "mckibben.blocks.compose:Parallel",
+        "per-channel": "mckibben.blocks.compose:PerChannel",
+        "pi": "mckibben.blocks.pi:PI",
+        "pi-inverse": "mckibben.blocks.pi:PIInverse",
+        "piecewise-linear": "mckibben.blocks.piecewise_linear:PiecewiseLinear",
+        "play": "mckibben.blocks.play:Play",
+        "polynomial": "mckibben.blocks.polynomial:Polynomial",
+        "polynomial-inverse": "mckibben.blocks.polynomial:PolynomialInverse",
+        "rate-dependent-pi": "mckibben.blocks.rate_dependent_pi:RateDependentPI",
+        "rate-dependent-pi-inverse": "mckibben.blocks.rate_dependent_pi:RateDependentPIInverse",
+        "series": "mckibben.blocks.compose:Series",
+    },
+    "envelopes": {
+        "exponential": "mckibben.blocks.envelopes.exponential:Exponential",
+        "piecewise-linear": "mckibben.blocks.envelopes.piecewise_linear:PiecewiseLinear",
+        "tanh": "mckibben.blocks.envelopes.tanh:Tanh",
+    },
+    "estimators": {
+        "eupi": "mckibben.estimators.eupi:EUPIEstimator",
+        "gpi": "mckibben.estimators.gpi:GPIEstimator",
+        "mpi": "mckibben.estimators.mpi:MPIEstimator",
+        "pi": "mckibben.estimators.pi:PIEstimator",
+        "rdpi": "mckibben.estimators.rdpi:RDPIEstimator",
+    },
+    "published": {
+        "field-models-pi": "mckibben.blocks.published.field_models:prandtl_ishlinskii",
+        "mpi-narmax-mpi": "mckibben.blocks.published.mpi_narmax:modified_prandtl_ishlinskii",
+    },
+}
+"""Group -> name -> ``"module:attribute"``. Adding a plug-in is one line here."""
+
+
+def names(group: str) -> tuple[str, ...]:
+    """Return the names of all plug-ins of a group, in alphabetical order.
+
+    >>> "gpi" in names("estimators")
+    True
+    """
+    return tuple(sorted(_locations(group)))
+
+
+def load(group: str, name: str) -> Any:
+    """Import and return one plug-in.
+
+    Raises
+    ------
+    ModelError
+        If the group has no plug-in of that name; the text lists those it has.
+    """
+    locations = _locations(group)
+    if name not in locations:
+        raise ModelError(
+            f"there is no {group[:-1] if group.endswith('s') else group} named {name!r}. "
+            f"Remedy: use one of {', '.join(sorted(locations))}."
+        )
+    module, _, attribute = locations[name].partition(":")
+    return getattr(import_module(module), attribute)
+
+
+@cache
+def _locations(group: str) -> dict[str, str]:
+    outside = {entry.name: entry.value for entry in entry_points(group=f"mckibben.{group}")}
+    return outside | PLUGINS[group]

@@ -12,7 +12,7 @@ class MckibbenError(Exception):
     """
 
 
-class DataError(MckibbenError, ValueError):
+class DataError(MckibbenError):
     """A recording, or a file with one, that cannot be used as it is.
 
     Parameters
@@ -56,7 +56,7 @@ class DataError(MckibbenError, ValueError):
         return f"{place}{self.problem}. Remedy: {self.remedy}."
 
 
-class ModelError(MckibbenError, ValueError):
+class ModelError(MckibbenError):
     """A model, or a file with one, that cannot do what was asked; the text ends with a remedy."""
 
 

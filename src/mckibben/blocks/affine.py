@@ -1,0 +1,107 @@
+"""Affine block: y = gain u + offset, the match that scales a unit-free model to a muscle.
+
+Source: "Analysis and modeling of a pneumatic artificial muscle system", Eq. (1).
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import ClassVar, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from pydantic import FiniteFloat
+from pydantic.dataclasses import dataclass
+
+from mckibben.blocks.base import (
+    DISPLACEMENT,
+    STRICT,
+    ChannelField,
+    Initial,
+    Kernel,
+    Primitive,
+    parameter_vector,
+)
+from mckibben.blocks.kernels import kernel
+from mckibben.blocks.single import SingleChannel
+from mckibben.errors import ModelError
+
+Array = NDArray[np.float64]
+
+
+@kernel
+def affine_kernel(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
+    """Scale and shift; coefficients are [gain, offset]."""
+    for t in range(inputs.shape[0]):
+        outputs[t, 0] = coefficients[0] * inputs[t, 0] + coefficients[1]
+
+
+@dataclass(frozen=True, config=STRICT)
+class Affine(SingleChannel, Primitive):
+    """Gain and offset.
+
+    Parameters
+    ----------
+    gain : float
+        Output per input; not zero where an inverse is wanted.
+    offset : float
+        Output at zero input.
+    input, output : Channel
+        Channel driven and channel given.
+    """
+
+    kind: ClassVar[str] = "affine"
+    kernel: ClassVar[Kernel] = affine_kernel
+
+    gain: FiniteFloat
+    offset: FiniteFloat = 0.0
+    input: ChannelField = DISPLACEMENT
+    output: ChannelField = DISPLACEMENT
+
+    @property
+    def n_states(self) -> int:
+        """None: the block is memoryless."""
+        return 0
+
+    @property
+    def n_parameters(self) -> int:
+        """Gain and offset."""
+        return 2
+
+    def pack(self) -> Array:
+        """Return [gain, offset]."""
+        return np.array([self.gain, self.offset])
+
+    def unpack(self, parameters: ArrayLike) -> Self:
+        """Return an affine block with other [gain, offset]."""
+        gain, offset = parameter_vector(self, parameters).tolist()
+        return replace(self, gain=gain, offset=offset)
+
+    def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
+        """Return an empty state."""
+        del first, initial
+        return np.empty(0)
+
+    def coefficients(self, sample_time: float | None) -> Array:
+        """Return [gain, offset]."""
+        del sample_time
+        return self.pack()
+
+    def inverse(self) -> Affine:
+        """Return the affine block that undoes this one.
+
+        Raises
+        ------
+        ModelError
+            If the gain is zero.
+        """
+        if self.gain == 0:
+            raise ModelError(
+                "'affine' of gain 0 has no inverse. Remedy: give a gain that is not 0."
+            )
+        return Affine(1 / self.gain, -self.offset / self.gain, self.output, self.input)
+
+    @classmethod
+    def example(cls) -> Self:
+        """Return a gain of 6.8 mm and an offset."""
+        return cls(6.8, -1.5)

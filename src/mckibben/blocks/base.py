@@ -1,0 +1,444 @@
+"""What a block is: an immutable parameter set with dynamics.
+
+A concrete block is either a `Primitive`, which is one compiled kernel with its coefficients, or
+composes other blocks. Both kinds say how they *bind*: given state, input and output arrays they
+return a function without arguments that runs them, and everything else here is built on that.
+"""
+
+from __future__ import annotations
+
+import os
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self, overload
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from pydantic import BeforeValidator, ConfigDict, FiniteFloat
+from pydantic.dataclasses import dataclass as validated_dataclass
+
+from mckibben.errors import DataError, ModelError
+from mckibben.recording import Recording
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+Array = NDArray[np.float64]
+Run = Callable[[], None]
+Kernel = Callable[..., None]
+Initial = Literal["first_sample", "virgin"] | Sequence[float]
+"""Memory before the first sample."""
+
+
+def _plain(values: Any) -> Any:
+    return tuple(values.tolist()) if isinstance(values, np.ndarray) else values
+
+
+def _plain_sequence(values: Any) -> Any:
+    values = _plain(values)
+    return tuple(values) if isinstance(values, list) else values
+
+
+Vector = Annotated[tuple[FiniteFloat, ...], BeforeValidator(_plain_sequence)]
+"""Finite numbers; arrays and lists are accepted and kept as a tuple."""
+
+StoredInitial = Literal["first_sample", "virgin"] | Vector
+"""`Initial` as a field of a block."""
+
+STRICT = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
+"""How blocks validate their fields: no unknown ones, no silent conversion, nothing infinite."""
+
+
+@validated_dataclass(frozen=True, config=STRICT)
+class Channel:
+    """Name and unit of an input or output."""
+
+    name: str
+    unit: str
+
+
+def _channel(value: Any) -> Any:
+    return Channel(**value) if isinstance(value, dict) else value
+
+
+ChannelField = Annotated[Channel, BeforeValidator(_channel)]
+"""A channel as a field of a block."""
+
+PRESSURE = Channel("pressure", "bar")
+DISPLACEMENT = Channel("displacement", "mm")
+
+
+class Block(ABC):
+    """An immutable parameter set with dynamics.
+
+    Concrete blocks are frozen dataclasses, registered under `kind`. They know their inputs and
+    outputs, their state, how to run, and where it exists their exact inverse. They know nothing of
+    data or fitting.
+    """
+
+    kind: ClassVar[str]
+    """Name in the registry and in saved files."""
+
+    rate_dependent: ClassVar[bool] = False
+    """Whether the sample time matters to any block of this class."""
+
+    @property
+    @abstractmethod
+    def inputs(self) -> tuple[Channel, ...]:
+        """Driven inputs, then scheduling inputs."""
+
+    @property
+    @abstractmethod
+    def outputs(self) -> tuple[Channel, ...]:
+        """Outputs."""
+
+    @property
+    def scheduling(self) -> tuple[str, ...]:
+        """Names of the inputs that schedule the block but are not driven through it."""
+        return ()
+
+    @property
+    @abstractmethod
+    def n_states(self) -> int:
+        """Length of the state vector."""
+
+    @property
+    @abstractmethod
+    def n_parameters(self) -> int:
+        """Length of the parameter vector, `pack`."""
+
+    @abstractmethod
+    def pack(self) -> Array:
+        """Return the parameters as a vector, shape (n_parameters,); structure stays outside."""
+
+    @abstractmethod
+    def unpack(self, parameters: ArrayLike) -> Self:
+        """Return a block of this structure with other parameters, shape (n_parameters,)."""
+
+    @abstractmethod
+    def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
+        """Return the state before the first sample, shape (n_states,), a new array.
+
+        Parameters
+        ----------
+        first : array, shape (n_inputs,)
+            The first input sample.
+        initial : {"first_sample", "virgin"} or sequence of float, optional
+            As if the input had only risen to the first sample; as if nothing had ever happened; or
+            the state itself. Default is the block's own.
+        """
+
+    @abstractmethod
+    def bind(self, sample_time: float | None, state: Array, inputs: Array, outputs: Array) -> Run:
+        """Return a function that runs the block over ``inputs`` into ``outputs``, changing ``state``.
+
+        ``inputs`` has shape (n, n_inputs) and ``outputs`` (n, n_outputs), both C-contiguous; all
+        arrays are used in place at every call, so the caller may refill ``inputs`` between calls.
+        """
+
+    @classmethod
+    @abstractmethod
+    def example(cls) -> Block:
+        """Return a small, typical block of this class, for documentation and contract tests."""
+
+    def inverse(self) -> Block:
+        """Return the block that undoes this one.
+
+        Raises
+        ------
+        ModelError
+            If this block has no inverse; the text says which condition fails and what to do.
+        """
+        raise ModelError(
+            f"{self.kind!r} has no exact inverse. Remedy: use an invertible model (pi, gpi, mpi)."
+        )
+
+    def reachable(self) -> tuple[Array, Array]:
+        """Return the outputs that can be reached whatever happened before, lowest and highest.
+
+        Each has shape (n_outputs,). Bounded by the block's own input range where it has one;
+        infinite where it has none.
+        """
+        n = len(self.outputs)
+        return np.full(n, -np.inf), np.full(n, np.inf)
+
+    # -- running -----------------------------------------------------------------------------
+
+    @overload
+    def simulate(
+        self, data: Recording, *, initial: Initial | None = None, sample_time: float | None = None
+    ) -> Recording: ...
+
+    @overload
+    def simulate(
+        self, data: ArrayLike, *, initial: Initial | None = None, sample_time: float | None = None
+    ) -> Array: ...
+
+    def simulate(
+        self,
+        data: Recording | ArrayLike,
+        *,
+        initial: Initial | None = None,
+        sample_time: float | None = None,
+    ) -> Recording | Array:
+        """Run free over a recording or an array of inputs.
+
+        Parameters
+        ----------
+        data : Recording or array_like, shape (n,) or (n, n_inputs)
+            A recording needs a channel for every input.
+        initial : {"first_sample", "virgin"} or sequence of float, optional
+            Memory before the first sample; default is the block's own.
+        sample_time : float, optional
+            Time between samples [s]; for arrays of a rate-dependent block only.
+
+        Returns
+        -------
+        Recording or array
+            The same kind: a recording of the inputs and the modelled outputs, or an array of shape
+            (n, n_outputs), or (n,) for one output from a one-dimensional input.
+
+        Raises
+        ------
+        DataError
+            On absent channels, wrong units or shapes, or values that are not finite.
+        ModelError
+            If the block is rate-dependent and the data have no time.
+        """
+        if isinstance(data, Recording):
+            inputs = self._inputs_from(data)
+            outputs = self._run(inputs, data.sample_time, initial)
+            names = [channel.name for channel in self.outputs]
+            modelled = dict(zip(names, outputs.T, strict=True))
+            units = {channel.name: channel.unit for channel in self.outputs}
+            kept = data.select([channel.name for channel in self.inputs])
+            return kept.with_channels(units, **modelled)
+        array = np.asarray(data, dtype=np.float64)
+        outputs = self._run(self._inputs_from_array(array), sample_time, initial)
+        return outputs[:, 0] if array.ndim == 1 and outputs.shape[1] == 1 else outputs
+
+    def stream(self, sample_time: float | None = None, *, initial: Initial | None = None) -> Stream:
+        """Return a stepper for use sample by sample, in the state before the first sample.
+
+        Parameters
+        ----------
+        sample_time : float, optional
+            Time between steps [s]; needed by rate-dependent blocks.
+        initial : {"first_sample", "virgin"} or sequence of float, optional
+            Memory before the first step; default is the block's own.
+        """
+        return Stream(self, sample_time, initial)
+
+    def simulate_many(
+        self,
+        parameters: ArrayLike,
+        data: ArrayLike,
+        *,
+        initial: Initial | None = None,
+        sample_time: float | None = None,
+    ) -> Array:
+        """Run many parameter sets of this structure over the same inputs, on all cores.
+
+        Parameters
+        ----------
+        parameters : array_like, shape (k, n_parameters)
+            One set a row, as `pack` gives them.
+        data : array_like, shape (n,) or (n, n_inputs)
+            Inputs.
+        initial, sample_time
+            As for `simulate`.
+
+        Returns
+        -------
+        array, shape (k, n), or (k, n, n_outputs) for several outputs
+        """
+        sets = np.atleast_2d(np.asarray(parameters, dtype=np.float64))
+        blocks = [self.unpack(row) for row in sets]
+        inputs = self._inputs_from_array(np.asarray(data, dtype=np.float64))
+        outputs = run_many(blocks, inputs, sample_time=sample_time, initial=initial)
+        return outputs[:, :, 0] if outputs.shape[2] == 1 else outputs
+
+    def final_state(self, data: Recording, *, initial: Initial | None = None) -> Array:
+        """Return the state after a recording, shape (n_states,): its memory, to start another with."""
+        inputs = self._inputs_from(data)
+        state = self.initial_state(inputs[0], initial)
+        self.bind(data.sample_time, state, inputs, np.empty((len(inputs), len(self.outputs))))()
+        return state
+
+    def _run(self, inputs: Array, sample_time: float | None, initial: Initial | None) -> Array:
+        state = self.initial_state(inputs[0], initial)
+        outputs = np.empty((inputs.shape[0], len(self.outputs)))
+        self.bind(sample_time, state, inputs, outputs)()
+        self.report(state)
+        return outputs
+
+    def report(self, state: Array) -> None:
+        """Warn of what happened during a run that its user should know, read off the final state."""
+        del state
+
+    def _inputs_from(self, recording: Recording) -> Array:
+        for channel in self.inputs:
+            if channel.name in recording and recording.units[channel.name] != channel.unit:
+                raise DataError(
+                    f"the model wants this input in {channel.unit or 'no unit'}, "
+                    f"the recording has {recording.units[channel.name] or 'no unit'}",
+                    file=recording.source,
+                    channel=channel.name,
+                    remedy="convert the recording, or name its unit when reading it",
+                )
+        return np.ascontiguousarray(recording.matrix(channel.name for channel in self.inputs))
+
+    def _inputs_from_array(self, array: Array) -> Array:
+        n_inputs = len(self.inputs)
+        table = array[:, np.newaxis] if array.ndim == 1 else array
+        if table.ndim != 2 or table.shape[1] != n_inputs or table.shape[0] == 0:
+            raise DataError(
+                f"inputs have shape {array.shape}, but {self.kind!r} has {n_inputs} input(s)",
+                remedy=f"give an array of shape (n, {n_inputs})"
+                + (" or (n,)" if n_inputs == 1 else ""),
+            )
+        finite = np.isfinite(table)
+        if not finite.all():
+            row, column = np.argwhere(~finite)[0]
+            raise DataError(
+                f"the input is {table[row, column]}",
+                channel=self.inputs[column].name,
+                row=int(row) + 1,
+                remedy="remove or interpolate samples that are not finite",
+            )
+        return np.ascontiguousarray(table)
+
+    # -- saving ------------------------------------------------------------------------------
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the block as a JSON-ready dict, exact to the last bit."""
+        from mckibben.blocks import saving
+
+        return saving.to_dict(self)
+
+    def save(self, path: str | Path) -> None:
+        """Write the block as JSON that a person can read; see `mckibben.load`."""
+        from mckibben.blocks import saving
+
+        saving.save(self, path)
+
+
+class Primitive(Block):
+    """A block that is one kernel, ``kernel(coefficients, state, inputs, outputs)``."""
+
+    kernel: ClassVar[Kernel]
+
+    @abstractmethod
+    def coefficients(self, sample_time: float | None) -> Array:
+        """Return the numbers that the kernel reads, shape of its own choosing, one-dimensional."""
+
+    def bind(self, sample_time: float | None, state: Array, inputs: Array, outputs: Array) -> Run:
+        """Return a function that runs the kernel in place."""
+        run, coefficients = type(self).kernel, self.coefficients(sample_time)
+        return lambda: run(coefficients, state, inputs, outputs)
+
+
+@dataclass
+class Stream:
+    """A block running sample by sample; `step` allocates nothing.
+
+    Parameters
+    ----------
+    block : Block
+        What runs.
+    sample_time : float or None
+        Time between steps [s].
+    initial : {"first_sample", "virgin"} or sequence of float or None
+        Memory before the first step.
+    """
+
+    block: Block
+    sample_time: float | None = None
+    initial: Initial | None = None
+
+    def __post_init__(self) -> None:
+        self._inputs = np.zeros((1, len(self.block.inputs)))
+        self._outputs = np.zeros((1, len(self.block.outputs)))
+        self._output = self._outputs[0]
+        self.state = np.zeros(self.block.n_states)
+        self._run = self.block.bind(self.sample_time, self.state, self._inputs, self._outputs)
+        self.reset()
+
+    def reset(self) -> None:
+        """Return to the memory before the first step."""
+        self._started = False
+
+    def step(self, inputs: float | ArrayLike) -> Array:
+        """Take one sample of every input and return the outputs, shape (n_outputs,).
+
+        The array returned is reused by the next step: copy what you keep.
+        """
+        self._inputs[0] = inputs
+        if not self._started:
+            self.state[:] = self.block.initial_state(self._inputs[0], self.initial)
+            self._started = True
+        self._run()
+        return self._output
+
+
+def run_many(
+    blocks: Sequence[Block],
+    inputs: Array,
+    *,
+    sample_time: float | None = None,
+    initial: Initial | None = None,
+) -> Array:
+    """Run several blocks with the same channels over the same inputs, on all cores.
+
+    Returns
+    -------
+    array, shape (len(blocks), n, n_outputs)
+    """
+    outputs = np.empty((len(blocks), inputs.shape[0], len(blocks[0].outputs)))
+
+    def run(share: Iterable[int]) -> None:
+        for index in share:
+            state = blocks[index].initial_state(inputs[0], initial)
+            blocks[index].bind(sample_time, state, inputs, outputs[index])()
+
+    workers = min(os.cpu_count() or 1, len(blocks))
+    if workers == 1:
+        run(range(len(blocks)))
+    else:
+        with ThreadPoolExecutor(workers) as pool:
+            list(pool.map(run, [range(first, len(blocks), workers) for first in range(workers)]))
+    return outputs
+
+
+def explicit_state(block: Block, initial: Sequence[float]) -> Array:
+    """Return an explicit initial state after checking its length."""
+    state = np.array(initial, dtype=np.float64)
+    if state.shape != (block.n_states,) or not np.isfinite(state).all():
+        raise ModelError(
+            f"{block.kind!r} has {block.n_states} states, the initial state given has shape "
+            f"{state.shape}. Remedy: give {block.n_states} finite numbers, or 'first_sample'."
+        )
+    return state
+
+
+def parameter_vector(block: Block, parameters: ArrayLike) -> Array:
+    """Return a parameter vector after checking its length."""
+    vector = np.asarray(parameters, dtype=np.float64)
+    if vector.shape != (block.n_parameters,):
+        raise ModelError(
+            f"{block.kind!r} of this structure has {block.n_parameters} parameters, got shape "
+            f"{vector.shape}. Remedy: give a vector as pack() returns it."
+        )
+    return vector
+
+
+def needs_sample_time(kind: str, sample_time: float | None) -> float:
+    """Return the sample time, or say that a rate-dependent block cannot do without."""
+    if sample_time is None or not sample_time > 0:
+        raise ModelError(
+            f"{kind!r} depends on rate and needs a sample time, but the data have no time. "
+            "Remedy: read the recording with a time column or --rate, or give sample_time."
+        )
+    return sample_time

@@ -1,0 +1,398 @@
+"""Blocks made of blocks: in series, in parallel, and one to a channel.
+
+They run, stream, save and invert because their parts do: the inverse of a series is the reversed
+series of the inverses.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import pairwise
+from typing import Annotated, ClassVar, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from pydantic import BeforeValidator, InstanceOf
+from pydantic.dataclasses import dataclass
+
+from mckibben.blocks.base import (
+    STRICT,
+    Block,
+    Channel,
+    Initial,
+    Run,
+    explicit_state,
+    parameter_vector,
+)
+from mckibben.blocks.saving import nested
+from mckibben.errors import ModelError
+
+Array = NDArray[np.float64]
+
+
+def _parts(value: object) -> object:
+    return tuple(nested(part) for part in value) if isinstance(value, tuple | list) else value
+
+
+Parts = Annotated[tuple[InstanceOf[Block], ...], BeforeValidator(_parts)]
+
+
+class Composition(Block):
+    """What all compositions share: states and parameters are those of the parts, one after another."""
+
+    parts: tuple[Block, ...]
+
+    @property
+    def n_states(self) -> int:
+        """The states of all parts."""
+        return sum(part.n_states for part in self.parts)
+
+    @property
+    def n_parameters(self) -> int:
+        """The parameters of all parts."""
+        return sum(part.n_parameters for part in self.parts)
+
+    def pack(self) -> Array:
+        """Return the parameters of all parts, one after another."""
+        return np.concatenate([part.pack() for part in self.parts])
+
+    def unpack(self, parameters: ArrayLike) -> Self:
+        """Return a composition of the same structure with other parameters."""
+        vector = parameter_vector(self, parameters)
+        shares = _shares(vector, [part.n_parameters for part in self.parts])
+        parts = tuple(part.unpack(share) for part, share in zip(self.parts, shares, strict=True))
+        return replace(self, parts=parts)  # type: ignore[type-var]
+
+    def _states(self, state: Array) -> list[Array]:
+        return _shares(state, [part.n_states for part in self.parts])
+
+    def report(self, state: Array) -> None:
+        """Pass on what the parts have to say."""
+        for part, share in zip(self.parts, self._states(state), strict=True):
+            part.report(share)
+
+    def _shared_initial(self, initial: Initial | None) -> Sequence[Initial | None]:
+        """Return every part's own share of an explicit initial state, or the rule for all."""
+        if initial is None or isinstance(initial, str):
+            return [initial] * len(self.parts)
+        return [share.tolist() for share in self._states(explicit_state(self, initial))]
+
+
+@dataclass(frozen=True, config=STRICT)
+class Series(Composition):
+    """One block after another: the outputs of each drive the next.
+
+    Scheduling inputs of later parts become inputs of the series.
+
+    Parameters
+    ----------
+    parts : sequence of Block
+        In the order of the signal; at least one.
+    """
+
+    kind: ClassVar[str] = "series"
+
+    parts: Parts
+
+    def __post_init__(self) -> None:
+        _check_any(self)
+        for before, after in pairwise(self.parts):
+            driven = len(after.inputs) - len(after.scheduling)
+            if len(before.outputs) != driven:
+                raise ModelError(
+                    f"{before.kind!r} gives {len(before.outputs)} output(s), {after.kind!r} behind it "
+                    f"wants {driven}. Remedy: connect blocks that fit."
+                )
+
+    @property
+    def rate_dependent(self) -> bool:  # type: ignore[override]
+        """Whether any part is."""
+        return any(part.rate_dependent for part in self.parts)
+
+    @property
+    def inputs(self) -> tuple[Channel, ...]:
+        """Those of the first part, then scheduling inputs of later parts."""
+        channels = {channel.name: channel for channel in self.parts[0].inputs}
+        for part in self.parts[1:]:
+            for channel in part.inputs[len(part.inputs) - len(part.scheduling) :]:
+                channels.setdefault(channel.name, channel)
+        return tuple(channels.values())
+
+    @property
+    def scheduling(self) -> tuple[str, ...]:
+        """Names of all scheduling inputs."""
+        first = self.parts[0]
+        driven = {c.name for c in first.inputs[: len(first.inputs) - len(first.scheduling)]}
+        return tuple(c.name for c in self.inputs if c.name not in driven)
+
+    @property
+    def outputs(self) -> tuple[Channel, ...]:
+        """Those of the last part."""
+        return self.parts[-1].outputs
+
+    def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
+        """Return the parts' states, each started from the first sample that reaches it."""
+        states: list[Array] = []
+        driven: Array | None = None
+        for part, own in zip(self.parts, self._shared_initial(initial), strict=True):
+            sample = self._sample(part, first, driven)
+            states.append(part.initial_state(sample, own))
+            outputs = np.empty((1, len(part.outputs)))
+            part.bind(1.0, states[-1].copy(), sample[np.newaxis], outputs)()
+            driven = outputs[0]
+        return np.concatenate(states)
+
+    def bind(self, sample_time: float | None, state: Array, inputs: Array, outputs: Array) -> Run:
+        """Return a function that runs the parts in order."""
+        runs: list[Run] = []
+        signal: Array | None = None
+        last = len(self.parts) - 1
+        for index, (part, own) in enumerate(zip(self.parts, self._states(state), strict=True)):
+            given = inputs
+            if signal is not None or part.scheduling:
+                given, gather = self._gathered(part, inputs, signal)
+                if gather is not None:
+                    runs.append(gather)
+            into = outputs if index == last else np.empty((inputs.shape[0], len(part.outputs)))
+            runs.append(part.bind(sample_time, own, given, into))
+            signal = into
+
+        def run() -> None:
+            for step in runs:
+                step()
+
+        return run
+
+    def _gathered(
+        self, part: Block, inputs: Array, signal: Array | None
+    ) -> tuple[Array, Run | None]:
+        """Return the inputs of a part, and what fills them before it runs, if anything must."""
+        names = [channel.name for channel in self.inputs]
+        scheduling = [names.index(name) for name in part.scheduling]
+        if signal is not None and not scheduling:
+            return signal, None
+        driven = len(part.inputs) - len(scheduling)
+        gathered = np.empty((inputs.shape[0], len(part.inputs)))
+
+        def gather() -> None:
+            gathered[:, :driven] = inputs[:, :driven] if signal is None else signal
+            for column, source in enumerate(scheduling, start=driven):
+                gathered[:, column] = inputs[:, source]
+
+        return gathered, gather
+
+    def _sample(self, part: Block, first: Array, driven: Array | None) -> Array:
+        given, gather = self._gathered(
+            part, first[np.newaxis], None if driven is None else driven[np.newaxis]
+        )
+        if gather is not None:
+            gather()
+        return given[0]
+
+    def inverse(self) -> Series:
+        """Return the reversed series of the inverses.
+
+        Raises
+        ------
+        ModelError
+            If a part has no inverse.
+        """
+        return Series(tuple(part.inverse() for part in reversed(self.parts)))
+
+    def reachable(self) -> tuple[Array, Array]:
+        """Return the outputs that can be reached whatever happened before.
+
+        Those of the first part, followed through the rest; for parts that increase.
+        """
+        low, high = self.parts[0].reachable()
+        for part in self.parts[1:]:
+            if np.isfinite([*low, *high]).all() and part.n_states == 0:
+                low, high = part.simulate(np.array([low, high]))
+            else:
+                own_low, own_high = part.reachable()
+                low, high = own_low, own_high
+        return low, high
+
+    @classmethod
+    def example(cls) -> Self:
+        """Return a modified Prandtl-Ishlinskii model: a PI model and a saturating curve."""
+        from mckibben.blocks.pi import PI
+        from mckibben.blocks.piecewise_linear import PiecewiseLinear
+
+        return cls((PI.example(), PiecewiseLinear.example()))
+
+
+@dataclass(frozen=True, config=STRICT)
+class Parallel(Composition):
+    """Blocks with the same inputs, whose outputs are added.
+
+    Parameters
+    ----------
+    parts : sequence of Block
+        At least one, all with the same number of outputs and the same inputs.
+    """
+
+    kind: ClassVar[str] = "parallel"
+
+    parts: Parts
+
+    def __post_init__(self) -> None:
+        _check_any(self)
+        for part in self.parts[1:]:
+            if part.inputs != self.parts[0].inputs or part.outputs != self.parts[0].outputs:
+                raise ModelError(
+                    f"{part.kind!r} and {self.parts[0].kind!r} differ in their channels. "
+                    "Remedy: put blocks in parallel that have the same inputs and outputs."
+                )
+
+    @property
+    def rate_dependent(self) -> bool:  # type: ignore[override]
+        """Whether any part is."""
+        return any(part.rate_dependent for part in self.parts)
+
+    @property
+    def inputs(self) -> tuple[Channel, ...]:
+        """Those of every part."""
+        return self.parts[0].inputs
+
+    @property
+    def scheduling(self) -> tuple[str, ...]:
+        """Those of the first part."""
+        return self.parts[0].scheduling
+
+    @property
+    def outputs(self) -> tuple[Channel, ...]:
+        """Those of every part."""
+        return self.parts[0].outputs
+
+    def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
+        """Return the parts' states."""
+        shared = zip(self.parts, self._shared_initial(initial), strict=True)
+        return np.concatenate([part.initial_state(first, own) for part, own in shared])
+
+    def bind(self, sample_time: float | None, state: Array, inputs: Array, outputs: Array) -> Run:
+        """Return a function that runs every part and adds the outputs."""
+        own = [np.empty_like(outputs) for _ in self.parts]
+        states = self._states(state)
+        runs = [
+            part.bind(sample_time, share, inputs, into)
+            for part, share, into in zip(self.parts, states, own, strict=True)
+        ]
+
+        def run() -> None:
+            outputs[:] = 0.0
+            for step, result in zip(runs, own, strict=True):
+                step()
+                np.add(outputs, result, out=outputs)
+
+        return run
+
+    @classmethod
+    def example(cls) -> Self:
+        """Return the sum of a PI model and a play operator."""
+        from mckibben.blocks.pi import PI
+        from mckibben.blocks.play import Play
+
+        return cls((PI.example(), Play.example()))
+
+
+@dataclass(frozen=True, config=STRICT)
+class PerChannel(Composition):
+    """One block to every channel: block k drives output k from input k.
+
+    Parameters
+    ----------
+    parts : sequence of Block
+        One a channel, each with one input and one output, all channel names different.
+    """
+
+    kind: ClassVar[str] = "per-channel"
+
+    parts: Parts
+
+    def __post_init__(self) -> None:
+        _check_any(self)
+        for part in self.parts:
+            if len(part.inputs) != 1 or len(part.outputs) != 1:
+                raise ModelError(
+                    f"{part.kind!r} has {len(part.inputs)} input(s) and {len(part.outputs)} "
+                    "output(s). Remedy: give blocks with one of each."
+                )
+        for channels in (self.inputs, self.outputs):
+            if len({channel.name for channel in channels}) < len(channels):
+                raise ModelError(
+                    f"channel names repeat: {', '.join(c.name for c in channels)}. "
+                    "Remedy: name them pressure_1, pressure_2 and so on."
+                )
+
+    @property
+    def rate_dependent(self) -> bool:  # type: ignore[override]
+        """Whether any part is."""
+        return any(part.rate_dependent for part in self.parts)
+
+    @property
+    def inputs(self) -> tuple[Channel, ...]:
+        """One of every part."""
+        return tuple(part.inputs[0] for part in self.parts)
+
+    @property
+    def outputs(self) -> tuple[Channel, ...]:
+        """One of every part."""
+        return tuple(part.outputs[0] for part in self.parts)
+
+    def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
+        """Return the parts' states."""
+        shared = zip(self.parts, first, self._shared_initial(initial), strict=True)
+        return np.concatenate([part.initial_state(np.array([u]), own) for part, u, own in shared])
+
+    def bind(self, sample_time: float | None, state: Array, inputs: Array, outputs: Array) -> Run:
+        """Return a function that runs every part on its own channel."""
+        n = inputs.shape[0]
+        columns = [(np.empty((n, 1)), np.empty((n, 1))) for _ in self.parts]
+        runs = [
+            part.bind(sample_time, share, given, into)
+            for part, share, (given, into) in zip(
+                self.parts, self._states(state), columns, strict=True
+            )
+        ]
+
+        def run() -> None:
+            for index, (step, (given, into)) in enumerate(zip(runs, columns, strict=True)):
+                given[:, 0] = inputs[:, index]
+                step()
+                outputs[:, index] = into[:, 0]
+
+        return run
+
+    def inverse(self) -> PerChannel:
+        """Return the inverses, channel by channel."""
+        return PerChannel(tuple(part.inverse() for part in self.parts))
+
+    def reachable(self) -> tuple[Array, Array]:
+        """Return the outputs that every channel can reach whatever happened before."""
+        ends = [part.reachable() for part in self.parts]
+        return np.concatenate([low for low, _ in ends]), np.concatenate([high for _, high in ends])
+
+    @classmethod
+    def example(cls) -> Self:
+        """Return two muscles with models of their own."""
+        from mckibben.blocks.gpi import GPI
+        from mckibben.blocks.pi import PI
+
+        parts = []
+        for number, part in enumerate((PI.example(), GPI.example()), start=1):
+            pressure = Channel(f"pressure_{number}", "bar")
+            displacement = Channel(f"displacement_{number}", "mm")
+            parts.append(replace(part, input=pressure, output=displacement))
+        return cls(tuple(parts))
+
+
+def _check_any(block: Composition) -> None:
+    if not block.parts:
+        raise ModelError(f"{block.kind!r} has no parts. Remedy: give at least one block.")
+
+
+def _shares(vector: Array, lengths: Sequence[int]) -> list[Array]:
+    ends = np.cumsum(lengths)
+    return [vector[end - length : end] for end, length in zip(ends, lengths, strict=True)]

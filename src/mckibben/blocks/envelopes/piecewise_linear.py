@@ -1,0 +1,80 @@
+"""Monotone piecewise-linear envelope, for loops of any shape.
+
+Straight between knots, continued straight beyond the first and the last.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import ClassVar, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from pydantic.dataclasses import dataclass
+
+from mckibben.blocks.base import STRICT, Vector
+from mckibben.blocks.envelopes.base import Envelope, EnvelopeKernel
+from mckibben.blocks.interpolation import check_increasing, interpolate
+from mckibben.blocks.kernels import kernel
+
+Array = NDArray[np.float64]
+
+
+@kernel
+def _value(coefficients: Array, inputs: Array, values: Array) -> None:
+    n = coefficients.size // 2
+    for t in range(inputs.size):
+        values[t] = interpolate(inputs[t], coefficients[:n], coefficients[n:])
+
+
+@kernel
+def _inverse(coefficients: Array, values: Array, inputs: Array) -> None:
+    n = coefficients.size // 2
+    for t in range(values.size):
+        inputs[t] = interpolate(values[t], coefficients[n:], coefficients[:n])
+
+
+@dataclass(frozen=True, config=STRICT)
+class PiecewiseLinear(Envelope):
+    """Straight lines between knots.
+
+    Parameters
+    ----------
+    knots : sequence of float, length K >= 2
+        Inputs where lines meet, increasing.
+    values : sequence of float, length K
+        Envelope there, increasing.
+    """
+
+    kind: ClassVar[str] = "piecewise-linear"
+    value: ClassVar[EnvelopeKernel] = _value
+    inverse: ClassVar[EnvelopeKernel] = _inverse
+
+    knots: Vector
+    values: Vector
+
+    def __post_init__(self) -> None:
+        check_increasing("piecewise-linear envelope", self.knots, self.values)
+
+    def coefficients(self) -> Array:
+        """Return [knots, values]."""
+        return np.array([*self.knots, *self.values])
+
+    def pack(self) -> Array:
+        """Return the values."""
+        return np.array(self.values)
+
+    def unpack(self, parameters: ArrayLike) -> Self:
+        """Return an envelope with the same knots and other values."""
+        values = np.asarray(parameters, dtype=np.float64)
+        return replace(self, values=tuple(values.tolist()))
+
+    def shifted(self, offset: float) -> Self:
+        """Return this envelope raised by a constant."""
+        return replace(self, values=tuple(value + offset for value in self.values))
+
+    @classmethod
+    def examples(cls) -> tuple[Self, Self]:
+        """Return a pair for rising and falling input over 0 to 5 bar."""
+        knots = (0.0, 1.0, 2.5, 4.0, 5.0)
+        return cls(knots, (0.0, 0.1, 0.5, 0.9, 1.0)), cls(knots, (0.05, 0.3, 0.7, 0.95, 1.05))

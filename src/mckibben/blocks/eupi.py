@@ -1,0 +1,282 @@
+"""Extended unparallel Prandtl-Ishlinskii (EUPI) model, for loops whose branches differ in slope.
+
+The unparallel play operator has edges of different slope: with x the input counted from the lower end
+of its range, it follows x - r on the rising edge and alpha x + beta r on the falling one, and holds
+between. Beside the weighted operators stands a polynomial of x without memory:
+y = y_0 + sum_k a_k x^k + sum_i w_i F_i[x]. With alpha = beta = 1 and no polynomial it is the classical
+PI model; with the polynomial alone set to 0, the unparallel (UPI) model.
+
+Named among the alternatives in "Modeling and Compensation of Stiffness-Dependent Hysteresis Coupling
+Behavior for Parallel Pneumatic Artificial Muscle-Driven Soft Manipulator", Section 3.1. Publications
+differ in how they write the falling edge; this general form contains them. Where the falling edge
+would run below the rising one (small r and alpha < 1) the two are the same line.
+
+The inverse is solved for every sample, until the bracket closes to rounding.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Annotated, ClassVar, Self
+
+import numpy as np
+from annotated_types import Ge, Gt
+from numpy.typing import ArrayLike, NDArray
+from pydantic import BeforeValidator, FiniteFloat
+from pydantic.dataclasses import dataclass
+
+from mckibben.blocks.base import (
+    DISPLACEMENT,
+    PRESSURE,
+    STRICT,
+    ChannelField,
+    Initial,
+    Kernel,
+    Primitive,
+    StoredInitial,
+    Vector,
+    parameter_vector,
+)
+from mckibben.blocks.kernels import kernel, summing_kernel
+from mckibben.blocks.memory import check_thresholds, play_state
+from mckibben.blocks.root import solve_increasing
+from mckibben.blocks.saving import nested
+from mckibben.blocks.single import Inverse, Ranged, check_input_range
+from mckibben.errors import ModelError
+
+Array = NDArray[np.float64]
+
+
+@summing_kernel
+def eupi_kernel(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
+    """Run the model; coefficients are [u_0, alpha, beta, offset, a_1..a_3, thresholds, weights]."""
+    n = state.size
+    origin, alpha, beta, offset = coefficients[0], coefficients[1], coefficients[2], coefficients[3]
+    a1, a2, a3 = coefficients[4], coefficients[5], coefficients[6]
+    r = coefficients[7 : n + 7]
+    w = coefficients[n + 7 :]
+    for t in range(inputs.shape[0]):
+        x = inputs[t, 0] - origin
+        y = 0.0
+        for i in range(n):
+            s = max(min(state[i], alpha * x + beta * r[i]), x - r[i])
+            state[i] = s
+            y += w[i] * s
+        outputs[t, 0] = offset + ((a3 * x + a2) * x + a1) * x + y
+
+
+@kernel
+def eupi_matrix(x: Array, alpha: float, beta: float, r: Array, s: Array, operators: Array) -> None:
+    """Run unparallel play operators side by side: ``operators[t, i]`` is operator i after sample t.
+
+    Shapes: x (n,), r and s (N,), operators (n, N). Changes the states ``s``.
+    """
+    for t in range(x.size):
+        for i in range(r.size):
+            s[i] = max(min(s[i], alpha * x[t] + beta * r[i]), x[t] - r[i])
+            operators[t, i] = s[i]
+
+
+@kernel
+def _trial(u: float, memory: tuple[Array, Array]) -> float:
+    coefficients, state = memory
+    n = state.size - 2
+    x = u - coefficients[0]
+    y = coefficients[3] + ((coefficients[6] * x + coefficients[5]) * x + coefficients[4]) * x
+    for i in range(n):
+        r = coefficients[7 + i]
+        upper = coefficients[1] * x + coefficients[2] * r
+        y += coefficients[7 + n + i] * max(min(state[i], upper), x - r)
+    return y
+
+
+@kernel
+def eupi_inverse_kernel(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
+    """Solve for the input; coefficients are [forward ones, lowest, highest input].
+
+    The state is [operators, previous input, samples clipped].
+    """
+    n = state.size - 2
+    lowest, highest = coefficients[-2], coefficients[-1]
+    for t in range(inputs.shape[0]):
+        u, clipped = solve_increasing(
+            _trial, inputs[t, 0], state[n], lowest, highest, (coefficients, state)
+        )
+        x = u - coefficients[0]
+        for i in range(n):
+            r = coefficients[7 + i]
+            state[i] = max(min(state[i], coefficients[1] * x + coefficients[2] * r), x - r)
+        state[n] = u
+        if clipped:
+            state[n + 1] += 1.0
+        outputs[t, 0] = u
+
+
+@dataclass(frozen=True, config=STRICT)
+class EUPI(Ranged, Primitive):
+    """Extended unparallel Prandtl-Ishlinskii model.
+
+    Parameters
+    ----------
+    thresholds : sequence of float, length N
+        Thresholds, in the unit of the input: 0 <= r_0 < r_1 < ...
+    weights : sequence of float, length N
+        Weights, output per input. The inverse wants none negative.
+    falling_slope : float
+        alpha, slope of the falling edge where the rising one has 1; positive.
+    falling_threshold : float
+        beta, threshold of the falling edge per threshold of the rising one; at least 0.
+    polynomial : (float, float, float)
+        a_1, a_2, a_3 of the part without memory. The inverse wants it to increase.
+    offset : float
+        Constant of the output.
+    input_range : (float, float)
+        Lowest and highest input; x counts from the lowest, and the inverse clips to both.
+    initial : {"first_sample", "virgin"} or sequence of float
+        Default memory before the first sample.
+    input, output : Channel
+        Channel driven and channel given.
+    """
+
+    kind: ClassVar[str] = "eupi"
+    kernel: ClassVar[Kernel] = eupi_kernel
+
+    thresholds: Vector
+    weights: Vector
+    falling_slope: Annotated[FiniteFloat, Gt(0)]
+    falling_threshold: Annotated[FiniteFloat, Ge(0)]
+    polynomial: tuple[FiniteFloat, FiniteFloat, FiniteFloat]
+    offset: FiniteFloat
+    input_range: tuple[FiniteFloat, FiniteFloat]
+    initial: StoredInitial = "first_sample"
+    input: ChannelField = PRESSURE
+    output: ChannelField = DISPLACEMENT
+
+    def __post_init__(self) -> None:
+        check_thresholds(self.kind, self.thresholds, self.weights)
+        check_input_range(self.kind, self.input_range)
+
+    @property
+    def n_states(self) -> int:
+        """One an operator."""
+        return len(self.thresholds)
+
+    @property
+    def n_parameters(self) -> int:
+        """Weights, both edge numbers, the polynomial and the offset; thresholds are structure."""
+        return len(self.weights) + 6
+
+    def pack(self) -> Array:
+        """Return [weights, alpha, beta, a_1, a_2, a_3, offset]."""
+        edges = (self.falling_slope, self.falling_threshold)
+        return np.array([*self.weights, *edges, *self.polynomial, self.offset])
+
+    def unpack(self, parameters: ArrayLike) -> Self:
+        """Return a model with the same thresholds and other parameters."""
+        vector = parameter_vector(self, parameters).tolist()
+        n = len(self.weights)
+        alpha, beta, *polynomial, offset = vector[n:]
+        return replace(
+            self,
+            weights=tuple(vector[:n]),
+            falling_slope=alpha,
+            falling_threshold=beta,
+            polynomial=tuple(polynomial),
+            offset=offset,
+        )
+
+    def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
+        """Return the operators' outputs before the first sample, shape (N,)."""
+        start = self.initial if initial is None else initial
+        x = first[0] - self.input_range[0]
+        return play_state(self, np.array(self.thresholds), x, x, start)
+
+    def coefficients(self, sample_time: float | None) -> Array:
+        """Return [u_0, alpha, beta, offset, a_1, a_2, a_3, thresholds, weights]."""
+        del sample_time
+        edges = (self.input_range[0], self.falling_slope, self.falling_threshold)
+        shape = (self.offset, *self.polynomial)
+        return np.array([*edges, *shape, *self.thresholds, *self.weights])
+
+    def inverse(self) -> EUPIInverse:
+        """Return the inverse, exact to rounding.
+
+        Raises
+        ------
+        ModelError
+            If a weight is negative or the part without memory does not increase.
+        """
+        return EUPIInverse(self)
+
+    @classmethod
+    def example(cls) -> Self:
+        """Return a loop over 0 to 5 bar that falls more steeply than it rises."""
+        shape = (1.0, 0.2, -0.02)
+        return cls((0.0, 0.3, 0.8, 1.5), (2.0, 1.5, 1.0, 0.5), 1.1, 0.8, shape, 2.0, (0.0, 5.0))
+
+
+@dataclass(frozen=True, config=STRICT)
+class EUPIInverse(Inverse, Primitive):
+    """Inverse of an `EUPI` model, solved for every sample to rounding.
+
+    Parameters
+    ----------
+    forward : EUPI
+        The model inverted.
+    """
+
+    kind: ClassVar[str] = "eupi-inverse"
+    kernel: ClassVar[Kernel] = eupi_inverse_kernel
+
+    forward: Annotated[EUPI, BeforeValidator(nested)]
+
+    def __post_init__(self) -> None:
+        forward = self.forward
+        low, high = forward.input_range
+        a1, a2, a3 = forward.polynomial
+        turn = -a2 / (3 * a3) if a3 else 0.0
+        places = np.array([0.0, high - low, min(max(turn, 0.0), high - low)])
+        slope = (a1 + 2 * a2 * places + 3 * a3 * places**2).min()
+        reversible = forward.thresholds[0] == 0 and forward.falling_slope <= 1
+        slope += forward.weights[0] if reversible else 0.0
+        if min(forward.weights) < 0 or slope <= 0:
+            raise ModelError(
+                "'eupi' has no inverse: a weight is negative, or its part without memory does not "
+                "increase. Remedy: identify it with non-negative weights (nonnegative=True)."
+            )
+
+    @property
+    def n_states(self) -> int:
+        """The forward model's, the previous input, and the count of clipped samples."""
+        return self.forward.n_states + 2
+
+    def matching_state(self, first: float, start: str) -> Array:
+        """Return the state of the inverse of a forward model started by a named rule."""
+        forward = self.forward
+        low, high = forward.input_range
+
+        def output(u: float) -> float:
+            return float(forward.simulate([u], initial=start)[0])  # type: ignore[arg-type]
+
+        if not output(low) < first < output(high):
+            u = low if first <= output(low) else high
+            clipped = float(first != output(u))
+        else:
+            from scipy.optimize import brentq
+
+            u, clipped = brentq(lambda u: output(u) - first, low, high, xtol=1e-15), 0.0
+        state = forward.initial_state(np.array([u]), start)  # type: ignore[arg-type]
+        return np.array([*state, u, clipped])
+
+    def state_from_forward(self, state: Array) -> Array:
+        """Return the state that matches a state of the forward model; the input starts lowest."""
+        return np.array([*state, self.forward.input_range[0], 0.0])
+
+    def coefficients(self, sample_time: float | None) -> Array:
+        """Return [the forward model's, lowest, highest input]."""
+        return np.array([*self.forward.coefficients(sample_time), *self.forward.input_range])
+
+    @classmethod
+    def example(cls) -> Self:
+        """Return the inverse of the example model."""
+        return cls(EUPI.example())

@@ -1,0 +1,340 @@
+"""The generalised Prandtl-Ishlinskii (GPI) model, for asymmetric and saturating loops, and its inverse.
+
+Operators play between two envelopes, gamma_R on rising and gamma_L on falling input:
+w_t = max(gamma_R(u_t) - r, w_{t-1}) when u rises, min(gamma_L(u_t) + r, w_{t-1}) when it falls, and
+w_{t-1} when it stands still; the output is y = sum_i x_i w_i.
+
+The inverse finds the common envelope value z at which the weighted sum equals the reference, then
+u = gamma_R^{-1}(z) while the reference rises and gamma_L^{-1}(z) while it falls. At a reversal z is
+continuous while u jumps across the dead zone between the envelopes, where every operator holds, so
+the inverse stays exact through minor loops.
+
+Source: "Modeling and Compensation of Stiffness-Dependent Hysteresis Coupling Behavior for Parallel
+Pneumatic Artificial Muscle-Driven Soft Manipulator", Eqs. (1) to (7).
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Annotated, ClassVar, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from pydantic import BeforeValidator, FiniteFloat, InstanceOf
+from pydantic.dataclasses import dataclass
+
+from mckibben.blocks.base import (
+    DISPLACEMENT,
+    PRESSURE,
+    STRICT,
+    ChannelField,
+    Initial,
+    Run,
+    StoredInitial,
+    Vector,
+    explicit_state,
+    parameter_vector,
+)
+from mckibben.blocks.envelopes.base import Envelope, nested_envelope
+from mckibben.blocks.envelopes.tanh import Tanh
+from mckibben.blocks.kernels import kernel, summing_kernel
+from mckibben.blocks.memory import (
+    check_invertible_sum,
+    check_thresholds,
+    fall_to,
+    play_state,
+    rise_to,
+    solve_from_rest,
+)
+from mckibben.blocks.saving import nested
+from mckibben.blocks.single import Inverse, Ranged, check_input_range
+from mckibben.errors import ModelError
+
+Array = NDArray[np.float64]
+EnvelopeField = Annotated[InstanceOf[Envelope], BeforeValidator(nested_envelope)]
+
+
+@summing_kernel
+def gpi_kernel(
+    coefficients: Array, state: Array, inputs: Array, rising: Array, falling: Array, outputs: Array
+) -> None:
+    """Run a GPI model, given its envelopes at every sample; coefficients are [thresholds, weights].
+
+    The state is [operators, previous input].
+    """
+    n = state.size - 1
+    r = coefficients[:n]
+    w = coefficients[n:]
+    previous = state[n]
+    for t in range(inputs.size):
+        u = inputs[t]
+        lower = rising[t] if u > previous else -np.inf
+        upper = falling[t] if u < previous else np.inf
+        y = 0.0
+        for i in range(n):
+            s = min(max(state[i], lower - r[i]), upper + r[i])
+            state[i] = s
+            y += w[i] * s
+        outputs[t, 0] = y
+        previous = u
+    state[n] = previous
+
+
+@kernel
+def gpi_matrix(
+    u: Array, rising: Array, falling: Array, r: Array, s: Array, operators: Array
+) -> None:
+    """Run generalised play operators side by side: ``operators[t, i]`` is operator i after sample t.
+
+    Shapes: u, rising and falling (n,), r and s (N,), operators (n, N). Changes the states ``s``, which
+    are those after the first sample: nothing moves before the second.
+    """
+    previous = u[0]
+    for t in range(u.size):
+        lower = rising[t] if u[t] > previous else -np.inf
+        upper = falling[t] if u[t] < previous else np.inf
+        for i in range(r.size):
+            s[i] = min(max(s[i], lower - r[i]), upper + r[i])
+            operators[t, i] = s[i]
+        previous = u[t]
+
+
+@kernel
+def gpi_inverse_kernel(
+    coefficients: Array, state: Array, references: Array, z: Array, direction: Array
+) -> None:
+    """Find the common envelope value z and the direction of the input, for every reference.
+
+    Coefficients are [lowest, highest z, thresholds, weights]; the state is [operators, previous
+    input, previous reference, samples clipped].
+    """
+    n = state.size - 3
+    lowest, highest = coefficients[0], coefficients[1]
+    r = coefficients[2 : n + 2]
+    w = coefficients[n + 2 :]
+    s = state[:n]
+    for t in range(references.size):
+        y = references[t]
+        total = 0.0
+        for i in range(n):
+            total += w[i] * s[i]
+        direction[t] = 0.0
+        if y > state[n + 1] and y > total:
+            direction[t] = 1.0
+            if rise_to(y, highest, r, w, s) == highest:
+                state[n + 2] += 1.0
+        elif y < state[n + 1] and y < total:
+            direction[t] = -1.0
+            if fall_to(y, lowest, r, w, s) == lowest:
+                state[n + 2] += 1.0
+        state[n + 1] = y
+        z[t] = s[0]
+
+
+@kernel
+def choose_branch(
+    limits: Array, state: Array, direction: Array, rising: Array, falling: Array, inputs: Array
+) -> None:
+    """Take the input from the envelope of the direction, or hold it; limits are [lowest, highest]."""
+    n = state.size - 3
+    u = state[n]
+    for t in range(direction.size):
+        if direction[t] > 0.0:
+            u = min(max(rising[t], limits[0]), limits[1])
+        elif direction[t] < 0.0:
+            u = min(max(falling[t], limits[0]), limits[1])
+        inputs[t, 0] = u
+    state[n] = u
+
+
+@dataclass(frozen=True, config=STRICT)
+class GPI(Ranged):
+    """Generalised Prandtl-Ishlinskii model.
+
+    Parameters
+    ----------
+    thresholds : sequence of float, length N + 1
+        Thresholds on the envelopes' values: 0 <= r_0 < r_1 < ...
+    weights : sequence of float, length N + 1
+        Weights, output per unit of the envelopes. The inverse wants r_0 = 0 and positive partial
+        sums.
+    rising, falling : Envelope
+        gamma_R and gamma_L. The inverse wants gamma_L >= gamma_R over the input range.
+    input_range : (float, float)
+        Lowest and highest input, over which the conditions hold and to which the inverse clips.
+    initial : {"first_sample", "virgin"} or sequence of float
+        Default memory before the first sample.
+    input, output : Channel
+        Channel driven and channel given.
+    """
+
+    kind: ClassVar[str] = "gpi"
+
+    thresholds: Vector
+    weights: Vector
+    rising: EnvelopeField
+    falling: EnvelopeField
+    input_range: tuple[FiniteFloat, FiniteFloat]
+    initial: StoredInitial = "first_sample"
+    input: ChannelField = PRESSURE
+    output: ChannelField = DISPLACEMENT
+
+    def __post_init__(self) -> None:
+        check_thresholds(self.kind, self.thresholds, self.weights)
+        check_input_range(self.kind, self.input_range)
+
+    @property
+    def n_states(self) -> int:
+        """One an operator, and the previous input."""
+        return len(self.thresholds) + 1
+
+    @property
+    def n_parameters(self) -> int:
+        """The weights and both envelopes' parameters; thresholds are structure."""
+        return self.pack().size
+
+    def pack(self) -> Array:
+        """Return [weights, rising envelope, falling envelope]."""
+        return np.concatenate([self.weights, self.rising.pack(), self.falling.pack()])
+
+    def unpack(self, parameters: ArrayLike) -> Self:
+        """Return a model with the same thresholds and other weights and envelopes."""
+        vector = parameter_vector(self, parameters)
+        first, second = len(self.weights), len(self.weights) + self.rising.pack().size
+        return replace(
+            self,
+            weights=tuple(vector[:first].tolist()),
+            rising=self.rising.unpack(vector[first:second]),
+            falling=self.falling.unpack(vector[second:]),
+        )
+
+    def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
+        """Return the operators' outputs and the first input, shape (N + 2,)."""
+        start = self.initial if initial is None else initial
+        if not isinstance(start, str) and len(start) == self.n_states:
+            return explicit_state(self, start)
+        r = np.array(self.thresholds)
+        rising, falling = self.rising(first)[0], self.falling(first)[0]
+        return np.array([*play_state(self, r, rising, falling, start), first[0]])
+
+    def bind(self, sample_time: float | None, state: Array, inputs: Array, outputs: Array) -> Run:
+        """Return a function that evaluates both envelopes, then runs the operators."""
+        del sample_time
+        coefficients = np.array([*self.thresholds, *self.weights])
+        u = inputs.reshape(-1)
+        rising, falling = np.empty(u.size), np.empty(u.size)
+        up, down = type(self.rising).value, type(self.falling).value
+        up_coefficients, down_coefficients = self.rising.coefficients(), self.falling.coefficients()
+
+        def run() -> None:
+            up(up_coefficients, u, rising)
+            down(down_coefficients, u, falling)
+            gpi_kernel(coefficients, state, u, rising, falling, outputs)
+
+        return run
+
+    def inverse(self) -> GPIInverse:
+        """Return the exact inverse.
+
+        Raises
+        ------
+        ModelError
+            If the first threshold is not 0, a partial sum of the weights is not positive, or the
+            falling envelope runs below the rising one within the input range.
+        """
+        return GPIInverse(self)
+
+    @classmethod
+    def example(cls) -> Self:
+        """Return a saturating, asymmetric loop over 0 to 5 bar."""
+        return cls((0.0, 0.1, 0.3, 0.5), (9.0, 4.0, 2.0, 1.0), *Tanh.examples(), (0.0, 5.0))
+
+
+@dataclass(frozen=True, config=STRICT)
+class GPIInverse(Inverse):
+    """Exact inverse of a `GPI` model.
+
+    Parameters
+    ----------
+    forward : GPI
+        The model inverted.
+    """
+
+    kind: ClassVar[str] = "gpi-inverse"
+
+    forward: Annotated[GPI, BeforeValidator(nested)]
+
+    def __post_init__(self) -> None:
+        forward = self.forward
+        check_invertible_sum(GPI.kind, forward.thresholds, forward.weights)
+        gap, where = smallest_gap(forward.rising, forward.falling, forward.input_range)
+        if gap < 0:
+            raise ModelError(
+                f"'gpi' has no inverse: at {where:.4g} {forward.input.unit} its falling envelope is "
+                f"{-gap:.3g} below the rising one. Remedy: identify it with mckibben fit gpi, which "
+                "keeps them in order."
+            )
+
+    @property
+    def n_states(self) -> int:
+        """Operators, previous input, previous reference, and the count of clipped samples."""
+        return self.forward.n_states + 2
+
+    def matching_state(self, first: float, start: str) -> Array:
+        """Return the state of the inverse of a forward model started by a named rule."""
+        forward = self.forward
+        r, w = np.array(forward.thresholds), np.array(forward.weights)
+        low, high = forward.input_range
+        if start == "virgin":
+            lowest, highest = float(forward.falling(low)), float(forward.rising(high))
+            states = solve_from_rest(first, lowest, highest, r, w)
+            envelope = forward.falling if first < 0 else forward.rising
+            u = float(np.clip(envelope.solve(states[0]), low, high))
+            return np.array([*states, u, first, 0.0])
+        risen = (first + w @ r) / w.sum()
+        z = min(max(risen, float(forward.rising(low))), float(forward.rising(high)))
+        u = float(np.clip(forward.rising.solve(z), low, high))
+        return np.array([*(z - r), u, first, float(z != risen)])
+
+    def state_from_forward(self, state: Array) -> Array:
+        """Return the state that matches a state of the forward model."""
+        return np.array([*state, np.dot(self.forward.weights, state[:-1]), 0.0])
+
+    def bind(self, sample_time: float | None, state: Array, inputs: Array, outputs: Array) -> Run:
+        """Return a function that solves for z, then inverts the envelopes."""
+        del sample_time
+        forward = self.forward
+        limits = np.array(forward.input_range)
+        ends = [float(forward.falling(limits[0])), float(forward.rising(limits[1]))]
+        coefficients = np.array([*ends, *forward.thresholds, *forward.weights])
+        references = inputs.reshape(-1)
+        z, direction, rising, falling = (np.empty(references.size) for _ in range(4))
+        up, down = type(forward.rising).inverse, type(forward.falling).inverse
+        up_coefficients = forward.rising.coefficients()
+        down_coefficients = forward.falling.coefficients()
+
+        def run() -> None:
+            gpi_inverse_kernel(coefficients, state, references, z, direction)
+            up(up_coefficients, z, rising)
+            down(down_coefficients, z, falling)
+            choose_branch(limits, state, direction, rising, falling, outputs)
+
+        return run
+
+    @classmethod
+    def example(cls) -> Self:
+        """Return the inverse of the example GPI model."""
+        return cls(GPI.example())
+
+
+def smallest_gap(
+    rising: Envelope, falling: Envelope, input_range: tuple[float, float]
+) -> tuple[float, float]:
+    """Return the smallest of gamma_L - gamma_R over the input range, and the input where it is."""
+    low, high = input_range
+    for _ in range(4):
+        u = np.linspace(low, high, 1025)
+        gaps = falling(u) - rising(u)
+        best = int(np.argmin(gaps))
+        low, high = u[max(best - 1, 0)], u[min(best + 1, u.size - 1)]
+    return float(gaps[best]), float(u[best])

@@ -1,0 +1,103 @@
+"""Memoryless monotone piecewise-linear block: a superposition of dead zones, and its exact inverse.
+
+Straight between knots, continued straight beyond the first and the last. After a Prandtl-Ishlinskii
+model it makes the modified Prandtl-Ishlinskii (MPI) model with an inverse of the same form.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import ClassVar, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from pydantic.dataclasses import dataclass
+
+from mckibben.blocks.base import (
+    DISPLACEMENT,
+    STRICT,
+    ChannelField,
+    Initial,
+    Kernel,
+    Primitive,
+    Vector,
+    parameter_vector,
+)
+from mckibben.blocks.interpolation import check_increasing, interpolate
+from mckibben.blocks.kernels import kernel
+from mckibben.blocks.single import SingleChannel
+
+Array = NDArray[np.float64]
+
+
+@kernel
+def piecewise_linear_kernel(
+    coefficients: Array, state: Array, inputs: Array, outputs: Array
+) -> None:
+    """Interpolate; coefficients are [knots, values]."""
+    n = coefficients.size // 2
+    for t in range(inputs.shape[0]):
+        outputs[t, 0] = interpolate(inputs[t, 0], coefficients[:n], coefficients[n:])
+
+
+@dataclass(frozen=True, config=STRICT)
+class PiecewiseLinear(SingleChannel, Primitive):
+    """Straight lines between knots.
+
+    Parameters
+    ----------
+    knots : sequence of float, length K >= 2
+        Inputs where lines meet, increasing.
+    values : sequence of float, length K
+        Outputs there, increasing.
+    input, output : Channel
+        Channel driven and channel given.
+    """
+
+    kind: ClassVar[str] = "piecewise-linear"
+    kernel: ClassVar[Kernel] = piecewise_linear_kernel
+
+    knots: Vector
+    values: Vector
+    input: ChannelField = DISPLACEMENT
+    output: ChannelField = DISPLACEMENT
+
+    def __post_init__(self) -> None:
+        check_increasing(f"{self.kind} block", self.knots, self.values)
+
+    @property
+    def n_states(self) -> int:
+        """None: the block is memoryless."""
+        return 0
+
+    @property
+    def n_parameters(self) -> int:
+        """The values; knots are structure."""
+        return len(self.values)
+
+    def pack(self) -> Array:
+        """Return the values."""
+        return np.array(self.values)
+
+    def unpack(self, parameters: ArrayLike) -> Self:
+        """Return a block with the same knots and other values."""
+        return replace(self, values=tuple(parameter_vector(self, parameters).tolist()))
+
+    def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
+        """Return an empty state."""
+        del first, initial
+        return np.empty(0)
+
+    def coefficients(self, sample_time: float | None) -> Array:
+        """Return [knots, values]."""
+        del sample_time
+        return np.array([*self.knots, *self.values])
+
+    def inverse(self) -> PiecewiseLinear:
+        """Return the block with knots and values exchanged."""
+        return PiecewiseLinear(self.values, self.knots, self.output, self.input)
+
+    @classmethod
+    def example(cls) -> Self:
+        """Return a saturating curve."""
+        return cls((0.0, 5.0, 15.0, 25.0), (0.0, 8.0, 20.0, 24.0))

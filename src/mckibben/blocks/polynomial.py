@@ -1,0 +1,236 @@
+"""Memoryless polynomial block, y = sum_k c_k ((u - centre) / scale)^k, and its inverse.
+
+After a Prandtl-Ishlinskii model it makes the modified Prandtl-Ishlinskii (MPI) model of
+"High-Precision Displacement and Force Hybrid Modeling of Pneumatic Artificial Muscle Using 3D
+PI-NARMAX Model", Eq. (5), where centre is 0 and scale is 1.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Annotated, ClassVar, Self
+
+import numpy as np
+from annotated_types import Gt
+from numpy.typing import ArrayLike, NDArray
+from pydantic import BeforeValidator, FiniteFloat
+from pydantic.dataclasses import dataclass
+
+from mckibben.blocks.base import (
+    DISPLACEMENT,
+    STRICT,
+    ChannelField,
+    Initial,
+    Kernel,
+    Primitive,
+    Vector,
+    parameter_vector,
+)
+from mckibben.blocks.kernels import kernel
+from mckibben.blocks.saving import nested
+from mckibben.blocks.single import Inverse, Ranged, check_input_range
+from mckibben.errors import ModelError
+
+Array = NDArray[np.float64]
+
+
+@kernel
+def horner(c: Array, x: float) -> float:
+    """Return the polynomial with ascending coefficients ``c`` at ``x``."""
+    y = 0.0
+    for k in range(c.size - 1, -1, -1):
+        y = y * x + c[k]
+    return y
+
+
+@kernel
+def polynomial_kernel(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
+    """Evaluate; coefficients are [centre, scale, ascending polynomial coefficients]."""
+    for t in range(inputs.shape[0]):
+        x = (inputs[t, 0] - coefficients[0]) / coefficients[1]
+        outputs[t, 0] = horner(coefficients[2:], x)
+
+
+@kernel
+def polynomial_inverse_kernel(
+    coefficients: Array, state: Array, inputs: Array, outputs: Array
+) -> None:
+    """Invert an increasing polynomial by Newton's method kept inside a shrinking bracket.
+
+    Coefficients are [centre, scale, lowest, highest argument, ascending coefficients]; the state is
+    the count of samples clipped. Ends when the bracket or the step cannot shrink any further.
+    """
+    centre, scale, lowest, highest = (
+        coefficients[0],
+        coefficients[1],
+        coefficients[2],
+        coefficients[3],
+    )
+    c = coefficients[4:]
+    for t in range(inputs.shape[0]):
+        y = inputs[t, 0]
+        low, high = lowest, highest
+        if y < horner(c, low) or y > horner(c, high):
+            state[0] += 1.0
+            outputs[t, 0] = centre + scale * (low if y < horner(c, low) else high)
+            continue
+        x = 0.5 * (low + high)
+        for _ in range(200):
+            error = horner(c, x) - y
+            if error == 0.0:
+                break
+            if error > 0.0:
+                high = x
+            else:
+                low = x
+            slope = 0.0
+            for k in range(c.size - 1, 0, -1):
+                slope = slope * x + k * c[k]
+            candidate = x - error / slope if slope > 0.0 else low
+            if not low < candidate < high:
+                candidate = 0.5 * (low + high)
+            if candidate in (x, low, high):
+                break
+            x = candidate
+        outputs[t, 0] = centre + scale * x
+
+
+@dataclass(frozen=True, config=STRICT)
+class Polynomial(Ranged, Primitive):
+    """Polynomial of a centred and scaled input.
+
+    Parameters
+    ----------
+    polynomial : sequence of float
+        Coefficients in ascending powers, at least one.
+    centre : float
+        Input that becomes argument 0.
+    scale : float
+        Input per argument; positive.
+    input_range : (float, float), optional
+        Where the polynomial holds; its inverse wants it to increase there, and clips there.
+    input, output : Channel
+        Channel driven and channel given.
+    """
+
+    kind: ClassVar[str] = "polynomial"
+    kernel: ClassVar[Kernel] = polynomial_kernel
+
+    polynomial: Vector
+    centre: FiniteFloat = 0.0
+    scale: Annotated[FiniteFloat, Gt(0)] = 1.0
+    input_range: tuple[FiniteFloat, FiniteFloat] | None = None
+    input: ChannelField = DISPLACEMENT
+    output: ChannelField = DISPLACEMENT
+
+    initial: ClassVar[Initial] = "first_sample"
+
+    def __post_init__(self) -> None:
+        check_input_range(self.kind, self.input_range)
+        if not self.polynomial:
+            raise ModelError("a polynomial without coefficients. Remedy: give at least one.")
+
+    @property
+    def n_states(self) -> int:
+        """None: the block is memoryless."""
+        return 0
+
+    @property
+    def n_parameters(self) -> int:
+        """The coefficients; centre and scale are structure."""
+        return len(self.polynomial)
+
+    def pack(self) -> Array:
+        """Return the coefficients in ascending powers."""
+        return np.array(self.polynomial)
+
+    def unpack(self, parameters: ArrayLike) -> Self:
+        """Return a polynomial of the same degree with other coefficients."""
+        return replace(self, polynomial=tuple(parameter_vector(self, parameters).tolist()))
+
+    def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
+        """Return an empty state."""
+        del first, initial
+        return np.empty(0)
+
+    def coefficients(self, sample_time: float | None) -> Array:
+        """Return [centre, scale, polynomial]."""
+        del sample_time
+        return np.array([self.centre, self.scale, *self.polynomial])
+
+    def inverse(self) -> PolynomialInverse:
+        """Return the inverse over the input range, exact to rounding.
+
+        Raises
+        ------
+        ModelError
+            If there is no input range or the polynomial does not increase over it.
+        """
+        return PolynomialInverse(self)
+
+    @classmethod
+    def example(cls) -> Self:
+        """Return a cubic that increases over 0 to 10."""
+        return cls((12.0, 20.0, 3.0, -4.0), 5.0, 5.0, (0.0, 10.0))
+
+
+@dataclass(frozen=True, config=STRICT)
+class PolynomialInverse(Inverse, Primitive):
+    """Inverse of an increasing `Polynomial`, exact to rounding.
+
+    Parameters
+    ----------
+    forward : Polynomial
+        The polynomial inverted.
+    """
+
+    kind: ClassVar[str] = "polynomial-inverse"
+    kernel: ClassVar[Kernel] = polynomial_inverse_kernel
+
+    forward: Annotated[Polynomial, BeforeValidator(nested)]
+
+    def __post_init__(self) -> None:
+        if self.forward.input_range is None:
+            raise ModelError(
+                "'polynomial' has no inverse without an input range. Remedy: give input_range."
+            )
+        low, high = self._arguments()
+        slope = np.polynomial.Polynomial(self.forward.polynomial).deriv()
+        turns = [x.real for x in slope.deriv().roots() if x.imag == 0 and low < x.real < high]
+        slopes = slope(np.array([low, high, *turns]))
+        if slopes.min() < -1e-12 * np.abs(slopes).max() or slopes.max() <= 0:
+            raise ModelError(
+                "'polynomial' has no inverse: it does not increase over its whole input range. Remedy: "
+                "identify it with --set output_map=piecewise-linear or monotone=true."
+            )
+
+    @property
+    def n_states(self) -> int:
+        """The count of clipped samples."""
+        return 1
+
+    def matching_state(self, first: float, start: str) -> Array:
+        """Return no samples clipped."""
+        del first, start
+        return np.zeros(1)
+
+    def state_from_forward(self, state: Array) -> Array:
+        """Return no samples clipped."""
+        del state
+        return np.zeros(1)
+
+    def coefficients(self, sample_time: float | None) -> Array:
+        """Return [centre, scale, lowest, highest argument, polynomial]."""
+        del sample_time
+        forward = self.forward
+        return np.array([forward.centre, forward.scale, *self._arguments(), *forward.polynomial])
+
+    def _arguments(self) -> tuple[float, float]:
+        low, high = self.forward.limits
+        centre, scale = self.forward.centre, self.forward.scale
+        return (low - centre) / scale, (high - centre) / scale
+
+    @classmethod
+    def example(cls) -> Self:
+        """Return the inverse of the example polynomial."""
+        return cls(Polynomial.example())

@@ -1,0 +1,154 @@
+"""Blocks as JSON that a person can read: exact to the last bit, and data only, never code.
+
+A file starts with ``format`` and ``version``; every block names its ``kind``, which the registry
+turns into a class. Unknown kinds and fields, numbers that are not finite and values of the wrong type
+are refused.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import tempfile
+from collections.abc import Mapping
+from dataclasses import fields, is_dataclass
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from mckibben.blocks.base import Block
+from mckibben.errors import ModelError
+from mckibben.registry import load as load_plugin
+
+FORMAT = "mckibben-model"
+VERSION = 1
+LARGEST_FILE = 64 * 2**20
+"""Bytes; a longer file is refused before it is parsed."""
+
+
+def to_dict(block: Block) -> dict[str, Any]:
+    """Return a block as a JSON-ready dict, with ``format`` and ``version`` first."""
+    return {"format": FORMAT, "version": VERSION, **part_to_dict(block)}
+
+
+def from_dict(content: Mapping[str, Any], *, file: str | Path | None = None) -> Block:
+    """Return the block that `to_dict` described.
+
+    Raises
+    ------
+    ModelError
+        If the dict is of another format or version, or anything in it is not as it should be.
+    """
+    place = "" if file is None else f"{file}: "
+    if not isinstance(content, Mapping) or content.get("format") != FORMAT:
+        raise ModelError(
+            f'{place}this is not a saved model (no "format": "{FORMAT}"). '
+            "Remedy: give a file written by 'mckibben fit' or Block.save."
+        )
+    if content.get("version") != VERSION:
+        raise ModelError(
+            f"{place}the model has format version {content.get('version')!r}, this package reads "
+            f"version {VERSION}. Remedy: save it again with a matching release of mckibben."
+        )
+    described = {key: value for key, value in content.items() if key not in ("format", "version")}
+    try:
+        return part_from_dict(described)
+    except ModelError as error:
+        raise ModelError(f"{place}{error}") from None
+
+
+def part_to_dict(part: Any) -> Any:
+    """Return a block, or anything in one, as JSON-ready values."""
+    if is_dataclass(part) and not isinstance(part, type):
+        named = {"kind": part.kind} if hasattr(part, "kind") else {}
+        return named | {f.name: part_to_dict(getattr(part, f.name)) for f in fields(part)}
+    if isinstance(part, tuple):
+        return [part_to_dict(item) for item in part]
+    return part
+
+
+def part_from_dict(content: Any, group: str = "blocks") -> Any:
+    """Return the block (or other plug-in of ``group``) that `part_to_dict` described."""
+    if not isinstance(content, Mapping) or not isinstance(content.get("kind"), str):
+        raise ModelError('a block without a "kind". Remedy: save the model again.')
+    kind = content["kind"]
+    cls = load_plugin(group, kind)
+    values = {key: _tuples(value) for key, value in content.items() if key != "kind"}
+    try:
+        return cls(**values)
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(str(step) for step in first["loc"]) or "its fields"
+        raise ModelError(
+            f"the {kind!r} block is damaged at {where}: {first['msg']}. Remedy: save the model again."
+        ) from None
+
+
+def nested(content: Any) -> Any:
+    """Turn the dict of a block inside another into that block; for fields of compositions."""
+    return part_from_dict(content) if isinstance(content, Mapping) else content
+
+
+def save(block: Block, path: str | Path) -> None:
+    """Write a block as JSON, by a temporary file that is then renamed."""
+    write_text(path, json.dumps(to_dict(block), indent=2, allow_nan=False) + "\n")
+
+
+def load(path: str | Path) -> Block:
+    """Read a block saved as JSON.
+
+    Raises
+    ------
+    ModelError
+        If the file is absent, unreadable, too large, truncated, or anything but a saved model.
+    """
+    path = Path(path)
+    try:
+        if path.stat().st_size > LARGEST_FILE:
+            raise ModelError(
+                f"{path}: larger than {LARGEST_FILE} bytes. Remedy: give a model file."
+            )
+        text = path.read_text(encoding="utf-8")
+        content = json.loads(text, parse_constant=_refuse, object_pairs_hook=_unique)
+    except OSError as error:
+        reason = error.strerror or "unreadable"
+        raise ModelError(f"{path}: {reason}. Remedy: check the path of the model file.") from None
+    except (UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
+        raise ModelError(
+            f"{path}: not readable as JSON ({error}). Remedy: save the model again."
+        ) from None
+    return from_dict(content, file=path)
+
+
+def write_text(path: str | Path, text: str) -> None:
+    """Write a text file so that a failure on the way leaves what was there before."""
+    path = Path(path)
+    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=".tmp")
+    try:
+        with os.fdopen(handle, "w", encoding="utf-8") as file:
+            file.write(text)
+        umask = os.umask(0)
+        os.umask(umask)
+        Path(temporary).chmod(0o666 & ~umask)
+        Path(temporary).replace(path)
+    except BaseException:
+        Path(temporary).unlink(missing_ok=True)
+        raise
+
+
+def _tuples(value: Any) -> Any:
+    return tuple(_tuples(item) for item in value) if isinstance(value, list) else value
+
+
+def _refuse(constant: str) -> None:
+    raise ModelError(
+        f"the file holds {constant}, which no model has. Remedy: save the model again."
+    )
+
+
+def _unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    content = dict(pairs)
+    if len(content) < len(pairs):
+        raise ModelError("a field stands twice in the file. Remedy: save the model again.")
+    return content

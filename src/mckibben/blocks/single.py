@@ -1,0 +1,142 @@
+"""Blocks with one input and one output, and inverses that clip at the input limits of a forward block."""
+
+from __future__ import annotations
+
+import warnings
+from abc import abstractmethod
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mckibben.blocks.base import Block, Channel, Initial, explicit_state
+from mckibben.errors import ModelError, ModelWarning
+
+Array = NDArray[np.float64]
+
+
+class SingleChannel(Block):
+    """A block with fields ``input`` and ``output``."""
+
+    input: Channel
+    output: Channel
+
+    @property
+    def inputs(self) -> tuple[Channel, ...]:
+        """The driven channel."""
+        return (self.input,)
+
+    @property
+    def outputs(self) -> tuple[Channel, ...]:
+        """The output channel."""
+        return (self.output,)
+
+
+class Ranged(SingleChannel):
+    """A single-channel block whose output rises with its input, within an optional input range."""
+
+    input_range: tuple[float, float] | None
+
+    @property
+    def limits(self) -> tuple[float, float]:
+        """Lowest and highest input; infinite where the block has no input range."""
+        return (-np.inf, np.inf) if self.input_range is None else self.input_range
+
+    def reachable(self) -> tuple[Array, Array]:
+        """Return the outputs that can be reached whatever happened before, each of shape (1,).
+
+        They are those at the ends of the input range once the whole range has been visited.
+        """
+        if self.input_range is None:
+            return super().reachable()
+        low, high = self.input_range
+        stream = self.stream(1.0, initial="first_sample")
+        ends = [stream.step(u).copy() for u in (low, high, low, high)]
+        return ends[2], ends[3]
+
+
+class Inverse(Block):
+    """The inverse of a `Ranged` block: wished-for output in, input out.
+
+    References beyond what the input range can reach are clipped there, and `simulate` says so. The
+    last state counts the samples clipped.
+    """
+
+    forward: Any
+
+    @property
+    def inputs(self) -> tuple[Channel, ...]:
+        """The forward block's output."""
+        outputs: tuple[Channel, ...] = self.forward.outputs
+        return outputs
+
+    @property
+    def outputs(self) -> tuple[Channel, ...]:
+        """The forward block's input."""
+        inputs: tuple[Channel, ...] = self.forward.inputs
+        return inputs
+
+    @property
+    def n_parameters(self) -> int:
+        """Those of the forward block."""
+        return int(self.forward.n_parameters)
+
+    def pack(self) -> Array:
+        """Return the forward block's parameters."""
+        parameters: Array = self.forward.pack()
+        return parameters
+
+    def unpack(self, parameters: ArrayLike) -> Self:
+        """Return the inverse of a forward block with other parameters."""
+        return type(self)(self.forward.unpack(parameters))  # type: ignore[call-arg]
+
+    def inverse(self) -> Block:
+        """Return the forward block."""
+        forward: Block = self.forward
+        return forward
+
+    def reachable(self) -> tuple[Array, Array]:
+        """Return the input range of the forward block, each end of shape (1,)."""
+        low, high = self.forward.limits
+        return np.array([low]), np.array([high])
+
+    def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
+        """Return the state before the first sample that matches the forward block's.
+
+        An explicit state may be this block's own, or the forward block's.
+        """
+        start = self.forward.initial if initial is None else initial
+        if isinstance(start, str):
+            return self.matching_state(float(first[0]), start)
+        if len(start) == self.forward.n_states:
+            return self.state_from_forward(explicit_state(self.forward, start))
+        return explicit_state(self, start)
+
+    @abstractmethod
+    def matching_state(self, first: float, start: str) -> Array:
+        """Return the state that matches a forward block started by a named rule."""
+
+    @abstractmethod
+    def state_from_forward(self, state: Array) -> Array:
+        """Return the state that matches a state of the forward block."""
+
+    def report(self, state: Array) -> None:
+        """Warn if references were clipped."""
+        if state[-1] > 0:
+            low, high = self.forward.reachable()
+            wanted, given = self.inputs[0], self.outputs[0]
+            warnings.warn(
+                f"{int(state[-1])} sample(s) of the reference {wanted.name!r} were clipped: they "
+                f"need {given.name} outside its limits. Reachable whatever happened before is "
+                f"{low[0]:.6g} to {high[0]:.6g} {wanted.unit}",
+                ModelWarning,
+                stacklevel=4,
+            )
+
+
+def check_input_range(kind: str, input_range: tuple[float, float] | None) -> None:
+    """Refuse an input range that is empty."""
+    if input_range is not None and not input_range[0] < input_range[1]:
+        raise ModelError(
+            f"the input range {input_range} of {kind!r} is empty. Remedy: give (lowest, highest)."
+        )

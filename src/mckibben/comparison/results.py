@@ -1,0 +1,238 @@
+"""What a comparison and a study hold: plain results, ready to be shown, saved or compared."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mckibben.blocks.base import Block
+from mckibben.characterization import Characterization
+from mckibben.metrics import Scores
+from mckibben.recording import Recording
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Memory:
+    """Whether a model keeps the branches apart as the data do.
+
+    Parameters
+    ----------
+    gap_ratio : float or None
+        Slope of the model's branch gaps over the measured ones, at instants with the same input
+        reached from opposite directions: 1 is perfect, 0 means that the model forgot. None where the
+        data have no such pairs.
+    n_pairs : int
+        Number of pairs of instants behind it.
+    hold_ratio : float or None
+        Share of the model's own branch gap that survives a synthetic hold on each branch; 1 for a
+        model that remembers.
+    """
+
+    gap_ratio: float | None
+    n_pairs: int
+    hold_ratio: float | None
+
+
+@dataclass(frozen=True)
+class Row:
+    """One model of a leaderboard.
+
+    Parameters
+    ----------
+    model : str
+        Short name of the model.
+    reason : str or None
+        Why it failed, or None where it did not.
+    n_parameters : int
+        Numbers identified.
+    fit_seconds : float
+        Wall time of the fit on the whole training set.
+    step_ns : float
+        Time of one sample in a long simulation [ns].
+    train, test : Scores or None
+        Free-running scores, in the unit of the output; test is on data not used to fit or choose.
+    validation_rmse : float or None
+        Cross-validated RMSE within the training set, by which models may be chosen.
+    rmse_interval : (float, float) or None
+        95 % moving-block bootstrap interval of the test RMSE.
+    difference_interval : (float, float) or None
+        The same of its difference to the best model's test RMSE, paired on the same blocks.
+    memory : Memory or None
+        The memory test, on the test set.
+    block : Block or None
+        The model identified.
+    diagnostics : mapping
+        What the estimator says of the fit.
+    """
+
+    model: str
+    reason: str | None = None
+    n_parameters: int = 0
+    fit_seconds: float = float("nan")
+    step_ns: float = float("nan")
+    train: Scores | None = None
+    test: Scores | None = None
+    validation_rmse: float | None = None
+    rmse_interval: tuple[float, float] | None = None
+    difference_interval: tuple[float, float] | None = None
+    memory: Memory | None = None
+    block: Block | None = None
+    diagnostics: Mapping[str, Any] = field(default_factory=dict)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the row as the leaderboard files hold it."""
+        if self.reason is not None:
+            return {"model": self.model, "status": "failed", "reason": self.reason}
+        train = None if self.train is None else asdict(self.train)
+        test = None if self.test is None else asdict(self.test)
+        if test is not None:
+            test["rmse_interval"] = _listed(self.rmse_interval)
+            test["difference_to_best_interval"] = _listed(self.difference_interval)
+        return {
+            "model": self.model,
+            "status": "ok",
+            "n_parameters": self.n_parameters,
+            "fit_seconds": self.fit_seconds,
+            "step_ns": self.step_ns,
+            "train": train,
+            "test": test,
+            "validation_rmse": self.validation_rmse,
+            "memory": None if self.memory is None else asdict(self.memory),
+            "rate_dependent": self.block is not None and bool(self.block.rate_dependent),
+        }
+
+
+@dataclass(frozen=True)
+class Leaderboard:
+    """Models ranked on data not used to fit them.
+
+    Parameters
+    ----------
+    input, output : str
+        Channels.
+    unit : str
+        Unit of the output and of every RMSE.
+    rows : tuple of Row
+        Sorted by test RMSE; models that failed last.
+    split : str
+        In words: what was used to fit, to choose, and to test, and how memory was started.
+    seed : int
+        The seed of everything random.
+    n_train, n_test : int
+        Samples.
+    """
+
+    input: str
+    output: str
+    unit: str
+    rows: tuple[Row, ...]
+    split: str
+    seed: int
+    n_train: int
+    n_test: int
+
+    @property
+    def best(self) -> Row | None:
+        """The first row that did not fail, or None."""
+        return next((row for row in self.rows if row.reason is None), None)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the leaderboard as ``leaderboard.json`` holds it."""
+        return {
+            "input": self.input,
+            "output": self.output,
+            "unit": self.unit,
+            "split": self.split,
+            "seed": self.seed,
+            "n_train": self.n_train,
+            "n_test": self.n_test,
+            "rows": [row.to_dict() for row in self.rows],
+        }
+
+    def to_frame(self) -> pd.DataFrame:
+        """Return the leaderboard as a table, one row a model, nested names joined by dots."""
+        import pandas as pd
+
+        return pd.json_normalize([row.to_dict() for row in self.rows])
+
+
+@dataclass(frozen=True)
+class InverseCheck:
+    """The inverse of a model, tried on a reference it can reach.
+
+    Parameters
+    ----------
+    model : str
+        Short name of the model inverted.
+    inverse : Block
+        The compensator.
+    reference, pressure, output : array, shape (n,)
+        Wished-for output, input the inverse gives, and what the model makes of it.
+    time : array, shape (n,)
+        Time [s], or sample numbers.
+    reachable : (float, float)
+        Outputs reachable whatever happened before.
+    error : float
+        Largest difference between reference and output, relative to the reachable range.
+    """
+
+    model: str
+    inverse: Block
+    reference: Array
+    pressure: Array
+    output: Array
+    time: Array
+    reachable: tuple[float, float]
+    error: float
+
+
+@dataclass(frozen=True)
+class Study:
+    """Everything that ``mckibben study`` finds.
+
+    Parameters
+    ----------
+    train, test : tuple of Recording
+        Data to fit, and data to test on.
+    characterization : Characterization
+        What the muscle does.
+    leaderboard : Leaderboard
+        Models ranked.
+    predictions : mapping of str to tuple of array
+        Model name to its free-running output on every training recording, then every test recording.
+    inverse : InverseCheck or None
+        The best invertible model's, or None where no model is.
+    notes : tuple of str
+        What was assumed or mended on the way.
+    """
+
+    train: tuple[Recording, ...]
+    test: tuple[Recording, ...]
+    characterization: Characterization
+    leaderboard: Leaderboard
+    predictions: Mapping[str, tuple[Array, ...]]
+    inverse: InverseCheck | None
+    notes: tuple[str, ...] = ()
+
+    @property
+    def input(self) -> str:
+        """The input channel."""
+        return self.leaderboard.input
+
+    @property
+    def output(self) -> str:
+        """The output channel."""
+        return self.leaderboard.output
+
+
+def _listed(interval: tuple[float, float] | None) -> list[float] | None:
+    return None if interval is None else list(interval)

@@ -50,21 +50,26 @@ def check_invertible_sum(kind: str, thresholds: Sequence[float], weights: Sequen
         )
 
 
-def play_state(block: Block, r: Array, rising: float, falling: float, initial: Initial) -> Array:
-    """Return the starting states of play operators with thresholds ``r``.
+def named_state(rule: str, r: Array, rising: float, falling: float) -> Array:
+    """Return the states of play operators with thresholds ``r``, started by a named rule.
 
     ``rising`` and ``falling`` are the first input as the two edges see it: the same for classical
     operators, the two envelopes' values for generalised ones.
     """
-    if initial == "first_sample":
+    if rule == "first_sample":
         return rising - r
-    if initial == "virgin":
+    if rule == "virgin":
         return np.asarray(np.clip(0.0, rising - r, falling + r))
+    raise ModelError(
+        f"there is no initial state {rule!r}. "
+        "Remedy: use 'first_sample', 'virgin', or the states themselves."
+    )
+
+
+def play_state(block: Block, r: Array, rising: float, falling: float, initial: Initial) -> Array:
+    """Return the starting states of play operators: by a named rule, or explicit."""
     if isinstance(initial, str):
-        raise ModelError(
-            f"{block.kind!r} has no initial state {initial!r}. "
-            "Remedy: use 'first_sample', 'virgin', or the states themselves."
-        )
+        return named_state(initial, r, rising, falling)
     return explicit_state(block, initial)
 
 

@@ -1,0 +1,1 @@
+"""What runs: immutable parameter sets with dynamics, one file per model family."""

@@ -1,0 +1,1 @@
+"""How blocks are found from recordings, one file per model family."""

@@ -1,0 +1,283 @@
+"""What an estimator is: settings that find a block from recordings."""
+
+from __future__ import annotations
+
+import time
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any, Literal, Self
+
+import numpy as np
+from numpy.typing import NDArray
+from sklearn.base import BaseEstimator
+from sklearn.exceptions import NotFittedError
+
+from mckibben.blocks.base import Block, Channel, run_many
+from mckibben.errors import ModelError
+from mckibben.estimators.data import Mask, TrainingData, training_data
+from mckibben.estimators.search import Progress, Swarm, Tracker
+from mckibben.recording import Recording
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Diagnostics:
+    """What a fit has to say of itself.
+
+    Parameters
+    ----------
+    rmse : float
+        Free-running RMSE on the samples fitted, in the unit of the output.
+    n_samples : int
+        Samples fitted.
+    n_evaluations : int
+        Times the model was evaluated in the search.
+    seconds : float
+        Wall time.
+    interrupted : bool
+        Whether the user stopped the search; the model is then the best found until there.
+    condition : float
+        Condition number of the sensitivity of the output to the free parameters, each scaled by its
+        own size.
+    at_bounds : tuple of int
+        Parameters, by their place in ``model_.pack()``, that ended at a bound.
+    standard_errors : tuple of float
+        One a parameter, as if residuals were independent; NaN for those at bounds or that the data
+        do not determine.
+    covariance : array, shape (n_parameters, n_parameters)
+        The same, NaN likewise.
+    peaks : tuple of float or None
+        For every recording, the input from which it was taken to have come before its first sample.
+    """
+
+    rmse: float
+    n_samples: int
+    n_evaluations: int
+    seconds: float
+    interrupted: bool
+    condition: float
+    at_bounds: tuple[int, ...]
+    standard_errors: tuple[float, ...]
+    covariance: Array = field(repr=False)
+    peaks: tuple[float | None, ...]
+
+
+@dataclass(kw_only=True, repr=False, eq=False)
+class Estimator(BaseEstimator, ABC):  # type: ignore[misc]  # scikit-learn ships no types
+    """Settings common to all estimators; see scikit-learn for ``get_params``, ``clone`` and the like.
+
+    Parameters
+    ----------
+    input, output : str
+        Channels to learn from.
+    method : {"ls", "pso-ls", "pso"}
+        Bounded least squares from many starts with linear parameters solved for; particle swarm on
+        the non-linear parameters only, the linear ones solved for; particle swarm on all parameters,
+        as the papers do it.
+    initial : {"first_sample", "virgin", "fitted"}
+        Memory before the first sample of every recording: as if the input had only risen; as if
+        nothing had ever happened; or one number a recording fitted with the rest, the input from which
+        it came down.
+    seed : int
+        Of everything random.
+    pso_particles, pso_iterations : int
+        Size of the swarm, and moves.
+    pso_inertia_start, pso_inertia_end : float
+        Inertia, falling linearly.
+    pso_c1, pso_c2 : float
+        Pull to the particle's own best, and to the swarm's.
+    """
+
+    input: str = "pressure"
+    output: str = "displacement"
+    method: Literal["ls", "pso-ls", "pso"] = "ls"
+    initial: Literal["first_sample", "virgin", "fitted"] = "first_sample"
+    seed: int = 0
+    pso_particles: int = 20
+    pso_iterations: int = 50
+    pso_inertia_start: float = 0.9
+    pso_inertia_end: float = 0.4
+    pso_c1: float = 2.0
+    pso_c2: float = 2.0
+
+    def fit(
+        self,
+        recordings: Recording | Sequence[Recording],
+        y: None = None,
+        *,
+        rows: Sequence[Mask] | None = None,
+        progress: Progress | None = None,
+    ) -> Self:
+        """Find the block that runs free closest to the recordings.
+
+        Parameters
+        ----------
+        recordings : Recording or sequence of Recording
+            What to learn from; every one starts with a memory of its own.
+        y : None
+            Ignored; scikit-learn passes it.
+        rows : sequence of bool arrays, optional
+            For every recording, the samples whose outputs count.
+        progress : callable, optional
+            Told the share of the work done and the best RMSE so far.
+
+        Returns
+        -------
+        self
+            With ``model_``, the block, and ``diagnostics_``.
+
+        Raises
+        ------
+        DataError
+            On recordings that cannot be learned from.
+        ModelError
+            On settings out of range.
+        """
+        del y
+        started = time.perf_counter()
+        self.check_settings()
+        data = training_data(recordings, self.input, self.output, rows)
+        tracker = Tracker(progress=progress)
+        block, data = self.identify(data, tracker)
+        self.model_ = block
+        self.diagnostics_ = self._diagnose(block, data, tracker, started)
+        if progress is not None:
+            progress(1.0, self.diagnostics_.rmse)
+        return self
+
+    @abstractmethod
+    def identify(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
+        """Return the block found, and the data with the memories at the start that belong to it."""
+
+    def check_settings(self) -> None:
+        """Refuse settings out of range."""
+        choices: dict[str, tuple[str, ...]] = {
+            "method": ("ls", "pso-ls", "pso"),
+            "initial": ("first_sample", "virgin", "fitted"),
+        } | self.choices()
+        for name, allowed in choices.items():
+            check_choice(name, getattr(self, name), allowed)
+        check_at_least("pso_particles", self.pso_particles, 2)
+        check_at_least("pso_iterations", self.pso_iterations, 1)
+        check_at_least("seed", self.seed, 0)
+
+    def choices(self) -> dict[str, tuple[str, ...]]:
+        """Return further settings that take one of a few words."""
+        return {}
+
+    @property
+    def swarm(self) -> Swarm:
+        """The settings of the particle swarm."""
+        inertia = (self.pso_inertia_start, self.pso_inertia_end)
+        return Swarm(self.pso_particles, self.pso_iterations, inertia, self.pso_c1, self.pso_c2)
+
+    def predict(self, recordings: Recording | Sequence[Recording]) -> list[Array]:
+        """Return the model's free-running output on every recording."""
+        listed = [recordings] if isinstance(recordings, Recording) else list(recordings)
+        return [self.fitted.simulate(recording)[self.output] for recording in listed]
+
+    def score(self, recordings: Recording | Sequence[Recording], y: None = None) -> float:
+        """Return R² of the free-running output over all recordings."""
+        del y
+        listed = [recordings] if isinstance(recordings, Recording) else list(recordings)
+        measured = np.concatenate([recording[self.output] for recording in listed])
+        residual = measured - np.concatenate(self.predict(listed))
+        return float(1 - np.sum(residual**2) / np.sum((measured - measured.mean()) ** 2))
+
+    @property
+    def fitted(self) -> Block:
+        """The block found.
+
+        Raises
+        ------
+        sklearn.exceptions.NotFittedError
+            Before `fit`.
+        """
+        if not hasattr(self, "model_"):
+            raise NotFittedError(f"{type(self).__name__} is not fitted yet: call fit first")
+        block: Block = self.model_
+        return block
+
+    def channels(self, data: TrainingData) -> dict[str, Channel]:
+        """Return the channels of the block to build, as keyword arguments."""
+        return {
+            "input": Channel(data.input, data.input_unit),
+            "output": Channel(data.output, data.output_unit),
+        }
+
+    @property
+    def starting_rule(self) -> Literal["first_sample", "virgin"]:
+        """The named rule behind `initial`."""
+        return "virgin" if self.initial == "virgin" else "first_sample"
+
+    def _diagnose(
+        self, block: Block, data: TrainingData, tracker: Tracker, started: float
+    ) -> Diagnostics:
+        parameters = block.pack()
+        at_bounds = self.at_bounds(block)
+        steps = 1e-6 * np.maximum(np.abs(parameters), 1e-3 * np.abs(parameters).max(initial=1e-3))
+        residual = data.target - simulate_all([block], data)[0]
+        free = [index for index in range(parameters.size) if index not in at_bounds]
+        thin = data.thinned(max(2000, 4 * parameters.size))
+        perturbed = [block.unpack(parameters + np.eye(parameters.size)[i] * steps[i]) for i in free]
+        base, *moved = simulate_all([block, *perturbed], thin)
+        n = data.target.size
+        covariance = np.full((parameters.size, parameters.size), np.nan)
+        condition = np.inf
+        if free:
+            sizes = np.maximum(np.abs(parameters[free]), steps[free] * 1e6)
+            slopes = np.column_stack(
+                [(m - base) / steps[i] for m, i in zip(moved, free, strict=True)]
+            )
+            scaled = slopes * sizes
+            singular, right = np.linalg.svd(scaled, full_matrices=False)[1:]
+            condition = float(singular[0] / singular[-1]) if singular[-1] > 0 else np.inf
+            kept = singular > 1e-6 * singular[0]
+            inverse = (right[kept].T / singular[kept] ** 2) @ right[kept]
+            determined = 1 - (right[~kept] ** 2).sum(axis=0) > 0.99
+            variance = float(residual @ residual) / max(n - len(free), 1)
+            block_covariance = variance * inverse * np.outer(sizes, sizes) * base.size / n
+            block_covariance[~determined] = np.nan
+            block_covariance[:, ~determined] = np.nan
+            covariance[np.ix_(free, free)] = block_covariance
+        return Diagnostics(
+            rmse=float(np.sqrt(np.mean(residual**2))),
+            n_samples=n,
+            n_evaluations=tracker.evaluations,
+            seconds=time.perf_counter() - started,
+            interrupted=tracker.interrupted,
+            condition=condition,
+            at_bounds=at_bounds,
+            standard_errors=tuple(np.sqrt(np.diag(covariance)).tolist()),
+            covariance=covariance,
+            peaks=tuple(run.peak for run in data.runs),
+        )
+
+    def at_bounds(self, block: Block) -> tuple[int, ...]:
+        """Return the places of parameters that ended at a bound: by default those that are zero."""
+        return tuple(np.flatnonzero(block.pack() == 0).tolist())
+
+
+def simulate_all(blocks: Sequence[Block], data: TrainingData) -> Array:
+    """Return the free-running outputs of blocks at the samples that count, shape (k, samples)."""
+    outputs = []
+    for run in data.runs:
+        many = run_many(blocks, run.history[:, np.newaxis], sample_time=run.sample_time)
+        trimmed = many[:, :, 0] if run.peak is None else many[:, 1:, 0]
+        outputs.append(trimmed[:, run.counts])
+    return np.concatenate(outputs, axis=1)
+
+
+def check_choice(name: str, value: object, allowed: Sequence[str]) -> None:
+    """Refuse a setting that is none of the words allowed."""
+    if value not in allowed:
+        raise ModelError(f"there is no {name} {value!r}. Remedy: use one of {', '.join(allowed)}.")
+
+
+def check_at_least(name: str, value: Any, least: float) -> None:
+    """Refuse a setting that is too small, or no number."""
+    number = isinstance(value, int | float) and not isinstance(value, bool)
+    if not number or not value >= least:
+        raise ModelError(f"{name} is {value!r}. Remedy: give a number of at least {least:g}.")

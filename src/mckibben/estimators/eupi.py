@@ -1,0 +1,116 @@
+"""Identification of the extended unparallel Prandtl-Ishlinskii model."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mckibben.blocks.base import Block
+from mckibben.blocks.eupi import EUPI, eupi_matrix
+from mckibben.blocks.memory import named_state
+from mckibben.estimators.base import check_at_least
+from mckibben.estimators.data import Run, TrainingData
+from mckibben.estimators.output_maps import PolynomialMap
+from mckibben.estimators.separable import SeparableEstimator
+from mckibben.estimators.thresholds import SPACINGS, spread
+
+Array = NDArray[np.float64]
+
+CUBIC = PolynomialMap(3)
+
+
+@dataclass(kw_only=True, repr=False, eq=False)
+class EUPIEstimator(SeparableEstimator):
+    """Extended unparallel Prandtl-Ishlinskii model by variable projection.
+
+    The slope and the threshold ratio of the falling edge are searched; the weights and an increasing
+    cubic without memory are solved for.
+
+    Parameters
+    ----------
+    n_operators : int
+        Unparallel play operators.
+    spacing : {"even", "dense"}
+        How thresholds spread over half the input range.
+    """
+
+    n_operators: int = 10
+    spacing: Literal["even", "dense"] = "even"
+    n_starts: int = 16
+
+    def choices(self) -> dict[str, tuple[str, ...]]:
+        """Return further settings that take one of a few words."""
+        return {"spacing": SPACINGS}
+
+    def check_settings(self) -> None:
+        """Refuse settings out of range."""
+        super().check_settings()
+        check_at_least("n_operators", self.n_operators, 1)
+
+    def radii(self, data: TrainingData) -> Array:
+        """Return the thresholds, shape (n_operators,)."""
+        low, high = data.input_range
+        return spread(self.n_operators, high - low, self.spacing)
+
+    def bounds(self, data: TrainingData) -> tuple[Array, Array]:
+        """Return bounds of the falling edge's slope and threshold ratio."""
+        del data
+        return np.array([0.3, 0.0]), np.array([3.0, 3.0])
+
+    def guesses(self, data: TrainingData) -> list[Array]:
+        """Return parallel edges, and ones a little apart."""
+        del data
+        return [np.array(edges) for edges in ([1.0, 1.0], [1.2, 0.8], [0.8, 1.2])]
+
+    def basis(self, theta: Array, run: Run, data: TrainingData) -> Array:
+        """Return the pieces of the cubic, then the operators, over the run's history."""
+        low, high = data.input_range
+        x = np.ascontiguousarray(run.history - low)
+        radii = self.radii(data)
+        operators = np.empty((x.size, radii.size))
+        state = named_state(self.starting_rule, radii, x[0], x[0])
+        eupi_matrix(x, theta[0], theta[1], radii, state, operators)
+        return np.column_stack([CUBIC.pieces(x / (high - low)), operators])
+
+    def least(self, matrix: Array, data: TrainingData) -> Array:
+        """Return a little of every piece of the cubic, so that it increases."""
+        floor = np.zeros(matrix.shape[1])
+        span = data.output_range[1] - data.output_range[0]
+        floor[: CUBIC.size] = 1e-3 * span
+        return floor
+
+    def build(self, theta: Array, linear: Array, offset: float, data: TrainingData) -> EUPI:
+        """Return the EUPI model."""
+        low, high = data.input_range
+        cubic = CUBIC.powers(linear[: CUBIC.size])[1:] / (high - low) ** np.arange(1, 4)
+        return EUPI(
+            self.radii(data),
+            linear[CUBIC.size :],
+            float(theta[0]),
+            float(theta[1]),
+            tuple(cubic.tolist()),
+            offset,
+            data.input_range,
+            self.starting_rule,
+            **self.channels(data),
+        )
+
+    def parameter_bounds(self, data: TrainingData) -> tuple[Block, Array, Array]:
+        """Return an EUPI model, with weights up to the mean slope of the data."""
+        radii = self.radii(data)
+        low, high = data.output_range
+        span, reach = high - low, data.input_range[1] - data.input_range[0]
+        linear = np.full(CUBIC.size + radii.size, span / radii.size)
+        template = self.build(np.ones(2), linear, low, data)
+        lower = [*np.zeros(radii.size), 0.3, 0.0, *(-span / reach ** np.arange(1, 4)), low - span]
+        upper = [
+            *np.full(radii.size, span / reach),
+            3.0,
+            3.0,
+            *(span / reach ** np.arange(1, 4)),
+            high,
+        ]
+        return template, np.array(lower), np.array(upper)

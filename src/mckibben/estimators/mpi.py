@@ -1,0 +1,165 @@
+"""Identification of the modified Prandtl-Ishlinskii model: PI, then a memoryless map."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mckibben.blocks.base import Block, Channel
+from mckibben.blocks.compose import Series
+from mckibben.blocks.pi import PI
+from mckibben.estimators.base import check_at_least
+from mckibben.estimators.data import Run, TrainingData
+from mckibben.estimators.output_maps import MAPS, OutputMap, output_map
+from mckibben.estimators.pi import play_operators
+from mckibben.estimators.search import solve_linear
+from mckibben.estimators.separable import LEAST_REVERSIBLE, SeparableEstimator
+from mckibben.estimators.thresholds import SPACINGS, spread
+
+Array = NDArray[np.float64]
+
+LEAST_PIECE = 1e-6
+"""Least share of the output's range that a piece of an increasing map gives."""
+
+
+@dataclass(kw_only=True, repr=False, eq=False)
+class MPIEstimator(SeparableEstimator):
+    """Modified Prandtl-Ishlinskii model by variable projection.
+
+    The weights of the operators are searched, scaled so that the PI part spans the output's range; the
+    map behind them is solved for.
+
+    Parameters
+    ----------
+    n_operators : int
+        Play operators, the one without dead zone included.
+    spacing : {"even", "dense"}
+        How thresholds spread over half the input range.
+    output_map : {"piecewise-linear", "polynomial", "free-polynomial", "odd-polynomial"}
+        Map behind the operators. The first two increase, and so have an inverse, whatever the data;
+        the last two are the papers' and may not.
+    map_size : int
+        Straight lines of the map, or degree of the polynomial.
+    """
+
+    n_operators: int = 10
+    spacing: Literal["even", "dense"] = "even"
+    output_map: Literal["piecewise-linear", "polynomial", "free-polynomial", "odd-polynomial"] = (
+        "polynomial"
+    )
+    map_size: int = 5
+    n_starts: int = 8
+    n_refined: int = 3
+
+    def choices(self) -> dict[str, tuple[str, ...]]:
+        """Return further settings that take one of a few words."""
+        return {"spacing": SPACINGS, "output_map": MAPS}
+
+    def check_settings(self) -> None:
+        """Refuse settings out of range."""
+        super().check_settings()
+        check_at_least("n_operators", self.n_operators, 1)
+        check_at_least("map_size", self.map_size, 1)
+
+    @property
+    def map(self) -> OutputMap:
+        """The family of maps."""
+        return output_map(self.output_map, self.map_size)
+
+    def radii(self, data: TrainingData) -> Array:
+        """Return the thresholds, shape (n_operators,)."""
+        low, high = data.input_range
+        return spread(self.n_operators, high - low, self.spacing)
+
+    def bounds(self, data: TrainingData) -> tuple[Array, Array]:
+        """Return bounds of the relative weights."""
+        del data
+        lower = np.zeros(self.n_operators)
+        lower[0] = LEAST_REVERSIBLE
+        return lower, np.ones(self.n_operators)
+
+    def guesses(self, data: TrainingData) -> list[Array]:
+        """Return the weights of the best PI model, and two even distributions."""
+        low, high = data.input_range
+        radii = self.radii(data)
+        matrix = np.concatenate(
+            [
+                run.trim(play_operators(run.history, radii, "first_sample"))[run.counts]
+                for run in data.runs
+            ]
+        )
+        weights, _ = solve_linear(matrix, data.target, nonnegative=True)
+        top = weights.max() if weights.max() > 0 else 1.0
+        fading = np.exp(-3 * radii / (high - low))
+        reversible = np.where(radii == 0, 1.0, 0.1)
+        return [weights / top, fading, reversible]
+
+    def operators(self, run: Run, data: TrainingData) -> Array:
+        """Return what the searched weights multiply, over the run's history."""
+        return play_operators(run.history, self.radii(data), self.starting_rule)
+
+    def level(self, theta: Array, data: TrainingData) -> tuple[float, float]:
+        """Return the lowest and highest value that the weighted operators can take."""
+        low, high = data.input_range
+        weights = theta[: self.n_operators]
+        lag, total = float(weights @ self.radii(data)), float(weights.sum())
+        floor = total * low - lag if self.starting_rule == "first_sample" else total * low
+        return floor, max(total * high - (lag if floor < 0 or low >= 0 else 0.0), floor + 1e-12)
+
+    def argument(self, theta: Array, run: Run, data: TrainingData) -> Array:
+        """Return the weighted operators, scaled to run from 0 to 1, over the run's history."""
+        low, high = self.level(theta, data)
+        return np.asarray((self.operators(run, data) @ theta - low) / (high - low))
+
+    def basis(self, theta: Array, run: Run, data: TrainingData) -> Array:
+        """Return the pieces of the map over the run's history."""
+        return self.map.pieces(self.argument(theta, run, data))
+
+    def least(self, matrix: Array, data: TrainingData) -> Array:
+        """Return a little of every piece, so that the map increases everywhere."""
+        span = data.output_range[1] - data.output_range[0]
+        return np.full(matrix.shape[1], LEAST_PIECE * span)
+
+    @property
+    def solves_nonnegative(self) -> bool:
+        """Whether the linear parameters may not be negative: for increasing maps only."""
+        return self.nonnegative and self.output_map in ("piecewise-linear", "polynomial")
+
+    def build(self, theta: Array, linear: Array, offset: float, data: TrainingData) -> Series:
+        """Return the series, its PI part scaled to the output's range."""
+        low, high = self.level(theta, data)
+        bottom, top = data.output_range
+        scale = (top - bottom) / (high - low)
+        first = self.first_part(theta * scale, bottom - low * scale, data)
+        channel = Channel(data.output, data.output_unit)
+        return Series((first, self.map.build(linear, offset, bottom, top, channel)))
+
+    def first_part(self, weights: Array, offset: float, data: TrainingData) -> Block:
+        """Return the hysteresis part."""
+        return PI(
+            self.radii(data),
+            weights,
+            offset,
+            data.input_range,
+            self.starting_rule,
+            **self.channels(data),
+        )
+
+    def parameter_bounds(self, data: TrainingData) -> tuple[Block, Array, Array]:
+        """Return a series, with a PI part within twice the output's range and a map of like size."""
+        theta = self.guesses(data)[1]
+        low, high = data.output_range
+        span = high - low
+        size = self.basis(theta, data.runs[0], data).shape[1]
+        template = self.build(theta, np.full(size, span / size), low, data)
+        n_first = template.parts[0].n_parameters
+        slope = span / (data.input_range[1] - data.input_range[0])
+        lower, upper = np.zeros(template.n_parameters), np.empty(template.n_parameters)
+        upper[:n_first] = slope
+        lower[n_first - 1], upper[n_first - 1] = low - span, high
+        values = template.pack()[n_first:]
+        lower[n_first:], upper[n_first:] = values - span / size, values + span / size
+        return template, lower, upper

@@ -1,0 +1,143 @@
+"""Memoryless maps behind a hysteresis model, as sums of increasing pieces to solve for.
+
+With non-negative weights on increasing pieces the map increases, whatever the data, so it has an
+inverse.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mckibben.blocks.base import Block, Channel
+from mckibben.blocks.piecewise_linear import PiecewiseLinear
+from mckibben.blocks.polynomial import Polynomial
+from mckibben.errors import ModelError
+
+Array = NDArray[np.float64]
+
+
+class OutputMap(ABC):
+    """A family of maps of an argument that runs from 0 to 1.
+
+    Parameters
+    ----------
+    size : int
+        Pieces: the degree of a polynomial, or the number of straight lines.
+    """
+
+    def __init__(self, size: int) -> None:
+        self.size = size
+
+    @abstractmethod
+    def pieces(self, x: Array) -> Array:
+        """Return the pieces at arguments of shape (n,), side by side, shape (n, k)."""
+
+    @abstractmethod
+    def build(
+        self, weights: Array, offset: float, low: float, high: float, channel: Channel
+    ) -> Block:
+        """Return the block whose argument runs from ``low`` to ``high``."""
+
+
+class PiecewiseLinearMap(OutputMap):
+    """Straight lines between equally spaced knots: a superposition of dead zones."""
+
+    def pieces(self, x: Array) -> Array:
+        """Return a ramp for every line; the first and last go on beyond the knots."""
+        ramps = x[:, np.newaxis] * self.size - np.arange(self.size)
+        lowest, highest = np.zeros(self.size), np.ones(self.size)
+        lowest[0], highest[-1] = -np.inf, np.inf
+        return np.clip(ramps, lowest, highest)
+
+    def build(
+        self, weights: Array, offset: float, low: float, high: float, channel: Channel
+    ) -> Block:
+        """Return the piecewise-linear block."""
+        values = offset + np.concatenate([[0.0], np.cumsum(weights)])
+        return PiecewiseLinear(np.linspace(low, high, self.size + 1), values, channel, channel)
+
+
+class PolynomialMap(OutputMap):
+    """Integrals of Bernstein polynomials: non-negative weights make the polynomial increase."""
+
+    def pieces(self, x: Array) -> Array:
+        """Return the integral from 0 of every Bernstein polynomial of degree ``size - 1``."""
+        return np.polynomial.polynomial.polyval(x, self._basis().T).T
+
+    def powers(self, weights: Array) -> Array:
+        """Return the weighted sum of the pieces in ascending powers, shape (size + 1,)."""
+        return np.asarray(weights @ self._basis())
+
+    def build(
+        self, weights: Array, offset: float, low: float, high: float, channel: Channel
+    ) -> Block:
+        """Return the polynomial block, in powers of the centred argument, which keeps digits."""
+        polynomial = np.polynomial.Polynomial(self.powers(weights))
+        centred = polynomial(np.polynomial.Polynomial([0.5, 0.5])).coef
+        centred = np.pad(centred, (0, self.size + 1 - centred.size))
+        centred[0] += offset
+        middle, half = 0.5 * (low + high), 0.5 * (high - low)
+        return Polynomial(centred, middle, half, (low, high), channel, channel)
+
+    def _basis(self) -> Array:
+        """Return the power-basis coefficients of all pieces, shape (size, size + 1)."""
+        from scipy.special import comb
+
+        degree = self.size - 1
+        powers = np.zeros((self.size, self.size + 1))
+        for k in range(self.size):
+            for j in range(degree - k + 1):
+                share = comb(degree, k) * comb(degree - k, j) * (-1.0) ** j
+                powers[k, k + j + 1] = share / (k + j + 1)
+        return powers
+
+
+class FreePolynomialMap(PolynomialMap):
+    """Powers of the centred argument, all of them or odd ones only, as the papers use them.
+
+    Nothing keeps such a polynomial increasing, so it may have no inverse.
+
+    Parameters
+    ----------
+    size : int
+        Degree.
+    odd : bool
+        Whether only odd powers are used.
+    """
+
+    def __init__(self, size: int, *, odd: bool = False) -> None:
+        super().__init__(size)
+        self.exponents = np.arange(1, size + 1, 2 if odd else 1)
+
+    def pieces(self, x: Array) -> Array:
+        """Return the powers, side by side."""
+        return np.asarray((2 * x - 1)[:, np.newaxis] ** self.exponents)
+
+    def build(
+        self, weights: Array, offset: float, low: float, high: float, channel: Channel
+    ) -> Block:
+        """Return the polynomial block."""
+        polynomial = np.zeros(int(self.exponents[-1]) + 1)
+        polynomial[self.exponents] = weights
+        polynomial[0] = offset
+        middle, half = 0.5 * (low + high), 0.5 * (high - low)
+        return Polynomial(polynomial, middle, half, (low, high), channel, channel)
+
+
+MAPS = ("piecewise-linear", "polynomial", "free-polynomial", "odd-polynomial")
+
+
+def output_map(name: str, size: int) -> OutputMap:
+    """Return a family of maps by name."""
+    if name == "piecewise-linear":
+        return PiecewiseLinearMap(size)
+    if name == "polynomial":
+        return PolynomialMap(size)
+    if name == "free-polynomial":
+        return FreePolynomialMap(size)
+    if name == "odd-polynomial":
+        return FreePolynomialMap(size, odd=True)
+    raise ModelError(f"there is no output map {name!r}. Remedy: use one of {', '.join(MAPS)}.")

@@ -1,0 +1,221 @@
+"""Models that are linear in most of their parameters: those are solved for, the few others searched.
+
+This is variable projection: for every trial of the non-linear parameters the weights and the offset
+are the exact (non-negative) least-squares solution, so the search runs in a handful of dimensions.
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mckibben.blocks.base import Block
+from mckibben.errors import ModelError
+from mckibben.estimators.base import Estimator, check_at_least, simulate_all
+from mckibben.estimators.data import Run, TrainingData
+from mckibben.estimators.search import Tracker, multi_start, particle_swarm, solve_linear
+
+Array = NDArray[np.float64]
+
+SEARCH_SAMPLES = 1500
+"""Samples that count while many starts are compared; the best is then polished on all."""
+
+LEAST_REVERSIBLE = 1e-3
+"""Least share of the output's range that the operator without dead zone gives."""
+
+WORST = 1e150
+"""Cost of parameters whose output overflows; its square is still a number."""
+
+
+@dataclass(kw_only=True, repr=False, eq=False)
+class SeparableEstimator(Estimator):
+    """An estimator of a block that is linear in its weights and offset.
+
+    Parameters
+    ----------
+    nonnegative : bool
+        Whether weights must be at least 0, which guarantees an exact inverse.
+    n_starts : int
+        Starting points tried for the non-linear parameters.
+    n_refined : int
+        How many of them, the most promising, are refined.
+    """
+
+    nonnegative: bool = True
+    n_starts: int = 48
+    n_refined: int = 4
+
+    @abstractmethod
+    def bounds(self, data: TrainingData) -> tuple[Array, Array]:
+        """Return lowest and highest non-linear parameters, each of shape (m,), m >= 0."""
+
+    @abstractmethod
+    def guesses(self, data: TrainingData) -> list[Array]:
+        """Return sensible non-linear parameters to start from, each of shape (m,)."""
+
+    @abstractmethod
+    def basis(self, theta: Array, run: Run, data: TrainingData) -> Array:
+        """Return what the linear parameters multiply, over the run's history, shape (n, k)."""
+
+    @abstractmethod
+    def build(self, theta: Array, linear: Array, offset: float, data: TrainingData) -> Block:
+        """Return the block with these parameters."""
+
+    @abstractmethod
+    def parameter_bounds(self, data: TrainingData) -> tuple[Block, Array, Array]:
+        """Return a block of the structure to identify, and bounds of its parameter vector.
+
+        For particle swarms over all parameters.
+        """
+
+    def check_settings(self) -> None:
+        """Refuse settings out of range."""
+        super().check_settings()
+        check_at_least("n_starts", self.n_starts, 1)
+        check_at_least("n_refined", self.n_refined, 1)
+
+    def identify(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
+        """Return the block found, and the data with the memories at the start that belong to it."""
+        if self.method == "pso":
+            if self.initial == "fitted":
+                raise ModelError(
+                    "a swarm over all parameters cannot fit the initial memory too. "
+                    "Remedy: use --set method=ls, or initial=first_sample."
+                )
+            return self._swarm_over_all(data, tracker), data
+        theta = self._search(data, tracker)
+        if self.initial == "fitted":
+            for _ in range(2):
+                data = self._fit_peaks(theta, data)
+                theta = self._polish(theta, data, tracker)
+        linear, offset = self._solve(theta, data)
+        return self.build(theta, linear, offset, data), data
+
+    def _search(self, data: TrainingData, tracker: Tracker) -> Array:
+        lower, upper = self.bounds(data)
+        if lower.size == 0:
+            return lower
+        thin = data.thinned(SEARCH_SAMPLES)
+        if self.method == "pso-ls":
+            tracker.budget = self.pso_particles * (self.pso_iterations + 1)
+
+            def costs(points: Array) -> Array:
+                return np.array([_rms(self._residuals(point, thin)) for point in points])
+
+            theta = particle_swarm(costs, lower, upper, self.swarm, tracker, self.seed)
+        else:
+            tracker.budget = self.n_starts + self.n_refined * 15 * (lower.size + 1)
+            theta = multi_start(
+                lambda point: self._residuals(point, thin),
+                self.guesses(data) + self._scattered(lower, upper),
+                lower,
+                upper,
+                tracker,
+                n_refined=self.n_refined,
+                max_evaluations=15,
+            )
+        return theta if tracker.interrupted else self._polish(theta, data, tracker)
+
+    def _scattered(self, lower: Array, upper: Array) -> list[Array]:
+        from scipy.stats import qmc
+
+        exponent = int(np.ceil(np.log2(max(self.n_starts, 2))))
+        points = qmc.Sobol(lower.size, seed=self.seed).random_base2(exponent)[: self.n_starts]
+        return list(qmc.scale(points, lower, upper))
+
+    def _polish(self, theta: Array, data: TrainingData, tracker: Tracker) -> Array:
+        lower, upper = self.bounds(data)
+        if lower.size == 0:
+            return theta
+        own = Tracker(progress=tracker.progress, budget=tracker.budget)
+        own.evaluations = tracker.evaluations
+        best = multi_start(
+            lambda point: self._residuals(point, data),
+            [theta],
+            lower,
+            upper,
+            own,
+            n_refined=1,
+            max_evaluations=10,
+        )
+        tracker.evaluations, tracker.interrupted = own.evaluations, own.interrupted
+        return best
+
+    def _fit_peaks(self, theta: Array, data: TrainingData) -> TrainingData:
+        """Choose for every run the peak before its first sample that fits best, others held."""
+        from scipy.optimize import minimize_scalar
+
+        high = data.input_range[1]
+        peaks = [run.peak for run in data.runs]
+        for index, run in enumerate(data.runs):
+            first = float(run.u[0])
+            if high - first <= 0:
+                continue
+
+            def cost(peak: float, index: int = index) -> float:
+                tried = [*peaks[:index], peak, *peaks[index + 1 :]]
+                return _rms(self._residuals(theta, data.with_peaks(tried)))
+
+            grid = np.linspace(first, high, 17)
+            costs = [cost(peak) for peak in grid]
+            best = int(np.argmin(costs))
+            around = (grid[max(best - 1, 0)], grid[min(best + 1, 16)])
+            found = minimize_scalar(cost, bounds=around, method="bounded")
+            peaks[index] = float(found.x) if found.fun < costs[best] else float(grid[best])
+            if cost(first) <= cost(peaks[index]) * (1 + 1e-12):
+                peaks[index] = None
+        return data.with_peaks(peaks)
+
+    def _matrix(self, theta: Array, data: TrainingData) -> Array:
+        return np.concatenate(
+            [run.trim(self.basis(theta, run, data))[run.counts] for run in data.runs]
+        )
+
+    def _solve(self, theta: Array, data: TrainingData) -> tuple[Array, float]:
+        return self._solve_for(self._matrix(theta, data), data)
+
+    def _solve_for(self, matrix: Array, data: TrainingData) -> tuple[Array, float]:
+        least = self.least(matrix, data)
+        nonnegative = self.solves_nonnegative
+        return solve_linear(matrix, data.target, nonnegative=nonnegative, least=least)
+
+    @property
+    def solves_nonnegative(self) -> bool:
+        """Whether the linear parameters may not be negative."""
+        return self.nonnegative
+
+    def least(self, matrix: Array, data: TrainingData) -> Array:
+        """Return the least that every linear parameter may be where none may be negative.
+
+        The first is kept off zero: it belongs to the operator without dead zone, and without it there
+        is no inverse.
+        """
+        floor = np.zeros(matrix.shape[1])
+        reach = float(np.ptp(matrix[:, 0]))
+        span = data.output_range[1] - data.output_range[0]
+        floor[0] = LEAST_REVERSIBLE * span / reach if reach > 0 else 0.0
+        return floor
+
+    def _residuals(self, theta: Array, data: TrainingData) -> Array:
+        matrix = self._matrix(theta, data)
+        if not np.isfinite(matrix).all():
+            return np.full(data.target.size, WORST)
+        linear, offset = self._solve_for(matrix, data)
+        return np.asarray(matrix @ linear + offset - data.target)
+
+    def _swarm_over_all(self, data: TrainingData, tracker: Tracker) -> Block:
+        template, lower, upper = self.parameter_bounds(data)
+        tracker.budget = self.pso_particles * (self.pso_iterations + 1)
+
+        def costs(points: Array) -> Array:
+            outputs = simulate_all([template.unpack(point) for point in points], data)
+            return np.sqrt(np.mean((outputs - data.target) ** 2, axis=1))
+
+        return template.unpack(particle_swarm(costs, lower, upper, self.swarm, tracker, self.seed))
+
+
+def _rms(residuals: Array) -> float:
+    return float(np.sqrt(np.mean(residuals**2)))

@@ -47,6 +47,12 @@ Vector = Annotated[tuple[FiniteFloat, ...], BeforeValidator(_plain_sequence)]
 StoredInitial = Literal["first_sample", "virgin"] | Vector
 """`Initial` as a field of a block."""
 
+
+def vector(values: ArrayLike) -> tuple[float, ...]:
+    """Return numbers as a field of a block holds them."""
+    return tuple(np.asarray(values, dtype=np.float64).tolist())
+
+
 STRICT = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
 """How blocks validate their fields: no unknown ones, no silent conversion, nothing infinite."""
 

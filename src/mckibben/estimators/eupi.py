@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from mckibben.blocks.base import Block
+from mckibben.blocks.base import Block, vector
 from mckibben.blocks.eupi import EUPI, eupi_matrix
 from mckibben.blocks.memory import named_state
 from mckibben.estimators.base import check_at_least
@@ -87,11 +87,11 @@ class EUPIEstimator(SeparableEstimator):
         low, high = data.input_range
         cubic = CUBIC.powers(linear[: CUBIC.size])[1:] / (high - low) ** np.arange(1, 4)
         return EUPI(
-            self.radii(data),
-            linear[CUBIC.size :],
+            vector(self.radii(data)),
+            vector(linear[CUBIC.size :]),
             float(theta[0]),
             float(theta[1]),
-            tuple(cubic.tolist()),
+            (float(cubic[0]), float(cubic[1]), float(cubic[2])),
             offset,
             data.input_range,
             self.starting_rule,

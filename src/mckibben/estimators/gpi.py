@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from mckibben.blocks.base import Block
+from mckibben.blocks.base import Block, vector
 from mckibben.blocks.envelopes.base import Envelope
 from mckibben.blocks.envelopes.exponential import Exponential
 from mckibben.blocks.envelopes.piecewise_linear import PiecewiseLinear
@@ -110,8 +110,8 @@ class GPIEstimator(SeparableEstimator):
         radii = self.radii(rising, falling, data)
         height = offset / linear.sum() if linear.sum() != 0 else 0.0
         return GPI(
-            radii,
-            linear,
+            vector(radii),
+            vector(linear),
             rising.shifted(height),
             falling.shifted(height),
             data.input_range,
@@ -252,8 +252,11 @@ class PiecewiseLinearShape(EnvelopeShape):
         knots = np.linspace(*input_range, self.n_knots)
         rising, falling = np.exp(shape).reshape(2, -1)
         scale = rising.sum()
-        heights = [np.concatenate([[0.0], np.cumsum(rise / scale)]) for rise in (rising, falling)]
-        return PiecewiseLinear(knots, heights[0]), PiecewiseLinear(knots, heights[1])
+        first, second = (
+            PiecewiseLinear(vector(knots), (0.0, *vector(np.cumsum(rise / scale))))
+            for rise in (rising, falling)
+        )
+        return first, second
 
     def parameter_bounds(self, input_range: Range) -> tuple[Array, Array]:
         """Return disjoint bounds of the values at the knots, so that they increase."""

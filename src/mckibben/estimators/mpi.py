@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from mckibben.blocks.base import Block, Channel
+from mckibben.blocks.base import Block, Channel, vector
 from mckibben.blocks.compose import Series
 from mckibben.blocks.pi import PI
 from mckibben.estimators.base import check_at_least
@@ -140,8 +140,8 @@ class MPIEstimator(SeparableEstimator):
     def first_part(self, weights: Array, offset: float, data: TrainingData) -> Block:
         """Return the hysteresis part."""
         return PI(
-            self.radii(data),
-            weights,
+            vector(self.radii(data)),
+            vector(weights),
             offset,
             data.input_range,
             self.starting_rule,

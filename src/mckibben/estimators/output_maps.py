@@ -11,7 +11,7 @@ from abc import ABC, abstractmethod
 import numpy as np
 from numpy.typing import NDArray
 
-from mckibben.blocks.base import Block, Channel
+from mckibben.blocks.base import Block, Channel, vector
 from mckibben.blocks.piecewise_linear import PiecewiseLinear
 from mckibben.blocks.polynomial import Polynomial
 from mckibben.errors import ModelError
@@ -56,8 +56,9 @@ class PiecewiseLinearMap(OutputMap):
         self, weights: Array, offset: float, low: float, high: float, channel: Channel
     ) -> Block:
         """Return the piecewise-linear block."""
+        knots = np.linspace(low, high, self.size + 1)
         values = offset + np.concatenate([[0.0], np.cumsum(weights)])
-        return PiecewiseLinear(np.linspace(low, high, self.size + 1), values, channel, channel)
+        return PiecewiseLinear(vector(knots), vector(values), channel, channel)
 
 
 class PolynomialMap(OutputMap):
@@ -80,7 +81,7 @@ class PolynomialMap(OutputMap):
         centred = np.pad(centred, (0, self.size + 1 - centred.size))
         centred[0] += offset
         middle, half = 0.5 * (low + high), 0.5 * (high - low)
-        return Polynomial(centred, middle, half, (low, high), channel, channel)
+        return Polynomial(vector(centred), middle, half, (low, high), channel, channel)
 
     def _basis(self) -> Array:
         """Return the power-basis coefficients of all pieces, shape (size, size + 1)."""
@@ -124,7 +125,7 @@ class FreePolynomialMap(PolynomialMap):
         polynomial[self.exponents] = weights
         polynomial[0] = offset
         middle, half = 0.5 * (low + high), 0.5 * (high - low)
-        return Polynomial(polynomial, middle, half, (low, high), channel, channel)
+        return Polynomial(vector(polynomial), middle, half, (low, high), channel, channel)
 
 
 MAPS = ("piecewise-linear", "polynomial", "free-polynomial", "odd-polynomial")

@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from mckibben.blocks.base import Block
+from mckibben.blocks.base import Block, vector
 from mckibben.blocks.memory import named_state
 from mckibben.blocks.pi import PI
 from mckibben.blocks.play import play_matrix
@@ -88,8 +88,8 @@ class PIEstimator(SeparableEstimator):
         """Return the PI model."""
         del theta
         return PI(
-            self.radii(data),
-            linear,
+            vector(self.radii(data)),
+            vector(linear),
             offset,
             data.input_range,
             self.starting_rule,

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mckibben.blocks.base import Block
+from mckibben.blocks.base import Block, vector
 from mckibben.blocks.rate_dependent_pi import RateDependentPI
 from mckibben.errors import DataError
 from mckibben.estimators.base import check_at_least
@@ -102,9 +102,9 @@ class RDPIEstimator(MPIEstimator):
         """Return the hysteresis part."""
         n = self.n_operators
         return RateDependentPI(
-            self.radii(data),
-            weights[n:] / self.fastest(data),
-            weights[:n],
+            vector(self.radii(data)),
+            vector(weights[n:] / self.fastest(data)),
+            vector(weights[:n]),
             offset,
             self.rate_time_constant or 0.0,
             data.input_range,

@@ -71,7 +71,7 @@ def solve_linear(
 
     means, mean = basis.mean(axis=0), float(target.mean())
     m = basis.shape[1]
-    triangle = np.linalg.qr(np.column_stack([basis - means, target - mean]), mode="r")
+    triangle: Array = np.linalg.qr(np.column_stack([basis - means, target - mean]), mode="r")  # type: ignore[assignment]
     scale = np.maximum(np.sqrt((triangle[:, :m] ** 2).sum(axis=0)), 1e-300)
     scaled, right = triangle[:, :m] / scale, triangle[:, m]
     if nonnegative:

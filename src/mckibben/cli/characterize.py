@@ -1,0 +1,48 @@
+"""mckibben characterize: what a muscle does, in numbers and words."""
+
+from __future__ import annotations
+
+from mckibben.cli.options import (
+    Columns,
+    Files,
+    GapPolicy,
+    Gaps,
+    Input,
+    Json,
+    Output,
+    Rate,
+    Reading,
+    Units,
+)
+from mckibben.cli.output import figure, print_json, print_table
+
+
+def characterize(
+    files: Files,
+    input: Input = "pressure",  # noqa: A002
+    output: Output = "displacement",
+    column: Columns = None,
+    unit: Units = None,
+    rate: Rate = None,
+    gaps: GapPolicy = Gaps.error,
+    as_json: Json = False,
+) -> None:
+    """Say what the muscle does: loop width, asymmetry, dead zone, creep, rate dependence."""
+    recordings = Reading(column, unit, rate, gaps).read(files, [input, output])
+    from mckibben.characterization import characterize as find
+
+    found = find(recordings, input, output)
+    if as_json:
+        print_json(found.to_dict())
+        return
+    for sentence in found.sentences:
+        print(sentence)
+    print()
+    print_table(
+        ["quantity", "value", "unit"],
+        [[str(name), _shown(value), str(units)] for name, value, units, _ in found.table()],
+    )
+
+
+def _shown(value: object) -> str:
+    return figure(value, 4) if isinstance(value, float) else ("-" if value is None else str(value))

@@ -1,0 +1,39 @@
+"""mckibben invert: turn a model into its compensator."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from mckibben.cli.options import Json
+from mckibben.cli.output import figure, print_json
+
+
+def invert(
+    model: Annotated[Path, typer.Argument(help="Model file (JSON).")],
+    out: Annotated[Path, typer.Option("-o", "--out", help="Inverse to write (JSON).")],
+    as_json: Json = False,
+) -> None:
+    """Write the inverse of a saved model: wished-for output in, input out."""
+    from mckibben.blocks.saving import load
+
+    block = load(model)
+    inverse = block.inverse()
+    inverse.save(out)
+    low, high = block.reachable()
+    reachable = {
+        channel.name: [float(a), float(b)]
+        for channel, a, b in zip(block.outputs, low, high, strict=True)
+    }
+    if as_json:
+        print_json({"file": str(out), "reachable": reachable})
+        return
+    for channel in block.outputs:
+        a, b = reachable[channel.name]
+        print(
+            f"Reachable whatever happened before: {channel.name} {figure(a, 5)} to {figure(b, 5)} "
+            f"{channel.unit}; references beyond are clipped."
+        )
+    print(f"Written: {out}")

@@ -1,0 +1,95 @@
+"""Entry point: the commands, and what becomes of errors and warnings.
+
+Heavy modules are imported inside the commands that use them, so that help comes at once.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+import warnings
+from typing import Annotated
+
+import typer
+
+from mckibben import __version__
+from mckibben.cli.characterize import characterize
+from mckibben.cli.compare import compare
+from mckibben.cli.fit import fit
+from mckibben.cli.info import info
+from mckibben.cli.invert import invert
+from mckibben.cli.plot import plot
+from mckibben.cli.simulate import simulate
+from mckibben.cli.study import study
+from mckibben.errors import DataWarning, MckibbenError, ModelWarning
+
+BAD_INPUT = 2
+INTERRUPTED = 130
+
+app = typer.Typer(
+    name="mckibben",
+    help="Hysteresis of pneumatic artificial muscles: from a recording to a ranked, saved and "
+    "inverted model. Start with: mckibben study FILE",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+)
+for command in (study, characterize, fit, compare, simulate, invert, plot, info):
+    app.command()(command)
+
+
+def _show_version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(__version__)
+        raise typer.Exit
+
+
+@app.callback()
+def _options(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Show version.")
+    ] = False,
+) -> None:
+    del version
+
+
+def run() -> None:
+    """Run the command line: errors become one paragraph on standard error, and exit code 2."""
+    warnings.simplefilter("ignore")
+    for category in (DataWarning, ModelWarning):
+        warnings.simplefilter("always", category)
+    warnings.showwarning = lambda message, *_: print(f"Note: {message}", file=sys.stderr)
+    try:
+        app()
+    except MckibbenError as error:
+        _leave(str(error), BAD_INPUT)
+    except KeyboardInterrupt:
+        _leave("Interrupted.", INTERRUPTED)
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        sys.exit(1)
+    except OSError as error:
+        place = f"{error.filename}: " if error.filename else ""
+        _leave(
+            f"{place}{error.strerror or error}. Remedy: check the path and its rights.", BAD_INPUT
+        )
+    except MemoryError:
+        _leave("Not enough memory. Remedy: cut or resample the recordings first.", BAD_INPUT)
+    except Exception as error:
+        if os.environ.get("MCKIBBEN_DEBUG"):
+            raise
+        _leave(
+            f"Internal error, please report it: {type(error).__name__}: {error}. "
+            "Set MCKIBBEN_DEBUG=1 to see where.",
+            1,
+        )
+
+
+def _leave(message: str, code: int) -> None:
+    print(" ".join(message.split()), file=sys.stderr)
+    sys.exit(code)
+
+
+if __name__ == "__main__":
+    run()

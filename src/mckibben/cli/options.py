@@ -1,0 +1,176 @@
+"""Options that several commands share, and reading files by them."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from mckibben.errors import DataError, ModelError
+
+if TYPE_CHECKING:
+    from mckibben.recording import Recording
+
+
+class Gaps(StrEnum):
+    """What to do about gaps in time."""
+
+    error = "error"
+    split = "split"
+    interpolate = "interpolate"
+
+
+Files = Annotated[
+    list[Path],
+    typer.Argument(metavar="FILES...", help="Recordings: CSV, TSV, Parquet, MAT, HDF5, TDMS."),
+]
+Test = Annotated[
+    list[Path] | None,
+    typer.Option("--test", metavar="FILE", help="Recording to test on; repeatable."),
+]
+Input = Annotated[str, typer.Option("--input", metavar="CHANNEL", help="Input channel.")]
+Output = Annotated[str, typer.Option("--output", metavar="CHANNEL", help="Output channel.")]
+Columns = Annotated[
+    list[str] | None,
+    typer.Option("--column", metavar="CHANNEL=COLUMN", help="Column to read a channel from."),
+]
+Units = Annotated[
+    list[str] | None, typer.Option("--unit", metavar="CHANNEL=UNIT", help="Unit of a channel.")
+]
+Rate = Annotated[
+    float | None,
+    typer.Option("--rate", metavar="HZ", help="Samples per second, without a time column."),
+]
+GapPolicy = Annotated[Gaps, typer.Option("--gaps", help="What to do about gaps in time.")]
+Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON on standard output.")]
+Seed = Annotated[int, typer.Option("--seed", help="Of everything random.")]
+Models = Annotated[
+    str,
+    typer.Option(
+        "--models", metavar="all|NAME,...", help="Models, by short name; see info --models."
+    ),
+]
+Settings = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set", metavar="[MODEL.]NAME=VALUE", help="Setting of the estimator; repeatable."
+    ),
+]
+Jobs = Annotated[int | None, typer.Option("--jobs", help="Processes. Default: as many as cores.")]
+
+
+@dataclass(frozen=True)
+class Reading:
+    """How files are to be read."""
+
+    columns: list[str] | None
+    units: list[str] | None
+    rate: float | None
+    gaps: Gaps
+
+    def read(
+        self, files: Sequence[Path], channels: Sequence[str], *, moving: bool = True
+    ) -> list[Recording]:
+        """Return the recordings in all files, with the channels asked for.
+
+        ``moving`` refuses channels that are constant.
+        """
+        from mckibben.files import read
+
+        recordings: list[Recording] = []
+        for file in files:
+            recordings += read(
+                file,
+                columns=_pairs("--column", self.columns),
+                units=_pairs("--unit", self.units),
+                rate=self.rate,
+                gaps=self.gaps.value,
+                channels=channels,
+                moving=moving,
+            )
+        return recordings
+
+
+def _pairs(option: str, given: list[str] | None) -> dict[str, str]:
+    pairs = {}
+    for item in given or []:
+        name, equals, value = item.partition("=")
+        if not (name and equals and value):
+            raise DataError(
+                f"{option} {item!r} is not of the form CHANNEL=VALUE",
+                remedy=f"write for instance {option} pressure="
+                + ("P1" if option == "--column" else "kPa"),
+            )
+        pairs[name] = value
+    return pairs
+
+
+def parse_settings(given: list[str] | None, model: str) -> dict[str, Any]:
+    """Return the settings of one model's estimator, checked against those it has.
+
+    Values are read as JSON where they are that, else as words. A name may be preceded by a model and
+    a dot, and is then for that model only.
+    """
+    import dataclasses
+
+    from mckibben import registry
+
+    known = {field.name for field in dataclasses.fields(registry.load("estimators", model))}
+    settings: dict[str, Any] = {}
+    for item in given or []:
+        name, equals, text = item.partition("=")
+        owner, dot, rest = name.partition(".")
+        if dot and owner != model:
+            continue
+        name = rest if dot else name
+        name = name.replace("-", "_")
+        if not equals or name not in known:
+            raise ModelError(
+                f"--set {item!r}: {model!r} has no setting {name!r}. "
+                f"Remedy: use one of {', '.join(sorted(known))}."
+            )
+        try:
+            value = json.loads(text)
+        except ValueError:
+            value = None if text.lower() == "none" else text
+        settings[name] = tuple(value) if isinstance(value, list) else value
+    return settings
+
+
+def chosen_models(given: str) -> str | list[str]:
+    """Return ``"all"`` or the list of names."""
+    return given if given == "all" else [name.strip() for name in given.split(",") if name.strip()]
+
+
+def settings_of_all(given: list[str] | None, models: str | list[str]) -> dict[str, dict[str, Any]]:
+    """Return the settings of several models; a bare setting goes to the models that have it."""
+    import dataclasses
+
+    from mckibben import registry
+
+    names = registry.names("estimators") if isinstance(models, str) else models
+    found: dict[str, dict[str, Any]] = {}
+    used: set[str] = set()
+    for model in names:
+        known = {field.name for field in dataclasses.fields(registry.load("estimators", model))}
+        mine = []
+        for item in given or []:
+            name = item.partition("=")[0].replace("-", "_")
+            owner, dot, rest = name.partition(".")
+            if (dot and owner == model) or (not dot and name in known):
+                mine.append(item)
+                used.add(item)
+            del rest
+        found[model] = parse_settings(mine, model)
+    for item in given or []:
+        if item not in used:
+            raise ModelError(
+                f"--set {item!r}: none of the models {', '.join(names)} has that setting. "
+                "Remedy: see mckibben info --models."
+            )
+    return found

@@ -1,0 +1,52 @@
+"""mckibben plot: print-quality figures."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from mckibben.cli.options import (
+    Columns,
+    Files,
+    GapPolicy,
+    Gaps,
+    Input,
+    Output,
+    Rate,
+    Reading,
+    Units,
+)
+
+
+def plot(
+    files: Files,
+    out: Annotated[Path, typer.Option("-o", "--out", help="Figure to write: .png, .svg or .pdf.")],
+    model: Annotated[
+        Path | None, typer.Option("--model", help="Saved model to draw against the recordings.")
+    ] = None,
+    kind: Annotated[
+        str | None,
+        typer.Option(
+            help="time, loop (default); with --model also fit (default), loops, residuals, weights."
+        ),
+    ] = None,
+    input: Input = "pressure",  # noqa: A002
+    output: Output = "displacement",
+    column: Columns = None,
+    unit: Units = None,
+    rate: Rate = None,
+    gaps: GapPolicy = Gaps.error,
+) -> None:
+    """Draw recordings, or a saved model against them."""
+    recordings = Reading(column, unit, rate, gaps).read(files, [input, output])
+    from mckibben.report.figures import plot_model, plot_recording
+
+    if model is None:
+        plot_recording(recordings, input, output, kind or "loop", out)
+    else:
+        from mckibben.blocks.saving import load
+
+        plot_model(load(model), recordings, kind or "fit", out)
+    typer.echo(f"Written: {out}")

@@ -1,0 +1,82 @@
+"""mckibben simulate: run a saved model, or an inverse, over a recording."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from mckibben.cli.options import Columns, GapPolicy, Gaps, Json, Rate, Reading, Units
+from mckibben.cli.output import figure, print_json
+from mckibben.errors import DataError
+
+
+def simulate(
+    model: Annotated[Path, typer.Argument(help="Model file (JSON).")],
+    file: Annotated[Path, typer.Argument(help="Recording with the model's inputs.")],
+    out: Annotated[Path, typer.Option("-o", "--out", help="File to write: .csv, .tsv, .parquet.")],
+    initial: Annotated[
+        str,
+        typer.Option(
+            help="Memory before the first sample: model (as saved), first_sample, virgin, or measured "
+            "(the one excursion that explains the first measured output)."
+        ),
+    ] = "model",
+    column: Columns = None,
+    unit: Units = None,
+    rate: Rate = None,
+    gaps: GapPolicy = Gaps.error,
+    as_json: Json = False,
+) -> None:
+    """Run a saved model free over a recording; adds channels named OUTPUT_model."""
+    from dataclasses import asdict
+
+    from mckibben.blocks.saving import load
+    from mckibben.files import write
+    from mckibben.metrics import score
+
+    block = load(model)
+    wanted = [channel.name for channel in block.inputs]
+    recordings = Reading(column, unit, rate, gaps).read([file], wanted, moving=False)
+    if len(recordings) > 1:
+        raise DataError(
+            f"the file splits into {len(recordings)} recordings at its gaps",
+            file=file,
+            remedy="simulate with --gaps interpolate, or cut the file first",
+        )
+    (recording,) = recordings
+    modelled = block.simulate(recording, initial=_initial(initial, block, recording))
+    result = recording.select(wanted)
+    metrics: dict[str, dict[str, float]] = {}
+    for channel in block.outputs:
+        name = f"{channel.name}_model"
+        result = result.with_channels({name: channel.unit}, **{name: modelled[channel.name]})
+        if channel.name in recording and channel.name not in wanted:
+            measured = recording[channel.name]
+            result = result.with_channels(
+                {channel.name: recording.units[channel.name]}, **{channel.name: measured}
+            )
+            metrics[channel.name] = asdict(score(measured, modelled[channel.name]))
+    write(result.with_meta(model=str(model)), out)
+    if as_json:
+        print_json({"file": str(out), "n_samples": len(result), "metrics": metrics})
+        return
+    for name, figures in metrics.items():
+        print(
+            f"{name}: RMSE {figure(figures['rmse'], 4)}, MAE {figure(figures['mae'], 4)}, worst "
+            f"{figure(figures['max_error'], 4)} {recording.units[name]}, R² {figure(figures['r2'], 5)}"
+        )
+    print(f"Written: {out}")
+
+
+def _initial(rule: str, block: Any, recording: Any) -> Any:
+    if rule == "model":
+        return None
+    if rule == "measured":
+        from mckibben.comparison.free_run import measured_start
+
+        name = block.outputs[0].name
+        recording[name]
+        return measured_start(block, recording, name).tolist()
+    return rule

@@ -1,0 +1,82 @@
+"""Free-running outputs of a model on recordings, with an honest start of its memory."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mckibben.blocks.base import Block
+from mckibben.comparison.splits import predecessor
+from mckibben.errors import ModelError
+from mckibben.recording import Recording
+
+Array = NDArray[np.float64]
+
+SETTLING = 256
+"""Samples for which the first input is held after the peak before it, so that rates die away."""
+
+
+def run_free(
+    block: Block, recording: Recording, output: str, known: Sequence[Recording] = ()
+) -> Array:
+    """Return the modelled output over a recording, shape (n,).
+
+    Memory starts from the end of the known recording that this one continues; else from the one
+    excursion before the first sample that best explains the first measured output (`measured_start`).
+    After that nothing measured but the inputs is used.
+
+    Raises
+    ------
+    ModelError
+        If the output is not finite.
+    """
+    before = predecessor(recording, known)
+    if before is not None:
+        start = block.final_state(before, initial=measured_start(block, before, output))
+    else:
+        start = measured_start(block, recording, output)
+    modelled = block.simulate(recording, initial=start.tolist())[output]
+    if not np.isfinite(modelled).all():
+        raise ModelError("the output is not finite. Remedy: this model does not suit these data.")
+    return modelled
+
+
+def measured_start(block: Block, recording: Recording, output: str) -> Array:
+    """Return the state before the first sample that best explains the first measured output.
+
+    The candidates are memories of a single excursion: the input came down from a peak between the
+    first sample and the highest of the block's range or the recording. The lowest peak that explains
+    the output is taken, so a model that has only risen starts from ``"first_sample"``.
+    """
+    inputs = recording.matrix(channel.name for channel in block.inputs)
+    first = inputs[0]
+    if block.n_states == 0:
+        return block.initial_state(first)
+    highest = inputs[:, 0].max()
+    limits = getattr(block, "input_range", None)
+    if limits is not None:
+        highest = max(highest, limits[1])
+    measured = float(recording[output][0])
+    place = [channel.name for channel in block.outputs].index(output)
+
+    def after(peak: float) -> tuple[float, Array]:
+        history = np.repeat(first[np.newaxis], SETTLING + 1, axis=0)
+        history[0, 0] = peak
+        state = block.initial_state(history[0], "first_sample")
+        outputs = np.empty((len(history), len(block.outputs)))
+        block.bind(recording.sample_time or 1.0, state, history, outputs)()
+        return abs(float(outputs[-1, place]) - measured), state
+
+    best_error, best_state = after(first[0])
+    low, high = float(first[0]), float(highest)
+    for _ in range(3):
+        peaks = np.linspace(low, high, 17)
+        tried = [after(peak) for peak in peaks]
+        errors = [error for error, _ in tried]
+        best = int(np.argmin(errors))
+        if errors[best] < best_error * (1 - 1e-9):
+            best_error, best_state = tried[best]
+        low, high = float(peaks[max(best - 1, 0)]), float(peaks[min(best + 1, 16)])
+    return best_state

@@ -1,0 +1,120 @@
+"""Does a model keep the branches of the loop apart, as the data do, and while the input is held?"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mckibben.blocks.base import Block
+from mckibben.comparison.results import Memory
+from mckibben.errors import MckibbenError
+from mckibben.recording import Recording
+from mckibben.signals import branches
+
+Array = NDArray[np.float64]
+
+LEVELS = 41
+"""Input levels at which branches are compared, between 5 and 95 % of the range."""
+
+HOLD = 10
+"""Length of the synthetic hold, relative to the ramp before it."""
+
+
+def memory_test(
+    block: Block,
+    recordings: Sequence[Recording],
+    outputs: Sequence[Array],
+    input_name: str,
+    output_name: str,
+) -> Memory:
+    """Compare the branch gaps of a model with the measured ones, and let it hold.
+
+    Parameters
+    ----------
+    recordings : sequence of Recording
+        Measured.
+    outputs : sequence of array, shape (n,)
+        The model's free-running output on each.
+    """
+    measured, modelled = [], []
+    for recording, output in zip(recordings, outputs, strict=True):
+        pair = np.column_stack([recording[output_name], output])
+        gaps = branch_gaps(recording[input_name], pair)
+        measured.append(gaps[:, 0])
+        modelled.append(gaps[:, 1])
+    gap, own = np.concatenate(measured), np.concatenate(modelled)
+    power = float(gap @ gap)
+    ratio = float(own @ gap) / power if gap.size and power > 0 else None
+    return Memory(ratio, gap.size, hold_test(block, recordings[0], input_name, output_name))
+
+
+def branch_gaps(u: Array, y: Array) -> Array:
+    """Return y on the falling branch less y on the rising one, at equal inputs.
+
+    Every level is taken on each pair of neighbouring branches that cross it.
+
+    Parameters
+    ----------
+    u : array, shape (n,)
+    y : array, shape (n, k)
+
+    Returns
+    -------
+    array, shape (number of pairs, k)
+    """
+    low, high = np.quantile(u, [0.0, 1.0])
+    levels = low + (high - low) * np.linspace(0.05, 0.95, LEVELS)
+    crossings = []
+    for start, stop, direction in branches(u):
+        piece = slice(start, stop)
+        order = np.argsort(u[piece], kind="stable")
+        along, values = u[piece][order], y[piece][order]
+        inside = (levels >= along[0]) & (levels <= along[-1])
+        at = np.full((LEVELS, y.shape[1]), np.nan)
+        for column in range(y.shape[1]):
+            at[inside, column] = np.interp(levels[inside], along, values[:, column])
+        crossings.append((direction, at))
+    gaps = [
+        (after - before) if first > 0 else (before - after)
+        for (first, before), (second, after) in zip(crossings, crossings[1:], strict=False)
+        if first * second < 0
+    ]
+    joined = np.concatenate(gaps) if gaps else np.empty((0, y.shape[1]))
+    return joined[np.isfinite(joined).all(axis=1)]
+
+
+def hold_test(
+    block: Block, recording: Recording, input_name: str, output_name: str
+) -> float | None:
+    """Return the share of the model's own mid-range branch gap that survives a long hold.
+
+    The input goes up to mid-range and stays, and in a second run up to the top, down to mid-range and
+    stays; ramps last as long as the recording's median branch, the hold ten times that.
+    """
+    u = recording[input_name]
+    low, high = float(u.min()), float(u.max())
+    middle = 0.5 * (low + high)
+    lengths = [stop - start for start, stop, _ in branches(u)]
+    ramp = int(np.clip(np.median(lengths), 20, 5000))
+    hold = np.full(HOLD * ramp, middle)
+    up = np.linspace(low, middle, ramp)
+    over = np.concatenate([np.linspace(low, high, 2 * ramp), np.linspace(high, middle, ramp)])
+    if len(block.inputs) > 1:
+        return None
+    place = [channel.name for channel in block.outputs].index(output_name)
+    try:
+        ends = [
+            block.simulate(
+                np.concatenate([way, hold])[:, np.newaxis],
+                initial="first_sample",
+                sample_time=recording.sample_time,
+            )[:, place]
+            for way in (up, over)
+        ]
+    except MckibbenError:
+        return None
+    before = float(ends[1][over.size] - ends[0][up.size])
+    after = float(ends[1][-1] - ends[0][-1])
+    return after / before if before != 0 else None

@@ -1,0 +1,132 @@
+"""What is used to fit, to choose and to test; each split is one function."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mckibben.errors import DataError
+from mckibben.recording import Recording
+
+Mask = NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Split:
+    """Data to fit, and data to test on.
+
+    Parameters
+    ----------
+    train : tuple of Recording
+        Used to fit and to choose.
+    test : tuple of Recording
+        Run free from their own start or, where they continue a training recording, from its memory.
+    test_rows : tuple of bool arrays
+        For every test recording, the samples that are scored.
+    described : str
+        The split in words.
+    """
+
+    train: tuple[Recording, ...]
+    test: tuple[Recording, ...]
+    test_rows: tuple[Mask, ...]
+    described: str
+
+
+@dataclass(frozen=True)
+class Fold:
+    """One part of a cross-validation: what is fitted, and what is scored.
+
+    Parameters
+    ----------
+    train, train_rows
+        Recordings to fit, and their samples that count.
+    test, test_rows
+        Recordings to run free, and their samples that are scored.
+    """
+
+    train: tuple[Recording, ...]
+    train_rows: tuple[Mask, ...]
+    test: tuple[Recording, ...]
+    test_rows: tuple[Mask, ...]
+
+
+def given_split(train: Sequence[Recording], test: Sequence[Recording]) -> Split:
+    """Return the split that the user gave.
+
+    The first sample of a test recording that continues no training recording is used to start its
+    memory, so it is not scored.
+    """
+    rows = []
+    for recording in test:
+        mask = np.ones(len(recording), dtype=bool)
+        mask[0] = predecessor(recording, train) is not None
+        rows.append(mask)
+    described = f"{len(train)} recording(s) to fit, {len(test)} to test"
+    return Split(tuple(train), tuple(test), tuple(rows), described)
+
+
+def held_out_tail(recordings: Sequence[Recording], share: float) -> Split:
+    """Hold out the last part of the last recording, of which nothing is seen while fitting.
+
+    The test runs through the whole recording, so that its memory is right, and scores the tail only.
+
+    Parameters
+    ----------
+    share : float
+        Of the recording's samples to hold out, between 0 and 1.
+
+    Raises
+    ------
+    DataError
+        If either part would have fewer than ten samples.
+    """
+    *others, last = recordings
+    start = round(len(last) * (1 - share))
+    if min(start, len(last) - start) < 10:
+        raise DataError(
+            f"{len(last)} samples are too few to hold out {share:.0%} for a test",
+            file=last.source,
+            remedy="give a longer recording, or a test recording of its own with --test",
+        )
+    mask = np.zeros(len(last), dtype=bool)
+    mask[start:] = True
+    described = f"last {share:.0%} of {last.name} to test, all before it to fit"
+    return Split((*others, last.slice(0, start)), (last,), (mask,), described)
+
+
+def folds(train: Sequence[Recording], channel: str, n: int) -> Iterator[Fold]:
+    """Yield the parts of a cross-validation over recordings, or over blocks of cycles of a single one.
+
+    Parameters
+    ----------
+    channel : str
+        The input, whose cycles make the blocks.
+    n : int
+        Largest number of parts, at least 2.
+    """
+    if len(train) > 1:
+        for group in np.array_split(np.arange(len(train)), min(n, len(train))):
+            kept = tuple(r for index, r in enumerate(train) if index not in group)
+            left = tuple(train[index] for index in group)
+            yield Fold(kept, _all_rows(kept), left, _all_rows(left))
+        return
+    from mckibben.signals import split_cycles
+
+    (recording,) = train
+    for start, stop in split_cycles(recording, channel, n):
+        mask = np.zeros(len(recording), dtype=bool)
+        mask[start:stop] = True
+        yield Fold((recording,), (~mask,), (recording,), (mask,))
+
+
+def predecessor(recording: Recording, others: Sequence[Recording]) -> Recording | None:
+    """Return the recording among others that this one continues, or None."""
+    return next((other for other in others if recording.continues(other)), None)
+
+
+def _all_rows(recordings: Sequence[Recording]) -> tuple[Mask, ...]:
+    return tuple(np.ones(len(recording), dtype=bool) for recording in recordings)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Hashable, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,7 +42,7 @@ class Run:
         return samples if self.peak is None else samples[1:]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class TrainingData:
     """All runs to identify from, with the ranges and units that they share."""
 
@@ -51,6 +51,13 @@ class TrainingData:
     output: str
     input_unit: str
     output_unit: str
+    _memo: dict[Hashable, Array] = field(default_factory=dict, init=False, repr=False)
+
+    def once(self, key: Hashable, compute: Callable[[], Array]) -> Array:
+        """Return what ``compute`` gives, computed at the first call with this key only."""
+        if key not in self._memo:
+            self._memo[key] = compute()
+        return self._memo[key]
 
     @property
     def input_range(self) -> tuple[float, float]:

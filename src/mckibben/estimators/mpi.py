@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
@@ -16,7 +17,7 @@ from mckibben.estimators.data import Run, TrainingData
 from mckibben.estimators.output_maps import MAPS, OutputMap, output_map
 from mckibben.estimators.pi import play_operators
 from mckibben.estimators.search import solve_linear
-from mckibben.estimators.separable import LEAST_REVERSIBLE, SeparableEstimator
+from mckibben.estimators.separable import LEAST_REVERSIBLE, SeparableEstimator, counting
 from mckibben.estimators.thresholds import SPACINGS, spread
 
 Array = NDArray[np.float64]
@@ -85,12 +86,7 @@ class MPIEstimator(SeparableEstimator):
         """Return the weights of the best PI model, and two even distributions."""
         low, high = data.input_range
         radii = self.radii(data)
-        matrix = np.concatenate(
-            [
-                run.trim(play_operators(run.history, radii, "first_sample"))[run.counts]
-                for run in data.runs
-            ]
-        )
+        matrix = counting(data, lambda run: play_operators(run.history, radii, self.starting_rule))
         weights, _ = solve_linear(matrix, data.target, nonnegative=True)
         top = weights.max() if weights.max() > 0 else 1.0
         fading = np.exp(-3 * radii / (high - low))
@@ -109,14 +105,26 @@ class MPIEstimator(SeparableEstimator):
         floor = total * low - lag if self.starting_rule == "first_sample" else total * low
         return floor, max(total * high - (lag if floor < 0 or low >= 0 else 0.0), floor + 1e-12)
 
-    def argument(self, theta: Array, run: Run, data: TrainingData) -> Array:
-        """Return the weighted operators, scaled to run from 0 to 1, over the run's history."""
-        low, high = self.level(theta, data)
-        return np.asarray((self.operators(run, data) @ theta - low) / (high - low))
-
     def basis(self, theta: Array, run: Run, data: TrainingData) -> Array:
         """Return the pieces of the map over the run's history."""
-        return self.map.pieces(self.argument(theta, run, data))
+        return self._pieces(theta, self.operators(run, data), data)
+
+    def matrix(self, theta: Array, data: TrainingData) -> Array:
+        """Return the basis at the samples that count; the operators are computed only once."""
+        operators = data.once(self.operators_key, lambda: counting(data, self._operators_of(data)))
+        return self._pieces(theta, operators, data)
+
+    @property
+    def operators_key(self) -> tuple[object, ...]:
+        """What the operators depend on beside the data."""
+        return ("operators", self.n_operators, self.spacing, self.initial)
+
+    def _operators_of(self, data: TrainingData) -> Callable[[Run], Array]:
+        return lambda run: self.operators(run, data)
+
+    def _pieces(self, theta: Array, operators: Array, data: TrainingData) -> Array:
+        low, high = self.level(theta, data)
+        return self.map.pieces((operators @ theta - low) / (high - low))
 
     def least(self, matrix: Array, data: TrainingData) -> Array:
         """Return a little of every piece, so that the map increases everywhere."""

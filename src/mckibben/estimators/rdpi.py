@@ -98,6 +98,11 @@ class RDPIEstimator(MPIEstimator):
         relative = self.rate(run) / self.fastest(data)
         return np.column_stack([play, play * relative[:, np.newaxis]])
 
+    @property
+    def operators_key(self) -> tuple[object, ...]:
+        """What the operators depend on beside the data."""
+        return (*super().operators_key, self.rate_time_constant)
+
     def first_part(self, weights: Array, offset: float, data: TrainingData) -> Block:
         """Return the hysteresis part."""
         n = self.n_operators

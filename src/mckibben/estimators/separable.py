@@ -7,6 +7,7 @@ are the exact (non-negative) least-squares solution, so the search runs in a han
 from __future__ import annotations
 
 from abc import abstractmethod
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -169,13 +170,12 @@ class SeparableEstimator(Estimator):
                 peaks[index] = None
         return data.with_peaks(peaks)
 
-    def _matrix(self, theta: Array, data: TrainingData) -> Array:
-        return np.concatenate(
-            [run.trim(self.basis(theta, run, data))[run.counts] for run in data.runs]
-        )
+    def matrix(self, theta: Array, data: TrainingData) -> Array:
+        """Return the basis at the samples that count, of all runs, shape (samples, k)."""
+        return counting(data, lambda run: self.basis(theta, run, data))
 
     def _solve(self, theta: Array, data: TrainingData) -> tuple[Array, float]:
-        return self._solve_for(self._matrix(theta, data), data)
+        return self._solve_for(self.matrix(theta, data), data)
 
     def _solve_for(self, matrix: Array, data: TrainingData) -> tuple[Array, float]:
         least = self.least(matrix, data)
@@ -200,7 +200,7 @@ class SeparableEstimator(Estimator):
         return floor
 
     def _residuals(self, theta: Array, data: TrainingData) -> Array:
-        matrix = self._matrix(theta, data)
+        matrix = self.matrix(theta, data)
         if not np.isfinite(matrix).all():
             return np.full(data.target.size, WORST)
         linear, offset = self._solve_for(matrix, data)
@@ -215,6 +215,11 @@ class SeparableEstimator(Estimator):
             return np.sqrt(np.mean((outputs - data.target) ** 2, axis=1))
 
         return template.unpack(particle_swarm(costs, lower, upper, self.swarm, tracker, self.seed))
+
+
+def counting(data: TrainingData, over_history: Callable[[Run], Array]) -> Array:
+    """Return what is computed over the runs' histories, at the samples that count, of all runs."""
+    return np.concatenate([run.trim(over_history(run))[run.counts] for run in data.runs])
 
 
 def _rms(residuals: Array) -> float:

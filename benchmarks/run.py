@@ -1,0 +1,167 @@
+"""Measure speed, beside plain NumPy and C, and print one table.
+
+Run: python benchmarks/run.py [--quick]
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import platform
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+from references import Compiled, numpy_gpi, numpy_pi
+
+from mckibben import GPI, PI, GPIEstimator, Recording, RDPIEstimator, MPIEstimator
+from mckibben.blocks.base import Block
+from mckibben.blocks.envelopes.tanh import Tanh
+
+Array = NDArray[np.float64]
+
+
+def processor() -> str:
+    """Return the name of the processor."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text().splitlines()
+        return next(line.split(":")[1].strip() for line in lines if line.startswith("model name"))
+    except (OSError, StopIteration):
+        return platform.processor()
+
+
+def best_of(runs: int, function: Callable[[], object]) -> float:
+    """Return the shortest time of several calls [s]; the first is not counted."""
+    function()
+    times = []
+    for _ in range(runs):
+        started = time.perf_counter()
+        function()
+        times.append(time.perf_counter() - started)
+    return min(times)
+
+
+def excitation(n: int) -> Array:
+    """Return a sine whose amplitude grows over five cycles, from 0 to at most 5 bar."""
+    t = np.linspace(0, 1, n)
+    return 0.5 * (0.3 + 0.7 * np.floor(5 * t).clip(0, 4) / 4) * 5 * (1 - np.cos(10 * np.pi * t))
+
+
+def models(n: int) -> tuple[PI, GPI]:
+    """Return a PI and a GPI model with ``n`` operators each."""
+    weights = tuple(np.linspace(2.0, 0.5, n).tolist())
+    pi = PI(tuple(np.linspace(0, 2.4, n).tolist()), weights, 1.0, (0.0, 5.0))
+    rising, falling = Tanh.examples()
+    radii = tuple(np.linspace(0, 0.9, n).tolist())
+    return pi, GPI(radii, weights, rising, falling, (0.0, 5.0))
+
+
+def kernels(quick: bool) -> None:
+    """Nanoseconds per operator and sample."""
+    u = excitation(200_000)
+    with tempfile.TemporaryDirectory() as folder:
+        compiled = Compiled(Path(folder)) if Compiled.available() else None
+        print("\nkernels, one core, 200 000 samples [ns per operator and sample]")
+        print(
+            f"{'model':>6} {'operators':>9} {'mckibben':>9} {'64 at once':>10} {'C -O3':>7} {'NumPy':>7}"
+        )
+        for n in (10, 100):
+            for block in models(n):
+                scale = 1e9 / (u.size * n)
+                ours = best_of(5, lambda block=block: block.simulate(u)) * scale
+                many = batched(block, u[:20_000]) * 1e9 / (20_000 * n * 64)
+                short = u[:: 20 if quick else 4]
+                reference = numpy_pi if isinstance(block, PI) else numpy_gpi
+                slow = best_of(1, lambda: reference(block, short)) * 1e9 / (short.size * n)  # type: ignore[arg-type]
+                c = float("nan")
+                if compiled is not None:
+                    call = compiled.pi if isinstance(block, PI) else compiled.gpi
+                    c = best_of(5, lambda: call(block, u)) * scale  # type: ignore[arg-type]
+                print(f"{block.kind:>6} {n:>9} {ours:9.3f} {many:10.3f} {c:7.3f} {slow:7.1f}")
+        pi, gpi = models(10)
+        envelopes = best_of(5, lambda: (gpi.rising(u), gpi.falling(u))) * 1e9 / u.size
+        print(f"both tanh envelopes: {envelopes:.1f} ns a sample")
+
+
+def batched(block: Block, u: Array) -> float:
+    """Return the time of 64 parameter sets at once [s], on all cores."""
+    sets = np.repeat(block.pack()[np.newaxis], 64, axis=0)
+    return best_of(3, lambda: block.simulate_many(sets, u))
+
+
+def fits(quick: bool) -> None:
+    """Time and error of GPI identification, beside particle swarms on all parameters."""
+    u = excitation(10_000)
+    _, truth = models(11)
+    creep = 0.15 * np.sin(np.linspace(0, 9, u.size))
+    noise = 0.02 * np.random.default_rng(0).standard_normal(u.size)
+    recording = Recording({"pressure": u, "displacement": truth.simulate(u) + creep + noise}, 0.01)
+    estimator = GPIEstimator(n_operators=10)
+    seconds = best_of(3, lambda: estimator.fit(recording))
+    print("\nGPI, N = 10, on 10 000 samples of progressive amplitude")
+    print(
+        f"  variable projection, multi-start: {seconds:.2f} s, RMSE {estimator.diagnostics_.rmse:.4f} mm"
+    )
+    for name, settings in (
+        ("c1 = c2 = 2, inertia .9 to .4", {}),
+        (
+            "c1 = c2 = 0.5, inertia .7",
+            {"pso_c1": 0.5, "pso_c2": 0.5, "pso_inertia_start": 0.7, "pso_inertia_end": 0.7},
+        ),
+    ):
+        ends, started = [], time.perf_counter()
+        for seed in range(5 if quick else 20):
+            swarm = GPIEstimator(n_operators=10, method="pso", seed=seed, **settings).fit(recording)
+            ends.append(swarm.diagnostics_.rmse)
+        each = (time.perf_counter() - started) / len(ends)
+        print(
+            f"  swarm 20 x 50 on all 17, {name}: {each:.2f} s each, RMSE best {min(ends):.4f}, median "
+            f"{np.median(ends):.4f} mm of {len(ends)} seeds"
+        )
+    for other in (MPIEstimator(), RDPIEstimator()):
+        seconds = best_of(1, lambda other=other: other.fit(recording))
+        print(f"  {type(other).__name__}: {seconds:.2f} s, RMSE {other.diagnostics_.rmse:.4f} mm")
+
+
+def streams() -> None:
+    """Latency of one step from Python."""
+    print("\nstream.step from Python [µs]")
+    u = excitation(20_000)
+    pi, gpi = models(10)
+    for name, block, inputs in (
+        ("pi", pi, u),
+        ("pi inverse", pi.inverse(), pi.simulate(u)),
+        ("gpi", gpi, u),
+        ("gpi inverse", gpi.inverse(), gpi.simulate(u)),
+    ):
+        stream = block.stream()
+        times = np.empty(u.size)
+        for t, value in enumerate(inputs.tolist()):
+            started = time.perf_counter_ns()
+            stream.step(value)
+            times[t] = time.perf_counter_ns() - started
+        percentiles = np.percentile(times[100:] / 1e3, [50, 99, 99.9])
+        print(
+            f"  {name:>12}: "
+            + ", ".join(f"p{p} {v:.1f}" for p, v in zip((50, 99, 99.9), percentiles, strict=True))
+        )
+
+
+def main() -> None:
+    """Print everything."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--quick", action="store_true", help="fewer repetitions")
+    quick = parser.parse_args().quick
+    print(f"{processor()}, {os.cpu_count()} cores; {platform.platform()}")
+    print(f"Python {platform.python_version()}, numba {numba.__version__}, NumPy {np.__version__}")
+    kernels(quick)
+    fits(quick)
+    streams()
+
+
+if __name__ == "__main__":
+    main()

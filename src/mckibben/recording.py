@@ -74,7 +74,9 @@ class Recording:
     def __post_init__(self) -> None:
         channels = {name: _frozen(name, samples) for name, samples in self.channels.items()}
         if not channels:
-            raise DataError("a recording needs at least one channel", remedy="name a column to read")
+            raise DataError(
+                "a recording needs at least one channel", remedy="name a column to read"
+            )
         lengths = {name: samples.size for name, samples in channels.items()}
         if len(set(lengths.values())) > 1:
             raise DataError(
@@ -183,7 +185,9 @@ class Recording:
         """Return several channels side by side, shape (n, number of channels)."""
         return np.column_stack([self[name] for name in channels])
 
-    def with_channels(self, units: Mapping[str, str] | None = None, /, **samples: ArrayLike) -> Recording:
+    def with_channels(
+        self, units: Mapping[str, str] | None = None, /, **samples: ArrayLike
+    ) -> Recording:
         """Return a recording with channels added or replaced."""
         added = {name: np.asarray(values, dtype=float) for name, values in samples.items()}
         kept = {name: unit for name, unit in self.units.items() if name not in added}

@@ -39,7 +39,7 @@ from mckibben.blocks.base import (
 )
 from mckibben.blocks.kernels import kernel, summing_kernel
 from mckibben.blocks.memory import check_thresholds, play_state
-from mckibben.blocks.root import solve_increasing
+from mckibben.blocks.root import solve_near
 from mckibben.blocks.saving import nested
 from mckibben.blocks.single import Inverse, Ranged, check_input_range
 from mckibben.errors import ModelError
@@ -99,7 +99,7 @@ def eupi_inverse_kernel(coefficients: Array, state: Array, inputs: Array, output
     n = state.size - 2
     lowest, highest = coefficients[-2], coefficients[-1]
     for t in range(inputs.shape[0]):
-        u, clipped = solve_increasing(
+        u, clipped = solve_near(
             _trial, inputs[t, 0], state[n], lowest, highest, (coefficients, state)
         )
         x = u - coefficients[0]

@@ -6,7 +6,9 @@ MPI model of "High-Precision Displacement and Force Hybrid Modeling of Pneumatic
 Using 3D PI-NARMAX Model", Eqs. (2) to (4).
 
 The rate depends on the input looked for, so the inverse is solved for every sample, until the bracket
-closes: within 1e-10 of the output's range.
+closes: within 1e-10 of the output's range. Where the output falls at first when the input jumps up
+(strongly negative weights by rate and a short filter), a model has solutions that swing ever wider;
+the inverse then runs into the input limits and says so. A longer `rate_time_constant` mends it.
 """
 
 from __future__ import annotations
@@ -37,7 +39,8 @@ from mckibben.blocks.base import (
 )
 from mckibben.blocks.kernels import kernel, summing_kernel
 from mckibben.blocks.memory import check_invertible_sum, check_thresholds, play_state
-from mckibben.blocks.root import solve_increasing
+from mckibben.blocks.pi import PI
+from mckibben.blocks.root import solve_near
 from mckibben.blocks.saving import nested
 from mckibben.blocks.single import Inverse, Ranged, check_input_range
 from mckibben.errors import ModelError
@@ -97,7 +100,7 @@ def rate_dependent_pi_inverse_kernel(
     n = state.size - 3
     lowest, highest = coefficients[-2], coefficients[-1]
     for t in range(inputs.shape[0]):
-        u, clipped = solve_increasing(
+        u, clipped = solve_near(
             _trial, inputs[t, 0], state[n], lowest, highest, (coefficients, state)
         )
         rate = coefficients[0] * state[n + 1] + coefficients[1] * (u - state[n])
@@ -211,6 +214,11 @@ class RateDependentPI(Ranged, Primitive):
             at rest is not positive.
         """
         return RateDependentPIInverse(self)
+
+    def reachable(self) -> tuple[Array, Array]:
+        """Return the outputs that can be reached at rest whatever happened before."""
+        at_rest = PI(self.thresholds, self.weights, self.offset, self.input_range)
+        return at_rest.reachable()
 
     @classmethod
     def example(cls) -> Self:

@@ -8,32 +8,44 @@ import numba
 
 
 @numba.njit(inline="always", nogil=True, error_model="numpy")
-def solve_increasing(
+def solve_near(
     evaluate: Any, target: float, start: float, lowest: float, highest: float, memory: Any
 ) -> tuple[float, bool]:
     """Find u with ``evaluate(u, memory) == target``, nearest to ``start``, within the limits.
 
-    Walks from ``start`` towards the target in growing steps until it is bracketed, then closes the
-    bracket by regula falsi (Illinois) and bisection until nothing lies between its ends. Returns u,
-    and whether a limit was reached first.
+    Walks from ``start`` in growing steps, both ways in turn, until the target is bracketed, then closes
+    the bracket by regula falsi (Illinois) and bisection until nothing lies between its ends. Returns u,
+    and whether both limits were reached without a solution; u is then the limit that came closest.
     """
     tiny = 1e-15 * (highest - lowest)
-    near, error_near = start, evaluate(start, memory) - target
-    if error_near == 0.0:
-        return near, False
-    direction = -1.0 if error_near > 0.0 else 1.0
+    error_start = evaluate(start, memory) - target
+    if abs(error_start) <= 1e-14 * abs(target):
+        return start, False
+    above, error_above = start, error_start
+    below, error_below = start, error_start
+    near, error_near, far, error_far = start, error_start, start, error_start
+    direction = -1.0 if error_start > 0.0 else 1.0
     step = (highest - lowest) / 256.0
     while True:
-        far = min(max(near + direction * step, lowest), highest)
-        error_far = evaluate(far, memory) - target
+        if direction > 0.0:
+            near, error_near = above, error_above
+            above = min(above + step, highest)
+            error_above = evaluate(above, memory) - target
+            far, error_far = above, error_above
+        else:
+            near, error_near = below, error_below
+            below = max(below - step, lowest)
+            error_below = evaluate(below, memory) - target
+            far, error_far = below, error_below
         if error_far == 0.0:
             return far, False
-        if (error_far > 0.0) != (error_near > 0.0):
+        if (error_far > 0.0) != (error_start > 0.0):
             break
-        if far in (lowest, highest):
-            return far, True
-        near, error_near = far, error_far
-        step *= 2.0
+        if above == highest and below == lowest:
+            return (above, True) if abs(error_above) < abs(error_below) else (below, True)
+        direction = -direction
+        if direction * error_start < 0.0:
+            step *= 1.5
     weight_near, weight_far = error_near, error_far
     side = 0
     for iteration in range(200):

@@ -101,11 +101,11 @@ def multi_start(
     def evaluate(point: Array) -> Array:
         try:
             r = residuals(point)
+            tracker.saw(point, float(np.sqrt(np.mean(r**2))))
         except KeyboardInterrupt:
             if tracker.best is None:
                 raise
             raise Interrupted from None
-        tracker.saw(point, float(np.sqrt(np.mean(r**2))))
         return r
 
     inside = [np.clip(start, lower, upper) for start in starts]

@@ -1,0 +1,145 @@
+"""Column headers as people write them, read as a channel of the package and a unit."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+from mckibben.files.units import find, find_listed
+from mckibben.recording import standard_unit
+
+ALIASES: dict[str, str] = {
+    "time": "t time timestamp time_stamp datetime elapsed elapsed_time zeit",
+    "pressure": "p press pressure druck",
+    "voltage": "u voltage valve_voltage command_voltage spannung",
+    "displacement": "disp displacement pos position stroke shortening weg hub",
+    "length": "l length länge laenge",
+    "contraction": "contraction contraction_ratio kontraktion",
+    "force": "f force load kraft",
+    "velocity": "velocity vel speed geschwindigkeit",
+    "angle": "angle theta winkel",
+    "temperature": "temperature temp temperatur",
+}
+"""Standard channel -> the names that people give it, in lower snake case."""
+
+_CHANNELS = {alias: channel for channel, names in ALIASES.items() for alias in names.split()}
+_NUMBERED = {alias for alias in _CHANNELS if len(alias) > 1} | {"p"}
+_EXTENSOR = {"extensor", "ext"}
+_DOUBTFUL = {"in", "min", "rev", "turn"}
+"""Endings that are units only where the channel suits: ``pressure_in`` is that of an inlet."""
+_LETTERS = {"m", "s", "N", "V"}
+"""Single letters that are units after any name but a standard one: ``u1_V``, not ``pressure_A``."""
+_GAUGE_ENDINGS = {"barg", "bara", "psig", "psia"}
+
+_BRACKETED = re.compile(r"(?P<name>.*?)[\s_,/]*[\[(](?P<unit>[^\[\]()]*(?:\([^()]*\))?)[\])]")
+_STATED = (
+    re.compile(r"(?P<name>.*\S)\s+(?P<unit>[^\s/]+/[^\s/]+)"),  # speed mm/s
+    re.compile(r"(?P<name>.*\S)\s+in\s+(?P<unit>\S+)"),  # Kraft in N
+    re.compile(r"(?P<name>[^/]*[^/\s])\s*/\s*\(?(?P<unit>[^()]*)\)?"),  # length/mm
+)
+_ENDINGS = (
+    re.compile(r"(?P<name>.*[^\s_])[\s_]*(?P<unit>%|°C|°F|°)"),  # contraction_%, angle°
+    re.compile(r"(?P<name>.*[^\s_])[\s_]+(?P<unit>[^\s_]+_s)"),  # velocity_mm_s
+    re.compile(r"(?P<name>.*[^\s_,.:;-])[\s_,.:;-]+(?P<unit>[^\s_,.:;-]+)"),  # force_N, Druck, bar
+)
+
+
+@dataclass(frozen=True)
+class Header:
+    """What a header says: ``name`` without the unit, and the unit's text or None."""
+
+    name: str
+    unit: str | None
+
+
+def parse(text: str) -> Header:
+    """Split a header into name and unit.
+
+    >>> parse("Pressure (kPa)"), parse("length/mm")
+    (Header(name='Pressure', unit='kPa'), Header(name='length', unit='mm'))
+    >>> parse("valve_voltage_V"), parse("pressure_in")
+    (Header(name='valve_voltage', unit='V'), Header(name='pressure_in', unit=None))
+    """
+    text = text.strip()
+    bracketed = _BRACKETED.fullmatch(text)
+    if bracketed and bracketed["name"] and not _EXTENSOR & set(_words(bracketed["unit"])):
+        return Header(bracketed["name"], bracketed["unit"].strip())
+    for form in _STATED:
+        match = form.fullmatch(text)
+        if match and find(match["unit"]) is not None:
+            return Header(match["name"], match["unit"].strip())
+    for form in _ENDINGS:
+        match = form.fullmatch(text)
+        if match and _is_unit(match["unit"], match["name"]):
+            return Header(match["name"], match["unit"])
+    return Header(text, None)
+
+
+def channel_of(header: Header) -> str:
+    """Return the channel that a header names: a standard one, or its name in lower snake case.
+
+    >>> channel_of(parse("P1 [bar]")), channel_of(parse("u1_V")), channel_of(parse("f [Hz]"))
+    ('pressure_1', 'u1', 'f')
+    """
+    name = snake_case(header.name)
+    standard = _standard(name)
+    if standard is None or header.unit is None:
+        return standard or name
+    unit = find(header.unit)
+    base = standard.partition("_")[0]
+    if unit is None or unit.target == unit_of(base):
+        return standard
+    if base == "contraction" and unit.target == "mm":
+        return standard.replace("contraction", "displacement")
+    # The unit decides about names that can mean other things: "f [Hz]" is no force, "load [kg]" is
+    # no newtons. A plain "pressure [mm]" stays a pressure, and is refused later.
+    return standard if name.startswith(base) else name
+
+
+def unit_of(channel: str) -> str | None:
+    """Return the package's unit of a standard channel or of time, or None for other channels."""
+    return "s" if channel == "time" else standard_unit(channel)
+
+
+def snake_case(name: str) -> str:
+    """Return a name in lower snake case.
+
+    >>> snake_case("Valve Voltage"), snake_case("TipPosition-2")
+    ('valve_voltage', 'tip_position_2')
+    """
+    return "_".join(_words(re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name)))
+
+
+def _words(text: str) -> list[str]:
+    return [word for word in re.split(r"[\W_]+", text.casefold()) if word]
+
+
+def _standard(name: str) -> str | None:
+    words = name.split("_")
+    if _EXTENSOR & set(words):
+        others = "_".join(word for word in words if word not in _EXTENSOR)
+        if _CHANNELS.get(others.rstrip("0123456789").rstrip("_")) == "pressure":
+            return "pressure_extensor"
+    if name in _CHANNELS:
+        return _CHANNELS[name]
+    numbered = re.fullmatch(r"(?P<alias>.*?)_?(?P<number>[0-9]+)", name)
+    if numbered and numbered["alias"] in _NUMBERED:
+        channel = _CHANNELS[numbered["alias"]]
+        return None if channel == "time" else f"{channel}_{numbered['number']}"
+    return None
+
+
+def _is_unit(text: str, name: str) -> bool:
+    """Tell whether the ending of a header is a unit and no part of the name."""
+    if text in ("-", "1", "none"):
+        return False
+    unit = find_listed(text) or (find(text) if text.casefold() in _GAUGE_ENDINGS else None)
+    expected = unit_of(_standard(snake_case(name)) or snake_case(name))
+    if unit is None:  # force_n, valve_voltage_v
+        capital = find_listed(text.upper()) if len(text) == 1 else None
+        return capital is not None and capital.target == expected
+    if unit.target == expected or (expected == "" and unit.target == "mm"):
+        return True
+    if text.casefold() in _DOUBTFUL or len(text) == 1 and text.isalpha():
+        return expected is None and text in _LETTERS
+    return True

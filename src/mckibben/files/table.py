@@ -1,0 +1,127 @@
+"""A table: the columns of a file as they stand in it, before anything is read into them."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mckibben.errors import DataError
+from mckibben.recording import Array
+
+MAX_SAMPLES = 250_000_000
+"""Samples of one file (2 GB of memory); one that declares more is refused before it is read."""
+
+
+@dataclass(frozen=True)
+class Column:
+    """One column of a file.
+
+    Parameters
+    ----------
+    header : str
+        As written in the file.
+    values : numpy.ndarray, shape (n,), or None
+        The samples, NaN where a cell is blank; None for a column of text.
+    unit : str, optional
+        The unit where the file states it apart from the header.
+    texts : sequence of str, length n
+        The cells of a column of text.
+    flaw : (int, str), optional
+        Sample, from 0, and text of the first cell that should be a number and is not.
+    """
+
+    header: str
+    values: Array | None
+    unit: str | None = None
+    texts: Sequence[str] = ()
+    flaw: tuple[int, str] | None = None
+
+
+@dataclass(frozen=True)
+class Table:
+    """The columns of one recording in a file, all of one length.
+
+    Parameters
+    ----------
+    columns : tuple of Column
+        At least one.
+    lines : numpy.ndarray of int, shape (n,), optional
+        The line of a text file that each sample stands in; samples count from 1 without.
+    sample_time, start_time : float
+        The time grid [s] where the file states it; ``sample_time`` is None otherwise.
+    meta : mapping
+        What else the file holds.
+    name : str, optional
+        The name of this recording among several in the file.
+    own : bool
+        Whether this package wrote it: names, units and meta then stand as they are.
+    """
+
+    columns: tuple[Column, ...]
+    lines: NDArray[np.int64] | None = None
+    sample_time: float | None = None
+    start_time: float = 0.0
+    meta: Mapping[str, Any] = field(default_factory=dict)
+    name: str | None = None
+    own: bool = False
+
+    def row(self, sample: int) -> int:
+        """Return the row to name in an error for a sample counted from 0."""
+        return sample + 1 if self.lines is None else int(self.lines[sample])
+
+
+def column(header: str, values: NDArray[Any], unit: str | None = None) -> Column:
+    """Return the column of an array of any type; instants become seconds since the first."""
+    if np.issubdtype(values.dtype, np.datetime64):
+        since = (values - values[:1]).astype("timedelta64[ns]").astype(np.float64) * 1e-9
+        return Column(header, np.where(np.isnat(values), np.nan, since), "s")
+    if np.issubdtype(values.dtype, np.timedelta64):
+        seconds = values.astype("timedelta64[ns]").astype(np.float64) * 1e-9
+        return Column(header, np.where(np.isnat(values), np.nan, seconds), "s")
+    if values.dtype.kind in "biuf":
+        return Column(header, np.asarray(values, dtype=np.float64), unit)
+    return Column(header, None, unit, texts=[str(value) for value in values])
+
+
+def of_equal_length(
+    columns: Mapping[str, Column], path: Path, *, meta: Mapping[str, Any], name: str | None = None
+) -> Table:
+    """Return the table of the columns that have the commonest length, the longest of several.
+
+    Parameters
+    ----------
+    columns : mapping of str to Column
+        By their place in the file; those that are left out are listed in the table's ``meta``.
+    """
+    lengths = Counter(_length(column) for column in columns.values() if _length(column) > 1)
+    if not lengths:
+        raise DataError(
+            "there are no vectors of numbers in it",
+            file=path,
+            remedy="save each channel as one vector, all of one length",
+        )
+    common = max(lengths, key=lambda length: (lengths[length], length))
+    left_out = [place for place, column in columns.items() if _length(column) != common]
+    kept = tuple(column for column in columns.values() if _length(column) == common)
+    listed = {"ignored_columns": left_out} if left_out else {}
+    return Table(kept, meta={**meta, **listed}, name=name)
+
+
+def refuse_huge(samples: int, path: Path) -> None:
+    """Raise a `DataError` if a file declares more samples than are reasonable to hold."""
+    if samples > MAX_SAMPLES:
+        raise DataError(
+            f"it declares {samples} samples, more than the {MAX_SAMPLES} that are read at once",
+            file=path,
+            remedy="split the file, or check that it is not damaged",
+        )
+
+
+def _length(column: Column) -> int:
+    return len(column.texts) if column.values is None else column.values.size

@@ -1,0 +1,218 @@
+"""What every estimator must do, and what each does on data of its own making."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from sklearn.base import clone
+from sklearn.model_selection import GridSearchCV, cross_val_score
+
+from mckibben import (
+    EUPI,
+    GPI,
+    PI,
+    DataError,
+    EUPIEstimator,
+    GPIEstimator,
+    ModelError,
+    MPIEstimator,
+    PIEstimator,
+    RateDependentPI,
+    RDPIEstimator,
+    Recording,
+    Series,
+)
+from mckibben.blocks.base import Block
+from mckibben.registry import load, names
+
+TIME = np.linspace(0, 1, 1500)
+PRESSURE = 2.5 * (1 - 0.7 * np.floor(6 * TIME).clip(0, 5) / 5) * (1 - np.cos(12 * np.pi * TIME))
+ESTIMATORS = names("estimators")
+
+
+def recorded(block: Block, noise: float = 0.0, seed: int = 0) -> Recording:
+    """Return a recording of a block under decaying cycles from 0 bar."""
+    rng = np.random.default_rng(seed)
+    y = block.simulate(PRESSURE, sample_time=0.01)
+    return Recording(
+        {"pressure": PRESSURE, "displacement": y + noise * rng.standard_normal(y.size)}, 0.01
+    )
+
+
+def quick(name: str, **settings: Any) -> Any:
+    """Return an estimator with settings that make it quick."""
+    known = load("estimators", name)().get_params()
+    cheap = {"n_operators": 4, "n_starts": 4, "n_refined": 1, "rate_time_constant": 0.0}
+    return load("estimators", name)(**{k: v for k, v in cheap.items() if k in known} | settings)
+
+
+@pytest.fixture(scope="module")
+def loop() -> Recording:
+    """A saturating loop with noise."""
+    return recorded(GPI.example(), 0.02)
+
+
+@pytest.mark.parametrize("name", ESTIMATORS)
+def test_fit_returns_self_repeats_and_leaves_settings_and_data_alone(
+    name: str, loop: Recording
+) -> None:
+    estimator = quick(name)
+    before, samples = estimator.get_params(), loop["displacement"].copy()
+    assert estimator.fit(loop) is estimator
+    assert estimator.get_params() == before
+    np.testing.assert_array_equal(samples, loop["displacement"])
+    assert clone(estimator).fit([loop]).model_ == estimator.model_
+    assert estimator.diagnostics_.n_samples == len(loop)
+
+
+@pytest.mark.parametrize("name", ESTIMATORS)
+def test_every_fit_can_be_inverted(name: str, loop: Recording) -> None:
+    if name == "rdpi":
+        loop = recorded(replace(RateDependentPI.example(), rate_weights=(0.01, 0.02, 0.01, 0.0)))
+    model = quick(name).fit(loop).model_
+    low, high = (float(end[0]) for end in model.reachable())
+    assert low < high
+    t = np.linspace(0, 1, 400)
+    wave = 0.5 + 0.35 * np.sin(9 * t) + 0.1 * np.sin(40 * t)
+    reference = low + (high - low) * wave
+    pressure = model.inverse().simulate(reference, sample_time=0.01)
+    error = np.abs(model.simulate(pressure, sample_time=0.01) - reference).max()
+    assert error <= 1e-9 * (high - low)
+
+
+@pytest.mark.parametrize("name", ESTIMATORS)
+@pytest.mark.parametrize("method", ["pso", "pso-ls"])
+def test_swarms_fit_too_and_repeat(name: str, method: str, loop: Recording) -> None:
+    settings = {"method": method, "pso_particles": 6, "pso_iterations": 4, "seed": 3}
+    first, second = (quick(name, **settings).fit(loop) for _ in range(2))
+    assert first.model_ == second.model_
+    assert first.diagnostics_.rmse < 2 * np.ptp(loop["displacement"])
+
+
+@pytest.mark.parametrize("name", ESTIMATORS)
+def test_outputs_that_do_not_count_are_never_looked_at(name: str, loop: Recording) -> None:
+    mask = np.ones(len(loop), dtype=bool)
+    mask[500:900] = False
+    spoilt = loop["displacement"].copy()
+    spoilt[500:900] = 1e3
+    clean = quick(name).fit(loop, rows=[mask]).model_
+    assert quick(name).fit(loop.with_channels(displacement=spoilt), rows=[mask]).model_ == clean
+
+
+@pytest.mark.parametrize("name", ESTIMATORS)
+def test_bad_settings_and_bad_data_are_refused(name: str, loop: Recording) -> None:
+    for setting in ({"method": "magic"}, {"initial": "yesterday"}, {"n_operators": -1}):
+        with pytest.raises(ModelError, match="Remedy"):
+            quick(name, **setting).fit(loop)
+    still = loop.with_channels(pressure=np.ones(len(loop)))
+    with pytest.raises(DataError, match=r"'pressure'.*constant.*Remedy"):
+        quick(name).fit(still)
+    with pytest.raises(DataError, match="no channel 'force'"):
+        quick(name, output="force").fit(loop)
+    with pytest.raises(DataError, match="too few"):
+        quick(name).fit(loop.slice(0, 5))
+    with pytest.raises(DataError, match="sample time"):
+        quick(name).fit([loop, replace(loop, sample_time=0.02)])
+
+
+def test_pi_recovers_its_own_weights_with_intervals() -> None:
+    truth = PI((0.0, 0.5, 1.0, 1.5), (3.0, 1.5, 1.0, 0.5), 2.0, (0.0, 5.0))
+    inside = []
+    for seed in range(40):
+        fit = PIEstimator(thresholds=truth.thresholds).fit(recorded(truth, 0.05, seed))
+        errors = np.array(fit.diagnostics_.standard_errors)
+        inside.append(np.abs(fit.model_.pack() - truth.pack()) < 1.96 * errors)
+    assert np.abs(fit.model_.pack() - truth.pack()).max() < 0.1
+    assert 0.88 < np.mean(inside) <= 1.0
+
+
+def test_slope_rule_recovers_the_weights_of_a_clean_loop() -> None:
+    truth = PI((0.0, 0.5, 1.0, 1.5), (3.0, 1.5, 1.0, 0.5), 2.0, (0.0, 5.0))
+    t = np.concatenate([np.linspace(0, 5, 401), np.linspace(5, 0, 401), np.linspace(0, 5, 401)])
+    loop = Recording({"pressure": t, "displacement": truth.simulate(t)}, 0.01)
+    second_rise = np.zeros(t.size, dtype=bool)
+    second_rise[802:] = True
+    fit = PIEstimator(thresholds=truth.thresholds, method="slopes").fit(loop, rows=[second_rise])
+    np.testing.assert_allclose(fit.model_.weights, truth.weights, rtol=1e-6)
+    assert fit.model_.offset == pytest.approx(truth.offset, rel=1e-6)
+
+
+@pytest.mark.parametrize("name", ESTIMATORS)
+def test_every_model_fits_data_of_its_own_making_to_the_noise(name: str, loop: Recording) -> None:
+    truth = quick(name).fit(loop).model_
+    again = quick(name, n_starts=16, n_refined=3).fit(recorded(truth, 0.02))
+    assert again.diagnostics_.rmse < 0.021
+
+
+def test_gpi_counts_seventeen_parameters_for_ten_operators(loop: Recording) -> None:
+    assert quick("gpi", n_operators=10).fit(loop).model_.n_parameters == 17
+
+
+@pytest.mark.parametrize("envelope", ["tanh", "exponential", "piecewise-linear"])
+def test_gpi_envelopes_stay_in_order(envelope: str, loop: Recording) -> None:
+    model = quick("gpi", envelope=envelope).fit(loop).model_
+    u = np.linspace(*model.input_range, 5000)
+    assert np.all(model.falling(u) >= model.rising(u))
+    assert np.all(np.diff(model.rising(u)) > 0)
+    assert np.all(np.diff(model.falling(u)) > 0)
+
+
+def test_papers_threshold_rule(loop: Recording) -> None:
+    model = quick("gpi", n_operators=5, threshold_rule="paper").fit(loop).model_
+    np.testing.assert_allclose(model.thresholds, np.arange(6) / 5 * loop["pressure"].max())
+
+
+def test_rate_dependence_is_found() -> None:
+    truth = RateDependentPI(
+        (0.0, 0.6, 1.2), (-0.02, 0.03, 0.02), (3.0, 1.5, 1.0), 0.0, 0.0, (0.0, 5.0)
+    )
+    recording = recorded(truth)
+    static = MPIEstimator(n_operators=5).fit(recording).diagnostics_.rmse
+    rate = RDPIEstimator(n_operators=5, rate_time_constant=0.0).fit(recording).diagnostics_.rmse
+    assert rate < 0.5 * static
+
+
+def test_rate_dependent_model_refuses_data_without_time(loop: Recording) -> None:
+    with pytest.raises(DataError, match=r"no time.*Remedy"):
+        RDPIEstimator().fit(replace(loop, sample_time=None))
+
+
+def test_fitted_start_finds_the_peak_before_the_recording() -> None:
+    truth = PI.example()
+    u = np.concatenate([[4.0], 2.5 + 1.5 * np.cos(np.linspace(np.pi, 30, 600))])
+    y = truth.simulate(u)
+    loop = Recording({"pressure": u[1:], "displacement": y[1:]}, 0.01)
+    settings = {"thresholds": truth.thresholds}
+    blind = PIEstimator(**settings).fit(loop)
+    fitted = PIEstimator(initial="fitted", **settings).fit(loop)
+    assert fitted.diagnostics_.rmse < 0.2 * blind.diagnostics_.rmse
+    assert fitted.diagnostics_.peaks[0] == pytest.approx(4.0, abs=0.05)
+
+
+def test_scikit_learn_tools_work_on_lists_of_recordings(loop: Recording) -> None:
+    runs = [recorded(GPI.example(), 0.02, seed) for seed in range(3)]
+    scores = cross_val_score(quick("pi"), runs, cv=3)
+    assert scores.shape == (3,)
+    assert np.all(scores > 0.8)
+    search = GridSearchCV(quick("pi"), {"n_operators": [1, 6]}, cv=3).fit(runs)
+    assert search.best_params_ == {"n_operators": 6}
+
+
+def test_interrupted_fit_keeps_the_best_model(loop: Recording) -> None:
+    def impatient(share: float, best: float) -> None:
+        if share > 0.3 and share < 1:
+            raise KeyboardInterrupt
+
+    fit = GPIEstimator(n_operators=4).fit(loop, progress=impatient)
+    assert fit.diagnostics_.interrupted
+    assert fit.diagnostics_.rmse < 1.0
+
+
+def test_progress_ends_at_one(loop: Recording) -> None:
+    told: list[float] = []
+    GPIEstimator(n_operators=4).fit(loop, progress=lambda share, best: told.append(share))
+    assert told[-1] == 1.0
+    assert told == sorted(told)

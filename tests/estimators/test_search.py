@@ -1,0 +1,156 @@
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.optimize import lsq_linear
+
+from mckibben.estimators.search import (
+    Swarm,
+    Tracker,
+    multi_start,
+    particle_swarm,
+    solve_linear,
+)
+
+
+@given(st.integers(0, 10_000), st.booleans())
+def test_linear_solution_matches_scipy(seed: int, nonnegative: bool) -> None:
+    rng = np.random.default_rng(seed)
+    basis = rng.standard_normal((60, 5))
+    target = basis @ rng.uniform(-1, 1, 5) + 3 + 0.1 * rng.standard_normal(60)
+    lower = np.array([*([0.0 if nonnegative else -np.inf] * 5), -np.inf])
+    reference = lsq_linear(
+        np.column_stack([basis, np.ones(60)]), target, (lower, np.inf), tol=1e-14, method="bvls"
+    )
+    x, offset = solve_linear(basis, target, nonnegative=nonnegative)
+    np.testing.assert_allclose([*x, offset], reference.x, rtol=1e-6, atol=1e-8)
+
+
+def test_linear_solution_respects_the_least_values() -> None:
+    rng = np.random.default_rng(0)
+    basis = rng.standard_normal((50, 3))
+    least = np.array([0.5, 0.0, 0.1])
+    x, _ = solve_linear(basis, basis @ [0.1, 0.4, -1.0], nonnegative=True, least=least)
+    assert np.all(x >= least)
+    assert x[1] > 0
+
+
+def test_nearly_parallel_columns_are_solved_without_squaring_the_condition() -> None:
+    t = np.linspace(0, 1, 200)
+    basis = np.column_stack([t, t + 1e-7 * np.sin(9 * t)])
+    x, offset = solve_linear(basis, basis @ [2.0, 1.0] + 5, nonnegative=False)
+    np.testing.assert_allclose([*x, offset], [2, 1, 5], rtol=1e-6)
+
+
+def valley(point: np.ndarray) -> np.ndarray:
+    """Rosenbrock's residuals, with their minimum 0 at (1, 1)."""
+    return np.array([10 * (point[1] - point[0] ** 2), 1 - point[0]])
+
+
+def test_multi_start_finds_the_minimum_and_reports() -> None:
+    told: list[float] = []
+    tracker = Tracker(progress=lambda share, best: told.append(share), budget=100)
+    starts = [np.array([-1.2, 1.0]), np.array([2.0, -1.0])]
+    best = multi_start(
+        valley,
+        starts,
+        np.full(2, -5.0),
+        np.full(2, 5.0),
+        tracker,
+        n_refined=2,
+        max_evaluations=100,
+    )
+    np.testing.assert_allclose(best, [1, 1], atol=1e-5)
+    assert told
+    assert all(0 < share <= 0.99 for share in told)
+
+
+def test_interrupt_keeps_the_best_so_far() -> None:
+    calls = 0
+
+    def impatient(point: np.ndarray) -> np.ndarray:
+        nonlocal calls
+        calls += 1
+        if calls == 5:
+            raise KeyboardInterrupt
+        return valley(point)
+
+    tracker = Tracker()
+    bounds = np.full(2, -5.0), np.full(2, 5.0)
+    best = multi_start(impatient, [np.zeros(2)], *bounds, tracker, n_refined=1, max_evaluations=50)
+    assert tracker.interrupted
+    assert np.sqrt(np.mean(valley(best) ** 2)) == tracker.best_cost
+
+
+def test_interrupt_before_anything_is_found_goes_through() -> None:
+    def never(point: np.ndarray) -> np.ndarray:
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        multi_start(
+            never,
+            [np.zeros(2)],
+            -np.ones(2),
+            np.ones(2),
+            Tracker(),
+            n_refined=1,
+            max_evaluations=5,
+        )
+
+
+def sphere(points: np.ndarray) -> np.ndarray:
+    return np.asarray(((points - 0.3) ** 2).sum(axis=1))
+
+
+def naive_swarm(seed: int, swarm: Swarm, lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
+    """Particle swarm, one particle and one coordinate at a time."""
+    rng = np.random.default_rng(seed)
+    n, m = swarm.particles, lower.size
+    position = rng.uniform(lower, upper, (n, m)).tolist()
+    velocity = (rng.uniform(-1, 1, (n, m)) * 0.1 * (upper - lower)).tolist()
+    own = [list(p) for p in position]
+    own_cost = [np.inf] * n
+    best, best_cost = position[0], np.inf
+    for k in range(swarm.iterations + 1):
+        cost = sphere(np.array(position))
+        for i in range(n):
+            if cost[i] < own_cost[i]:
+                own[i], own_cost[i] = list(position[i]), cost[i]
+            if cost[i] < best_cost:
+                best, best_cost = list(position[i]), cost[i]
+        leader = own[int(np.argmin(own_cost))]
+        weight = swarm.inertia[0] + (swarm.inertia[1] - swarm.inertia[0]) * k / swarm.iterations
+        pulls = rng.random((2, n, m))
+        for i in range(n):
+            for j in range(m):
+                v = weight * velocity[i][j]
+                v += swarm.c1 * pulls[0, i, j] * (own[i][j] - position[i][j])
+                v += swarm.c2 * pulls[1, i, j] * (leader[j] - position[i][j])
+                fastest = 0.2 * (upper[j] - lower[j])
+                v = min(max(v, -fastest), fastest)
+                x = position[i][j] + v
+                if not lower[j] <= x <= upper[j]:
+                    v, x = 0.0, min(max(x, lower[j]), upper[j])
+                velocity[i][j], position[i][j] = v, x
+    return np.array(best)
+
+
+def test_swarm_agrees_with_the_naive_one_and_repeats() -> None:
+    lower, upper = np.array([-1.0, -2.0, 0.0]), np.array([1.0, 2.0, 3.0])
+    swarm = Swarm(8, 30)
+    first = particle_swarm(sphere, lower, upper, swarm, Tracker(), seed=5)
+    np.testing.assert_allclose(first, naive_swarm(5, swarm, lower, upper), rtol=1e-9)
+    np.testing.assert_array_equal(
+        first, particle_swarm(sphere, lower, upper, swarm, Tracker(), seed=5)
+    )
+    assert sphere(first[np.newaxis])[0] < 1e-2
+
+
+def test_swarm_survives_costs_that_are_not_numbers() -> None:
+    def costs(points: np.ndarray) -> np.ndarray:
+        values = sphere(points)
+        values[points[:, 0] > 0.5] = np.nan
+        return values
+
+    best = particle_swarm(costs, np.zeros(2), np.ones(2), Swarm(10, 20), Tracker(), seed=0)
+    assert best[0] <= 0.5

@@ -140,6 +140,6 @@ def _is_unit(text: str, name: str) -> bool:
         return capital is not None and capital.target == expected
     if unit.target == expected or (expected == "" and unit.target == "mm"):
         return True
-    if text.casefold() in _DOUBTFUL or len(text) == 1 and text.isalpha():
+    if text.casefold() in _DOUBTFUL or (len(text) == 1 and text.isalpha()):
         return expected is None and text in _LETTERS
     return True

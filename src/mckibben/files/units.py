@@ -119,6 +119,7 @@ def find(text: str) -> Unit | None:
 def convert(samples: Array, unit: str, target: str) -> Array:
     """Return samples in ``target``; untouched where it is the unit that they have.
 
+    >>> import numpy as np
     >>> convert(np.array([100.0, 250.0]), "kPa", "bar").tolist()
     [1.0, 2.5]
     """

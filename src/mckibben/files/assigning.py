@@ -1,0 +1,106 @@
+"""Which column of a table is which channel."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from mckibben.errors import DataError
+from mckibben.files.headers import channel_of, parse, snake_case
+from mckibben.files.request import Request
+from mckibben.files.table import Column, Table
+
+
+def assign(table: Table, request: Request, path: Path) -> tuple[dict[str, Column], list[str]]:
+    """Return the column of every channel, in the order of the file, and the columns left out.
+
+    Columns that the request maps go before those whose headers say the channel, numbers go before
+    text, and text is left out unless it was asked for or may be the time.
+
+    Raises
+    ------
+    DataError
+        If a channel asked for is missing, or two columns are one channel.
+    """
+    mapped = {
+        channel: _column(wanted, channel, table, path)
+        for channel, wanted in request.columns.items()
+    }
+    named: dict[str, Column] = dict(mapped)
+    left_out: list[str] = []
+    numbers_first = sorted(table.columns, key=lambda column: column.values is None)
+    for column in numbers_first:
+        if any(column is taken for taken in mapped.values()):
+            continue
+        header = parse(column.header)
+        channel = column.header if table.own else channel_of(header)
+        if channel in mapped and not table.own:
+            channel = snake_case(header.name)
+        text = column.values is None
+        wanted = channel not in named and (channel == "time" or request.asks_for(channel))
+        if channel in mapped or (text and not wanted):
+            left_out.append(column.header)
+        elif channel in named:
+            raise DataError(
+                f"columns {named[channel].header!r} and {column.header!r} both hold it",
+                file=path,
+                channel=channel,
+                remedy=f"say which, with --column {channel}={named[channel].header!r}; "
+                "the columns of a file need different headers",
+            )
+        else:
+            named[channel] = column
+    order = {id(column): place for place, column in enumerate(table.columns)}
+    named = dict(sorted(named.items(), key=lambda item: order[id(item[1])]))
+    _require(named, table, request, path)
+    return named, left_out
+
+
+def _column(wanted: str, channel: str, table: Table, path: Path) -> Column:
+    """Return the column of a name: as written, without its unit, or in another case."""
+    readings = (
+        lambda column: column.header == wanted,
+        lambda column: parse(column.header).name == wanted.strip(),
+        lambda column: column.header.casefold().strip() == wanted.casefold().strip(),
+        lambda column: snake_case(parse(column.header).name) == snake_case(wanted),
+    )
+    for reading in readings:
+        matches = [column for column in table.columns if reading(column)]
+        if len(matches) > 1:
+            raise DataError(
+                f"{len(matches)} columns are named {wanted!r}",
+                file=path,
+                channel=channel,
+                remedy="give them different headers",
+            )
+        if matches:
+            return matches[0]
+    raise DataError(
+        f"there is no column {wanted!r}; there are {_listed(table)}",
+        file=path,
+        channel=channel,
+        remedy=f"name one of them with --column {channel}=COLUMN",
+    )
+
+
+def _require(named: Mapping[str, Column], table: Table, request: Request, path: Path) -> None:
+    for channel in request.channels or ():
+        if channel not in named:
+            raise DataError(
+                f"there is no such channel; the columns are {_listed(table)}",
+                file=path,
+                channel=channel,
+                remedy=f"name its column with --column {channel}=COLUMN",
+            )
+    for channel in request.units:
+        if channel not in named:
+            raise DataError(
+                f"a unit is given for it and it is not there; there are {', '.join(named)}",
+                file=path,
+                channel=channel,
+                remedy="give --unit for one of them",
+            )
+
+
+def _listed(table: Table) -> str:
+    return ", ".join(column.header for column in table.columns)

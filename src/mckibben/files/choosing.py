@@ -1,0 +1,219 @@
+"""The channels of a table in the units of the package."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mckibben.errors import DataError
+from mckibben.files.assigning import assign
+from mckibben.files.headers import parse, unit_of
+from mckibben.files.notices import warn
+from mckibben.files.request import Request
+from mckibben.files.table import Column, Table
+from mckibben.files.units import Unit, convert, find
+from mckibben.recording import Array
+
+IMPLAUSIBLE_BAR = 50.0
+"""No muscle sees this pressure; larger numbers without a unit are kPa, psi or the like."""
+
+
+@dataclass(frozen=True)
+class Choice:
+    """The channels of a table in the package's units, and its times in their own unit.
+
+    Parameters
+    ----------
+    channels, units : dict
+        Samples and unit of every channel.
+    time : numpy.ndarray or None
+        In the unit ``time_unit``, so that the digits recorded can still be seen.
+    meta : dict
+        What else to tell about the columns.
+    """
+
+    channels: dict[str, Array]
+    units: dict[str, str]
+    time: Array | None
+    time_unit: str
+    meta: dict[str, Any]
+
+
+@dataclass
+class _Findings:
+    """What comes up while columns are looked at."""
+
+    ignored: list[str]
+    assumed: list[str] = field(default_factory=list)
+    references: dict[str, str] = field(default_factory=dict)
+
+
+def choose(table: Table, request: Request, path: Path) -> Choice:
+    """Choose and convert the channels of a table.
+
+    Raises
+    ------
+    DataError
+        If a channel asked for is missing, two columns are one channel, a cell is no number, or a
+        unit is unknown or of the wrong dimension.
+    """
+    named, left_out = assign(table, request, path)
+    found = _Findings(ignored=[*table.meta.get("ignored_columns", ()), *left_out])
+    time, time_unit = None, "s"
+    if "time" in named:
+        time, time_unit = _time(named.pop("time"), table, request, path, found)
+    channels: dict[str, Array] = {}
+    units: dict[str, str] = {}
+    for channel, column in named.items():
+        values = _numbers(channel, column, table, request, path, found)
+        if values is not None:
+            unit = _unit(channel, column, values, table.own, request, path, found)
+            target = unit_of(channel)
+            target = unit.target if target is None else target
+            keeps = target is None or (table.own and unit_of(channel) is None)
+            units[channel] = unit.name if keeps or target is None else target
+            channels[channel] = convert(values, unit.name, units[channel])
+    if not channels:
+        raise DataError(
+            "there is no column of numbers", file=path, remedy="give a file with samples in columns"
+        )
+    if found.assumed:
+        warn(
+            path,
+            f"no unit is given, so these are assumed: {', '.join(found.assumed)}; "
+            "say --unit CHANNEL=UNIT where that is wrong",
+        )
+    notes = {"ignored_columns": found.ignored, "pressure_reference": found.references}
+    meta = {name: note for name, note in notes.items() if note}
+    return Choice(channels, units, time, time_unit, meta)
+
+
+def _numbers(
+    channel: str, column: Column, table: Table, request: Request, path: Path, found: _Findings
+) -> Array | None:
+    """Return the samples of a column, or None where it is to be left out."""
+    if column.values is None:
+        raise DataError(
+            f"column {column.header!r} holds text",
+            file=path,
+            channel=channel,
+            row=table.row(0),
+            remedy=f"name a column of numbers with --column {channel}=COLUMN",
+        )
+    if column.flaw is None:
+        return column.values
+    sample, cell = column.flaw
+    if request.asks_for(channel) or unit_of(channel) is not None:
+        raise DataError(
+            f"{cell[:40]!r} is not a number",
+            file=path,
+            channel=channel,
+            row=table.row(sample),
+            remedy="correct that cell, or leave it blank and say --gaps split or interpolate",
+        )
+    warn(path, f"column {column.header!r} is left out: {cell[:40]!r} is not a number")
+    found.ignored.append(column.header)
+    return None
+
+
+def _unit(
+    channel: str,
+    column: Column,
+    values: Array,
+    own: bool,
+    request: Request,
+    path: Path,
+    found: _Findings,
+) -> Unit:
+    """Return the unit of a column: as given, as the file states it, or as assumed."""
+    given = request.units.get(channel)
+    text = column.unit if given is None else given
+    if text is None and not own:
+        text = parse(column.header).unit
+    expected = unit_of(channel)
+    if text is None:
+        return _assumed(channel, expected, values, path, found)
+    if own and given is None and text == (text if expected is None else expected):
+        return Unit(text, expected)
+    unit = find(text)
+    example = {"bar": "kPa", "N": "kN", "s": "ms"}.get(expected or "", "UNIT")
+    if unit is None and expected is None and given is None:
+        return Unit(text, None)
+    if unit is None:
+        raise DataError(
+            f"the unit {text!r} is unknown",
+            file=path,
+            channel=channel,
+            remedy=f"say which it is, as in --unit {channel}={example}",
+        )
+    if expected is not None and unit.target != expected:
+        raise DataError(
+            f"it cannot be in {text!r}, which does not convert to {expected or 'a pure number'}",
+            file=path,
+            channel=channel,
+            remedy=f"correct the unit with --unit {channel}={expected or '%'}, "
+            f"or name another column with --column {channel}=COLUMN",
+        )
+    if unit.reference is not None:
+        found.references[channel] = unit.reference
+    return unit
+
+
+def _assumed(
+    channel: str, expected: str | None, values: Array, path: Path, found: _Findings
+) -> Unit:
+    if expected is None:
+        return Unit("", "")
+    finite = np.abs(values[np.isfinite(values)])
+    largest = float(finite.max()) if finite.size else 0.0
+    if expected == "bar" and largest > IMPLAUSIBLE_BAR:
+        raise DataError(
+            f"it has no unit and reaches {largest:g}, which cannot be bar",
+            file=path,
+            channel=channel,
+            remedy=f"say its unit, as in --unit {channel}=kPa or --unit {channel}=psi",
+        )
+    hint = ""
+    if expected == "mm" and 0 < largest < 0.5:
+        hint = f" (at most {largest:.3g}: is it in m?)"
+    if expected == "" and largest > 1.5:
+        hint = f" (up to {largest:.3g}: is it in %?)"
+    if expected or hint:
+        found.assumed.append(f"{channel} in {expected or 'parts of one'}{hint}")
+    return Unit(expected, expected)
+
+
+def _time(
+    column: Column, table: Table, request: Request, path: Path, found: _Findings
+) -> tuple[Array | None, str]:
+    if column.values is None:
+        return _instants(column, table, request, path, found), "s"
+    values = _numbers("time", column, table, request, path, found)
+    assert values is not None  # time is a channel that _numbers never leaves out
+    return values, _unit("time", column, values, table.own, request, path, found).name
+
+
+def _instants(
+    column: Column, table: Table, request: Request, path: Path, found: _Findings
+) -> Array | None:
+    """Return ISO 8601 instants as seconds since the first."""
+    if request.rate is not None:
+        found.ignored.append(column.header)
+        return None
+    import pandas as pd
+
+    instants = pd.to_datetime(pd.Series(column.texts), format="ISO8601", utc=True, errors="coerce")
+    bad = np.flatnonzero(instants.isna())
+    if bad.size:
+        raise DataError(
+            f"{column.texts[bad[0]][:40]!r} is no time",
+            file=path,
+            channel="time",
+            row=table.row(int(bad[0])),
+            remedy="write times in seconds or as 2026-01-31T12:00:00.5, or give --rate",
+        )
+    since = instants - instants.iloc[0]
+    return np.asarray(since.dt.total_seconds(), dtype=np.float64)

@@ -1,0 +1,111 @@
+"""The formats of files: which module reads which ending, one line each."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from pathlib import Path
+from types import ModuleType
+
+from mckibben.errors import DataError, MckibbenError
+from mckibben.files.table import Table
+
+READERS: dict[str, str] = {
+    ".csv": "delimited",
+    ".tsv": "delimited",
+    ".txt": "delimited",
+    ".dat": "delimited",
+    ".parquet": "parquet",
+    ".mat": "matlab",
+    ".h5": "hdf5",
+    ".hdf5": "hdf5",
+    ".tdms": "tdms",
+}
+"""Ending of the file's name -> module of this folder with ``read(path) -> list[Table]``."""
+
+WRITERS: tuple[str, ...] = (".csv", ".tsv", ".parquet")
+"""Endings whose module also has ``write(recording, path)``."""
+
+_SIGNATURES: dict[bytes, tuple[str, tuple[str, ...]]] = {
+    b"PAR1": ("Parquet", (".parquet",)),
+    b"\x89HDF\r\n\x1a\n": ("HDF5", (".h5", ".hdf5", ".mat")),
+    b"TDSm": ("TDMS", (".tdms",)),
+    b"MATLAB 5.0 MAT": ("MATLAB", (".mat",)),
+    b"MATLAB 7.3 MAT": ("MATLAB 7.3", (".mat",)),
+    b"PK\x03\x04": ("a spreadsheet or an archive", ()),
+    b"\xd0\xcf\x11\xe0": ("an Excel workbook", ()),
+}
+
+
+def tables(path: Path) -> list[Table]:
+    """Return what is in a file, as it stands there.
+
+    Raises
+    ------
+    DataError
+        If there is no such file, its ending is none that is known or not that of its content, or
+        it is damaged.
+    """
+    module = _module(path, tuple(READERS), "read")
+    try:
+        _refuse_impostor(path)
+        found: list[Table] = module.read(path)
+    except MckibbenError:
+        raise
+    except OSError as error:
+        if error.strerror is None:  # the libraries' own, about the content
+            raise _damaged(path, error) from None
+        raise DataError(
+            f"it cannot be read ({error.strerror})",
+            file=path,
+            remedy="check the path and its rights",
+        ) from None
+    except MemoryError:
+        raise DataError(
+            "it needs more memory than there is",
+            file=path,
+            remedy="split it into shorter recordings",
+        ) from None
+    except Exception as error:  # damaged files make the libraries raise anything at all
+        raise _damaged(path, error) from None
+    return found
+
+
+def writer(path: Path) -> ModuleType:
+    """Return the module that writes files of this ending."""
+    return _module(path, WRITERS, "written")
+
+
+def _module(path: Path, endings: tuple[str, ...], done: str) -> ModuleType:
+    ending = path.suffix.casefold()
+    if ending not in endings:
+        raise DataError(
+            f"files ending in {ending or 'nothing'!r} cannot be {done}",
+            file=path,
+            remedy=f"give one of {', '.join(endings)}",
+        )
+    return import_module(f"mckibben.files.{READERS[ending]}")
+
+
+def _refuse_impostor(path: Path) -> None:
+    """Refuse what is no file, is empty, or whose content is that of another ending."""
+    if path.is_dir():
+        raise DataError("this is a folder", file=path, remedy="give a file in it")
+    with path.open("rb") as file:
+        start = file.read(16)
+    if not start:
+        raise DataError(
+            "there is nothing in it", file=path, remedy="give a file with a header and samples"
+        )
+    for signature, (name, endings) in _SIGNATURES.items():
+        if start.startswith(signature) and path.suffix.casefold() not in endings:
+            better = f"rename it to end in {endings[0]}" if endings else "export it as CSV"
+            raise DataError(f"by its content it is {name}", file=path, remedy=better)
+
+
+def _damaged(path: Path, error: Exception) -> DataError:
+    reason = " ".join(str(error).split())[:200] or type(error).__name__
+    return DataError(
+        f"it is damaged, or not {path.suffix[1:]} ({reason})",
+        file=path,
+        remedy="export it again from its source",
+    )

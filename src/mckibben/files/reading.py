@@ -1,0 +1,257 @@
+"""Reading recordings: the columns of a file, on one time grid, without holes."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from mckibben.errors import DataError
+from mckibben.files import timebase
+from mckibben.files.choosing import Choice, choose
+from mckibben.files.formats import tables
+from mckibben.files.holes import Channels, treat
+from mckibben.files.notices import warn
+from mckibben.files.request import Request
+from mckibben.files.table import Table
+from mckibben.files.timebase import Span
+from mckibben.files.units import convert
+from mckibben.recording import Array, Recording
+
+FEWEST = 10
+"""Samples; a shorter recording, or stretch of one, shows no loop."""
+
+LONGEST_BRIDGE = 100
+"""Times the samples there are: interpolating gaps to more than that is refused."""
+
+
+@dataclass(frozen=True)
+class Piece:
+    """Samples on a uniform grid: the step [s], None where there is no time, and the start [s]."""
+
+    samples: Channels
+    step: float | None
+    start: float
+
+
+def read(
+    path: str | Path,
+    *,
+    columns: Mapping[str, str] | None = None,
+    units: Mapping[str, str] | None = None,
+    rate: float | None = None,
+    gaps: Literal["error", "split", "interpolate"] = "error",
+    channels: Sequence[str] | None = None,
+) -> list[Recording]:
+    """Read the recordings in a file; by its ending CSV, TSV, Parquet, MAT, HDF5 or TDMS.
+
+    Parameters
+    ----------
+    path : path
+        Ends in ``.csv .tsv .txt .dat .parquet .mat .h5 .hdf5 .tdms``.
+    columns : mapping of str to str, optional
+        Channel -> column, by its header with or without the unit. Standard channels are found by
+        common names (``p``, ``Druck``, ``position``, ...) without it. ``time`` is a channel here.
+    units : mapping of str to str, optional
+        Channel -> unit, such as ``{"pressure": "kPa"}``; goes before what the header says.
+    rate : float, optional
+        Samples per second, positive, where there is no column of times. Without either, the
+        recording has no time.
+    gaps : {"error", "split", "interpolate"}
+        What to do where time is missing (a step of more than three median steps) or a sample is
+        (blank, NaN or infinite): refuse, cut into several recordings, or bridge linearly.
+    channels : sequence of str, optional
+        Channels that must be there, whole and not constant. Others are then left out, with a
+        `DataWarning`, if samples of theirs are missing. By default all must be whole.
+
+    Returns
+    -------
+    list of Recording
+        One; or one for each stretch with ``gaps="split"``, and for each group of a TDMS file.
+        In the package's units: bar, mm, N, s, rad, V, mm/s, degC. A file that `write` made gives
+        a recording equal to the one written.
+
+    Raises
+    ------
+    DataError
+        Naming file, channel, row and remedy: file missing, damaged or of an unknown kind; column
+        or unit unknown; time repeated, going back or with gaps; samples missing or fewer than 10.
+
+    Warns
+    -----
+    DataWarning
+        Of units assumed, jittered time that was resampled, gaps bridged, and what was left out.
+    """
+    path = Path(path)
+    request = Request(dict(columns or {}), dict(units or {}), rate, gaps, channels)
+    request.check(path)
+    return [recording for table in tables(path) for recording in _recordings(table, request, path)]
+
+
+def _recordings(table: Table, request: Request, path: Path) -> list[Recording]:
+    choice = choose(table, request, path)
+    n = next(iter(choice.channels.values())).size
+    if n < FEWEST:
+        raise DataError(
+            f"{n} sample(s) are too few, at least {FEWEST} are needed",
+            file=path,
+            remedy="give a longer recording",
+        )
+    step = _stated_step(choice, table, request, path)
+    measured = choice.time if step is None else None
+    if measured is not None:
+        timebase.check(measured, table, path)
+    order = np.arange(n, dtype=float) if measured is None else measured
+    channels, spans = treat(choice.channels, order, table, request, path)
+    _refuse_constant(channels, spans, request, path)
+    if measured is None:
+        begin = table.start_time if choice.time is None else _seconds(choice.time[0], choice)
+        pieces = [
+            Piece(_cut(channels, span), step, begin + (step or 1.0) * span[0])
+            for span in _long_enough(spans, path)
+        ]
+    else:
+        pieces = _on_grid(channels, measured, spans, choice, table, request, path)
+    units = {name: choice.units[name] for name in channels}
+    meta = dict(table.meta) if table.own else _meta(choice, table, path)
+    found = [Recording(piece.samples, piece.step, units, piece.start, meta) for piece in pieces]
+    if len(found) == 1:
+        return found
+    return [each.with_meta(name=f"{each.name}[{i}]") for i, each in enumerate(found, start=1)]
+
+
+def _stated_step(choice: Choice, table: Table, request: Request, path: Path) -> float | None:
+    """Return the sample time that the caller or the file states, which the times must not deny."""
+    step = table.sample_time if request.rate is None else 1.0 / request.rate
+    if step is None:
+        return None
+    if table.sample_time is not None and abs(step - table.sample_time) > 1e-3 * step:
+        problem = f"the file states {1 / table.sample_time:g} samples per second"
+    elif choice.time is not None and not timebase.agrees(choice.time, step / _seconds(1.0, choice)):
+        lasting = _seconds(float(choice.time[-1] - choice.time[0]), choice)
+        mean = (choice.time.size - 1) / lasting if lasting else np.nan
+        problem = f"the column of times has {mean:.6g} samples per second on average"
+    else:
+        return step if table.sample_time is None else table.sample_time
+    raise DataError(
+        f"{problem}, or not evenly, which is not the {1 / step:g} asked for",
+        file=path,
+        channel="time",
+        remedy="leave --rate out, or delete the column of times",
+    )
+
+
+def _on_grid(
+    channels: Channels,
+    time: Array,
+    spans: list[Span],
+    choice: Choice,
+    table: Table,
+    request: Request,
+    path: Path,
+) -> list[Piece]:
+    """Return the spans on one grid: as they are where times are uniform, else resampled."""
+    cuts = [at for at in timebase.gaps(time) for start, stop in spans if start < at < stop]
+    if cuts and request.gaps == "error":
+        length = _seconds(float(time[cuts[0]] - time[cuts[0] - 1]), choice)
+        raise DataError(
+            f"there is a gap of {length:.6g} s before this row ({len(cuts)} gap(s) in all)",
+            file=path,
+            channel="time",
+            row=table.row(int(cuts[0])),
+            remedy="say --gaps split to cut there or --gaps interpolate to bridge them",
+        )
+    bridged = bool(cuts) and request.gaps == "interpolate"
+    stretches = _split(spans, cuts)
+    if request.gaps == "split":
+        spans = stretches = _long_enough(stretches, path)
+    step = timebase.common_step(time, stretches)
+    seconds = _seconds(step.size, choice)
+    if step.jitter is not None:
+        rms, worst = (_seconds(deviation, choice) for deviation in step.jitter)
+        warn(
+            path,
+            f"the time is not uniform: its steps deviate from {seconds:.6g} s by {rms:.3g} s rms "
+            f"({100 * rms / seconds:.3g} %) and {worst:.3g} s at worst "
+            f"({100 * worst / seconds:.3g} %); the samples were interpolated onto a uniform grid",
+        )
+    if bridged:
+        _announce_bridges(time, cuts, step.size, choice, path)
+    pieces = []
+    for start, stop in _long_enough(spans, path):
+        samples, t = _cut(channels, (start, stop)), time[start:stop]
+        if bridged or step.jitter is not None:
+            samples = {
+                name: timebase.resample(t, values, step.size) for name, values in samples.items()
+            }
+        pieces.append(Piece(samples, seconds, _seconds(float(t[0]), choice)))
+    return pieces
+
+
+def _announce_bridges(
+    time: Array, cuts: Sequence[int], step: float, choice: Choice, path: Path
+) -> None:
+    missing = _seconds(float(sum(time[at] - time[at - 1] for at in cuts)), choice)
+    if (time[-1] - time[0]) / step > LONGEST_BRIDGE * time.size:
+        raise DataError(
+            f"{len(cuts)} gap(s) of {missing:.6g} s in all are too long to interpolate over",
+            file=path,
+            channel="time",
+            remedy="say --gaps split",
+        )
+    warn(path, f"{len(cuts)} gap(s) in time, {missing:.6g} s in all, were interpolated over")
+
+
+def _refuse_constant(channels: Channels, spans: list[Span], request: Request, path: Path) -> None:
+    for name in request.channels or ():
+        samples = np.concatenate([channels[name][start:stop] for start, stop in spans])
+        if samples.size and np.ptp(samples) == 0:
+            raise DataError(
+                f"it is constant, at {samples[0]:g}",
+                file=path,
+                channel=name,
+                remedy=f"give a recording in which it changes, or --column {name}=COLUMN",
+            )
+
+
+def _long_enough(spans: list[Span], path: Path) -> list[Span]:
+    """Return the spans that are not too short to be of use."""
+    kept = [span for span in spans if span[1] - span[0] >= FEWEST]
+    if not kept:
+        raise DataError(
+            f"no stretch without gaps has {FEWEST} samples",
+            file=path,
+            remedy="say --gaps interpolate, or give a recording with fewer gaps",
+        )
+    if len(kept) < len(spans):
+        warn(
+            path,
+            f"{len(spans) - len(kept)} of {len(spans)} stretches between gaps have fewer than "
+            f"{FEWEST} samples and were left out",
+        )
+    return kept
+
+
+def _split(spans: list[Span], cuts: Sequence[int]) -> list[Span]:
+    ends = [[start, *(at for at in cuts if start < at < stop), stop] for start, stop in spans]
+    return [pair for edges in ends for pair in pairwise(edges)]
+
+
+def _cut(channels: Channels, span: Span) -> Channels:
+    return {name: samples[span[0] : span[1]] for name, samples in channels.items()}
+
+
+def _seconds(value: float, choice: Choice) -> float:
+    return float(convert(np.array([value]), choice.time_unit, "s")[0])
+
+
+def _meta(choice: Choice, table: Table, path: Path) -> dict[str, object]:
+    with path.open("rb") as file:
+        digest = hashlib.file_digest(file, "sha256").hexdigest()
+    name = {} if table.name is None else {"name": f"{path.stem}[{table.name}]"}
+    return {**table.meta, **choice.meta, **name, "file": str(path), "sha256": digest}

@@ -1,0 +1,46 @@
+"""What the caller of `read` asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from mckibben.errors import DataError
+
+
+@dataclass(frozen=True)
+class Request:
+    """What the caller of `read` asked for; see there."""
+
+    columns: Mapping[str, str]
+    units: Mapping[str, str]
+    rate: float | None
+    gaps: Literal["error", "split", "interpolate"]
+    channels: Sequence[str] | None
+
+    def asks_for(self, channel: str) -> bool:
+        """Tell whether a channel was named by the caller."""
+        return channel in (self.channels or ()) or channel in self.columns
+
+    def needs(self, channel: str) -> bool:
+        """Tell whether a channel with flaws is an error rather than left out."""
+        return self.channels is None or self.asks_for(channel)
+
+    def check(self, path: Path) -> None:
+        """Refuse what cannot be done with any file."""
+        if self.gaps not in ("error", "split", "interpolate"):
+            raise DataError(
+                f"there is no way {self.gaps!r} to treat gaps",
+                file=path,
+                remedy="use one of error, split, interpolate",
+            )
+        if self.rate is not None and not 0 < self.rate < np.inf:
+            raise DataError(
+                f"a rate of {self.rate:g} samples per second is impossible",
+                file=path,
+                remedy="give a positive number with --rate",
+            )

@@ -1,0 +1,139 @@
+"""From the times of the samples, as recorded, to one uniform time grid."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mckibben.errors import DataError
+from mckibben.files.table import Table
+from mckibben.recording import Array
+
+Span = tuple[int, int]
+"""Samples from the first to, not including, the second."""
+
+GAP = 3.0
+"""Steps longer than this many median steps are gaps; shorter ones are jitter."""
+
+
+@dataclass(frozen=True)
+class Step:
+    """A time step, and how far the recorded steps are from it.
+
+    Parameters
+    ----------
+    size : float
+        In the unit of the times.
+    jitter : (float, float) or None
+        Root mean square and largest deviation of a step; None where every time is on the grid
+        within the digits that were recorded.
+    """
+
+    size: float
+    jitter: tuple[float, float] | None
+
+
+def check(time: Array, table: Table, path: Path) -> None:
+    """Refuse times that are missing, repeated or going back, naming the row."""
+    missing = np.flatnonzero(~np.isfinite(time))
+    if missing.size:
+        raise DataError(
+            f"the time is missing in {missing.size} row(s)",
+            file=path,
+            channel="time",
+            row=table.row(int(missing[0])),
+            remedy="fill it in or delete the row; or delete the column and give --rate",
+        )
+    steps = np.diff(time)
+    wrong = np.flatnonzero(steps <= 0)
+    if not wrong.size:
+        return
+    at = int(wrong[0])
+    if steps[at] == 0:
+        problem = (
+            f"the time {time[at]:.10g} is repeated ({np.sum(steps == 0)} repetition(s) in all)"
+        )
+        remedy = "delete the repeated row; or, where times were rounded when saved, give --rate"
+    else:
+        problem = f"the time goes back from {time[at]:.10g} to {time[at + 1]:.10g}"
+        remedy = "split the file there, or sort its rows by time"
+    raise DataError(problem, file=path, channel="time", row=table.row(at + 1), remedy=remedy)
+
+
+def gaps(time: Array) -> NDArray[np.intp]:
+    """Return the samples, from 0, that come after a gap."""
+    steps = np.diff(time)
+    return np.flatnonzero(steps > GAP * np.median(steps)) + 1
+
+
+def resolution(time: Array) -> float:
+    """Return the last digit that the times were recorded with.
+
+    >>> resolution(np.array([0.0, 0.083, 0.167])), resolution(np.array([0.0, 4.0, 8.0]))
+    (0.001, 1.0)
+    """
+    largest = float(np.max(np.abs(time)))
+    noise = 4 * float(np.spacing(largest))
+    for decimals in range(10):
+        digit = float(f"1e-{decimals}")
+        if digit < 100 * noise:
+            break
+        if np.all(np.abs(time - np.round(time, decimals)) <= noise):
+            return digit
+    single = np.float32(largest)
+    return float(np.spacing(single)) if np.all(time == time.astype(np.float32)) else noise
+
+
+def common_step(time: Array, spans: list[Span]) -> Step:
+    """Return the step that all spans have in common: the shortest decimal that fits them.
+
+    Rounding of recorded times is told from jitter by the spread of the times about the grid.
+    """
+    spans = [span for span in spans if span[1] - span[0] > 1]
+    if not spans:
+        return Step(float(f"{np.median(np.diff(time)):.6g}"), (0.0, 0.0))
+    lengths = np.array([stop - start for start, stop in spans])
+    starts = np.cumsum(lengths) - lengths
+    t = np.concatenate([time[start:stop] - time[start] for start, stop in spans])
+    k = np.concatenate([np.arange(length, dtype=float) for length in lengths])
+    t_mid = t - np.repeat(np.add.reduceat(t, starts) / lengths, lengths)
+    k_mid = k - np.repeat(np.add.reduceat(k, starts) / lengths, lengths)
+    slope = float(np.sum(k_mid * t_mid) / np.sum(k_mid**2))
+    digit = resolution(time)
+    # Times printed more coarsely than half a step could hide a lost sample: they count as jitter.
+    rounding = 0.75 * digit if digit <= 0.5 * slope else 0.0
+    tolerance = rounding + 8 * float(np.spacing(np.max(np.abs(time)))) + 1e-6 * slope
+    for size in _shortest_first(slope):
+        off = t - size * k
+        spread = np.maximum.reduceat(off, starts) - np.minimum.reduceat(off, starts)
+        if np.all(spread <= 2 * tolerance):
+            return Step(size, None)
+    within = np.delete(np.diff(t), starts[1:] - 1)
+    size = float(f"{slope:.6g}")
+    off = np.abs(within - size)
+    return Step(size, (float(np.sqrt(np.mean(off**2))), float(off.max())))
+
+
+def agrees(time: Array, step: float) -> bool:
+    """Tell whether times are those of a stated step, within the digits recorded."""
+    off = np.abs(time - time[0] - step * np.arange(time.size))
+    return bool(np.all(off <= max(resolution(time), 1e-3 * step)))
+
+
+def resample(time: Array, samples: Array, step: float) -> Array:
+    """Return samples on the grid of this step that starts at the first time, linear between."""
+    n = int((time[-1] - time[0]) / step + 1e-6) + 1
+    grid: Array = time[0] + step * np.arange(n)
+    return np.interp(grid, time, samples)
+
+
+def _shortest_first(step: float) -> Iterator[float]:
+    """Yield decimals ever closer to a step, and steps whose rate is such a decimal."""
+    for digits in range(1, 17):
+        yield float(f"{step:.{digits}g}")
+        yield 1.0 / float(f"{1.0 / step:.{digits}g}")
+    yield step

@@ -1,0 +1,181 @@
+"""What a figure shows, free of any drawing library: panels of curves, thinned to what an eye can see."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mckibben.recording import Recording
+
+Array = NDArray[np.float64]
+
+POINTS = 4000
+"""Most points of a curve: two for each of 2000 bins, more than a screen or a column has pixels."""
+
+FEW = 300
+"""Up to so many samples, each is shown as a dot on its line."""
+
+N_COLOURS = 6
+"""Colours that can be told apart; as many models or recordings share a panel at most."""
+
+N_AGES = 5
+"""Steps of the colour scale from early to late."""
+
+
+@dataclass(frozen=True)
+class Curve:
+    """One line or set of points.
+
+    Parameters
+    ----------
+    x, y : array, shape (n,)
+        Points in order.
+    name : str
+        In the legend; empty for none.
+    colour : str
+        ``"measured"``, ``"input"``, ``"series-1"`` to ``"series-6"``, or ``"age-1"`` (early) to
+        ``"age-5"`` (late).
+    style : {"line", "dashed", "dots", "rings", "ticks", "stems"}
+        How the points are drawn.
+    model : str or None
+        The model it belongs to, by which it is shown or hidden.
+    interval : (array, array) or None
+        Lower and upper end of every x, each of shape (n,).
+    """
+
+    x: Array
+    y: Array
+    name: str = ""
+    colour: str = "measured"
+    style: Literal["line", "dashed", "dots", "rings", "ticks", "stems"] = "line"
+    model: str | None = None
+    interval: tuple[Array, Array] | None = None
+
+
+@dataclass(frozen=True)
+class Arrow:
+    """The direction of time on a curve: from tail to head, each (x, y)."""
+
+    tail: tuple[float, float]
+    head: tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Mark:
+    """A vertical line with a word at its top."""
+
+    x: float
+    text: str
+
+
+@dataclass(frozen=True)
+class Panel:
+    """One pair of axes.
+
+    Parameters
+    ----------
+    x_label, y_label : str
+        With units.
+    curves : tuple of Curve
+        Later ones lie on top.
+    title : str
+        Above the panel; empty for none.
+    arrows, marks : tuple
+        Directions of time, and vertical lines.
+    zero : bool
+        Whether to draw the line y = 0.
+    categories : tuple of str
+        Words for y = 0, 1, ... from the top down, instead of numbers.
+    """
+
+    x_label: str
+    y_label: str
+    curves: tuple[Curve, ...]
+    title: str = ""
+    arrows: tuple[Arrow, ...] = ()
+    marks: tuple[Mark, ...] = ()
+    zero: bool = False
+    categories: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """A figure.
+
+    Parameters
+    ----------
+    panels : tuple of Panel
+        At least one.
+    stacked : bool
+        Whether the panels stand one below the other on the same x axis; else side by side.
+    columns : int
+        How many panels stand side by side at most.
+    note : str
+        What the figure leaves out; empty for nothing.
+    """
+
+    panels: tuple[Panel, ...]
+    stacked: bool = False
+    columns: int = 3
+    note: str = ""
+
+
+def over_time(time: Array, y: Array, points: int = POINTS) -> tuple[Array, Array]:
+    """Return time and y thinned to at most ``points``, with every extremum to the eye.
+
+    Parameters
+    ----------
+    time, y : array, shape (n,)
+        Uniform time [s], and what is drawn over it.
+    points : int, at least 2
+        Most points left.
+    """
+    from mckibben.signals import decimate_minmax
+
+    time, y = decimate_minmax(time, y, max_points=points)
+    return time, y
+
+
+def along(x: Array, y: Array, points: int = POINTS) -> tuple[Array, Array, Array]:
+    """Return places in time, x and y of a path thinned to at most ``points``.
+
+    Extrema of both x and y are kept, so that a loop keeps its tips and its width.
+
+    Parameters
+    ----------
+    x, y : array, shape (n,)
+        In order of time.
+    points : int, at least 4
+        Most points left.
+
+    Returns
+    -------
+    places, x, y : array, shape (m,)
+        ``places`` are sample numbers.
+    """
+    from mckibben.signals import decimate_minmax
+
+    places, x, y = decimate_minmax(np.arange(x.size, dtype=float), x, y, max_points=points)
+    return places, x, y
+
+
+def axis_label(channel: str, unit: str) -> str:
+    """Return the label of an axis.
+
+    >>> axis_label("pressure", "bar"), axis_label("contraction", "")
+    ('pressure [bar]', 'contraction')
+    """
+    return f"{channel} [{unit}]" if unit else channel
+
+
+def time_label(recording: Recording) -> str:
+    """Return the label of the time axis of a recording."""
+    return "sample" if recording.sample_time is None else "time [s]"
+
+
+def series_colour(place: int) -> str:
+    """Return the colour of the model or recording at a place counted from 0."""
+    return f"series-{place % N_COLOURS + 1}"

@@ -1,0 +1,217 @@
+"""Figures for print, by name: of a study, of recordings, and of a saved model against recordings."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from types import MappingProxyType
+from typing import TYPE_CHECKING
+
+from mckibben.blocks.base import Block
+from mckibben.errors import ModelError
+from mckibben.recording import Recording
+from mckibben.report import printed, subjects
+from mckibben.report.drawing import N_COLOURS, Drawing, Panel
+from mckibben.report.shown import Shown, shown
+
+if TYPE_CHECKING:
+    from mckibben.comparison.results import Study
+
+
+def time(study: Study) -> Drawing:
+    """Input and output of all recordings over time."""
+    return subjects.time_course(_recordings(study), (study.input, study.output))
+
+
+def loop(study: Study) -> Drawing:
+    """Output over input of all recordings."""
+    return subjects.loop(_recordings(study), study.input, study.output)
+
+
+def leaderboard(study: Study) -> Drawing:
+    """Errors of all models, with the interval of the test error."""
+    return subjects.leaderboard(study.leaderboard)
+
+
+def fit(study: Study) -> Drawing:
+    """Measured and modelled output over time, of the best model."""
+    return _one_each(
+        shown(study),
+        lambda one: subjects.fit_over_time(
+            one.recording, study.output, _best(one), one.test_from
+        ),
+    )
+
+
+def loops(study: Study) -> Drawing:
+    """Measured and modelled loop, of the best model."""
+    return _one_each(
+        shown(study),
+        lambda one: subjects.fit_loops(one.recording, study.input, study.output, _best(one)),
+    )
+
+
+def residuals(study: Study) -> Drawing:
+    """Residuals of the best model against input and time, on the recording tested on."""
+    first = shown(study)[0]
+    return subjects.residuals(
+        first.recording, study.input, study.output, _best(first), first.test_from
+    )
+
+
+def weights(study: Study) -> Drawing:
+    """Weights over thresholds of all models that have them."""
+    return subjects.weights(
+        {row.model: row.block for row in study.leaderboard.rows if row.block is not None}
+    )
+
+
+def inverse(study: Study) -> Drawing:
+    """Reference, output, error and the input that the inverse gives."""
+    if study.inverse is None:
+        raise ModelError(
+            "no model of this study has an inverse. Remedy: compare models that have (pi, gpi, mpi)."
+        )
+    return subjects.inverse_check(study.inverse, study.train[0].sample_time is not None)
+
+
+FIGURES: Mapping[str, Callable[[Study], Drawing]] = MappingProxyType(
+    {
+        "time": time,
+        "loop": loop,
+        "leaderboard": leaderboard,
+        "fit": fit,
+        "loops": loops,
+        "residuals": residuals,
+        "weights": weights,
+        "inverse": inverse,
+    }
+)
+"""Name -> what draws it from a study."""
+
+RECORDING_KINDS = ("time", "loop")
+MODEL_KINDS = ("fit", "loops", "residuals", "weights")
+
+
+def save_figure(study: Study, name: str, path: str | Path) -> None:
+    """Write one figure of a study.
+
+    Parameters
+    ----------
+    study : Study
+        What was found.
+    name : str
+        One of `FIGURES`.
+    path : path
+        File to write, ``.png``, ``.svg`` or ``.pdf``.
+
+    Raises
+    ------
+    ModelError
+        On an unknown name, or where the study has nothing to draw.
+    DataError
+        On another suffix, or a folder that does not exist.
+    """
+    printed.save(FIGURES[_known(name, tuple(FIGURES))](study), path)
+
+
+def plot_recording(
+    recordings: Sequence[Recording], input: str, output: str, kind: str, path: str | Path  # noqa: A002
+) -> None:
+    """Write a figure of recordings.
+
+    Parameters
+    ----------
+    recordings : sequence of Recording
+        At least one; of more than six, the first six are drawn and the others named.
+    input, output : str
+        Channels.
+    kind : {"time", "loop"}
+        Both over time, or the output over the input.
+    path : path
+        File to write, ``.png``, ``.svg`` or ``.pdf``.
+
+    Raises
+    ------
+    DataError
+        On absent channels, another suffix, or a folder that does not exist.
+    ModelError
+        On an unknown kind.
+    """
+    if _known(kind, RECORDING_KINDS) == "time":
+        drawing = subjects.time_course(recordings, (input, output))
+    else:
+        drawing = subjects.loop(recordings, input, output)
+    printed.save(drawing, path)
+
+
+def plot_model(block: Block, recordings: Sequence[Recording], kind: str, path: str | Path) -> None:
+    """Write a figure of a model, running free, against recordings.
+
+    The first input and the first output of the model are drawn.
+
+    Parameters
+    ----------
+    block : Block
+        The model.
+    recordings : sequence of Recording
+        At least one, with the model's inputs and its measured output; of more than six, the first
+        six are drawn. Each starts from the memory that best explains its first sample.
+    kind : {"fit", "loops", "residuals", "weights"}
+        Output over time; output over input; measured less modelled; weights over thresholds.
+    path : path
+        File to write, ``.png``, ``.svg`` or ``.pdf``.
+
+    Raises
+    ------
+    DataError
+        On absent channels, another suffix, or a folder that does not exist.
+    ModelError
+        On an unknown kind, a model without weights, or one that does not suit the recordings.
+    """
+    from mckibben.comparison.free_run import run_free
+
+    name = block.kind
+    if _known(kind, MODEL_KINDS) == "weights":
+        printed.save(subjects.weights({name: block}), path)
+        return
+    given, wanted = block.inputs[0].name, block.outputs[0].name
+    runs = [Shown(r, {name: run_free(block, r, wanted)}, "") for r in recordings[:N_COLOURS]]
+
+    def drawing(one: Shown) -> Drawing:
+        if kind == "fit":
+            return subjects.fit_over_time(one.recording, wanted, one.outputs)
+        if kind == "loops":
+            return subjects.fit_loops(one.recording, given, wanted, one.outputs)
+        return subjects.residuals(one.recording, given, wanted, one.outputs)
+
+    printed.save(_one_each(runs, drawing, [r.name for r in recordings[N_COLOURS:]]), path)
+
+
+def _one_each(
+    runs: Sequence[Shown], draw: Callable[[Shown], Drawing], others: Sequence[str] = ()
+) -> Drawing:
+    """Draw each recording in panels of its own."""
+    panels: list[Panel] = []
+    for one in runs[:N_COLOURS]:
+        drawing = draw(one)
+        title = one.recording.name if len(runs) > 1 else ""
+        panels += [replace(panel, title=title) for panel in drawing.panels]
+    named = [*(one.recording.name for one in runs[N_COLOURS:]), *others]
+    note = f"Not shown: {', '.join(named)}." if named else ""
+    return replace(drawing, panels=tuple(panels), note=note)
+
+
+def _recordings(study: Study) -> list[Recording]:
+    return [one.recording for one in shown(study)]
+
+
+def _best(one: Shown) -> dict[str, subjects.Array]:
+    return dict(list(one.outputs.items())[:1])
+
+
+def _known(name: str, names: tuple[str, ...]) -> str:
+    if name not in names:
+        raise ModelError(f"there is no figure {name!r}. Remedy: use one of {', '.join(names)}.")
+    return name

@@ -1,0 +1,143 @@
+"""Figures for the page, as plotly.js reads them: plain dicts, numbers packed, colours left to the page.
+
+Nothing of plotly is imported: the page's own script unpacks the numbers and looks up the colours, which
+depend on whether the page is dark or light.
+"""
+
+from __future__ import annotations
+
+from base64 import b64encode
+from html import escape
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mckibben.report.drawing import FEW, Curve, Drawing, Panel
+
+Array = NDArray[np.float64]
+Json = dict[str, Any]
+
+_GAP = 0.09
+"""Share of the height between stacked panels."""
+
+
+def plots(drawing: Drawing) -> list[Json]:
+    """Return the plots of a drawing: one for all panels where they are stacked, else one each."""
+    if drawing.stacked:
+        return [_plot(drawing.panels)]
+    return [_plot((panel,)) for panel in drawing.panels]
+
+
+def packed(values: Array) -> Json:
+    """Return numbers as the page's script unpacks them: seven digits beside a base, in few bytes.
+
+    The base keeps the digits of numbers that are large and close together, such as times.
+
+    Parameters
+    ----------
+    values : array, shape (n,)
+        NaN is a gap.
+    """
+    values = np.asarray(values, dtype=np.float64)
+    finite = values[np.isfinite(values)]
+    base = float(finite[0]) if finite.size else 0.0
+    return {"base": base, "f4": b64encode((values - base).astype("<f4").tobytes()).decode("ascii")}
+
+
+def text(words: str) -> str:
+    """Return words as plotly.js shows them verbatim: it takes tags such as <b> and <a> for markup."""
+    return escape(words, quote=False)
+
+
+def _plot(panels: tuple[Panel, ...]) -> Json:
+    layout: Json = {"annotations": [], "shapes": [], "showlegend": False}
+    traces: list[Json] = []
+    height = (1 - _GAP * (len(panels) - 1)) / len(panels)
+    for row, panel in enumerate(panels):
+        x, y = (f"{axis}{row + 1 if row else ''}" for axis in "xy")
+        bottom = (len(panels) - 1 - row) * (height + _GAP)
+        last = row == len(panels) - 1
+        layout[f"xaxis{x[1:]}"] = _axis(panel.x_label if last else "") | {
+            "anchor": y,
+            "showticklabels": last,
+            **({"matches": "x"} if row else {}),
+        }
+        layout[f"yaxis{y[1:]}"] = _axis(panel.y_label) | {
+            "domain": [bottom, bottom + height],
+            "zeroline": panel.zero,
+            **_ticks(panel),
+        }
+        named = [_trace(curve, x, y) for curve in panel.curves]
+        traces += named
+        layout["showlegend"] |= any(curve.name and curve.model is None for curve in panel.curves)
+        for arrow in panel.arrows:
+            (x0, y0), (x1, y1) = arrow.tail, arrow.head
+            layout["annotations"].append(
+                {"xref": x, "yref": y, "axref": x, "ayref": y, "x": x1, "y": y1, "ax": x0, "ay": y0}
+                | {"text": "", "showarrow": True, "arrowhead": 2, "arrowsize": 1.3}
+                | {"arrowwidth": 1.6, "arrowcolor": "--ink"}
+            )
+        for mark in panel.marks:
+            layout["shapes"].append(
+                {"type": "line", "xref": x, "yref": f"{y} domain", "x0": mark.x, "x1": mark.x}
+                | {"y0": 0, "y1": 1, "line": {"color": "--muted", "width": 1, "dash": "dot"}}
+            )
+            layout["annotations"].append(
+                {"xref": x, "yref": f"{y} domain", "x": mark.x, "y": 1, "text": text(mark.text)}
+                | {"xanchor": "left", "yanchor": "bottom", "showarrow": False}
+            )
+        if panel.title:
+            layout["title"] = {"text": text(panel.title)}
+    return {"data": traces, "layout": layout}
+
+
+def _axis(label: str) -> Json:
+    return {"title": {"text": text(label)}} if label else {}
+
+
+def _ticks(panel: Panel) -> Json:
+    if not panel.categories:
+        return {}
+    places = list(range(len(panel.categories)))
+    return {
+        "tickvals": places,
+        "ticktext": [text(word) for word in panel.categories],
+        "range": [len(places) - 0.5, -0.5],
+    }
+
+
+def _trace(curve: Curve, x: str, y: str) -> Json:
+    colour = f"--{curve.colour}"
+    trace: Json = {
+        "type": "scatter",
+        "x": packed(curve.x),
+        "y": packed(curve.y),
+        "xaxis": x,
+        "yaxis": y,
+        "name": text(curve.name or curve.model or ""),
+        "showlegend": bool(curve.name),
+        "meta": curve.model,
+    }
+    if curve.style in ("line", "dashed"):
+        dots = {"mode": "lines+markers"} if curve.x.size <= FEW else {"mode": "lines"}
+        line = {"color": colour, "width": 1.5, "dash": "dash" if curve.style == "dashed" else "solid"}
+        return trace | dots | {"line": line, "marker": {"color": colour, "size": 3}}
+    if curve.style == "stems":
+        n = curve.x.size
+        gap = np.full(n, np.nan)
+        return trace | {
+            "x": packed(np.column_stack([curve.x, curve.x, gap]).ravel()),
+            "y": packed(np.column_stack([np.zeros(n), curve.y, gap]).ravel()),
+            "mode": "lines+markers",
+            "line": {"color": colour, "width": 2},
+            "marker": {"color": colour, "size": [0, 8, 0] * n, "opacity": 1},
+        }
+    symbol = {"dots": "circle", "rings": "circle-open", "ticks": "line-ns-open"}[curve.style]
+    marker = {"color": colour, "size": 10, "symbol": symbol, "line": {"color": colour, "width": 2}}
+    trace |= {"mode": "markers", "marker": marker}
+    if curve.interval is not None:
+        low, high = curve.interval
+        bars = {"array": packed(high - curve.x), "arrayminus": packed(curve.x - low)}
+        trace["error_x"] = {"type": "data", "symmetric": False, "color": colour, "width": 5, **bars}
+    return trace

@@ -1,0 +1,145 @@
+"""The report of a study: one HTML file that needs nothing but itself."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from mckibben.errors import ModelError
+from mckibben.report import interactive, subjects, wording
+from mckibben.report.drawing import N_COLOURS, POINTS, Drawing, series_colour
+from mckibben.report.shown import MOST_RECORDINGS, Shown, shown
+
+if TYPE_CHECKING:
+    from mckibben.comparison.results import Leaderboard, Row, Study
+
+N_VALUES = 200_000
+"""Numbers in all plots together, so that the file stays under 6 MB beside plotly.js."""
+
+FEWEST_POINTS = 400
+"""Points left to a curve at least, however many curves there are."""
+
+Plots = dict[str, list[list[interactive.Json]]]
+"""Figure -> for each recording shown, or once for all -> its plots side by side."""
+
+
+def write_report(study: Study, path: str | Path) -> None:
+    """Write the report of a study as one HTML file that opens without a network.
+
+    Parameters
+    ----------
+    study : Study
+        What was found.
+    path : path
+        File to write; a failure on the way leaves what was there before.
+
+    Raises
+    ------
+    OSError
+        If the file cannot be written.
+    """
+    from mckibben.blocks.saving import write_text
+
+    write_text(path, page(study))
+
+
+def page(study: Study) -> str:
+    """Return the report of a study as HTML."""
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+    from plotly.offline import get_plotlyjs
+
+    environment = Environment(
+        loader=PackageLoader("mckibben.report"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters |= {"number": wording.number, "percent": wording.percent}
+    environment.policies["json.dumps_kwargs"] = {"allow_nan": False, "separators": (",", ":")}
+    every = shown(study)
+    drawn = every[:MOST_RECORDINGS]
+    figures, notes = _figures(study, drawn)
+    return environment.get_template("report.html.j2").render(
+        study=study,
+        board=study.leaderboard,
+        shown=every,
+        drawn=drawn,
+        figures=figures,
+        notes=notes,
+        models=_models(study.leaderboard),
+        bars=_bars(study.leaderboard),
+        wording=wording,
+        plotly=get_plotlyjs(),
+    )
+
+
+def _figures(study: Study, drawn: tuple[Shown, ...]) -> tuple[Plots, dict[str, str]]:
+    """Return the plots of every figure, and what to say where there is none."""
+    n_models = min(N_COLOURS, len(study.predictions))
+    # A recording has two panels over time and its loop, then each model in four panels more.
+    n_values = len(drawn) * 2 * (5 + 4 * n_models)
+    points = max(FEWEST_POINTS, min(POINTS, N_VALUES // n_values))
+    u, y = study.input, study.output
+
+    def each(draw: Callable[[Shown], Drawing]) -> list[list[interactive.Json]]:
+        return [interactive.plots(draw(one)) for one in drawn]
+
+    figures: Plots = {
+        "time": each(lambda one: subjects.time_course([one.recording], (u, y), points)),
+        "loop": each(lambda one: subjects.loop([one.recording], u, y, points)),
+    }
+    if n_models:
+        figures["fit"] = each(
+            lambda one: subjects.fit_over_time(one.recording, y, one.outputs, one.test_from, points)
+        )
+        figures["loops"] = each(
+            lambda one: subjects.fit_loops(one.recording, u, y, one.outputs, points)
+        )
+        figures["residuals"] = each(
+            lambda one: subjects.residuals(one.recording, u, y, one.outputs, one.test_from, points)
+        )
+    blocks = {row.model: row.block for row in study.leaderboard.rows if row.block is not None}
+    notes: dict[str, str] = {}
+    for name, draw in (
+        ("leaderboard", lambda: subjects.leaderboard(study.leaderboard)),
+        ("weights", lambda: subjects.weights(blocks)),
+    ):
+        try:
+            drawing = draw()
+        except ModelError:
+            continue
+        figures[name] = [interactive.plots(drawing)]
+        notes[name] = drawing.note
+    if study.inverse is not None:
+        timed = study.train[0].sample_time is not None
+        figures["inverse"] = [interactive.plots(subjects.inverse_check(study.inverse, timed))]
+    return figures, notes
+
+
+def _models(board: Leaderboard) -> list[dict[str, str]]:
+    """Return the models that figures show, best first, each with its colour."""
+    ranked = [row.model for row in board.rows if row.reason is None][:N_COLOURS]
+    return [{"name": name, "colour": series_colour(place)} for place, name in enumerate(ranked)]
+
+
+def _bars(board: Leaderboard) -> dict[str, dict[str, float]]:
+    """Return for each model its test RMSE and interval as percentages of the widest."""
+
+    def ends(row: Row) -> tuple[float, float]:
+        rmse = 0.0 if row.test is None else row.test.rmse
+        return row.rmse_interval or (rmse, rmse)
+
+    scored = [row for row in board.rows if row.test is not None]
+    widest = max((ends(row)[1] for row in scored), default=1.0) or 1.0
+    bars: dict[str, Any] = {}
+    for row in scored:
+        low, high = ends(row)
+        middle = 0.0 if row.test is None else row.test.rmse
+        bars[row.model] = {
+            "low": 100 * low / widest,
+            "high": 100 * high / widest,
+            "middle": 100 * middle / widest,
+        }
+    return bars

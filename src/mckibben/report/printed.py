@@ -1,0 +1,222 @@
+"""Figures for print: drawings set by matplotlib at the width of a journal's column, as PNG, SVG or PDF.
+
+Neither pyplot nor any global state is touched, and the same drawing gives the same bytes.
+"""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mckibben.errors import DataError
+from mckibben.report.drawing import FEW, Curve, Drawing, Panel
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+COLUMN = 3.5
+"""Width of a column [in]."""
+
+PAGE = 7.2
+"""Width of two columns and the space between them [in]."""
+
+RESOLUTION = 300
+"""Of PNG [dots per inch]."""
+
+COLOURS: Mapping[str, str] = MappingProxyType(
+    {
+        "measured": "#222222",
+        "input": "#777777",
+        "series-1": "#0072B2",
+        "series-2": "#E69F00",
+        "series-3": "#009E73",
+        "series-4": "#CC79A7",
+        "series-5": "#56B4E9",
+        "series-6": "#D55E00",
+        "age-1": "#FDB42F",
+        "age-2": "#ED7953",
+        "age-3": "#C23C81",
+        "age-4": "#7E03A8",
+        "age-5": "#0D0887",
+    }
+)
+"""Okabe and Ito's colours for what differs in kind, a scale from light to dark for time."""
+
+STYLE: Mapping[str, Any] = MappingProxyType(
+    {
+        "font.family": "DejaVu Sans",
+        "font.size": 7.5,
+        "axes.linewidth": 0.6,
+        "axes.spines.top": False,
+        "axes.spines.right": False,
+        "axes.titlesize": 7.5,
+        "lines.linewidth": 0.9,
+        "xtick.major.width": 0.6,
+        "ytick.major.width": 0.6,
+        "legend.frameon": False,
+        "legend.fontsize": 6.5,
+        "figure.facecolor": "white",
+        "savefig.facecolor": "white",
+        "pdf.fonttype": 42,
+        "svg.fonttype": "path",
+        "svg.hashsalt": "mckibben",
+        "path.simplify": False,
+    }
+)
+
+METADATA: Mapping[str, Mapping[str, None]] = MappingProxyType(
+    {
+        "png": {"Software": None},
+        "svg": {"Date": None},
+        "pdf": {"CreationDate": None},
+    }
+)
+"""What each format would record of when and by what it was made, left out."""
+
+
+def save(drawing: Drawing, path: str | Path) -> None:
+    """Write a drawing; a failure on the way leaves what was there before.
+
+    Parameters
+    ----------
+    drawing : Drawing
+        What to draw.
+    path : path
+        File to write; its suffix is ``.png`` (300 dots per inch), ``.svg`` or ``.pdf``.
+
+    Raises
+    ------
+    DataError
+        On another suffix, or a folder that does not exist.
+    """
+    from matplotlib import rc_context
+
+    path = Path(path)
+    kind = path.suffix.lower().lstrip(".")
+    if kind not in METADATA:
+        raise DataError(
+            f"figures cannot be written as {path.suffix or 'a file without suffix'}",
+            file=path,
+            remedy="name it .png, .svg or .pdf",
+        )
+    if not path.parent.is_dir():
+        raise DataError("its folder does not exist", file=path, remedy="create the folder first")
+    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=".tmp")
+    try:
+        with os.fdopen(handle, "wb") as file, rc_context(dict(STYLE)):
+            drawn(drawing).savefig(
+                file, format=kind, dpi=RESOLUTION, metadata=dict(METADATA[kind])
+            )
+        umask = os.umask(0)
+        os.umask(umask)
+        Path(temporary).chmod(0o666 & ~umask)
+        Path(temporary).replace(path)
+    except BaseException:
+        Path(temporary).unlink(missing_ok=True)
+        raise
+
+
+def drawn(drawing: Drawing) -> Figure:
+    """Return a drawing as a matplotlib figure; `save` adds the style of this package."""
+    from matplotlib.figure import Figure
+
+    n = len(drawing.panels)
+    columns = 1 if drawing.stacked else min(n, drawing.columns)
+    rows = -(-n // columns)
+    width = COLUMN if columns == 1 else PAGE
+    panel_height = 1.4 if drawing.stacked else min(0.8 * width / columns, 2.6)
+    if drawing.panels[0].categories:
+        panel_height = 0.9 + 0.2 * len(drawing.panels[0].categories)
+    elif drawing.columns == 1:
+        panel_height = 1.7
+    note = 0.25 if drawing.note else 0.0
+    height = rows * panel_height + 0.2 + note
+    figure = Figure(figsize=(width, height), layout="constrained")
+    axes = figure.subplots(rows, columns, squeeze=False, sharex=drawing.stacked).ravel()
+    for place, (panel, axis) in enumerate(zip(drawing.panels, axes, strict=False)):
+        _panel(axis, panel, bottom=not drawing.stacked or place == n - 1)
+    for axis in axes[n:]:
+        axis.set_axis_off()
+    if drawing.note:
+        figure.supxlabel(verbatim(drawing.note), fontsize=6, wrap=True)
+    return figure
+
+
+def verbatim(words: str) -> str:
+    """Return words as matplotlib shows them as they are: it takes $ for mathematics."""
+    readable = "".join(letter if letter.isprintable() else " " for letter in words)
+    return readable.replace("$", r"\$")
+
+
+def _panel(axis: Axes, panel: Panel, bottom: bool) -> None:
+    if panel.zero:
+        axis.axhline(0, color="#aaaaaa", linewidth=0.6, zorder=0)
+    for curve in panel.curves:
+        _curve(axis, curve)
+    for arrow in panel.arrows:
+        axis.annotate(
+            "",
+            xy=arrow.head,
+            xytext=arrow.tail,
+            arrowprops={"arrowstyle": "-|>", "color": "#222222", "linewidth": 0.8},
+        )
+    for mark in panel.marks:
+        axis.axvline(mark.x, color="#777777", linewidth=0.6, linestyle=":")
+        axis.annotate(
+            verbatim(mark.text),
+            xy=(mark.x, 1),
+            xycoords=("data", "axes fraction"),
+            xytext=(2, 1),
+            textcoords="offset points",
+            fontsize=6,
+        )
+    if bottom:
+        axis.set_xlabel(verbatim(panel.x_label))
+    axis.set_ylabel(verbatim(panel.y_label))
+    if panel.categories:
+        axis.set_yticks(range(len(panel.categories)), [verbatim(w) for w in panel.categories])
+        axis.set_ylim(len(panel.categories) - 0.5, -0.5)
+        axis.set_xlim(left=0)
+    handles, names = axis.get_legend_handles_labels()
+    if handles:
+        n_columns = 3 if max(map(len, names)) < 18 else 1
+        axis.legend(
+            *(handles, names),
+            title=verbatim(panel.title) or None,
+            ncols=n_columns,
+            loc="lower left",
+            bbox_to_anchor=(0, 1),
+            borderaxespad=0.2,
+            alignment="left",
+        )
+    else:
+        axis.set_title(verbatim(panel.title), loc="left")
+
+
+def _curve(axis: Axes, curve: Curve) -> None:
+    colour = COLOURS[curve.colour]
+    # A name that begins with an underscore would be left out of the legend.
+    name = f" {verbatim(curve.name)}" if curve.name.startswith("_") else verbatim(curve.name)
+    label = name or None
+    if curve.style in ("line", "dashed"):
+        marker = "." if curve.x.size <= FEW else ""
+        line = "--" if curve.style == "dashed" else "-"
+        axis.plot(curve.x, curve.y, line, color=colour, marker=marker, markersize=2, label=label)
+    elif curve.style == "stems":
+        axis.vlines(curve.x, np.minimum(curve.y, 0), np.maximum(curve.y, 0), color=colour)
+        axis.plot(curve.x, curve.y, "o", color=colour, markersize=3, label=label)
+    else:
+        if curve.interval is not None:
+            low, high = curve.interval
+            axis.hlines(curve.y, low, high, color=colour)
+        marker = {"dots": "o", "rings": "o", "ticks": "|"}[curve.style]
+        face = colour if curve.style == "dots" else "none"
+        style = {"color": colour, "markerfacecolor": face, "markersize": 4}
+        axis.plot(curve.x, curve.y, marker, label=label, **style)

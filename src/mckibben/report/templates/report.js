@@ -1,0 +1,100 @@
+"use strict";
+
+const source = document.getElementById("figures").textContent;
+const choices = { recording: 0, models: new Set() };
+
+function unpack(key, value) {
+  if (value !== null && typeof value === "object" && typeof value.f4 === "string") {
+    const bytes = Uint8Array.from(atob(value.f4), (letter) => letter.charCodeAt(0));
+    return Float64Array.from(new Float32Array(bytes.buffer), (x) => x + value.base);
+  }
+  if (/color$/i.test(key) && typeof value === "string" && value.startsWith("--")) {
+    return getComputedStyle(document.documentElement).getPropertyValue(value).trim();
+  }
+  return value;
+}
+
+let figures = JSON.parse(source, unpack);
+
+function styled(layout) {
+  const style = getComputedStyle(document.documentElement);
+  const colour = (name) => style.getPropertyValue(name).trim();
+  const whole = {
+    autosize: true,
+    hovermode: "closest",
+    paper_bgcolor: "rgba(0,0,0,0)",
+    plot_bgcolor: "rgba(0,0,0,0)",
+    font: { family: getComputedStyle(document.body).fontFamily, size: 12, color: colour("--ink") },
+    margin: { l: 55, r: 10, t: 34, b: 45 },
+    legend: { orientation: "h", x: 0, xanchor: "left", y: 1, yanchor: "bottom", itemsizing: "constant" },
+    ...layout,
+  };
+  if (layout.title) whole.title = { ...layout.title, font: { size: 13 }, x: 0, xanchor: "left" };
+  for (const name of Object.keys(whole).filter((key) => /^[xy]axis/.test(key))) {
+    const axis = { gridcolor: colour("--grid"), zerolinecolor: colour("--rule"), zerolinewidth: 1.5 };
+    const own = whole[name];
+    whole[name] = { ...axis, automargin: true, ...(name[0] === "x" ? { zeroline: false } : {}), ...own };
+    if (own.title) whole[name].title = { ...own.title, standoff: 8 };
+  }
+  return whole;
+}
+
+const config = {
+  responsive: true,
+  displaylogo: false,
+  modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d"],
+};
+
+function draw(place) {
+  const variants = figures[place.dataset.figure];
+  const plots = variants[Math.min(choices.recording, variants.length - 1)];
+  const plot = plots[Number(place.dataset.panel)];
+  const data = plot.data.map((trace) => ({
+    ...trace,
+    visible: trace.meta === null || choices.models.has(trace.meta) || !place.dataset.toggled,
+  }));
+  return Plotly.react(place, data, styled(plot.layout), config);
+}
+
+const places = [...document.querySelectorAll(".plot")];
+
+function redraw(which) {
+  places.filter(which).forEach(draw);
+}
+
+for (const box of document.querySelectorAll("input[name=model]")) {
+  if (box.checked) choices.models.add(box.value);
+  box.addEventListener("change", () => {
+    choices.models[box.checked ? "add" : "delete"](box.value);
+    for (const same of document.querySelectorAll("input[name=model]")) {
+      if (same.value === box.value) same.checked = box.checked;
+    }
+    redraw((place) => place.dataset.toggled);
+  });
+}
+
+for (const chooser of document.querySelectorAll("select[name=recording]")) {
+  chooser.addEventListener("change", () => {
+    choices.recording = Number(chooser.value);
+    for (const other of document.querySelectorAll("select[name=recording]")) other.value = chooser.value;
+    redraw((place) => figures[place.dataset.figure].length > 1);
+  });
+}
+
+function recolour() {
+  figures = JSON.parse(source, unpack);
+  redraw(() => true);
+}
+
+matchMedia("(prefers-color-scheme: dark)").addEventListener("change", recolour);
+
+// One plot after another, so that the page can be read and scrolled from the start.
+async function start() {
+  for (const place of places) {
+    await draw(place);
+    await new Promise((next) => setTimeout(next));
+  }
+  document.documentElement.dataset.drawn = "all";
+}
+
+start();

@@ -1,0 +1,204 @@
+"""Numbers and sentences of the report."""
+
+from __future__ import annotations
+
+import math
+import shlex
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from mckibben.comparison.results import Row, Study
+    from mckibben.recording import Recording
+
+WORSE_ON_TEST = 1.5
+"""Test error over training error from which more varied data are asked for."""
+
+FORGETFUL = 0.7
+"""Share of the measured branch gap below which a model is said to forget."""
+
+MISLEADING = 0.05
+"""RMSE over range from which the best model is said to miss something."""
+
+
+def number(value: float | None, digits: int = 3) -> str:
+    """Return a number to so many significant digits, without an exponent where that is readable.
+
+    >>> number(0.012345), number(12345.6), number(None), number(1.5e-12)
+    ('0.0123', '12346', '–', '1.5e-12')
+    """
+    if value is None or not math.isfinite(value):
+        return "–"
+    if value == 0:
+        return "0"
+    size = math.floor(math.log10(abs(value)))
+    if not -4 <= size <= 6:
+        return f"{value:.{digits}g}"
+    return f"{value:.{max(0, digits - 1 - size)}f}"
+
+
+def percent(value: float | None, digits: int = 2) -> str:
+    """Return a share as a percentage.
+
+    >>> percent(0.0123), percent(None)
+    ('1.2 %', '–')
+    """
+    return "–" if value is None else f"{number(100 * value, digits)} %"
+
+
+def output_range(study: Study) -> float:
+    """Return the range of the measured output over all recordings."""
+    outputs = [recording[study.output] for recording in (*study.train, *study.test)]
+    return float(max(y.max() for y in outputs) - min(y.min() for y in outputs))
+
+
+def verdict(study: Study) -> list[str]:
+    """Return which model is best, how good it is, and whether it can be inverted."""
+    board, best = study.leaderboard, study.leaderboard.best
+    if best is None or best.test is None:
+        return [f"None of the {len(board.rows)} models could be identified on these recordings."]
+    n_ok = sum(row.reason is None for row in board.rows)
+    between = ""
+    if best.rmse_interval is not None:
+        low, high = best.rmse_interval
+        between = f" (95 % interval {number(low)} to {number(high)} {board.unit})"
+    share = percent(best.test.rmse / output_range(study))
+    sentences = [
+        f"The best of {n_ok} models is {best.model}: free-running on data that it was not fitted to, "
+        f"its RMSE is {number(best.test.rmse)} {board.unit}{between}, {share} of the measured range; "
+        f"at worst it is off by {number(best.test.max_error)} {board.unit}."
+    ]
+    tied = [row.model for row in board.rows if row is not best and _ties(row)]
+    if tied:
+        sentences.append(
+            f"On these data {_listed(tied)} cannot be told apart from it: their interval of the "
+            "difference contains 0."
+        )
+    return [*sentences, _invertibility(study, best)]
+
+
+def _invertibility(study: Study, best: Row) -> str:
+    check = study.inverse
+    if check is None:
+        return "None of the models that worked can be inverted."
+    low, high = check.reachable
+    if check.model == best.model:
+        which = "It can be inverted"
+    else:
+        which = f"It cannot be inverted here; the best model that can is {check.model}"
+    return (
+        f"{which}: any {study.output} from {number(low)} to {number(high)} "
+        f"{study.leaderboard.unit} can be asked for, whatever happened before."
+    )
+
+
+def next_steps(study: Study) -> list[str]:
+    """Return what to do next, most useful first."""
+    best = study.leaderboard.best
+    if best is None or best.test is None or best.train is None:
+        return [
+            "Read the reasons in the leaderboard below, then check that input and output are the "
+            "right channels and that the recording covers several cycles."
+        ]
+    steps = []
+    if study.inverse is not None:
+        steps.append(
+            f"Use the inverse as feedforward: inverse.json turns a wished-for {study.output} into "
+            f"{study.input} (command at the end). On the muscle itself expect the error of the "
+            f"model, not of the inverse."
+        )
+    if best.test.rmse / output_range(study) > MISLEADING:
+        steps.append(
+            "The best model still misses something: the residuals below show whether it depends on "
+            "the input (a wrong shape) or on time (creep, rate)."
+        )
+    if best.train.rmse > 0 and best.test.rmse > WORSE_ON_TEST * best.train.rmse:
+        ratio = number(best.test.rmse / best.train.rmse, 2)
+        steps.append(
+            f"The error on new data is {ratio} times that on the data fitted: record more varied "
+            "movements, with turning points at many levels, and fit again."
+        )
+    memory = best.memory
+    if memory is not None and memory.gap_ratio is not None and memory.gap_ratio < FORGETFUL:
+        steps.append(
+            f"It keeps only {percent(memory.gap_ratio)} of the measured gap between branches: do "
+            "not rely on it where the input is held."
+        )
+    if not steps:
+        steps.append(
+            "Test the model on a recording made on another day or with another load (--test)."
+        )
+    return steps
+
+
+def commands(study: Study) -> list[tuple[str, str]]:
+    """Return what to type to repeat the study and to use its results, each with what it does."""
+    board = study.leaderboard
+    train, test = _files(study.train), _files(study.test)
+    channels = f"--input {shlex.quote(board.input)} --output {shlex.quote(board.output)}"
+    tested = "".join(f" --test {file}" for file in test if file not in train)
+    models = ",".join(sorted(row.model for row in board.rows))
+    lines = [
+        (
+            "Repeat this study",
+            f"mckibben study {' '.join(train)}{tested} {channels} --models {models} "
+            f"--seed {board.seed} -o study",
+        )
+    ]
+    if board.best is not None:
+        model = board.best.model
+        lines.append(
+            (
+                f"Fit {model} to whole recordings",
+                f"mckibben fit {model} {' '.join(train)} {channels} --seed {board.seed} "
+                f"-o {model}.json",
+            )
+        )
+        lines.append(
+            (
+                f"Run it on another {board.input}",
+                f"mckibben simulate {model}.json new.csv -o modelled.csv",
+            )
+        )
+    if study.inverse is not None:
+        lines.append(
+            (
+                f"From a wished-for {board.output} to {board.input}",
+                "mckibben simulate inverse.json reference.csv -o feedforward.csv",
+            )
+        )
+    return lines
+
+
+def versions() -> dict[str, str]:
+    """Return the versions of Python, this package, and those that its numbers come from."""
+    import platform
+    from importlib.metadata import version
+
+    packages = ("mckibben", "numpy", "scipy", "numba", "scikit-learn")
+    return {"Python": platform.python_version()} | {name: version(name) for name in packages}
+
+
+def _files(recordings: Sequence[Recording]) -> list[str]:
+    sources = [recording.source or f"{recording.name}.csv" for recording in recordings]
+    return [shlex.quote(source) for source in dict.fromkeys(sources)]
+
+
+def _ties(row: Row) -> bool:
+    interval = row.difference_interval
+    return row.reason is None and interval is not None and bool(interval[0] <= 0 <= interval[1])
+
+
+def _listed(names: Sequence[str]) -> str:
+    *others, last = names
+    return f"{', '.join(others)} and {last}" if others else last
+
+
+def duration(recording: Recording) -> str:
+    """Return how long a recording is, in words."""
+    samples = f"{recording.n_samples} samples"
+    if recording.duration is None or recording.sample_time is None:
+        return f"{samples}, no time"
+    return f"{samples}, {number(recording.duration)} s at {number(1 / recording.sample_time)} Hz"

@@ -1,0 +1,129 @@
+"""A study put together by hand, so that the report is tested without fitting anything."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mckibben.blocks.base import Block, Channel
+from mckibben.blocks.compose import Series
+from mckibben.blocks.gpi import GPI
+from mckibben.blocks.pi import PI
+from mckibben.blocks.piecewise_linear import PiecewiseLinear
+from mckibben.blocks.rate_dependent_pi import RateDependentPI
+from mckibben.characterization import characterize
+from mckibben.comparison.results import InverseCheck, Leaderboard, Memory, Row, Study
+from mckibben.comparison.studying import check_inverse
+from mckibben.metrics import score
+from mckibben.recording import Recording
+
+Array = NDArray[np.float64]
+
+
+def measured(
+    n: int = 3000,
+    *,
+    seed: int = 0,
+    sample_time: float | None = 0.01,
+    channels: tuple[str, str] = ("pressure", "displacement"),
+    **meta: str,
+) -> Recording:
+    """Return a recording of a made-up muscle: growing triangles with noise, six cycles."""
+    rng = np.random.default_rng(seed)
+    phase = np.linspace(0, 6, n)
+    u = (1 - np.abs(2 * (phase % 1) - 1)) * (2 + 3 * np.floor(phase + 1e-9).clip(0, 5) / 5)
+    y = GPI.example().simulate(u) + 0.05 * rng.standard_normal(n)
+    units = {} if channels == ("pressure", "displacement") else dict.fromkeys(channels, "V")
+    return Recording(
+        dict(zip(channels, (u, y), strict=True)), sample_time, units, meta={"name": "muscle"} | meta
+    )
+
+
+def models() -> dict[str, Block]:
+    """Return models of every kind that the report treats apart, best first."""
+    gpi, pi = GPI.example(), PI.example()
+    curve = PiecewiseLinear.example()
+    return {
+        "gpi": gpi,
+        "mpi": Series((pi, curve)),
+        "rdpi": RateDependentPI.example(),
+        "pi": replace(pi, weights=tuple(0.9 * w for w in pi.weights)),
+    }
+
+
+def study(
+    train: tuple[Recording, ...] | None = None,
+    test: tuple[Recording, ...] | None = None,
+    *,
+    blocks: dict[str, Block] | None = None,
+    inverse: bool = True,
+    notes: tuple[str, ...] = (),
+    reason: str = "the data have no time. Remedy: give --rate.",
+) -> Study:
+    """Return a study; without recordings, one of which the last quarter is held out."""
+    if train is None:
+        whole = measured()
+        train, test = (whole.slice(0, 3 * len(whole) // 4),), (whole,)
+    test = test if test is not None else (measured(seed=1, name="another day"),)
+    blocks = models() if blocks is None else blocks
+    input_name, output_name = list(train[0].channels)[:2]
+    predictions = {
+        name: tuple(
+            block.simulate(r[input_name], sample_time=r.sample_time or 1.0) for r in (*train, *test)
+        )
+        for name, block in blocks.items()
+    }
+    rows = []
+    for place, (name, block) in enumerate(blocks.items()):
+        n_train = len(train)
+        fitted = score(train[0][output_name], predictions[name][0])
+        tested = score(test[0][output_name], predictions[name][n_train])
+        rows.append(
+            Row(
+                model=name,
+                n_parameters=block.n_parameters,
+                fit_seconds=0.4 + place,
+                step_ns=12.5,
+                train=fitted,
+                test=tested,
+                validation_rmse=1.1 * fitted.rmse,
+                rmse_interval=(0.9 * tested.rmse, 1.15 * tested.rmse),
+                difference_interval=(-0.01 + 0.1 * place, 0.2 + place),
+                memory=Memory(0.95 - 0.3 * place, 40, 1.0),
+                block=block,
+            )
+        )
+    rows.append(Row(model="eupi", reason=reason))
+    board = Leaderboard(
+        input=input_name,
+        output=output_name,
+        unit=train[0].units[output_name],
+        rows=tuple(rows),
+        split="last 25 % of muscle to test, all before it to fit",
+        seed=0,
+        n_train=sum(map(len, train)),
+        n_test=sum(map(len, test)),
+    )
+    return Study(
+        train=train,
+        test=test,
+        characterization=characterize([*train, *test], input_name, output_name),
+        leaderboard=board,
+        predictions=predictions,
+        inverse=checked_inverse(blocks, train[0]) if inverse and blocks else None,
+        notes=notes,
+    )
+
+
+def checked_inverse(blocks: dict[str, Block], recording: Recording) -> InverseCheck:
+    """Return the check of the first model's inverse."""
+    name, block = next(iter(blocks.items()))
+    return check_inverse(name, block, recording)
+
+
+def renamed(block: Block, names: tuple[str, str]) -> Block:
+    """Return a model with other channels."""
+    channels = (Channel(name, "V") for name in names)
+    return replace(block, **dict(zip(("input", "output"), channels, strict=True)))  # type: ignore[type-var]

@@ -1,0 +1,121 @@
+"""Cutting a recording in time, and putting it on another grid."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mckibben.errors import DataError
+from mckibben.recording import Recording
+
+Array = NDArray[np.float64]
+
+STOP_BAND = 60.0
+"""Attenuation of what could alias [dB]."""
+
+PASS_SHARE = 0.8
+"""Share of the new Nyquist frequency up to which signals pass unchanged."""
+
+
+def cut(recording: Recording, start: float, stop: float = np.inf) -> Recording:
+    """Return the samples from ``start`` up to, not including, ``stop``, in seconds of its own time.
+
+    Parameters
+    ----------
+    recording : Recording
+        With time.
+    start, stop : float
+        In the time of the recording [s], start before stop; they may lie outside of it. Default to
+        the end, with its last sample.
+
+    Raises
+    ------
+    DataError
+        If the recording has no time, or fewer than two samples are left.
+    """
+    step = _step(recording, "cut by time", "use Recording.slice, which counts samples")
+    first, last = (
+        int(np.clip(np.ceil((limit - recording.start_time) / step - 1e-6), 0, len(recording)))
+        for limit in (start, stop)
+    )
+    if last - first < 2:
+        raise DataError(
+            f"there are {max(last - first, 0)} samples from {start:g} to {stop:g} s",
+            file=recording.source,
+            remedy=f"stay within {recording.time[0]:g} and {recording.time[-1]:g} s",
+        )
+    return recording.slice(first, last)
+
+
+def resample(recording: Recording, sample_time: float) -> Recording:
+    """Return a recording on another sample time, any ratio, without aliasing and without delay.
+
+    Onto a coarser grid, a zero-phase FIR low-pass comes first: signals pass up to 80 % of the new
+    Nyquist frequency, and what would alias is attenuated by 60 dB; then a cubic spline is read at the
+    new instants. Onto a finer grid, the samples are joined by straight lines, which adds no overshoot
+    and so no reversals. Beyond its ends the signal is continued by its mirror image in the end point.
+
+    Parameters
+    ----------
+    recording : Recording
+        With time.
+    sample_time : float
+        Wanted time between samples [s], positive. The first instant stays; the last is the last
+        that fits.
+
+    Raises
+    ------
+    DataError
+        If the recording has no time, the sample time is not positive, or fewer than two samples would
+        be left.
+    """
+    step = _step(recording, "be resampled", "read it with --rate")
+    if not 0 < sample_time < np.inf:
+        raise DataError(
+            f"a sample time of {sample_time} s is impossible", remedy="give a positive time"
+        )
+    ratio = sample_time / step
+    if ratio == 1:
+        return recording
+    n = int(np.floor((len(recording) - 1) / ratio + 1e-9)) + 1
+    if n < 2:
+        raise DataError(
+            f"{recording.duration:g} s at {sample_time:g} s a sample leave one sample",
+            file=recording.source,
+            remedy="ask for a shorter sample time",
+        )
+    places = np.minimum(np.arange(n) * ratio, len(recording) - 1)
+    read = _read_smoothed if ratio > 1 else _read_straight
+    return replace(
+        recording,
+        channels={name: read(recording[name], places, ratio) for name in recording.channels},
+        sample_time=sample_time,
+    )
+
+
+def _read_straight(x: Array, places: Array, ratio: float) -> Array:
+    del ratio
+    return np.asarray(np.interp(places, np.arange(x.size), x))
+
+
+def _read_smoothed(x: Array, places: Array, ratio: float) -> Array:
+    from scipy.interpolate import make_interp_spline
+    from scipy.signal import firwin, kaiserord, oaconvolve
+
+    n_taps, beta = kaiserord(STOP_BAND, (1 - PASS_SHARE) / ratio)
+    half = n_taps // 2
+    low_pass = firwin(2 * half + 1, 0.5 * (1 + PASS_SHARE) / ratio, window=("kaiser", beta))
+    beyond = np.pad(x, half, mode="reflect", reflect_type="odd")
+    smooth = oaconvolve(beyond, low_pass, mode="valid")
+    degree = min(3, x.size - 1)
+    return np.asarray(make_interp_spline(np.arange(x.size), smooth, k=degree)(places))
+
+
+def _step(recording: Recording, wish: str, remedy: str) -> float:
+    if recording.sample_time is None:
+        raise DataError(
+            f"a recording without time cannot {wish}", file=recording.source, remedy=remedy
+        )
+    return recording.sample_time

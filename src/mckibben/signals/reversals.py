@@ -1,0 +1,217 @@
+"""Turning points of a signal, told from noise; the branches and cycles between them."""
+
+from __future__ import annotations
+
+import numba
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mckibben.errors import DataError
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+NOISE_SHARE = 0.05
+"""Sample-to-sample scatter above this share of the range is taken for movement, not for noise."""
+
+RANGE_SHARE = 0.01
+"""Smallest swing that counts as a movement, relative to the range."""
+
+WHOLE = 0.9
+"""A cycle at either end of a signal counts when its branch there is at least this share of the
+other one."""
+
+
+def noise_level(x: ArrayLike) -> float:
+    """Return the standard deviation of the white noise on a signal, in its unit.
+
+    Third differences remove what moves smoothly, and their median is not moved by jumps and turns.
+
+    Parameters
+    ----------
+    x : array_like, shape (n,)
+        At least two samples.
+
+    Returns
+    -------
+    float
+        NaN where noise cannot be told from movement: fewer than eight samples, or a scatter above
+        5 % of the range, as in levels chosen at random of which each was recorded once.
+
+    Raises
+    ------
+    DataError
+        On fewer than two samples, or values that are not finite.
+    """
+    values = _checked(x)
+    if values.size < 8:
+        return float("nan")
+    scatter = float(np.median(np.abs(np.diff(values, 3))))
+    # 0.6745 is the median of |N(0, 1)|, and 20 the variance that third differences give to N(0, 1).
+    noise = scatter / (0.6745 * np.sqrt(20.0))
+    return noise if noise <= NOISE_SHARE * float(np.ptp(values)) else float("nan")
+
+
+def swing_threshold(noise: float, span: float, n: int) -> float:
+    """Return the smallest swing that is a movement: above the noise, and at least 1 % of the range.
+
+    Parameters
+    ----------
+    noise : float
+        Standard deviation; NaN for unknown.
+    span : float
+        Range of the signal.
+    n : int
+        Number of samples; the more there are, the further noise swings somewhere among them.
+    """
+    # The expected range of n samples of N(0, 1) is below 2 sqrt(2 ln n).
+    factor = 2 * np.sqrt(2 * np.log(max(n, 2))) + 1
+    return max(RANGE_SHARE * span, 0.0 if np.isnan(noise) else factor * noise)
+
+
+def reversals(x: ArrayLike, threshold: float | None = None) -> Indices:
+    """Return where a signal turns, with its first and last sample.
+
+    Between two turning points the signal never swings back by more than the threshold, and each is
+    the extreme sample of the branches that meet there; of a plateau it is the last sample, so that a
+    hold belongs to the branch that led to it. A hold within a branch is no reversal. Only the first
+    and last sample may be less extreme than a neighbour, by at most the threshold.
+
+    Parameters
+    ----------
+    x : array_like, shape (n,)
+        At least two samples.
+    threshold : float, optional
+        Smallest swing back that makes a reversal, not negative, unit of the signal; default the
+        greater of 1 % of the range and what noise reaches.
+
+    Returns
+    -------
+    array of int, shape (m,), m at least 2
+        Increasing sample numbers.
+
+    Raises
+    ------
+    DataError
+        On fewer than two samples, values that are not finite, or a negative threshold.
+
+    Examples
+    --------
+    >>> reversals([0.0, 1.0, 2.0, 2.0, 1.0, 1.0, 0.0]).tolist()
+    [0, 3, 6]
+    """
+    values = _checked(x)
+    if threshold is None:
+        threshold = swing_threshold(noise_level(values), float(np.ptp(values)), values.size)
+    if not threshold >= 0:
+        raise DataError(f"a threshold of {threshold} is impossible", remedy="give 0 or more")
+    found = np.empty(values.size, dtype=np.int64)
+    return found[: _turns(values, float(threshold), found)]
+
+
+def branches(x: ArrayLike, threshold: float | None = None) -> list[tuple[int, int, int]]:
+    """Return the monotonic branches of a signal.
+
+    Parameters
+    ----------
+    x, threshold
+        As for `reversals`.
+
+    Returns
+    -------
+    list of (start, stop, direction)
+        ``x[start:stop]`` is the branch with both its turning points, which neighbouring branches
+        share; direction is 1 rising, -1 falling, and 0 for a signal that ends where it began without
+        having turned.
+
+    Examples
+    --------
+    >>> branches([0.0, 1.0, 2.0, 1.0])
+    [(0, 3, 1), (2, 4, -1)]
+    """
+    values = _checked(x)
+    turns = reversals(values, threshold)
+    ways = np.sign(np.diff(values[turns])).astype(int)
+    return [
+        (int(start), int(stop) + 1, int(way))
+        for start, stop, way in zip(turns[:-1], turns[1:], ways, strict=True)
+    ]
+
+
+def cycles(x: ArrayLike, threshold: float | None = None) -> list[slice]:
+    """Return the whole cycles of a signal, from minimum to minimum.
+
+    Every slice holds both its minima, so that neighbouring ones share a sample. What comes before the
+    first minimum and after the last is left out; where a signal begins or ends within a cycle, that
+    counts when no more than a tenth of its branch is missing.
+
+    Parameters
+    ----------
+    x, threshold
+        As for `reversals`.
+
+    Examples
+    --------
+    >>> cycles([0.0, 2.0, 0.0, 3.0, 0.0, 1.0])
+    [slice(0, 3, None), slice(2, 5, None)]
+    """
+    values = _checked(x)
+    return whole_cycles(values, reversals(values, threshold))
+
+
+def whole_cycles(x: Array, turns: Indices) -> list[slice]:
+    """Return the whole cycles between turning points that are known already."""
+    heights = x[turns]
+    # A minimum, a maximum and a minimum in a row, wherever the first two rise.
+    first = 0 if heights[1] > heights[0] else 1
+    last = turns.size - 3
+    found = []
+    for i in range(first, last + 1, 2):
+        rise, fall = heights[i + 1] - heights[i], heights[i + 1] - heights[i + 2]
+        begun = i > 0 or rise >= WHOLE * fall
+        ended = i < last or fall >= WHOLE * rise
+        if begun and ended:
+            found.append(slice(int(turns[i]), int(turns[i + 2]) + 1))
+    return found
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _turns(x: Array, threshold: float, found: Indices) -> int:
+    """Write the turning points into ``found``; return how many there are."""
+    n, count, way = x.size, 1, 0
+    found[0] = 0
+    low = high = 0
+    for i in range(1, n):
+        if way <= 0 and x[i] <= x[low]:
+            low = i
+        if way >= 0 and x[i] >= x[high]:
+            high = i
+        if way >= 0 and x[high] - x[i] > threshold:
+            if way > 0:
+                found[count] = high
+                count += 1
+            way, low = -1, i
+        elif way <= 0 and x[i] - x[low] > threshold:
+            if way < 0:
+                found[count] = low
+                count += 1
+            way, high = 1, i
+    found[count] = n - 1
+    return count + 1
+
+
+def _checked(x: ArrayLike) -> Array:
+    values = np.ascontiguousarray(x, dtype=np.float64)
+    if values.ndim != 1 or values.size < 2:
+        raise DataError(
+            f"a signal of shape {values.shape} has no branches",
+            remedy="give a row of at least two samples",
+        )
+    bad = np.flatnonzero(~np.isfinite(values))
+    if bad.size:
+        raise DataError(
+            f"the value is {values[bad[0]]}, and {bad.size} of {values.size} are not finite",
+            row=int(bad[0]) + 1,
+            remedy="cut those samples out",
+        )
+    return values

@@ -1,0 +1,93 @@
+"""Splitting a recording: in time, at its cycles, or into its branches."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mckibben.errors import DataError
+from mckibben.recording import Recording
+from mckibben.signals.reversals import branches, reversals
+
+
+def split_time(recording: Recording, fraction: float) -> tuple[Recording, Recording]:
+    """Return the first part of a recording, and the rest, which continues it.
+
+    Parameters
+    ----------
+    fraction : float
+        Share of the samples in the first part, between 0 and 1.
+
+    Raises
+    ------
+    DataError
+        If either part would have fewer than two samples.
+    """
+    n = len(recording)
+    at = round(fraction * n) if 0 < fraction < 1 else 0
+    if min(at, n - at) < 2:
+        raise DataError(
+            f"a share of {fraction} of {n} samples leaves a part with fewer than two",
+            file=recording.source,
+            remedy="give a share further inside 0 and 1, or a longer recording",
+        )
+    return recording.slice(0, at), recording.slice(at, n)
+
+
+def split_cycles(recording: Recording, channel: str, n_blocks: int) -> list[tuple[int, int]]:
+    """Return blocks of whole cycles that cover a recording, about equally long.
+
+    Parameters
+    ----------
+    channel : str
+        The input, at whose minima is cut; at its maxima too where it has no minimum inside.
+    n_blocks : int
+        Most blocks, at least 1. There are fewer where there are fewer cycles.
+
+    Returns
+    -------
+    list of (start, stop)
+        Sample numbers, the first 0 and the last the number of samples; each stop is the next start.
+
+    Raises
+    ------
+    DataError
+        On fewer than one block, or on more than one where the channel never turns.
+    """
+    if n_blocks < 1:
+        raise DataError(f"{n_blocks} blocks are impossible", remedy="ask for at least 1")
+    n = len(recording)
+    if n_blocks == 1:
+        return [(0, n)]
+    x = recording[channel]
+    turns = reversals(x)
+    inside = turns[1:-1]
+    minima = inside[x[inside] < x[turns[:-2]]]
+    allowed = minima if minima.size else inside
+    if not allowed.size:
+        raise DataError(
+            "it never turns, so there is no cycle to split at",
+            file=recording.source,
+            channel=channel,
+            remedy="record at least one rising and one falling branch",
+        )
+    wanted = n * np.arange(1, n_blocks) / n_blocks
+    nearest = allowed[np.abs(allowed[:, np.newaxis] - wanted).argmin(axis=0)]
+    cuts = [0, *np.unique(nearest).tolist(), n]
+    return list(zip(cuts[:-1], cuts[1:], strict=True))
+
+
+def branches_of(
+    recording: Recording, channel: str, threshold: float | None = None
+) -> list[Recording]:
+    """Return the monotonic branches of a recording, each a recording of its own.
+
+    Parameters
+    ----------
+    channel : str
+        The input, whose reversals part the branches.
+    threshold : float, optional
+        Smallest swing back that is a reversal; see `reversals`.
+    """
+    return [
+        recording.slice(start, stop) for start, stop, _ in branches(recording[channel], threshold)
+    ]

@@ -33,8 +33,8 @@ _GAUGE_ENDINGS = {"barg", "bara", "psig", "psia"}
 
 _BRACKETED = re.compile(r"(?P<name>.*?)[\s_,/]*[\[(](?P<unit>[^\[\]()]*(?:\([^()]*\))?)[\])]")
 _STATED = (
-    re.compile(r"(?P<name>.*\S)\s+(?P<unit>[^\s/]+/[^\s/]+)"),  # speed mm/s
     re.compile(r"(?P<name>.*\S)\s+in\s+(?P<unit>\S+)"),  # Kraft in N
+    re.compile(r"(?P<name>.*\S)\s+(?P<unit>[^\s/]+/[^\s/]+)"),  # speed mm/s
     re.compile(r"(?P<name>[^/]*[^/\s])\s*/\s*\(?(?P<unit>[^()]*)\)?"),  # length/mm
 )
 _ENDINGS = (

@@ -1,0 +1,146 @@
+"""Text tables in the forms that programs write."""
+
+import io
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import mckibben
+from mckibben import DataError, DataWarning
+from mckibben.files.dialect import detect
+
+P = [0.0, 1.5, 2.25, 3.0, 4.125, 5.0, 4.0, 3.0, 2.0, 1.0, 0.5]
+L = [0.0, -1.25, 12.5, 20.0, 21.0, 22.0, 1e-3, 3.5e2, 4.0, 2.0, 1.0]
+
+
+def text(separator, decimal=".", header=("pressure_bar", "displacement_mm")):
+    rows = [separator.join(header)] + [f"{p!r}{separator}{x!r}" for p, x in zip(P, L, strict=True)]
+    head, *body = rows
+    return "\n".join([head, *[row.replace(".", decimal) for row in body]]) + "\n"
+
+
+def read(tmp_path, content, name="a.csv", **options):
+    path = tmp_path / name
+    path.write_bytes(content if isinstance(content, bytes) else content.encode())
+    (recording,) = mckibben.read(path, **options)
+    return recording
+
+
+@pytest.mark.parametrize("name", ["a.csv", "a.tsv", "a.txt", "a.DAT"])
+@pytest.mark.parametrize(
+    ("separator", "decimal"),
+    [(s, d) for s in [",", ";", "\t", "|", " ", "   ", " \t"] for d in ".," if s != d],
+)
+def test_separator_and_decimal_mark(tmp_path, separator, decimal, name):
+    recording = read(tmp_path, text(separator, decimal), name)
+    assert recording["pressure"].tolist() == P
+    assert recording["displacement"].tolist() == L
+
+
+VARIANTS = {
+    "bom": text(",").encode("utf-8-sig"),
+    "utf-16": text(",").encode("utf-16"),
+    "crlf": text(",").replace("\n", "\r\n").encode(),
+    "cr": text(",").replace("\n", "\r").encode(),
+    "comments": ("# rig 3\n% date\n\n" + text(",") + "# end\n").encode(),
+    "comment inside": text(",").replace("2.25,", "# pause\n2.25,").encode(),
+    "quoted header": text(",", header=('"Pressure, upstream [bar]"', '"pos (mm)"')).encode(),
+    "blank lines": text(",").replace("\n", "\n\n").encode(),
+    "trailing separators": text(",").replace("\n", ",\n").encode(),
+    "spaces": text(" , ").encode(),
+    "brackets between blanks": text(" ", header=("Pressure (bar)", "Stroke (mm)")).encode(),
+    "wide blanks": text("  ", header=("Druck in bar", "Weg in mm")).encode(),
+    "line of units": text(",", header=("p", "disp")).replace("disp\n", "disp\nbar,mm\n").encode(),
+    "no end of line": text(",").rstrip("\n").encode(),
+    "quoted cells": text(",").replace("2.25", '"2.25"').encode(),
+}
+
+
+@pytest.mark.parametrize("variant", VARIANTS)
+def test_variant(tmp_path, variant):
+    recording = read(tmp_path, VARIANTS[variant])
+    assert [samples.tolist() for samples in recording.channels.values()] == [P, L]
+    assert list(recording.units.values()) == ["bar", "mm"]
+
+
+def test_latin_1(tmp_path):
+    recording = read(tmp_path, text(";", ",", header=("Druck_bar", "Winkel (°)")).encode("latin-1"))
+    assert recording["angle"] == pytest.approx(np.deg2rad(L))
+
+
+def test_header_in_a_comment_as_numpy_saves_it(tmp_path):
+    buffer = io.StringIO()
+    np.savetxt(buffer, np.column_stack([P, L]), header="p_bar l_mm")
+    recording = read(tmp_path, buffer.getvalue(), "a.txt")
+    assert recording["pressure"].tolist() == P
+    assert recording["length"].tolist() == L
+
+
+def test_without_names_columns_are_numbered(tmp_path):
+    body = text(",").partition("\n")[2]
+    with pytest.warns(DataWarning, match="column_1 to column_2"):
+        recording = read(
+            tmp_path,
+            body,
+            columns={"pressure": "column_1", "displacement": "column_2"},
+            units={"pressure": "kPa", "displacement": "mm"},
+        )
+    assert recording["pressure"] == pytest.approx(np.array(P) / 100)
+
+
+def test_text_columns_are_left_out_and_said(tmp_path):
+    lines = text(",").splitlines()
+    rows = [f"{line},up" for line in lines[1:]]
+    recording = read(tmp_path, "\n".join([lines[0] + ",branch", *rows]))
+    assert recording.meta["ignored_columns"] == ["branch"]
+    assert list(recording.channels) == ["pressure", "displacement"]
+
+
+def test_own_meta_of_a_foreign_file(tmp_path):
+    import hashlib
+
+    content = text(",").encode()
+    recording = read(tmp_path, content)
+    assert recording.meta == {
+        "file": str(tmp_path / "a.csv"),
+        "sha256": hashlib.sha256(content).hexdigest(),
+    }
+    assert recording.name == "a"
+
+
+cells = st.floats(allow_nan=False, allow_infinity=False)
+
+
+@settings(deadline=None, max_examples=50)
+@given(
+    st.lists(st.tuples(cells, cells, cells), min_size=10, max_size=15),
+    st.sampled_from([(",", "."), (";", ","), ("\t", ","), ("|", "."), (" ", ",")]),
+)
+def test_numbers_are_read_to_the_last_bit(tmp_path_factory, rows, form):
+    separator, decimal = form
+    lines = [separator.join(repr(cell).replace(".", decimal) for cell in row) for row in rows]
+    path = tmp_path_factory.mktemp("bits") / "a.csv"
+    path.write_text(separator.join("abc") + "\n" + "\n".join(lines))
+    (recording,) = mckibben.read(path)
+    for name, samples in zip("abc", zip(*rows, strict=True), strict=True):
+        assert recording[name].tobytes() == np.array(samples).tobytes()
+
+
+lines = st.text(st.characters(exclude_characters="\r\n"), max_size=30)
+
+
+@given(st.lists(lines, min_size=1, max_size=5))
+def test_any_lines_have_some_dialect(lines):
+    dialect = detect(lines)
+    assert all(isinstance(dialect.split(line), list) for line in lines)
+
+
+@settings(deadline=None, max_examples=100)
+@given(st.binary(max_size=300))
+def test_any_bytes_are_a_recording_or_a_data_error(tmp_path_factory, content):
+    path = tmp_path_factory.mktemp("any") / "a.csv"
+    path.write_bytes(content)
+    with pytest.raises(DataError):
+        mckibben.read(path)

@@ -1,0 +1,186 @@
+"""What is written is read back equal, to the last bit."""
+
+import json
+import warnings
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+import mckibben
+from mckibben import DataError, DataWarning, Recording
+
+ENDINGS = (".csv", ".tsv", ".parquet")
+finite = st.floats(allow_nan=False, allow_infinity=False)
+names = (
+    st.sampled_from(
+        ["pressure", "displacement", "displacement_model", "u1_V", "x", "t", "#1", "a,b"]
+    )
+    | st.text(min_size=1, max_size=8).filter(lambda s: s.isprintable() and s.strip())
+).filter(lambda s: s != "time")
+json_values = st.recursive(
+    st.none() | st.booleans() | st.integers(-(2**53), 2**53) | finite | st.text(max_size=8),
+    lambda inner: (
+        st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=5), inner, max_size=3)
+    ),
+    max_leaves=5,
+)
+
+
+@st.composite
+def recordings(draw):
+    n = draw(st.integers(10, 30))
+    channels = draw(
+        st.dictionaries(names, st.lists(finite, min_size=n, max_size=n), min_size=1, max_size=4)
+    )
+    units = {
+        name: draw(st.sampled_from(["", "cm", "V", "l/min"]))
+        for name in channels
+        if mckibben.recording.standard_unit(name) is None
+    }
+    return Recording(
+        channels,
+        sample_time=draw(st.none() | st.floats(1e-9, 1e9)),
+        units=units,
+        start_time=draw(st.floats(-1e9, 1e9)),
+        meta=draw(st.dictionaries(st.text(max_size=6), json_values, max_size=3)),
+    )
+
+
+@pytest.mark.parametrize("ending", ENDINGS)
+@settings(max_examples=40, deadline=None, suppress_health_check=list(HealthCheck))
+@given(recording=recordings())
+def test_read_gives_back_what_write_took(recording, ending, tmp_path):
+    path = tmp_path / f"run{ending}"
+    mckibben.write(recording, path)
+    (back,) = mckibben.read(path)
+    assert back == recording
+    assert {k: v.tobytes() for k, v in back.channels.items()} == {
+        k: v.tobytes() for k, v in recording.channels.items()
+    }
+    assert not list(tmp_path.glob("*.part"))
+
+
+@pytest.fixture
+def recording():
+    k = np.arange(50)
+    return Recording(
+        {"pressure": np.sin(k / 7) + 1, "displacement_model": np.cos(k / 5)},
+        sample_time=1 / 30,
+        start_time=0.1,
+        meta={"rig": "bench 2", "load_N": 12.5},
+    )
+
+
+def test_csv_is_plain_to_other_programs(recording, tmp_path):
+    import pandas as pd
+
+    mckibben.write(recording, tmp_path / "a.csv")
+    assert (tmp_path / "a.csv").read_text().startswith("time,pressure,displacement_model\n0.1,")
+    frame = pd.read_csv(tmp_path / "a.csv")
+    assert np.array_equal(frame["pressure"], recording["pressure"])
+    described = json.loads((tmp_path / "a.csv-metadata.json").read_text())
+    assert described["format"] == "mckibben-recording"
+    assert described["units"] == {"pressure": "bar", "displacement_model": "mm"}
+
+
+def test_without_time_there_is_no_column_of_it(tmp_path):
+    mckibben.write(Recording({"pressure": np.arange(20.0)}), tmp_path / "a.csv")
+    assert (tmp_path / "a.csv").read_text().startswith("pressure\n0.0\n")
+    assert mckibben.read(tmp_path / "a.csv")[0].sample_time is None
+
+
+def test_stale_sidecar_is_ignored_with_a_warning(recording, tmp_path):
+    path = tmp_path / "a.csv"
+    mckibben.write(recording, path)
+    path.write_text(path.read_text().replace("0.1,", "0.10,", 1))
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        (back,) = mckibben.read(path)
+    told = [str(warning.message) for warning in caught if warning.category is DataWarning]
+    assert any("describes another version" in text for text in told)
+    assert any("pressure in bar" in text for text in told)
+    assert back.meta["file"] == str(path)
+    assert back.sample_time == pytest.approx(1 / 30)
+    assert np.array_equal(back["pressure"], recording["pressure"])
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["", "{", "[]", "null", '{"format": "other"}', '{"@context": "http://www.w3.org/ns/csvw"}'],
+)
+def test_broken_sidecar_is_ignored_with_a_warning(recording, tmp_path, text):
+    path = tmp_path / "a.csv"
+    mckibben.write(recording, path)
+    (tmp_path / "a.csv-metadata.json").write_text(text)
+    with pytest.warns(DataWarning, match="not a description"):
+        given = {"time": "s", "pressure": "bar", "displacement_model": "mm"}
+        assert mckibben.read(path, units=given)[0].n_samples == 50
+
+
+def test_parquet_changed_by_another_program_is_read_as_foreign(recording, tmp_path):
+    import pyarrow.parquet as pq
+
+    path = tmp_path / "a.parquet"
+    mckibben.write(recording, path)
+    pq.write_table(pq.read_table(path).slice(0, 20), path)
+    with pytest.warns(DataWarning, match="of other samples"):
+        given = {"time": "s", "pressure": "bar", "displacement_model": "mm"}
+        assert mckibben.read(path, units=given)[0].n_samples == 20
+
+
+def test_own_files_follow_columns_units_rate_and_channels(tmp_path):
+    path = tmp_path / "sim.csv"
+    k = np.arange(20.0)
+    mckibben.write(
+        Recording({"pressure": k, "pressure_model": 2 * k, "y": k}, units={"y": "cm"}), path
+    )
+    (one,) = mckibben.read(path, columns={"pressure": "pressure_model"}, rate=10)
+    assert one.sample_time == 0.1
+    assert np.array_equal(one["pressure"], 2 * k)
+    assert list(one.channels) == ["pressure", "y"]
+    (two,) = mckibben.read(path, columns={"displacement": "y"}, units={"pressure": "kPa"})
+    assert np.allclose(two["displacement"], 10 * k)
+    assert np.allclose(two["pressure"], k / 100)
+    with pytest.raises(DataError, match=r"channel 'force'.*no such channel.*--column force=COLUMN"):
+        mckibben.read(path, channels=["force"])
+
+
+def test_rate_that_the_file_denies_is_refused(recording, tmp_path):
+    mckibben.write(recording, tmp_path / "a.csv")
+    with pytest.raises(DataError, match=r"30 samples per second.*leave --rate out"):
+        mckibben.read(tmp_path / "a.csv", rate=25)
+
+
+@pytest.mark.parametrize("ending", [".mat", ".xlsx", "", ".h5"])
+def test_other_endings_cannot_be_written(recording, tmp_path, ending):
+    with pytest.raises(DataError, match=r"cannot be written.*\.csv, \.tsv, \.parquet"):
+        mckibben.write(recording, tmp_path / f"a{ending}")
+
+
+@pytest.mark.parametrize("ending", ENDINGS)
+def test_missing_folder_is_an_error(recording, tmp_path, ending):
+    with pytest.raises(DataError, match="cannot be written"):
+        mckibben.write(recording, tmp_path / "no" / f"a{ending}")
+
+
+@pytest.mark.parametrize("ending", ENDINGS)
+@pytest.mark.parametrize(
+    "bad",
+    [
+        Recording({"time": np.arange(10.0)}),
+        Recording({"a\nb": np.arange(10.0)}),
+        Recording({" ": np.arange(10.0)}),
+        Recording({"x": np.arange(10.0)}, meta={"a": {1, 2}}),
+        Recording({"x": np.arange(10.0)}, meta={"a": float("nan")}),
+    ],
+)
+def test_what_cannot_be_read_back_is_not_written_and_nothing_is_lost(
+    recording, tmp_path, bad, ending
+):
+    path = tmp_path / f"a{ending}"
+    mckibben.write(recording, path)
+    with pytest.raises(DataError):
+        mckibben.write(bad, path)
+    assert mckibben.read(path) == [recording]

@@ -1,0 +1,94 @@
+"""Units against conversions done by hand."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from mckibben.files.units import SPELLINGS, convert, find
+
+FACTORS = [
+    ("kPa", "bar", 0.01),
+    ("MPa", "bar", 10.0),
+    ("Pa", "bar", 1e-5),
+    ("mbar", "bar", 1e-3),
+    ("psi", "bar", 0.0689475729),
+    ("psig", "bar", 0.0689475729),
+    ("atm", "bar", 1.01325),
+    ("mmHg", "bar", 0.00133322387),
+    ("m", "mm", 1e3),
+    ("cm", "mm", 10.0),
+    ("µm", "mm", 1e-3),
+    ("μm", "mm", 1e-3),
+    ("inch", "mm", 25.4),
+    ("kN", "N", 1e3),
+    ("kgf", "N", 9.80665),
+    ("lbf", "N", 4.4482216),
+    ("ms", "s", 1e-3),
+    ("min", "s", 60.0),
+    ("h", "s", 3600.0),
+    ("deg", "rad", np.pi / 180),
+    ("°", "rad", np.pi / 180),
+    ("rev", "rad", 2 * np.pi),
+    ("mV", "V", 1e-3),
+    ("m/s", "mm/s", 1e3),
+    ("mm s^-1", "mm/s", 1.0),
+    ("cm/min", "mm/s", 1 / 6),
+    ("%", "", 0.01),
+    ("mm/mm", "", 1.0),
+]
+
+
+@pytest.mark.parametrize(("text", "target", "factor"), FACTORS)
+def test_factor(text, target, factor):
+    unit = find(text)
+    assert unit.target == target
+    assert convert(np.array([1.0, -3.0]), unit.name, target) == pytest.approx([factor, -3 * factor])
+
+
+def test_temperatures_have_an_offset():
+    assert convert(np.array([300.0]), find("K").name, "degC") == pytest.approx([26.85])
+    assert convert(np.array([212.0]), find("°F").name, "degC") == pytest.approx([100.0])
+
+
+@pytest.mark.parametrize("target", SPELLINGS)
+def test_what_is_in_the_units_of_the_package_is_not_touched(target):
+    samples = np.array([0.1, 0.2])
+    assert convert(samples, find(target).name, target) is samples
+
+
+def test_every_listed_unit_has_the_dimension_it_is_listed_under():
+    for target, names in SPELLINGS.items():
+        for name in names:
+            assert np.all(np.isfinite(convert(np.array([1.0]), name, target)))
+
+
+@pytest.mark.parametrize(
+    ("text", "reference"),
+    [
+        ("barg", "gauge"),
+        ("bara", "absolute"),
+        ("bar abs", "absolute"),
+        ("kPa(g)", "gauge"),
+        ("bar", None),
+    ],
+)
+def test_reference_of_a_pressure(text, reference):
+    assert find(text).reference == reference
+
+
+@pytest.mark.parametrize(
+    "text", ["foo", "9**9**9", "10^10^10", "__import__", "bar;", "a" * 1000, "(", "1e9"]
+)
+def test_what_is_no_unit(text):
+    assert find(text) is None
+
+
+def test_units_without_a_place_in_the_package_are_kept():
+    assert find("l/min").target is None
+
+
+@given(st.text(max_size=12))
+def test_any_text_is_a_unit_or_none(text):
+    unit = find(text)
+    assert unit is None or unit.target is None or unit.target in SPELLINGS

@@ -172,7 +172,7 @@ def random_wave(
     if bottom == top:
         raise DataError("one instant makes no wave", remedy="give more than one time")
     # Clipped, because rounding may carry the extreme samples past the limits.
-    return np.clip(low + (high - low) * (wave - bottom) / (top - bottom), low, high)
+    return np.asarray(np.clip(low + (high - low) * (wave - bottom) / (top - bottom), low, high))
 
 
 def _cycles(
@@ -192,7 +192,8 @@ def _cycles(
             f"time starts at {t.min():g} s", remedy="count time from the start of the first cycle"
         )
     count = np.floor(t / period)
-    return np.asarray(low + heights[count.astype(int) % heights.size] * shape(t / period - count))
+    peak = heights[count.astype(int) % heights.size]
+    return np.asarray(low + peak * shape(t / period - count))
 
 
 def _checked(time: ArrayLike) -> Array:

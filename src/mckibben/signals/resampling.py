@@ -53,9 +53,10 @@ def resample(recording: Recording, sample_time: float) -> Recording:
     """Return a recording on another sample time, any ratio, without aliasing and without delay.
 
     Onto a coarser grid, a zero-phase FIR low-pass comes first: signals pass up to 80 % of the new
-    Nyquist frequency, and what would alias is attenuated by 60 dB; then a cubic spline is read at the
-    new instants. Onto a finer grid, the samples are joined by straight lines, which adds no overshoot
-    and so no reversals. Beyond its ends the signal is continued by its mirror image in the end point.
+    Nyquist frequency, and what would alias is attenuated by 60 dB; then a cubic spline is read at
+    the new instants. Onto a finer grid, the samples are joined by straight lines, which adds no
+    overshoot and so no reversals. Beyond its ends the signal is continued by its mirror image in
+    the end point.
 
     Parameters
     ----------
@@ -68,8 +69,8 @@ def resample(recording: Recording, sample_time: float) -> Recording:
     Raises
     ------
     DataError
-        If the recording has no time, the sample time is not positive, or fewer than two samples would
-        be left.
+        If the recording has no time, the sample time is not positive, or fewer than two samples
+        would be left.
     """
     step = _step(recording, "be resampled", "read it with --rate")
     if not 0 < sample_time < np.inf:

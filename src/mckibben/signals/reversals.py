@@ -73,9 +73,9 @@ def reversals(x: ArrayLike, threshold: float | None = None) -> Indices:
     """Return where a signal turns, with its first and last sample.
 
     Between two turning points the signal never swings back by more than the threshold, and each is
-    the extreme sample of the branches that meet there; of a plateau it is the last sample, so that a
-    hold belongs to the branch that led to it. A hold within a branch is no reversal. Only the first
-    and last sample may be less extreme than a neighbour, by at most the threshold.
+    the extreme sample of the branches that meet there; of a plateau it is the last sample, so that
+    a hold belongs to the branch that led to it. A hold within a branch is no reversal. Only the
+    first and last sample may be less extreme than a neighbour, by at most the threshold.
 
     Parameters
     ----------
@@ -121,8 +121,8 @@ def branches(x: ArrayLike, threshold: float | None = None) -> list[tuple[int, in
     -------
     list of (start, stop, direction)
         ``x[start:stop]`` is the branch with both its turning points, which neighbouring branches
-        share; direction is 1 rising, -1 falling, and 0 for a signal that ends where it began without
-        having turned.
+        share; direction is 1 rising, -1 falling, and 0 for a signal that ends where it began
+        without having turned.
 
     Examples
     --------
@@ -141,9 +141,9 @@ def branches(x: ArrayLike, threshold: float | None = None) -> list[tuple[int, in
 def cycles(x: ArrayLike, threshold: float | None = None) -> list[slice]:
     """Return the whole cycles of a signal, from minimum to minimum.
 
-    Every slice holds both its minima, so that neighbouring ones share a sample. What comes before the
-    first minimum and after the last is left out; where a signal begins or ends within a cycle, that
-    counts when no more than a tenth of its branch is missing.
+    Every slice holds both its minima, so that neighbouring ones share a sample. What comes before
+    the first minimum and after the last is left out; where a signal begins or ends within a cycle,
+    that counts when no more than a tenth of its branch is missing.
 
     Parameters
     ----------
@@ -175,7 +175,7 @@ def whole_cycles(x: Array, turns: Indices) -> list[slice]:
     return found
 
 
-@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@numba.njit(cache=True, nogil=True)
 def _turns(x: Array, threshold: float, found: Indices) -> int:
     """Write the turning points into ``found``; return how many there are."""
     n, count, way = x.size, 1, 0

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 
 from mckibben.errors import DataError
@@ -73,7 +75,7 @@ def split_cycles(recording: Recording, channel: str, n_blocks: int) -> list[tupl
     wanted = n * np.arange(1, n_blocks) / n_blocks
     nearest = allowed[np.abs(allowed[:, np.newaxis] - wanted).argmin(axis=0)]
     cuts = [0, *np.unique(nearest).tolist(), n]
-    return list(zip(cuts[:-1], cuts[1:], strict=True))
+    return list(pairwise(cuts))
 
 
 def branches_of(

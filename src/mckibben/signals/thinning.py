@@ -13,8 +13,9 @@ Array = NDArray[np.float64]
 def decimate_minmax(t: ArrayLike, *series: ArrayLike, max_points: int) -> tuple[Array, ...]:
     """Return a few samples that look like all of them: lowest and highest of every bin.
 
-    Bins hold equally many samples. Every series keeps its own extrema, and all are thinned to the same
-    samples, so that one may be drawn over another. The first and last sample stay where there is room.
+    Bins hold equally many samples. Every series keeps its own extrema, and all are thinned to the
+    same samples, so that one may be drawn over another. The first and last sample stay where there
+    is room.
 
     Parameters
     ----------

@@ -216,6 +216,11 @@ class Block(ABC):
         if isinstance(data, Recording):
             inputs = self._inputs_from(data)
             outputs = self._run(inputs, data.sample_time, initial)
+            if not np.isfinite(outputs).all():
+                raise ModelError(
+                    f"the output of {self.kind!r} is not finite on {data.name}. "
+                    "Remedy: this model does not suit these data; identify it again."
+                )
             names = [channel.name for channel in self.outputs]
             modelled = dict(zip(names, outputs.T, strict=True))
             units = {channel.name: channel.unit for channel in self.outputs}

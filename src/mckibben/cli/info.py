@@ -31,7 +31,9 @@ def info(
     elif file.suffix.lower() == ".json":
         _model(file, as_json)
     else:
-        _recordings(Reading(column, unit, rate, gaps).read([file], []), as_json)
+        _recordings(
+            Reading(column, unit, rate, gaps).read([file], None, informative=False), as_json
+        )
 
 
 def _models(as_json: bool) -> None:

@@ -74,12 +74,9 @@ class Reading:
     gaps: Gaps
 
     def read(
-        self, files: Sequence[Path], channels: Sequence[str], *, moving: bool = True
+        self, files: Sequence[Path], channels: Sequence[str] | None, *, informative: bool = True
     ) -> list[Recording]:
-        """Return the recordings in all files, with the channels asked for.
-
-        ``moving`` refuses channels that are constant.
-        """
+        """Return the recordings in all files, with the channels asked for; see `mckibben.read`."""
         from mckibben.files import read
 
         recordings: list[Recording] = []
@@ -91,7 +88,7 @@ class Reading:
                 rate=self.rate,
                 gaps=self.gaps.value,
                 channels=channels,
-                moving=moving,
+                informative=informative,
             )
         return recordings
 

@@ -38,7 +38,7 @@ def simulate(
 
     block = load(model)
     wanted = [channel.name for channel in block.inputs]
-    recordings = Reading(column, unit, rate, gaps).read([file], wanted, moving=False)
+    recordings = Reading(column, unit, rate, gaps).read([file], wanted, informative=False)
     if len(recordings) > 1:
         raise DataError(
             f"the file splits into {len(recordings)} recordings at its gaps",

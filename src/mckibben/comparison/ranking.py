@@ -137,11 +137,13 @@ def _run_tasks(
     tasks: Sequence[Task], jobs: int | None, progress: Callable[[str, float], None] | None
 ) -> list[tuple[Row, Array | None]]:
     from joblib import Parallel, delayed
+    from joblib.parallel import get_active_backend
 
     workers = min(jobs or os.cpu_count() or 1, len(tasks))
+    one_by_one = get_active_backend()[0].supports_return_generator
     results: dict[int, tuple[Row, Array | None]] = {}
     try:
-        pool = Parallel(n_jobs=workers, return_as="generator_unordered")
+        pool = Parallel(n_jobs=workers, return_as="generator_unordered" if one_by_one else "list")
         for index, result in pool(delayed(_try_numbered)(i, task) for i, task in enumerate(tasks)):
             results[index] = result
             if progress is not None:

@@ -10,12 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mckibben.blocks.base import Block
-from mckibben.characterization import Characterization
 from mckibben.metrics import Scores
 from mckibben.recording import Recording
 
 if TYPE_CHECKING:
     import pandas as pd
+
+    from mckibben.characterization import Characterization
 
 Array = NDArray[np.float64]
 

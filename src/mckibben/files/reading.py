@@ -23,9 +23,6 @@ from mckibben.files.timebase import Span
 from mckibben.files.units import convert
 from mckibben.recording import Array, Recording
 
-FEWEST = 10
-"""Samples; a shorter recording, or stretch of one, shows no loop."""
-
 LONGEST_BRIDGE = 100
 """Times the samples there are: interpolating gaps to more than that is refused."""
 
@@ -47,6 +44,7 @@ def read(
     rate: float | None = None,
     gaps: Literal["error", "split", "interpolate"] = "error",
     channels: Sequence[str] | None = None,
+    informative: bool = True,
 ) -> list[Recording]:
     """Read the recordings in a file; by its ending CSV, TSV, Parquet, MAT, HDF5 or TDMS.
 
@@ -66,8 +64,11 @@ def read(
         What to do where time is missing (a step of more than three median steps) or a sample is
         (blank, NaN or infinite): refuse, cut into several recordings, or bridge linearly.
     channels : sequence of str, optional
-        Channels that must be there, whole and not constant. Others are then left out, with a
-        `DataWarning`, if samples of theirs are missing. By default all must be whole.
+        Channels that must be there and whole. Others are then left out, with a `DataWarning`, if
+        samples of theirs are missing. By default all must be whole.
+    informative : bool
+        Whether there must be something to learn from: at least 10 samples, and no constant channel
+        among those asked for. Without, two samples will do, as for simulating a model.
 
     Returns
     -------
@@ -88,7 +89,7 @@ def read(
         Of units assumed, jittered time that was resampled, gaps bridged, and what was left out.
     """
     path = Path(path)
-    request = Request(dict(columns or {}), dict(units or {}), rate, gaps, channels)
+    request = Request(dict(columns or {}), dict(units or {}), rate, gaps, channels, informative)
     request.check(path)
     return [recording for table in tables(path) for recording in _recordings(table, request, path)]
 
@@ -96,9 +97,9 @@ def read(
 def _recordings(table: Table, request: Request, path: Path) -> list[Recording]:
     choice = choose(table, request, path)
     n = next(iter(choice.channels.values())).size
-    if n < FEWEST:
+    if n < request.fewest:
         raise DataError(
-            f"{n} sample(s) are too few, at least {FEWEST} are needed",
+            f"{n} sample(s) are too few, at least {request.fewest} are needed",
             file=path,
             remedy="give a longer recording",
         )
@@ -108,12 +109,13 @@ def _recordings(table: Table, request: Request, path: Path) -> list[Recording]:
         timebase.check(measured, table, path)
     order = np.arange(n, dtype=float) if measured is None else measured
     channels, spans = treat(choice.channels, order, table, request, path)
-    _refuse_constant(channels, spans, request, path)
+    if request.informative:
+        _refuse_constant(channels, spans, request, path)
     if measured is None:
         begin = table.start_time if choice.time is None else _seconds(choice.time[0], choice)
         pieces = [
             Piece(_cut(channels, span), step, begin + (step or 1.0) * span[0])
-            for span in _long_enough(spans, path)
+            for span in _long_enough(spans, request, path)
         ]
     else:
         pieces = _on_grid(channels, measured, spans, choice, table, request, path)
@@ -169,7 +171,7 @@ def _on_grid(
     bridged = bool(cuts) and request.gaps == "interpolate"
     stretches = _split(spans, cuts)
     if request.gaps == "split":
-        spans = stretches = _long_enough(stretches, path)
+        spans = stretches = _long_enough(stretches, request, path)
     step = timebase.common_step(time, stretches)
     seconds = _seconds(step.size, choice)
     if step.jitter is not None:
@@ -183,7 +185,7 @@ def _on_grid(
     if bridged:
         _announce_bridges(time, cuts, step.size, choice, path)
     pieces = []
-    for start, stop in _long_enough(spans, path):
+    for start, stop in _long_enough(spans, request, path):
         samples, t = _cut(channels, (start, stop)), time[start:stop]
         if bridged or step.jitter is not None:
             samples = {
@@ -219,12 +221,12 @@ def _refuse_constant(channels: Channels, spans: list[Span], request: Request, pa
             )
 
 
-def _long_enough(spans: list[Span], path: Path) -> list[Span]:
+def _long_enough(spans: list[Span], request: Request, path: Path) -> list[Span]:
     """Return the spans that are not too short to be of use."""
-    kept = [span for span in spans if span[1] - span[0] >= FEWEST]
+    kept = [span for span in spans if span[1] - span[0] >= request.fewest]
     if not kept:
         raise DataError(
-            f"no stretch without gaps has {FEWEST} samples",
+            f"no stretch without gaps has {request.fewest} samples",
             file=path,
             remedy="say --gaps interpolate, or give a recording with fewer gaps",
         )
@@ -232,7 +234,7 @@ def _long_enough(spans: list[Span], path: Path) -> list[Span]:
         warn(
             path,
             f"{len(spans) - len(kept)} of {len(spans)} stretches between gaps have fewer than "
-            f"{FEWEST} samples and were left out",
+            f"{request.fewest} samples and were left out",
         )
     return kept
 

@@ -12,6 +12,10 @@ import numpy as np
 from mckibben.errors import DataError
 
 
+FEWEST = 10
+"""Samples; a shorter recording, or stretch of one, shows no loop."""
+
+
 @dataclass(frozen=True)
 class Request:
     """What the caller of `read` asked for; see there."""
@@ -21,6 +25,12 @@ class Request:
     rate: float | None
     gaps: Literal["error", "split", "interpolate"]
     channels: Sequence[str] | None
+    informative: bool = True
+
+    @property
+    def fewest(self) -> int:
+        """Fewest samples of a recording, or of a stretch of one."""
+        return FEWEST if self.informative else 2
 
     def asks_for(self, channel: str) -> bool:
         """Tell whether a channel was named by the caller."""

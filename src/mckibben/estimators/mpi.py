@@ -98,12 +98,17 @@ class MPIEstimator(SeparableEstimator):
         return play_operators(run.history, self.radii(data), self.starting_rule)
 
     def level(self, theta: Array, data: TrainingData) -> tuple[float, float]:
-        """Return the lowest and highest value that the weighted operators can take."""
+        """Return the lowest and highest value that the weighted operators take when static."""
+        lowest, highest = self._ends(data)
+        return float(theta @ lowest), float(theta @ highest)
+
+    def _ends(self, data: TrainingData) -> tuple[Array, Array]:
+        """Return the operators when the input has only risen, at both ends of its range."""
         low, high = data.input_range
-        weights = theta[: self.n_operators]
-        lag, total = float(weights @ self.radii(data)), float(weights.sum())
-        floor = total * low - lag if self.starting_rule == "first_sample" else total * low
-        return floor, max(total * high - (lag if floor < 0 or low >= 0 else 0.0), floor + 1e-12)
+        radii = self.radii(data)
+        if self.starting_rule == "first_sample":
+            return low - radii, high - radii
+        return np.clip(0.0, low - radii, low + radii), np.clip(0.0, high - radii, high + radii)
 
     def basis(self, theta: Array, run: Run, data: TrainingData) -> Array:
         """Return the pieces of the map over the run's history."""
@@ -125,6 +130,26 @@ class MPIEstimator(SeparableEstimator):
     def _pieces(self, theta: Array, operators: Array, data: TrainingData) -> Array:
         low, high = self.level(theta, data)
         return self.map.pieces((operators @ theta - low) / (high - low))
+
+    def jacobian(self, theta: Array, data: TrainingData) -> Array | None:
+        """Return the derivatives of the residuals with the linear parameters solved for.
+
+        Kaufman's form: the derivative of the map's argument times the map's slope, less what the linear
+        parameters that are free would take up of it.
+        """
+        operators = data.once(self.operators_key, lambda: counting(data, self._operators_of(data)))
+        lowest, highest = self._ends(data)
+        low, high = float(theta @ lowest), float(theta @ highest)
+        x = (operators @ theta - low) / (high - low)
+        pieces = self.map.pieces(x)
+        linear, _ = self._solve_for(pieces, data)
+        by_argument = self.map.slopes(x) @ linear
+        moved = (operators - lowest - np.outer(x, highest - lowest)) / (high - low)
+        derivative = by_argument[:, np.newaxis] * moved
+        free = linear > 1.01 * self.least(pieces, data) if self.solves_nonnegative else linear != 0
+        taken = np.column_stack([np.ones(x.size), pieces[:, free]])
+        directions = np.linalg.qr(taken)[0]
+        return np.asarray(derivative - directions @ (directions.T @ derivative))
 
     def least(self, matrix: Array, data: TrainingData) -> Array:
         """Return a little of every piece, so that the map increases everywhere."""

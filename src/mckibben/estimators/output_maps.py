@@ -36,6 +36,10 @@ class OutputMap(ABC):
         """Return the pieces at arguments of shape (n,), side by side, shape (n, k)."""
 
     @abstractmethod
+    def slopes(self, x: Array) -> Array:
+        """Return the derivatives of the pieces by the argument, shape (n, k)."""
+
+    @abstractmethod
     def build(
         self, weights: Array, offset: float, low: float, high: float, channel: Channel
     ) -> Block:
@@ -52,6 +56,11 @@ class PiecewiseLinearMap(OutputMap):
         lowest[0], highest[-1] = -np.inf, np.inf
         return np.clip(ramps, lowest, highest)
 
+    def slopes(self, x: Array) -> Array:
+        """Return the number of lines on the line that the argument is on, and 0 on the others."""
+        line = np.clip(np.floor(x * self.size), 0, self.size - 1)
+        return self.size * (line[:, np.newaxis] == np.arange(self.size)).astype(np.float64)
+
     def build(
         self, weights: Array, offset: float, low: float, high: float, channel: Channel
     ) -> Block:
@@ -67,6 +76,11 @@ class PolynomialMap(OutputMap):
     def pieces(self, x: Array) -> Array:
         """Return the integral from 0 of every Bernstein polynomial of degree ``size - 1``."""
         return np.polynomial.polynomial.polyval(x, self._basis().T).T
+
+    def slopes(self, x: Array) -> Array:
+        """Return every Bernstein polynomial."""
+        derivatives = np.polynomial.polynomial.polyder(self._basis(), axis=1)
+        return np.polynomial.polynomial.polyval(x, derivatives.T).T
 
     def powers(self, weights: Array) -> Array:
         """Return the weighted sum of the pieces in ascending powers, shape (size + 1,)."""
@@ -116,6 +130,10 @@ class FreePolynomialMap(PolynomialMap):
     def pieces(self, x: Array) -> Array:
         """Return the powers, side by side."""
         return np.asarray((2 * x - 1)[:, np.newaxis] ** self.exponents)
+
+    def slopes(self, x: Array) -> Array:
+        """Return the derivatives of the powers."""
+        return np.asarray(2 * self.exponents * (2 * x - 1)[:, np.newaxis] ** (self.exponents - 1))
 
     def build(
         self, weights: Array, offset: float, low: float, high: float, channel: Channel

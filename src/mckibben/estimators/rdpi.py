@@ -103,6 +103,11 @@ class RDPIEstimator(MPIEstimator):
         """What the operators depend on beside the data."""
         return (*super().operators_key, self.rate_time_constant)
 
+    def _ends(self, data: TrainingData) -> tuple[Array, Array]:
+        """Return the operators at both ends of the input's range, at rest."""
+        lowest, highest = super()._ends(data)
+        return np.pad(lowest, (0, lowest.size)), np.pad(highest, (0, highest.size))
+
     def first_part(self, weights: Array, offset: float, data: TrainingData) -> Block:
         """Return the hysteresis part."""
         n = self.n_operators

@@ -91,10 +91,12 @@ def multi_start(
     *,
     n_refined: int,
     max_evaluations: int,
+    jacobian: Callable[[Array], Array] | None = None,
 ) -> Array:
     """Return the best point found by refining the most promising of many starts within bounds.
 
-    Every start is evaluated once; the best ``n_refined`` are refined by a bounded trust-region method.
+    Every start is evaluated once; the best ``n_refined`` are refined by a bounded trust-region
+    method, with the derivatives of the residuals where given, else with finite differences.
     """
     from scipy.optimize import least_squares
 
@@ -116,6 +118,7 @@ def multi_start(
             least_squares(
                 evaluate,
                 np.clip(inside[index], lower + margin, upper - margin),
+                jac="2-point" if jacobian is None else jacobian,
                 bounds=(lower, upper),
                 x_scale=np.maximum(upper - lower, 1e-12),
                 max_nfev=max_evaluations,

@@ -72,6 +72,11 @@ class SeparableEstimator(Estimator):
         For particle swarms over all parameters.
         """
 
+    def jacobian(self, theta: Array, data: TrainingData) -> Array | None:
+        """Return the derivatives of the residuals, shape (samples, m), or None where unknown."""
+        del theta, data
+        return None
+
     def check_settings(self) -> None:
         """Refuse settings out of range."""
         super().check_settings()
@@ -117,8 +122,14 @@ class SeparableEstimator(Estimator):
                 tracker,
                 n_refined=self.n_refined,
                 max_evaluations=15,
+                jacobian=self._jacobian_on(thin, lower),
             )
         return theta if tracker.interrupted else self._polish(theta, data, tracker)
+
+    def _jacobian_on(self, data: TrainingData, lower: Array) -> Callable[[Array], Array] | None:
+        if self.jacobian(lower, data) is None:
+            return None
+        return lambda theta: np.asarray(self.jacobian(theta, data))
 
     def _scattered(self, lower: Array, upper: Array) -> list[Array]:
         from scipy.stats import qmc
@@ -141,6 +152,7 @@ class SeparableEstimator(Estimator):
             own,
             n_refined=1,
             max_evaluations=10,
+            jacobian=self._jacobian_on(data, lower),
         )
         tracker.evaluations, tracker.interrupted = own.evaluations, own.interrupted
         return best

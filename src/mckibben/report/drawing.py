@@ -1,4 +1,4 @@
-"""What a figure shows, free of any drawing library: panels of curves, thinned to what an eye can see."""
+"""What a figure shows, free of any drawing library: panels of curves, thinned for the eye."""
 
 from __future__ import annotations
 
@@ -11,12 +11,15 @@ from numpy.typing import NDArray
 from mckibben.recording import Recording
 
 Array = NDArray[np.float64]
+Style = Literal["line", "fine", "broad", "beads", "dots", "rings", "ticks", "stems"]
+"""How points are drawn: a line, a thin one, a pale wide one to lie under others, a line with a bead
+at every point, or separate marks."""
 
 POINTS = 4000
 """Most points of a curve: two for each of 2000 bins, more than a screen or a column has pixels."""
 
 FEW = 300
-"""Up to so many samples, each is shown as a dot on its line."""
+"""Up to so many samples, each measured one is shown as a bead on its line."""
 
 N_COLOURS = 6
 """Colours that can be told apart; as many models or recordings share a panel at most."""
@@ -38,7 +41,7 @@ class Curve:
     colour : str
         ``"measured"``, ``"input"``, ``"series-1"`` to ``"series-6"``, or ``"age-1"`` (early) to
         ``"age-5"`` (late).
-    style : {"line", "dashed", "dots", "rings", "ticks", "stems"}
+    style : Style
         How the points are drawn.
     model : str or None
         The model it belongs to, by which it is shown or hidden.
@@ -50,7 +53,7 @@ class Curve:
     y: Array
     name: str = ""
     colour: str = "measured"
-    style: Literal["line", "dashed", "dots", "rings", "ticks", "stems"] = "line"
+    style: Style = "line"
     model: str | None = None
     interval: tuple[Array, Array] | None = None
 

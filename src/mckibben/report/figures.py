@@ -1,4 +1,4 @@
-"""Figures for print, by name: of a study, of recordings, and of a saved model against recordings."""
+"""Figures for print, by name: of a study, of recordings, of a saved model against recordings."""
 
 from __future__ import annotations
 
@@ -38,9 +38,7 @@ def fit(study: Study) -> Drawing:
     """Measured and modelled output over time, of the best model."""
     return _one_each(
         shown(study),
-        lambda one: subjects.fit_over_time(
-            one.recording, study.output, _best(one), one.test_from
-        ),
+        lambda one: subjects.fit_over_time(one.recording, study.output, _best(one), one.test_from),
     )
 
 
@@ -68,10 +66,10 @@ def weights(study: Study) -> Drawing:
 
 
 def inverse(study: Study) -> Drawing:
-    """Reference, output, error and the input that the inverse gives."""
+    """Wished-for and modelled output, error, and the input that the inverse gives."""
     if study.inverse is None:
         raise ModelError(
-            "no model of this study has an inverse. Remedy: compare models that have (pi, gpi, mpi)."
+            "no model of this study has an inverse. Remedy: compare pi, mpi and gpi, which can."
         )
     return subjects.inverse_check(study.inverse, study.train[0].sample_time is not None)
 
@@ -117,7 +115,11 @@ def save_figure(study: Study, name: str, path: str | Path) -> None:
 
 
 def plot_recording(
-    recordings: Sequence[Recording], input: str, output: str, kind: str, path: str | Path  # noqa: A002
+    recordings: Sequence[Recording],
+    input: str,  # noqa: A002
+    output: str,
+    kind: str,
+    path: str | Path,
 ) -> None:
     """Write a figure of recordings.
 

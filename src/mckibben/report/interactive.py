@@ -1,7 +1,7 @@
-"""Figures for the page, as plotly.js reads them: plain dicts, numbers packed, colours left to the page.
+"""Figures for the page, as plotly.js reads them: plain dicts with packed numbers.
 
-Nothing of plotly is imported: the page's own script unpacks the numbers and looks up the colours, which
-depend on whether the page is dark or light.
+Nothing of plotly is imported: the page's own script unpacks the numbers and looks up the colours,
+which depend on whether the page is dark or light.
 """
 
 from __future__ import annotations
@@ -13,10 +13,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mckibben.report.drawing import FEW, Curve, Drawing, Panel
+from mckibben.report.drawing import Curve, Drawing, Panel
 
 Array = NDArray[np.float64]
 Json = dict[str, Any]
+
+_WIDTHS = {"line": 1.5, "fine": 0.8, "broad": 5.0, "beads": 1.0}
+"""Of lines [px], by style."""
 
 _GAP = 0.09
 """Share of the height between stacked panels."""
@@ -46,7 +49,7 @@ def packed(values: Array) -> Json:
 
 
 def text(words: str) -> str:
-    """Return words as plotly.js shows them verbatim: it takes tags such as <b> and <a> for markup."""
+    """Return words as plotly.js shows them verbatim: it takes <b>, <a> and the like for markup."""
     return escape(words, quote=False)
 
 
@@ -60,11 +63,12 @@ def _plot(panels: tuple[Panel, ...]) -> Json:
         last = row == len(panels) - 1
         layout[f"xaxis{x[1:]}"] = _axis(panel.x_label if last else "") | {
             "anchor": y,
+            "rangemode": "tozero" if panel.categories else "normal",
             "showticklabels": last,
             **({"matches": "x"} if row else {}),
         }
         layout[f"yaxis{y[1:]}"] = _axis(panel.y_label) | {
-            "domain": [bottom, bottom + height],
+            "domain": [bottom, min(bottom + height, 1.0)],
             "zeroline": panel.zero,
             **_ticks(panel),
         }
@@ -119,10 +123,13 @@ def _trace(curve: Curve, x: str, y: str) -> Json:
         "showlegend": bool(curve.name),
         "meta": curve.model,
     }
-    if curve.style in ("line", "dashed"):
-        dots = {"mode": "lines+markers"} if curve.x.size <= FEW else {"mode": "lines"}
-        line = {"color": colour, "width": 1.5, "dash": "dash" if curve.style == "dashed" else "solid"}
-        return trace | dots | {"line": line, "marker": {"color": colour, "size": 3}}
+    if curve.style in _WIDTHS:
+        trace |= {"mode": "lines", "line": {"color": colour, "width": _WIDTHS[curve.style]}}
+        if curve.style == "broad":
+            trace["opacity"] = 0.35
+        if curve.style == "beads":
+            trace |= {"mode": "lines+markers", "marker": {"color": colour, "size": 4}}
+        return trace
     if curve.style == "stems":
         n = curve.x.size
         gap = np.full(n, np.nan)

@@ -6,7 +6,6 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from mckibben.errors import ModelError
 from mckibben.report import interactive, subjects, wording
 from mckibben.report.drawing import N_COLOURS, POINTS, Drawing, series_colour
 from mckibben.report.shown import MOST_RECORDINGS, Shown, shown
@@ -60,14 +59,14 @@ def page(study: Study) -> str:
     environment.policies["json.dumps_kwargs"] = {"allow_nan": False, "separators": (",", ":")}
     every = shown(study)
     drawn = every[:MOST_RECORDINGS]
-    figures, notes = _figures(study, drawn)
+    figures, left_out = _figures(study, drawn)
     return environment.get_template("report.html.j2").render(
         study=study,
         board=study.leaderboard,
         shown=every,
         drawn=drawn,
         figures=figures,
-        notes=notes,
+        left_out=left_out,
         models=_models(study.leaderboard),
         bars=_bars(study.leaderboard),
         wording=wording,
@@ -75,8 +74,8 @@ def page(study: Study) -> str:
     )
 
 
-def _figures(study: Study, drawn: tuple[Shown, ...]) -> tuple[Plots, dict[str, str]]:
-    """Return the plots of every figure, and what to say where there is none."""
+def _figures(study: Study, drawn: tuple[Shown, ...]) -> tuple[Plots, str]:
+    """Return the plots of every figure, and which weights are left out."""
     n_models = min(N_COLOURS, len(study.predictions))
     # A recording has two panels over time and its loop, then each model in four panels more.
     n_values = len(drawn) * 2 * (5 + 4 * n_models)
@@ -91,6 +90,7 @@ def _figures(study: Study, drawn: tuple[Shown, ...]) -> tuple[Plots, dict[str, s
         "loop": each(lambda one: subjects.loop([one.recording], u, y, points)),
     }
     if n_models:
+        figures["leaderboard"] = [interactive.plots(subjects.leaderboard(study.leaderboard))]
         figures["fit"] = each(
             lambda one: subjects.fit_over_time(one.recording, y, one.outputs, one.test_from, points)
         )
@@ -101,21 +101,14 @@ def _figures(study: Study, drawn: tuple[Shown, ...]) -> tuple[Plots, dict[str, s
             lambda one: subjects.residuals(one.recording, u, y, one.outputs, one.test_from, points)
         )
     blocks = {row.model: row.block for row in study.leaderboard.rows if row.block is not None}
-    notes: dict[str, str] = {}
-    for name, draw in (
-        ("leaderboard", lambda: subjects.leaderboard(study.leaderboard)),
-        ("weights", lambda: subjects.weights(blocks)),
-    ):
-        try:
-            drawing = draw()
-        except ModelError:
-            continue
-        figures[name] = [interactive.plots(drawing)]
-        notes[name] = drawing.note
+    left_out = ""
+    if any(any(subjects.operator_sums(block)) for block in blocks.values()):
+        drawing = subjects.weights(blocks)
+        figures["weights"], left_out = [interactive.plots(drawing)], drawing.note
     if study.inverse is not None:
         timed = study.train[0].sample_time is not None
         figures["inverse"] = [interactive.plots(subjects.inverse_check(study.inverse, timed))]
-    return figures, notes
+    return figures, left_out
 
 
 def _models(board: Leaderboard) -> list[dict[str, str]]:

@@ -1,4 +1,4 @@
-"""Figures for print: drawings set by matplotlib at the width of a journal's column, as PNG, SVG or PDF.
+"""Figures for print: drawings set by matplotlib at the width of a journal's column.
 
 Neither pyplot nor any global state is touched, and the same drawing gives the same bytes.
 """
@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mckibben.errors import DataError
-from mckibben.report.drawing import FEW, Curve, Drawing, Panel
+from mckibben.report.drawing import Curve, Drawing, Panel
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -49,7 +49,7 @@ COLOURS: Mapping[str, str] = MappingProxyType(
 )
 """Okabe and Ito's colours for what differs in kind, a scale from light to dark for time."""
 
-STYLE: Mapping[str, Any] = MappingProxyType(
+STYLE: Mapping[Any, Any] = MappingProxyType(
     {
         "font.family": "DejaVu Sans",
         "font.size": 7.5,
@@ -57,7 +57,6 @@ STYLE: Mapping[str, Any] = MappingProxyType(
         "axes.spines.top": False,
         "axes.spines.right": False,
         "axes.titlesize": 7.5,
-        "lines.linewidth": 0.9,
         "xtick.major.width": 0.6,
         "ytick.major.width": 0.6,
         "legend.frameon": False,
@@ -68,8 +67,15 @@ STYLE: Mapping[str, Any] = MappingProxyType(
         "svg.fonttype": "path",
         "svg.hashsalt": "mckibben",
         "path.simplify": False,
+        "text.parse_math": False,
     }
 )
+
+_WIDTHS = {"line": 0.9, "fine": 0.4, "broad": 2.6, "beads": 0.5}
+"""Of lines [pt], by style."""
+
+_LEGEND = 45
+"""Letters of three names that stand side by side above a panel at most."""
 
 METADATA: Mapping[str, Mapping[str, None]] = MappingProxyType(
     {
@@ -98,7 +104,7 @@ def save(drawing: Drawing, path: str | Path) -> None:
     """
     from matplotlib import rc_context
 
-    path = Path(path)
+    path, style = Path(path), dict(STYLE)
     kind = path.suffix.lower().lstrip(".")
     if kind not in METADATA:
         raise DataError(
@@ -110,10 +116,8 @@ def save(drawing: Drawing, path: str | Path) -> None:
         raise DataError("its folder does not exist", file=path, remedy="create the folder first")
     handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=".tmp")
     try:
-        with os.fdopen(handle, "wb") as file, rc_context(dict(STYLE)):
-            drawn(drawing).savefig(
-                file, format=kind, dpi=RESOLUTION, metadata=dict(METADATA[kind])
-            )
+        with os.fdopen(handle, "wb") as file, rc_context(style):
+            drawn(drawing).savefig(file, format=kind, dpi=RESOLUTION, metadata=dict(METADATA[kind]))
         umask = os.umask(0)
         os.umask(umask)
         Path(temporary).chmod(0o666 & ~umask)
@@ -124,7 +128,7 @@ def save(drawing: Drawing, path: str | Path) -> None:
 
 
 def drawn(drawing: Drawing) -> Figure:
-    """Return a drawing as a matplotlib figure; `save` adds the style of this package."""
+    """Return a drawing as a matplotlib figure; `save` adds the style of this module."""
     from matplotlib.figure import Figure
 
     n = len(drawing.panels)
@@ -150,9 +154,8 @@ def drawn(drawing: Drawing) -> Figure:
 
 
 def verbatim(words: str) -> str:
-    """Return words as matplotlib shows them as they are: it takes $ for mathematics."""
-    readable = "".join(letter if letter.isprintable() else " " for letter in words)
-    return readable.replace("$", r"\$")
+    """Return words without line breaks and other characters that cannot be printed."""
+    return "".join(letter if letter.isprintable() else " " for letter in words)
 
 
 def _panel(axis: Axes, panel: Panel, bottom: bool) -> None:
@@ -186,7 +189,7 @@ def _panel(axis: Axes, panel: Panel, bottom: bool) -> None:
         axis.set_xlim(left=0)
     handles, names = axis.get_legend_handles_labels()
     if handles:
-        n_columns = 3 if max(map(len, names)) < 18 else 1
+        n_columns = 3 if sum(map(len, names[:3])) < _LEGEND else 1
         axis.legend(
             *(handles, names),
             title=verbatim(panel.title) or None,
@@ -203,20 +206,23 @@ def _panel(axis: Axes, panel: Panel, bottom: bool) -> None:
 def _curve(axis: Axes, curve: Curve) -> None:
     colour = COLOURS[curve.colour]
     # A name that begins with an underscore would be left out of the legend.
-    name = f" {verbatim(curve.name)}" if curve.name.startswith("_") else verbatim(curve.name)
-    label = name or None
-    if curve.style in ("line", "dashed"):
-        marker = "." if curve.x.size <= FEW else ""
-        line = "--" if curve.style == "dashed" else "-"
-        axis.plot(curve.x, curve.y, line, color=colour, marker=marker, markersize=2, label=label)
+    label = f" {verbatim(curve.name)}" if curve.name.startswith("_") else verbatim(curve.name)
+    look: dict[str, Any] = {"color": colour, "label": label or None}
+    if curve.style in _WIDTHS:
+        look["linewidth"] = _WIDTHS[curve.style]
+        if curve.style == "broad":
+            look["alpha"] = 0.35
+        if curve.style == "beads":
+            look |= {"marker": "o", "markersize": 1.6}
+        axis.plot(curve.x, curve.y, **look)
+        return
+    look |= {"linestyle": "none", "marker": "o", "markersize": 4}
+    if curve.style == "rings":
+        look["markerfacecolor"] = "none"
+    elif curve.style == "ticks":
+        look["marker"] = "|"
     elif curve.style == "stems":
         axis.vlines(curve.x, np.minimum(curve.y, 0), np.maximum(curve.y, 0), color=colour)
-        axis.plot(curve.x, curve.y, "o", color=colour, markersize=3, label=label)
-    else:
-        if curve.interval is not None:
-            low, high = curve.interval
-            axis.hlines(curve.y, low, high, color=colour)
-        marker = {"dots": "o", "rings": "o", "ticks": "|"}[curve.style]
-        face = colour if curve.style == "dots" else "none"
-        style = {"color": colour, "markerfacecolor": face, "markersize": 4}
-        axis.plot(curve.x, curve.y, marker, label=label, **style)
+    if curve.interval is not None:
+        axis.hlines(curve.y, *curve.interval, color=colour)
+    axis.plot(curve.x, curve.y, **look)

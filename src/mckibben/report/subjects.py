@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,6 +13,7 @@ from mckibben.blocks.base import Block
 from mckibben.errors import ModelError
 from mckibben.recording import Recording
 from mckibben.report.drawing import (
+    FEW,
     N_AGES,
     N_COLOURS,
     POINTS,
@@ -20,6 +22,7 @@ from mckibben.report.drawing import (
     Drawing,
     Mark,
     Panel,
+    Style,
     along,
     axis_label,
     over_time,
@@ -46,7 +49,8 @@ def time_course(
         curves = []
         for recording, (name, colour) in zip(kept, colours, strict=True):
             t, y = over_time(recording.time, recording[channel], points)
-            curves.append(Curve(t, y, name if channel == channels[0] else "", colour))
+            name = name if channel == channels[0] else ""
+            curves.append(Curve(t, y, name, colour, _measured_style(recording)))
         label = axis_label(channel, kept[0].units[channel])
         panels.append(Panel(time_label(kept[0]), label, tuple(curves)))
     return Drawing(tuple(panels), stacked=True, note=note)
@@ -63,7 +67,12 @@ def loop(
         curves = _by_age(kept[0], input_name, output_name, points)
     else:
         curves = tuple(
-            Curve(*along(recording[input_name], recording[output_name], points)[1:], name, colour)
+            Curve(
+                *along(recording[input_name], recording[output_name], points)[1:],
+                name,
+                colour,
+                _measured_style(recording),
+            )
             for recording, (name, colour) in zip(kept, _colours(kept), strict=True)
         )
     return Drawing((Panel(x_label, y_label, curves, arrows=arrows),), note=note)
@@ -106,7 +115,8 @@ def fit_over_time(
 ) -> Drawing:
     """Draw the measured output over time and the models' on top, the best last."""
     time = recording.time
-    curves = [Curve(*over_time(time, recording[output_name], points), "measured")]
+    under = _measured_style(recording, under=True)
+    curves = [Curve(*over_time(time, recording[output_name], points), "measured", style=under)]
     for model, colour, modelled in _worst_to_best(outputs):
         curves.append(Curve(*over_time(time, modelled, points), model, colour, model=model))
     label = axis_label(output_name, recording.units[output_name])
@@ -125,7 +135,8 @@ def fit_loops(
     """Draw the measured loop and the models' on top, the best last."""
     u = recording[input_name]
     measured = recording[output_name]
-    curves = [Curve(*along(u, measured, points)[1:], "measured")]
+    under = _measured_style(recording, under=True)
+    curves = [Curve(*along(u, measured, points)[1:], "measured", style=under)]
     for model, colour, modelled in _worst_to_best(outputs):
         curves.append(Curve(*along(u, modelled, points)[1:], model, colour, model=model))
     x_label, y_label = _plane(recording, input_name, output_name)
@@ -145,10 +156,9 @@ def residuals(
     against_input, against_time = [], []
     for model, colour, modelled in _worst_to_best(outputs):
         left = measured - modelled
-        against_input.append(Curve(*along(u, left, points)[1:], model, colour, model=model))
-        against_time.append(
-            Curve(*over_time(recording.time, left, points), "", colour, model=model)
-        )
+        path, course = along(u, left, points)[1:], over_time(recording.time, left, points)
+        against_input.append(Curve(*path, model, colour, "fine", model))
+        against_time.append(Curve(*course, "", colour, "fine", model))
     x_label = axis_label(input_name, recording.units[input_name])
     y_label = axis_label("measured − model", recording.units[output_name])
     marks = _test_mark(recording.time, test_from)
@@ -222,13 +232,13 @@ def inverse_check(check: InverseCheck, timed: bool = True) -> Drawing:
                 label,
                 axis_label(wanted.name, wanted.unit),
                 (
-                    Curve(*over_time(t, check.reference), "reference"),
-                    Curve(
-                        *over_time(t, check.output), "model behind inverse", "series-1", "dashed"
-                    ),
+                    Curve(*over_time(t, check.reference), "reference", style="broad"),
+                    Curve(*over_time(t, check.output), "model behind its inverse", "series-1"),
                 ),
             ),
-            Panel(label, axis_label("error", wanted.unit), (Curve(*error, "", "series-6"),)),
+            Panel(
+                label, axis_label("error", wanted.unit), (Curve(*error, "", "series-6", "fine"),)
+            ),
             Panel(
                 label,
                 axis_label(given.name, given.unit),
@@ -240,7 +250,7 @@ def inverse_check(check: InverseCheck, timed: bool = True) -> Drawing:
 
 
 def directions(u: Array, y: Array) -> tuple[Arrow, ...]:
-    """Return the direction of time at mid-height of the widest rising and the widest falling branch.
+    """Return the direction of time amid the widest rising and the widest falling branch.
 
     Parameters
     ----------
@@ -280,9 +290,16 @@ def _by_age(
             y[first : last + 1],
             f"{time[int(edges[age])]:.4g} to {time[int(edges[age + 1])]:.4g}{unit}",
             f"age-{age + 1}",
+            _measured_style(recording),
         )
-        for age, (first, last) in enumerate(zip(cuts[:-1], cuts[1:], strict=True))
+        for age, (first, last) in enumerate(pairwise(cuts))
     )
+
+
+def _measured_style(recording: Recording, under: bool = False) -> Style:
+    if recording.n_samples <= FEW:
+        return "beads"
+    return "broad" if under else "line"
 
 
 def _first(recordings: Sequence[Recording]) -> tuple[Sequence[Recording], str]:

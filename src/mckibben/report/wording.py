@@ -7,8 +7,6 @@ import shlex
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 if TYPE_CHECKING:
     from mckibben.comparison.results import Row, Study
     from mckibben.recording import Recording
@@ -26,17 +24,16 @@ MISLEADING = 0.05
 def number(value: float | None, digits: int = 3) -> str:
     """Return a number to so many significant digits, without an exponent where that is readable.
 
-    >>> number(0.012345), number(12345.6), number(None), number(1.5e-12)
-    ('0.0123', '12346', '–', '1.5e-12')
+    >>> number(0.012345), number(-12345.6), number(None), number(1.5e-12)
+    ('0.0123', '−12346', '–', '1.5e−12')
     """
     if value is None or not math.isfinite(value):
         return "–"
     if value == 0:
         return "0"
     size = math.floor(math.log10(abs(value)))
-    if not -4 <= size <= 6:
-        return f"{value:.{digits}g}"
-    return f"{value:.{max(0, digits - 1 - size)}f}"
+    form = f".{max(0, digits - 1 - size)}f" if -4 <= size <= 6 else f".{digits}g"
+    return f"{value:{form}}".replace("-", "−")
 
 
 def percent(value: float | None, digits: int = 2) -> str:
@@ -66,9 +63,9 @@ def verdict(study: Study) -> list[str]:
         between = f" (95 % interval {number(low)} to {number(high)} {board.unit})"
     share = percent(best.test.rmse / output_range(study))
     sentences = [
-        f"The best of {n_ok} models is {best.model}: free-running on data that it was not fitted to, "
-        f"its RMSE is {number(best.test.rmse)} {board.unit}{between}, {share} of the measured range; "
-        f"at worst it is off by {number(best.test.max_error)} {board.unit}."
+        f"The best of {n_ok} models is {best.model}: free-running on data that it was not fitted "
+        f"to, its RMSE is {number(best.test.rmse)} {board.unit}{between}, {share} of the measured "
+        f"range; at worst it is off by {number(best.test.max_error)} {board.unit}."
     ]
     tied = [row.model for row in board.rows if row is not best and _ties(row)]
     if tied:

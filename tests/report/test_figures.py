@@ -1,0 +1,72 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from studies_by_hand import measured, study
+
+from mckibben.blocks.gpi import GPI
+from mckibben.errors import DataError, ModelError
+from mckibben.report.figures import (
+    FIGURES,
+    MODEL_KINDS,
+    RECORDING_KINDS,
+    plot_model,
+    plot_recording,
+    save_figure,
+)
+
+CHANNELS = ("pressure", "displacement")
+FORMATS = ("png", "svg", "pdf")
+
+
+@pytest.mark.parametrize("name", list(FIGURES))
+def test_every_figure_of_a_study_is_written_alike_twice(tmp_path: Path, name: str) -> None:
+    paths = [tmp_path / f"{k}.svg" for k in range(2)]
+    for path in paths:
+        save_figure(study(), name, path)
+    assert paths[0].read_bytes() == paths[1].read_bytes()
+
+
+@pytest.mark.parametrize("ending", FORMATS)
+@pytest.mark.parametrize("kind", RECORDING_KINDS)
+def test_recordings_are_drawn_in_every_format(tmp_path: Path, kind: str, ending: str) -> None:
+    recordings = [measured(200, sample_time=None), measured(100, sample_time=None, name="second")]
+    path = tmp_path / f"figure.{ending}"
+    plot_recording(recordings, *CHANNELS, kind, path)
+    assert path.stat().st_size > 1000
+
+
+@pytest.mark.parametrize("ending", FORMATS)
+@pytest.mark.parametrize("kind", MODEL_KINDS)
+def test_models_are_drawn_in_every_format(tmp_path: Path, kind: str, ending: str) -> None:
+    path = tmp_path / f"figure.{ending}"
+    plot_model(GPI.example(), [measured(200), measured(100, seed=1)], kind, path)
+    assert path.stat().st_size > 1000
+
+
+def test_many_recordings_are_named_where_they_are_not_drawn(tmp_path: Path) -> None:
+    many = [measured(60, seed=k, name=f"run {k}") for k in range(8)]
+    plot_model(GPI.example(), many, "fit", tmp_path / "figure.pdf")
+    save_figure(study(tuple(many[:4]), tuple(many[4:])), "loops", tmp_path / "loops.pdf")
+
+
+def test_unknown_kinds_list_the_known_ones(tmp_path: Path) -> None:
+    path = tmp_path / "figure.png"
+    with pytest.raises(ModelError, match="time, loop"):
+        plot_recording([measured(50)], *CHANNELS, "pie", path)
+    with pytest.raises(ModelError, match="fit, loops, residuals, weights"):
+        plot_model(GPI.example(), [measured(50)], "time", path)
+    with pytest.raises(ModelError, match="leaderboard"):
+        save_figure(study(), "pie", path)
+    assert not path.exists()
+
+
+def test_absent_channels_are_named(tmp_path: Path) -> None:
+    with pytest.raises(DataError, match="force"):
+        plot_recording([measured(50)], "pressure", "force", "time", tmp_path / "figure.png")
+
+
+def test_a_study_without_inverse_says_so(tmp_path: Path) -> None:
+    with pytest.raises(ModelError, match="no model of this study has an inverse"):
+        save_figure(study(inverse=False), "inverse", tmp_path / "figure.png")

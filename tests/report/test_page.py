@@ -1,0 +1,209 @@
+from __future__ import annotations
+
+import json
+import re
+from html.parser import HTMLParser
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import pytest
+from studies_by_hand import measured, models, renamed, study
+
+from mckibben.blocks.gpi import GPI
+from mckibben.blocks.pi import PI
+from mckibben.comparison.results import Study
+from mckibben.report import write_report
+from mckibben.report.page import page
+
+SECTIONS = (
+    "headline",
+    "recordings",
+    "characterization",
+    "leaderboard",
+    "fit",
+    "residuals",
+    "weights",
+    "inverse",
+    "method",
+)
+VOID = {"meta", "link", "input", "br", "img"}
+LOADING = {"src", "srcset", "href", "action", "poster", "data", "formaction", "xlink:href"}
+
+
+class Parsed(HTMLParser):
+    """A page: its attributes, its words outside scripts, its scripts; nesting is checked."""
+
+    def __init__(self, html: str) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.attributes: list[tuple[str, str, str]] = []
+        self.scripts: list[str] = []
+        self.words = ""
+        self.feed(html)
+        self.close()
+        assert self.open == []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.attributes += [(tag, name, value or "") for name, value in attrs]
+        if tag == "script":
+            self.scripts.append("")
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.attributes += [(tag, name, value or "") for name, value in attrs]
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop() == tag
+
+    def handle_data(self, data: str) -> None:
+        if self.open and self.open[-1] == "script":
+            self.scripts[-1] += data
+        elif not self.open or self.open[-1] != "style":
+            self.words += data
+
+    @property
+    def ids(self) -> list[str]:
+        return [value for _, name, value in self.attributes if name == "id"]
+
+    @property
+    def figures(self) -> dict[str, Any]:
+        found: dict[str, Any] = json.loads(self.scripts[0])
+        return found
+
+
+@pytest.fixture(scope="module")
+def whole() -> Study:
+    return study(notes=("Time was resampled: jitter 3 %.",))
+
+
+@pytest.fixture(scope="module")
+def parsed(whole: Study) -> Parsed:
+    return Parsed(page(whole))
+
+
+def test_the_page_parses_and_has_every_section(parsed: Parsed) -> None:
+    assert set(SECTIONS) <= set(parsed.ids)
+    assert len(parsed.ids) == len(set(parsed.ids))
+    linked = {v[1:] for tag, name, v in parsed.attributes if tag == "a" and name == "href"}
+    assert linked <= set(parsed.ids)
+
+
+def test_every_plot_has_its_data_and_a_label(parsed: Parsed) -> None:
+    wanted = {value for _, name, value in parsed.attributes if name == "data-figure"}
+    assert wanted == set(parsed.figures)
+    plots = sum(name == "data-panel" for _, name, _ in parsed.attributes)
+    assert plots == sum(len(variants[0]) for variants in parsed.figures.values())
+    assert sum(name == "aria-label" for _, name, _ in parsed.attributes) >= plots
+
+
+def test_nothing_is_loaded_from_elsewhere(parsed: Parsed) -> None:
+    for _, name, value in parsed.attributes:
+        if name in LOADING:
+            assert value.startswith(("#", "data:"))
+        assert "url(" not in value
+    policy = [v for t, name, v in parsed.attributes if t == "meta" and name == "content"]
+    assert any(value.startswith("default-src 'none'") for value in policy)
+    style = files("mckibben.report").joinpath("templates/report.css").read_text()
+    assert not re.search(r"url\(|@import|https?:", style)
+
+
+def test_every_colour_of_the_plots_is_in_the_style_in_light_and_dark(parsed: Parsed) -> None:
+    style = files("mckibben.report").joinpath("templates/report.css").read_text()
+    used = set(re.findall(r'"(--[a-z0-9-]+)"', parsed.scripts[0]))
+    assert used
+    for colour in used:
+        assert style.count(f"{colour}: #") == 2
+
+
+def test_what_was_found_is_said_with_units(parsed: Parsed, whole: Study) -> None:
+    for words in (*whole.characterization.sentences, *whole.notes, "gpi", "[mm]", "seed 0"):
+        assert words in parsed.words
+    assert "eupi" in parsed.words
+    assert "failed: the data have no time. Remedy: give --rate." in parsed.words
+
+
+def test_the_same_study_gives_the_same_page(whole: Study) -> None:
+    assert page(whole) == page(whole)
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "<script>alert(1)</script>",
+        "</script><script>alert(1)</script>",
+        "\" onload='x' \"",
+        "{{ 7 }}",
+    ],
+)
+def test_hostile_names_stay_words(name: str) -> None:
+    channels = (f"pressure{name}", f"displacement{name}")
+    recording = measured(300, channels=channels, name=name, file=f"{name}.csv", notes=name)
+    test = measured(200, seed=1, channels=channels, name=name)
+    blocks = {"gpi": renamed(GPI.example(), channels), "pi": renamed(PI.example(), channels)}
+    html = page(study((recording,), (test,), blocks=blocks, notes=(name,), reason=name))
+    parsed = Parsed(html)
+    assert len(parsed.scripts) == 3
+    assert not any(attribute.startswith("on") for _, attribute, _ in parsed.attributes)
+    assert "<script>alert" not in html
+    assert parsed.words.count(name) >= 4
+    title = parsed.figures["loop"][0][0]["layout"]["xaxis"]["title"]["text"]
+    assert title.startswith("pressure")
+    assert "<" not in title
+
+
+def test_one_recording_without_time_is_enough() -> None:
+    whole = measured(200, sample_time=None)
+    blocks = {"gpi": GPI.example()}
+    parsed = Parsed(page(study((whole.slice(0, 150),), (whole,), blocks=blocks)))
+    assert "no time" in parsed.words
+    axis = parsed.figures["fit"][0][0]["layout"]["xaxis"]
+    assert axis["title"]["text"] == "sample"
+    assert not any(value == "recording" for _, name, value in parsed.attributes if name == "name")
+
+
+def test_a_study_without_inverse_says_so() -> None:
+    parsed = Parsed(page(study(inverse=False)))
+    assert "no model that worked can be inverted" in parsed.words
+    assert "inverse" not in parsed.figures
+
+
+def test_a_study_in_which_every_model_failed_is_still_a_report() -> None:
+    parsed = Parsed(page(study(blocks={})))
+    assert set(SECTIONS) <= set(parsed.ids)
+    assert set(parsed.figures) == {"time", "loop"}
+    assert "failed: the data have no time" in parsed.words
+
+
+def test_six_recordings_are_drawn_and_all_are_named() -> None:
+    train = tuple(measured(200, seed=k, name=f"run {k}") for k in range(7))
+    parsed = Parsed(page(study(train)))
+    assert len(parsed.figures["fit"]) == 6
+    assert all(f"run {k}" in parsed.words for k in range(7))
+    options = [value for tag, name, value in parsed.attributes if tag == "option"]
+    assert sorted(set(options)) == [str(k) for k in range(6)]
+
+
+@pytest.mark.parametrize("n_recordings", [1, 6])
+def test_a_million_samples_stay_under_six_megabytes(tmp_path: Path, n_recordings: int) -> None:
+    each = tuple(
+        measured(1_000_000 // n_recordings, seed=k, sample_time=1e-3, name=f"run {k}")
+        for k in range(n_recordings)
+    )
+    train = each[:-1] or (each[0].slice(0, 750_000),)
+    blocks = models() | {f"model {k}": GPI.example() for k in range(4)}
+    write_report(study(train, each[-1:], blocks=blocks), tmp_path / "report.html")
+    assert (tmp_path / "report.html").stat().st_size < 6e6
+
+
+def test_a_failure_leaves_what_was_there(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, whole: Study
+) -> None:
+    path = tmp_path / "report.html"
+    path.write_text("before")
+    monkeypatch.setattr(Path, "replace", lambda *_: 1 / 0)
+    with pytest.raises(ZeroDivisionError):
+        write_report(whole, path)
+    assert path.read_text() == "before"
+    assert list(tmp_path.iterdir()) == [path]

@@ -1,0 +1,125 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from studies_by_hand import measured, models, study
+
+from mckibben.blocks.compose import Parallel, Series
+from mckibben.blocks.gpi import GPI
+from mckibben.blocks.pi import PI
+from mckibben.blocks.piecewise_linear import PiecewiseLinear
+from mckibben.blocks.play import Play
+from mckibben.errors import ModelError
+from mckibben.report import subjects
+
+LINE = Play.example()
+
+
+def test_the_loop_of_one_recording_is_coloured_by_age_without_gaps() -> None:
+    recording = measured(500)
+    (panel,) = subjects.loop([recording], "pressure", "displacement").panels
+    assert [curve.colour for curve in panel.curves] == [f"age-{k}" for k in range(1, 6)]
+    for before, after in zip(panel.curves, panel.curves[1:], strict=False):
+        assert (before.x[-1], before.y[-1]) == (after.x[0], after.y[0])
+    drawn = np.concatenate([panel.curves[0].x, *(curve.x[1:] for curve in panel.curves[1:])])
+    np.testing.assert_array_equal(drawn, recording["pressure"])
+
+
+def test_the_shortest_recording_has_a_loop() -> None:
+    recording = measured(500).slice(0, 2)
+    (panel,) = subjects.loop([recording], "pressure", "displacement").panels
+    assert [curve.x.size for curve in panel.curves] == [2]
+
+
+def test_several_recordings_share_panels_and_the_seventh_is_named() -> None:
+    recordings = [measured(100, seed=k, name=f"run {k}") for k in range(8)]
+    for drawing in (
+        subjects.loop(recordings, "pressure", "displacement"),
+        subjects.time_course(recordings, ("pressure", "displacement")),
+    ):
+        curves = drawing.panels[0].curves
+        assert [curve.name for curve in curves] == [f"run {k}" for k in range(6)]
+        assert drawing.note == "Not shown: run 6, run 7."
+
+
+def test_arrows_follow_time_on_both_branches() -> None:
+    u = np.concatenate([np.linspace(0, 5, 100), np.linspace(5, 0, 100)])
+    up, down = subjects.directions(u, 2 * u)
+    assert up.tail[0] < up.head[0]
+    assert down.tail[0] > down.head[0]
+    assert 2 < up.tail[0] < 3
+
+
+def test_residuals_are_measured_less_modelled() -> None:
+    recording = measured(200)
+    outputs = {"gpi": recording["displacement"] - 0.5}
+    against_input, against_time = subjects.residuals(
+        recording, "pressure", "displacement", outputs, test_from=150
+    ).panels
+    np.testing.assert_allclose(against_input.curves[0].y, 0.5)
+    np.testing.assert_allclose(against_time.curves[0].y, 0.5)
+    assert against_time.marks[0].x == pytest.approx(1.5)
+
+
+def test_the_best_model_lies_on_top() -> None:
+    recording = measured(100)
+    outputs = dict.fromkeys(("best", "second", "third"), recording["displacement"])
+    for drawing in (
+        subjects.fit_over_time(recording, "displacement", outputs),
+        subjects.fit_loops(recording, "pressure", "displacement", outputs),
+    ):
+        names = [curve.name for curve in drawing.panels[0].curves]
+        assert names == ["measured", "third", "second", "best"]
+
+
+def test_only_models_that_worked_are_ranked() -> None:
+    (panel,) = subjects.leaderboard(study().leaderboard).panels
+    assert panel.categories == tuple(models())
+    tested = panel.curves[-1]
+    assert tested.interval is not None
+    assert np.all(tested.interval[0] < tested.x)
+    assert np.all(tested.x < tested.interval[1])
+
+
+def test_nothing_to_rank_is_said() -> None:
+    with pytest.raises(ModelError, match="no model worked"):
+        subjects.leaderboard(study(blocks={}).leaderboard)
+
+
+def test_sums_of_operators_are_found_however_nested() -> None:
+    pi, gpi = PI.example(), GPI.example()
+    nested = Series((Parallel((pi, LINE)), PiecewiseLinear.example()))
+    assert list(subjects.operator_sums(nested)) == [pi]
+    assert list(subjects.operator_sums(gpi.inverse())) == [gpi]
+    assert list(subjects.operator_sums(LINE)) == []
+
+
+def test_weights_stand_over_their_thresholds_with_their_units() -> None:
+    drawing = subjects.weights(models())
+    titles = [panel.title for panel in drawing.panels]
+    assert titles == ["gpi", "mpi: pi", "rdpi", "pi"]
+    gpi, mpi, rdpi, _ = drawing.panels
+    assert gpi.x_label == "threshold on the envelopes"
+    assert mpi.x_label == "threshold [bar]"
+    np.testing.assert_array_equal(gpi.curves[0].y, GPI.example().weights)
+    assert [curve.name for curve in rdpi.curves] == ["at rest", "per rate"]
+
+
+def test_more_weights_than_fit_are_counted() -> None:
+    drawing = subjects.weights({f"model {k}": PI.example() for k in range(9)})
+    assert len(drawing.panels) == 6
+    assert drawing.note == "3 more are not shown."
+
+
+def test_a_model_without_weights_is_refused_with_a_remedy() -> None:
+    with pytest.raises(ModelError, match="Remedy"):
+        subjects.weights({"play": LINE})
+
+
+def test_the_inverse_check_shows_its_own_error() -> None:
+    check = study().inverse
+    assert check is not None
+    following, error, given = subjects.inverse_check(check).panels
+    assert following.y_label == "displacement [mm]"
+    assert given.y_label == "pressure [bar]"
+    np.testing.assert_array_equal(error.curves[0].y, check.output - check.reference)

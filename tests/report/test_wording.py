@@ -1,0 +1,119 @@
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from studies_by_hand import measured, models, study
+
+from mckibben.comparison.results import Memory
+from mckibben.report.wording import (
+    commands,
+    duration,
+    next_steps,
+    number,
+    percent,
+    verdict,
+    versions,
+)
+
+
+@given(st.floats(-1e300, 1e300), st.integers(1, 6))
+def test_numbers_keep_their_digits(value: float, digits: int) -> None:
+    read = float(number(value, digits).replace("−", "-"))
+    assert read == pytest.approx(value, rel=0.5000001 * 10 ** (1 - digits), abs=5e-324)
+
+
+@pytest.mark.parametrize("value", [None, float("nan"), float("inf")])
+def test_what_is_not_a_number_is_a_dash(value: float | None) -> None:
+    assert number(value) == "–"
+
+
+def test_shares_are_percentages() -> None:
+    assert (percent(0.5), percent(1.0, 3), percent(None)) == ("50 %", "100 %", "–")
+
+
+def test_the_verdict_names_the_model_its_error_with_unit_and_range_and_the_inverse() -> None:
+    found = study()
+    best = found.leaderboard.best
+    assert best is not None
+    assert best.test is not None
+    words = " ".join(verdict(found))
+    assert "best of 4 models is gpi" in words
+    assert f"{number(best.test.rmse)} mm" in words
+    assert "% of the measured range" in words
+    assert "It can be inverted" in words
+
+
+def test_another_model_may_be_the_one_to_invert() -> None:
+    found = study()
+    assert found.inverse is not None
+    other = replace(found, inverse=replace(found.inverse, model="pi"))
+    assert "the best model that can is pi" in " ".join(verdict(other))
+    none = replace(found, inverse=None)
+    assert "None of the models that worked can be inverted" in " ".join(verdict(none))
+
+
+def test_models_that_tie_with_the_best_are_named() -> None:
+    found = study()
+    rows = list(found.leaderboard.rows)
+    rows[1] = replace(rows[1], difference_interval=(-0.1, 0.1))
+    tied = replace(found, leaderboard=replace(found.leaderboard, rows=tuple(rows)))
+    assert "mpi cannot be told apart" in " ".join(verdict(tied))
+    assert "told apart" not in " ".join(verdict(found))
+
+
+def test_next_steps_answer_what_is_wrong() -> None:
+    found = study()
+    best, *others = found.leaderboard.rows
+    assert best.train is not None
+    assert best.test is not None
+    bad = replace(
+        best,
+        test=replace(best.test, rmse=5.0),
+        memory=Memory(gap_ratio=0.2, n_pairs=10, hold_ratio=1.0),
+    )
+    worse = replace(found, leaderboard=replace(found.leaderboard, rows=(bad, *others)))
+    words = " ".join(next_steps(worse))
+    assert "misses something" in words
+    assert "record more varied movements" in words
+    assert "20 % of the measured gap" in words
+    assert "feedforward" in words
+    assert len(next_steps(replace(found, inverse=None))) == 1
+
+
+def test_a_study_in_which_nothing_worked_says_what_to_do() -> None:
+    empty = study(blocks={})
+    assert "None of the 1 models" in " ".join(verdict(empty))
+    assert "reasons" in " ".join(next_steps(empty))
+
+
+def test_commands_are_quoted_and_name_every_file_once() -> None:
+    whole = measured(200, file="my data/run 1.csv")
+    other = measured(200, seed=1, file="$(rm).csv", name="other")
+    held_out = dict(commands(study((whole.slice(0, 150),), (whole,))))
+    assert held_out["Repeat this study"].startswith(
+        "mckibben study 'my data/run 1.csv' --input pressure --output displacement --models "
+    )
+    with_test = dict(commands(study((whole,), (other,))))
+    assert "--test '$(rm).csv'" in with_test["Repeat this study"]
+    assert with_test["Fit gpi to whole recordings"].startswith(
+        "mckibben fit gpi 'my data/run 1.csv'"
+    )
+
+
+def test_there_is_no_command_for_an_absent_inverse() -> None:
+    lines = commands(study(inverse=False, blocks=models()))
+    assert not any("inverse.json" in command for _, command in lines)
+
+
+def test_durations_are_said_with_and_without_time() -> None:
+    assert duration(measured(101)) == "101 samples, 1.00 s at 100 Hz"
+    assert duration(measured(101, sample_time=None)) == "101 samples, no time"
+
+
+def test_versions_are_those_installed() -> None:
+    from importlib.metadata import version
+
+    assert versions()["numpy"] == version("numpy")

@@ -1,0 +1,80 @@
+"""Imports point one way: no module imports from a layer above its own."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+import mckibben
+
+SOURCE = Path(mckibben.__file__).parent
+
+LAYERS = (
+    {"errors", "registry"},
+    {"recording", "signals", "metrics", "characterization"},
+    {"files"},
+    {"blocks"},
+    {"estimators"},
+    {"compensators"},
+    {"comparison"},
+    {"report"},
+    {"cli"},
+)
+"""Lowest first."""
+
+FILES_STAND_ON = {"files", "recording", "errors", "registry"}
+
+MODULES = [path for path in sorted(SOURCE.rglob("*.py")) if path != SOURCE / "__init__.py"]
+
+
+def member(path: Path) -> str:
+    """Return the folder or file directly in the package that a module belongs to."""
+    return path.relative_to(SOURCE).with_suffix("").parts[0]
+
+
+def layer(name: str) -> int:
+    for number, members in enumerate(LAYERS):
+        if name in members:
+            return number
+    raise AssertionError(f"{name!r} is in no layer: add it to LAYERS where it belongs")
+
+
+def imported(path: Path) -> Iterator[str]:
+    """Give the members of the package that a module imports, wherever in its text."""
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            found = [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{path}: relative imports hide where they point"
+            whole = node.module == "mckibben"
+            found = [
+                f"mckibben.{alias.name}" if whole else node.module or "" for alias in node.names
+            ]
+        else:
+            continue
+        for name in found:
+            package, _, rest = name.partition(".")
+            own = rest.partition(".")[0]
+            if package == "mckibben" and own and own != "__version__":
+                yield own
+
+
+@pytest.mark.parametrize("path", MODULES, ids=lambda path: str(path.relative_to(SOURCE)))
+def test_imports_point_down(path: Path) -> None:
+    own = member(path)
+    upward = {name for name in imported(path) if layer(name) > layer(own)}
+    assert not upward, f"{own} imports {upward} from above"
+    if own == "files":
+        assert set(imported(path)) <= FILES_STAND_ON
+
+
+def test_registry_names_modules_that_exist() -> None:
+    from mckibben.registry import PLUGINS
+
+    for group in PLUGINS.values():
+        for location in group.values():
+            module, _, _ = location.partition(":")
+            assert (SOURCE.parent / module.replace(".", "/")).with_suffix(".py").is_file()

@@ -1,0 +1,93 @@
+"""What is on disk is registered, and what is registered is on disk and loads."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Iterator
+from importlib import import_module
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import pytest
+
+import mckibben
+from mckibben import Block, ModelError
+from mckibben.blocks.envelopes import Envelope
+from mckibben.registry import PLUGINS, load, names
+
+SOURCE = Path(mckibben.__file__).parent
+EVERYTHING = [(group, name) for group in PLUGINS for name in PLUGINS[group]]
+
+
+def modules_under(folder: str) -> Iterator[ModuleType]:
+    """Import and give every module of a folder of the package, which may be absent."""
+    for path in sorted((SOURCE / folder).rglob("*.py")):
+        parts = path.relative_to(SOURCE).with_suffix("").parts
+        yield import_module(".".join(("mckibben", *parts)).removesuffix(".__init__"))
+
+
+def concrete(base: type, *folders: str) -> set[type]:
+    """Return the concrete subclasses of a class that the modules of some folders define."""
+    return {
+        value
+        for folder in folders
+        for module in modules_under(folder)
+        for _, value in inspect.getmembers(module, inspect.isclass)
+        if value.__module__ == module.__name__
+        and issubclass(value, base)
+        and not inspect.isabstract(value)
+    }
+
+
+def registered(group: str) -> set[Any]:
+    return {load(group, name) for name in PLUGINS[group]}
+
+
+@pytest.mark.parametrize(("group", "name"), EVERYTHING)
+def test_loads(group: str, name: str) -> None:
+    assert callable(load(group, name))
+
+
+def test_every_block_is_registered() -> None:
+    assert concrete(Block, "blocks") == registered("blocks")
+
+
+def test_every_envelope_is_registered() -> None:
+    assert concrete(Envelope, "blocks/envelopes") == registered("envelopes")
+
+
+def test_every_published_model_is_registered() -> None:
+    functions = {
+        value
+        for module in modules_under("blocks/published")
+        for name, value in inspect.getmembers(module, inspect.isfunction)
+        if value.__module__ == module.__name__ and not name.startswith("_")
+    }
+    assert functions == registered("published")
+
+
+def test_every_estimator_is_registered() -> None:
+    from mckibben.estimators.base import Estimator
+
+    assert concrete(Estimator, "estimators", "compensators") == registered("estimators")
+
+
+def test_every_group_is_checked_here() -> None:
+    assert set(PLUGINS) == {"blocks", "envelopes", "published", "estimators"}
+
+
+@pytest.mark.parametrize("name", [name for name in mckibben.__all__ if not name.startswith("__")])
+def test_every_public_name_is_there(name: str) -> None:
+    assert getattr(mckibben, name) is not None
+
+
+def test_unknown_name_lists_the_known_ones() -> None:
+    with pytest.raises(ModelError, match=r"no block named .ip.*Remedy: use one of affine, eupi"):
+        load("blocks", "ip")
+
+
+def test_names_are_in_order() -> None:
+    for group in PLUGINS:
+        assert list(names(group)) == sorted(names(group))
+        assert list(PLUGINS[group]) == sorted(PLUGINS[group])

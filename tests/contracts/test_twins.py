@@ -1,0 +1,70 @@
+"""Every compiled block agrees with its naive twin, and every envelope with its formula."""
+
+from __future__ import annotations
+
+import inspect
+import sys
+from typing import Any
+
+import numpy as np
+import pytest
+from numba.core.dispatcher import Dispatcher
+
+from mckibben.blocks.trial import Trial
+from mckibben.registry import load, names
+from tests.twins import ENVELOPES, TWINS
+
+SAMPLE_TIME = 0.01
+
+
+def kernels_in(module: str) -> list[str]:
+    """Return the names of the compiled functions that a module defines."""
+    members = inspect.getmembers(sys.modules[module])
+    return [
+        name
+        for name, value in members
+        if isinstance(value, Dispatcher) and value.__module__ == module
+    ]
+
+
+COMPILED = [kind for kind in names("blocks") if kernels_in(load("blocks", kind).__module__)]
+
+
+def test_every_compiled_block_has_a_twin_and_every_twin_a_block() -> None:
+    assert set(TWINS) == set(COMPILED)
+
+
+def test_every_envelope_has_a_twin_and_every_twin_an_envelope() -> None:
+    assert set(ENVELOPES) == set(names("envelopes"))
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("kind", COMPILED)
+def test_kernel_agrees_with_its_twin(kind: str, seed: int) -> None:
+    block = load("blocks", kind).example()
+    trial = Trial.of(block, SAMPLE_TIME, seed)
+    inputs = trial.inputs[:1000]
+    expected = np.array(TWINS[kind](block, inputs.tolist(), SAMPLE_TIME))
+    error = np.abs(trial.outputs[:1000] - expected)
+    tolerance = 1e-9 if kind.endswith("-inverse") else 1e-12
+    assert error.max() <= tolerance * np.ptp(expected)
+
+
+@pytest.mark.parametrize("kind", names("envelopes"))
+def test_envelope_agrees_with_its_formula_and_its_own_inverse(kind: str) -> None:
+    u = np.linspace(-1.0, 6.0, 1001)
+    for envelope in load("envelopes", kind).examples():
+        expected: list[Any] = [ENVELOPES[kind](envelope, x) for x in u.tolist()]
+        np.testing.assert_allclose(envelope(u), expected, rtol=1e-13, atol=1e-14)
+        np.testing.assert_allclose(envelope.solve(envelope(u)), u, rtol=1e-11, atol=1e-11)
+        assert np.all(np.diff(envelope(u)) > 0)
+
+
+@pytest.mark.parametrize("kind", names("envelopes"))
+def test_envelope_packs_shifts_and_stays_in_order(kind: str) -> None:
+    rising, falling = load("envelopes", kind).examples()
+    u = np.linspace(0.0, 5.0, 501)
+    assert np.all(falling(u) >= rising(u))
+    for envelope in (rising, falling):
+        assert envelope.unpack(envelope.pack()) == envelope
+        np.testing.assert_allclose(envelope.shifted(0.25)(u), envelope(u) + 0.25, rtol=1e-13)

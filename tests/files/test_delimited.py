@@ -1,6 +1,8 @@
 """Text tables in the forms that programs write."""
 
 import io
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -8,20 +10,24 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import mckibben
-from mckibben import DataError, DataWarning
+from mckibben import DataError, DataWarning, Recording
 from mckibben.files.dialect import detect
 
 P = [0.0, 1.5, 2.25, 3.0, 4.125, 5.0, 4.0, 3.0, 2.0, 1.0, 0.5]
 L = [0.0, -1.25, 12.5, 20.0, 21.0, 22.0, 1e-3, 3.5e2, 4.0, 2.0, 1.0]
 
 
-def text(separator, decimal=".", header=("pressure_bar", "displacement_mm")):
+def text(
+    separator: str,
+    decimal: str = ".",
+    header: tuple[str, str] = ("pressure_bar", "displacement_mm"),
+) -> str:
     rows = [separator.join(header)] + [f"{p!r}{separator}{x!r}" for p, x in zip(P, L, strict=True)]
     head, *body = rows
     return "\n".join([head, *[row.replace(".", decimal) for row in body]]) + "\n"
 
 
-def read(tmp_path, content, name="a.csv", **options):
+def read(tmp_path: Path, content: bytes | str, name: str = "a.csv", **options: Any) -> Recording:
     path = tmp_path / name
     path.write_bytes(content if isinstance(content, bytes) else content.encode())
     (recording,) = mckibben.read(path, **options)
@@ -33,7 +39,9 @@ def read(tmp_path, content, name="a.csv", **options):
     ("separator", "decimal"),
     [(s, d) for s in [",", ";", "\t", "|", " ", "   ", " \t"] for d in ".," if s != d],
 )
-def test_separator_and_decimal_mark(tmp_path, separator, decimal, name):
+def test_separator_and_decimal_mark(
+    tmp_path: Path, separator: str, decimal: str, name: str
+) -> None:
     recording = read(tmp_path, text(separator, decimal), name)
     assert recording["pressure"].tolist() == P
     assert recording["displacement"].tolist() == L
@@ -59,18 +67,18 @@ VARIANTS = {
 
 
 @pytest.mark.parametrize("variant", VARIANTS)
-def test_variant(tmp_path, variant):
+def test_variant(tmp_path: Path, variant: str) -> None:
     recording = read(tmp_path, VARIANTS[variant])
     assert [samples.tolist() for samples in recording.channels.values()] == [P, L]
     assert list(recording.units.values()) == ["bar", "mm"]
 
 
-def test_latin_1(tmp_path):
+def test_latin_1(tmp_path: Path) -> None:
     recording = read(tmp_path, text(";", ",", header=("Druck_bar", "Winkel (°)")).encode("latin-1"))
     assert recording["angle"] == pytest.approx(np.deg2rad(L))
 
 
-def test_header_in_a_comment_as_numpy_saves_it(tmp_path):
+def test_header_in_a_comment_as_numpy_saves_it(tmp_path: Path) -> None:
     buffer = io.StringIO()
     np.savetxt(buffer, np.column_stack([P, L]), header="p_bar l_mm")
     recording = read(tmp_path, buffer.getvalue(), "a.txt")
@@ -78,7 +86,7 @@ def test_header_in_a_comment_as_numpy_saves_it(tmp_path):
     assert recording["length"].tolist() == L
 
 
-def test_without_names_columns_are_numbered(tmp_path):
+def test_without_names_columns_are_numbered(tmp_path: Path) -> None:
     body = text(",").partition("\n")[2]
     with pytest.warns(DataWarning, match="column_1 to column_2"):
         recording = read(
@@ -90,7 +98,7 @@ def test_without_names_columns_are_numbered(tmp_path):
     assert recording["pressure"] == pytest.approx(np.array(P) / 100)
 
 
-def test_text_columns_are_left_out_and_said(tmp_path):
+def test_text_columns_are_left_out_and_said(tmp_path: Path) -> None:
     lines = text(",").splitlines()
     rows = [f"{line},up" for line in lines[1:]]
     recording = read(tmp_path, "\n".join([lines[0] + ",branch", *rows]))
@@ -98,7 +106,7 @@ def test_text_columns_are_left_out_and_said(tmp_path):
     assert list(recording.channels) == ["pressure", "displacement"]
 
 
-def test_own_meta_of_a_foreign_file(tmp_path):
+def test_own_meta_of_a_foreign_file(tmp_path: Path) -> None:
     import hashlib
 
     content = text(",").encode()
@@ -118,7 +126,11 @@ cells = st.floats(allow_nan=False, allow_infinity=False)
     st.lists(st.tuples(cells, cells, cells), min_size=10, max_size=15),
     st.sampled_from([(",", "."), (";", ","), ("\t", ","), ("|", "."), (" ", ",")]),
 )
-def test_numbers_are_read_to_the_last_bit(tmp_path_factory, rows, form):
+def test_numbers_are_read_to_the_last_bit(
+    tmp_path_factory: pytest.TempPathFactory,
+    rows: list[tuple[float, float, float]],
+    form: tuple[str, str],
+) -> None:
     separator, decimal = form
     lines = [separator.join(repr(cell).replace(".", decimal) for cell in row) for row in rows]
     path = tmp_path_factory.mktemp("bits") / "a.csv"
@@ -132,14 +144,16 @@ lines = st.text(st.characters(exclude_characters="\r\n"), max_size=30)
 
 
 @given(st.lists(lines, min_size=1, max_size=5))
-def test_any_lines_have_some_dialect(lines):
+def test_any_lines_have_some_dialect(lines: list[str]) -> None:
     dialect = detect(lines)
     assert all(isinstance(dialect.split(line), list) for line in lines)
 
 
 @settings(deadline=None, max_examples=100)
 @given(st.binary(max_size=300))
-def test_any_bytes_are_a_recording_or_a_data_error(tmp_path_factory, content):
+def test_any_bytes_are_a_recording_or_a_data_error(
+    tmp_path_factory: pytest.TempPathFactory, content: bytes
+) -> None:
     path = tmp_path_factory.mktemp("any") / "a.csv"
     path.write_bytes(content)
     with pytest.raises(DataError):

@@ -77,13 +77,13 @@ FORMS = {
 
 
 @pytest.mark.parametrize("text", FORMS)
-def test_form(text):
+def test_form(text: str) -> None:
     header = parse(text)
     assert (channel_of(header), header.unit) == FORMS[text]
 
 
 @pytest.mark.parametrize("channel", ALIASES)
-def test_every_alias_in_any_case_is_its_channel(channel):
+def test_every_alias_in_any_case_is_its_channel(channel: str) -> None:
     for alias in ALIASES[channel].split():
         for text in (alias, alias.upper(), alias.capitalize(), alias.replace("_", " ")):
             assert channel_of(parse(text)) == channel
@@ -91,7 +91,7 @@ def test_every_alias_in_any_case_is_its_channel(channel):
 
 @pytest.mark.parametrize("form", ["{} ({})", "{} [{}]", "{}/{}", "{} in {}"])
 @pytest.mark.parametrize("unit", SPELLINGS)
-def test_every_spelling_of_a_unit_is_found_in_every_form(form, unit):
+def test_every_spelling_of_a_unit_is_found_in_every_form(form: str, unit: str) -> None:
     for spellings in SPELLINGS[unit].values():
         for spelling in filter(None, spellings.split(" ")):
             header = parse(form.format("some thing", spelling))
@@ -99,11 +99,11 @@ def test_every_spelling_of_a_unit_is_found_in_every_form(form, unit):
 
 
 @given(st.text(max_size=30))
-def test_any_text_is_some_header(text):
+def test_any_text_is_some_header(text: str) -> None:
     header = parse(text)
     assert isinstance(channel_of(header), str)
 
 
 @given(st.text(max_size=30))
-def test_snake_case_is_idempotent(text):
+def test_snake_case_is_idempotent(text: str) -> None:
     assert snake_case(snake_case(text)) == snake_case(text)

@@ -2,6 +2,8 @@
 
 import json
 import warnings
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -19,7 +21,7 @@ names = (
     )
     | st.text(min_size=1, max_size=8).filter(lambda s: s.isprintable() and s.strip())
 ).filter(lambda s: s != "time")
-json_values = st.recursive(
+json_values: st.SearchStrategy[Any] = st.recursive(
     st.none() | st.booleans() | st.integers(-(2**53), 2**53) | finite | st.text(max_size=8),
     lambda inner: (
         st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=5), inner, max_size=3)
@@ -29,7 +31,7 @@ json_values = st.recursive(
 
 
 @st.composite
-def recordings(draw):
+def recordings(draw: st.DrawFn) -> Recording:
     n = draw(st.integers(10, 30))
     channels = draw(
         st.dictionaries(names, st.lists(finite, min_size=n, max_size=n), min_size=1, max_size=4)
@@ -40,7 +42,7 @@ def recordings(draw):
         if mckibben.recording.standard_unit(name) is None
     }
     return Recording(
-        channels,
+        {name: np.array(samples) for name, samples in channels.items()},
         sample_time=draw(st.none() | st.floats(1e-9, 1e9)),
         units=units,
         start_time=draw(st.floats(-1e9, 1e9)),
@@ -51,7 +53,7 @@ def recordings(draw):
 @pytest.mark.parametrize("ending", ENDINGS)
 @settings(max_examples=40, deadline=None, suppress_health_check=list(HealthCheck))
 @given(recording=recordings())
-def test_read_gives_back_what_write_took(recording, ending, tmp_path):
+def test_read_gives_back_what_write_took(recording: Recording, ending: str, tmp_path: Path) -> None:
     path = tmp_path / f"run{ending}"
     mckibben.write(recording, path)
     (back,) = mckibben.read(path)
@@ -62,8 +64,11 @@ def test_read_gives_back_what_write_took(recording, ending, tmp_path):
     assert not list(tmp_path.glob("*.part"))
 
 
+UNITS = {"time": "s", "pressure": "bar", "displacement_model": "mm"}
+
+
 @pytest.fixture
-def recording():
+def recording() -> Recording:
     k = np.arange(50)
     return Recording(
         {"pressure": np.sin(k / 7) + 1, "displacement_model": np.cos(k / 5)},
@@ -73,7 +78,7 @@ def recording():
     )
 
 
-def test_csv_is_plain_to_other_programs(recording, tmp_path):
+def test_csv_is_plain_to_other_programs(recording: Recording, tmp_path: Path) -> None:
     import pandas as pd
 
     mckibben.write(recording, tmp_path / "a.csv")
@@ -85,13 +90,13 @@ def test_csv_is_plain_to_other_programs(recording, tmp_path):
     assert described["units"] == {"pressure": "bar", "displacement_model": "mm"}
 
 
-def test_without_time_there_is_no_column_of_it(tmp_path):
+def test_without_time_there_is_no_column_of_it(tmp_path: Path) -> None:
     mckibben.write(Recording({"pressure": np.arange(20.0)}), tmp_path / "a.csv")
     assert (tmp_path / "a.csv").read_text().startswith("pressure\n0.0\n")
     assert mckibben.read(tmp_path / "a.csv")[0].sample_time is None
 
 
-def test_stale_sidecar_is_ignored_with_a_warning(recording, tmp_path):
+def test_stale_sidecar_is_ignored_with_a_warning(recording: Recording, tmp_path: Path) -> None:
     path = tmp_path / "a.csv"
     mckibben.write(recording, path)
     path.write_text(path.read_text().replace("0.1,", "0.10,", 1))
@@ -110,27 +115,29 @@ def test_stale_sidecar_is_ignored_with_a_warning(recording, tmp_path):
     "text",
     ["", "{", "[]", "null", '{"format": "other"}', '{"@context": "http://www.w3.org/ns/csvw"}'],
 )
-def test_broken_sidecar_is_ignored_with_a_warning(recording, tmp_path, text):
+def test_broken_sidecar_is_ignored_with_a_warning(
+    recording: Recording, tmp_path: Path, text: str
+) -> None:
     path = tmp_path / "a.csv"
     mckibben.write(recording, path)
     (tmp_path / "a.csv-metadata.json").write_text(text)
     with pytest.warns(DataWarning, match="not a description"):
-        given = {"time": "s", "pressure": "bar", "displacement_model": "mm"}
-        assert mckibben.read(path, units=given)[0].n_samples == 50
+        assert mckibben.read(path, units=UNITS)[0].n_samples == 50
 
 
-def test_parquet_changed_by_another_program_is_read_as_foreign(recording, tmp_path):
+def test_parquet_changed_by_another_program_is_read_as_foreign(
+    recording: Recording, tmp_path: Path
+) -> None:
     import pyarrow.parquet as pq
 
     path = tmp_path / "a.parquet"
     mckibben.write(recording, path)
     pq.write_table(pq.read_table(path).slice(0, 20), path)
     with pytest.warns(DataWarning, match="of other samples"):
-        given = {"time": "s", "pressure": "bar", "displacement_model": "mm"}
-        assert mckibben.read(path, units=given)[0].n_samples == 20
+        assert mckibben.read(path, units=UNITS)[0].n_samples == 20
 
 
-def test_own_files_follow_columns_units_rate_and_channels(tmp_path):
+def test_own_files_follow_columns_units_rate_and_channels(tmp_path: Path) -> None:
     path = tmp_path / "sim.csv"
     k = np.arange(20.0)
     mckibben.write(
@@ -147,20 +154,20 @@ def test_own_files_follow_columns_units_rate_and_channels(tmp_path):
         mckibben.read(path, channels=["force"])
 
 
-def test_rate_that_the_file_denies_is_refused(recording, tmp_path):
+def test_rate_that_the_file_denies_is_refused(recording: Recording, tmp_path: Path) -> None:
     mckibben.write(recording, tmp_path / "a.csv")
     with pytest.raises(DataError, match=r"30 samples per second.*leave --rate out"):
         mckibben.read(tmp_path / "a.csv", rate=25)
 
 
 @pytest.mark.parametrize("ending", [".mat", ".xlsx", "", ".h5"])
-def test_other_endings_cannot_be_written(recording, tmp_path, ending):
+def test_other_endings_cannot_be_written(recording: Recording, tmp_path: Path, ending: str) -> None:
     with pytest.raises(DataError, match=r"cannot be written.*\.csv, \.tsv, \.parquet"):
         mckibben.write(recording, tmp_path / f"a{ending}")
 
 
 @pytest.mark.parametrize("ending", ENDINGS)
-def test_missing_folder_is_an_error(recording, tmp_path, ending):
+def test_missing_folder_is_an_error(recording: Recording, tmp_path: Path, ending: str) -> None:
     with pytest.raises(DataError, match="cannot be written"):
         mckibben.write(recording, tmp_path / "no" / f"a{ending}")
 
@@ -177,8 +184,8 @@ def test_missing_folder_is_an_error(recording, tmp_path, ending):
     ],
 )
 def test_what_cannot_be_read_back_is_not_written_and_nothing_is_lost(
-    recording, tmp_path, bad, ending
-):
+    recording: Recording, tmp_path: Path, bad: Recording, ending: str
+) -> None:
     path = tmp_path / f"a{ending}"
     mckibben.write(recording, path)
     with pytest.raises(DataError):

@@ -1,6 +1,9 @@
 """Time grids: rounding is told from jitter, and gaps from both."""
 
 import warnings
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -8,8 +11,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import mckibben
-from mckibben import DataError, DataWarning
+from mckibben import DataError, DataWarning, Recording
 from mckibben.files import timebase
+from mckibben.recording import Array
 
 
 @settings(deadline=None)
@@ -19,7 +23,9 @@ from mckibben.files import timebase
     start=st.floats(0, 100),
     more=st.integers(0, 5),
 )
-def test_printed_times_of_a_uniform_grid_are_seen_as_uniform(rate, n, start, more):
+def test_printed_times_of_a_uniform_grid_are_seen_as_uniform(
+    rate: float, n: int, start: float, more: int
+) -> None:
     decimals = int(np.ceil(np.log10(2 * rate))) + more
     time = np.round(start + np.arange(n) / rate, decimals)
     step = timebase.common_step(time, [(0, n)])
@@ -28,25 +34,25 @@ def test_printed_times_of_a_uniform_grid_are_seen_as_uniform(rate, n, start, mor
 
 
 @given(st.floats(1e-6, 1e3), st.integers(10, 500), st.floats(-1e3, 1e3))
-def test_full_precision_times_keep_their_step(step, n, start):
-    time = start + step * np.arange(n)
+def test_full_precision_times_keep_their_step(step: float, n: int, start: float) -> None:
+    time: Array = start + step * np.arange(n, dtype=np.float64)
     found = timebase.common_step(time, [(0, n)])
     assert found.jitter is None
     assert found.size == pytest.approx(step, rel=1e-5)
 
 
 @pytest.mark.parametrize(("rate", "step"), [(1000, 0.001), (60, 1 / 60), (12, 1 / 12), (0.25, 4.0)])
-def test_step_is_the_plain_number_that_was_meant(rate, step):
-    time = np.round(np.arange(5000) / rate, 9)
+def test_step_is_the_plain_number_that_was_meant(rate: float, step: float) -> None:
+    time: Array = np.round(np.arange(5000) / rate, 9)
     assert timebase.common_step(time, [(0, 5000)]).size == step
 
 
-def test_single_precision_times_are_uniform():
+def test_single_precision_times_are_uniform() -> None:
     time = (np.arange(20_000) * 0.001).astype(np.float32).astype(float)
     assert timebase.common_step(time, [(0, time.size)]).jitter is None
 
 
-def test_jitter_is_measured():
+def test_jitter_is_measured() -> None:
     rng = np.random.default_rng(1)
     error = rng.normal(scale=0.0005, size=2000)
     time = np.arange(2000) * 0.01 + error
@@ -57,13 +63,13 @@ def test_jitter_is_measured():
     )
 
 
-def test_a_lost_sample_is_not_taken_for_rounding():
+def test_a_lost_sample_is_not_taken_for_rounding() -> None:
     time = np.delete(np.arange(1000) / 1000, 500)
     assert timebase.common_step(time, [(0, 999)]).jitter is not None
 
 
 @given(st.lists(st.integers(1, 30), min_size=2, max_size=8))
-def test_gaps_between_stretches_do_not_change_the_step(lengths):
+def test_gaps_between_stretches_do_not_change_the_step(lengths: list[int]) -> None:
     pieces, spans, begin, at = [], [], 0.0, 0
     for length in lengths:
         pieces.append(begin + 0.02 * np.arange(length))
@@ -74,12 +80,12 @@ def test_gaps_between_stretches_do_not_change_the_step(lengths):
         assert timebase.common_step(time, spans).size == pytest.approx(0.02)
 
 
-def test_gaps_are_found():
+def test_gaps_are_found() -> None:
     time = np.concatenate([np.arange(50) * 0.1, 7 + np.arange(50) * 0.1])
     assert timebase.gaps(time).tolist() == [50]
 
 
-def test_resampling_keeps_what_is_linear():
+def test_resampling_keeps_what_is_linear() -> None:
     rng = np.random.default_rng(2)
     time = 5 + np.cumsum(rng.uniform(0.5, 1.5, 300))
     grid = timebase.resample(time, 2 * time - 1, 0.7)
@@ -89,7 +95,9 @@ def test_resampling_keeps_what_is_linear():
 # Through files ---------------------------------------------------------------------------------
 
 
-def read(tmp_path, time, header="time_s", **options):
+def read(
+    tmp_path: Path, time: Sequence[object] | Array, header: str = "time_s", **options: Any
+) -> tuple[list[Recording], Array]:
     path = tmp_path / "run.csv"
     samples = np.sin(np.arange(len(time)) / 5)
     lines = [f"{t},{x!r}" for t, x in zip(time, samples.tolist(), strict=True)]
@@ -101,7 +109,9 @@ def read(tmp_path, time, header="time_s", **options):
     ("header", "scale"),
     [("time_s", 1.0), ("t (ms)", 1e3), ("time_us", 1e6), ("Zeit in min", 1 / 60)],
 )
-def test_uniform_time_leaves_the_samples_untouched(tmp_path, header, scale):
+def test_uniform_time_leaves_the_samples_untouched(
+    tmp_path: Path, header: str, scale: float
+) -> None:
     time = [f"{scale * (0.5 + 0.25 * k):.10g}" for k in range(40)]
     (recording,), samples = read(tmp_path, time, header)
     assert recording.sample_time == pytest.approx(0.25, rel=1e-9)
@@ -109,14 +119,14 @@ def test_uniform_time_leaves_the_samples_untouched(tmp_path, header, scale):
     assert np.array_equal(recording["pressure"], samples)
 
 
-def test_iso_timestamps(tmp_path):
+def test_iso_timestamps(tmp_path: Path) -> None:
     time = [f"2026-01-31T12:00:{k * 0.5:06.3f}Z" for k in range(40)]
     (recording,), samples = read(tmp_path, time, "timestamp")
     assert (recording.sample_time, recording.start_time) == (0.5, 0.0)
     assert np.array_equal(recording["pressure"], samples)
 
 
-def test_a_column_of_numbers_goes_before_timestamps(tmp_path):
+def test_a_column_of_numbers_goes_before_timestamps(tmp_path: Path) -> None:
     lines = [f"2026-01-31 12:00:{k:02d},{k / 10},{k % 7}" for k in range(40)]
     path = tmp_path / "a.csv"
     path.write_text("\n".join(["timestamp,time_s,p_bar", *lines]))
@@ -127,14 +137,14 @@ def test_a_column_of_numbers_goes_before_timestamps(tmp_path):
     assert recording.sample_time == 1.0
 
 
-def test_epoch_times(tmp_path):
+def test_epoch_times(tmp_path: Path) -> None:
     (recording,), samples = read(tmp_path, [f"{1.7e9 + 0.01 * k:.3f}" for k in range(200)])
     assert recording.sample_time == 0.01
     assert recording.start_time == 1.7e9
     assert np.array_equal(recording["pressure"], samples)
 
 
-def test_jittered_time_is_resampled_and_said(tmp_path):
+def test_jittered_time_is_resampled_and_said(tmp_path: Path) -> None:
     rng = np.random.default_rng(0)
     time = np.arange(100) * 0.1 + rng.uniform(-0.02, 0.02, 100)
     with pytest.warns(DataWarning, match=r"not uniform.*s rms \(.*%\) and .*s at worst"):
@@ -143,14 +153,14 @@ def test_jittered_time_is_resampled_and_said(tmp_path):
     assert recording["pressure"] == pytest.approx(np.interp(recording.time, time, samples))
 
 
-def test_rate_gives_the_time_where_there_is_none(tmp_path):
+def test_rate_gives_the_time_where_there_is_none(tmp_path: Path) -> None:
     path = tmp_path / "a.csv"
     path.write_text("p_bar\n" + "\n".join(map(str, range(20))))
     assert mckibben.read(path)[0].sample_time is None
     assert mckibben.read(path, rate=50)[0].sample_time == 0.02
 
 
-def test_rate_that_agrees_with_rounded_and_repeated_times(tmp_path):
+def test_rate_that_agrees_with_rounded_and_repeated_times(tmp_path: Path) -> None:
     time = [f"{k / 300:.2f}" for k in range(60)]
     with pytest.raises(DataError, match=r"row 3: the time 0 is repeated.*give --rate"):
         read(tmp_path, time)
@@ -159,13 +169,13 @@ def test_rate_that_agrees_with_rounded_and_repeated_times(tmp_path):
     assert np.array_equal(recording["pressure"], samples)
 
 
-def test_rate_that_the_times_deny(tmp_path):
+def test_rate_that_the_times_deny(tmp_path: Path) -> None:
     with pytest.raises(DataError, match=r"10 samples per second.*not the 20 asked for"):
         read(tmp_path, [k / 10 for k in range(40)], rate=20)
 
 
 @pytest.mark.parametrize("rate", [0, -1, float("nan"), float("inf")])
-def test_impossible_rate(tmp_path, rate):
+def test_impossible_rate(tmp_path: Path, rate: float) -> None:
     with pytest.raises(DataError, match="impossible"):
         read(tmp_path, [k / 10 for k in range(40)], rate=rate)
 
@@ -175,14 +185,14 @@ GAPPED = (
 )
 
 
-def test_gaps_stop_by_default(tmp_path):
+def test_gaps_stop_by_default(tmp_path: Path) -> None:
     with pytest.raises(
         DataError, match=r"'time', row 32: there is a gap of 5.1 s .* \(2 gap.*--gaps split"
     ):
         read(tmp_path, GAPPED)
 
 
-def test_gaps_split(tmp_path):
+def test_gaps_split(tmp_path: Path) -> None:
     with pytest.warns(DataWarning, match=r"1 of 3 stretches.*fewer than 10 samples"):
         parts, samples = read(tmp_path, GAPPED, gaps="split")
     assert [part.name for part in parts] == ["run[1]", "run[2]"]
@@ -192,7 +202,7 @@ def test_gaps_split(tmp_path):
     assert np.array_equal(parts[1]["pressure"], samples[35:])
 
 
-def test_gaps_interpolate(tmp_path):
+def test_gaps_interpolate(tmp_path: Path) -> None:
     with pytest.warns(DataWarning, match=r"2 gap\(s\) in time, .* interpolated over"):
         (recording,), samples = read(tmp_path, GAPPED, gaps="interpolate")
     assert recording.sample_time == 0.1
@@ -200,18 +210,18 @@ def test_gaps_interpolate(tmp_path):
     assert recording.duration == pytest.approx(22.4)
 
 
-def test_bridges_are_not_endless(tmp_path):
+def test_bridges_are_not_endless(tmp_path: Path) -> None:
     time = [*range(20), *range(10**7, 10**7 + 20)]
     with pytest.raises(DataError, match=r"too long to interpolate.*split"):
         read(tmp_path, time, gaps="interpolate")
 
 
-def test_unknown_policy(tmp_path):
+def test_unknown_policy(tmp_path: Path) -> None:
     with pytest.raises(DataError, match="one of error, split, interpolate"):
         read(tmp_path, range(20), gaps="ignore")
 
 
-def test_warnings_point_at_the_caller(tmp_path):
+def test_warnings_point_at_the_caller(tmp_path: Path) -> None:
     path = tmp_path / "a.csv"
     path.write_text("p\n" + "\n".join(map(str, range(20))))
     with warnings.catch_warnings(record=True) as caught:

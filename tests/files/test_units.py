@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mckibben.files.units import SPELLINGS, convert, find
+from mckibben.files.units import SPELLINGS, Unit, convert, find
 
 FACTORS = [
     ("kPa", "bar", 0.01),
@@ -39,25 +39,31 @@ FACTORS = [
 ]
 
 
-@pytest.mark.parametrize(("text", "target", "factor"), FACTORS)
-def test_factor(text, target, factor):
+def known(text: str) -> Unit:
     unit = find(text)
+    assert unit is not None
+    return unit
+
+
+@pytest.mark.parametrize(("text", "target", "factor"), FACTORS)
+def test_factor(text: str, target: str, factor: float) -> None:
+    unit = known(text)
     assert unit.target == target
     assert convert(np.array([1.0, -3.0]), unit.name, target) == pytest.approx([factor, -3 * factor])
 
 
-def test_temperatures_have_an_offset():
-    assert convert(np.array([300.0]), find("K").name, "degC") == pytest.approx([26.85])
-    assert convert(np.array([212.0]), find("°F").name, "degC") == pytest.approx([100.0])
+def test_temperatures_have_an_offset() -> None:
+    assert convert(np.array([300.0]), known("K").name, "degC") == pytest.approx([26.85])
+    assert convert(np.array([212.0]), known("°F").name, "degC") == pytest.approx([100.0])
 
 
 @pytest.mark.parametrize("target", SPELLINGS)
-def test_what_is_in_the_units_of_the_package_is_not_touched(target):
+def test_what_is_in_the_units_of_the_package_is_not_touched(target: str) -> None:
     samples = np.array([0.1, 0.2])
-    assert convert(samples, find(target).name, target) is samples
+    assert convert(samples, known(target).name, target) is samples
 
 
-def test_every_listed_unit_has_the_dimension_it_is_listed_under():
+def test_every_listed_unit_has_the_dimension_it_is_listed_under() -> None:
     for target, names in SPELLINGS.items():
         for name in names:
             assert np.all(np.isfinite(convert(np.array([1.0]), name, target)))
@@ -73,22 +79,22 @@ def test_every_listed_unit_has_the_dimension_it_is_listed_under():
         ("bar", None),
     ],
 )
-def test_reference_of_a_pressure(text, reference):
-    assert find(text).reference == reference
+def test_reference_of_a_pressure(text: str, reference: str | None) -> None:
+    assert known(text).reference == reference
 
 
 @pytest.mark.parametrize(
     "text", ["foo", "9**9**9", "10^10^10", "__import__", "bar;", "a" * 1000, "(", "1e9"]
 )
-def test_what_is_no_unit(text):
+def test_what_is_no_unit(text: str) -> None:
     assert find(text) is None
 
 
-def test_units_without_a_place_in_the_package_are_kept():
-    assert find("l/min").target is None
+def test_units_without_a_place_in_the_package_are_kept() -> None:
+    assert known("l/min").target is None
 
 
 @given(st.text(max_size=12))
-def test_any_text_is_a_unit_or_none(text):
+def test_any_text_is_a_unit_or_none(text: str) -> None:
     unit = find(text)
     assert unit is None or unit.target is None or unit.target in SPELLINGS

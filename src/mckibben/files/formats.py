@@ -90,6 +90,8 @@ def _refuse_impostor(path: Path) -> None:
     """Refuse what is no file, is empty, or whose content is that of another ending."""
     if path.is_dir():
         raise DataError("this is a folder", file=path, remedy="give a file in it")
+    if path.exists() and not path.is_file():  # opening a pipe would wait for ever
+        raise DataError("this is no ordinary file", file=path, remedy="give a file on disk")
     with path.open("rb") as file:
         start = file.read(16)
     if not start:

@@ -11,7 +11,6 @@ import numpy as np
 
 from mckibben.errors import DataError
 
-
 FEWEST = 10
 """Samples; a shorter recording, or stretch of one, shows no loop."""
 

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import logging
 import math
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +26,13 @@ def read(path: Path) -> list[Table]:
             remedy="pip install mckibben[tdms]",
         ) from None
 
-    with TdmsFile.open(path) as file:
+    with _quiet(), path.open("rb") as raw, TdmsFile.open(raw) as file:
+        if file.file_status.incomplete_final_segment:
+            raise DataError(
+                "it is damaged: its last segment is cut off",
+                file=path,
+                remedy="record or export it again",
+            )
         refuse_huge(sum(len(c) for group in file.groups() for c in group.channels()), path)
         meta = _plain(file.properties)
         groups = [group for group in file.groups() if any(len(c) for c in group.channels())]
@@ -54,6 +63,20 @@ def _table(group: Any, path: Path, meta: dict[str, Any], name: str | None) -> Ta
     return Table(
         table.columns, sample_time=step, start_time=start, meta=table.meta, name=table.name
     )
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Keep nptdms from printing what is said by errors here."""
+    from nptdms.log import log_manager
+
+    handler = log_manager.console_handler
+    level = handler.level
+    handler.setLevel(logging.CRITICAL)
+    try:
+        yield
+    finally:
+        handler.setLevel(level)
 
 
 def _waveform(channel: Any) -> _Waveform:

@@ -1,0 +1,259 @@
+"""Choosing channels and units, and what is done about missing samples."""
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import mckibben
+from mckibben import DataError, DataWarning, Recording
+
+N = 40
+K = np.arange(N)
+PRESSURE = (2 + np.sin(K / 4)).tolist()
+POSITION = (10 + 3 * np.cos(K / 4)).tolist()
+
+
+Write = Callable[..., Path]
+Measured = Callable[..., Path]
+
+
+@pytest.fixture
+def table(tmp_path: Path) -> Write:
+    """Write a file of the columns given and return its path."""
+
+    def write(**columns: Sequence[object]) -> Path:
+        path = tmp_path / "run.csv"
+        header = ",".join(f'"{name}"' for name in columns)
+        rows = [",".join(map(str, row)) for row in zip(*columns.values(), strict=True)]
+        path.write_text("\n".join([header, *rows]))
+        return path
+
+    return write
+
+
+def blank(samples: Sequence[object], *places: int) -> list[object]:
+    return ["" if k in places else sample for k, sample in enumerate(samples)]
+
+
+def read_one(path: Path, **options: Any) -> Recording:
+    (recording,) = mckibben.read(path, **options)
+    return recording
+
+
+# Columns -------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["P2 [kPa]", "P2", "p2", "p2 [KPA]"])
+def test_a_column_is_found_by_header_or_name(table: Write, name: str) -> None:
+    path = table(**{"P1 [kPa]": PRESSURE, "P2 [kPa]": POSITION})
+    recording = read_one(path, columns={"pressure": name})
+    assert recording["pressure"] == pytest.approx(np.array(POSITION) / 100)
+    assert list(recording.channels) == ["pressure_1", "pressure"]
+
+
+def test_a_mapped_column_goes_before_an_alias(table: Write) -> None:
+    path = table(position_mm=POSITION, x_mm=PRESSURE, displacement_mm=POSITION)
+    recording = read_one(path, columns={"displacement": "x_mm"})
+    assert recording["displacement"].tolist() == PRESSURE
+    assert recording["position"].tolist() == POSITION
+    assert recording.meta["ignored_columns"] == ["displacement_mm"]
+
+
+def test_two_columns_of_one_channel(table: Write) -> None:
+    path = table(position_mm=POSITION, stroke_mm=PRESSURE)
+    with pytest.raises(
+        DataError, match=r"'position_mm' and 'stroke_mm' both hold it.*--column displacement="
+    ):
+        mckibben.read(path)
+
+
+def test_a_channel_that_is_not_there(table: Write) -> None:
+    with pytest.raises(DataError, match=r"'force'.*columns are a, b.*--column force=COLUMN"):
+        mckibben.read(table(a=PRESSURE, b=POSITION), channels=["force"])
+
+
+def test_a_column_that_is_not_there(table: Write) -> None:
+    with pytest.raises(DataError, match="no column 'c'; there are a, b"):
+        mckibben.read(table(a=PRESSURE, b=POSITION), columns={"force": "c"})
+
+
+def test_text_asked_for(table: Write) -> None:
+    path = table(pressure=["up"] * N, b=POSITION)
+    with pytest.raises(DataError, match="'pressure', row 2: column 'pressure' holds text"):
+        mckibben.read(path, channels=["pressure"])
+    assert read_one(path).meta["ignored_columns"] == ["pressure"]
+
+
+def test_a_cell_that_is_no_number(table: Write) -> None:
+    cells = [*PRESSURE[:7], "n.d.", *PRESSURE[8:]]
+    for channels in (None, ["b"]):
+        with pytest.raises(DataError, match=r"'pressure', row 9: 'n.d.' is not a number"):
+            mckibben.read(table(pressure_bar=cells, b=POSITION), channels=channels)
+    with pytest.warns(DataWarning, match=r"'a' is left out: 'n.d.'"):
+        recording = read_one(table(a=cells, b=POSITION))
+    assert list(recording.channels) == ["b"]
+    with pytest.raises(DataError, match=r"'a', row 9: 'n.d.' is not a number"):
+        mckibben.read(table(a=cells, b=POSITION), channels=["a"])
+
+
+# Units ---------------------------------------------------------------------------------------
+
+
+def test_assumed_units_are_said_once(table: Write) -> None:
+    with pytest.warns(DataWarning) as caught:
+        read_one(table(pressure=PRESSURE, displacement=POSITION, level=POSITION))
+    assert [str(warning.message).partition(": ")[2] for warning in caught] == [
+        "no unit is given, so these are assumed: pressure in bar, displacement in mm; "
+        "say --unit CHANNEL=UNIT where that is wrong"
+    ]
+
+
+def test_metres_are_suspected(table: Write) -> None:
+    with pytest.warns(DataWarning, match=r"at most 0.013: is it in m\?"):
+        read_one(table(displacement=[x / 1000 for x in POSITION]))
+
+
+def test_percent_is_suspected(table: Write) -> None:
+    with pytest.warns(DataWarning, match=r"up to 13: is it in %\?"):
+        read_one(table(contraction=POSITION))
+
+
+def test_pressures_of_hundreds_of_bar_are_not_believed(table: Write) -> None:
+    path = table(pressure=[100 * p for p in PRESSURE])
+    with pytest.raises(DataError, match=r"cannot be bar.*--unit pressure=kPa"):
+        mckibben.read(path)
+    assert read_one(path, units={"pressure": "kPa"})["pressure"] == pytest.approx(PRESSURE)
+
+
+def test_given_units_go_before_the_header(table: Write) -> None:
+    recording = read_one(table(pressure_bar=PRESSURE), units={"pressure": "psi"})
+    assert recording["pressure"] == pytest.approx(0.0689475729 * np.array(PRESSURE))
+
+
+@pytest.mark.parametrize(
+    ("header", "options", "message"),
+    [
+        ("pressure (foo)", {}, "'foo' is unknown.*--unit pressure=kPa"),
+        ("pressure_mm", {}, "cannot be in 'mm'.*--unit pressure=bar"),
+        ("force [kg]", {}, "cannot be in 'kg'"),
+        ("pressure", {"units": {"pressure": "stone"}}, "cannot be in 'stone'"),
+        ("flow", {"units": {"flow": "blub"}}, "'blub' is unknown"),
+        ("pressure_bar", {"units": {"force": "N"}}, "'force'.*not there"),
+    ],
+)
+def test_wrong_units(table: Write, header: str, options: dict[str, Any], message: str) -> None:
+    with pytest.raises(DataError, match=message):
+        mckibben.read(table(**{header: PRESSURE}), **options)
+
+
+def test_gauge_pressure_is_noted_and_no_offset_removed(table: Write) -> None:
+    recording = read_one(table(**{"p (barg)": PRESSURE}))
+    assert recording["pressure"].tolist() == PRESSURE
+    assert recording.meta["pressure_reference"] == {"pressure": "gauge"}
+
+
+def test_other_channels_keep_units_that_the_package_has_none_for(table: Write) -> None:
+    recording = read_one(
+        table(**{"flow (l/min)": PRESSURE, "gain (foo)": PRESSURE, "y_cm": PRESSURE})
+    )
+    assert dict(recording.units) == {"flow": "l/min", "gain": "foo", "y": "mm"}
+    assert recording["flow"].tolist() == PRESSURE
+
+
+# Missing samples -----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("cell", ["", "NaN", "inf", "-inf", "NA"])
+def test_a_missing_sample_stops_by_default(table: Write, cell: str) -> None:
+    cells = [*PRESSURE[:7], cell, *PRESSURE[8:]]
+    with pytest.raises(
+        DataError, match=r"'pressure', row 9: 1 of 40 samples are missing.*--gaps interpolate"
+    ):
+        mckibben.read(table(pressure_bar=cells, force_N=POSITION))
+
+
+def test_missing_samples_of_a_channel_not_asked_for(table: Write) -> None:
+    path = table(pressure_bar=PRESSURE, force_N=blank(POSITION, 3))
+    with pytest.warns(DataWarning, match="'force' is left out: 1"):
+        assert list(read_one(path, channels=["pressure"]).channels) == ["pressure"]
+
+
+def test_missing_samples_interpolated_and_ends_cut(table: Write) -> None:
+    holes = (0, 1, 10, 11, 39)
+    path = table(time_s=K / 10, pressure_bar=blank(PRESSURE, *holes), force_N=POSITION)
+    with (
+        pytest.warns(DataWarning, match=r"2 row.* at the start and 1 at the end were cut"),
+        pytest.warns(DataWarning, match="2 missing sample"),
+    ):
+        recording = read_one(path, gaps="interpolate")
+    assert recording.start_time == pytest.approx(0.2)
+    assert recording.n_samples == 37
+    whole = np.delete(K, holes)
+    expected = np.interp(K[2:39], whole, np.array(PRESSURE)[whole])
+    assert recording["pressure"] == pytest.approx(expected)
+    assert recording["force"].tolist() == POSITION[2:39]
+
+
+@pytest.mark.parametrize("timed", [True, False])
+def test_missing_samples_split(table: Write, timed: bool) -> None:
+    time = {"time_s": K / 10} if timed else {}
+    path = table(**time, pressure_bar=blank(PRESSURE, 15), force_N=blank(POSITION, 16, 20))
+    with pytest.warns(DataWarning, match="1 of 3 stretches"):
+        first, second = mckibben.read(path, gaps="split", rate=None if timed else 10)
+    assert first["pressure"].tolist() == PRESSURE[:15]
+    assert second["force"].tolist() == POSITION[21:]
+    assert second.start_time == pytest.approx(2.1)
+    assert (first.name, second.name) == ("run[1]", "run[2]")
+
+
+def test_constant_channel_is_refused_only_where_asked_for(table: Write) -> None:
+    path = table(pressure_bar=[1.5] * N, force_N=POSITION)
+    assert read_one(path).n_samples == N
+    assert read_one(path, channels=["force"]).n_samples == N
+    with pytest.raises(DataError, match=r"'pressure': it is constant, at 1.5"):
+        mckibben.read(path, channels=["pressure"])
+
+
+def test_a_short_or_constant_recording_is_one_where_nothing_is_learned(table: Write) -> None:
+    path = table(pressure_bar=[2.0] * 3, time_s=[0.0, 0.1, 0.2])
+    with pytest.raises(DataError, match="too few, at least 10"):
+        mckibben.read(path, channels=["pressure"])
+    recording = read_one(path, channels=["pressure"], informative=False)
+    assert recording["pressure"].tolist() == [2.0] * 3
+
+
+# Measured files, where they are at hand ---------------------------------------------------------
+
+
+def test_measured_files(measured: Measured) -> None:
+    static = read_one(measured("festo_dmsp10_static"))
+    assert static.sample_time is None
+    assert static.n_samples == 606
+    assert static.meta["ignored_columns"] == ["branch"]
+    levels = read_one(measured("festo_dmsp10_levels"), channels=["pressure", "displacement"])
+    assert levels.sample_time == 4.0
+    assert levels.start_time == 204.0
+    wing = read_one(measured("sma_wing"))
+    assert dict(wing.units) == {"branch": "", "input": "V", "output": "rad"}
+
+
+def test_measured_file_with_gaps(measured: Measured) -> None:
+    path = measured("cavatappi_loads", "sample1_load200g")
+    with pytest.raises(DataError, match=r"row 102.*430 gap"):
+        mckibben.read(path)
+    parts = mckibben.read(path, gaps="split")
+    assert len(parts) == 431
+    assert {part.sample_time for part in parts} == {0.001}
+    assert sum(part.n_samples for part in parts) == 43100
+    with pytest.warns(DataWarning, match="430 gap"):
+        assert read_one(path, gaps="interpolate").sample_time == 0.001
+
+
+def test_measured_file_with_jitter(measured: Measured) -> None:
+    with pytest.warns(DataWarning, match="not uniform"):
+        recording = read_one(measured("soft_arm_three_muscles", "trial_00"))
+    assert recording.sample_time == pytest.approx(1 / 12.04, rel=1e-3)
+    assert recording.duration == pytest.approx(288, rel=1e-2)

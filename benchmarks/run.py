@@ -11,16 +11,17 @@ import platform
 import tempfile
 import time
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import numba
 import numpy as np
 from numpy.typing import NDArray
-from references import Compiled, numpy_gpi, numpy_pi
 
-from mckibben import GPI, PI, GPIEstimator, Recording, RDPIEstimator, MPIEstimator
+from mckibben import GPI, PI, GPIEstimator, MPIEstimator, RDPIEstimator, Recording
 from mckibben.blocks.base import Block
 from mckibben.blocks.envelopes.tanh import Tanh
+from references import Compiled, numpy_gpi, numpy_pi
 
 Array = NDArray[np.float64]
 
@@ -72,17 +73,18 @@ def kernels(quick: bool) -> None:
         for n in (10, 100):
             for block in models(n):
                 scale = 1e9 / (u.size * n)
-                ours = best_of(5, lambda block=block: block.simulate(u)) * scale
+                ours = best_of(5, partial(block.simulate, u)) * scale
                 many = batched(block, u[:20_000]) * 1e9 / (20_000 * n * 64)
                 short = u[:: 20 if quick else 4]
-                reference = numpy_pi if isinstance(block, PI) else numpy_gpi
-                slow = best_of(1, lambda: reference(block, short)) * 1e9 / (short.size * n)  # type: ignore[arg-type]
-                c = float("nan")
-                if compiled is not None:
-                    call = compiled.pi if isinstance(block, PI) else compiled.gpi
-                    c = best_of(5, lambda: call(block, u)) * scale  # type: ignore[arg-type]
+                slow_run, c_run = (
+                    (partial(numpy_pi, block), compiled and partial(compiled.pi, block))
+                    if isinstance(block, PI)
+                    else (partial(numpy_gpi, block), compiled and partial(compiled.gpi, block))
+                )
+                slow = best_of(1, partial(slow_run, short)) * 1e9 / (short.size * n)
+                c = best_of(5, partial(c_run, u)) * scale if c_run else float("nan")
                 print(f"{block.kind:>6} {n:>9} {ours:9.3f} {many:10.3f} {c:7.3f} {slow:7.1f}")
-        pi, gpi = models(10)
+        _, gpi = models(10)
         envelopes = best_of(5, lambda: (gpi.rising(u), gpi.falling(u))) * 1e9 / u.size
         print(f"both tanh envelopes: {envelopes:.1f} ns a sample")
 
@@ -123,7 +125,7 @@ def fits(quick: bool) -> None:
             f"{np.median(ends):.4f} mm of {len(ends)} seeds"
         )
     for other in (MPIEstimator(), RDPIEstimator()):
-        seconds = best_of(1, lambda other=other: other.fit(recording))
+        seconds = best_of(1, partial(other.fit, recording))
         print(f"  {type(other).__name__}: {seconds:.2f} s, RMSE {other.diagnostics_.rmse:.4f} mm")
 
 

@@ -11,6 +11,7 @@ Run: python examples/make.py
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -39,33 +40,35 @@ def pull(pressure: float, contraction: float) -> float:
     return area * 0.1 * pressure * (a * (1 - 1.25 * contraction) ** 2 - b)
 
 
-def contract(pressure: Array) -> Array:
-    """Return the contraction at every sample, found from the force balance by bisection."""
-    stretch = np.zeros(len(REACH))  # elastic stretch of every friction element
-    relaxed, before = 0.0, 0.0
-    found = np.empty_like(pressure)
-    rate = -math.expm1(-SAMPLE_TIME / RELAXATION[1])
-    for t, p in enumerate(pressure):
+@dataclass
+class Muscle:
+    """What the muscle remembers: contraction, its relaxed part, and every friction element's stretch."""
 
-        def surplus(contraction: float, p: float = float(p)) -> float:
-            force = pull(p, contraction) - LOAD - BLADDER[0] * contraction
-            force -= BLADDER[1] * contraction**3 + RELAXATION[0] * (contraction - relaxed)
-            for i, reach in enumerate(REACH):
-                share = stretch[i] + (contraction - before) / reach
-                limit = FRICTION[0][i] if share > 0 else FRICTION[1][i]
-                force -= limit * (p + 0.3) * min(max(share, -1.0), 1.0)
-            return force
+    contraction: float = 0.0
+    relaxed: float = 0.0
+    stretch: Array = field(default_factory=lambda: np.zeros(len(REACH)))
 
+    def surplus(self, pressure: float, contraction: float) -> float:
+        """Return the force that is left over at a contraction [N]; it falls as the muscle contracts."""
+        force = pull(pressure, contraction) - LOAD - BLADDER[0] * contraction
+        force -= BLADDER[1] * contraction**3 + RELAXATION[0] * (contraction - self.relaxed)
+        for stretch, reach, up, down in zip(self.stretch, REACH, *FRICTION, strict=True):
+            share = stretch + (contraction - self.contraction) / reach
+            limit = (up if share > 0 else down) * (pressure + 0.3)
+            force -= limit * min(max(share, -1.0), 1.0)
+        return force
+
+    def step(self, pressure: float) -> float:
+        """Return the contraction at which the forces balance, one sample later."""
         low, high = -0.02, 0.35
         for _ in range(45):
             middle = 0.5 * (low + high)
-            low, high = (middle, high) if surplus(middle) > 0 else (low, middle)
-        contraction = 0.5 * (low + high)
-        stretch = np.clip(stretch + (contraction - before) / np.array(REACH), -1.0, 1.0)
-        relaxed += rate * (contraction - relaxed)
-        before = contraction
-        found[t] = contraction
-    return found
+            low, high = (middle, high) if self.surplus(pressure, middle) > 0 else (low, middle)
+        moved = middle - self.contraction
+        self.stretch = np.clip(self.stretch + moved / np.array(REACH), -1.0, 1.0)
+        self.relaxed += -math.expm1(-SAMPLE_TIME / RELAXATION[1]) * (middle - self.relaxed)
+        self.contraction = middle
+        return middle
 
 
 def ramps(turning_points: list[float], rate: float) -> Array:
@@ -78,7 +81,8 @@ def record(turning_points: list[float], seed: int, notes: str) -> mckibben.Recor
     """Return the recording of a run through turning points [bar], with sensor noise."""
     rng = np.random.default_rng(seed)
     pressure = ramps(turning_points, 1.0)
-    displacement = REST_LENGTH * contract(pressure)
+    muscle = Muscle()
+    displacement = REST_LENGTH * np.array([muscle.step(p) for p in pressure.tolist()])
     return mckibben.Recording(
         {
             "pressure": np.round(

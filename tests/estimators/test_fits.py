@@ -11,11 +11,9 @@ from sklearn.base import clone
 from sklearn.model_selection import GridSearchCV, cross_val_score
 
 from mckibben import (
-    EUPI,
     GPI,
     PI,
     DataError,
-    EUPIEstimator,
     GPIEstimator,
     ModelError,
     MPIEstimator,
@@ -23,7 +21,6 @@ from mckibben import (
     RateDependentPI,
     RDPIEstimator,
     Recording,
-    Series,
 )
 from mckibben.blocks.base import Block
 from mckibben.registry import load, names

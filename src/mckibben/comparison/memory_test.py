@@ -1,8 +1,9 @@
-"""Does a model keep the branches of the loop apart, as the data do, and while the input is held?"""
+"""The memory test: a model must keep the branches of the loop apart, as the data do, also in a hold."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -78,7 +79,7 @@ def branch_gaps(u: Array, y: Array) -> Array:
         crossings.append((direction, at))
     gaps = [
         (after - before) if first > 0 else (before - after)
-        for (first, before), (second, after) in zip(crossings, crossings[1:], strict=False)
+        for (first, before), (second, after) in pairwise(crossings)
         if first * second < 0
     ]
     joined = np.concatenate(gaps) if gaps else np.empty((0, y.shape[1]))

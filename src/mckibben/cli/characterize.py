@@ -12,6 +12,7 @@ from mckibben.cli.options import (
     Output,
     Rate,
     Reading,
+    Resample,
     Units,
 )
 from mckibben.cli.output import figure, print_json, print_table
@@ -25,10 +26,11 @@ def characterize(
     unit: Units = None,
     rate: Rate = None,
     gaps: GapPolicy = Gaps.error,
+    resample: Resample = None,
     as_json: Json = False,
 ) -> None:
     """Say what the muscle does: loop width, asymmetry, dead zone, creep, rate dependence."""
-    recordings = Reading(column, unit, rate, gaps).read(files, [input, output])
+    recordings = Reading(column, unit, rate, gaps, resample).read(files, [input, output])
     from mckibben.characterization import characterize as find
 
     found = find(recordings, input, output)

@@ -19,6 +19,7 @@ from mckibben.cli.options import (
     Output,
     Rate,
     Reading,
+    Resample,
     Seed,
     Settings,
     Test,
@@ -45,12 +46,13 @@ def compare(
     unit: Units = None,
     rate: Rate = None,
     gaps: GapPolicy = Gaps.error,
+    resample: Resample = None,
     as_json: Json = False,
 ) -> None:
     """Fit and rank models: cross-validated, tested on data not used to fit, free-running."""
     chosen = chosen_models(models)
     given = settings_of_all(settings, chosen)
-    reading = Reading(column, unit, rate, gaps)
+    reading = Reading(column, unit, rate, gaps, resample)
     train = reading.read(files, [input, output])
     tests = reading.read(test or [], [input, output])
     from mckibben.cli.leaderboards import print_leaderboard, write_leaderboard

@@ -17,6 +17,7 @@ from mckibben.cli.options import (
     Output,
     Rate,
     Reading,
+    Resample,
     Seed,
     Settings,
     Units,
@@ -40,6 +41,7 @@ def fit(
     unit: Units = None,
     rate: Rate = None,
     gaps: GapPolicy = Gaps.error,
+    resample: Resample = None,
     as_json: Json = False,
 ) -> None:
     """Identify one model from recordings and save it as JSON."""
@@ -47,7 +49,7 @@ def fit(
 
     estimator_class = registry.load("estimators", model)
     given = parse_settings(settings, model)
-    recordings = Reading(column, unit, rate, gaps).read(files, [input, output])
+    recordings = Reading(column, unit, rate, gaps, resample).read(files, [input, output])
     given = {"input": input, "output": output, "seed": seed} | given
     if method is not None:
         given["method"] = method

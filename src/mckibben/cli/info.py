@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from mckibben.cli.options import Columns, GapPolicy, Gaps, Json, Rate, Reading, Units
+from mckibben.cli.options import Columns, GapPolicy, Gaps, Json, Rate, Reading, Resample, Units
 from mckibben.cli.output import print_json, print_table
 from mckibben.errors import DataError
 
@@ -21,6 +21,7 @@ def info(
     unit: Units = None,
     rate: Rate = None,
     gaps: GapPolicy = Gaps.error,
+    resample: Resample = None,
     as_json: Json = False,
 ) -> None:
     """List the models, or say what a recording or a model file holds."""
@@ -32,7 +33,8 @@ def info(
         _model(file, as_json)
     else:
         _recordings(
-            Reading(column, unit, rate, gaps).read([file], None, informative=False), as_json
+            Reading(column, unit, rate, gaps, resample).read([file], None, informative=False),
+            as_json,
         )
 
 

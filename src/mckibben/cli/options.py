@@ -47,6 +47,12 @@ Rate = Annotated[
     typer.Option("--rate", metavar="HZ", help="Samples per second, without a time column."),
 ]
 GapPolicy = Annotated[Gaps, typer.Option("--gaps", help="What to do about gaps in time.")]
+Resample = Annotated[
+    float | None,
+    typer.Option(
+        "--resample", metavar="SECONDS", help="Sample time to resample to, without aliasing."
+    ),
+]
 Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON on standard output.")]
 Seed = Annotated[int, typer.Option("--seed", help="Of everything random.")]
 Models = Annotated[
@@ -72,6 +78,7 @@ class Reading:
     units: list[str] | None
     rate: float | None
     gaps: Gaps
+    sample_time: float | None = None
 
     def read(
         self, files: Sequence[Path], channels: Sequence[str] | None, *, informative: bool = True
@@ -90,6 +97,10 @@ class Reading:
                 channels=channels,
                 informative=informative,
             )
+        if self.sample_time is not None:
+            from mckibben.signals import resample
+
+            recordings = [resample(recording, self.sample_time) for recording in recordings]
         return recordings
 
 

@@ -16,6 +16,7 @@ from mckibben.cli.options import (
     Output,
     Rate,
     Reading,
+    Resample,
     Units,
 )
 
@@ -38,9 +39,10 @@ def plot(
     unit: Units = None,
     rate: Rate = None,
     gaps: GapPolicy = Gaps.error,
+    resample: Resample = None,
 ) -> None:
     """Draw recordings, or a saved model against them."""
-    recordings = Reading(column, unit, rate, gaps).read(files, [input, output])
+    recordings = Reading(column, unit, rate, gaps, resample).read(files, [input, output])
     from mckibben.report.figures import plot_model, plot_recording
 
     if model is None:

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from mckibben.cli.options import Columns, GapPolicy, Gaps, Json, Rate, Reading, Units
+from mckibben.cli.options import Columns, GapPolicy, Gaps, Json, Rate, Reading, Resample, Units
 from mckibben.cli.output import figure, print_json
 from mckibben.errors import DataError
 
@@ -27,6 +27,7 @@ def simulate(
     unit: Units = None,
     rate: Rate = None,
     gaps: GapPolicy = Gaps.error,
+    resample: Resample = None,
     as_json: Json = False,
 ) -> None:
     """Run a saved model free over a recording; adds channels named OUTPUT_model."""
@@ -38,7 +39,7 @@ def simulate(
 
     block = load(model)
     wanted = [channel.name for channel in block.inputs]
-    recordings = Reading(column, unit, rate, gaps).read([file], wanted, informative=False)
+    recordings = Reading(column, unit, rate, gaps, resample).read([file], wanted, informative=False)
     if len(recordings) > 1:
         raise DataError(
             f"the file splits into {len(recordings)} recordings at its gaps",

@@ -19,6 +19,7 @@ from mckibben.cli.options import (
     Output,
     Rate,
     Reading,
+    Resample,
     Seed,
     Settings,
     Test,
@@ -45,6 +46,7 @@ def study(
     unit: Units = None,
     rate: Rate = None,
     gaps: GapPolicy = Gaps.error,
+    resample: Resample = None,
     as_json: Json = False,
 ) -> None:
     """Say what the muscle does, rank every model, invert the best, and write a report."""
@@ -54,7 +56,7 @@ def study(
 
     chosen = chosen_models(models)
     given = settings_of_all(settings, chosen)
-    reading = Reading(column, unit, rate, gaps)
+    reading = Reading(column, unit, rate, gaps, resample)
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", DataWarning)
         train = reading.read(files, [input, output])

@@ -32,6 +32,18 @@ class Run:
     sample_time: float | None
     peak: float | None = None
 
+    def condensed(self) -> Run:
+        """Return the run without samples that neither count nor are turning points of the input.
+
+        Play operators do not feel how the input went from one turning point to the next. Turns within
+        the noise go too, so this is for searching, not for the final word.
+        """
+        from mckibben.signals import reversals
+
+        kept = self.counts.copy()
+        kept[reversals(self.u)] = True
+        return replace(self, u=self.u[kept], y=self.y[kept], counts=self.counts[kept])
+
     @property
     def history(self) -> Array:
         """The input with the peak before the first sample in front, if there is one."""
@@ -84,6 +96,10 @@ class TrainingData:
         """Return the same data with other memories at the start."""
         runs = tuple(replace(run, peak=peak) for run, peak in zip(self.runs, peaks, strict=True))
         return replace(self, runs=runs)
+
+    def condensed(self) -> TrainingData:
+        """Return the same data with every run condensed; see `Run.condensed`."""
+        return replace(self, runs=tuple(run.condensed() for run in self.runs))
 
     def thinned(self, most: int) -> TrainingData:
         """Return the same runs with fewer samples that count, spread evenly; inputs stay whole."""

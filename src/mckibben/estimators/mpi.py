@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -54,6 +54,9 @@ class MPIEstimator(SeparableEstimator):
     map_size: int = 5
     n_starts: int = 8
     n_refined: int = 3
+
+    # Operators are computed once a fit, so there is nothing to gain from fewer inputs.
+    searches_condensed: ClassVar[bool] = False
 
     def choices(self) -> dict[str, tuple[str, ...]]:
         """Return further settings that take one of a few words."""

@@ -9,6 +9,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +23,10 @@ from mckibben.estimators.search import Tracker, multi_start, particle_swarm, sol
 Array = NDArray[np.float64]
 
 SEARCH_SAMPLES = 1500
-"""Samples that count while many starts are compared; the best is then polished on all."""
+"""Samples that count while many starts are compared."""
+
+POLISH_SAMPLES = 20_000
+"""Samples that count while the best is polished; the linear parameters are then solved on all."""
 
 LEAST_REVERSIBLE = 1e-3
 """Least share of the output's range that the operator without dead zone gives."""
@@ -48,6 +52,9 @@ class SeparableEstimator(Estimator):
     nonnegative: bool = True
     n_starts: int = 48
     n_refined: int = 4
+
+    searches_condensed: ClassVar[bool] = True
+    """Whether the search may skip what lies between turning points of the input."""
 
     @abstractmethod
     def bounds(self, data: TrainingData) -> tuple[Array, Array]:
@@ -105,6 +112,8 @@ class SeparableEstimator(Estimator):
         if lower.size == 0:
             return lower
         thin = data.thinned(SEARCH_SAMPLES)
+        if self.searches_condensed:
+            thin = thin.condensed()
         if self.method == "pso-ls":
             tracker.budget = self.pso_particles * (self.pso_iterations + 1)
 
@@ -142,17 +151,18 @@ class SeparableEstimator(Estimator):
         lower, upper = self.bounds(data)
         if lower.size == 0:
             return theta
+        thin = data.thinned(POLISH_SAMPLES)
         own = Tracker(progress=tracker.progress, budget=tracker.budget)
         own.evaluations = tracker.evaluations
         best = multi_start(
-            lambda point: self._residuals(point, data),
+            lambda point: self._residuals(point, thin),
             [theta],
             lower,
             upper,
             own,
             n_refined=1,
             max_evaluations=10,
-            jacobian=self._jacobian_on(data, lower),
+            jacobian=self._jacobian_on(thin, lower),
         )
         tracker.evaluations, tracker.interrupted = own.evaluations, own.interrupted
         return best

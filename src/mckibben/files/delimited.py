@@ -6,6 +6,7 @@ What this package writes is a plain header of channel names and, beside the file
 
 from __future__ import annotations
 
+import csv
 import io
 import re
 from pathlib import Path
@@ -45,12 +46,16 @@ def read(path: Path) -> list[Table]:
 
 def write(recording: Recording, path: Path) -> None:
     """Write a recording as text, and its description beside it."""
-    import pandas as pd
-
     time = {} if recording.sample_time is None else {"time": recording.time}
-    frame = pd.DataFrame({**time, **recording.channels})
+    columns = {**time, **recording.channels}
     separator = "\t" if path.suffix.casefold() == ".tsv" else ","
-    data = frame.to_csv(index=False, sep=separator, lineterminator="\n").encode()
+    text = io.StringIO()
+    csv.writer(text, delimiter=separator, lineterminator="\n").writerow(columns)
+    row = separator.join(["%r"] * len(columns)) + "\n"
+    text.writelines(
+        row % cells for cells in zip(*map(np.ndarray.tolist, columns.values()), strict=True)
+    )
+    data = text.getvalue().encode()
     description = Stored.describe(recording, data, path).to_json(path) + "\n"
     with replacing(path) as new:
         new.write_bytes(data)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -57,7 +58,7 @@ def study(
     train: tuple[Recording, ...] | None = None,
     test: tuple[Recording, ...] | None = None,
     *,
-    blocks: dict[str, Block] | None = None,
+    blocks: Mapping[str, Block] | None = None,
     inverse: bool = True,
     notes: tuple[str, ...] = (),
     reason: str = "the data have no time. Remedy: give --rate.",
@@ -117,7 +118,7 @@ def study(
     )
 
 
-def checked_inverse(blocks: dict[str, Block], recording: Recording) -> InverseCheck:
+def checked_inverse(blocks: Mapping[str, Block], recording: Recording) -> InverseCheck:
     """Return the check of the first model's inverse."""
     name, block = next(iter(blocks.items()))
     return check_inverse(name, block, recording)

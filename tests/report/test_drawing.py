@@ -56,7 +56,7 @@ def test_labels_carry_units(channel: str, unit: str, label: str) -> None:
 
 
 def test_time_without_time_is_samples() -> None:
-    samples = {"pressure": [0.0, 1.0]}
+    samples = {"pressure": np.array([0.0, 1.0])}
     assert time_label(Recording(samples)) == "sample"
     assert time_label(Recording(samples, 0.1)) == "time [s]"
 

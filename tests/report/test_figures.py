@@ -3,7 +3,6 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from studies_by_hand import measured, study
 
 from mckibben.blocks.gpi import GPI
 from mckibben.errors import DataError, ModelError
@@ -15,6 +14,7 @@ from mckibben.report.figures import (
     plot_recording,
     save_figure,
 )
+from tests.report.studies_by_hand import measured, study
 
 CHANNELS = ("pressure", "displacement")
 FORMATS = ("png", "svg", "pdf")

@@ -9,11 +9,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
-from studies_by_hand import measured, models, study
 
 from mckibben.report import figures, subjects
 from mckibben.report.drawing import Curve, Drawing, Panel
 from mckibben.report.interactive import packed, plots, text
+from tests.report.studies_by_hand import measured, models, study
 
 
 def unpacked(value: Any) -> Any:

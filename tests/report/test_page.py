@@ -8,13 +8,13 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from studies_by_hand import measured, models, renamed, study
 
 from mckibben.blocks.gpi import GPI
 from mckibben.blocks.pi import PI
 from mckibben.comparison.results import Study
 from mckibben.report import write_report
 from mckibben.report.page import page
+from tests.report.studies_by_hand import measured, models, renamed, study
 
 SECTIONS = (
     "headline",

@@ -4,11 +4,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from studies_by_hand import measured
 
 from mckibben.errors import DataError
 from mckibben.report import printed, subjects
 from mckibben.report.drawing import Curve, Drawing, Panel
+from tests.report.studies_by_hand import measured
 
 SIGNATURES = {"png": b"\x89PNG", "svg": b"<?xml", "pdf": b"%PDF"}
 

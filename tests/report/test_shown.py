@@ -1,9 +1,9 @@
 from __future__ import annotations
 
 import numpy as np
-from studies_by_hand import measured, study
 
 from mckibben.report.shown import shown
+from tests.report.studies_by_hand import measured, study
 
 
 def test_a_recording_with_a_held_out_part_is_shown_once_with_its_start() -> None:

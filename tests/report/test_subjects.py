@@ -2,7 +2,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from studies_by_hand import measured, models, study
 
 from mckibben.blocks.compose import Parallel, Series
 from mckibben.blocks.gpi import GPI
@@ -10,7 +9,9 @@ from mckibben.blocks.pi import PI
 from mckibben.blocks.piecewise_linear import PiecewiseLinear
 from mckibben.blocks.play import Play
 from mckibben.errors import ModelError
+from mckibben.recording import Recording
 from mckibben.report import subjects
+from tests.report.studies_by_hand import measured, models, study
 
 LINE = Play.example()
 
@@ -123,3 +124,20 @@ def test_the_inverse_check_shows_its_own_error() -> None:
     assert following.y_label == "displacement [mm]"
     assert given.y_label == "pressure [bar]"
     np.testing.assert_array_equal(error.curves[0].y, check.output - check.reference)
+
+
+def test_a_path_that_jumps_is_drawn_as_dots_without_direction() -> None:
+    levels = np.random.default_rng(0).uniform(0, 5, 100)
+    recording = Recording({"pressure": levels, "displacement": levels**2}, 4.0)
+    outputs = {"pi": levels}
+    for drawing in (
+        subjects.loop([recording], "pressure", "displacement"),
+        subjects.fit_loops(recording, "pressure", "displacement", outputs),
+    ):
+        (panel,) = drawing.panels
+        assert {curve.style for curve in panel.curves} == {"specks"}
+        assert panel.arrows == ()
+    against_input, against_time = subjects.residuals(
+        recording, "pressure", "displacement", outputs
+    ).panels
+    assert (against_input.curves[0].style, against_time.curves[0].style) == ("specks", "fine")

@@ -5,7 +5,6 @@ from dataclasses import replace
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from studies_by_hand import measured, models, study
 
 from mckibben.comparison.results import Memory
 from mckibben.report.wording import (
@@ -17,6 +16,7 @@ from mckibben.report.wording import (
     verdict,
     versions,
 )
+from tests.report.studies_by_hand import measured, models, study
 
 
 @given(st.floats(-1e300, 1e300), st.integers(1, 6))
@@ -110,6 +110,7 @@ def test_there_is_no_command_for_an_absent_inverse() -> None:
 
 def test_durations_are_said_with_and_without_time() -> None:
     assert duration(measured(101)) == "101 samples, 1.00 s at 100 Hz"
+    assert duration(measured(101, sample_time=4.0)) == "101 samples, 400 s every 4.00 s"
     assert duration(measured(101, sample_time=None)) == "101 samples, no time"
 
 

@@ -11,15 +11,19 @@ from numpy.typing import NDArray
 from mckibben.recording import Recording
 
 Array = NDArray[np.float64]
-Style = Literal["line", "fine", "broad", "beads", "dots", "rings", "ticks", "stems"]
+Style = Literal["line", "fine", "broad", "beads", "specks", "dots", "rings", "ticks", "stems"]
 """How points are drawn: a line, a thin one, a pale wide one to lie under others, a line with a bead
-at every point, or separate marks."""
+at every point, small dots without a line, or separate marks."""
 
 POINTS = 4000
 """Most points of a curve: two for each of 2000 bins, more than a screen or a column has pixels."""
 
 FEW = 300
 """Up to so many samples, each measured one is shown as a bead on its line."""
+
+JUMP = 0.05
+"""Median step of the input over its range from which a path is drawn as dots: a line would cross the
+loop at every step."""
 
 N_COLOURS = 6
 """Colours that can be told apart; as many models or recordings share a panel at most."""

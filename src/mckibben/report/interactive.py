@@ -130,6 +130,8 @@ def _trace(curve: Curve, x: str, y: str) -> Json:
         if curve.style == "beads":
             trace |= {"mode": "lines+markers", "marker": {"color": colour, "size": 4}}
         return trace
+    if curve.style == "specks":
+        return trace | {"mode": "markers", "marker": {"color": colour, "size": 4}}
     if curve.style == "stems":
         n = curve.x.size
         gap = np.full(n, np.nan)

@@ -217,7 +217,9 @@ def _curve(axis: Axes, curve: Curve) -> None:
         axis.plot(curve.x, curve.y, **look)
         return
     look |= {"linestyle": "none", "marker": "o", "markersize": 4}
-    if curve.style == "rings":
+    if curve.style == "specks":
+        look["markersize"] = 1.6
+    elif curve.style == "rings":
         look["markerfacecolor"] = "none"
     elif curve.style == "ticks":
         look["marker"] = "|"

@@ -14,6 +14,7 @@ from mckibben.errors import ModelError
 from mckibben.recording import Recording
 from mckibben.report.drawing import (
     FEW,
+    JUMP,
     N_AGES,
     N_COLOURS,
     POINTS,
@@ -71,7 +72,7 @@ def loop(
                 *along(recording[input_name], recording[output_name], points)[1:],
                 name,
                 colour,
-                _measured_style(recording),
+                _path_style(recording[input_name], _measured_style(recording)),
             )
             for recording, (name, colour) in zip(kept, _colours(kept), strict=True)
         )
@@ -135,10 +136,11 @@ def fit_loops(
     """Draw the measured loop and the models' on top, the best last."""
     u = recording[input_name]
     measured = recording[output_name]
-    under = _measured_style(recording, under=True)
+    under = _path_style(u, _measured_style(recording, under=True))
+    over = _path_style(u, "line")
     curves = [Curve(*along(u, measured, points)[1:], "measured", style=under)]
     for model, colour, modelled in _worst_to_best(outputs):
-        curves.append(Curve(*along(u, modelled, points)[1:], model, colour, model=model))
+        curves.append(Curve(*along(u, modelled, points)[1:], model, colour, over, model))
     x_label, y_label = _plane(recording, input_name, output_name)
     return Drawing((Panel(x_label, y_label, tuple(curves), arrows=directions(u, measured)),))
 
@@ -157,7 +159,7 @@ def residuals(
     for model, colour, modelled in _worst_to_best(outputs):
         left = measured - modelled
         path, course = along(u, left, points)[1:], over_time(recording.time, left, points)
-        against_input.append(Curve(*path, model, colour, "fine", model))
+        against_input.append(Curve(*path, model, colour, _path_style(u, "fine"), model))
         against_time.append(Curve(*course, "", colour, "fine", model))
     x_label = axis_label(input_name, recording.units[input_name])
     y_label = axis_label("measured − model", recording.units[output_name])
@@ -252,6 +254,8 @@ def inverse_check(check: InverseCheck, timed: bool = True) -> Drawing:
 def directions(u: Array, y: Array) -> tuple[Arrow, ...]:
     """Return the direction of time amid the widest rising and the widest falling branch.
 
+    There are none where the input jumps.
+
     Parameters
     ----------
     u, y : array, shape (n,)
@@ -259,7 +263,9 @@ def directions(u: Array, y: Array) -> tuple[Arrow, ...]:
     """
     from mckibben.signals import branches
 
-    arrows = []
+    arrows: list[Arrow] = []
+    if _jumps(u):
+        return ()
     found = [(abs(u[stop - 1] - u[start]), start, stop, way) for start, stop, way in branches(u)]
     for wanted in (1, -1):
         same = [branch for branch in found if branch[3] * wanted > 0]
@@ -290,7 +296,7 @@ def _by_age(
             y[first : last + 1],
             f"{time[int(edges[age])]:.4g} to {time[int(edges[age + 1])]:.4g}{unit}",
             f"age-{age + 1}",
-            _measured_style(recording),
+            _path_style(recording[input_name], _measured_style(recording)),
         )
         for age, (first, last) in enumerate(pairwise(cuts))
     )
@@ -300,6 +306,14 @@ def _measured_style(recording: Recording, under: bool = False) -> Style:
     if recording.n_samples <= FEW:
         return "beads"
     return "broad" if under else "line"
+
+
+def _path_style(u: Array, style: Style) -> Style:
+    return "specks" if _jumps(u) else style
+
+
+def _jumps(u: Array) -> bool:
+    return bool(np.median(np.abs(np.diff(u))) > JUMP * np.ptp(u))
 
 
 def _first(recordings: Sequence[Recording]) -> tuple[Sequence[Recording], str]:

@@ -198,4 +198,6 @@ def duration(recording: Recording) -> str:
     samples = f"{recording.n_samples} samples"
     if recording.duration is None or recording.sample_time is None:
         return f"{samples}, no time"
-    return f"{samples}, {number(recording.duration)} s at {number(1 / recording.sample_time)} Hz"
+    step = recording.sample_time
+    pace = f"at {number(1 / step)} Hz" if step < 1 else f"every {number(step)} s"
+    return f"{samples}, {number(recording.duration)} s {pace}"

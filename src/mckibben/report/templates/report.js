@@ -25,11 +25,11 @@ function styled(layout) {
     paper_bgcolor: "rgba(0,0,0,0)",
     plot_bgcolor: "rgba(0,0,0,0)",
     font: { family: getComputedStyle(document.body).fontFamily, size: 12, color: colour("--ink") },
-    margin: { l: 55, r: 10, t: layout.showlegend || layout.title || layout.annotations.length ? 34 : 10, b: 45 },
+    margin: { l: 55, r: 10, t: layout.title ? 50 : 30, b: 45 },
     legend: { orientation: "h", x: 0, xanchor: "left", y: 1, yanchor: "bottom", itemsizing: "constant" },
     ...layout,
   };
-  if (layout.title) whole.title = { ...layout.title, font: { size: 13 }, x: 0, xanchor: "left" };
+  if (layout.title) whole.title = { ...layout.title, font: { size: 13 }, x: 0, y: 1, yanchor: "top", pad: { t: 6 } };
   for (const name of Object.keys(whole).filter((key) => /^[xy]axis/.test(key))) {
     const axis = { exponentformat: "power", gridcolor: colour("--grid"), zerolinecolor: colour("--rule"), zerolinewidth: 1.5 };
     const own = whole[name];

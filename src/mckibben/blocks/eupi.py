@@ -198,6 +198,10 @@ class EUPI(Ranged, Primitive):
         shape = (self.offset, *self.polynomial)
         return np.array([*edges, *shape, *self.thresholds, *self.weights])
 
+    def peaks(self) -> Array:
+        """Return the peaks from which the operators just come back to the lowest input."""
+        return self.input_range[0] + (1 + self.falling_threshold) * np.array(self.thresholds)
+
     def inverse(self) -> EUPIInverse:
         """Return the inverse, exact to rounding.
 
@@ -258,15 +262,14 @@ class EUPIInverse(Inverse, Primitive):
         def output(u: float) -> float:
             return float(forward.simulate([u], initial=start)[0])  # type: ignore[arg-type]
 
-        if not output(low) < first < output(high):
-            u = low if first <= output(low) else high
-            clipped = float(first != output(u))
-        else:
+        if output(low) < first < output(high):
             from scipy.optimize import brentq
 
-            u, clipped = brentq(lambda u: output(u) - first, low, high, xtol=1e-15), 0.0
+            u = brentq(lambda u: output(u) - first, low, high, xtol=1e-15)
+        else:
+            u = low if first <= output(low) else high
         state = forward.initial_state(np.array([u]), start)  # type: ignore[arg-type]
-        return np.array([*state, u, clipped])
+        return np.array([*state, u, 0.0])
 
     def state_from_forward(self, state: Array) -> Array:
         """Return the state that matches a state of the forward model; the input starts lowest."""

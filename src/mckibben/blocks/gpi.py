@@ -41,9 +41,8 @@ from mckibben.blocks.kernels import kernel, summing_kernel
 from mckibben.blocks.memory import (
     check_invertible_sum,
     check_thresholds,
-    fall_to,
+    follow,
     play_state,
-    rise_to,
     solve_from_rest,
 )
 from mckibben.blocks.saving import nested
@@ -115,18 +114,9 @@ def gpi_inverse_kernel(
     s = state[:n]
     for t in range(references.size):
         y = references[t]
-        total = 0.0
-        for i in range(n):
-            total += w[i] * s[i]
-        direction[t] = 0.0
-        if y > state[n + 1] and y > total:
-            direction[t] = 1.0
-            if rise_to(y, highest, r, w, s) == highest:
-                state[n + 2] += 1.0
-        elif y < state[n + 1] and y < total:
-            direction[t] = -1.0
-            if fall_to(y, lowest, r, w, s) == lowest:
-                state[n + 2] += 1.0
+        direction[t], clipped = follow(y, state[n + 1], lowest, highest, r, w, s)
+        if clipped:
+            state[n + 2] += 1.0
         state[n + 1] = y
         z[t] = s[0]
 
@@ -233,6 +223,13 @@ class GPI(Ranged):
 
         return run
 
+    def peaks(self) -> Array:
+        """Return the peaks from which the operators just come back to the lowest input."""
+        low, high = self.limits
+        edges = self.falling(low) + 2 * np.array(self.thresholds)
+        inside = edges[edges < self.rising(high)]
+        return np.asarray(self.rising.solve(inside))
+
     def inverse(self) -> GPIInverse:
         """Return the exact inverse.
 
@@ -294,7 +291,7 @@ class GPIInverse(Inverse):
         risen = (first + w @ r) / w.sum()
         z = min(max(risen, float(forward.rising(low))), float(forward.rising(high)))
         u = float(np.clip(forward.rising.solve(z), low, high))
-        return np.array([*(z - r), u, first, float(z != risen)])
+        return np.array([*(z - r), u, first, 0.0])
 
     def state_from_forward(self, state: Array) -> Array:
         """Return the state that matches a state of the forward model."""

@@ -84,12 +84,36 @@ def solve_from_rest(target: float, lowest: float, highest: float, r: Array, w: A
 
 
 @kernel
+def follow(
+    target: float, previous: float, lowest: float, highest: float, r: Array, w: Array, s: Array
+) -> tuple[float, bool]:
+    """Move the input of a weighted sum of play operators until the sum is the new target.
+
+    Moves only where target and sum agree on the way to go, so that rounding is never taken for a
+    reversal. Changes the states ``s``; returns the direction taken (1, -1, or 0 for none), and
+    whether the input would have to leave its limits, by more than rounding.
+    """
+    total = 0.0
+    for i in range(r.size):
+        total += w[i] * s[i]
+    slack = 1e-9 * (highest - lowest)
+    if target > previous and target > total:
+        return 1.0, rise_to(target, highest, r, w, s) > highest + slack
+    if target < previous and target < total:
+        return -1.0, fall_to(target, lowest, r, w, s) < lowest - slack
+    missing = (target - total) / w[0]
+    above = missing > slack and s[0] >= highest
+    below = missing < -slack and s[0] <= lowest
+    return 0.0, above or below
+
+
+@kernel
 def rise_to(target: float, z_max: float, r: Array, w: Array, s: Array) -> float:
     """Raise the input of a weighted sum of play operators until the sum is ``target``.
 
     While the input z rises, operator i moves once z > s_i + r_i, and operators start moving in the
-    order of their thresholds; between two starts the sum is linear in z. Changes the states ``s``
-    and returns z, at most ``z_max``.
+    order of their thresholds; between two starts the sum is linear in z. Changes the states ``s``,
+    as far as ``z_max`` allows, and returns the z that the target asks for.
     """
     n = r.size
     still = 0.0
@@ -105,9 +129,8 @@ def rise_to(target: float, z_max: float, r: Array, w: Array, s: Array) -> float:
         z = (target - still + moving) / slope
         if i + 1 == n or z <= s[i + 1] + r[i + 1]:
             break
-    z = min(z, z_max)
     for i in range(n):
-        s[i] = max(s[i], z - r[i])
+        s[i] = max(s[i], min(z, z_max) - r[i])
     return z
 
 
@@ -128,7 +151,6 @@ def fall_to(target: float, z_min: float, r: Array, w: Array, s: Array) -> float:
         z = (target - still - moving) / slope
         if i + 1 == n or z >= s[i + 1] - r[i + 1]:
             break
-    z = max(z, z_min)
     for i in range(n):
-        s[i] = min(s[i], z + r[i])
+        s[i] = min(s[i], max(z, z_min) + r[i])
     return z

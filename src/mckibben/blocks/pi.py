@@ -34,9 +34,8 @@ from mckibben.blocks.kernels import kernel, summing_kernel
 from mckibben.blocks.memory import (
     check_invertible_sum,
     check_thresholds,
-    fall_to,
+    follow,
     play_state,
-    rise_to,
     solve_from_rest,
 )
 from mckibben.blocks.saving import nested
@@ -75,13 +74,8 @@ def pi_inverse_kernel(coefficients: Array, state: Array, inputs: Array, outputs:
     s = state[:n]
     for t in range(inputs.shape[0]):
         y = inputs[t, 0]
-        total = offset
-        for i in range(n):
-            total += w[i] * s[i]
-        if y > state[n] and y > total:
-            if rise_to(y - offset, highest, r, w, s) == highest:
-                state[n + 1] += 1.0
-        elif y < state[n] and y < total and fall_to(y - offset, lowest, r, w, s) == lowest:
+        _, clipped = follow(y - offset, state[n] - offset, lowest, highest, r, w, s)
+        if clipped:
             state[n + 1] += 1.0
         state[n] = y
         outputs[t, 0] = s[0]
@@ -151,6 +145,10 @@ class PI(Ranged, Primitive):
         del sample_time
         return np.array([self.offset, *self.thresholds, *self.weights])
 
+    def peaks(self) -> Array:
+        """Return the peaks from which the operators just come back to the lowest input."""
+        return self.limits[0] + 2 * np.array(self.thresholds)
+
     def inverse(self) -> PIInverse:
         """Return the exact inverse.
 
@@ -200,7 +198,7 @@ class PIInverse(Inverse, Primitive):
             return np.array([*states, first, 0.0])
         risen = (first - forward.offset + w @ r) / w.sum()
         u = min(max(risen, lowest), highest)
-        return np.array([*(u - r), first, float(u != risen)])
+        return np.array([*(u - r), first, 0.0])
 
     def state_from_forward(self, state: Array) -> Array:
         """Return the state that matches a state of the forward model."""

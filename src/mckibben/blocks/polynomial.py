@@ -67,12 +67,15 @@ def polynomial_inverse_kernel(
         coefficients[3],
     )
     c = coefficients[4:]
+    bottom, top = horner(c, lowest), horner(c, highest)
+    slack = 1e-9 * (top - bottom)
     for t in range(inputs.shape[0]):
         y = inputs[t, 0]
         low, high = lowest, highest
-        if y < horner(c, low) or y > horner(c, high):
-            state[0] += 1.0
-            outputs[t, 0] = centre + scale * (low if y < horner(c, low) else high)
+        if not bottom < y < top:
+            if y < bottom - slack or y > top + slack:
+                state[0] += 1.0
+            outputs[t, 0] = centre + scale * (low if y <= bottom else high)
             continue
         x = 0.5 * (low + high)
         for _ in range(200):

@@ -15,7 +15,8 @@ def solve_near(
 
     Walks from ``start`` in growing steps, both ways in turn, until the target is bracketed, then closes
     the bracket by regula falsi (Illinois) and bisection until nothing lies between its ends. Returns u,
-    and whether both limits were reached without a solution; u is then the limit that came closest.
+    and whether both limits were reached without a solution, by more than rounding; u is then the limit
+    that came closest.
     """
     tiny = 1e-15 * (highest - lowest)
     error_start = evaluate(start, memory) - target
@@ -42,7 +43,10 @@ def solve_near(
         if (error_far > 0.0) != (error_start > 0.0):
             break
         if above == highest and below == lowest:
-            return (above, True) if abs(error_above) < abs(error_below) else (below, True)
+            slack = 1e-9 * abs(error_above - error_below)
+            if abs(error_above) < abs(error_below):
+                return above, abs(error_above) > slack
+            return below, abs(error_below) > slack
         direction = -direction
         if direction * error_start < 0.0:
             step *= 1.5

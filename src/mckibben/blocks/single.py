@@ -45,14 +45,22 @@ class Ranged(SingleChannel):
     def reachable(self) -> tuple[Array, Array]:
         """Return the outputs that can be reached whatever happened before, each of shape (1,).
 
-        They are those at the ends of the input range once the whole range has been visited.
+        How far the output falls at the lowest input depends on the highest peak before: the least
+        favourable one counts.
         """
         if self.input_range is None:
             return super().reachable()
         low, high = self.input_range
-        stream = self.stream(1.0, initial="first_sample")
-        ends = [stream.step(u).copy() for u in (low, high, low, high)]
-        return ends[2], ends[3]
+
+        def last(*inputs: float) -> float:
+            return float(self.simulate(inputs, initial="first_sample")[-1])
+
+        peaks = [low, *self.peaks().clip(low, high).tolist(), high]
+        return np.array([max(last(low, peak, low) for peak in peaks)]), np.array([last(low, high)])
+
+    def peaks(self) -> Array:
+        """Return the peaks at which one operator more keeps a memory; none without operators."""
+        return np.empty(0)
 
 
 class Inverse(Block):

@@ -22,7 +22,7 @@ WHOLE = 0.9
 other one."""
 
 
-def noise_level(x: ArrayLike) -> float:
+def noise_level(x: ArrayLike, span: float | None = None) -> float:
     """Return the standard deviation of the white noise on a signal, in its unit.
 
     Third differences remove what moves smoothly, and their median is not moved by jumps and turns.
@@ -31,6 +31,9 @@ def noise_level(x: ArrayLike) -> float:
     ----------
     x : array_like, shape (n,)
         At least two samples.
+    span : float, optional
+        Range of the movement to judge by; default that of ``x``. Give it where ``x`` is a quiet
+        piece of something longer.
 
     Returns
     -------
@@ -49,7 +52,8 @@ def noise_level(x: ArrayLike) -> float:
     scatter = float(np.median(np.abs(np.diff(values, 3))))
     # 0.6745 is the median of |N(0, 1)|, and 20 the variance that third differences give to N(0, 1).
     noise = scatter / (0.6745 * np.sqrt(20.0))
-    return noise if noise <= NOISE_SHARE * float(np.ptp(values)) else float("nan")
+    span = float(np.ptp(values)) if span is None else span
+    return noise if noise <= NOISE_SHARE * span else float("nan")
 
 
 def swing_threshold(noise: float, span: float, n: int) -> float:

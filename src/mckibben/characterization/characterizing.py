@@ -1,0 +1,142 @@
+"""Measure everything that recordings tell about a muscle."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from mckibben.characterization.loops import Array, Loop, largest_of, loops_of, pooled_curves
+from mckibben.characterization.mean_curve import mean_curve
+from mckibben.characterization.memory import dead_zones, minor_loop_errors
+from mckibben.characterization.results import Characterization
+from mckibben.characterization.time_effects import creep, drift, rate_dependence
+from mckibben.characterization.tracks import Scale, Track, prepare
+from mckibben.errors import DataError
+from mckibben.recording import Recording
+from mckibben.signals.reversals import whole_cycles
+
+JOULE_PER_SQUARE_METRE = 100.0
+"""1 bar mm is 1e5 Pa times 1e-3 m."""
+
+
+COVERED = 0.8
+"""Share of the input range that one cycle must cover to speak for all."""
+
+
+def characterize(
+    recordings: Recording | Sequence[Recording],
+    input: str = "pressure",  # noqa: A002
+    output: str = "displacement",
+) -> Characterization:
+    """Measure what a muscle does: width and shape of its loop, memory, creep, dependence on rate.
+
+    Sensor noise is averaged away first, over samples within which the input moves by no more than
+    half a percent of its range. Ranges are those of all recordings together. What the recordings
+    cannot tell is None: widths without a whole cycle, rates and creep without time, and so on.
+
+    Parameters
+    ----------
+    recordings : Recording or sequence of Recording
+        One muscle; every recording starts with unknown memory.
+    input, output : str
+        Channels.
+
+    Returns
+    -------
+    Characterization
+
+    Raises
+    ------
+    DataError
+        On no recordings, a missing or constant channel, units that differ between recordings, or
+        fewer than ten samples.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from mckibben import Recording
+    >>> from mckibben.signals import triangle
+    >>> pressure = triangle(np.arange(401) / 100, period=2.0, peaks=4.0)
+    >>> lag = 0.5 * np.sign(np.gradient(pressure))
+    >>> run = Recording({"pressure": pressure, "displacement": pressure - lag}, 0.01)
+    >>> found = characterize(run)
+    >>> found.n_cycles, round(found.mid_width, 6)
+    (2, 1.0)
+    """
+    runs = [recordings] if isinstance(recordings, Recording) else list(recordings)
+    scale, tracks = prepare(runs, input, output)
+    units = tuple(_unit(runs, channel) for channel in (input, output))
+    loops = loops_of(tracks, scale)
+    largest = largest_of(loops)
+    curve = mean_curve(*_branch_curves(tracks, largest, scale), scale)
+    upper, lower = dead_zones(tracks, scale)
+    closure, wiping_out = minor_loop_errors(tracks, scale)
+    crept, creep_time = creep(tracks, scale)
+    slope, verdict = rate_dependence(loops)
+    durations = [run.duration for run in runs]
+    steps = {run.sample_time for run in runs}
+    area = None if largest is None else largest.area
+    return Characterization(
+        input=input,
+        output=output,
+        input_unit=units[0],
+        output_unit=units[1],
+        n_recordings=len(runs),
+        n_samples=sum(len(run) for run in runs),
+        n_cycles=sum(len(whole_cycles(track.u, track.major_turns)) for track in tracks),
+        n_reversals=sum(track.turns.size - 2 for track in tracks),
+        duration=None if None in durations else float(sum(d for d in durations if d is not None)),
+        sample_time=steps.pop() if len(steps) == 1 else None,
+        input_range=(scale.u_low, scale.u_high),
+        output_range=(scale.y_low, scale.y_high),
+        input_noise=None if np.isnan(scale.u_noise) else scale.u_noise,
+        output_noise=None if np.isnan(scale.y_noise) else scale.y_noise,
+        cycles=tuple(loop.cycle for loop in loops),
+        loop_width=None if largest is None else largest.cycle.width,
+        mid_width=None if largest is None else largest.mid_width,
+        asymmetry=None if largest is None else largest.asymmetry,
+        width_centroid=None if largest is None else largest.width_centroid,
+        loop_area=area,
+        loop_area_share=(
+            None
+            if largest is None
+            else 100 * largest.area / (largest.cycle.amplitude * largest.span)
+        ),
+        loss_per_area=(
+            JOULE_PER_SQUARE_METRE * area if area is not None and units == ("bar", "mm") else None
+        ),
+        dead_zone_upper=upper,
+        dead_zone_lower=lower,
+        gain=curve.gain,
+        onset=curve.onset,
+        saturation=curve.saturation,
+        branch_gap=curve.gap,
+        creep=crept,
+        creep_time=creep_time,
+        drift=drift(loops),
+        rate_dependence=slope,
+        rate_verdict=verdict,
+        closure_error=closure,
+        wiping_out_error=wiping_out,
+    )
+
+
+def _branch_curves(
+    tracks: Sequence[Track], largest: Loop | None, scale: Scale
+) -> tuple[Array, Array, Array]:
+    """Return the curves of the largest cycle where it covers the input range, else those of all."""
+    if largest is not None and largest.cycle.amplitude >= COVERED * scale.u_span:
+        return largest.levels, largest.up, largest.down
+    return pooled_curves(tracks, scale)
+
+
+def _unit(runs: Sequence[Recording], channel: str) -> str:
+    units = {run.units[channel] for run in runs}
+    if len(units) > 1:
+        raise DataError(
+            f"recordings have it in different units: {', '.join(sorted(units))}",
+            channel=channel,
+            remedy="convert them, or read the files with --unit",
+        )
+    return units.pop()

@@ -1,0 +1,145 @@
+"""What characterization finds: plain numbers, a table and sentences."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, fields
+from typing import Any
+
+from mckibben.characterization.loops import Cycle
+
+Range = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Characterization:
+    """What a muscle does, from recordings alone; None for what they cannot tell.
+
+    ``table()`` explains every number, ``sentences`` says the most important ones in words. Units are
+    those of the channels; percentages are of the output range.
+
+    Parameters
+    ----------
+    input, output, input_unit, output_unit : str
+        Channels, and their units.
+    n_recordings, n_samples, n_cycles, n_reversals : int
+        Whole cycles run from minimum to minimum of the input and over at least a tenth of its
+        range; reversals are where it turns, minor loops included.
+    duration, sample_time : float or None
+        All recordings together [s]; the sample time that they share [s].
+    input_range, output_range : (float, float)
+        Lowest and highest value.
+    input_noise, output_noise : float or None
+        Standard deviation of a sample.
+    cycles : tuple of Cycle
+        Those with enough samples to measure a width.
+    loop_width : float or None
+        e_w of the largest cycle [%].
+    mid_width : float or None
+        Distance of its branches at mid input [output unit].
+    asymmetry : float or None
+        How far it is from its own image, turned by half a turn [%].
+    width_centroid : float or None
+        Where it is wide, from -1 (low input) to 1 (high input).
+    loop_area, loop_area_share : float or None
+        Area that it encloses [input unit x output unit], and that over the rectangle round it [%].
+    loss_per_area : float or None
+        The area as work lost a cycle and effective area [J/m²], for pressure over displacement.
+    dead_zone_upper, dead_zone_lower : float or None
+        Change of the input after upper and lower reversals before the output moves [input unit].
+    gain : float or None
+        Slope at mid input [output unit/input unit].
+    onset, saturation : float or None
+        Input below, and above, which the output hardly moves [input unit].
+    branch_gap : float or None
+        Mean distance of falling and rising output at the same input, positive where the output
+        lags [output unit].
+    creep, creep_time : float or None
+        Change of the output in a hold of the input [output unit], and over what time [s].
+    drift : float or None
+        Change of the output from one cycle to the next alike [output unit].
+    rate_dependence : float or None
+        Growth of e_w at twice the speed [%].
+    rate_verdict : str
+        "none", "weak", "strong" or "unknown".
+    closure_error, wiping_out_error : float or None
+        Return-point memory and wiping-out: how far minor loops fail to close, and to be forgotten
+        [%].
+    """
+
+    input: str
+    output: str
+    input_unit: str
+    output_unit: str
+    n_recordings: int
+    n_samples: int
+    n_cycles: int
+    n_reversals: int
+    duration: float | None
+    sample_time: float | None
+    input_range: Range
+    output_range: Range
+    input_noise: float | None
+    output_noise: float | None
+    cycles: tuple[Cycle, ...]
+    loop_width: float | None
+    mid_width: float | None
+    asymmetry: float | None
+    width_centroid: float | None
+    loop_area: float | None
+    loop_area_share: float | None
+    loss_per_area: float | None
+    dead_zone_upper: float | None
+    dead_zone_lower: float | None
+    gain: float | None
+    onset: float | None
+    saturation: float | None
+    branch_gap: float | None
+    creep: float | None
+    creep_time: float | None
+    drift: float | None
+    rate_dependence: float | None
+    rate_verdict: str
+    closure_error: float | None
+    wiping_out_error: float | None
+
+    @property
+    def output_span(self) -> float:
+        """Range of the output."""
+        return self.output_range[1] - self.output_range[0]
+
+    @property
+    def sentences(self) -> list[str]:
+        """What the muscle does, in plain words, most important first."""
+        from mckibben.characterization.wording import sentences
+
+        return sentences(self)
+
+    def table(self) -> list[tuple[str, float | int | str | None, str, str]]:
+        """Return rows of quantity, value, unit and explanation."""
+        from mckibben.characterization.wording import table
+
+        return table(self)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return everything as JSON holds it, with None for what could not be measured."""
+        found = {field.name: _plain(getattr(self, field.name)) for field in fields(self)}
+        found["cycles"] = [
+            {
+                "recording": cycle.recording,
+                "low": cycle.low,
+                "high": cycle.high,
+                "amplitude": cycle.amplitude,
+                "rate": cycle.rate,
+                "width": cycle.width,
+            }
+            for cycle in self.cycles
+        ]
+        found["sentences"] = self.sentences
+        return found
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, tuple):
+        return list(value)
+    return None if isinstance(value, float) and not math.isfinite(value) else value

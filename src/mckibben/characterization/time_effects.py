@@ -1,0 +1,163 @@
+"""What depends on time: creep in holds, drift between cycles, dependence on rate."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mckibben.characterization.loops import Cycle, Loop
+from mckibben.characterization.tracks import Scale, Track
+from mckibben.signals.reversals import swing_threshold
+
+Array = NDArray[np.float64]
+
+HELD = 0.005
+"""Share of its range within which an input counts as held."""
+
+HELD_TRAVEL = 0.5
+"""A hold lasts at least as long as the input, when it moves, takes for this share of its range."""
+
+SETTLED = 0.1
+"""Share of a hold after which creep is measured, so that the lag of a jump is not taken for it."""
+
+CLEAR = 20
+"""A step this many times the noise shows movement."""
+
+ALIKE = 0.05
+"""Share of the amplitude by which the extremes of two cycles may differ for these to be compared."""
+
+SPEED_RATIO = 1.5
+"""Speeds must differ this much for dependence on rate to be judged."""
+
+WEAK, STRONG = 0.05, 0.2
+"""Change of the loop width at twice the speed, relative to its mean: from here weak, strong."""
+
+LEAST = 1.0
+"""Loop width that changes are compared with where there is hardly a loop [% of output range]."""
+
+
+def creep(tracks: Sequence[Track], scale: Scale) -> tuple[float | None, float | None]:
+    """Return how far the output creeps in a hold of the input, and over what time [s].
+
+    Positive where it goes on the way it was going. A hold keeps the input within 0.5 % of its range,
+    or its noise, for as long as it otherwise takes to cross half of its range, and at least ten
+    samples. The first tenth of it is left out. Medians over the holds that are at least half as long
+    as the longest. None without time or holds.
+    """
+    found = []
+    for track in tracks:
+        if track.sample_time is None:
+            continue
+        settled = swing_threshold(track.u_noise, scale.u_span, track.u.size)
+        for start, stop in _holds(track, scale):
+            before = track.u[max(0, start - (stop - start)) : start]
+            if before.size == 0 or np.ptp(before) < settled:
+                continue
+            came_from = float(before[np.argmax(np.abs(before - track.u[start]))])
+            way = scale.sign * np.sign(track.u[start] - came_from)
+            first = start + round(SETTLED * (stop - start))
+            moved = float(way * (track.y[stop - 1] - track.y[first]))
+            found.append((track.sample_time * (stop - 1 - first), moved))
+    if not found:
+        return None, None
+    times, moves = np.array(found).T
+    long = times >= 0.5 * times.max()
+    return float(np.median(moves[long])), float(np.median(times[long]))
+
+
+def drift(loops: Sequence[Loop]) -> float | None:
+    """Return the change of the output from one cycle to the next of the same amplitude.
+
+    Mean over both branches at the same inputs, median over the pairs of neighbouring cycles whose
+    extremes differ by at most a twentieth of the amplitude. None where there is no such pair.
+    """
+    changes = []
+    for one, other in pairwise(loops):
+        if one.cycle.recording == other.cycle.recording and _alike(one.cycle, other.cycle):
+            common = (one.levels >= other.levels[0]) & (one.levels <= other.levels[-1])
+            later = [
+                np.interp(one.levels[common], other.levels, curve)
+                for curve in (other.up, other.down)
+            ]
+            sooner = [one.up[common], one.down[common]]
+            changes.append(float(np.mean(np.subtract(later, sooner))))
+    return float(np.median(changes)) if changes else None
+
+
+def rate_dependence(loops: Sequence[Loop]) -> tuple[float | None, str]:
+    """Return how much wider the loop is at twice the speed [% of output range], and a verdict.
+
+    A line through e_w over the logarithm of the mean speed, of the cycles between like extremes that
+    differ most in speed. The verdict is "none", "weak" or "strong" as twice the speed changes the
+    width by less than 5 %, less than 20 %, or more of its mean; "unknown" where the speeds differ by
+    less than half, or the change is below twice its standard error.
+    """
+    timed = [loop.cycle for loop in loops if loop.cycle.rate is not None]
+    if not timed:
+        return None, "unknown"
+    # Any cycle may be the one to compare with; of very many, fifty will do.
+    wanted = timed[:: max(1, len(timed) // 50)]
+    groups = [[cycle for cycle in timed if _alike(one, cycle)] for one in wanted]
+    speeds = [np.log2([cycle.rate for cycle in group]) for group in groups]  # type: ignore[arg-type]
+    widest = int(np.argmax([np.ptp(speed) for speed in speeds]))
+    speed, widths = speeds[widest], np.array([cycle.width for cycle in groups[widest]])
+    if np.ptp(speed) < np.log2(SPEED_RATIO):
+        return None, "unknown"
+    growth, offset = np.polyfit(speed, widths, 1)
+    left = widths - (offset + growth * speed)
+    doubt = np.sqrt(left @ left / max(1, speed.size - 2) / np.sum((speed - speed.mean()) ** 2))
+    share = abs(growth) / max(float(widths.mean()), LEAST)
+    if share < WEAK:
+        return float(growth), "none"
+    if abs(growth) < 2 * doubt:
+        return float(growth), "unknown"
+    return float(growth), "weak" if share < STRONG else "strong"
+
+
+def _alike(one: Cycle, other: Cycle) -> bool:
+    limit = ALIKE * one.amplitude
+    return abs(one.low - other.low) <= limit and abs(one.high - other.high) <= limit
+
+
+def _holds(track: Track, scale: Scale) -> list[tuple[int, int]]:
+    from scipy.ndimage import maximum_filter1d, minimum_filter1d
+
+    u = track.u
+    speed = _speed(track)
+    if speed == 0:
+        return []
+    length = max(10, int(np.ceil(HELD_TRAVEL * scale.u_span / speed)))
+    if length > u.size:
+        return []
+    band = max(HELD * scale.u_span, swing_threshold(track.u_noise, 0.0, u.size))
+    swing = maximum_filter1d(u, length, mode="nearest") - minimum_filter1d(
+        u, length, mode="nearest"
+    )
+    # The filters are centred: window i holds samples i - length // 2 on.
+    begins = np.arange(u.size) - length // 2
+    whole = (begins >= 0) & (begins + length <= u.size)
+    quiet = begins[whole & (swing <= band)]
+    if quiet.size == 0:
+        return []
+    breaks = np.flatnonzero(np.diff(quiet) > 1)
+    firsts = quiet[np.concatenate([[0], breaks + 1])]
+    lasts = quiet[np.concatenate([breaks, [quiet.size - 1]])]
+    return [(int(a), int(b) + length) for a, b in zip(firsts, lasts, strict=True)]
+
+
+def _speed(track: Track) -> float:
+    """Return how fast the input moves when it moves [input unit/sample].
+
+    The mean is weighted with the way covered, so that holds and slow turns do not count, and taken
+    over steps that are long enough to stand out of the noise.
+    """
+    stride = track.window
+    while True:
+        steps = np.abs(np.diff(track.u[::stride]))
+        step = float(np.sum(steps**2) / np.sum(steps)) if steps.any() else 0.0
+        if step > CLEAR * track.u_noise or 16 * stride > track.u.size:
+            return step / stride
+        stride *= 2

@@ -1,0 +1,242 @@
+"""Characterization in words: sentences, and a table that explains itself."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from mckibben.characterization.results import Characterization
+
+NARROW, WIDE, VERY_WIDE = 5.0, 15.0, 40.0
+"""Loop widths from which a loop is called moderate, wide, very wide [%]."""
+
+ASYMMETRIC = 5.0
+"""Asymmetry from which a loop is called asymmetric [%]."""
+
+NOTABLE = 0.5
+"""Creep, drift and minor-loop errors below this share of the output range are not spoken of as
+such [%]."""
+
+REMEMBERED = 2.0
+"""Errors of minor loops below this are those of a muscle that remembers its turning points [%]."""
+
+Row = tuple[str, float | int | str | None, str, str]
+
+
+def sentences(found: Characterization) -> list[str]:
+    """Return what the muscle does, in plain words, most important first."""
+    said = [_headline(found), _motion(found), _memory(found), _rate(found), _trust(found)]
+    return [sentence for sentence in said if sentence]
+
+
+def table(found: Characterization) -> list[Row]:
+    """Return rows of quantity, value, unit and explanation."""
+    u, y = found.input_unit, found.output_unit
+    gain = f"{y}/{u}" if u else y
+    area = " ".join(part for part in (u, y) if part)
+    step = found.sample_time
+    return [
+        ("recordings", found.n_recordings, "", "files or segments looked at"),
+        ("samples", found.n_samples, "", "of all recordings"),
+        ("duration", found.duration, "s", "of all recordings; none without time"),
+        ("sample time", step, "s", "none where unknown or not the same everywhere"),
+        ("cycles", found.n_cycles, "", "whole ones over at least a tenth of the input range"),
+        (
+            "reversals",
+            found.n_reversals,
+            "",
+            "turning points of the input, those of minor loops too",
+        ),
+        (f"lowest {found.input}", found.input_range[0], u, "input range"),
+        (f"highest {found.input}", found.input_range[1], u, "input range"),
+        (f"lowest {found.output}", found.output_range[0], y, "output range"),
+        (f"highest {found.output}", found.output_range[1], y, "output range"),
+        (f"noise of {found.input}", found.input_noise, u, "standard deviation of a sample"),
+        (f"noise of {found.output}", found.output_noise, y, "standard deviation of a sample"),
+        (
+            "loop width e_w",
+            found.loop_width,
+            "%",
+            "of the largest cycle: distance of its branches at mid input over its output range",
+        ),
+        ("width at mid input", found.mid_width, y, "the same distance in units of the output"),
+        (
+            "mean branch gap",
+            found.branch_gap,
+            y,
+            "same input reached from above and from below: mean difference of the output",
+        ),
+        (
+            "asymmetry",
+            found.asymmetry,
+            "%",
+            "distance of the loop from its image turned by half a turn; 0 for a classical "
+            "Prandtl-Ishlinskii model",
+        ),
+        (
+            "width centroid",
+            found.width_centroid,
+            "",
+            "where the loop is wide: -1 at low, 0 at mid, 1 at high input",
+        ),
+        ("loop area", found.loop_area, area, "enclosed by the largest cycle"),
+        (
+            "loop area share",
+            found.loop_area_share,
+            "%",
+            "of the rectangle round the loop: 0 no hysteresis, 100 a relay",
+        ),
+        (
+            "loss per effective area",
+            found.loss_per_area,
+            "J/m²",
+            "the loop area as work lost in a cycle; times the effective area it is an energy",
+        ),
+        (
+            "dead zone after upper reversals",
+            found.dead_zone_upper,
+            u,
+            "input change before the output moves back; 2 r for a play operator of radius r",
+        ),
+        ("dead zone after lower reversals", found.dead_zone_lower, u, "the same from below"),
+        ("gain", found.gain, gain, "slope of the mean of both branches at mid input"),
+        ("onset", found.onset, u, "below it the slope is under a fifth of its maximum"),
+        ("saturation", found.saturation, u, "above it the slope is under a fifth of its maximum"),
+        ("creep", found.creep, y, "in a hold of the input; positive: it goes on as it was going"),
+        ("creep time", found.creep_time, "s", "the time over which it crept so far"),
+        ("drift", found.drift, y, "change of the output from one cycle to the next alike"),
+        ("rate dependence", found.rate_dependence, "%", "growth of e_w at twice the speed"),
+        ("rate verdict", found.rate_verdict, "", "from cycles alike at different speed"),
+        (
+            "closure error",
+            found.closure_error,
+            "%",
+            "return-point memory: output after a minor loop against output before it",
+        ),
+        (
+            "wiping-out error",
+            found.wiping_out_error,
+            "%",
+            "output beyond a minor loop against that without one",
+        ),
+    ]
+
+
+def _headline(found: Characterization) -> str:
+    parts = []
+    width = found.loop_width
+    if width is not None:
+        size = (
+            "narrow"
+            if width < NARROW
+            else "moderately wide"
+            if width < WIDE
+            else "wide"
+            if width < VERY_WIDE
+            else "very wide"
+        )
+        shape = ""
+        if found.asymmetry is not None:
+            shape = ", asymmetric" if found.asymmetry >= ASYMMETRIC else ", symmetric"
+        parts.append(f"{size} ({_percent(width)}){shape} loop")
+    elif found.branch_gap is not None:
+        share = 100 * abs(found.branch_gap) / found.output_span
+        parts.append(
+            f"no cycle is sampled finely enough for a loop width; on average the branches are "
+            f"{_value(abs(found.branch_gap), found.output_unit)} ({_percent(share)}) apart"
+        )
+    else:
+        parts.append("the input never reaches a level from both sides, so no loop is seen")
+    if found.saturation is not None:
+        parts.append(f"saturates above {_value(found.saturation, found.input_unit)}")
+    if found.onset is not None:
+        parts.append(f"hardly moves below {_value(found.onset, found.input_unit)}")
+    if found.creep is not None and found.creep_time is not None:
+        parts.append(_crept(found, found.creep, found.creep_time))
+    return _sentence("; ".join(parts))
+
+
+def _crept(found: Characterization, creep: float, time: float) -> str:
+    if 100 * abs(creep) < NOTABLE * found.output_span:
+        return f"hardly creeps in {time:.2g} s"
+    back = " back" if creep < 0 else ""
+    return f"creeps{back} {_value(abs(creep), found.output_unit)} over {time:.2g} s"
+
+
+def _motion(found: Characterization) -> str:
+    moves = _range(found.output_range, found.output_unit)
+    text = f"{found.output} goes {moves} as {found.input} goes "
+    text += _range(found.input_range, found.input_unit)
+    if found.gain is not None:
+        unit = f"{found.output_unit}/{found.input_unit}" if found.input_unit else found.output_unit
+        text += f", {_value(found.gain, unit)} at mid input"
+    zones = [zone for zone in (found.dead_zone_upper, found.dead_zone_lower) if zone is not None]
+    if zones and max(zones) >= 0.01 * (found.input_range[1] - found.input_range[0]):
+        low, high = (_value(zone, found.input_unit) for zone in (min(zones), max(zones)))
+        dead = high if low == high else f"{low} to {high}"
+        text += f"; after a reversal the input changes by {dead} before the output moves back"
+    return _sentence(text)
+
+
+def _memory(found: Characterization) -> str:
+    parts = []
+    if found.closure_error is not None:
+        share = f"{_percent(found.closure_error)} of the output range"
+        closed = found.closure_error < REMEMBERED
+        parts.append(f"minor loops {'close within' if closed else 'miss their start by'} {share}")
+    if found.wiping_out_error is not None:
+        share = _percent(found.wiping_out_error)
+        wiped = found.wiping_out_error < REMEMBERED
+        parts.append(
+            f"beyond them the output is {'as without them, within' if wiped else 'off that without them by'} {share}"
+        )
+    if found.drift is not None and 100 * abs(found.drift) >= NOTABLE * found.output_span:
+        parts.append(
+            f"from cycle to cycle the output drifts by {_value(found.drift, found.output_unit)}"
+        )
+    return _sentence("; ".join(parts)) if parts else ""
+
+
+def _rate(found: Characterization) -> str:
+    if found.rate_verdict == "unknown":
+        return (
+            "Whether the loop depends on speed cannot be told: that takes several cycles between the "
+            "same extremes at different speeds."
+        )
+    if found.rate_verdict == "none" or found.rate_dependence is None:
+        return "The loop does not depend on speed, as far as these cycles tell."
+    way = "wider" if found.rate_dependence > 0 else "narrower"
+    return (
+        f"The loop depends on speed ({found.rate_verdict}): twice as fast, it is "
+        f"{abs(found.rate_dependence):.2g} % of the output range {way}."
+    )
+
+
+def _trust(found: Characterization) -> str:
+    if found.n_cycles == 0:
+        return (
+            "There is no whole cycle of the input: record at least one, minimum to minimum, for loop "
+            "width, area and shape."
+        )
+    return ""
+
+
+def _range(limits: tuple[float, float], unit: str) -> str:
+    """Return limits to about a percent of their distance, so that noise at 0 is not spelled out."""
+    digits = 2 - math.floor(math.log10(limits[1] - limits[0]))
+    low, high = (f"{round(limit, digits) + 0.0:.6g}" for limit in limits)
+    return f"from {low} to {high} {unit}".rstrip()
+
+
+def _value(value: float, unit: str) -> str:
+    text = f"{value:.2g}" if abs(value) < 100 else f"{value:.0f}"
+    return f"{text} {unit}" if unit else text
+
+
+def _percent(share: float) -> str:
+    return "less than 0.1 %" if share < 0.1 else f"{share:.2g} %"
+
+
+def _sentence(text: str) -> str:
+    return f"{text[0].upper()}{text[1:]}."

@@ -58,7 +58,7 @@ def test_stacked_panels_make_one_plot_and_others_one_each() -> None:
     assert plot["layout"]["xaxis2"]["matches"] == "x"
     low, high = (plot["layout"][name]["domain"] for name in ("yaxis2", "yaxis"))
     assert 0 == low[0] < low[1] < high[0] < high[1] == 1
-    assert len(plots(subjects.weights(models()))) == 4
+    assert len(plots(subjects.weights(models()))) == 5
 
 
 def test_the_best_model_is_at_the_top_of_the_chart() -> None:

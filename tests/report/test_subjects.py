@@ -8,6 +8,7 @@ from mckibben.blocks.gpi import GPI
 from mckibben.blocks.pi import PI
 from mckibben.blocks.piecewise_linear import PiecewiseLinear
 from mckibben.blocks.play import Play
+from mckibben.blocks.rate_dependent_pi import RateDependentPI
 from mckibben.errors import ModelError
 from mckibben.recording import Recording
 from mckibben.report import subjects
@@ -98,12 +99,12 @@ def test_sums_of_operators_are_found_however_nested() -> None:
 def test_weights_stand_over_their_thresholds_with_their_units() -> None:
     drawing = subjects.weights(models())
     titles = [panel.title for panel in drawing.panels]
-    assert titles == ["gpi", "mpi: pi", "rdpi", "pi"]
-    gpi, mpi, rdpi, _ = drawing.panels
+    assert titles == ["gpi", "mpi: pi", "rdpi", "rdpi, per rate", "pi"]
+    gpi, mpi, _, rated, _ = drawing.panels
     assert gpi.x_label == "threshold on the envelopes"
     assert mpi.x_label == "threshold [bar]"
     np.testing.assert_array_equal(gpi.curves[0].y, GPI.example().weights)
-    assert [curve.name for curve in rdpi.curves] == ["at rest", "per rate"]
+    np.testing.assert_array_equal(rated.curves[0].y, RateDependentPI.example().rate_weights)
 
 
 def test_more_weights_than_fit_are_counted() -> None:

@@ -108,6 +108,7 @@ def _ticks(panel: Panel) -> Json:
         "tickvals": places,
         "ticktext": [text(word) for word in panel.categories],
         "range": [len(places) - 0.5, -0.5],
+        "ticklabelstandoff": 8,
     }
 
 
@@ -140,7 +141,7 @@ def _trace(curve: Curve, x: str, y: str) -> Json:
             "y": packed(np.column_stack([np.zeros(n), curve.y, gap]).ravel()),
             "mode": "lines+markers",
             "line": {"color": colour, "width": 2},
-            "marker": {"color": colour, "size": [0, 8, 0] * n, "opacity": 1},
+            "marker": {"color": colour, "size": [0, 8, 0] * n, "opacity": 1, "line": {"width": 0}},
         }
     symbol = {"dots": "circle", "rings": "circle-open", "ticks": "line-ns-open"}[curve.style]
     marker = {"color": colour, "size": 10, "symbol": symbol, "line": {"color": colour, "width": 2}}

@@ -13,7 +13,7 @@ from mckibben.report.shown import MOST_RECORDINGS, Shown, shown
 if TYPE_CHECKING:
     from mckibben.comparison.results import Leaderboard, Row, Study
 
-N_VALUES = 200_000
+N_VALUES = 180_000
 """Numbers in all plots together, so that the file stays under 6 MB beside plotly.js."""
 
 FEWEST_POINTS = 400

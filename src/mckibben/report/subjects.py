@@ -189,13 +189,13 @@ def weights(blocks: Mapping[str, Block]) -> Drawing:
             x_label = axis_label(threshold, "" if part.kind == "gpi" else unit)
             r = np.array(part.thresholds)  # type: ignore[attr-defined]
             w = np.array(part.weights)  # type: ignore[attr-defined]
-            curves = [Curve(r, w, colour=series_colour(place), style="stems")]
-            rated = getattr(part, "rate_weights", None)
-            if rated is not None:
-                curves[0] = Curve(r, w, "at rest", series_colour(place), "stems")
-                curves.append(Curve(r, np.array(rated), "per rate", "input", "rings"))
             title = model if part is block else f"{model}: {part.kind}"
-            panels.append(Panel(x_label, "weight", tuple(curves), title, zero=True))
+            drawn = {title: w}
+            if hasattr(part, "rate_weights"):
+                drawn[f"{title}, per rate"] = np.array(part.rate_weights)
+            for heading, values in drawn.items():
+                stems = Curve(r, values, colour=series_colour(place), style="stems")
+                panels.append(Panel(x_label, "weight", (stems,), heading, zero=True))
     if not panels:
         raise ModelError(
             "no model here is a weighted sum of play operators, so it has no weights to draw. "

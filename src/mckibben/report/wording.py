@@ -24,9 +24,13 @@ MISLEADING = 0.05
 def number(value: float | None, digits: int = 3) -> str:
     """Return a number to so many significant digits, without an exponent where that is readable.
 
-    >>> number(0.012345), number(-12345.6), number(None), number(1.5e-12)
-    ('0.0123', '−12346', '–', '1.5e−12')
+    Counts are whole, and nothing is a dash.
+
+    >>> number(0.012345), number(-12345.6), number(1.5e-12), number(7), number(None)
+    ('0.0123', '−12346', '1.5e−12', '7', '–')
     """
+    if isinstance(value, int):
+        return str(value)
     if value is None or not math.isfinite(value):
         return "–"
     if value == 0:

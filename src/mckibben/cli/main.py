@@ -56,10 +56,15 @@ def _options(
 
 def run() -> None:
     """Run the command line: errors become one paragraph on standard error, and exit code 2."""
-    warnings.simplefilter("ignore")
-    for category in (DataWarning, ModelWarning):
-        warnings.simplefilter("always", category)
-    warnings.showwarning = lambda message, *_: print(f"Note: {message}", file=sys.stderr)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        for category in (DataWarning, ModelWarning):
+            warnings.simplefilter("always", category)
+        warnings.showwarning = lambda message, *_: print(f"Note: {message}", file=sys.stderr)
+        _run()
+
+
+def _run() -> None:
     try:
         app()
     except MckibbenError as error:
@@ -71,9 +76,8 @@ def run() -> None:
         sys.exit(1)
     except OSError as error:
         place = f"{error.filename}: " if error.filename else ""
-        _leave(
-            f"{place}{error.strerror or error}. Remedy: check the path and its rights.", BAD_INPUT
-        )
+        reason = error.strerror or error
+        _leave(f"{place}{reason}. Remedy: check the path and its rights.", BAD_INPUT)
     except MemoryError:
         _leave("Not enough memory. Remedy: cut or resample the recordings first.", BAD_INPUT)
     except Exception as error:

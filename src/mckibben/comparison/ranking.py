@@ -105,6 +105,11 @@ def compare(
     split = given_split(recordings, tests) if tests else held_out_tail(recordings, HELD_OUT)
     parts = tuple(folds(split.train, input, n_folds)) if n_folds >= 2 else ()
     chosen = registry.names("estimators") if models == "all" else tuple(models)
+    if not chosen:
+        raise ModelError(
+            "there are no models to compare. "
+            f"Remedy: name some of {', '.join(registry.names('estimators'))}, or all."
+        )
     for model in chosen:
         registry.load("estimators", model)
     tasks = [

@@ -1,0 +1,145 @@
+"""The grammar that scripts rely on, from a file to a checked inverse."""
+
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.cli.conftest import Cli
+
+from mckibben import GPI, load
+
+
+def columns(path: Path) -> dict[str, np.ndarray]:
+    with path.open() as file:
+        rows = list(csv.DictReader(file))
+    return {name: np.array([float(row[name]) for row in rows]) for name in rows[0]}
+
+
+@pytest.fixture
+def model(cli: Cli, files: tuple[Path, Path], tmp_path: Path) -> Path:
+    path = tmp_path / "model.json"
+    settings = ["--set", "n_operators=5", "--method", "ls", "--seed", 0]
+    channels = ["--input", "pressure", "--output", "displacement"]
+    result = cli("fit", "gpi", files[0], *channels, "-o", path, *settings)
+    assert result.code == 0, result.err
+    assert "RMSE" in result.out
+    return path
+
+
+def test_fit_writes_a_model_with_the_settings_asked_for(model: Path) -> None:
+    block = load(model)
+    assert isinstance(block, GPI)
+    assert len(block.weights) == 6
+
+
+def test_simulate_writes_the_inputs_the_modelled_and_the_measured_output(
+    cli: Cli, model: Path, files: tuple[Path, Path], tmp_path: Path
+) -> None:
+    out = tmp_path / "out.csv"
+    result = cli("simulate", model, files[1], "-o", out, "--json")
+    assert result.code == 0, result.err
+    found, given = columns(out), columns(files[1])
+    assert list(found) == ["time", "pressure", "displacement_model", "displacement"]
+    np.testing.assert_array_equal(found["pressure"], given["pressure"])
+    expected = load(model).simulate(given["pressure"])
+    np.testing.assert_array_equal(found["displacement_model"], expected)
+    rmse = np.sqrt(np.mean((expected - given["displacement"]) ** 2))
+    metrics = json.loads(result.out)["metrics"]["displacement"]
+    assert metrics["rmse"] == pytest.approx(rmse, rel=1e-12)
+    assert {"mae", "r2", "max_error"} <= set(metrics)
+
+
+def test_inverse_then_forward_through_files_is_the_identity(
+    cli: Cli, model: Path, tmp_path: Path
+) -> None:
+    inverse, reference = tmp_path / "inverse.json", tmp_path / "reference.csv"
+    result = cli("invert", model, "-o", inverse, "--json")
+    assert result.code == 0, result.err
+    low, high = json.loads(result.out)["reachable"]["displacement"]
+    t = np.arange(0, 10, 0.02)
+    wave = 0.5 + 0.35 * np.sin(2 * t) + 0.1 * np.sin(9 * t)
+    lines = [
+        f"{a!r},{b!r}"
+        for a, b in zip(t.tolist(), (low + (high - low) * wave).tolist(), strict=True)
+    ]
+    reference.write_text("time_s,displacement_mm\n" + "\n".join(lines) + "\n")
+    wished, back = tmp_path / "wished.csv", tmp_path / "back.csv"
+    assert cli("simulate", inverse, reference, "-o", wished).code == 0
+    assert "pressure_model" in columns(wished)
+    result = cli("simulate", model, wished, "--column", "pressure=pressure_model", "-o", back)
+    assert result.code == 0, result.err
+    found = columns(back)
+    error = np.abs(found["displacement_model"] - found["displacement"]).max()
+    assert error <= 1e-9 * (high - low)
+
+
+def test_compare_writes_the_promised_leaderboard(
+    cli: Cli, files: tuple[Path, Path], tmp_path: Path
+) -> None:
+    options = ["--models", "pi,gpi", "--set", "gpi.n_operators=4", "--jobs", 1]
+    result = cli("compare", files[0], "--test", files[1], *options, "-o", tmp_path / "lb")
+    assert result.code == 0, result.err
+    board = json.loads((tmp_path / "lb" / "leaderboard.json").read_text())
+    assert (board["input"], board["output"]) == ("pressure", "displacement")
+    assert [row["model"] for row in board["rows"]] == ["gpi", "pi"]
+    assert board["rows"][0]["test"]["rmse"] < board["rows"][1]["test"]["rmse"]
+    assert board["rows"][0]["n_parameters"] == 11
+    table = columns_of_text(tmp_path / "lb" / "leaderboard.csv")
+    assert table[0]["model"] == "gpi"
+    assert float(table[0]["test.rmse"]) == board["rows"][0]["test"]["rmse"]
+
+
+def columns_of_text(path: Path) -> list[dict[str, str]]:
+    with path.open() as file:
+        return list(csv.DictReader(file))
+
+
+def test_study_writes_everything(cli: Cli, files: tuple[Path, Path], tmp_path: Path) -> None:
+    folder = tmp_path / "study"
+    options = ["--models", "pi,gpi", "--jobs", 1, "--json"]
+    result = cli("study", files[0], "--test", files[1], "-o", folder, *options)
+    assert result.code == 0, result.err
+    printed = json.loads(result.out)
+    assert printed["inverse"]["model"] == "gpi"
+    assert printed["inverse"]["error"] <= 1e-9
+    written = {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
+    assert written == {
+        *("report.html", "leaderboard.csv", "leaderboard.json", "inverse.json"),
+        *("models/pi.json", "models/gpi.json"),
+    }
+    assert load(folder / "inverse.json").inverse() == load(folder / "models" / "gpi.json")
+
+
+def test_characterize_speaks_and_counts(cli: Cli, files: tuple[Path, Path]) -> None:
+    spoken = cli("characterize", files[0])
+    assert spoken.code == 0
+    assert "loop" in spoken.out
+    assert json.loads(cli("characterize", files[0], "--json").out)
+
+
+@pytest.mark.parametrize("suffix", [".png", ".svg", ".pdf"])
+def test_plot_writes_figures(
+    cli: Cli, files: tuple[Path, Path], model: Path, tmp_path: Path, suffix: str
+) -> None:
+    loop, fit = tmp_path / f"loop{suffix}", tmp_path / f"fit{suffix}"
+    assert cli("plot", files[0], "-o", loop).code == 0
+    assert cli("plot", files[1], "--model", model, "--kind", "residuals", "-o", fit).code == 0
+    assert loop.stat().st_size > 1000
+    assert fit.stat().st_size > 1000
+
+
+def test_info_lists_models_and_tells_about_files(
+    cli: Cli, files: tuple[Path, Path], model: Path
+) -> None:
+    listed = json.loads(cli("info", "--models", "--json").out)
+    assert {"pi", "mpi", "rdpi", "gpi", "eupi"} <= set(listed)
+    assert listed["gpi"]["settings"]["n_operators"] == 10
+    assert json.loads(cli("info", model, "--json").out)["kind"] == "gpi"
+    (recording,) = json.loads(cli("info", files[0], "--json").out)
+    assert recording["channels"]["pressure"]["unit"] == "bar"
+    assert cli("info", "--models").code == cli("info", model).code == 0

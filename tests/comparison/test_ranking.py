@@ -1,0 +1,217 @@
+from __future__ import annotations
+
+import json
+import sys
+import types
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from mckibben import GPI, PI, DataError, ModelError, PIEstimator, Recording, compare, registry
+from mckibben.comparison.ranking import Task, try_model
+from mckibben.comparison.splits import folds, given_split, held_out_tail
+from mckibben.signals import irregular_triangle, triangle
+
+TIME = np.arange(0, 24, 0.02)
+
+
+def recorded(u: np.ndarray, seed: int = 0, start: float = 0.0) -> Recording:
+    noise = 0.02 * np.random.default_rng(seed).standard_normal(u.size)
+    y = GPI.example().simulate(u) + noise
+    return Recording({"pressure": u, "displacement": y}, 0.02, start_time=start)
+
+
+@pytest.fixture(scope="module")
+def train() -> Recording:
+    return recorded(triangle(TIME, 4.0, [5.0, 4.2, 3.4, 2.6, 1.8, 1.0]))
+
+
+@pytest.fixture(scope="module")
+def test_set() -> Recording:
+    return recorded(irregular_triangle(TIME, 12, 5.0, seed=3), seed=1)
+
+
+def without_times(board: Any) -> list[dict[str, Any]]:
+    rows = board.to_dict()["rows"]
+    return [{k: v for k, v in row.items() if k not in ("fit_seconds", "step_ns")} for row in rows]
+
+
+def test_leaderboard_has_the_promised_form(train: Recording, test_set: Recording) -> None:
+    board = compare(train, test_set, models=["pi", "gpi"], n_folds=2, jobs=1)
+    content = json.loads(json.dumps(board.to_dict(), allow_nan=False))
+    assert content["input"] == "pressure"
+    assert content["output"] == "displacement"
+    assert [row["model"] for row in content["rows"]] == ["gpi", "pi"]
+    for row in content["rows"]:
+        assert row["status"] == "ok"
+        assert {"n_parameters", "fit_seconds", "step_ns"} <= set(row)
+        assert {"rmse", "mae", "r2", "max_error"} <= set(row["train"])
+        assert {"rmse", "mae", "r2", "max_error", "rmse_interval"} <= set(row["test"])
+        low, high = row["test"]["rmse_interval"]
+        assert low <= row["test"]["rmse"] <= high
+    best, other = content["rows"]
+    assert best["test"]["rmse"] < 0.1 < other["test"]["rmse"]
+    assert best["test"]["difference_to_best_interval"] == [0.0, 0.0]
+    assert other["test"]["difference_to_best_interval"][0] > 0
+
+
+def test_same_seed_same_table_whatever_the_number_of_processes(
+    train: Recording, test_set: Recording
+) -> None:
+    one = compare(train, test_set, models=["pi", "mpi"], n_folds=2, jobs=1, seed=4)
+    two = compare(train, test_set, models=["pi", "mpi"], n_folds=2, jobs=2, seed=4)
+    assert without_times(one) == without_times(two)
+
+
+def test_test_outputs_are_never_looked_at_while_fitting(
+    train: Recording, test_set: Recording
+) -> None:
+    spoilt = test_set["displacement"].copy()
+    spoilt[1:] += 50 * np.sin(np.arange(spoilt.size - 1))
+    models = ["gpi"]
+    clean = compare(train, test_set, models=models, n_folds=0, jobs=1)
+    other = compare(
+        train, test_set.with_channels(displacement=spoilt), models=models, n_folds=0, jobs=1
+    )
+    assert clean.rows[0].block == other.rows[0].block
+
+
+def test_held_out_tail_is_never_looked_at(train: Recording) -> None:
+    spoilt = {name: samples.copy() for name, samples in train.channels.items()}
+    start = round(len(train) * 0.75)
+    for samples in spoilt.values():
+        samples[start:] = samples[start:][::-1]
+    clean = compare(train, models=["gpi"], n_folds=2, jobs=1)
+    other = compare(replace(train, channels=spoilt), models=["gpi"], n_folds=2, jobs=1)
+    assert clean.rows[0].block == other.rows[0].block
+    assert clean.n_train == start
+    assert clean.n_test == len(train) - start
+
+
+class FailingEstimator(PIEstimator):
+    """An estimator that breaks, for the test below."""
+
+    def fit(self, *args: Any, **settings: Any) -> Any:
+        raise ZeroDivisionError("of all things")
+
+
+class OverflowingEstimator(PIEstimator):
+    """An estimator whose model overflows, for the test below."""
+
+    def fit(self, *args: Any, **settings: Any) -> Any:
+        super().fit(*args, **settings)
+        weights = tuple(1e308 for _ in self.model_.weights)
+        self.model_ = replace(self.model_, weights=weights)
+        return self
+
+
+def test_a_model_that_fails_is_a_row_with_its_reason(
+    train: Recording, test_set: Recording, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    broken = types.ModuleType("broken_models")
+    broken.Failing = FailingEstimator  # type: ignore[attr-defined]
+    broken.Overflowing = OverflowingEstimator  # type: ignore[attr-defined]
+    monkeypatch.setitem(sys.modules, "broken_models", broken)
+    extra = {"failing": "broken_models:Failing", "overflowing": "broken_models:Overflowing"}
+    monkeypatch.setitem(registry.PLUGINS, "estimators", registry.PLUGINS["estimators"] | extra)
+    registry._locations.cache_clear()
+    try:
+        board = compare(train, test_set, models=["failing", "overflowing", "pi"], n_folds=0, jobs=1)
+    finally:
+        registry._locations.cache_clear()
+    assert [row.model for row in board.rows] == ["pi", "failing", "overflowing"]
+    reasons = {row.model: row.reason for row in board.rows}
+    assert reasons["failing"] == "ZeroDivisionError: of all things"
+    assert "not finite" in str(reasons["overflowing"])
+    assert board.to_dict()["rows"][1] == {
+        "model": "failing",
+        "status": "failed",
+        "reason": "ZeroDivisionError: of all things",
+    }
+
+
+def test_timeless_recordings_fail_only_the_rate_dependent_model(
+    train: Recording, test_set: Recording
+) -> None:
+    board = compare(
+        replace(train, sample_time=None),
+        replace(test_set, sample_time=None),
+        models=["pi", "rdpi"],
+        n_folds=0,
+        jobs=1,
+    )
+    assert board.rows[0].model == "pi"
+    assert "no time" in str(board.rows[1].reason)
+
+
+def test_bad_input_is_refused_at_once(train: Recording) -> None:
+    with pytest.raises(ModelError, match=r"no estimator named 'spline'.*Remedy"):
+        compare(train, models=["spline"])
+    with pytest.raises(DataError, match="no channel 'force'"):
+        compare(train, output="force")
+    with pytest.raises(DataError, match="no recordings"):
+        compare([])
+    with pytest.raises(DataError, match="too few samples|too few"):
+        compare(train.slice(0, 12), models=["pi"])
+
+
+def test_interrupt_keeps_what_is_finished(train: Recording, test_set: Recording) -> None:
+    def impatient(model: str, share: float) -> None:
+        raise KeyboardInterrupt
+
+    board = compare(train, test_set, models=["pi", "mpi"], n_folds=0, jobs=1, progress=impatient)
+    assert board.rows[0].model == "pi"
+    assert "interrupted" in str(board.rows[1].reason)
+
+
+def test_cross_validation_over_recordings_never_mixes_them(
+    train: Recording, test_set: Recording
+) -> None:
+    runs = [train, test_set, recorded(irregular_triangle(TIME, 9, 4.0, seed=8))]
+    parts = list(folds(runs, "pressure", 5))
+    assert len(parts) == 3
+    for part in parts:
+        assert not set(map(id, part.train)) & set(map(id, part.test))
+        assert all(rows.all() for rows in (*part.train_rows, *part.test_rows))
+
+
+def test_cross_validation_over_cycles_scores_every_sample_once(train: Recording) -> None:
+    scored = np.zeros(len(train), dtype=int)
+    for part in folds([train], "pressure", 3):
+        assert not np.any(part.train_rows[0] & part.test_rows[0])
+        scored += part.test_rows[0]
+    np.testing.assert_array_equal(scored, 1)
+
+
+def test_first_sample_of_a_test_that_continues_nothing_is_not_scored(train: Recording) -> None:
+    later = replace(train, start_time=float(train.time[-1]) + 0.02)
+    assert not given_split([train], [train]).test_rows[0][0]
+    assert given_split([train], [later]).test_rows[0][0]
+    with pytest.raises(DataError, match=r"too few.*--test"):
+        held_out_tail([train.slice(0, 20)], 0.25)
+
+
+def test_a_task_runs_on_its_own(train: Recording, test_set: Recording) -> None:
+    task = Task("pi", {"seed": 0}, given_split([train], [test_set]), (), "pressure", "displacement")
+    row, errors = try_model(task)
+    assert isinstance(row.block, PI)
+    assert errors is not None
+    assert row.test is not None
+    assert row.test.rmse == pytest.approx(float(np.sqrt(np.mean(errors**2))))
+
+
+def test_dask_backend_gives_the_same_table(train: Recording, test_set: Recording) -> None:
+    joblib = pytest.importorskip("joblib")
+    distributed = pytest.importorskip("distributed")
+    serial = compare(train, test_set, models=["pi", "mpi"], n_folds=0, jobs=1)
+    with (
+        distributed.LocalCluster(
+            n_workers=1, threads_per_worker=2, processes=False, dashboard_address=None
+        ) as cluster,
+        distributed.Client(cluster),
+        joblib.parallel_config(backend="dask"),
+    ):
+        spread = compare(train, test_set, models=["pi", "mpi"], n_folds=0, jobs=2)
+    assert without_times(serial) == without_times(spread)

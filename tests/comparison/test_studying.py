@@ -1,0 +1,67 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from mckibben import GPI, PI, ModelError, Recording, study
+from mckibben.blocks.base import Block
+from mckibben.comparison.studying import check_inverse, invert_best
+from mckibben.signals import irregular_triangle, triangle
+
+TIME = np.arange(0, 24, 0.02)
+
+
+def recorded(u: np.ndarray) -> Recording:
+    noise = 0.02 * np.random.default_rng(0).standard_normal(u.size)
+    return Recording({"pressure": u, "displacement": GPI.example().simulate(u) + noise}, 0.02)
+
+
+@pytest.fixture(scope="module")
+def train() -> Recording:
+    return recorded(triangle(TIME, 4.0, [5.0, 4.2, 3.4, 2.6, 1.8, 1.0]))
+
+
+def test_a_study_holds_everything_the_report_shows(train: Recording) -> None:
+    test = recorded(irregular_triangle(TIME, 12, 5.0, seed=3))
+    found = study(train, test, models=["pi", "gpi"], jobs=1, notes=["a note"])
+    assert found.leaderboard.best is not None
+    assert found.leaderboard.best.model == "gpi"
+    assert set(found.predictions) == {"pi", "gpi"}
+    for outputs in found.predictions.values():
+        assert [output.size for output in outputs] == [len(train), len(test)]
+    assert found.inverse is not None
+    assert found.inverse.model == "gpi"
+    assert found.inverse.error <= 1e-9
+    assert found.notes == ("a note",)
+    assert found.characterization.sentences
+
+
+def test_predictions_are_those_that_were_scored(train: Recording) -> None:
+    found = study(train, models=["pi"], jobs=1)
+    (row,) = found.leaderboard.rows
+    error = found.predictions["pi"][-1] - train["displacement"]
+    tail = error[round(len(train) * 0.75) :]
+    assert row.test is not None
+    assert row.test.rmse == pytest.approx(float(np.sqrt(np.mean(tail**2))), rel=1e-12)
+
+
+@pytest.mark.parametrize("block", [PI.example(), GPI.example()], ids=lambda b: b.kind)
+def test_inverse_check_covers_the_reachable_range(block: Block, train: Recording) -> None:
+    check = check_inverse("it", block, train)
+    assert check.error <= 1e-12
+    low, high = check.reachable
+    assert np.ptp(check.reference) > 0.9 * (high - low)
+    assert np.all((check.pressure >= 0) & (check.pressure <= 5))
+
+
+def test_models_without_inverse_are_passed_over(train: Recording) -> None:
+    found = study(train, models=["pi", "gpi"], jobs=1).leaderboard
+    first, second = found.rows
+    stuck = replace(PI.example(), weights=(0.0, 1.0, 1.0, 1.0))
+    board = replace(found, rows=(replace(first, block=stuck), second))
+    check = invert_best(board, train)
+    assert check is not None
+    assert check.model == second.model
+    assert invert_best(replace(found, rows=()), train) is None
+    with pytest.raises(ModelError, match="no output that it can reach"):
+        check_inverse("pi", replace(PI.example(), input_range=None), train)

@@ -96,7 +96,7 @@ def follow(
     total = 0.0
     for i in range(r.size):
         total += w[i] * s[i]
-    slack = 1e-9 * (highest - lowest)
+    slack = 1e-9 * abs(highest - lowest)
     if target > previous and target > total:
         return 1.0, rise_to(target, highest, r, w, s) > highest + slack
     if target < previous and target < total:

@@ -13,6 +13,7 @@ import time
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numba
 import numpy as np
@@ -108,13 +109,14 @@ def fits(quick: bool) -> None:
     print(
         f"  variable projection, multi-start: {seconds:.2f} s, RMSE {estimator.diagnostics_.rmse:.4f} mm"
     )
-    for name, settings in (
+    swarms: list[tuple[str, dict[str, Any]]] = [
         ("c1 = c2 = 2, inertia .9 to .4", {}),
         (
             "c1 = c2 = 0.5, inertia .7",
             {"pso_c1": 0.5, "pso_c2": 0.5, "pso_inertia_start": 0.7, "pso_inertia_end": 0.7},
         ),
-    ):
+    ]
+    for name, settings in swarms:
         ends, started = [], time.perf_counter()
         for seed in range(5 if quick else 20):
             swarm = GPIEstimator(n_operators=10, method="pso", seed=seed, **settings).fit(recording)

@@ -160,7 +160,7 @@ class Recording:
     def time(self) -> Array:
         """Time of every sample [s], shape (n,); sample numbers where the recording has no time."""
         step = 1.0 if self.sample_time is None else self.sample_time
-        return self.start_time + step * np.arange(self.n_samples)
+        return self.start_time + step * np.arange(self.n_samples, dtype=np.float64)
 
     @property
     def duration(self) -> float | None:

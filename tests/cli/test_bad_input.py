@@ -6,11 +6,11 @@ import sys
 from pathlib import Path
 
 import pytest
+from tests.cli.conftest import Cli
+from tests.files.malformed import CASES, Case
 
 from mckibben.cli.options import parse_settings
 from mckibben.errors import ModelError
-from tests.cli.conftest import Cli
-from tests.files.malformed import CASES, Case
 
 
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)

@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
 from tests.cli.conftest import Cli
 
 from mckibben import GPI, load

@@ -102,8 +102,7 @@ class OverflowingEstimator(PIEstimator):
 
     def fit(self, *args: Any, **settings: Any) -> Any:
         super().fit(*args, **settings)
-        weights = tuple(1e308 for _ in self.model_.weights)
-        self.model_ = replace(self.model_, weights=weights)
+        self.model_ = self.fitted.unpack(np.full(self.fitted.n_parameters, 1e308))
         return self
 
 
@@ -153,7 +152,7 @@ def test_bad_input_is_refused_at_once(train: Recording) -> None:
         compare(train, output="force")
     with pytest.raises(DataError, match="no recordings"):
         compare([])
-    with pytest.raises(DataError, match="too few samples|too few"):
+    with pytest.raises(DataError, match="too few"):
         compare(train.slice(0, 12), models=["pi"])
 
 

@@ -133,7 +133,8 @@ def test_slope_rule_recovers_the_weights_of_a_clean_loop() -> None:
     second_rise = np.zeros(t.size, dtype=bool)
     second_rise[802:] = True
     fit = PIEstimator(thresholds=truth.thresholds, method="slopes").fit(loop, rows=[second_rise])
-    np.testing.assert_allclose(fit.model_.weights, truth.weights, rtol=1e-6)
+    assert isinstance(fit.model_, PI)
+    np.testing.assert_allclose(fit.model_.pack()[:-1], truth.pack()[:-1], rtol=1e-6)
     assert fit.model_.offset == pytest.approx(truth.offset, rel=1e-6)
 
 
@@ -151,7 +152,8 @@ def test_gpi_counts_seventeen_parameters_for_ten_operators(loop: Recording) -> N
 @pytest.mark.parametrize("envelope", ["tanh", "exponential", "piecewise-linear"])
 def test_gpi_envelopes_stay_in_order(envelope: str, loop: Recording) -> None:
     model = quick("gpi", envelope=envelope).fit(loop).model_
-    u = np.linspace(*model.input_range, 5000)
+    low, high = model.input_range
+    u = np.linspace(low, high, 5000)
     assert np.all(model.falling(u) >= model.rising(u))
     assert np.all(np.diff(model.rising(u)) > 0)
     assert np.all(np.diff(model.falling(u)) > 0)
@@ -182,9 +184,8 @@ def test_fitted_start_finds_the_peak_before_the_recording() -> None:
     u = np.concatenate([[4.0], 2.5 + 1.5 * np.cos(np.linspace(np.pi, 30, 600))])
     y = truth.simulate(u)
     loop = Recording({"pressure": u[1:], "displacement": y[1:]}, 0.01)
-    settings = {"thresholds": truth.thresholds}
-    blind = PIEstimator(**settings).fit(loop)
-    fitted = PIEstimator(initial="fitted", **settings).fit(loop)
+    blind = PIEstimator(thresholds=truth.thresholds).fit(loop)
+    fitted = PIEstimator(thresholds=truth.thresholds, initial="fitted").fit(loop)
     assert fitted.diagnostics_.rmse < 0.2 * blind.diagnostics_.rmse
     assert fitted.diagnostics_.peaks[0] == pytest.approx(4.0, abs=0.05)
 

@@ -39,10 +39,10 @@ def test_increasing_maps_increase_and_invert(name: str, w: np.ndarray) -> None:
 def test_bernstein_pieces_are_integrals_of_bernstein_polynomials() -> None:
     from scipy.stats import binom
 
-    x = np.linspace(0, 1, 20_001)
+    x = np.linspace(0.0, 1.0, 20_001)
     pieces = output_map("polynomial", 4).pieces(x)
     for k in range(4):
-        density = binom.pmf(k, 3, x)
+        density = np.asarray(binom.pmf(k, 3, x))
         integral = np.concatenate([[0], np.cumsum(0.5 * (density[1:] + density[:-1]) * np.diff(x))])
         np.testing.assert_allclose(pieces[:, k], integral, atol=1e-8)
 

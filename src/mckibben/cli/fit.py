@@ -40,7 +40,7 @@ def fit(
     column: Columns = None,
     unit: Units = None,
     rate: Rate = None,
-    gaps: GapPolicy = Gaps.error,
+    gaps: GapPolicy = Gaps.ERROR,
     resample: Resample = None,
     as_json: Json = False,
 ) -> None:

@@ -20,7 +20,7 @@ def info(
     column: Columns = None,
     unit: Units = None,
     rate: Rate = None,
-    gaps: GapPolicy = Gaps.error,
+    gaps: GapPolicy = Gaps.ERROR,
     resample: Resample = None,
     as_json: Json = False,
 ) -> None:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
@@ -20,9 +20,9 @@ if TYPE_CHECKING:
 class Gaps(StrEnum):
     """What to do about gaps in time."""
 
-    error = "error"
-    split = "split"
-    interpolate = "interpolate"
+    ERROR = "error"
+    SPLIT = "split"
+    INTERPOLATE = "interpolate"
 
 
 Files = Annotated[
@@ -70,6 +70,13 @@ Settings = Annotated[
 Jobs = Annotated[int | None, typer.Option("--jobs", help="Processes. Default: as many as cores.")]
 
 
+_POLICIES: dict[Gaps, Literal["error", "split", "interpolate"]] = {
+    Gaps.ERROR: "error",
+    Gaps.SPLIT: "split",
+    Gaps.INTERPOLATE: "interpolate",
+}
+
+
 @dataclass(frozen=True)
 class Reading:
     """How files are to be read."""
@@ -93,7 +100,7 @@ class Reading:
                 columns=_pairs("--column", self.columns),
                 units=_pairs("--unit", self.units),
                 rate=self.rate,
-                gaps=self.gaps.value,
+                gaps=_POLICIES[self.gaps],
                 channels=channels,
                 informative=informative,
             )

@@ -38,7 +38,7 @@ def plot(
     column: Columns = None,
     unit: Units = None,
     rate: Rate = None,
-    gaps: GapPolicy = Gaps.error,
+    gaps: GapPolicy = Gaps.ERROR,
     resample: Resample = None,
 ) -> None:
     """Draw recordings, or a saved model against them."""

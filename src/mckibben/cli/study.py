@@ -45,7 +45,7 @@ def study(
     column: Columns = None,
     unit: Units = None,
     rate: Rate = None,
-    gaps: GapPolicy = Gaps.error,
+    gaps: GapPolicy = Gaps.ERROR,
     resample: Resample = None,
     as_json: Json = False,
 ) -> None:

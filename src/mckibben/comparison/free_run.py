@@ -33,7 +33,7 @@ def run_free(
     """
     before = predecessor(recording, known)
     if before is not None:
-        start = block.final_state(before, initial=measured_start(block, before, output))
+        start = block.final_state(before, initial=measured_start(block, before, output).tolist())
     else:
         start = measured_start(block, recording, output)
     return block.simulate(recording, initial=start.tolist())[output]

@@ -137,7 +137,7 @@ def check_inverse(model: str, block: Block, recording: Recording) -> InverseChec
         reference=reference,
         pressure=pressure,
         output=output,
-        time=np.arange(CHECK_SAMPLES) * (1.0 if step is None else step),
+        time=np.arange(CHECK_SAMPLES, dtype=np.float64) * (1.0 if step is None else step),
         reachable=(low, high),
         error=float(np.abs(output - reference).max() / (high - low)),
     )

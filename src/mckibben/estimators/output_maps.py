@@ -75,12 +75,12 @@ class PolynomialMap(OutputMap):
 
     def pieces(self, x: Array) -> Array:
         """Return the integral from 0 of every Bernstein polynomial of degree ``size - 1``."""
-        return np.polynomial.polynomial.polyval(x, self._basis().T).T
+        return np.asarray(np.polynomial.polynomial.polyval(x, self._basis().T).T, dtype=np.float64)
 
     def slopes(self, x: Array) -> Array:
         """Return every Bernstein polynomial."""
         derivatives = np.polynomial.polynomial.polyder(self._basis(), axis=1)
-        return np.polynomial.polynomial.polyval(x, derivatives.T).T
+        return np.asarray(np.polynomial.polynomial.polyval(x, derivatives.T).T, dtype=np.float64)
 
     def powers(self, weights: Array) -> Array:
         """Return the weighted sum of the pieces in ascending powers, shape (size + 1,)."""

@@ -187,9 +187,8 @@ class SeparableEstimator(Estimator):
             best = int(np.argmin(costs))
             around = (grid[max(best - 1, 0)], grid[min(best + 1, 16)])
             found = minimize_scalar(cost, bounds=around, method="bounded")
-            peaks[index] = float(found.x) if found.fun < costs[best] else float(grid[best])
-            if cost(first) <= cost(peaks[index]) * (1 + 1e-12):
-                peaks[index] = None
+            peak = float(found.x) if found.fun < costs[best] else float(grid[best])
+            peaks[index] = None if costs[0] <= cost(peak) * (1 + 1e-12) else peak
         return data.with_peaks(peaks)
 
     def matrix(self, theta: Array, data: TrainingData) -> Array:

@@ -89,21 +89,23 @@ def follow(
 ) -> tuple[float, bool]:
     """Move the input of a weighted sum of play operators until the sum is the new target.
 
-    Moves only where target and sum agree on the way to go, so that rounding is never taken for a
-    reversal. Changes the states ``s``; returns the direction taken (1, -1, or 0 for none), and
-    whether the input would have to leave its limits, by more than rounding.
+    Stays where the reference does, and where target and sum differ by rounding only, so that rounding
+    is never taken for a reversal. Changes the states ``s``; returns the direction taken (1, -1, or 0
+    for none), and whether the input would have to leave its limits, by more than rounding.
     """
     total = 0.0
+    size = 0.0
     for i in range(r.size):
         total += w[i] * s[i]
+        size += abs(w[i] * s[i])
+    missing = target - total
     slack = 1e-9 * abs(highest - lowest)
-    if target > previous and target > total:
+    if target > previous and missing > 1e-14 * size:
         return 1.0, rise_to(target, highest, r, w, s) > highest + slack
-    if target < previous and target < total:
+    if target < previous and missing < -1e-14 * size:
         return -1.0, fall_to(target, lowest, r, w, s) < lowest - slack
-    missing = (target - total) / w[0]
-    above = missing > slack and s[0] >= highest
-    below = missing < -slack and s[0] <= lowest
+    above = missing > w[0] * slack and s[0] >= highest
+    below = missing < -w[0] * slack and s[0] <= lowest
     return 0.0, above or below
 
 

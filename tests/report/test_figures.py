@@ -70,3 +70,10 @@ def test_absent_channels_are_named(tmp_path: Path) -> None:
 def test_a_study_without_inverse_says_so(tmp_path: Path) -> None:
     with pytest.raises(ModelError, match="no model of this study has an inverse"):
         save_figure(study(inverse=False), "inverse", tmp_path / "figure.png")
+
+
+@pytest.mark.parametrize("name", ["leaderboard", "fit", "loops", "residuals", "weights"])
+def test_a_study_in_which_nothing_worked_draws_no_empty_figure(tmp_path: Path, name: str) -> None:
+    with pytest.raises(ModelError, match="Remedy"):
+        save_figure(study(blocks={}), name, tmp_path / "figure.png")
+    assert list(tmp_path.iterdir()) == []

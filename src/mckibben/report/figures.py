@@ -174,7 +174,7 @@ def plot_model(block: Block, recordings: Sequence[Recording], kind: str, path: s
     """
     from mckibben.comparison.free_run import run_free
 
-    name = block.kind
+    name = "model"
     if _known(kind, MODEL_KINDS) == "weights":
         printed.save(subjects.weights({name: block}), path)
         return
@@ -210,6 +210,10 @@ def _recordings(study: Study) -> list[Recording]:
 
 
 def _best(one: Shown) -> dict[str, subjects.Array]:
+    if not one.outputs:
+        raise ModelError(
+            "no model of this study worked. Remedy: read the reasons in its leaderboard."
+        )
     return dict(list(one.outputs.items())[:1])
 
 

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from mckibben.report import figures, subjects
+from mckibben.report import figures, model_subjects, subjects
 from mckibben.report.drawing import Curve, Drawing, Panel
 from mckibben.report.interactive import packed, plots, text
 from tests.report.studies_by_hand import measured, models, study
@@ -58,11 +58,11 @@ def test_stacked_panels_make_one_plot_and_others_one_each() -> None:
     assert plot["layout"]["xaxis2"]["matches"] == "x"
     low, high = (plot["layout"][name]["domain"] for name in ("yaxis2", "yaxis"))
     assert 0 == low[0] < low[1] < high[0] < high[1] == 1
-    assert len(plots(subjects.weights(models()))) == 5
+    assert len(plots(model_subjects.weights(models()))) == 5
 
 
 def test_the_best_model_is_at_the_top_of_the_chart() -> None:
-    (plot,) = plots(subjects.leaderboard(study().leaderboard))
+    (plot,) = plots(model_subjects.leaderboard(study().leaderboard))
     axis = plot["layout"]["yaxis"]
     assert axis["ticktext"][0] == "gpi"
     assert axis["range"][0] > axis["range"][1]

@@ -3,18 +3,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mckibben.blocks.compose import Parallel, Series
-from mckibben.blocks.gpi import GPI
-from mckibben.blocks.pi import PI
-from mckibben.blocks.piecewise_linear import PiecewiseLinear
-from mckibben.blocks.play import Play
-from mckibben.blocks.rate_dependent_pi import RateDependentPI
-from mckibben.errors import ModelError
 from mckibben.recording import Recording
 from mckibben.report import subjects
-from tests.report.studies_by_hand import measured, models, study
-
-LINE = Play.example()
+from tests.report.studies_by_hand import measured
 
 
 def test_the_loop_of_one_recording_is_coloured_by_age_without_gaps() -> None:
@@ -72,59 +63,6 @@ def test_the_best_model_lies_on_top() -> None:
     ):
         names = [curve.name for curve in drawing.panels[0].curves]
         assert names == ["measured", "third", "second", "best"]
-
-
-def test_only_models_that_worked_are_ranked() -> None:
-    (panel,) = subjects.leaderboard(study().leaderboard).panels
-    assert panel.categories == tuple(models())
-    tested = panel.curves[-1]
-    assert tested.interval is not None
-    assert np.all(tested.interval[0] < tested.x)
-    assert np.all(tested.x < tested.interval[1])
-
-
-def test_nothing_to_rank_is_said() -> None:
-    with pytest.raises(ModelError, match="no model worked"):
-        subjects.leaderboard(study(blocks={}).leaderboard)
-
-
-def test_sums_of_operators_are_found_however_nested() -> None:
-    pi, gpi = PI.example(), GPI.example()
-    nested = Series((Parallel((pi, LINE)), PiecewiseLinear.example()))
-    assert list(subjects.operator_sums(nested)) == [pi]
-    assert list(subjects.operator_sums(gpi.inverse())) == [gpi]
-    assert list(subjects.operator_sums(LINE)) == []
-
-
-def test_weights_stand_over_their_thresholds_with_their_units() -> None:
-    drawing = subjects.weights(models())
-    titles = [panel.title for panel in drawing.panels]
-    assert titles == ["gpi", "mpi: pi", "rdpi", "rdpi, per rate", "pi"]
-    gpi, mpi, _, rated, _ = drawing.panels
-    assert gpi.x_label == "threshold on the envelopes"
-    assert mpi.x_label == "threshold [bar]"
-    np.testing.assert_array_equal(gpi.curves[0].y, GPI.example().weights)
-    np.testing.assert_array_equal(rated.curves[0].y, RateDependentPI.example().rate_weights)
-
-
-def test_more_weights_than_fit_are_counted() -> None:
-    drawing = subjects.weights({f"model {k}": PI.example() for k in range(9)})
-    assert len(drawing.panels) == 6
-    assert drawing.note == "3 more are not shown."
-
-
-def test_a_model_without_weights_is_refused_with_a_remedy() -> None:
-    with pytest.raises(ModelError, match="Remedy"):
-        subjects.weights({"play": LINE})
-
-
-def test_the_inverse_check_shows_its_own_error() -> None:
-    check = study().inverse
-    assert check is not None
-    following, error, given = subjects.inverse_check(check).panels
-    assert following.y_label == "displacement [mm]"
-    assert given.y_label == "pressure [bar]"
-    np.testing.assert_array_equal(error.curves[0].y, check.output - check.reference)
 
 
 def test_a_path_that_jumps_is_drawn_as_dots_without_direction() -> None:

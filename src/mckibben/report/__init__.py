@@ -1,6 +1,6 @@
 """What a study found, for people: one offline HTML page, and figures for print.
 
-Every figure is described once, free of any drawing library (`drawing`, `subjects`), and drawn
+Every figure is described once, free of any drawing library (`subjects`, `model_subjects`), and drawn
 twice: for the page (`interactive`) and for print (`printed`).
 """
 

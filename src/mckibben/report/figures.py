@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from mckibben.blocks.base import Block
 from mckibben.errors import ModelError
 from mckibben.recording import Recording
-from mckibben.report import printed, subjects
+from mckibben.report import model_subjects, printed, subjects
 from mckibben.report.drawing import N_COLOURS, Drawing, Panel
 from mckibben.report.shown import Shown, shown
 
@@ -31,7 +31,7 @@ def loop(study: Study) -> Drawing:
 
 def leaderboard(study: Study) -> Drawing:
     """Errors of all models, with the interval of the test error."""
-    return subjects.leaderboard(study.leaderboard)
+    return model_subjects.leaderboard(study.leaderboard)
 
 
 def fit(study: Study) -> Drawing:
@@ -60,7 +60,7 @@ def residuals(study: Study) -> Drawing:
 
 def weights(study: Study) -> Drawing:
     """Weights over thresholds of all models that have them."""
-    return subjects.weights(
+    return model_subjects.weights(
         {row.model: row.block for row in study.leaderboard.rows if row.block is not None}
     )
 
@@ -71,7 +71,7 @@ def inverse(study: Study) -> Drawing:
         raise ModelError(
             "no model of this study has an inverse. Remedy: compare pi, mpi and gpi, which can."
         )
-    return subjects.inverse_check(study.inverse, study.train[0].sample_time is not None)
+    return model_subjects.inverse_check(study.inverse, study.train[0].sample_time is not None)
 
 
 FIGURES: Mapping[str, Callable[[Study], Drawing]] = MappingProxyType(
@@ -176,7 +176,7 @@ def plot_model(block: Block, recordings: Sequence[Recording], kind: str, path: s
 
     name = "model"
     if _known(kind, MODEL_KINDS) == "weights":
-        printed.save(subjects.weights({name: block}), path)
+        printed.save(model_subjects.weights({name: block}), path)
         return
     given, wanted = block.inputs[0].name, block.outputs[0].name
     runs = [Shown(r, {name: run_free(block, r, wanted)}, "") for r in recordings[:N_COLOURS]]

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from mckibben.report import interactive, subjects, wording
+from mckibben.report import interactive, model_subjects, subjects, wording
 from mckibben.report.drawing import N_COLOURS, POINTS, Drawing, series_colour
 from mckibben.report.shown import MOST_RECORDINGS, Shown, shown
 
@@ -90,7 +90,7 @@ def _figures(study: Study, drawn: tuple[Shown, ...]) -> tuple[Plots, str]:
         "loop": each(lambda one: subjects.loop([one.recording], u, y, points)),
     }
     if n_models:
-        figures["leaderboard"] = [interactive.plots(subjects.leaderboard(study.leaderboard))]
+        figures["leaderboard"] = [interactive.plots(model_subjects.leaderboard(study.leaderboard))]
         figures["fit"] = each(
             lambda one: subjects.fit_over_time(one.recording, y, one.outputs, one.test_from, points)
         )
@@ -102,12 +102,12 @@ def _figures(study: Study, drawn: tuple[Shown, ...]) -> tuple[Plots, str]:
         )
     blocks = {row.model: row.block for row in study.leaderboard.rows if row.block is not None}
     left_out = ""
-    if any(any(subjects.operator_sums(block)) for block in blocks.values()):
-        drawing = subjects.weights(blocks)
+    if any(any(model_subjects.operator_sums(block)) for block in blocks.values()):
+        drawing = model_subjects.weights(blocks)
         figures["weights"], left_out = [interactive.plots(drawing)], drawing.note
     if study.inverse is not None:
         timed = study.train[0].sample_time is not None
-        figures["inverse"] = [interactive.plots(subjects.inverse_check(study.inverse, timed))]
+        figures["inverse"] = [interactive.plots(model_subjects.inverse_check(study.inverse, timed))]
     return figures, left_out
 
 

@@ -1,0 +1,129 @@
+"""Figures of models themselves: their ranking, their weights, and the check of an inverse."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mckibben.blocks.base import Block
+from mckibben.errors import ModelError
+from mckibben.report.drawing import (
+    N_COLOURS,
+    Curve,
+    Drawing,
+    Panel,
+    axis_label,
+    over_time,
+    series_colour,
+)
+
+if TYPE_CHECKING:
+    from mckibben.comparison.results import InverseCheck, Leaderboard
+
+
+def leaderboard(board: Leaderboard) -> Drawing:
+    """Draw the errors of all models that worked, with the interval of the test error.
+
+    Raises
+    ------
+    ModelError
+        If none worked.
+    """
+    ranked = [row for row in board.rows if row.train is not None and row.test is not None]
+    if not ranked:
+        raise ModelError("no model worked, so there is nothing to rank. Remedy: read the reasons.")
+    place = np.arange(len(ranked), dtype=float)
+    tested = np.array([row.test.rmse for row in ranked if row.test is not None])
+    fitted = np.array([row.train.rmse for row in ranked if row.train is not None])
+    chosen = [row.validation_rmse for row in ranked]
+    ends = np.array([row.rmse_interval or (np.nan, np.nan) for row in ranked], dtype=float)
+    ends = np.where(np.isfinite(ends), ends, tested[:, np.newaxis])
+    curves = [Curve(fitted, place, "fit", "input", "ticks")]
+    if any(value is not None for value in chosen):
+        validated = np.array([np.nan if value is None else value for value in chosen])
+        curves.append(Curve(validated, place, "cross-validation", "input", "rings"))
+    interval = (ends[:, 0], ends[:, 1])
+    curves.append(Curve(tested, place, "test, 95 % interval", "series-1", "dots", None, interval))
+    label = axis_label("RMSE", board.unit)
+    names = tuple(row.model for row in ranked)
+    return Drawing((Panel(label, "", tuple(curves), categories=names),))
+
+
+def weights(blocks: Mapping[str, Block]) -> Drawing:
+    """Draw the weights over the thresholds of every sum of play operators in the models.
+
+    Raises
+    ------
+    ModelError
+        If no model has any.
+    """
+    panels = []
+    for place, (model, block) in enumerate(blocks.items()):
+        for part in operator_sums(block):
+            unit = part.inputs[0].unit
+            threshold = "threshold on the envelopes" if part.kind == "gpi" else "threshold"
+            x_label = axis_label(threshold, "" if part.kind == "gpi" else unit)
+            r = np.array(part.thresholds)  # type: ignore[attr-defined]
+            w = np.array(part.weights)  # type: ignore[attr-defined]
+            title = model if part is block else f"{model}: {part.kind}"
+            drawn = {title: w}
+            if hasattr(part, "rate_weights"):
+                drawn[f"{title}, per rate"] = np.array(part.rate_weights)
+            for heading, values in drawn.items():
+                stems = Curve(r, values, colour=series_colour(place), style="stems")
+                panels.append(Panel(x_label, "weight", (stems,), heading, zero=True))
+    if not panels:
+        raise ModelError(
+            "no model here is a weighted sum of play operators, so it has no weights to draw. "
+            "Remedy: draw the fit or the loops."
+        )
+    note = "" if len(panels) <= N_COLOURS else f"{len(panels) - N_COLOURS} more are not shown."
+    return Drawing(tuple(panels[:N_COLOURS]), note=note)
+
+
+def operator_sums(block: Block) -> Iterator[Block]:
+    """Yield the parts of a model, however nested, that are weighted sums of play operators."""
+    if hasattr(block, "thresholds") and hasattr(block, "weights"):
+        yield block
+    elif hasattr(block, "forward"):
+        yield from operator_sums(block.forward)
+    else:
+        for part in getattr(block, "parts", ()):
+            yield from operator_sums(part)
+
+
+def inverse_check(check: InverseCheck, timed: bool = True) -> Drawing:
+    """Draw reference and output, their difference, and the input that the inverse gives.
+
+    Parameters
+    ----------
+    timed : bool
+        Whether ``check.time`` is in seconds, and not in samples.
+    """
+    (wanted,), (given,) = check.inverse.inputs[:1], check.inverse.outputs[:1]
+    label = "time [s]" if timed else "sample"
+    t = check.time
+    error = over_time(t, check.output - check.reference)
+    return Drawing(
+        (
+            Panel(
+                label,
+                axis_label(wanted.name, wanted.unit),
+                (
+                    Curve(*over_time(t, check.reference), "reference", style="broad"),
+                    Curve(*over_time(t, check.output), "model behind its inverse", "series-1"),
+                ),
+            ),
+            Panel(
+                label, axis_label("error", wanted.unit), (Curve(*error, "", "series-6", "fine"),)
+            ),
+            Panel(
+                label,
+                axis_label(given.name, given.unit),
+                (Curve(*over_time(t, check.pressure), "", "input"),),
+            ),
+        ),
+        stacked=True,
+    )

@@ -20,6 +20,7 @@ PLUGINS: dict[str, dict[str, str]] = {
         "eupi-inverse": "mckibben.blocks.eupi:EUPIInverse",
         "gpi": "mckibben.blocks.gpi:GPI",
         "gpi-inverse": "mckibben.blocks.gpi:GPIInverse",
+        "negative": "mckibben.blocks.negative:Negative",
         "parallel": "mckibben.blocks.compose:Parallel",
         "per-channel": "mckibben.blocks.compose:PerChannel",
         "pi": "mckibben.blocks.pi:PI",

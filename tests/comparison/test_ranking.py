@@ -80,7 +80,7 @@ def test_test_outputs_are_never_looked_at_while_fitting(
 
 def test_held_out_tail_is_never_looked_at(train: Recording) -> None:
     spoilt = {name: samples.copy() for name, samples in train.channels.items()}
-    start = round(len(train) * 0.75)
+    start = len(held_out_tail([train], "pressure", 0.25).train[0])
     for samples in spoilt.values():
         samples[start:] = samples[start:][::-1]
     clean = compare(train, models=["gpi"], n_folds=2, jobs=1)
@@ -189,7 +189,14 @@ def test_first_sample_of_a_test_that_continues_nothing_is_not_scored(train: Reco
     assert not given_split([train], [train]).test_rows[0][0]
     assert given_split([train], [later]).test_rows[0][0]
     with pytest.raises(DataError, match=r"too few.*--test"):
-        held_out_tail([train.slice(0, 20)], 0.25)
+        held_out_tail([train.slice(0, 20)], "pressure", 0.25)
+
+
+def test_held_out_tail_is_a_quarter_of_the_travel_and_not_the_rest_after_it() -> None:
+    u = np.concatenate([triangle(TIME, 4.0, 5.0), np.zeros(2000)])
+    noisy = u + 0.01 * np.random.default_rng(0).standard_normal(u.size)
+    split = held_out_tail([recorded(noisy)], "pressure", 0.25)
+    assert len(split.train[0]) == pytest.approx(0.75 * TIME.size, rel=0.02)
 
 
 def test_a_task_runs_on_its_own(train: Recording, test_set: Recording) -> None:

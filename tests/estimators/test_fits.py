@@ -145,6 +145,21 @@ def test_every_model_fits_data_of_its_own_making_to_the_noise(name: str, loop: R
     assert again.diagnostics_.rmse < 0.021
 
 
+@pytest.mark.parametrize("name", ESTIMATORS)
+def test_outputs_that_fall_are_fitted_like_those_that_rise(name: str, loop: Recording) -> None:
+    length = loop.with_channels(length=200 - loop["displacement"])
+    rising, falling = quick(name).fit(loop), quick(name, output="length").fit(length)
+    assert falling.diagnostics_.rmse == pytest.approx(rising.diagnostics_.rmse, rel=1e-3)
+    assert falling.model_.n_parameters == rising.model_.n_parameters
+    low, high = (float(end[0]) for end in falling.model_.reachable())
+    assert 150 < low < high < 250
+    reference = np.linspace(high, low, 50)
+    pressure = falling.model_.inverse().simulate(reference, sample_time=1.0)
+    np.testing.assert_allclose(
+        falling.model_.simulate(pressure, sample_time=1.0), reference, atol=1e-9 * (high - low)
+    )
+
+
 def test_gpi_counts_seventeen_parameters_for_ten_operators(loop: Recording) -> None:
     assert quick("gpi", n_operators=10).fit(loop).model_.n_parameters == 17
 

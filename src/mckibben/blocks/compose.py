@@ -203,12 +203,12 @@ class Series(Composition):
     def reachable(self) -> tuple[Array, Array]:
         """Return the outputs that can be reached whatever happened before.
 
-        Those of the first part, followed through the rest; for parts that increase.
+        Those of the first part, followed through the rest, which must be monotone.
         """
         low, high = self.parts[0].reachable()
         for part in self.parts[1:]:
             if np.isfinite([*low, *high]).all() and part.n_states == 0:
-                low, high = part.simulate(np.array([low, high]))
+                low, high = np.sort(part.simulate(np.array([low, high])), axis=0)
             else:
                 own_low, own_high = part.reachable()
                 low, high = own_low, own_high
@@ -380,12 +380,11 @@ class PerChannel(Composition):
         from mckibben.blocks.gpi import GPI
         from mckibben.blocks.pi import PI
 
-        parts = []
-        for number, part in enumerate((PI.example(), GPI.example()), start=1):
-            pressure = Channel(f"pressure_{number}", "bar")
-            displacement = Channel(f"displacement_{number}", "mm")
-            parts.append(replace(part, input=pressure, output=displacement))
-        return cls(tuple(parts))
+        pressures = [Channel(f"pressure_{number}", "bar") for number in (1, 2)]
+        displacements = [Channel(f"displacement_{number}", "mm") for number in (1, 2)]
+        first = replace(PI.example(), input=pressures[0], output=displacements[0])
+        second = replace(GPI.example(), input=pressures[1], output=displacements[1])
+        return cls((first, second))
 
 
 def _check_any(block: Composition) -> None:

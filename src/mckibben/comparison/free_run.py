@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mckibben.blocks.base import Block
+from mckibben.blocks.compose import Series
 from mckibben.comparison.splits import predecessor
 from mckibben.recording import Recording
 
@@ -51,7 +52,7 @@ def measured_start(block: Block, recording: Recording, output: str) -> Array:
     if block.n_states == 0:
         return block.initial_state(first)
     highest = inputs[:, 0].max()
-    limits = getattr(block, "input_range", None)
+    limits = getattr(_first_part(block), "input_range", None)
     if limits is not None:
         highest = max(highest, limits[1])
     measured = float(recording[output][0])
@@ -76,3 +77,7 @@ def measured_start(block: Block, recording: Recording, output: str) -> Array:
             best_error, best_state = tried[best]
         low, high = float(peaks[max(best - 1, 0)]), float(peaks[min(best + 1, 16)])
     return best_state
+
+
+def _first_part(block: Block) -> Block:
+    return _first_part(block.parts[0]) if isinstance(block, Series) else block

@@ -26,7 +26,7 @@ Array = NDArray[np.float64]
 Settings = Mapping[str, Mapping[str, Any]]
 
 HELD_OUT = 0.25
-"""Share of a single recording that is held out where no test recording is given."""
+"""Share of the last recording's travel that is held out where no test recording is given."""
 
 TIMED_SAMPLES = 20_000
 
@@ -67,7 +67,8 @@ def compare(
     train : Recording or sequence of Recording
         To fit and to choose.
     test : Recording or sequence of Recording, optional
-        To rank. Default: the last quarter of the last training recording, then left out of training.
+        To rank. Default: the part of the last recording with the last quarter of the input's
+        travel, which is then left out of training.
     input, output : str
         Channels.
     models : "all" or sequence of str
@@ -102,7 +103,7 @@ def compare(
     training_data(recordings, input, output)
     if tests:
         training_data([recordings[0], *tests], input, output)
-    split = given_split(recordings, tests) if tests else held_out_tail(recordings, HELD_OUT)
+    split = given_split(recordings, tests) if tests else held_out_tail(recordings, input, HELD_OUT)
     parts = tuple(folds(split.train, input, n_folds)) if n_folds >= 2 else ()
     chosen = registry.names("estimators") if models == "all" else tuple(models)
     if not chosen:

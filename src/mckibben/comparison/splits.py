@@ -10,8 +10,14 @@ from numpy.typing import NDArray
 
 from mckibben.errors import DataError
 from mckibben.recording import Recording
+from mckibben.signals import reversals, split_cycles
 
+Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
+
+
+FEWEST = 10
+"""Samples in either part of a split."""
 
 
 @dataclass(frozen=True)
@@ -69,15 +75,17 @@ def given_split(train: Sequence[Recording], test: Sequence[Recording]) -> Split:
     return Split(tuple(train), tuple(test), tuple(rows), described)
 
 
-def held_out_tail(recordings: Sequence[Recording], share: float) -> Split:
+def held_out_tail(recordings: Sequence[Recording], channel: str, share: float) -> Split:
     """Hold out the last part of the last recording, of which nothing is seen while fitting.
 
     The test runs through the whole recording, so that its memory is right, and scores the tail only.
 
     Parameters
     ----------
+    channel : str
+        The input, whose travel is divided: a rest at the end of a recording tests nothing.
     share : float
-        Of the recording's samples to hold out, between 0 and 1.
+        Of the input's travel to hold out, between 0 and 1.
 
     Raises
     ------
@@ -85,8 +93,9 @@ def held_out_tail(recordings: Sequence[Recording], share: float) -> Split:
         If either part would have fewer than ten samples.
     """
     *others, last = recordings
-    start = round(len(last) * (1 - share))
-    if min(start, len(last) - start) < 10:
+    travel = _travel(last[channel])
+    start = int(np.searchsorted(travel, (1 - share) * travel[-1]))
+    if min(start, len(last) - start) < FEWEST:
         raise DataError(
             f"{len(last)} samples are too few to hold out {share:.0%} for a test",
             file=last.source,
@@ -94,8 +103,17 @@ def held_out_tail(recordings: Sequence[Recording], share: float) -> Split:
         )
     mask = np.zeros(len(last), dtype=bool)
     mask[start:] = True
-    described = f"last {share:.0%} of {last.name} to test, all before it to fit"
+    described = f"last {len(last) - start} samples of {last.name} to test, all before them to fit"
     return Split((*others, last.slice(0, start)), (last,), (mask,), described)
+
+
+def _travel(u: Array) -> Array:
+    """Return how far the input has gone up and down until every sample, without its noise."""
+    turns = reversals(u)
+    gone = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(u[turns])))])
+    branch = np.clip(np.searchsorted(turns, np.arange(u.size), side="right") - 1, 0, turns.size - 2)
+    own = np.abs(u - u[turns[branch]])
+    return np.minimum(gone[branch] + own, gone[branch + 1])
 
 
 def folds(train: Sequence[Recording], channel: str, n: int) -> Iterator[Fold]:
@@ -114,8 +132,6 @@ def folds(train: Sequence[Recording], channel: str, n: int) -> Iterator[Fold]:
             left = tuple(train[index] for index in group)
             yield Fold(kept, _all_rows(kept), left, _all_rows(left))
         return
-    from mckibben.signals import split_cycles
-
     (recording,) = train
     for start, stop in split_cycles(recording, channel, n):
         mask = np.zeros(len(recording), dtype=bool)

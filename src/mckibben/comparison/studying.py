@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Sequence
 
 import numpy as np
@@ -13,12 +14,15 @@ from mckibben.comparison.free_run import run_free
 from mckibben.comparison.ranking import HELD_OUT, Settings, compare
 from mckibben.comparison.results import InverseCheck, Leaderboard, Study
 from mckibben.comparison.splits import given_split, held_out_tail
-from mckibben.errors import ModelError
+from mckibben.errors import ModelError, ModelWarning
 from mckibben.recording import Recording
 
 Array = NDArray[np.float64]
 
 CHECK_SAMPLES = 2000
+
+FOLLOWED = 1e-6
+"""Largest error of an inverse that counts as one, relative to the reachable range."""
 
 
 def study(
@@ -66,7 +70,7 @@ def study(
         jobs=jobs,
         progress=progress,
     )
-    split = given_split(recordings, tests) if tests else held_out_tail(recordings, HELD_OUT)
+    split = given_split(recordings, tests) if tests else held_out_tail(recordings, input, HELD_OUT)
     predictions = {
         row.model: tuple(
             run_free(row.block, recording, output, split.train if index >= len(split.train) else ())
@@ -113,7 +117,8 @@ def check_inverse(model: str, block: Block, recording: Recording) -> InverseChec
     Raises
     ------
     ModelError
-        If the model has no inverse, or nothing can be reached whatever happened before.
+        If the model has no inverse, nothing can be reached whatever happened before, or the inverse
+        does not follow the reference.
     """
     inverse = block.inverse()
     lows, highs = block.reachable()
@@ -129,8 +134,16 @@ def check_inverse(model: str, block: Block, recording: Recording) -> InverseChec
     share = (wave - wave.min()) / np.ptp(wave)
     reference = low + (high - low) * (0.02 + 0.96 * share)
     step = recording.sample_time
-    pressure = inverse.simulate(reference, sample_time=step)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ModelWarning)
+        pressure = inverse.simulate(reference, sample_time=step)
     output = block.simulate(pressure, sample_time=step)
+    error = float(np.abs(output - reference).max() / (high - low))
+    if not error <= FOLLOWED:
+        raise ModelError(
+            f"the inverse of {model!r} misses a reachable reference by {error:.1e} of its range. "
+            "Remedy: invert another model."
+        )
     return InverseCheck(
         model=model,
         inverse=inverse,
@@ -139,5 +152,5 @@ def check_inverse(model: str, block: Block, recording: Recording) -> InverseChec
         output=output,
         time=np.arange(CHECK_SAMPLES, dtype=np.float64) * (1.0 if step is None else step),
         reachable=(low, high),
-        error=float(np.abs(output - reference).max() / (high - low)),
+        error=error,
     )

@@ -14,6 +14,8 @@ from sklearn.base import BaseEstimator
 from sklearn.exceptions import NotFittedError
 
 from mckibben.blocks.base import Block, Channel, run_many
+from mckibben.blocks.compose import Series
+from mckibben.blocks.negative import Negative
 from mckibben.errors import ModelError
 from mckibben.estimators.data import Mask, TrainingData, training_data
 from mckibben.estimators.search import Progress, Swarm, Tracker
@@ -140,7 +142,13 @@ class Estimator(BaseEstimator, ABC):  # type: ignore[misc]  # scikit-learn ships
         self.check_settings()
         data = training_data(recordings, self.input, self.output, rows)
         tracker = Tracker(progress=progress)
-        block, data = self.identify(data, tracker)
+        if data.falls:
+            rising, used = self.identify(data.negated(), tracker)
+            channel = self.channels(data)["output"]
+            block: Block = Series((rising, Negative(channel, channel)))
+            data = data.with_peaks([run.peak for run in used.runs])
+        else:
+            block, data = self.identify(data, tracker)
         self.model_ = block
         self.diagnostics_ = self._diagnose(block, data, tracker, started)
         if progress is not None:
@@ -149,7 +157,10 @@ class Estimator(BaseEstimator, ABC):  # type: ignore[misc]  # scikit-learn ships
 
     @abstractmethod
     def identify(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
-        """Return the block found, and the data with the memories at the start that belong to it."""
+        """Return the block found, and the data with the memories at the start that belong to it.
+
+        The output of the data rises with the input; `fit` changes its sign where it does not.
+        """
 
     def check_settings(self) -> None:
         """Refuse settings out of range."""

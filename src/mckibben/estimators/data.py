@@ -92,6 +92,16 @@ class TrainingData:
         """Sample time of all runs, or None where one has none."""
         return self.runs[0].sample_time
 
+    @property
+    def falls(self) -> bool:
+        """Whether the output falls while the input rises, as a muscle's length does."""
+        inputs = np.concatenate([run.u[run.counts] for run in self.runs])
+        return float(np.dot(inputs - inputs.mean(), self.target)) < 0
+
+    def negated(self) -> TrainingData:
+        """Return the same data with the output's sign changed."""
+        return replace(self, runs=tuple(replace(run, y=-run.y) for run in self.runs))
+
     def with_peaks(self, peaks: Sequence[float | None]) -> TrainingData:
         """Return the same data with other memories at the start."""
         runs = tuple(replace(run, peak=peak) for run, peak in zip(self.runs, peaks, strict=True))

@@ -21,7 +21,7 @@ HELD_TRAVEL = 0.5
 """A hold lasts at least as long as the input, when it moves, takes for this share of its range."""
 
 SETTLED = 0.1
-"""Share of a hold after which creep is measured, so that the lag of a jump is not taken for it."""
+"""Share of a hold that is left out at its start, so that the lag of a jump is not taken for creep."""
 
 CLEAR = 20
 """A step this many times the noise shows movement."""
@@ -44,8 +44,9 @@ def creep(tracks: Sequence[Track], scale: Scale) -> tuple[float | None, float | 
 
     Positive where it goes on the way it was going. A hold keeps the input within 0.5 % of its range,
     or its noise, for as long as it otherwise takes to cross half of its range, and at least ten
-    samples. The first tenth of it is left out. Medians over the holds that are at least half as long
-    as the longest. None without time or holds.
+    samples. The first tenth of it is left out; the means over the second tenth and the last are
+    compared. Medians over the holds that are at least half as long as the longest. None without time
+    or holds.
     """
     found = []
     for track in tracks:
@@ -58,9 +59,10 @@ def creep(tracks: Sequence[Track], scale: Scale) -> tuple[float | None, float | 
                 continue
             came_from = float(before[np.argmax(np.abs(before - track.u[start]))])
             way = scale.sign * np.sign(track.u[start] - came_from)
-            first = start + round(SETTLED * (stop - start))
-            moved = float(way * (track.y[stop - 1] - track.y[first]))
-            found.append((track.sample_time * (stop - 1 - first), moved))
+            part = max(1, round(SETTLED * (stop - start)))
+            early, late = (track.y[at : at + part].mean() for at in (start + part, stop - part))
+            lasted = track.sample_time * (stop - start - 2 * part)
+            found.append((lasted, float(way * (late - early))))
     if not found:
         return None, None
     times, moves = np.array(found).T

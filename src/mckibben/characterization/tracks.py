@@ -129,7 +129,7 @@ def prepare(
                 channel=channel,
                 remedy="record while it moves, or name another channel",
             )
-    together = sum(float(np.dot(u - u.mean(), y - y.mean())) for u, y in pairs)
+    together = sum(float(np.sum((u - u.mean()) * (y - y.mean()))) for u, y in pairs)
     scale = Scale(
         float(u_low),
         float(u_high),

@@ -188,9 +188,8 @@ def _memory(found: Characterization) -> str:
     if found.wiping_out_error is not None:
         share = _percent(found.wiping_out_error)
         wiped = found.wiping_out_error < REMEMBERED
-        parts.append(
-            f"beyond them the output is {'as without them, within' if wiped else 'off that without them by'} {share}"
-        )
+        off = "as without them, within" if wiped else "off that without them by"
+        parts.append(f"beyond them the output is {off} {share}")
     if found.drift is not None and 100 * abs(found.drift) >= NOTABLE * found.output_span:
         parts.append(
             f"from cycle to cycle the output drifts by {_value(found.drift, found.output_unit)}"

@@ -133,7 +133,7 @@ def staircase(time: ArrayLike, levels: Sequence[float], hold: float, ramp: float
     step = np.clip(np.floor(t / (hold + ramp)), 0, heights.size - 1).astype(int)
     if ramp == 0:
         return np.asarray(heights[step])
-    share = np.clip((t - step * (hold + ramp) - hold) / ramp, 0.0, 1.0)
+    share = np.clip(t - step * (hold + ramp) - hold, 0.0, ramp) / ramp
     after = heights[np.minimum(step + 1, heights.size - 1)]
     return np.asarray(heights[step] + share * (after - heights[step]))
 

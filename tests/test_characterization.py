@@ -1,0 +1,419 @@
+"""Characterization against loops whose every number is known, under noise, and on real muscles."""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+import re
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from mckibben import PI, DataError, Recording
+from mckibben.characterization import Characterization, characterize
+from mckibben.characterization.memory import excursions
+from mckibben.signals import irregular_triangle, random_wave, sine, staircase, triangle
+
+Array = NDArray[np.float64]
+
+DATA = Path(os.environ.get("MCKIBBEN_DATA", Path(__file__).parents[2] / "shared" / "data"))
+STEP = 0.01
+TIME = np.arange(10_001) * STEP
+
+
+def run(u: Array, y: Array, step: float | None = STEP) -> Recording:
+    """Return a recording of pressure and displacement."""
+    return Recording({"pressure": u, "displacement": y}, step)
+
+
+def play(u: Array, radius: float) -> Array:
+    """Return a play operator that starts on its lower side."""
+    return PI(thresholds=(radius,), weights=(1.0,)).simulate(u)
+
+
+def noisy(recording: Recording, share: float, seed: int = 0) -> Recording:
+    """Return a recording with noise of a share of each channel's range."""
+    rng = np.random.default_rng(seed)
+    channels = {
+        name: x + share * float(np.ptp(x)) * rng.standard_normal(x.size)
+        for name, x in recording.channels.items()
+    }
+    return Recording(channels, recording.sample_time)
+
+
+def lag(u: Array, seconds: float) -> Array:
+    """Return a first-order lag."""
+    y = np.empty_like(u)
+    y[0] = u[0]
+    for i in range(1, u.size):
+        y[i] = y[i - 1] + STEP / seconds * (u[i] - y[i - 1])
+    return y
+
+
+def parallelogram(gain: float, gap: float) -> Recording:
+    """Return a loop whose branches are straight and a constant gap apart, jumping at the ends."""
+    u = triangle(TIME, 20.0, 4.0)
+    rising = np.diff(u, append=u[-1] + 1) > 0
+    return run(u, gain * u + np.where(rising, 0.0, gap))
+
+
+@given(st.floats(0.5, 20.0), st.floats(0.01, 2.0))
+@settings(max_examples=25)
+def test_every_number_of_a_parallelogram(gain: float, gap: float) -> None:
+    found = characterize(parallelogram(gain, gap))
+    span = 4 * gain + gap
+    assert found.n_cycles == 5
+    assert found.n_reversals == 9
+    assert found.mid_width == pytest.approx(gap, rel=1e-6)
+    assert found.loop_width == pytest.approx(100 * gap / span, rel=0.01)
+    assert [cycle.width for cycle in found.cycles] == pytest.approx(
+        [found.loop_width] * 5, rel=0.01
+    )
+    assert [cycle.amplitude for cycle in found.cycles] == pytest.approx([4.0] * 5)
+    assert [cycle.rate for cycle in found.cycles] == pytest.approx([0.4] * 5)
+    assert found.loop_area == pytest.approx(4 * gap, rel=0.01)
+    assert found.loss_per_area == pytest.approx(400 * gap, rel=0.01)
+    assert found.branch_gap == pytest.approx(gap, rel=0.01)
+    assert found.gain == pytest.approx(gain)
+    assert found.asymmetry == pytest.approx(0.0, abs=1e-6)
+    assert found.drift == pytest.approx(0.0, abs=1e-9)
+    assert found.saturation is None
+    assert found.onset is None
+    assert found.creep is None
+
+
+@given(st.floats(0.1, 0.9), st.sampled_from([0.0, 0.002, 0.01]))
+@settings(max_examples=20)
+def test_dead_zone_of_a_play_operator_is_twice_its_radius(radius: float, noise: float) -> None:
+    u = triangle(TIME, 20.0, 4.0)
+    found = characterize(noisy(run(u, play(u, radius)), noise))
+    tolerance = 1e-9 if noise == 0 else 4 * noise
+    assert found.dead_zone_upper == pytest.approx(2 * radius, abs=tolerance * 4)
+    assert found.dead_zone_lower == pytest.approx(2 * radius, abs=tolerance * 4)
+    assert found.mid_width == pytest.approx(2 * radius, abs=1e-9 + 4 * noise)
+    assert found.rate_verdict == "unknown"
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.003, 0.01])
+@pytest.mark.parametrize("seed", range(4))
+def test_prandtl_ishlinskii_loops_close_and_are_wiped_out(noise: float, seed: int) -> None:
+    model = PI(thresholds=(0.0, 0.2, 0.5, 1.0), weights=(3.0, 2.0, 1.0, 1.0))
+    u = np.concatenate(
+        [triangle(TIME[:4000], 10.0, 5.0), irregular_triangle(TIME, 60, 5.0, seed=seed)]
+    )
+    found = characterize(noisy(run(u, model.simulate(u)), noise, seed))
+    assert found.closure_error is not None
+    assert found.wiping_out_error is not None
+    # Turns fall between samples, so that even clean loops close to within a step only.
+    assert found.closure_error < 0.1 + 150 * noise
+    assert found.wiping_out_error < 0.1 + 150 * noise
+    assert found.asymmetry is not None
+    assert found.asymmetry < 0.5 + 30 * noise
+
+
+def test_what_forgets_its_turning_points_does_not_close() -> None:
+    u = np.concatenate(
+        [triangle(TIME[:4000], 10.0, 5.0), irregular_triangle(TIME, 60, 5.0, seed=1)]
+    )
+    found = characterize(run(u, lag(u, 1.0)))
+    assert found.closure_error is not None
+    assert found.closure_error > 2
+    assert any("miss their start" in sentence for sentence in found.sentences)
+
+
+def naive_closed(heights: list[int]) -> set[tuple[int, int]]:
+    """Return (departure, back) of closed minor loops, from the definition of return-point memory.
+
+    A turn is a departure when the input comes back beyond it before it passes the turn's own origin:
+    the extreme, since the last time that it was beyond the departure, on the other side.
+    """
+    closed = set()
+    for i in range(1, len(heights) - 1):
+        way = 1 if heights[i] > heights[i - 1] else -1
+        level = way * heights[i]
+        before = []
+        for height in reversed(heights[:i]):
+            if way * height > level:
+                break
+            before.append(way * height)
+        origin = min(before)
+        for k in range(i + 1, len(heights)):
+            if way * heights[k] > level:
+                closed.add((i, k - 1))
+                break
+            if way * heights[k] < origin:
+                break
+    return closed
+
+
+@given(st.lists(st.integers(0, 10_000), min_size=2, max_size=40, unique=True))
+def test_excursions_are_those_of_return_point_memory(levels: list[int]) -> None:
+    u = np.array(levels, dtype=float)
+    inside = [k for k in range(1, u.size - 1) if (u[k] - u[k - 1]) * (u[k + 1] - u[k]) < 0]
+    heights = [levels[0], *(levels[k] for k in inside), levels[-1]]
+    found = {(e.departure, e.back) for e in excursions(np.array(heights, dtype=float), 0.0)}
+    assert found == naive_closed(heights)
+
+
+def test_saturation_and_onset() -> None:
+    u = triangle(TIME, 20.0, 5.0)
+    found = characterize(run(u, np.clip(u, 1.5, 4.0)))
+    assert found.saturation == pytest.approx(4.0, abs=0.2)
+    assert found.onset == pytest.approx(1.5, abs=0.2)
+    assert found.gain == pytest.approx(1.0, rel=1e-6)
+    assert re.search(r"saturates above (3\.9|4|4\.1) bar", found.sentences[0])
+
+
+def test_asymmetry_of_a_loop_that_widens_towards_high_inputs() -> None:
+    u = triangle(TIME, 20.0, 4.0)
+    rising = np.diff(u, append=u[-1] + 1) > 0
+    found = characterize(run(u, u + np.where(rising, 0.0, 0.3 * u)))
+    # The centroid of a triangle lies at two thirds of its height.
+    assert found.width_centroid == pytest.approx(1 / 3, abs=0.02)
+    assert found.asymmetry is not None
+    assert found.asymmetry > 5
+    assert "asymmetric" in found.sentences[0]
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.002])
+def test_creep_in_holds(noise: float) -> None:
+    u = staircase(TIME, [0.0, 1, 2, 3, 4, 3, 2, 1, 0, 1], hold=9.5, ramp=0.5)
+    y = 5 * u + 0.5 * lag(u, 3.0)
+    found = characterize(noisy(run(u, y), noise))
+    # An exponential that starts in the ramp, between the middles of the second tenth and the last.
+    held, tau, ramp = 9.5, 3.0, 0.5
+    start = 0.5 * tau / ramp * (1 - np.exp(-ramp / tau))
+    expected = start * (np.exp(-0.15 * held / tau) - np.exp(-0.95 * held / tau))
+    assert found.creep == pytest.approx(expected, rel=0.1)
+    assert found.creep_time == pytest.approx(0.8 * held, rel=0.05)
+    assert "creeps 0.27 mm over 7.6 s" in found.sentences[0]
+
+
+def test_creep_has_a_sign() -> None:
+    u = staircase(TIME, [0.0, 1, 2, 3, 4, 3, 2, 1, 0, 1], hold=9.5, ramp=0.5)
+    found = characterize(run(u, -5 * u + 0.5 * lag(u, 3.0)))
+    assert found.creep is not None
+    assert found.creep < 0
+    assert "creeps back" in found.sentences[0]
+
+
+@pytest.mark.parametrize(
+    "wave",
+    [sine(TIME, 10.0, 5.0), triangle(TIME, 10.0, (5.0, 3.0)), sine(TIME, 25.0, (5, 2, 1, 4))],
+)
+@pytest.mark.parametrize("noise", [0.0, 0.01])
+def test_waves_have_no_holds(wave: Array, noise: float) -> None:
+    assert characterize(noisy(run(wave, play(wave, 0.3)), noise)).creep is None
+
+
+def test_drift_between_cycles() -> None:
+    u = triangle(TIME, 10.0, 5.0)
+    found = characterize(run(u, 4 * u + 0.05 * TIME))
+    assert found.drift == pytest.approx(0.5, rel=1e-6)
+    assert any("drifts by 0.5 mm" in sentence for sentence in found.sentences)
+
+
+def test_dependence_on_rate() -> None:
+    u = np.concatenate([sine(TIME[:4000], 20.0, 4.0), sine(TIME[:1001], 5.0, 4.0)])
+    fast = characterize(run(u, lag(u, 0.3)))
+    assert fast.rate_verdict == "strong"
+    # The width of a lag is near 2 sin(phase), and the phase grows with the frequency.
+    assert fast.rate_dependence == pytest.approx((33.5 - 9.4) / 2, rel=0.1)
+    same = characterize(run(u, play(u, 0.3)))
+    assert same.rate_verdict == "none"
+    assert same.rate_dependence == pytest.approx(0.0, abs=1.0)
+
+
+def test_without_time_what_needs_time_is_none() -> None:
+    u = triangle(TIME, 10.0, 5.0)
+    found = characterize(run(u, play(u, 0.3), None))
+    assert found.duration is found.sample_time is found.creep is found.rate_dependence is None
+    assert found.rate_verdict == "unknown"
+    assert [cycle.rate for cycle in found.cycles] == [None] * 10
+    assert found.loop_width is not None
+    assert found.drift == pytest.approx(0.0, abs=1e-9)
+
+
+def test_an_output_that_falls_with_the_input() -> None:
+    u = triangle(TIME, 10.0, 5.0)
+    up, down = characterize(run(u, play(u, 0.3))), characterize(run(u, -play(u, 0.3)))
+    for name in ("loop_width", "asymmetry", "dead_zone_upper", "dead_zone_lower", "branch_gap"):
+        assert getattr(down, name) == pytest.approx(getattr(up, name))
+    assert down.gain is not None
+    assert down.gain == pytest.approx(-1.0)
+
+
+@given(st.integers(0, 50))
+@settings(max_examples=10)
+def test_noise_moves_nothing_much(seed: int) -> None:
+    u = triangle(TIME, 20.0, 4.0)
+    model = PI(thresholds=(0.0, 0.3, 0.8), weights=(3.0, 2.0, 1.0))
+    clean = characterize(run(u, model.simulate(u)))
+    found = characterize(noisy(run(u, model.simulate(u)), 0.01, seed))
+    assert found.n_reversals == clean.n_reversals
+    assert found.input_noise == pytest.approx(0.04, rel=0.15)
+    assert found.loop_width == pytest.approx(clean.loop_width, abs=1.5)
+    assert found.gain == pytest.approx(clean.gain, rel=0.05)
+    assert found.dead_zone_upper == pytest.approx(clean.dead_zone_upper, abs=0.1)
+    assert found.loop_area_share == pytest.approx(clean.loop_area_share, abs=1.5)
+
+
+def test_minor_loops_do_not_part_a_cycle() -> None:
+    levels = [0.0, 2.0, 1.8, 4.0, 2.5, 2.8, 0.0, 2.0, 1.8, 4.0, 2.5, 2.8, 0.0]
+    ways = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(levels)))])
+    u = np.interp(np.linspace(0, ways[-1], 5001), ways, levels)
+    found = characterize(run(u, play(u, 0.2)))
+    assert found.n_cycles == 2
+    assert found.n_reversals == 11
+    assert found.mid_width == pytest.approx(0.4, abs=0.01)
+
+
+def test_recordings_are_measured_together() -> None:
+    u = triangle(TIME, 20.0, 4.0)
+    low, high = run(0.5 * u, play(0.5 * u, 0.3)), run(u, play(u, 0.3))
+    both = characterize([low, high])
+    assert both.n_recordings == 2
+    assert both.n_cycles == 10
+    assert both.input_range == (0.0, 4.0)
+    assert both.duration == pytest.approx(200.0)
+    assert both.mid_width == pytest.approx(0.6)
+    assert {cycle.recording for cycle in both.cycles} == {0, 1}
+
+
+def test_it_can_be_saved_and_shown() -> None:
+    for found in (
+        characterize(parallelogram(3.0, 1.0)),
+        characterize(run(np.linspace(0, 5, 50), np.linspace(0, 5, 50) ** 2)),
+    ):
+        assert json.loads(json.dumps(found.to_dict(), allow_nan=False)) == found.to_dict()
+        rows = found.table()
+        assert len({quantity for quantity, *_ in rows}) == len(rows)
+        assert all(isinstance(v, float | int | str | None) for _, v, *_ in rows)
+        assert all(explanation for *_, explanation in rows)
+        for sentence in found.sentences:
+            assert sentence[0].isupper()
+            assert sentence.endswith(".")
+            assert not any(odd in sentence for odd in ("None", "nan", "  "))
+
+
+@pytest.mark.parametrize(
+    ("recordings", "words"),
+    [
+        ([], "no recording"),
+        (run(np.zeros(50), np.arange(50.0)), "'pressure'.*constant"),
+        (run(np.arange(50.0), np.ones(50)), "'displacement'.*constant"),
+        (run(np.arange(5.0), np.arange(5.0)), "'pressure'.*too few"),
+        (Recording({"pressure": np.arange(50.0)}), "no channel 'displacement'"),
+        (
+            [
+                Recording({"pressure": np.arange(50.0), "displacement": np.arange(50.0)}),
+                Recording({"pressure": np.arange(50.0), "force": np.arange(50.0)}),
+            ],
+            "no channel 'displacement'",
+        ),
+    ],
+)
+def test_what_cannot_be_characterized_is_refused(
+    recordings: Recording | list[Recording], words: str
+) -> None:
+    with pytest.raises(DataError, match=words):
+        characterize(recordings)
+
+
+def test_units_must_agree() -> None:
+    ramp = np.arange(50.0)
+    runs = [Recording({"a": ramp, "b": ramp}, 1.0, {"a": unit}) for unit in ("rad", "deg")]
+    with pytest.raises(DataError, match="different units"):
+        characterize(runs, "a", "b")
+
+
+@given(
+    st.integers(10, 60).flatmap(
+        lambda n: st.tuples(*(st.lists(st.integers(-9, 9), min_size=n, max_size=n),) * 2)
+    )
+)
+def test_any_recording_is_described_or_refused(channels: tuple[list[int], list[int]]) -> None:
+    u, y = (np.array(channel, dtype=float) for channel in channels)
+    try:
+        found = characterize(run(u, y))
+    except DataError:
+        assert min(np.ptp(u), np.ptp(y)) == 0
+        return
+    json.dumps(found.to_dict(), allow_nan=False)
+    assert found.sentences
+
+
+def test_a_million_samples_take_under_a_second() -> None:
+    t = np.arange(1_000_000) * 1e-3
+    u = random_wave(t, 0.1, 5.0, seed=0)
+    long = noisy(run(u, play(u, 0.4), 1e-3), 0.005)
+    best = np.inf
+    for _ in range(3):
+        began = time.perf_counter()
+        characterize(long)
+        best = min(best, time.perf_counter() - began)
+    assert best < 1.0
+
+
+def read(name: str, pressure: str, displacement: str) -> tuple[Array, Array, Array]:
+    """Return time (or sample numbers), pressure and displacement of a real recording."""
+    path = DATA / f"{name}.csv"
+    if not path.exists():
+        pytest.skip("the measured recordings are not here")
+    with path.open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    columns = [np.array([float(row[name]) for row in rows]) for name in (pressure, displacement)]
+    timed = "time_s" in rows[0]
+    t = [float(row["time_s"]) if timed else number for number, row in enumerate(rows)]
+    return np.array(t, dtype=float), *columns  # type: ignore[return-value]
+
+
+def test_a_real_quasi_static_muscle() -> None:
+    _, u, y = read("festo_dmsp10_static/festo_dmsp10_static", "pressure_bar", "displacement_mm")
+    found = characterize(run(u, y, None))
+    assert found.n_cycles == 3
+    assert [14 < cycle.width < 17 for cycle in found.cycles] == [True] * 3
+    assert found.gain is not None
+    assert 8 < found.gain < 12
+    assert found.sentences[0].startswith("Wide (16 %)")
+
+
+def test_real_levels_are_too_coarse_for_a_loop_but_show_the_gap() -> None:
+    t, u, y = read("festo_dmsp10_levels/festo_dmsp10_levels", "pressure_bar", "displacement_mm")
+    found = characterize(run(u, y, float(t[1] - t[0])))
+    assert found.input_noise is None
+    assert found.n_reversals > 100
+    assert found.cycles == ()
+    assert found.loop_width is found.dead_zone_upper is found.closure_error is None
+    assert found.branch_gap == pytest.approx(1.4, abs=0.5)
+
+
+@pytest.mark.parametrize(
+    "name", ["sample1_load200g", "sample2_load200g", "sample2_load400g", "sample3_load400g"]
+)
+def test_real_cavatappi_muscles_have_very_wide_loops(name: str) -> None:
+    t, psi, y = read(f"cavatappi_loads/{name}", "pressure_psi", "position_mm")
+    grid = np.arange(t[0], t[-1], 1e-3)
+    u = 0.0689476 * np.interp(grid, t, psi)
+    found = characterize(run(u, np.interp(grid, t, y), 1e-3))
+    assert 3 <= found.n_cycles <= 7
+    assert found.loop_width is not None
+    assert 50 < found.loop_width < 90
+    assert found.sentences[0].startswith("Very wide")
+
+
+def test_a_real_recording_in_pieces() -> None:
+    t, psi, y = read("cavatappi_loads/sample1_load200g", "pressure_psi", "position_mm")
+    cuts = np.flatnonzero(np.diff(t) > 0.0015) + 1
+    pieces = zip(np.split(psi, cuts), np.split(y, cuts), strict=True)
+    found: Characterization = characterize([run(u, x, 1e-3) for u, x in pieces if u.size > 9])
+    assert found.n_cycles == 0
+    assert found.loop_width is None
+    assert found.branch_gap is not None
+    assert "no whole cycle" in found.sentences[-1]

@@ -1,0 +1,113 @@
+"""Excitations: exact shapes, limits, repeatability."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from mckibben import DataError
+from mckibben.signals import (
+    cycles,
+    irregular_triangle,
+    random_wave,
+    reversals,
+    sine,
+    staircase,
+    triangle,
+)
+
+TIME = np.arange(4001) / 100
+
+
+@pytest.mark.parametrize("wave", [sine, triangle])
+def test_each_cycle_starts_at_the_minimum_and_reaches_its_peak(wave: Callable[..., Any]) -> None:
+    peaks = (2.0, 5.0, 3.0, 1.0)
+    u = wave(TIME, 10.0, peaks, low=0.5)
+    assert u[::1000] == pytest.approx(0.5)
+    assert u[500::1000] == pytest.approx(peaks)
+    assert [piece.start for piece in cycles(u)] == [0, 1000, 2000, 3000]
+
+
+def test_a_sine_is_a_cosine_from_its_minimum() -> None:
+    expected = 1 + 3 * (0.5 - 0.5 * np.cos(2 * np.pi * 0.2 * TIME))
+    assert sine(TIME, 5.0, 4.0, low=1.0) == pytest.approx(expected, abs=1e-12)
+
+
+def test_peaks_come_again() -> None:
+    u = triangle(TIME, 10.0, (1.0, 2.0))
+    assert u[500::1000] == pytest.approx([1.0, 2.0, 1.0, 2.0])
+
+
+@given(st.integers(1, 40), st.integers(0, 1000))
+def test_irregular_triangle_turns_as_often_as_asked(n_turns: int, seed: int) -> None:
+    time = np.linspace(0, 100, 20001)
+    u = irregular_triangle(time, n_turns, 5.0, 1.0, seed=seed)
+    assert u[0] == 1.0
+    assert u.min() >= 1.0
+    assert u.max() == pytest.approx(5.0, abs=0.1)
+    found = reversals(u, 0.0).size - 2
+    assert found <= n_turns
+    # Turns closer to each other than two samples may be lost.
+    assert found >= 0.8 * n_turns - 1
+
+
+def test_irregular_triangle_moves_at_one_speed() -> None:
+    u = irregular_triangle(np.linspace(0, 10, 100_001), 12, 5.0, seed=4)
+    speeds = np.abs(np.diff(u))
+    assert np.quantile(speeds, 0.01) == pytest.approx(np.quantile(speeds, 0.99), rel=1e-6)
+
+
+@given(st.lists(st.floats(-5, 5), min_size=1, max_size=6), st.floats(0.0, 2.0))
+def test_staircase_holds_every_level(levels: list[float], ramp: float) -> None:
+    hold = 1.0
+    for number, level in enumerate(levels):
+        within = number * (hold + ramp) + np.array([0.01, 0.5, 0.99]) * hold
+        assert staircase(within, levels, hold, ramp) == pytest.approx(level)
+    late = np.array([1e3, 1e4])
+    assert staircase(late, levels, hold, ramp) == pytest.approx(levels[-1])
+
+
+@given(st.integers(0, 100), st.floats(0.1, 5.0))
+def test_random_wave_fills_its_limits_and_stays_within_its_band(seed: int, band: float) -> None:
+    time = np.arange(8192) / 100
+    u = random_wave(time, band, 4.0, 1.0, seed=seed)
+    assert (u.min(), u.max()) == pytest.approx((1.0, 4.0), rel=1e-15)
+    assert u.max() <= 4.0
+    power = np.abs(np.fft.rfft((u - u.mean()) * np.hanning(u.size))) ** 2
+    beyond = np.fft.rfftfreq(u.size, 0.01) > band + 0.1
+    assert power[beyond].sum() < 1e-4 * power.sum()
+
+
+def test_random_excitations_repeat_with_their_seed() -> None:
+    for wave in (random_wave, irregular_triangle):
+        first, again, other = (wave(TIME, 9, 5.0, seed=seed) for seed in (3, 3, 4))
+        assert np.array_equal(first, again)
+        assert not np.array_equal(first, other)
+
+
+@pytest.mark.parametrize(
+    "wish",
+    [
+        lambda: sine(TIME, 0.0, 1.0),
+        lambda: sine(TIME, 1.0, ()),
+        lambda: triangle(TIME - 1.0, 1.0, 1.0),
+        lambda: triangle([0.0, np.nan], 1.0, 1.0),
+        lambda: triangle([], 1.0, 1.0),
+        lambda: irregular_triangle(TIME, 0, 5.0, seed=0),
+        lambda: irregular_triangle(TIME, 3, 1.0, 2.0, seed=0),
+        lambda: staircase(TIME, (), 1.0),
+        lambda: staircase(TIME, (1.0,), 0.0),
+        lambda: staircase(TIME, (1.0,), 1.0, -1.0),
+        lambda: random_wave(TIME, np.inf, 5.0, seed=0),
+        lambda: random_wave(TIME, 1.0, 0.0, seed=0),
+        lambda: random_wave([1.0], 1.0, 5.0, seed=0),
+    ],
+)
+def test_impossible_wishes_are_refused(wish: Callable[[], Any]) -> None:
+    with pytest.raises(DataError, match="Remedy"):
+        wish()

@@ -1,0 +1,166 @@
+"""Turning points, branches and cycles: against a naive zigzag, and under noise."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from mckibben import DataError
+from mckibben.signals import branches, cycles, noise_level, reversals, sine, staircase, triangle
+
+Array = NDArray[np.float64]
+
+LEVELS = st.lists(st.integers(-8, 8).map(float), min_size=2, max_size=60).map(np.array)
+THRESHOLDS = st.sampled_from([0.0, 0.5, 1.0, 2.5, 6.0])
+TIME = np.arange(10_001) / 100
+
+
+def naive_turns(x: Array, threshold: float) -> list[int]:
+    """Find each turn as the extreme sample before the first swing back beyond the threshold."""
+    turns = [0]
+    start, way = 0, 0
+    for i in range(1, x.size):
+        run = x[start : i + 1]
+        back = {1: run.max() - x[i], -1: x[i] - run.min()}
+        if way == 0:
+            way = -1 if back[1] > threshold else 1 if back[-1] > threshold else 0
+            start = start if way == 0 else i
+        elif back[way] > threshold:
+            extreme = run.max() if way > 0 else run.min()
+            turns.append(start + int(np.flatnonzero(run == extreme)[-1]))
+            start, way = i, -way
+    return [*turns, x.size - 1]
+
+
+@given(LEVELS, THRESHOLDS)
+def test_reversals_are_those_of_a_naive_search(x: Array, threshold: float) -> None:
+    # The naive search restarts where the swing is noticed, which is where the next extreme is too.
+    assert reversals(x, threshold).tolist() == naive_turns(x, threshold)
+
+
+@given(LEVELS, THRESHOLDS)
+def test_between_turns_nothing_swings_back_beyond_the_threshold(x: Array, threshold: float) -> None:
+    for start, stop, way in branches(x, threshold):
+        piece = x[start:stop] * (way or 1)
+        assert (np.maximum.accumulate(piece) - piece).max() <= threshold
+
+
+@given(LEVELS, THRESHOLDS)
+def test_inner_turns_are_the_extremes_of_both_branches(x: Array, threshold: float) -> None:
+    turns = reversals(x, threshold)
+    for before, turn, after in zip(turns, turns[1:], turns[2:], strict=False):
+        around = x[before : after + 1]
+        assert x[turn] in (around.max(), around.min())
+        assert abs(x[turn] - x[before]) > 0
+        assert abs(x[turn] - x[after]) > 0
+
+
+@given(LEVELS, THRESHOLDS)
+def test_branches_join_and_alternate(x: Array, threshold: float) -> None:
+    found = branches(x, threshold)
+    assert found[0][0] == 0
+    assert found[-1][1] == x.size
+    for (_, stop, way), (start, _, next_way) in pairwise(found):
+        assert start == stop - 1
+        assert way == -next_way != 0
+
+
+@given(LEVELS, THRESHOLDS, st.integers(1, 5))
+def test_holds_are_no_reversals(x: Array, threshold: float, hold: int) -> None:
+    turns = reversals(x, threshold)
+    held = reversals(np.repeat(x, hold), threshold)
+    assert held[0] == 0
+    assert held[1:].tolist() == ((turns[1:] + 1) * hold - 1).tolist()
+
+
+@given(LEVELS, THRESHOLDS)
+def test_turning_the_signal_over_turns_it_at_the_same_places(x: Array, threshold: float) -> None:
+    assert reversals(-x, threshold).tolist() == reversals(x, threshold).tolist()
+
+
+@pytest.mark.parametrize("noise", [0.001, 0.01, 0.05, 0.1])
+@pytest.mark.parametrize("seed", range(3))
+def test_noise_makes_no_reversals(noise: float, seed: int) -> None:
+    clean = triangle(TIME, 20.0, (5.0, 3.0, 4.0, 2.0, 5.0))
+    noisy = clean + noise * np.random.default_rng(seed).standard_normal(TIME.size)
+    turns = reversals(noisy)
+    assert turns.size == reversals(clean).size == 11
+    # A maximum of noisy samples lies where the signal is within the noise of its peak.
+    assert np.abs(clean[turns] - clean[reversals(clean)]).max() <= 8 * noise
+
+
+def test_noisy_holds_are_no_reversals() -> None:
+    steps = staircase(TIME, [0.0, 2.0, 4.0, 5.0, 3.0, 1.0], hold=15.0, ramp=1.0)
+    noisy = steps + 0.02 * np.random.default_rng(0).standard_normal(TIME.size)
+    assert [way for _, _, way in branches(noisy)] == [1, -1]
+
+
+@pytest.mark.parametrize("noise", [1e-4, 0.01, 0.2])
+def test_noise_level_is_that_of_the_noise(noise: float) -> None:
+    rng = np.random.default_rng(1)
+    for clean in (sine(TIME, 10.0, 5.0), triangle(TIME, 7.0, 5.0), 0.1 * TIME):
+        found = noise_level(clean + noise * rng.standard_normal(TIME.size))
+        assert found == pytest.approx(noise, rel=0.1)
+
+
+def test_noise_level_is_not_moved_by_jumps() -> None:
+    steps = staircase(TIME, [0.0, 2.0, 1.0, 4.0], hold=2.0)
+    noisy = steps + 0.01 * np.random.default_rng(0).standard_normal(TIME.size)
+    assert noise_level(noisy) == pytest.approx(0.01, rel=0.1)
+
+
+def test_levels_recorded_once_each_have_no_known_noise() -> None:
+    levels = np.random.default_rng(0).uniform(0, 5, 200)
+    assert math.isnan(noise_level(levels))
+    assert math.isnan(noise_level(levels[:5]))
+    assert reversals(levels).size > 100
+
+
+def test_a_quiet_piece_is_judged_by_the_range_given() -> None:
+    quiet = 0.01 * np.random.default_rng(0).standard_normal(500)
+    assert math.isnan(noise_level(quiet))
+    assert noise_level(quiet, span=5.0) == pytest.approx(0.01, rel=0.15)
+
+
+@pytest.mark.parametrize("low", [0.0, 1.0])
+def test_cycles_run_from_minimum_to_minimum(low: float) -> None:
+    u = triangle(TIME, 20.0, (5.0, 3.0, 4.0), low)
+    found = cycles(u)
+    assert [(piece.start, piece.stop) for piece in found] == [
+        (2000 * k, 2000 * (k + 1) + 1) for k in range(5)
+    ]
+
+
+def test_cut_cycles_at_the_ends_do_not_count() -> None:
+    u = triangle(TIME, 20.0, 5.0)
+    assert len(cycles(u[500:])) == 4
+    assert len(cycles(u[:-500])) == 4
+    assert len(cycles(u[50:-50])) == 5
+    assert cycles(u[:900]) == []
+    assert len(cycles(-u)) == 4
+
+
+def test_a_constant_has_one_branch_without_direction() -> None:
+    assert branches([2.0, 2.0, 2.0]) == [(0, 3, 0)]
+    assert cycles([2.0, 2.0, 2.0]) == []
+
+
+@pytest.mark.parametrize(
+    ("x", "words"),
+    [([1.0], "no branches"), ([[1.0, 2.0]], "no branches"), ([0.0, math.nan], "row 2")],
+)
+def test_what_is_no_signal_is_refused(x: list[float], words: str) -> None:
+    for search in (noise_level, reversals, branches, cycles):
+        with pytest.raises(DataError, match=words):
+            search(x)
+
+
+def test_a_negative_threshold_is_refused() -> None:
+    with pytest.raises(DataError, match="threshold"):
+        reversals([0.0, 1.0], -1.0)

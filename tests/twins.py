@@ -49,6 +49,10 @@ def affine(block: Any, inputs: Rows, sample_time: float) -> Rows:
     return _rows([block.gain * u + block.offset for u in _column(inputs)])
 
 
+def negative(block: Any, inputs: Rows, sample_time: float) -> Rows:
+    return _rows([-u for u in _column(inputs)])
+
+
 def _lines(knots: tuple[float, ...], values: tuple[float, ...], x: float) -> float:
     piece = 0
     while piece < len(knots) - 2 and x >= knots[piece + 1]:
@@ -295,6 +299,7 @@ TWINS: dict[str, Twin] = {
     "eupi-inverse": eupi_inverse,
     "gpi": gpi,
     "gpi-inverse": gpi_inverse,
+    "negative": negative,
     "pi": pi,
     "pi-inverse": pi_inverse,
     "piecewise-linear": piecewise_linear,

@@ -8,15 +8,15 @@ return a function without arguments that runs them, and everything else here is 
 from __future__ import annotations
 
 import os
-from abc import ABC, abstractmethod
+from abc import ABCMeta, abstractmethod
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self, overload
+from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self, TypeVar, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from pydantic import BeforeValidator, ConfigDict, FiniteFloat
+from pydantic import BeforeValidator, ConfigDict, FiniteFloat, ValidationError
 from pydantic.dataclasses import dataclass as validated_dataclass
 
 from mckibben.errors import DataError, ModelError
@@ -76,7 +76,32 @@ PRESSURE = Channel("pressure", "bar")
 DISPLACEMENT = Channel("displacement", "mm")
 
 
-class Block(ABC):
+Made = TypeVar("Made")
+
+
+class Checked(ABCMeta):
+    """What makes classes whose constructors refuse bad fields with a `ModelError`."""
+
+    def __call__(cls: type[Made], *values: Any, **named: Any) -> Made:
+        """Return an instance, its fields validated."""
+        try:
+            return super().__call__(*values, **named)  # type: ignore[misc]
+        except ValidationError as error:
+            first = error.errors()[0]
+            names = [field.name for field in fields(cls)]  # type: ignore[arg-type]
+            field, *inside = first["loc"]
+            if isinstance(field, int):
+                field = names[field] if field < len(names) else f"argument {field + 1}"
+            where = ".".join(str(step) for step in (field, *inside))
+            kind = getattr(cls, "kind", cls.__name__)
+            given = "" if first["type"] == "missing" else f", but it is {first['input']!r:.60}"
+            raise ModelError(
+                f"{where} of {kind!r}: {first['msg']}{given}. "
+                f"Remedy: give what {cls.__name__} documents."
+            ) from None
+
+
+class Block(metaclass=Checked):
     """An immutable parameter set with dynamics.
 
     Concrete blocks are frozen dataclasses, registered under `kind`. They know their inputs and

@@ -199,8 +199,8 @@ class PolynomialInverse(Inverse, Primitive):
             )
         low, high = self._arguments()
         slope = np.polynomial.Polynomial(self.forward.polynomial).deriv()
-        turns = [x.real for x in slope.deriv().roots() if x.imag == 0 and low < x.real < high]
-        slopes = slope(np.array([low, high, *turns]))
+        turns = np.asarray(slope.deriv().roots(), dtype=np.complex128)
+        slopes = slope(np.array([low, high, *turns.real[turns.imag == 0].clip(low, high)]))
         if slopes.min() < -1e-12 * np.abs(slopes).max() or slopes.max() <= 0:
             raise ModelError(
                 "'polynomial' has no inverse: it does not increase over its whole input range. Remedy: "

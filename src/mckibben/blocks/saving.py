@@ -15,8 +15,6 @@ from dataclasses import fields, is_dataclass
 from pathlib import Path
 from typing import Any
 
-from pydantic import ValidationError
-
 from mckibben.blocks.base import Block
 from mckibben.errors import ModelError
 from mckibben.registry import load as load_plugin
@@ -75,14 +73,7 @@ def part_from_dict(content: Any, group: str = "blocks") -> Any:
     kind = content["kind"]
     cls = load_plugin(group, kind)
     values = {key: _tuples(value) for key, value in content.items() if key != "kind"}
-    try:
-        return cls(**values)
-    except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(str(step) for step in first["loc"]) or "its fields"
-        raise ModelError(
-            f"the {kind!r} block is damaged at {where}: {first['msg']}. Remedy: save the model again."
-        ) from None
+    return cls(**values)
 
 
 def nested(content: Any) -> Any:

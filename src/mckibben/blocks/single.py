@@ -1,4 +1,4 @@
-"""Blocks with one input and one output, and inverses that clip at the input limits of a forward block."""
+"""Blocks with one input and one output, and inverses that clip at a forward block's input limits."""
 
 from __future__ import annotations
 

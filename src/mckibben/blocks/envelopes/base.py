@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Callable
 from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from mckibben.blocks.base import Checked
 from mckibben.blocks.saving import part_from_dict
 
 Array = NDArray[np.float64]
 EnvelopeKernel = Callable[[Array, Array, Array], None]
 
 
-class Envelope(ABC):
+class Envelope(metaclass=Checked):
     """A strictly increasing function of the input, with its inverse.
 
     The kernels have the signature ``kernel(coefficients, arguments, values)`` on one-dimensional

@@ -7,7 +7,14 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from mckibben.recording import Recording
-from mckibben.report.drawing import along, axis_label, over_time, series_colour, time_label
+from mckibben.report.drawing import (
+    along,
+    axis_label,
+    left_out,
+    over_time,
+    series_colour,
+    time_label,
+)
 
 signals = st.integers(2, 500).flatmap(
     lambda n: arrays(np.float64, (2, n), elements=st.floats(-1e6, 1e6))
@@ -63,3 +70,9 @@ def test_time_without_time_is_samples() -> None:
 
 def test_colours_go_round() -> None:
     assert [series_colour(place) for place in (0, 5, 6)] == ["series-1", "series-6", "series-1"]
+
+
+def test_what_is_left_out_is_named_up_to_six_and_counted() -> None:
+    assert left_out([]) == ""
+    names = [f"run {k}" for k in range(400)]
+    assert left_out(names).endswith("run 4, run 5 and 394 more.")

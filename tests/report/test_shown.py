@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mckibben.report.shown import shown
+from mckibben.report.shown import MOST_RECORDINGS, drawn, shown
 from tests.report.studies_by_hand import measured, study
 
 
@@ -34,3 +34,11 @@ def test_outputs_belong_to_their_recording_and_are_ranked() -> None:
     assert list(first.outputs) == [row.model for row in one.leaderboard.rows if row.block]
     np.testing.assert_array_equal(first.outputs["pi"], one.predictions["pi"][1])
     np.testing.assert_array_equal(second.outputs["pi"], one.predictions["pi"][0])
+
+
+def test_recordings_tested_on_are_drawn_first_and_then_the_longest() -> None:
+    train = tuple(measured(100 + 10 * k, seed=k, name=f"run {k}") for k in range(8))
+    found = drawn(shown(study(train, (measured(100, seed=9, name="tested"),))))
+    assert len(found) == MOST_RECORDINGS
+    names = [one.recording.name for one in found]
+    assert names == ["tested", "run 7", "run 6", "run 5", "run 4", "run 3"]

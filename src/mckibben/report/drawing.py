@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -181,6 +182,19 @@ def axis_label(channel: str, unit: str) -> str:
 def time_label(recording: Recording) -> str:
     """Return the label of the time axis of a recording."""
     return "sample" if recording.sample_time is None else "time [s]"
+
+
+def left_out(names: Sequence[str]) -> str:
+    """Return the note on what a figure leaves out.
+
+    >>> left_out(["run 7", "run 8"])
+    'Not shown: run 7, run 8.'
+    """
+    if not names:
+        return ""
+    more = len(names) - N_COLOURS
+    others = f" and {more} more" if more > 0 else ""
+    return f"Not shown: {', '.join(names[:N_COLOURS])}{others}."
 
 
 def series_colour(place: int) -> str:

@@ -12,7 +12,7 @@ from mckibben.blocks.base import Block
 from mckibben.errors import ModelError
 from mckibben.recording import Recording
 from mckibben.report import model_subjects, printed, subjects
-from mckibben.report.drawing import N_COLOURS, Drawing, Panel
+from mckibben.report.drawing import N_COLOURS, Drawing, Panel, left_out
 from mckibben.report.shown import Shown, shown
 
 if TYPE_CHECKING:
@@ -201,8 +201,7 @@ def _one_each(
         title = one.recording.name if len(runs) > 1 else ""
         panels += [replace(panel, title=title) for panel in drawing.panels]
     named = [*(one.recording.name for one in runs[N_COLOURS:]), *others]
-    note = f"Not shown: {', '.join(named)}." if named else ""
-    return replace(drawing, panels=tuple(panels), note=note)
+    return replace(drawing, panels=tuple(panels), note=left_out(named))
 
 
 def _recordings(study: Study) -> list[Recording]:

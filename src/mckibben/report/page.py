@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from mckibben.report import interactive, model_subjects, subjects, wording
 from mckibben.report.drawing import N_COLOURS, POINTS, Drawing, series_colour
-from mckibben.report.shown import MOST_RECORDINGS, Shown, shown
+from mckibben.report.shown import Shown, drawn, shown
 
 if TYPE_CHECKING:
     from mckibben.comparison.results import Leaderboard, Row, Study
@@ -58,13 +58,13 @@ def page(study: Study) -> str:
     environment.filters |= {"number": wording.number, "percent": wording.percent}
     environment.policies["json.dumps_kwargs"] = {"allow_nan": False, "separators": (",", ":")}
     every = shown(study)
-    drawn = every[:MOST_RECORDINGS]
-    figures, left_out = _figures(study, drawn)
+    pictured = drawn(every)
+    figures, left_out = _figures(study, pictured)
     return environment.get_template("report.html.j2").render(
         study=study,
         board=study.leaderboard,
         shown=every,
-        drawn=drawn,
+        drawn=pictured,
         figures=figures,
         left_out=left_out,
         models=_models(study.leaderboard),
@@ -74,16 +74,16 @@ def page(study: Study) -> str:
     )
 
 
-def _figures(study: Study, drawn: tuple[Shown, ...]) -> tuple[Plots, str]:
+def _figures(study: Study, pictured: tuple[Shown, ...]) -> tuple[Plots, str]:
     """Return the plots of every figure, and which weights are left out."""
     n_models = min(N_COLOURS, len(study.predictions))
     # A recording has two panels over time and its loop, then each model in four panels more.
-    n_values = len(drawn) * 2 * (5 + 4 * n_models)
+    n_values = len(pictured) * 2 * (5 + 4 * n_models)
     points = max(FEWEST_POINTS, min(POINTS, N_VALUES // n_values))
     u, y = study.input, study.output
 
     def each(draw: Callable[[Shown], Drawing]) -> list[list[interactive.Json]]:
-        return [interactive.plots(draw(one)) for one in drawn]
+        return [interactive.plots(draw(one)) for one in pictured]
 
     figures: Plots = {
         "time": each(lambda one: subjects.time_course([one.recording], (u, y), points)),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -20,7 +20,7 @@ MOST_RECORDINGS = 6
 """Recordings with figures of their own; the others are named."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Shown:
     """One recording and the models' free-running outputs on it.
 
@@ -62,6 +62,12 @@ def shown(study: Study) -> tuple[Shown, ...]:
             outputs = {model: study.predictions[model][index] for model in ranked}
             found.append(Shown(recording, outputs, "fit"))
     return tuple(found)
+
+
+def drawn(found: Sequence[Shown]) -> tuple[Shown, ...]:
+    """Return those with figures of their own: recordings tested on first, then the longest."""
+    by_weight = sorted(found, key=lambda one: (one.role == "fit", -len(one.recording)))
+    return tuple(by_weight[:MOST_RECORDINGS])
 
 
 def _part_of(study: Study, whole: Recording) -> int | None:

@@ -23,6 +23,7 @@ from mckibben.report.drawing import (
     Style,
     along,
     axis_label,
+    left_out,
     over_time,
     series_colour,
     time_label,
@@ -205,10 +206,8 @@ def _jumps(u: Array) -> bool:
 
 
 def _first(recordings: Sequence[Recording]) -> tuple[Sequence[Recording], str]:
-    if len(recordings) <= N_COLOURS:
-        return recordings, ""
-    others = ", ".join(recording.name for recording in recordings[N_COLOURS:])
-    return recordings[:N_COLOURS], f"Not shown: {others}."
+    others = [recording.name for recording in recordings[N_COLOURS:]]
+    return recordings[:N_COLOURS], left_out(others)
 
 
 def _colours(recordings: Sequence[Recording]) -> list[tuple[str, str]]:

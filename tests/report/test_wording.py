@@ -85,7 +85,7 @@ def test_next_steps_answer_what_is_wrong() -> None:
 
 def test_a_study_in_which_nothing_worked_says_what_to_do() -> None:
     empty = study(blocks={})
-    assert "None of the 1 models" in " ".join(verdict(empty))
+    assert "No model could be identified" in " ".join(verdict(empty))
     assert "reasons" in " ".join(next_steps(empty))
 
 

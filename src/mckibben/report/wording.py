@@ -59,15 +59,16 @@ def verdict(study: Study) -> list[str]:
     """Return which model is best, how good it is, and whether it can be inverted."""
     board, best = study.leaderboard, study.leaderboard.best
     if best is None or best.test is None:
-        return [f"None of the {len(board.rows)} models could be identified on these recordings."]
+        return ["No model could be identified on these recordings."]
     n_ok = sum(row.reason is None for row in board.rows)
     between = ""
     if best.rmse_interval is not None:
         low, high = best.rmse_interval
         between = f" (95 % interval {number(low)} to {number(high)} {board.unit})"
+    lead = f"The best of {n_ok} models is" if n_ok > 1 else "The only model that worked is"
     share = percent(best.test.rmse / output_range(study))
     sentences = [
-        f"The best of {n_ok} models is {best.model}: free-running on data that it was not fitted "
+        f"{lead} {best.model}: free-running on data that it was not fitted "
         f"to, its RMSE is {number(best.test.rmse)} {board.unit}{between}, {share} of the measured "
         f"range; at worst it is off by {number(best.test.max_error)} {board.unit}."
     ]

@@ -30,6 +30,9 @@ HELD_OUT = 0.25
 
 TIMED_SAMPLES = 20_000
 
+WORTH_A_PROCESS = 10_000
+"""Training samples below which starting processes takes longer than it saves."""
+
 
 @dataclass(frozen=True)
 class Task:
@@ -80,7 +83,7 @@ def compare(
     seed : int
         Of everything random.
     jobs : int, optional
-        Processes; default as many as there are cores and models. A joblib backend chosen outside, such
+        Processes; default as many as there are cores and models, or one for short recordings. A joblib backend chosen outside, such
         as Dask's or Ray's, is used as it is.
     progress : callable, optional
         Told the model just finished and the share of all that are.
@@ -124,6 +127,9 @@ def compare(
         )
         for model in chosen
     ]
+    n_train = sum(len(recording) for recording in split.train)
+    if jobs is None and n_train < WORTH_A_PROCESS:
+        jobs = 1
     tried = _run_tasks(tasks, jobs, progress)
     lengths = [int(rows.sum()) for rows in split.test_rows]
     described = split.described + (f", {len(parts)}-fold cross-validation" if parts else "")
@@ -134,7 +140,7 @@ def compare(
         rows=_ranked(tried, BlockBootstrap(lengths, seed)),
         split=described,
         seed=seed,
-        n_train=sum(len(recording) for recording in split.train),
+        n_train=n_train,
         n_test=sum(lengths),
     )
 

@@ -82,7 +82,7 @@ Made = TypeVar("Made")
 class Checked(ABCMeta):
     """What makes classes whose constructors refuse bad fields with a `ModelError`."""
 
-    def __call__(cls: type[Made], *values: Any, **named: Any) -> Made:
+    def __call__(cls: type[Made], /, *values: Any, **named: Any) -> Made:
         """Return an instance, its fields validated."""
         try:
             return super().__call__(*values, **named)  # type: ignore[misc]

@@ -150,7 +150,7 @@ class Series(Composition):
         last = len(self.parts) - 1
         for index, (part, own) in enumerate(zip(self.parts, self._states(state), strict=True)):
             given = inputs
-            if signal is not None or part.scheduling:
+            if signal is not None or len(part.inputs) < inputs.shape[1]:
                 given, gather = self._gathered(part, inputs, signal)
                 if gather is not None:
                     runs.append(gather)
@@ -207,7 +207,8 @@ class Series(Composition):
         """
         low, high = self.parts[0].reachable()
         for part in self.parts[1:]:
-            if np.isfinite([*low, *high]).all() and part.n_states == 0:
+            plain = part.n_states == 0 and not part.scheduling
+            if np.isfinite([*low, *high]).all() and plain:
                 low, high = np.sort(part.simulate(np.array([low, high])), axis=0)
             else:
                 own_low, own_high = part.reachable()

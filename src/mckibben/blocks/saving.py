@@ -30,7 +30,7 @@ def to_dict(block: Block) -> dict[str, Any]:
     return {"format": FORMAT, "version": VERSION, **part_to_dict(block)}
 
 
-def from_dict(content: Mapping[str, Any], *, file: str | Path | None = None) -> Block:
+def from_dict(content: Mapping[str, Any]) -> Block:
     """Return the block that `to_dict` described.
 
     Raises
@@ -38,22 +38,20 @@ def from_dict(content: Mapping[str, Any], *, file: str | Path | None = None) -> 
     ModelError
         If the dict is of another format or version, or anything in it is not as it should be.
     """
-    place = "" if file is None else f"{file}: "
     if not isinstance(content, Mapping) or content.get("format") != FORMAT:
         raise ModelError(
-            f'{place}this is not a saved model (no "format": "{FORMAT}"). '
+            f'this is not a saved model (no "format": "{FORMAT}"). '
             "Remedy: give a file written by 'mckibben fit' or Block.save."
         )
-    if content.get("version") != VERSION:
+    version = content.get("version")
+    if type(version) is not int or version != VERSION:
         raise ModelError(
-            f"{place}the model has format version {content.get('version')!r}, this package reads "
-            f"version {VERSION}. Remedy: save it again with a matching release of mckibben."
+            f"the model has format version {version!r:.60}, this package reads version {VERSION}. "
+            "Remedy: save it again with a matching release of mckibben."
         )
     described = {key: value for key, value in content.items() if key not in ("format", "version")}
-    try:
-        return part_from_dict(described)
-    except ModelError as error:
-        raise ModelError(f"{place}{error}") from None
+    block: Block = part_from_dict(described)
+    return block
 
 
 def part_to_dict(part: Any) -> Any:
@@ -73,6 +71,9 @@ def part_from_dict(content: Any, group: str = "blocks") -> Any:
     kind = content["kind"]
     cls = load_plugin(group, kind)
     values = {key: _tuples(value) for key, value in content.items() if key != "kind"}
+    unknown = sorted(set(values) - {field.name for field in fields(cls)})
+    if unknown:
+        raise ModelError(f"{kind!r} has no field {unknown[0]!r}. Remedy: save the model again.")
     return cls(**values)
 
 
@@ -97,19 +98,18 @@ def load(path: str | Path) -> Block:
     path = Path(path)
     try:
         if path.stat().st_size > LARGEST_FILE:
-            raise ModelError(
-                f"{path}: larger than {LARGEST_FILE} bytes. Remedy: give a model file."
-            )
+            raise ModelError(f"larger than {LARGEST_FILE} bytes. Remedy: give a model file.")
         text = path.read_text(encoding="utf-8")
-        content = json.loads(text, parse_constant=_refuse, object_pairs_hook=_unique)
+        return from_dict(json.loads(text, parse_constant=_refuse, object_pairs_hook=_unique))
     except OSError as error:
         reason = error.strerror or "unreadable"
         raise ModelError(f"{path}: {reason}. Remedy: check the path of the model file.") from None
-    except (UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
+    except (ValueError, RecursionError) as error:
         raise ModelError(
-            f"{path}: not readable as JSON ({error}). Remedy: save the model again."
+            f"{path}: not readable as a model ({error}). Remedy: save the model again."
         ) from None
-    return from_dict(content, file=path)
+    except ModelError as error:
+        raise ModelError(f"{path}: {error}") from None
 
 
 def write_text(path: str | Path, text: str) -> None:

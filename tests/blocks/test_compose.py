@@ -1,0 +1,245 @@
+"""Blocks made of blocks: wiring, scheduling inputs, inverses of compositions."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar, Self
+
+import numpy as np
+import pytest
+from hypothesis import given
+from numpy.typing import ArrayLike, NDArray
+
+from mckibben import (
+    EUPI,
+    GPI,
+    PI,
+    Affine,
+    Block,
+    Channel,
+    DataError,
+    ModelError,
+    Parallel,
+    PerChannel,
+    PiecewiseLinear,
+    Play,
+    RateDependentPI,
+    Recording,
+    Series,
+)
+from mckibben.blocks.base import DISPLACEMENT, Initial, Run
+from mckibben.blocks.inverse_laws import inverts
+from mckibben.blocks.trial import Trial
+from mckibben.registry import load, names
+from tests.blocks.strategies import paths, pi_models
+
+Array = NDArray[np.float64]
+
+FORCE = Channel("force", "N")
+TEMPERATURE = Channel("temperature", "degC")
+
+
+@dataclass(frozen=True)
+class Compliance(Block):
+    """Displacement lost under a scheduling channel: y = u - softness times that channel."""
+
+    kind: ClassVar[str] = "compliance"
+
+    softness: float
+    schedule: Channel = FORCE
+
+    @property
+    def inputs(self) -> tuple[Channel, ...]:
+        return (DISPLACEMENT, self.schedule)
+
+    @property
+    def outputs(self) -> tuple[Channel, ...]:
+        return (DISPLACEMENT,)
+
+    @property
+    def scheduling(self) -> tuple[str, ...]:
+        return (self.schedule.name,)
+
+    @property
+    def n_states(self) -> int:
+        return 0
+
+    @property
+    def n_parameters(self) -> int:
+        return 1
+
+    def pack(self) -> Array:
+        return np.array([self.softness])
+
+    def unpack(self, parameters: ArrayLike) -> Self:
+        return replace(self, softness=float(np.asarray(parameters)[0]))
+
+    def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
+        return np.empty(0)
+
+    def bind(self, sample_time: float | None, state: Array, inputs: Array, outputs: Array) -> Run:
+        def run() -> None:
+            outputs[:, 0] = inputs[:, 0] - self.softness * inputs[:, 1]
+
+        return run
+
+    def inverse(self) -> Compliance:
+        return replace(self, softness=-self.softness)
+
+    @classmethod
+    def example(cls) -> Compliance:
+        return cls(0.02)
+
+
+@given(pi_models(), paths())
+def test_series_is_one_after_another(model: PI, u: Array) -> None:
+    second = Play(0.7, input=DISPLACEMENT)
+    expected = second.simulate(model.simulate(u))
+    np.testing.assert_array_equal(Series((model, second)).simulate(u), expected)
+
+
+@given(pi_models(), paths())
+def test_parallel_is_a_sum(model: PI, u: Array) -> None:
+    parts = (model, Play(0.7), Play(0.2))
+    expected = sum(part.simulate(u) for part in parts)
+    np.testing.assert_allclose(Parallel(parts).simulate(u), expected, rtol=1e-14, atol=1e-14)
+
+
+@given(paths(), paths())
+def test_channels_do_not_mix(one: Array, other: Array) -> None:
+    n = min(one.size, other.size)
+    pair = PerChannel.example()
+    outputs = pair.simulate(np.column_stack([one[:n], other[:n]]))
+    for part, u, y in zip(pair.parts, (one[:n], other[:n]), outputs.T, strict=True):
+        np.testing.assert_array_equal(part.simulate(u), y)
+
+
+def test_a_recording_is_wired_by_name_not_by_order() -> None:
+    pair = PerChannel.example()
+    u = np.column_stack([np.linspace(0, 3, 40), np.linspace(2, 0, 40)])
+    channels = {"pressure_2": u[:, 1], "time_of_day": u[:, 0], "pressure_1": u[:, 0]}
+    outputs = pair.simulate(Recording(channels, 0.1))
+    np.testing.assert_array_equal(
+        outputs.matrix(["displacement_1", "displacement_2"]), pair.simulate(u)
+    )
+    assert outputs.sample_time == 0.1
+
+
+def scheduled() -> Series:
+    return Series((PI.example(), Compliance(0.02), PiecewiseLinear.example()))
+
+
+def test_scheduling_inputs_reach_the_part_that_wants_them() -> None:
+    series = scheduled()
+    assert [channel.name for channel in series.inputs] == ["pressure", "force"]
+    assert series.scheduling == ("force",)
+    u, force = np.linspace(0, 5, 50), 20 * np.sin(np.linspace(0, 9, 50))
+    model, _, curve = series.parts
+    expected = curve.simulate(model.simulate(u) - 0.02 * force)
+    table = np.column_stack([u, force])
+    np.testing.assert_array_equal(series.simulate(table)[:, 0], expected)
+    stream = series.stream()
+    stepped = np.array([stream.step(row)[0] for row in table])
+    np.testing.assert_array_equal(stepped, expected)
+
+
+def test_two_parts_share_a_scheduling_input_and_others_stay_apart() -> None:
+    series = Series(
+        (PI.example(), Compliance(0.02), Compliance(0.1, TEMPERATURE), Compliance(0.03))
+    )
+    assert [channel.name for channel in series.inputs] == ["pressure", "force", "temperature"]
+    table = np.column_stack([np.linspace(0, 5, 50), np.linspace(9, 0, 50), np.full(50, 20.0)])
+    expected = PI.example().simulate(table[:, 0]) - 0.05 * table[:, 1] - 2.0
+    np.testing.assert_allclose(series.simulate(table)[:, 0], expected, atol=1e-12)
+
+
+def test_first_part_may_be_scheduled() -> None:
+    series = Series((Compliance(0.5), Affine(2.0, 1.0)))
+    assert series.scheduling == ("force",)
+    table = np.array([[1.0, 2.0], [3.0, 4.0]])
+    np.testing.assert_array_equal(series.simulate(table)[:, 0], [1.0, 3.0])
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_inverse_keeps_the_scheduling_inputs(seed: int) -> None:
+    series = scheduled()
+    inverse = series.inverse()
+    assert [channel.name for channel in inverse.inputs] == ["displacement", "force"]
+    assert [channel.name for channel in inverse.outputs] == ["pressure"]
+    rng = np.random.default_rng(seed)
+    u = np.interp(np.arange(300), np.arange(0, 300, 23), rng.uniform(0.2, 4.8, 14))
+    force = np.interp(np.arange(300), np.arange(0, 300, 31), rng.uniform(0, 60, 10))
+    references = series.simulate(np.column_stack([u, force]))
+    recovered = inverse.simulate(np.column_stack([references, force]))
+    outputs = series.simulate(np.column_stack([recovered, force]))
+    assert np.abs(outputs - references).max() <= 1e-9 * np.ptp(references)
+
+
+def test_a_scheduled_series_obeys_the_law_of_inverses() -> None:
+    inverts(Trial.of(Series((GPI.example(), Compliance(0.0))), 0.01, seed=1))
+
+
+def test_absent_scheduling_channel_is_named() -> None:
+    with pytest.raises(DataError, match=r"no channel 'force'.*Remedy:"):
+        scheduled().simulate(Recording({"pressure": np.linspace(0, 1, 9)}, 0.1))
+
+
+@pytest.mark.parametrize("kind", [k for k in names("blocks") if k != "parallel"])
+def test_inverse_of_a_series_is_the_reversed_series_of_inverses(kind: str) -> None:
+    block = load("blocks", kind).example()
+    if len(block.inputs) > 1:
+        return
+    try:
+        inverse = block.inverse()
+    except ModelError:
+        return
+    scaled = Series((block, Affine(2.0, 1.0, block.outputs[0])))
+    assert scaled.inverse() == Series((scaled.parts[1].inverse(), inverse))
+
+
+def test_a_series_with_a_part_without_inverse_says_which() -> None:
+    with pytest.raises(ModelError, match=r"'play' has no exact inverse.*Remedy:"):
+        Series((PI.example(), Play(0.1, input=DISPLACEMENT))).inverse()
+
+
+def test_a_series_depends_on_rate_if_a_part_does() -> None:
+    series = Series((RateDependentPI.example(), PiecewiseLinear.example()))
+    assert series.rate_dependent
+    with pytest.raises(ModelError, match=r"needs a sample time.*Remedy:"):
+        series.simulate([0.0, 1.0])
+    assert not Series((PI.example(),)).rate_dependent
+
+
+def test_explicit_states_are_shared_out() -> None:
+    series = Series((PI.example(), Play(0.5, input=DISPLACEMENT)))
+    states = (*np.linspace(0.5, 0.2, 4), 9.0)
+    first, second = series.parts
+    u = np.linspace(0, 3, 20)
+    middle = first.simulate(u, initial=states[:4])
+    expected = second.simulate(middle, initial=states[4:])
+    np.testing.assert_array_equal(series.simulate(u, initial=states), expected)
+    with pytest.raises(ModelError, match=r"5 states.*Remedy:"):
+        series.simulate(u, initial=states[:4])
+
+
+def test_a_nested_series_is_the_flat_one() -> None:
+    parts: tuple[Any, ...] = (PI.example(), Affine(2.0), PiecewiseLinear.example())
+    nested = Series((Series(parts[:2]), parts[2]))
+    u = np.linspace(0, 5, 60)
+    np.testing.assert_array_equal(nested.simulate(u), Series(parts).simulate(u))
+
+
+def test_parts_must_fit() -> None:
+    with pytest.raises(ModelError, match=r"gives 2 output\(s\).*wants 1.*Remedy:"):
+        Series((PerChannel.example(), PI.example()))
+    with pytest.raises(ModelError, match=r"differ in their channels.*Remedy:"):
+        Parallel((PI.example(), Affine(1.0)))
+    with pytest.raises(ModelError, match=r"channel names repeat.*Remedy:"):
+        PerChannel((PI.example(), EUPI.example()))
+    with pytest.raises(ModelError, match=r"'per-channel' has 2 input\(s\).*Remedy:"):
+        PerChannel((PerChannel.example(),))
+    for composition in (Series, Parallel, PerChannel):
+        with pytest.raises(ModelError, match=r"no parts.*Remedy:"):
+            composition(())
+        with pytest.raises(ModelError, match=r"parts.0.*Remedy:"):
+            composition((3,))  # type: ignore[arg-type]

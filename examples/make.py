@@ -77,7 +77,7 @@ def ramps(turning_points: list[float], rate: float) -> Array:
     return np.interp(np.arange(0.0, times[-1], SAMPLE_TIME), times, turning_points)
 
 
-def record(turning_points: list[float], seed: int, notes: str) -> mckibben.Recording:
+def record(name: str, turning_points: list[float], seed: int, notes: str) -> mckibben.Recording:
     """Return the recording of a run through turning points [bar], with sensor noise."""
     rng = np.random.default_rng(seed)
     pressure = ramps(turning_points, 1.0)
@@ -93,7 +93,11 @@ def record(turning_points: list[float], seed: int, notes: str) -> mckibben.Recor
             ),
         },
         SAMPLE_TIME,
-        meta={"rig": "simulated 20 mm, 200 mm muscle with a hanging 20 kg", "notes": notes},
+        meta={
+            "name": name,
+            "rig": "simulated 20 mm, 200 mm muscle with a hanging 20 kg",
+            "notes": notes,
+        },
     )
 
 
@@ -104,12 +108,14 @@ def main() -> None:
     for top in np.linspace(5.5, 1.8, 8):
         falling += [float(top), 1.0]
     mckibben.write(
-        record(falling, 1, "triangle whose amplitude falls each cycle"),
+        record("decaying_triangle", falling, 1, "triangle whose amplitude falls each cycle"),
         folder / "decaying_triangle.csv",
     )
     irregular = np.random.default_rng(2).uniform(1.0, 5.4, 24).tolist()
     mckibben.write(
-        record([1.0, *irregular], 3, "triangle with irregular turning points"),
+        record(
+            "irregular_triangle", [1.0, *irregular], 3, "triangle with irregular turning points"
+        ),
         folder / "irregular_triangle.csv",
     )
 

@@ -31,6 +31,10 @@ STANDARD_UNITS: Mapping[str, str] = MappingProxyType(
 """Units of the standard channels; ``pressure_2`` and ``pressure_extensor`` follow ``pressure``."""
 
 
+PROVENANCE = ("file", "sha256")
+"""Entries of ``meta`` that say where a recording was read from; recordings are equal without them."""
+
+
 def standard_unit(channel: str) -> str | None:
     """Return the unit that a channel of this name has throughout the package, or None.
 
@@ -128,10 +132,14 @@ class Recording:
             self.sample_time == other.sample_time
             and self.start_time == other.start_time
             and dict(self.units) == dict(other.units)
-            and dict(self.meta) == dict(other.meta)
+            and self._known() == other._known()
             and list(self.channels) == list(other.channels)
             and all(np.array_equal(self[name], other[name]) for name in self.channels)
         )
+
+    def _known(self) -> dict[str, Any]:
+        """Return what is known of the run itself, not of the file it was read from."""
+        return {key: value for key, value in self.meta.items() if key not in PROVENANCE}
 
     __hash__ = None  # type: ignore[assignment]  # equal by content, and content is too large to hash
 

@@ -6,11 +6,11 @@ import sys
 from pathlib import Path
 
 import pytest
-from tests.cli.conftest import Cli
-from tests.files.malformed import CASES, Case
 
 from mckibben.cli.options import parse_settings
 from mckibben.errors import ModelError
+from tests.cli.conftest import Cli
+from tests.files.malformed import CASES, Case
 
 
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
@@ -52,7 +52,7 @@ def test_malformed_files_leave_with_a_remedy_and_nothing_lost(
         (["compare", "FILE", "--models", "pi,what"], "no estimator named 'what'"),
         (["compare", "FILE", "--models", ""], "no models"),
         (["study", "FILE", "-o", "FILE"], "a file of that name"),
-        (["simulate", "FILE", "FILE", "-o", "x.csv"], "JSON"),
+        (["simulate", "FILE", "FILE", "-o", "x.csv"], "not readable as a model"),
         (["simulate", "nowhere.json", "FILE", "-o", "x.csv"], "nowhere.json"),
         (["invert", "nowhere.json", "-o", "x.json"], "nowhere.json"),
         (["plot", "FILE", "-o", "x.bmp"], "bmp"),

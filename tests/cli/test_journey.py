@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.cli.conftest import Cli
 
 from mckibben import GPI, load
+from tests.cli.conftest import Cli
 
 
 def columns(path: Path) -> dict[str, np.ndarray]:

@@ -199,6 +199,15 @@ def test_held_out_tail_is_a_quarter_of_the_travel_and_not_the_rest_after_it() ->
     assert len(split.train[0]) == pytest.approx(0.75 * TIME.size, rel=0.02)
 
 
+def test_whole_recordings_are_held_out_where_there_are_many(train: Recording) -> None:
+    many = [train.slice(100 * k, 100 * (k + 1)) for k in range(12)]
+    split = held_out_tail(many, "pressure", 0.25)
+    assert 6 <= len(split.train) <= 10
+    assert all(recording in many for recording in split.test)
+    kept = sum(len(recording) for recording in split.train)
+    assert kept + sum(int(rows.sum()) for rows in split.test_rows) >= len(train) - len(split.test)
+
+
 def test_a_task_runs_on_its_own(train: Recording, test_set: Recording) -> None:
     task = Task("pi", {"seed": 0}, given_split([train], [test_set]), (), "pressure", "displacement")
     row, errors = try_model(task)

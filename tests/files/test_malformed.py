@@ -3,10 +3,10 @@
 from pathlib import Path
 
 import pytest
-from tests.files.malformed import CASES, CHANNELS, Case
 
 import mckibben
 from mckibben import DataError
+from tests.files.malformed import CASES, CHANNELS, Case
 
 
 def test_there_are_enough_of_them() -> None:

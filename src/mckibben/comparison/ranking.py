@@ -26,7 +26,7 @@ Array = NDArray[np.float64]
 Settings = Mapping[str, Mapping[str, Any]]
 
 HELD_OUT = 0.25
-"""Share of the last recording's travel that is held out where no test recording is given."""
+"""Share of the input's travel that is held out where no test recording is given."""
 
 TIMED_SAMPLES = 20_000
 
@@ -70,8 +70,8 @@ def compare(
     train : Recording or sequence of Recording
         To fit and to choose.
     test : Recording or sequence of Recording, optional
-        To rank. Default: the part of the last recording with the last quarter of the input's
-        travel, which is then left out of training.
+        To rank. Default: the last quarter of the input's travel over the
+        training recordings, which is then left out of training.
     input, output : str
         Channels.
     models : "all" or sequence of str
@@ -83,8 +83,8 @@ def compare(
     seed : int
         Of everything random.
     jobs : int, optional
-        Processes; default as many as there are cores and models, or one for short recordings. A joblib backend chosen outside, such
-        as Dask's or Ray's, is used as it is.
+        Processes; default as many as there are cores and models, or one for short recordings. A
+        joblib backend chosen outside, such as Dask's or Ray's, is used, for as many models at once.
     progress : callable, optional
         Told the model just finished and the share of all that are.
 
@@ -128,9 +128,7 @@ def compare(
         for model in chosen
     ]
     n_train = sum(len(recording) for recording in split.train)
-    if jobs is None and n_train < WORTH_A_PROCESS:
-        jobs = 1
-    tried = _run_tasks(tasks, jobs, progress)
+    tried = _run_tasks(tasks, jobs or _default_jobs(n_train), progress)
     lengths = [int(rows.sum()) for rows in split.test_rows]
     described = split.described + (f", {len(parts)}-fold cross-validation" if parts else "")
     return Leaderboard(
@@ -145,13 +143,22 @@ def compare(
     )
 
 
+def _default_jobs(n_train: int) -> int:
+    from joblib.parallel import LokyBackend, get_active_backend
+
+    backend, wanted = get_active_backend()
+    if not isinstance(backend, LokyBackend):
+        return int(backend.effective_n_jobs(wanted or -1))
+    return 1 if n_train < WORTH_A_PROCESS else os.cpu_count() or 1
+
+
 def _run_tasks(
-    tasks: Sequence[Task], jobs: int | None, progress: Callable[[str, float], None] | None
+    tasks: Sequence[Task], jobs: int, progress: Callable[[str, float], None] | None
 ) -> list[tuple[Row, Array | None]]:
     from joblib import Parallel, delayed
     from joblib.parallel import get_active_backend
 
-    workers = min(jobs or os.cpu_count() or 1, len(tasks))
+    workers = min(jobs, len(tasks))
     one_by_one = get_active_backend()[0].supports_return_generator
     results: dict[int, tuple[Row, Array | None]] = {}
     try:

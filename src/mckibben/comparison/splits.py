@@ -76,35 +76,52 @@ def given_split(train: Sequence[Recording], test: Sequence[Recording]) -> Split:
 
 
 def held_out_tail(recordings: Sequence[Recording], channel: str, share: float) -> Split:
-    """Hold out the last part of the last recording, of which nothing is seen while fitting.
+    """Hold out the last part of the recordings, of which nothing is seen while fitting.
 
-    The test runs through the whole recording, so that its memory is right, and scores the tail only.
+    Whole recordings from the end, then the tail of one. That one is run through from its start, so
+    that its memory is right, and scored on the tail only.
 
     Parameters
     ----------
     channel : str
         The input, whose travel is divided: a rest at the end of a recording tests nothing.
     share : float
-        Of the input's travel to hold out, between 0 and 1.
+        Of the input's travel over all recordings to hold out, between 0 and 1.
 
     Raises
     ------
     DataError
-        If either part would have fewer than ten samples.
+        If nothing would be left to fit, or to test.
     """
-    *others, last = recordings
-    travel = _travel(last[channel])
-    start = int(np.searchsorted(travel, (1 - share) * travel[-1]))
-    if min(start, len(last) - start) < FEWEST:
+    train = list(recordings)
+    whole: list[Recording] = []
+    travels = [_travel(recording[channel]) for recording in train]
+    wanted = share * sum(float(travel[-1]) for travel in travels)
+    while len(train) > 1 and travels[-1][-1] <= wanted:
+        wanted -= float(travels.pop()[-1])
+        whole.insert(0, train.pop())
+    last, travel = train[-1], travels[-1]
+    start = int(np.searchsorted(travel, travel[-1] - wanted))
+    if min(start, len(last) - start) >= FEWEST:
+        tail = np.zeros(len(last), dtype=bool)
+        tail[start:] = True
+        described = f"last {len(last) - start} samples of {last.name}"
+        train[-1] = last.slice(0, start)
+        tests, rows = [last], [tail]
+    elif whole:
+        described, tests, rows = "", [], []
+    else:
         raise DataError(
             f"{len(last)} samples are too few to hold out {share:.0%} for a test",
             file=last.source,
             remedy="give a longer recording, or a test recording of its own with --test",
         )
-    mask = np.zeros(len(last), dtype=bool)
-    mask[start:] = True
-    described = f"last {len(last) - start} samples of {last.name} to test, all before them to fit"
-    return Split((*others, last.slice(0, start)), (last,), (mask,), described)
+    if whole:
+        rest = given_split(train, whole)
+        tests, rows = [*tests, *rest.test], [*rows, *rest.test_rows]
+        described += f"{' and ' if described else ''}the last {len(whole)} recording(s)"
+    described += " to test, all before to fit"
+    return Split(tuple(train), tuple(tests), tuple(rows), described)
 
 
 def _travel(u: Array) -> Array:

@@ -120,7 +120,7 @@ def _recordings(table: Table, request: Request, path: Path) -> list[Recording]:
     else:
         pieces = _on_grid(channels, measured, spans, choice, table, request, path)
     units = {name: choice.units[name] for name in channels}
-    meta = dict(table.meta) if table.own else _meta(choice, table, path)
+    meta = _meta(choice, table, path)
     found = [Recording(piece.samples, piece.step, units, piece.start, meta) for piece in pieces]
     if len(found) == 1:
         return found

@@ -1,0 +1,233 @@
+"""The elastic-plastic model: a spring beside a spring that slips, and its exact inverse.
+
+y = gain u + weight E_r[u], where the stop operator E_r[u] = u - F_r[u] follows the input until it
+reaches r, then slips; F_r is the play operator of the same threshold.
+
+Source: write here the title of the paper and the numbers of its equations, and own up to every
+departure from it. Numbers and units stand in the docstring of the class.
+
+--- For the author: copy this file to src/mckibben/blocks/, rename what is in it, and keep its order:
+--- what is modelled and where it comes from, the kernel, the class, the exact inverse.
+--- Comments that start with three dashes are for you; take them out.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Annotated, ClassVar, Self
+
+import numpy as np
+from annotated_types import Gt
+from numpy.typing import ArrayLike, NDArray
+from pydantic import BeforeValidator, FiniteFloat
+from pydantic.dataclasses import dataclass
+
+from mckibben.blocks.base import (
+    DISPLACEMENT,
+    PRESSURE,
+    STRICT,
+    ChannelField,
+    Initial,
+    Kernel,
+    Primitive,
+    StoredInitial,
+    parameter_vector,
+)
+from mckibben.blocks.kernels import kernel
+from mckibben.blocks.memory import play_state
+from mckibben.blocks.saving import nested
+from mckibben.blocks.single import Inverse, Ranged, check_input_range
+from mckibben.errors import ModelError
+
+Array = NDArray[np.float64]
+
+
+# --- A kernel is one pass over time: coefficients in, state changed in place, outputs filled. It
+# --- allocates nothing. simulate, stream and simulate_many all call it, so they agree to the bit.
+# --- Use summing_kernel instead where many weighted operators are added up: it vectorises.
+@kernel
+def elastic_plastic_kernel(
+    coefficients: Array, state: Array, inputs: Array, outputs: Array
+) -> None:
+    """Run the model; coefficients are [gain, weight, r], the state is the play operator's output."""
+    gain, weight, r = coefficients[0], coefficients[1], coefficients[2]
+    s = state[0]
+    for t in range(inputs.shape[0]):
+        u = inputs[t, 0]
+        s = min(max(s, u - r), u + r)
+        outputs[t, 0] = gain * u + weight * (u - s)
+    state[0] = s
+
+
+@kernel
+def elastic_plastic_inverse_kernel(
+    coefficients: Array, state: Array, inputs: Array, outputs: Array
+) -> None:
+    """Invert the model; coefficients are [forward ones, lowest, highest input].
+
+    The state is [play operator's output, samples clipped].
+    """
+    gain, weight, r = coefficients[0], coefficients[1], coefficients[2]
+    lowest, highest = coefficients[3], coefficients[4]
+    slack = 1e-9 * (highest - lowest)
+    for t in range(inputs.shape[0]):
+        y = inputs[t, 0]
+        s = state[0]
+        u = (y + weight * s) / (gain + weight)
+        if u > s + r:
+            u = (y - weight * r) / gain
+        elif u < s - r:
+            u = (y + weight * r) / gain
+        if u < lowest - slack or u > highest + slack:
+            state[1] += 1.0
+        u = min(max(u, lowest), highest)
+        state[0] = min(max(s, u - r), u + r)
+        outputs[t, 0] = u
+
+
+# --- A block is a frozen dataclass of its parameters. STRICT refuses unknown fields, numbers that are
+# --- not finite, and silent conversions: that is what makes saved files safe to load.
+@dataclass(frozen=True, config=STRICT)
+class ElasticPlastic(Ranged, Primitive):
+    """Elastic-plastic model.
+
+    Parameters
+    ----------
+    gain : float
+        Output per input while slipping; positive.
+    weight : float
+        What output per input rises by while sticking. The inverse wants gain + weight > 0.
+    threshold : float
+        Travel of the input from the middle to slipping, in its unit; at least 0.
+    input_range : (float, float), optional
+        Lowest and highest input that may be asked for; the inverse clips there. Default none.
+    initial : {"first_sample", "virgin"} or sequence of float
+        Default memory before the first sample.
+    input, output : Channel
+        Channel driven and channel given.
+    """
+
+    # --- The name in the registry and in saved files; it never changes once there are files.
+    kind: ClassVar[str] = "elastic-plastic"
+    kernel: ClassVar[Kernel] = elastic_plastic_kernel
+    # --- Where time matters: rate_dependent: ClassVar[bool] = True, and coefficients() turns the
+    # --- sample time into what the kernel needs; see blocks/rate_dependent_pi.py.
+
+    gain: Annotated[FiniteFloat, Gt(0)]
+    weight: FiniteFloat
+    threshold: FiniteFloat
+    input_range: tuple[FiniteFloat, FiniteFloat] | None = None
+    initial: StoredInitial = "first_sample"
+    input: ChannelField = PRESSURE
+    output: ChannelField = DISPLACEMENT
+
+    def __post_init__(self) -> None:
+        if self.threshold < 0:
+            raise ModelError(
+                f"the threshold of {self.kind!r} is {self.threshold:g}. Remedy: give at least 0."
+            )
+        check_input_range(self.kind, self.input_range)
+
+    @property
+    def n_states(self) -> int:
+        """The play operator's output."""
+        return 1
+
+    @property
+    def n_parameters(self) -> int:
+        """Gain, weight and threshold."""
+        return 3
+
+    def pack(self) -> Array:
+        """Return [gain, weight, threshold]."""
+        return np.array([self.gain, self.weight, self.threshold])
+
+    def unpack(self, parameters: ArrayLike) -> Self:
+        """Return a model with other [gain, weight, threshold]."""
+        gain, weight, threshold = parameter_vector(self, parameters).tolist()
+        return replace(self, gain=gain, weight=weight, threshold=threshold)
+
+    # --- Memory is always explicit: a rule by name, or the state itself. It is a new array each time.
+    def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
+        """Return the play operator's output before the first sample, shape (1,)."""
+        start = self.initial if initial is None else initial
+        return play_state(self, np.array([self.threshold]), first[0], first[0], start)
+
+    def coefficients(self, sample_time: float | None) -> Array:
+        """Return [gain, weight, threshold]."""
+        del sample_time
+        return self.pack()
+
+    def peaks(self) -> Array:
+        """Return the peak from which the operator just comes back to the lowest input."""
+        return np.array([self.limits[0] + 2 * self.threshold])
+
+    # --- Without an exact inverse, leave out inverse() and the class below: Block.inverse then says
+    # --- what to use instead. An inverse that needs solving or training is a compensator.
+    def inverse(self) -> ElasticPlasticInverse:
+        """Return the exact inverse.
+
+        Raises
+        ------
+        ModelError
+            If the output would fall while the input rises.
+        """
+        return ElasticPlasticInverse(self)
+
+    # --- Contract tests run on the example: make it small and typical.
+    @classmethod
+    def example(cls) -> Self:
+        """Return the shape of a stiff little muscle over 0 to 5 bar."""
+        return cls(4.0, -1.5, 0.4, (0.0, 5.0))
+
+
+@dataclass(frozen=True, config=STRICT)
+class ElasticPlasticInverse(Inverse, Primitive):
+    """Exact inverse of an `ElasticPlastic` model.
+
+    Parameters
+    ----------
+    forward : ElasticPlastic
+        The model inverted.
+    """
+
+    kind: ClassVar[str] = "elastic-plastic-inverse"
+    kernel: ClassVar[Kernel] = elastic_plastic_inverse_kernel
+
+    forward: Annotated[ElasticPlastic, BeforeValidator(nested)]
+
+    # --- An error says which condition fails, and ends with the remedy.
+    def __post_init__(self) -> None:
+        slope = self.forward.gain + self.forward.weight
+        if slope <= 0:
+            raise ModelError(
+                f"'elastic-plastic' has no inverse: gain and weight add up to {slope:g}, so its output "
+                "would not rise with its input. Remedy: identify it with a weight above -gain."
+            )
+
+    @property
+    def n_states(self) -> int:
+        """The play operator's output, and the count of clipped samples."""
+        return 2
+
+    def matching_state(self, first: float, start: str) -> Array:
+        """Return the state of the inverse of a forward model started by a named rule."""
+        forward = self.forward
+        if start == "virgin":
+            return np.zeros(2)
+        low, high = forward.limits
+        risen = (first - forward.weight * forward.threshold) / forward.gain
+        return np.array([min(max(risen, low), high) - forward.threshold, 0.0])
+
+    def state_from_forward(self, state: Array) -> Array:
+        """Return the state that matches a state of the forward model."""
+        return np.array([*state, 0.0])
+
+    def coefficients(self, sample_time: float | None) -> Array:
+        """Return [the forward model's, lowest, highest input]."""
+        return np.array([*self.forward.coefficients(sample_time), *self.forward.limits])
+
+    @classmethod
+    def example(cls) -> Self:
+        """Return the inverse of the example model."""
+        return cls(ElasticPlastic.example())

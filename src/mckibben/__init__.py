@@ -77,7 +77,7 @@ _HOMES = {
     "write_report": "report",
 }
 
-__all__ = [  # noqa: PLE0604  # the names of _HOMES are resolved by __getattr__
+__all__ = [  # the names of _HOMES are resolved by __getattr__
     "DataError",
     "DataWarning",
     "MckibbenError",

@@ -11,18 +11,24 @@ import pytest
 from numpy.typing import NDArray
 
 from mckibben import (
+    EUPI,
+    GPI,
     PI,
+    Affine,
     Block,
     DataError,
     ModelError,
     Play,
     Polynomial,
     RateDependentPI,
+    Series,
     check_block,
 )
 from mckibben.blocks import saving
-from mckibben.blocks.base import Stream
+from mckibben.blocks.base import Stream, vector
 from mckibben.blocks.check import ContractError
+from mckibben.blocks.envelopes.exponential import Exponential
+from mckibben.blocks.envelopes.tanh import Tanh
 from mckibben.blocks.pi import PIInverse
 
 Array = NDArray[np.float64]
@@ -232,6 +238,13 @@ def test_a_block_that_hides_its_rate_dependence_is_caught(
         PI((0.2, 0.5), (1.0, 1.0)),
         PI((0.0, 0.5), (1.0, 1.0)),
         PI((0.0, 0.5), (1.0, 1.0), initial=(0.3, 0.2)),
+        PI((0.0, 0.3), (1.0, 1.0), 1e6, (0.0, 5.0)),
+        PI(vector(np.linspace(0.0, 2.4, 200)), (1.0,) * 200, 0.0, (0.0, 5.0)),
+        GPI((0.0, 0.2), (3.0, 1.0), Tanh(10.0, -25.0), Tanh(10.0, -22.0), (0.0, 5.0)),
+        GPI((0.0, 0.2), (3.0, 1.0), Tanh(1e-6, 0.0), Tanh(1e-6, 0.0, 1e-7), (0.0, 5.0)),
+        GPI((0.0, 0.2), (3.0, 1.0), Exponential(5.0, 0.0), Exponential(5.0, 0.0, 0.1), (0.0, 5.0)),
+        EUPI((0.0, 0.3), (1.0, 1.0), 0.9, 1.5, (0.0, 0.0, 0.0), 0.0, (0.0, 5.0)),
+        Series((PI.example(), Affine(-2.0, 3.0))),
         Polynomial((0.0, 1.0, -3.0)),
         Play(0.0),
         RateDependentPI((0.0,), (0.01,), (1.0,), 0.0, 0.5, (-2.0, 2.0)),

@@ -51,7 +51,9 @@ class Trial:
 
     def __post_init__(self) -> None:
         self.outputs = self.run(self.inputs)
-        self.span = np.ptp(self.outputs, axis=0) + np.finfo(float).tiny
+        # where outputs hardly move, rounding of their size is all there is to see
+        least = 1e-4 * np.abs(self.outputs).max(axis=0) + np.finfo(float).tiny
+        self.span = np.maximum(np.ptp(self.outputs, axis=0), least)
         self.n_driven = len(self.block.inputs) - len(self.block.scheduling)
 
     @classmethod

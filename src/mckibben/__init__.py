@@ -19,12 +19,12 @@ from mckibben.errors import DataError, DataWarning, MckibbenError, ModelError, M
 if TYPE_CHECKING:
     from mckibben.blocks.affine import Affine as Affine
     from mckibben.blocks.base import Block as Block
-    from mckibben.blocks.base import Channel as Channel
     from mckibben.blocks.check import check_block as check_block
     from mckibben.blocks.compose import Parallel as Parallel
     from mckibben.blocks.compose import PerChannel as PerChannel
     from mckibben.blocks.compose import Series as Series
     from mckibben.blocks.eupi import EUPI as EUPI
+    from mckibben.blocks.fields import Channel as Channel
     from mckibben.blocks.gpi import GPI as GPI
     from mckibben.blocks.pi import PI as PI
     from mckibben.blocks.piecewise_linear import PiecewiseLinear as PiecewiseLinear

@@ -7,11 +7,11 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from mckibben import EUPI, GPI, PI, Polynomial, RateDependentPI
-from mckibben.blocks.base import vector
 from mckibben.blocks.envelopes.base import Envelope
 from mckibben.blocks.envelopes.exponential import Exponential
 from mckibben.blocks.envelopes.piecewise_linear import PiecewiseLinear
 from mckibben.blocks.envelopes.tanh import Tanh
+from mckibben.blocks.fields import vector
 from mckibben.blocks.trial import through
 
 Array = NDArray[np.float64]

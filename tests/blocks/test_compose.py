@@ -27,7 +27,8 @@ from mckibben import (
     Recording,
     Series,
 )
-from mckibben.blocks.base import DISPLACEMENT, Initial, Run
+from mckibben.blocks.base import Run
+from mckibben.blocks.fields import DISPLACEMENT, Initial
 from mckibben.blocks.inverse_laws import inverts
 from mckibben.blocks.trial import Trial
 from mckibben.registry import load, names

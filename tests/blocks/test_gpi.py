@@ -8,10 +8,10 @@ from hypothesis import given
 from numpy.typing import NDArray
 
 from mckibben import GPI, PI, ModelError, ModelWarning
-from mckibben.blocks.base import vector
 from mckibben.blocks.envelopes.exponential import Exponential
 from mckibben.blocks.envelopes.piecewise_linear import PiecewiseLinear
 from mckibben.blocks.envelopes.tanh import Tanh
+from mckibben.blocks.fields import vector
 from mckibben.blocks.gpi import gpi_matrix
 from tests.blocks.strategies import HIGH, LOW, gpi_models, numbers, paths, pi_models
 

@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from mckibben.blocks.base import DISPLACEMENT
+from mckibben.blocks.fields import DISPLACEMENT
 from mckibben.errors import ModelError
 from mckibben.estimators.output_maps import MAPS, output_map
 

@@ -8,8 +8,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from mckibben.blocks.base import Block, Channel
+from mckibben.blocks.base import Block
 from mckibben.blocks.compose import Series
+from mckibben.blocks.fields import Channel
 from mckibben.blocks.gpi import GPI
 from mckibben.blocks.pi import PI
 from mckibben.blocks.piecewise_linear import PiecewiseLinear

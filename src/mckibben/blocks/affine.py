@@ -13,17 +13,11 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
-from mckibben.blocks.base import (
-    DISPLACEMENT,
-    STRICT,
-    ChannelField,
-    Initial,
-    Kernel,
-    Primitive,
-    parameter_vector,
-)
+from mckibben.blocks.base import Kernel, Primitive
+from mckibben.blocks.fields import DISPLACEMENT, STRICT, ChannelField
 from mckibben.blocks.kernels import kernel
-from mckibben.blocks.single import SingleChannel
+from mckibben.blocks.refusals import parameter_vector
+from mckibben.blocks.single import Memoryless
 from mckibben.errors import ModelError
 
 Array = NDArray[np.float64]
@@ -37,7 +31,7 @@ def affine_kernel(coefficients: Array, state: Array, inputs: Array, outputs: Arr
 
 
 @dataclass(frozen=True, config=STRICT)
-class Affine(SingleChannel, Primitive):
+class Affine(Memoryless, Primitive):
     """Gain and offset.
 
     Parameters
@@ -59,11 +53,6 @@ class Affine(SingleChannel, Primitive):
     output: ChannelField = DISPLACEMENT
 
     @property
-    def n_states(self) -> int:
-        """None: the block is memoryless."""
-        return 0
-
-    @property
     def n_parameters(self) -> int:
         """Gain and offset."""
         return 2
@@ -76,11 +65,6 @@ class Affine(SingleChannel, Primitive):
         """Return an affine block with other [gain, offset]."""
         gain, offset = parameter_vector(self, parameters).tolist()
         return replace(self, gain=gain, offset=offset)
-
-    def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
-        """Return an empty state."""
-        del first, initial
-        return np.empty(0)
 
     def coefficients(self, sample_time: float | None) -> Array:
         """Return [gain, offset]."""

@@ -7,74 +7,27 @@ return a function without arguments that runs them, and everything else here is 
 
 from __future__ import annotations
 
-import os
 from abc import ABCMeta, abstractmethod
-from collections.abc import Callable, Iterable, Sequence
-from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, fields
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self, TypeVar, overload
+from collections.abc import Callable
+from dataclasses import fields
+from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from pydantic import BeforeValidator, ConfigDict, FiniteFloat, ValidationError
-from pydantic.dataclasses import dataclass as validated_dataclass
+from pydantic import ValidationError
 
+from mckibben.blocks.fields import Channel, Initial
 from mckibben.errors import DataError, ModelError
 from mckibben.recording import Recording
 
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from mckibben.blocks.running import Stream
+
 Array = NDArray[np.float64]
 Run = Callable[[], None]
 Kernel = Callable[..., None]
-Initial = Literal["first_sample", "virgin"] | Sequence[float]
-"""Memory before the first sample."""
-
-
-def _plain(values: Any) -> Any:
-    return tuple(values.tolist()) if isinstance(values, np.ndarray) else values
-
-
-def _plain_sequence(values: Any) -> Any:
-    values = _plain(values)
-    return tuple(values) if isinstance(values, list) else values
-
-
-Vector = Annotated[tuple[FiniteFloat, ...], BeforeValidator(_plain_sequence)]
-"""Finite numbers; arrays and lists are accepted and kept as a tuple."""
-
-StoredInitial = Literal["first_sample", "virgin"] | Vector
-"""`Initial` as a field of a block."""
-
-
-def vector(values: ArrayLike) -> tuple[float, ...]:
-    """Return numbers as a field of a block holds them."""
-    return tuple(np.asarray(values, dtype=np.float64).tolist())
-
-
-STRICT = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
-"""How blocks validate their fields: no unknown ones, no silent conversion, nothing infinite."""
-
-
-@validated_dataclass(frozen=True, config=STRICT)
-class Channel:
-    """Name and unit of an input or output."""
-
-    name: str
-    unit: str
-
-
-def _channel(value: Any) -> Any:
-    return Channel(**value) if isinstance(value, dict) else value
-
-
-ChannelField = Annotated[Channel, BeforeValidator(_channel)]
-"""A channel as a field of a block."""
-
-PRESSURE = Channel("pressure", "bar")
-DISPLACEMENT = Channel("displacement", "mm")
-
 
 Made = TypeVar("Made")
 
@@ -265,6 +218,8 @@ class Block(metaclass=Checked):
         initial : {"first_sample", "virgin"} or sequence of float, optional
             Memory before the first step; default is the block's own.
         """
+        from mckibben.blocks.running import Stream
+
         return Stream(self, sample_time, initial)
 
     def simulate_many(
@@ -290,6 +245,8 @@ class Block(metaclass=Checked):
         -------
         array, shape (k, n), or (k, n, n_outputs) for several outputs
         """
+        from mckibben.blocks.running import run_many
+
         sets = np.atleast_2d(np.asarray(parameters, dtype=np.float64))
         blocks = [self.unpack(row) for row in sets]
         inputs = self._inputs_from_array(np.asarray(data, dtype=np.float64))
@@ -374,107 +331,3 @@ class Primitive(Block):
         """Return a function that runs the kernel in place."""
         run, coefficients = type(self).kernel, self.coefficients(sample_time)
         return lambda: run(coefficients, state, inputs, outputs)
-
-
-@dataclass
-class Stream:
-    """A block running sample by sample; `step` allocates nothing.
-
-    Parameters
-    ----------
-    block : Block
-        What runs.
-    sample_time : float or None
-        Time between steps [s].
-    initial : {"first_sample", "virgin"} or sequence of float or None
-        Memory before the first step.
-    """
-
-    block: Block
-    sample_time: float | None = None
-    initial: Initial | None = None
-
-    def __post_init__(self) -> None:
-        self._inputs = np.zeros((1, len(self.block.inputs)))
-        self._outputs = np.zeros((1, len(self.block.outputs)))
-        self._output = self._outputs[0]
-        self.state = np.zeros(self.block.n_states)
-        self._run = self.block.bind(self.sample_time, self.state, self._inputs, self._outputs)
-        self.reset()
-
-    def reset(self) -> None:
-        """Return to the memory before the first step."""
-        self._started = False
-
-    def step(self, inputs: float | ArrayLike) -> Array:
-        """Take one sample of every input and return the outputs, shape (n_outputs,).
-
-        The array returned is reused by the next step: copy what you keep.
-        """
-        self._inputs[0] = inputs
-        if not self._started:
-            self.state[:] = self.block.initial_state(self._inputs[0], self.initial)
-            self._started = True
-        self._run()
-        return self._output
-
-
-def run_many(
-    blocks: Sequence[Block],
-    inputs: Array,
-    *,
-    sample_time: float | None = None,
-    initial: Initial | None = None,
-) -> Array:
-    """Run several blocks with the same channels over the same inputs, on all cores.
-
-    Returns
-    -------
-    array, shape (len(blocks), n, n_outputs)
-    """
-    outputs = np.empty((len(blocks), inputs.shape[0], len(blocks[0].outputs)))
-
-    def run(share: Iterable[int]) -> None:
-        for index in share:
-            state = blocks[index].initial_state(inputs[0], initial)
-            blocks[index].bind(sample_time, state, inputs, outputs[index])()
-
-    workers = min(os.cpu_count() or 1, len(blocks))
-    if workers == 1:
-        run(range(len(blocks)))
-    else:
-        with ThreadPoolExecutor(workers) as pool:
-            list(pool.map(run, [range(first, len(blocks), workers) for first in range(workers)]))
-    return outputs
-
-
-def explicit_state(block: Block, initial: Sequence[float]) -> Array:
-    """Return an explicit initial state after checking its length."""
-    state = np.array(initial, dtype=np.float64)
-    if state.shape != (block.n_states,) or not np.isfinite(state).all():
-        raise ModelError(
-            f"{block.kind!r} has {block.n_states} states, the initial state given has shape "
-            f"{state.shape}. Remedy: give {block.n_states} finite numbers, or 'first_sample'."
-        )
-    return state
-
-
-def parameter_vector(block: Block, parameters: ArrayLike) -> Array:
-    """Return a parameter vector after checking its length."""
-    vector = np.asarray(parameters, dtype=np.float64)
-    if vector.shape != (block.n_parameters,):
-        raise ModelError(
-            f"{block.kind!r} of this structure has {block.n_parameters} parameters, got shape "
-            f"{vector.shape}. Remedy: give a vector as pack() returns it."
-        )
-    return vector
-
-
-def needs_sample_time(kind: str, sample_time: float | None) -> float:
-    """Return the sample time, or say that a rate-dependent block cannot do without."""
-    if sample_time is None or not sample_time > 0:
-        raise ModelError(
-            f"{kind!r} depends on rate and needs a sample time, but the data have no time. "
-            "Remedy: read the recording with a time column or --rate, or give sample_time."
-        )
-    return sample_time

@@ -16,15 +16,9 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic import BeforeValidator, InstanceOf
 from pydantic.dataclasses import dataclass
 
-from mckibben.blocks.base import (
-    STRICT,
-    Block,
-    Channel,
-    Initial,
-    Run,
-    explicit_state,
-    parameter_vector,
-)
+from mckibben.blocks.base import Block, Run
+from mckibben.blocks.fields import STRICT, Channel, Initial
+from mckibben.blocks.refusals import explicit_state, parameter_vector
 from mckibben.blocks.saving import nested
 from mckibben.errors import ModelError
 

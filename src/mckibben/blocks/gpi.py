@@ -23,20 +23,18 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic import BeforeValidator, FiniteFloat, InstanceOf
 from pydantic.dataclasses import dataclass
 
-from mckibben.blocks.base import (
+from mckibben.blocks.base import Run
+from mckibben.blocks.envelopes.base import Envelope, nested_envelope
+from mckibben.blocks.envelopes.tanh import Tanh
+from mckibben.blocks.fields import (
     DISPLACEMENT,
     PRESSURE,
     STRICT,
     ChannelField,
     Initial,
-    Run,
     StoredInitial,
     Vector,
-    explicit_state,
-    parameter_vector,
 )
-from mckibben.blocks.envelopes.base import Envelope, nested_envelope
-from mckibben.blocks.envelopes.tanh import Tanh
 from mckibben.blocks.kernels import kernel, summing_kernel
 from mckibben.blocks.memory import (
     check_invertible_sum,
@@ -45,6 +43,7 @@ from mckibben.blocks.memory import (
     play_state,
     solve_from_rest,
 )
+from mckibben.blocks.refusals import explicit_state, parameter_vector
 from mckibben.blocks.saving import nested
 from mckibben.blocks.single import Inverse, Ranged, check_input_range
 from mckibben.errors import ModelError

@@ -7,8 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from mckibben.blocks.base import Block, Initial, explicit_state
+from mckibben.blocks.base import Block
+from mckibben.blocks.fields import Initial
 from mckibben.blocks.kernels import kernel
+from mckibben.blocks.refusals import explicit_state
 from mckibben.errors import ModelError
 
 Array = NDArray[np.float64]

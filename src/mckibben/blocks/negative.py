@@ -8,17 +8,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic.dataclasses import dataclass
 
-from mckibben.blocks.base import (
-    DISPLACEMENT,
-    STRICT,
-    ChannelField,
-    Initial,
-    Kernel,
-    Primitive,
-    parameter_vector,
-)
+from mckibben.blocks.base import Kernel, Primitive
+from mckibben.blocks.fields import DISPLACEMENT, STRICT, ChannelField
 from mckibben.blocks.kernels import kernel
-from mckibben.blocks.single import SingleChannel
+from mckibben.blocks.refusals import parameter_vector
+from mckibben.blocks.single import Memoryless
 
 Array = NDArray[np.float64]
 
@@ -31,7 +25,7 @@ def negative_kernel(coefficients: Array, state: Array, inputs: Array, outputs: A
 
 
 @dataclass(frozen=True, config=STRICT)
-class Negative(SingleChannel, Primitive):
+class Negative(Memoryless, Primitive):
     """y = -u.
 
     Parameters
@@ -47,11 +41,6 @@ class Negative(SingleChannel, Primitive):
     output: ChannelField = DISPLACEMENT
 
     @property
-    def n_states(self) -> int:
-        """None: the block is memoryless."""
-        return 0
-
-    @property
     def n_parameters(self) -> int:
         """None."""
         return 0
@@ -64,11 +53,6 @@ class Negative(SingleChannel, Primitive):
         """Return this block, which has no parameters."""
         parameter_vector(self, parameters)
         return self
-
-    def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
-        """Return an empty state."""
-        del first, initial
-        return np.empty(0)
 
     def coefficients(self, sample_time: float | None) -> Array:
         """Return an empty vector."""

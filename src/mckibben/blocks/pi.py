@@ -18,17 +18,15 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic import BeforeValidator, FiniteFloat
 from pydantic.dataclasses import dataclass
 
-from mckibben.blocks.base import (
+from mckibben.blocks.base import Kernel, Primitive
+from mckibben.blocks.fields import (
     DISPLACEMENT,
     PRESSURE,
     STRICT,
     ChannelField,
     Initial,
-    Kernel,
-    Primitive,
     StoredInitial,
     Vector,
-    parameter_vector,
 )
 from mckibben.blocks.kernels import kernel, summing_kernel
 from mckibben.blocks.memory import (
@@ -38,6 +36,7 @@ from mckibben.blocks.memory import (
     play_state,
     solve_from_rest,
 )
+from mckibben.blocks.refusals import parameter_vector
 from mckibben.blocks.saving import nested
 from mckibben.blocks.single import Inverse, Ranged, check_input_range
 

@@ -13,19 +13,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic.dataclasses import dataclass
 
-from mckibben.blocks.base import (
-    DISPLACEMENT,
-    STRICT,
-    ChannelField,
-    Initial,
-    Kernel,
-    Primitive,
-    Vector,
-    parameter_vector,
-)
+from mckibben.blocks.base import Kernel, Primitive
+from mckibben.blocks.fields import DISPLACEMENT, STRICT, ChannelField, Vector
 from mckibben.blocks.interpolation import check_increasing, interpolate
 from mckibben.blocks.kernels import kernel
-from mckibben.blocks.single import SingleChannel
+from mckibben.blocks.refusals import parameter_vector
+from mckibben.blocks.single import Memoryless
 
 Array = NDArray[np.float64]
 
@@ -41,7 +34,7 @@ def piecewise_linear_kernel(
 
 
 @dataclass(frozen=True, config=STRICT)
-class PiecewiseLinear(SingleChannel, Primitive):
+class PiecewiseLinear(Memoryless, Primitive):
     """Straight lines between knots.
 
     Parameters
@@ -66,11 +59,6 @@ class PiecewiseLinear(SingleChannel, Primitive):
         check_increasing(f"{self.kind} block", self.knots, self.values)
 
     @property
-    def n_states(self) -> int:
-        """None: the block is memoryless."""
-        return 0
-
-    @property
     def n_parameters(self) -> int:
         """The values; knots are structure."""
         return len(self.values)
@@ -82,11 +70,6 @@ class PiecewiseLinear(SingleChannel, Primitive):
     def unpack(self, parameters: ArrayLike) -> Self:
         """Return a block with the same knots and other values."""
         return replace(self, values=tuple(parameter_vector(self, parameters).tolist()))
-
-    def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
-        """Return an empty state."""
-        del first, initial
-        return np.empty(0)
 
     def coefficients(self, sample_time: float | None) -> Array:
         """Return [knots, values]."""

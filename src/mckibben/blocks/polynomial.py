@@ -16,19 +16,12 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic import BeforeValidator, FiniteFloat
 from pydantic.dataclasses import dataclass
 
-from mckibben.blocks.base import (
-    DISPLACEMENT,
-    STRICT,
-    ChannelField,
-    Initial,
-    Kernel,
-    Primitive,
-    Vector,
-    parameter_vector,
-)
+from mckibben.blocks.base import Kernel, Primitive
+from mckibben.blocks.fields import DISPLACEMENT, STRICT, ChannelField, Initial, Vector
 from mckibben.blocks.kernels import kernel
+from mckibben.blocks.refusals import parameter_vector
 from mckibben.blocks.saving import nested
-from mckibben.blocks.single import Inverse, Ranged, check_input_range
+from mckibben.blocks.single import Inverse, Memoryless, Ranged, check_input_range
 from mckibben.errors import ModelError
 
 Array = NDArray[np.float64]
@@ -99,7 +92,7 @@ def polynomial_inverse_kernel(
 
 
 @dataclass(frozen=True, config=STRICT)
-class Polynomial(Ranged, Primitive):
+class Polynomial(Memoryless, Ranged, Primitive):
     """Polynomial of a centred and scaled input.
 
     Parameters
@@ -134,11 +127,6 @@ class Polynomial(Ranged, Primitive):
             raise ModelError("a polynomial without coefficients. Remedy: give at least one.")
 
     @property
-    def n_states(self) -> int:
-        """None: the block is memoryless."""
-        return 0
-
-    @property
     def n_parameters(self) -> int:
         """The coefficients; centre and scale are structure."""
         return len(self.polynomial)
@@ -150,11 +138,6 @@ class Polynomial(Ranged, Primitive):
     def unpack(self, parameters: ArrayLike) -> Self:
         """Return a polynomial of the same degree with other coefficients."""
         return replace(self, polynomial=tuple(parameter_vector(self, parameters).tolist()))
-
-    def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
-        """Return an empty state."""
-        del first, initial
-        return np.empty(0)
 
     def coefficients(self, sample_time: float | None) -> Array:
         """Return [centre, scale, polynomial]."""

@@ -23,23 +23,20 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic import BeforeValidator, FiniteFloat
 from pydantic.dataclasses import dataclass
 
-from mckibben.blocks.base import (
+from mckibben.blocks.base import Kernel, Primitive
+from mckibben.blocks.fields import (
     DISPLACEMENT,
     PRESSURE,
     STRICT,
     ChannelField,
     Initial,
-    Kernel,
-    Primitive,
     StoredInitial,
     Vector,
-    explicit_state,
-    needs_sample_time,
-    parameter_vector,
 )
 from mckibben.blocks.kernels import kernel, summing_kernel
 from mckibben.blocks.memory import check_invertible_sum, check_thresholds, play_state
 from mckibben.blocks.pi import PI
+from mckibben.blocks.refusals import explicit_state, needs_sample_time, parameter_vector
 from mckibben.blocks.root import solve_near
 from mckibben.blocks.saving import nested
 from mckibben.blocks.single import Inverse, Ranged, check_input_range

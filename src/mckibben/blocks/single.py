@@ -9,7 +9,9 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mckibben.blocks.base import Block, Channel, Initial, explicit_state
+from mckibben.blocks.base import Block
+from mckibben.blocks.fields import Channel, Initial
+from mckibben.blocks.refusals import explicit_state
 from mckibben.errors import ModelError, ModelWarning
 
 Array = NDArray[np.float64]
@@ -30,6 +32,20 @@ class SingleChannel(Block):
     def outputs(self) -> tuple[Channel, ...]:
         """The output channel."""
         return (self.output,)
+
+
+class Memoryless(SingleChannel):
+    """A single-channel block without state."""
+
+    @property
+    def n_states(self) -> int:
+        """None."""
+        return 0
+
+    def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
+        """Return an empty state."""
+        del first, initial
+        return np.empty(0)
 
 
 class Ranged(SingleChannel):

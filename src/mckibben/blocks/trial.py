@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mckibben.blocks.base import Block, Initial
+from mckibben.blocks.base import Block
+from mckibben.blocks.fields import Initial
 from mckibben.blocks.single import Ranged
 from mckibben.errors import ModelError
 

@@ -13,9 +13,11 @@ from numpy.typing import NDArray
 from sklearn.base import BaseEstimator
 from sklearn.exceptions import NotFittedError
 
-from mckibben.blocks.base import Block, Channel, run_many
+from mckibben.blocks.base import Block
 from mckibben.blocks.compose import Series
+from mckibben.blocks.fields import Channel
 from mckibben.blocks.negative import Negative
+from mckibben.blocks.running import run_many
 from mckibben.errors import ModelError
 from mckibben.estimators.data import Mask, TrainingData, training_data
 from mckibben.estimators.search import Progress, Swarm, Tracker

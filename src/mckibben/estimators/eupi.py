@@ -8,8 +8,9 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from mckibben.blocks.base import Block, vector
+from mckibben.blocks.base import Block
 from mckibben.blocks.eupi import EUPI, eupi_matrix
+from mckibben.blocks.fields import vector
 from mckibben.blocks.memory import named_state
 from mckibben.estimators.base import check_at_least
 from mckibben.estimators.data import Run, TrainingData

@@ -9,11 +9,12 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from mckibben.blocks.base import Block, vector
+from mckibben.blocks.base import Block
 from mckibben.blocks.envelopes.base import Envelope
 from mckibben.blocks.envelopes.exponential import Exponential
 from mckibben.blocks.envelopes.piecewise_linear import PiecewiseLinear
 from mckibben.blocks.envelopes.tanh import Tanh
+from mckibben.blocks.fields import vector
 from mckibben.blocks.gpi import GPI, gpi_matrix, smallest_gap
 from mckibben.blocks.memory import named_state
 from mckibben.estimators.base import check_at_least

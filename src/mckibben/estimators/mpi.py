@@ -9,8 +9,9 @@ from typing import ClassVar, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from mckibben.blocks.base import Block, Channel, vector
+from mckibben.blocks.base import Block
 from mckibben.blocks.compose import Series
+from mckibben.blocks.fields import Channel, vector
 from mckibben.blocks.pi import PI
 from mckibben.estimators.base import check_at_least
 from mckibben.estimators.data import Run, TrainingData

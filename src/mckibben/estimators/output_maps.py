@@ -11,7 +11,8 @@ from abc import ABC, abstractmethod
 import numpy as np
 from numpy.typing import NDArray
 
-from mckibben.blocks.base import Block, Channel, vector
+from mckibben.blocks.base import Block
+from mckibben.blocks.fields import Channel, vector
 from mckibben.blocks.piecewise_linear import PiecewiseLinear
 from mckibben.blocks.polynomial import Polynomial
 from mckibben.errors import ModelError

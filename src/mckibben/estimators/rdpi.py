@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mckibben.blocks.base import Block, vector
+from mckibben.blocks.base import Block
+from mckibben.blocks.fields import vector
 from mckibben.blocks.rate_dependent_pi import RateDependentPI
 from mckibben.errors import DataError
 from mckibben.estimators.base import check_at_least

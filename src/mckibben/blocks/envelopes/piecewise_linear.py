@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic.dataclasses import dataclass
 
-from mckibben.blocks.base import STRICT, Vector
 from mckibben.blocks.envelopes.base import Envelope, EnvelopeKernel
+from mckibben.blocks.fields import STRICT, Vector
 from mckibben.blocks.interpolation import check_increasing, interpolate
 from mckibben.blocks.kernels import kernel
 

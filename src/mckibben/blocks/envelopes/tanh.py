@@ -18,8 +18,8 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
-from mckibben.blocks.base import STRICT
 from mckibben.blocks.envelopes.base import Envelope, EnvelopeKernel
+from mckibben.blocks.fields import STRICT
 from mckibben.blocks.kernels import kernel
 
 Array = NDArray[np.float64]

@@ -10,8 +10,8 @@ gives loops of 1.6 to 48 mm. Read upwards from b^1, as Eq. (5) is written, it gi
 
 from __future__ import annotations
 
-from mckibben.blocks.base import DISPLACEMENT, Channel
 from mckibben.blocks.compose import Series
+from mckibben.blocks.fields import DISPLACEMENT, Channel
 from mckibben.blocks.polynomial import Polynomial
 from mckibben.blocks.rate_dependent_pi import RateDependentPI
 

@@ -1,0 +1,58 @@
+"""Fields of blocks: numbers, channels and starting memories, validated and kept as plain data."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+from pydantic import BeforeValidator, ConfigDict, FiniteFloat
+from pydantic.dataclasses import dataclass as validated_dataclass
+
+Initial = Literal["first_sample", "virgin"] | Sequence[float]
+"""Memory before the first sample."""
+
+
+def _plain(values: Any) -> Any:
+    return tuple(values.tolist()) if isinstance(values, np.ndarray) else values
+
+
+def _plain_sequence(values: Any) -> Any:
+    values = _plain(values)
+    return tuple(values) if isinstance(values, list) else values
+
+
+Vector = Annotated[tuple[FiniteFloat, ...], BeforeValidator(_plain_sequence)]
+"""Finite numbers; arrays and lists are accepted and kept as a tuple."""
+
+StoredInitial = Literal["first_sample", "virgin"] | Vector
+"""`Initial` as a field of a block."""
+
+
+def vector(values: ArrayLike) -> tuple[float, ...]:
+    """Return numbers as a field of a block holds them."""
+    return tuple(np.asarray(values, dtype=np.float64).tolist())
+
+
+STRICT = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
+"""How blocks validate their fields: no unknown ones, no silent conversion, nothing infinite."""
+
+
+@validated_dataclass(frozen=True, config=STRICT)
+class Channel:
+    """Name and unit of an input or output."""
+
+    name: str
+    unit: str
+
+
+def _channel(value: Any) -> Any:
+    return Channel(**value) if isinstance(value, dict) else value
+
+
+ChannelField = Annotated[Channel, BeforeValidator(_channel)]
+"""A channel as a field of a block."""
+
+PRESSURE = Channel("pressure", "bar")
+DISPLACEMENT = Channel("displacement", "mm")

@@ -1,0 +1,45 @@
+"""What blocks refuse in the same words: states and parameters of the wrong length, absent time."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mckibben.blocks.base import Block
+from mckibben.errors import ModelError
+
+Array = NDArray[np.float64]
+
+
+def explicit_state(block: Block, initial: Sequence[float]) -> Array:
+    """Return an explicit initial state after checking its length."""
+    state = np.array(initial, dtype=np.float64)
+    if state.shape != (block.n_states,) or not np.isfinite(state).all():
+        raise ModelError(
+            f"{block.kind!r} has {block.n_states} states, the initial state given has shape "
+            f"{state.shape}. Remedy: give {block.n_states} finite numbers, or 'first_sample'."
+        )
+    return state
+
+
+def parameter_vector(block: Block, parameters: ArrayLike) -> Array:
+    """Return a parameter vector after checking its length."""
+    vector = np.asarray(parameters, dtype=np.float64)
+    if vector.shape != (block.n_parameters,):
+        raise ModelError(
+            f"{block.kind!r} of this structure has {block.n_parameters} parameters, got shape "
+            f"{vector.shape}. Remedy: give a vector as pack() returns it."
+        )
+    return vector
+
+
+def needs_sample_time(kind: str, sample_time: float | None) -> float:
+    """Return the sample time, or say that a rate-dependent block cannot do without."""
+    if sample_time is None or not sample_time > 0:
+        raise ModelError(
+            f"{kind!r} depends on rate and needs a sample time, but the data have no time. "
+            "Remedy: read the recording with a time column or --rate, or give sample_time."
+        )
+    return sample_time

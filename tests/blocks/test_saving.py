@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mckibben import GPI, PI, ModelError, Series, load
+from mckibben import GPI, PI, DataError, ModelError, Series, load
 from mckibben.blocks import saving
 from mckibben.registry import load as load_plugin
 from mckibben.registry import names
@@ -194,7 +194,7 @@ def test_a_failed_write_leaves_the_old_file(
 
     with monkeypatch.context() as broken:
         broken.setattr(Path, "replace", fail)
-        with pytest.raises(OSError, match="disk is full"):
+        with pytest.raises(DataError, match="disk is full"):
             GPI.example().save(path)
     assert load(path) == PI.example()
     assert [file.name for file in tmp_path.iterdir()] == ["model.json"]

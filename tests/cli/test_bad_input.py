@@ -43,7 +43,7 @@ def test_malformed_files_leave_with_a_remedy_and_nothing_lost(
             ["fit", "pi", "FILE", "-o", "x.json", "--set", "n_operators=many"],
             "n_operators is 'many'",
         ),
-        (["fit", "pi", "FILE", "-o", "x.json", "--method", "luck"], "no method 'luck'"),
+        (["fit", "pi", "FILE", "-o", "x.json", "--method", "luck"], "method is 'luck'"),
         (["fit", "pi", "FILE", "-o", "x.json", "--output", "force"], "force"),
         (["fit", "pi", "FILE", "-o", "x.json", "--output", "pressure"], "same channel"),
         (["fit", "pi", "FILE", "-o", "x.json", "--unit", "pressure"], "--unit 'pressure'"),

@@ -13,7 +13,7 @@ import mckibben
 SOURCE = Path(mckibben.__file__).parent
 
 LAYERS = (
-    {"errors", "registry"},
+    {"errors", "registry", "atomic"},
     {"recording", "signals", "metrics", "characterization"},
     {"files"},
     {"blocks"},
@@ -25,7 +25,7 @@ LAYERS = (
 )
 """Lowest first."""
 
-FILES_STAND_ON = {"files", "recording", "errors", "registry"}
+FILES_STAND_ON = {"files", "recording", "errors", "registry", "atomic"}
 
 MODULES = [path for path in sorted(SOURCE.rglob("*.py")) if path != SOURCE / "__init__.py"]
 

@@ -101,9 +101,12 @@ def test_outputs_that_do_not_count_are_never_looked_at(name: str, loop: Recordin
 
 @pytest.mark.parametrize("name", ESTIMATORS)
 def test_bad_settings_and_bad_data_are_refused(name: str, loop: Recording) -> None:
-    for setting in ({"method": "magic"}, {"initial": "yesterday"}, {"n_operators": -1}):
-        with pytest.raises(ModelError, match="Remedy"):
-            quick(name, **setting).fit(loop)
+    for setting, value in (
+        *(("method", "magic"), ("initial", "yesterday"), ("n_operators", -1), ("n_operators", 2.5)),
+        *(("n_operators", 10**9), ("n_operators", True), ("nonnegative", "maybe"), ("seed", -1)),
+    ):
+        with pytest.raises(ModelError, match=rf"{setting} is .*{value}.*Remedy"):
+            quick(name, **{setting: value}).fit(loop)
     still = loop.with_channels(pressure=np.ones(len(loop)))
     with pytest.raises(DataError, match=r"'pressure'.*constant.*Remedy"):
         quick(name).fit(still)
@@ -222,6 +225,13 @@ def test_interrupted_fit_keeps_the_best_model(loop: Recording) -> None:
     fit = GPIEstimator(n_operators=4).fit(loop, progress=impatient)
     assert fit.diagnostics_.interrupted
     assert fit.diagnostics_.rmse < 1.0
+
+
+def test_settings_may_be_numpy_numbers(loop: Recording) -> None:
+    assert quick("pi", n_operators=np.int64(3)).fit(loop).model_.n_parameters == 4
+    assert quick("pi", thresholds=np.array([0.0, 1.0])).fit(loop).model_.n_parameters == 3
+    with pytest.raises(ModelError, match="thresholds is 'abc'"):
+        PIEstimator(thresholds="abc").fit(loop)  # type: ignore[arg-type]
 
 
 def test_progress_ends_at_one(loop: Recording) -> None:

@@ -168,7 +168,7 @@ def test_other_endings_cannot_be_written(recording: Recording, tmp_path: Path, e
 
 @pytest.mark.parametrize("ending", ENDINGS)
 def test_missing_folder_is_an_error(recording: Recording, tmp_path: Path, ending: str) -> None:
-    with pytest.raises(DataError, match="cannot be written"):
+    with pytest.raises(DataError, match="folder does not exist"):
         mckibben.write(recording, tmp_path / "no" / f"a{ending}")
 
 

@@ -8,13 +8,12 @@ are refused.
 from __future__ import annotations
 
 import json
-import os
-import tempfile
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
 from pathlib import Path
 from typing import Any
 
+from mckibben.atomic import write_text
 from mckibben.blocks.base import Block
 from mckibben.errors import ModelError
 from mckibben.registry import load as load_plugin
@@ -110,22 +109,6 @@ def load(path: str | Path) -> Block:
         ) from None
     except ModelError as error:
         raise ModelError(f"{path}: {error}") from None
-
-
-def write_text(path: str | Path, text: str) -> None:
-    """Write a text file so that a failure on the way leaves what was there before."""
-    path = Path(path)
-    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=".tmp")
-    try:
-        with os.fdopen(handle, "w", encoding="utf-8") as file:
-            file.write(text)
-        umask = os.umask(0)
-        os.umask(umask)
-        Path(temporary).chmod(0o666 & ~umask)
-        Path(temporary).replace(path)
-    except BaseException:
-        Path(temporary).unlink(missing_ok=True)
-        raise
 
 
 def _tuples(value: Any) -> Any:

@@ -49,7 +49,7 @@ def print_leaderboard(board: Leaderboard) -> None:
 
 def write_leaderboard(board: Leaderboard, folder: Path) -> None:
     """Write ``leaderboard.json`` and ``leaderboard.csv``."""
-    from mckibben.blocks.saving import write_text
+    from mckibben.atomic import write_text
 
     write_text(folder / "leaderboard.json", to_json(board.to_dict()) + "\n")
     write_text(folder / "leaderboard.csv", board.to_frame().to_csv(index=False))

@@ -109,6 +109,8 @@ def compare(
     split = given_split(recordings, tests) if tests else held_out_tail(recordings, input, HELD_OUT)
     parts = tuple(folds(split.train, input, n_folds)) if n_folds >= 2 else ()
     chosen = registry.names("estimators") if models == "all" else tuple(models)
+    if jobs is not None and jobs < 1:
+        raise ModelError(f"jobs is {jobs}. Remedy: give a number of at least 1, or leave it out.")
     if not chosen:
         raise ModelError(
             "there are no models to compare. "

@@ -5,11 +5,13 @@ from __future__ import annotations
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass, field
-from typing import Any, Literal, Self
+from dataclasses import dataclass, field, fields
+from typing import Annotated, Literal, Self, get_type_hints
 
 import numpy as np
+from annotated_types import Ge, Interval
 from numpy.typing import NDArray
+from pydantic import ConfigDict, TypeAdapter, ValidationError
 from sklearn.base import BaseEstimator
 from sklearn.exceptions import NotFittedError
 
@@ -24,6 +26,11 @@ from mckibben.estimators.search import Progress, Swarm, Tracker
 from mckibben.recording import Recording
 
 Array = NDArray[np.float64]
+
+Operators = Annotated[int, Interval(ge=1, le=1000)]
+"""Number of operators."""
+
+STRICT_SETTINGS = ConfigDict(strict=True, allow_inf_nan=False)
 
 
 @dataclass(frozen=True)
@@ -98,13 +105,13 @@ class Estimator(BaseEstimator, ABC):  # type: ignore[misc]  # scikit-learn ships
     output: str = "displacement"
     method: Literal["ls", "pso-ls", "pso"] = "ls"
     initial: Literal["first_sample", "virgin", "fitted"] = "first_sample"
-    seed: int = 0
-    pso_particles: int = 20
-    pso_iterations: int = 50
+    seed: Annotated[int, Ge(0)] = 0
+    pso_particles: Annotated[int, Ge(2)] = 20
+    pso_iterations: Annotated[int, Ge(1)] = 50
     pso_inertia_start: float = 0.9
     pso_inertia_end: float = 0.4
-    pso_c1: float = 2.0
-    pso_c2: float = 2.0
+    pso_c1: Annotated[float, Ge(0)] = 2.0
+    pso_c2: Annotated[float, Ge(0)] = 2.0
 
     def fit(
         self,
@@ -165,20 +172,25 @@ class Estimator(BaseEstimator, ABC):  # type: ignore[misc]  # scikit-learn ships
         """
 
     def check_settings(self) -> None:
-        """Refuse settings out of range."""
-        choices: dict[str, tuple[str, ...]] = {
-            "method": ("ls", "pso-ls", "pso"),
-            "initial": ("first_sample", "virgin", "fitted"),
-        } | self.choices()
-        for name, allowed in choices.items():
-            check_choice(name, getattr(self, name), allowed)
-        check_at_least("pso_particles", self.pso_particles, 2)
-        check_at_least("pso_iterations", self.pso_iterations, 1)
-        check_at_least("seed", self.seed, 0)
+        """Refuse settings that are not as they are declared.
 
-    def choices(self) -> dict[str, tuple[str, ...]]:
-        """Return further settings that take one of a few words."""
-        return {}
+        Raises
+        ------
+        ModelError
+            Naming the setting, what it is, and what it may be.
+        """
+        hints = get_type_hints(type(self), include_extras=True)
+        for setting in fields(self):
+            given = getattr(self, setting.name)
+            value = given.tolist() if isinstance(given, np.generic | np.ndarray) else given
+            try:
+                TypeAdapter(hints[setting.name], config=STRICT_SETTINGS).validate_python(value)
+            except ValidationError as error:
+                wanted = error.errors()[0]["msg"]
+                raise ModelError(
+                    f"{setting.name} is {value!r}: {wanted[0].lower()}{wanted[1:]}. "
+                    f"Remedy: choose {setting.name} accordingly, or leave it out."
+                ) from None
 
     @property
     def swarm(self) -> Swarm:
@@ -281,16 +293,3 @@ def simulate_all(blocks: Sequence[Block], data: TrainingData) -> Array:
         trimmed = many[:, :, 0] if run.peak is None else many[:, 1:, 0]
         outputs.append(trimmed[:, run.counts])
     return np.concatenate(outputs, axis=1)
-
-
-def check_choice(name: str, value: object, allowed: Sequence[str]) -> None:
-    """Refuse a setting that is none of the words allowed."""
-    if value not in allowed:
-        raise ModelError(f"there is no {name} {value!r}. Remedy: use one of {', '.join(allowed)}.")
-
-
-def check_at_least(name: str, value: Any, least: float) -> None:
-    """Refuse a setting that is too small, or no number."""
-    number = isinstance(value, int | float) and not isinstance(value, bool)
-    if not number or not value >= least:
-        raise ModelError(f"{name} is {value!r}. Remedy: give a number of at least {least:g}.")

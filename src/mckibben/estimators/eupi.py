@@ -3,20 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
+from annotated_types import Ge
 from numpy.typing import NDArray
 
 from mckibben.blocks.base import Block
 from mckibben.blocks.eupi import EUPI, eupi_matrix
 from mckibben.blocks.fields import vector
 from mckibben.blocks.memory import named_state
-from mckibben.estimators.base import check_at_least
+from mckibben.estimators.base import Operators
 from mckibben.estimators.data import Run, TrainingData
 from mckibben.estimators.output_maps import PolynomialMap
 from mckibben.estimators.separable import SeparableEstimator
-from mckibben.estimators.thresholds import SPACINGS, spread
+from mckibben.estimators.thresholds import spread
 
 Array = NDArray[np.float64]
 
@@ -38,18 +39,9 @@ class EUPIEstimator(SeparableEstimator):
         How thresholds spread over half the input range.
     """
 
-    n_operators: int = 10
+    n_operators: Operators = 10
     spacing: Literal["even", "dense"] = "even"
-    n_starts: int = 16
-
-    def choices(self) -> dict[str, tuple[str, ...]]:
-        """Return further settings that take one of a few words."""
-        return {"spacing": SPACINGS}
-
-    def check_settings(self) -> None:
-        """Refuse settings out of range."""
-        super().check_settings()
-        check_at_least("n_operators", self.n_operators, 1)
+    n_starts: Annotated[int, Ge(1)] = 16
 
     def radii(self, data: TrainingData) -> Array:
         """Return the thresholds, shape (n_operators,)."""

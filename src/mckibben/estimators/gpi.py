@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
+from annotated_types import Interval
 from numpy.typing import NDArray
 
 from mckibben.blocks.base import Block
@@ -17,10 +18,9 @@ from mckibben.blocks.envelopes.tanh import Tanh
 from mckibben.blocks.fields import vector
 from mckibben.blocks.gpi import GPI, gpi_matrix, smallest_gap
 from mckibben.blocks.memory import named_state
-from mckibben.estimators.base import check_at_least
 from mckibben.estimators.data import Run, TrainingData
 from mckibben.estimators.separable import SeparableEstimator
-from mckibben.estimators.thresholds import SPACINGS, spread
+from mckibben.estimators.thresholds import spread
 
 Array = NDArray[np.float64]
 Range = tuple[float, float]
@@ -50,25 +50,11 @@ class GPIEstimator(SeparableEstimator):
         How thresholds spread under the first rule.
     """
 
-    n_operators: int = 10
+    n_operators: Annotated[int, Interval(ge=0, le=1000)] = 10
     envelope: Literal["tanh", "piecewise-linear", "exponential"] = "tanh"
-    n_knots: int = 6
+    n_knots: Annotated[int, Interval(ge=3, le=100)] = 6
     threshold_rule: Literal["envelope", "paper"] = "envelope"
     spacing: Literal["even", "dense"] = "even"
-
-    def choices(self) -> dict[str, tuple[str, ...]]:
-        """Return further settings that take one of a few words."""
-        return {
-            "envelope": tuple(SHAPES),
-            "threshold_rule": ("envelope", "paper"),
-            "spacing": SPACINGS,
-        }
-
-    def check_settings(self) -> None:
-        """Refuse settings out of range."""
-        super().check_settings()
-        check_at_least("n_operators", self.n_operators, 0)
-        check_at_least("n_knots", self.n_knots, 3)
 
     @property
     def shape(self) -> EnvelopeShape:

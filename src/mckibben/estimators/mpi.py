@@ -4,22 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import ClassVar, Literal
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
+from annotated_types import Ge, Interval
 from numpy.typing import NDArray
 
 from mckibben.blocks.base import Block
 from mckibben.blocks.compose import Series
 from mckibben.blocks.fields import Channel, vector
 from mckibben.blocks.pi import PI
-from mckibben.estimators.base import check_at_least
+from mckibben.estimators.base import Operators
 from mckibben.estimators.data import Run, TrainingData
-from mckibben.estimators.output_maps import MAPS, OutputMap, output_map
+from mckibben.estimators.output_maps import OutputMap, output_map
 from mckibben.estimators.pi import play_operators
 from mckibben.estimators.search import solve_linear
 from mckibben.estimators.separable import LEAST_REVERSIBLE, SeparableEstimator, counting
-from mckibben.estimators.thresholds import SPACINGS, spread
+from mckibben.estimators.thresholds import spread
 
 Array = NDArray[np.float64]
 
@@ -47,27 +48,17 @@ class MPIEstimator(SeparableEstimator):
         Straight lines of the map, or degree of the polynomial.
     """
 
-    n_operators: int = 10
+    n_operators: Operators = 10
     spacing: Literal["even", "dense"] = "even"
     output_map: Literal["piecewise-linear", "polynomial", "free-polynomial", "odd-polynomial"] = (
         "polynomial"
     )
-    map_size: int = 5
-    n_starts: int = 8
-    n_refined: int = 3
+    map_size: Annotated[int, Interval(ge=1, le=50)] = 5
+    n_starts: Annotated[int, Ge(1)] = 8
+    n_refined: Annotated[int, Ge(1)] = 3
 
     # Operators are computed once a fit, so there is nothing to gain from fewer inputs.
     searches_condensed: ClassVar[bool] = False
-
-    def choices(self) -> dict[str, tuple[str, ...]]:
-        """Return further settings that take one of a few words."""
-        return {"spacing": SPACINGS, "output_map": MAPS}
-
-    def check_settings(self) -> None:
-        """Refuse settings out of range."""
-        super().check_settings()
-        check_at_least("n_operators", self.n_operators, 1)
-        check_at_least("map_size", self.map_size, 1)
 
     @property
     def map(self) -> OutputMap:

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
+from annotated_types import Len
 from numpy.typing import NDArray
 
 from mckibben.blocks.base import Block
@@ -15,11 +16,11 @@ from mckibben.blocks.memory import named_state
 from mckibben.blocks.pi import PI
 from mckibben.blocks.play import play_matrix
 from mckibben.errors import DataError, ModelError
-from mckibben.estimators.base import check_at_least
+from mckibben.estimators.base import Operators
 from mckibben.estimators.data import Run, TrainingData
 from mckibben.estimators.search import Tracker
 from mckibben.estimators.separable import SeparableEstimator
-from mckibben.estimators.thresholds import SPACINGS, spread
+from mckibben.estimators.thresholds import spread
 
 Array = NDArray[np.float64]
 
@@ -44,18 +45,9 @@ class PIEstimator(SeparableEstimator):
     """
 
     method: Literal["ls", "pso-ls", "pso", "slopes"] = "ls"  # type: ignore[assignment]
-    n_operators: int = 10
+    n_operators: Operators = 10
     spacing: Literal["even", "dense"] = "even"
-    thresholds: Sequence[float] | None = None
-
-    def choices(self) -> dict[str, tuple[str, ...]]:
-        """Return further settings that take one of a few words."""
-        return {"method": ("ls", "pso-ls", "pso", "slopes"), "spacing": SPACINGS}
-
-    def check_settings(self) -> None:
-        """Refuse settings out of range."""
-        super().check_settings()
-        check_at_least("n_operators", self.n_operators, 1)
+    thresholds: Annotated[Sequence[float], Len(1)] | None = None
 
     def identify(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
         """Return the block found, and the data with the memories at the start that belong to it."""

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
+from annotated_types import Ge
 from numpy.typing import NDArray
 
 from mckibben.blocks.base import Block
 from mckibben.blocks.fields import vector
 from mckibben.blocks.rate_dependent_pi import RateDependentPI
 from mckibben.errors import DataError
-from mckibben.estimators.base import check_at_least
 from mckibben.estimators.data import Run, TrainingData
 from mckibben.estimators.mpi import MPIEstimator
 from mckibben.estimators.pi import play_operators
@@ -37,13 +38,7 @@ class RDPIEstimator(MPIEstimator):
         Default: the best on the training data of none, 5 and 25 samples.
     """
 
-    rate_time_constant: float | None = None
-
-    def check_settings(self) -> None:
-        """Refuse settings out of range."""
-        super().check_settings()
-        if self.rate_time_constant is not None:
-            check_at_least("rate_time_constant", self.rate_time_constant, 0)
+    rate_time_constant: Annotated[float, Ge(0)] | None = None
 
     def identify(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
         """Return the block found, and the data with the memories at the start that belong to it."""

@@ -9,14 +9,15 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
+from annotated_types import Ge
 from numpy.typing import NDArray
 
 from mckibben.blocks.base import Block
 from mckibben.errors import ModelError
-from mckibben.estimators.base import Estimator, check_at_least, simulate_all
+from mckibben.estimators.base import Estimator, simulate_all
 from mckibben.estimators.data import Run, TrainingData
 from mckibben.estimators.search import Tracker, multi_start, particle_swarm, solve_linear
 
@@ -50,8 +51,8 @@ class SeparableEstimator(Estimator):
     """
 
     nonnegative: bool = True
-    n_starts: int = 48
-    n_refined: int = 4
+    n_starts: Annotated[int, Ge(1)] = 48
+    n_refined: Annotated[int, Ge(1)] = 4
 
     searches_condensed: ClassVar[bool] = True
     """Whether the search may skip what lies between turning points of the input."""
@@ -83,12 +84,6 @@ class SeparableEstimator(Estimator):
         """Return the derivatives of the residuals, shape (samples, m), or None where unknown."""
         del theta, data
         return None
-
-    def check_settings(self) -> None:
-        """Refuse settings out of range."""
-        super().check_settings()
-        check_at_least("n_starts", self.n_starts, 1)
-        check_at_least("n_refined", self.n_refined, 1)
 
     def identify(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
         """Return the block found, and the data with the memories at the start that belong to it."""

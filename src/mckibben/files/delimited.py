@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mckibben.atomic import replacing
 from mckibben.errors import DataError
 from mckibben.files import stored
-from mckibben.files.atomic import replacing
 from mckibben.files.dialect import Dialect, detect
 from mckibben.files.notices import warn
 from mckibben.files.stored import Stored

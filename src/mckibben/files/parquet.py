@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from mckibben.atomic import replacing
 from mckibben.files import stored
-from mckibben.files.atomic import replacing
 from mckibben.files.notices import warn
 from mckibben.files.stored import Stored
 from mckibben.files.table import Table, column, of_equal_length, refuse_huge

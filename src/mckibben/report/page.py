@@ -38,7 +38,7 @@ def write_report(study: Study, path: str | Path) -> None:
     OSError
         If the file cannot be written.
     """
-    from mckibben.blocks.saving import write_text
+    from mckibben.atomic import write_text
 
     write_text(path, page(study))
 

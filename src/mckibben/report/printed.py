@@ -5,8 +5,6 @@ Neither pyplot nor any global state is touched, and the same drawing gives the s
 
 from __future__ import annotations
 
-import os
-import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 from types import MappingProxyType
@@ -14,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from mckibben.atomic import replacing
 from mckibben.errors import DataError
 from mckibben.report.drawing import Curve, Drawing, Panel
 
@@ -112,19 +111,8 @@ def save(drawing: Drawing, path: str | Path) -> None:
             file=path,
             remedy="name it .png, .svg or .pdf",
         )
-    if not path.parent.is_dir():
-        raise DataError("its folder does not exist", file=path, remedy="create the folder first")
-    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=".tmp")
-    try:
-        with os.fdopen(handle, "wb") as file, rc_context(style):
-            drawn(drawing).savefig(file, format=kind, dpi=RESOLUTION, metadata=dict(METADATA[kind]))
-        umask = os.umask(0)
-        os.umask(umask)
-        Path(temporary).chmod(0o666 & ~umask)
-        Path(temporary).replace(path)
-    except BaseException:
-        Path(temporary).unlink(missing_ok=True)
-        raise
+    with replacing(path) as new, rc_context(style):
+        drawn(drawing).savefig(new, format=kind, dpi=RESOLUTION, metadata=dict(METADATA[kind]))
 
 
 def drawn(drawing: Drawing) -> Figure:

@@ -69,8 +69,12 @@ def _run() -> None:
         app()
     except MckibbenError as error:
         _leave(str(error), BAD_INPUT)
+    except SystemExit as leaving:
+        if leaving.code == INTERRUPTED:
+            print("Interrupted: nothing was finished that could be kept.", file=sys.stderr)
+        raise
     except KeyboardInterrupt:
-        _leave("Interrupted.", INTERRUPTED)
+        _leave("Interrupted: nothing was finished that could be kept.", INTERRUPTED)
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(1)

@@ -164,7 +164,11 @@ def _run_tasks(
     one_by_one = get_active_backend()[0].supports_return_generator
     results: dict[int, tuple[Row, Array | None]] = {}
     try:
-        pool = Parallel(n_jobs=workers, return_as="generator_unordered" if one_by_one else "list")
+        pool = Parallel(
+            n_jobs=workers,
+            return_as="generator_unordered" if one_by_one else "list",
+            max_nbytes=None,
+        )
         for index, result in pool(delayed(_try_numbered)(i, task) for i, task in enumerate(tasks)):
             results[index] = result
             if progress is not None:

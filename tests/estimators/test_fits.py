@@ -227,6 +227,19 @@ def test_interrupted_fit_keeps_the_best_model(loop: Recording) -> None:
     assert fit.diagnostics_.rmse < 1.0
 
 
+def test_interrupt_while_diagnosing_keeps_the_model(
+    loop: Recording, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def impatient(*arguments: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("mckibben.estimators.base._sensitivity", impatient)
+    fit = quick("pi").fit(loop)
+    assert fit.diagnostics_.interrupted
+    assert fit.diagnostics_.rmse < 2
+    assert np.isnan(fit.diagnostics_.standard_errors).all()
+
+
 def test_settings_may_be_numpy_numbers(loop: Recording) -> None:
     assert quick("pi", n_operators=np.int64(3)).fit(loop).model_.n_parameters == 4
     assert quick("pi", thresholds=np.array([0.0, 1.0])).fit(loop).model_.n_parameters == 3

@@ -240,36 +240,17 @@ class Estimator(BaseEstimator, ABC):  # type: ignore[misc]  # scikit-learn ships
     def _diagnose(
         self, block: Block, data: TrainingData, tracker: Tracker, started: float
     ) -> Diagnostics:
-        parameters = block.pack()
         at_bounds = self.at_bounds(block)
-        steps = 1e-6 * np.maximum(np.abs(parameters), 1e-3 * np.abs(parameters).max(initial=1e-3))
         residual = data.target - simulate_all([block], data)[0]
-        free = [index for index in range(parameters.size) if index not in at_bounds]
-        thin = data.thinned(max(2000, 4 * parameters.size))
-        perturbed = [block.unpack(parameters + np.eye(parameters.size)[i] * steps[i]) for i in free]
-        base, *moved = simulate_all([block, *perturbed], thin)
-        n = data.target.size
-        covariance = np.full((parameters.size, parameters.size), np.nan)
-        condition = np.inf
-        if free:
-            sizes = np.maximum(np.abs(parameters[free]), steps[free] * 1e6)
-            slopes = np.column_stack(
-                [(m - base) / steps[i] for m, i in zip(moved, free, strict=True)]
-            )
-            scaled = slopes * sizes
-            singular, right = np.linalg.svd(scaled, full_matrices=False)[1:]
-            condition = float(singular[0] / singular[-1]) if singular[-1] > 0 else np.inf
-            kept = singular > 1e-6 * singular[0]
-            inverse = (right[kept].T / singular[kept] ** 2) @ right[kept]
-            determined = 1 - (right[~kept] ** 2).sum(axis=0) > 0.99
-            variance = float(residual @ residual) / max(n - len(free), 1)
-            block_covariance = variance * inverse * np.outer(sizes, sizes) * base.size / n
-            block_covariance[~determined] = np.nan
-            block_covariance[:, ~determined] = np.nan
-            covariance[np.ix_(free, free)] = block_covariance
+        try:
+            condition, covariance = _sensitivity(block, data, residual, at_bounds)
+        except KeyboardInterrupt:  # the model is found; only what is known about it is cut short
+            tracker.interrupted = True
+            condition = np.nan
+            covariance = np.full((block.n_parameters, block.n_parameters), np.nan)
         return Diagnostics(
             rmse=float(np.sqrt(np.mean(residual**2))),
-            n_samples=n,
+            n_samples=residual.size,
             n_evaluations=tracker.evaluations,
             seconds=time.perf_counter() - started,
             interrupted=tracker.interrupted,
@@ -293,3 +274,39 @@ def simulate_all(blocks: Sequence[Block], data: TrainingData) -> Array:
         trimmed = many[:, :, 0] if run.peak is None else many[:, 1:, 0]
         outputs.append(trimmed[:, run.counts])
     return np.concatenate(outputs, axis=1)
+
+
+def _sensitivity(
+    block: Block, data: TrainingData, residual: Array, fixed: Sequence[int]
+) -> tuple[float, Array]:
+    """Return the condition of the parameters that are free, and the covariance of all.
+
+    From finite differences of the free-running output on a share of the samples. Parameters that are
+    fixed, or that the data do not determine, have NaN.
+    """
+    parameters = block.pack()
+    covariance = np.full((parameters.size, parameters.size), np.nan)
+    free = [index for index in range(parameters.size) if index not in fixed]
+    if not free:
+        return np.inf, covariance
+    sizes = np.maximum(np.abs(parameters), 1e-3 * np.abs(parameters).max(initial=1e-3))[free]
+    moves = 1e-6 * np.diag(sizes)
+    thin = data.thinned(max(2000, 4 * parameters.size))
+    perturbed = []
+    for move in moves:
+        moved = parameters.copy()
+        moved[free] += move
+        perturbed.append(block.unpack(moved))
+    base, *others = simulate_all([block, *perturbed], thin)
+    scaled = np.column_stack([other - base for other in others]) / 1e-6
+    singular, right = np.linalg.svd(scaled, full_matrices=False)[1:]
+    condition = float(singular[0] / singular[-1]) if singular[-1] > 0 else np.inf
+    kept = singular > 1e-6 * singular[0]
+    inverse = (right[kept].T / singular[kept] ** 2) @ right[kept]
+    determined = 1 - (right[~kept] ** 2).sum(axis=0) > 0.99
+    variance = float(residual @ residual) / max(residual.size - len(free), 1)
+    own = variance * inverse * np.outer(sizes, sizes) * base.size / residual.size
+    own[~determined] = np.nan
+    own[:, ~determined] = np.nan
+    covariance[np.ix_(free, free)] = own
+    return condition, covariance

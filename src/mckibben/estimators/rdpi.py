@@ -76,7 +76,11 @@ class RDPIEstimator(MPIEstimator):
 
     def fastest(self, data: TrainingData) -> float:
         """Return the largest rate in the data, per second."""
-        return max(float(np.abs(self.rate(run)).max()) for run in data.runs)
+        rates = data.once(
+            ("fastest", self.rate_time_constant),
+            lambda: np.array([np.abs(self.rate(run)).max() for run in data.runs]),
+        )
+        return float(rates.max())
 
     def bounds(self, data: TrainingData) -> tuple[Array, Array]:
         """Return bounds of the weights at rest, then of those by rate relative to the fastest."""

@@ -44,6 +44,8 @@ if TYPE_CHECKING:
     from mckibben.files import write as write
     from mckibben.recording import Recording as Recording
     from mckibben.report import write_report as write_report
+    from mckibben.rigs import Rig as Rig
+    from mckibben.rigs import load_rig as load_rig
 
 __version__ = version("mckibben")
 
@@ -67,10 +69,12 @@ _HOMES = {
     "RateDependentPI": "blocks.rate_dependent_pi",
     "Recording": "recording",
     "Series": "blocks.compose",
+    "Rig": "rigs",
     "characterize": "characterization",
     "check_block": "blocks.check",
     "compare": "comparison.ranking",
     "load": "blocks.saving",
+    "load_rig": "rigs",
     "read": "files",
     "study": "comparison.studying",
     "write": "files",

@@ -49,6 +49,11 @@ PLUGINS: dict[str, dict[str, str]] = {
         "field-models-pi": "mckibben.blocks.published.field_models:prandtl_ishlinskii",
         "mpi-narmax-mpi": "mckibben.blocks.published.mpi_narmax:modified_prandtl_ishlinskii",
     },
+    "setups": {
+        "arm": "mckibben.rigs.setups.arm:Arm",
+        "moving-end": "mckibben.rigs.setups.moving_end:MovingEnd",
+        "test-stand": "mckibben.rigs.setups.test_stand:TestStand",
+    },
 }
 """Group -> name -> ``"module:attribute"``. Adding a plug-in is one line here."""
 

@@ -73,8 +73,16 @@ def test_every_estimator_is_registered() -> None:
     assert concrete(Estimator, "estimators", "compensators") == registered("estimators")
 
 
+def test_every_setup_is_registered() -> None:
+    from mckibben.rigs import Rig
+
+    assert concrete(Rig, "rigs") == registered("setups")
+    for name in PLUGINS["setups"]:
+        assert load("setups", name).model_fields["setup"].default == name
+
+
 def test_every_group_is_checked_here() -> None:
-    assert set(PLUGINS) == {"blocks", "envelopes", "published", "estimators"}
+    assert set(PLUGINS) == {"blocks", "envelopes", "published", "estimators", "setups"}
 
 
 @pytest.mark.parametrize("name", [name for name in mckibben.__all__ if not name.startswith("__")])

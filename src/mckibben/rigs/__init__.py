@@ -1,0 +1,7 @@
+"""Virtual rigs: physics that knows nothing of the models fitted to it."""
+
+from mckibben.rigs.files import describe as describe
+from mckibben.rigs.files import load_rig as load_rig
+from mckibben.rigs.files import rig_names as rig_names
+from mckibben.rigs.files import save_rig as save_rig
+from mckibben.rigs.rig import Rig as Rig

@@ -1,0 +1,155 @@
+"""Rigs as files: TOML that a person can read, each number with its unit, meaning and range."""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from pydantic import BaseModel, ValidationError
+
+from mckibben import registry
+from mckibben.atomic import write_text
+from mckibben.errors import DataError
+from mckibben.rigs.refusals import limits, refused, unit
+from mckibben.rigs.rig import Rig
+
+FORMAT = "mckibben-rig"
+FORMAT_VERSION = 1
+PUBLISHED = Path(__file__).parent / "published"
+MOST_BYTES = 1_000_000
+
+
+@cache
+def rig_names() -> tuple[str, ...]:
+    """Return the names of the rigs that come with the package, in alphabetical order.
+
+    >>> "mas20-hanging" in rig_names()
+    True
+    """
+    return tuple(sorted(path.stem for path in PUBLISHED.glob("*.toml")))
+
+
+def load_rig(rig: str | Path) -> Rig:
+    """Return a rig by name, or from a file.
+
+    Parameters
+    ----------
+    rig : str or path
+        A name of `rig_names`, or a path that ends in ``.toml``.
+
+    Raises
+    ------
+    DataError
+        On an unknown name, or a file that is not a rig: the text names the parameter and its range.
+    """
+    path = Path(rig)
+    if path.suffix != ".toml":
+        if str(rig) not in rig_names():
+            raise DataError(
+                f"there is no rig {str(rig)!r}",
+                remedy=f"use one of {', '.join(rig_names())}, or a file that ends in .toml",
+            )
+        path = PUBLISHED / f"{rig}.toml"
+    return _from_fields(_read(path), path)
+
+
+def save_rig(rig: Rig, path: str | Path) -> None:
+    """Write a rig as a documented file; what stood there before stays until all is written."""
+    path = Path(path)
+    if path.suffix != ".toml":
+        raise DataError("a rig's file ends in .toml", file=path, remedy="name it so")
+    write_text(path, describe(rig))
+
+
+def describe(rig: Rig) -> str:
+    """Return the text of a rig's file: every parameter with its unit, meaning and range."""
+    lines = [f'format = "{FORMAT}"', f"format_version = {FORMAT_VERSION}"]
+    _write_section(rig, "", lines)
+    return "\n".join(lines) + "\n"
+
+
+def _write_section(section: BaseModel, path: str, lines: list[str]) -> None:
+    later: list[tuple[str, BaseModel]] = []
+    for name, field in type(section).model_fields.items():
+        value = getattr(section, name)
+        if isinstance(value, BaseModel):
+            later.append((name, value))
+        elif (
+            isinstance(value, dict) and value and isinstance(next(iter(value.values())), BaseModel)
+        ):
+            later += [(f"{name}.{key}", item) for key, item in value.items()]
+        else:
+            words = ", ".join(part for part in (field.description, limits(field)) if part)
+            of_unit = f"[{unit(field)}] " if unit(field) else ""
+            comment = f"  # {of_unit}{words}" if words or of_unit else ""
+            lines.append(f"{name} = {_toml(value)}{comment}")
+    for name, inner in later:
+        whole = f"{path}.{name}" if path else name
+        lines += ["", f"[{whole}]"]
+        _write_section(inner, whole, lines)
+
+
+def _toml(value: Any) -> str:
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, int | float):
+        return repr(value)
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{key} = {_toml(item)}" for key, item in value.items()) + "}"
+    if isinstance(value, tuple | list):
+        return "[" + ", ".join(map(_toml, value)) + "]"
+    text = str(value).replace("\\", "\\\\").replace('"', '\\"').replace("\n", " ")
+    return f'"{text}"'
+
+
+def _read(path: Path) -> dict[str, Any]:
+    try:
+        size = path.stat().st_size
+    except FileNotFoundError:
+        raise DataError("there is no such file", file=path, remedy="check the path") from None
+    if size > MOST_BYTES:
+        raise DataError(
+            f"{size} bytes are too many for a rig", file=path, remedy="give a rig's TOML file"
+        )
+    try:
+        fields = tomllib.loads(path.read_bytes().decode())
+    except (UnicodeDecodeError, tomllib.TOMLDecodeError, RecursionError) as error:
+        raise DataError(f"this is not TOML: {error}", file=path, remedy="mend the file") from None
+    if fields.pop("format", None) != FORMAT:
+        raise DataError(
+            f"it does not begin with format = {FORMAT!r}",
+            file=path,
+            remedy="start from mckibben rig show NAME --toml",
+        )
+    version = fields.pop("format_version", None)
+    if version != FORMAT_VERSION:
+        raise DataError(
+            f"format_version is {version!r}, not {FORMAT_VERSION}",
+            file=path,
+            remedy="write it with this version of the package",
+        )
+    return fields
+
+
+def _from_fields(fields: dict[str, Any], path: Path) -> Rig:
+    known = registry.names("setups")
+    setup = fields.get("setup")
+    if setup not in known:
+        raise DataError(f"setup is {setup!r}", file=path, remedy=f"give one of {', '.join(known)}")
+    model: type[Rig] = registry.load("setups", str(setup))
+    try:
+        return model.model_validate(_floats(fields))
+    except ValidationError as error:
+        raise refused(error, model, path) from None
+
+
+def _floats(value: Any) -> Any:
+    """Return TOML's nan and inf as words, which every number field refuses by name."""
+    if isinstance(value, dict):
+        return {key: _floats(item) for key, item in value.items()}
+    if isinstance(value, list):
+        return [_floats(item) for item in value]
+    return str(value) if isinstance(value, float) and not math.isfinite(value) else value

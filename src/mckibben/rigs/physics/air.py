@@ -1,0 +1,83 @@
+"""Compressed air: a proportional pressure regulator that fills and vents a muscle.
+
+The flow through an opening is that of ISO 6358: choked below the critical pressure ratio, an ellipse
+above, and a straight line where pressures are nearly equal. Filling and venting openings differ. The
+valve follows its controller with a lag and not within a dead band; the chamber is the muscle, whose
+room changes as it moves, and dead volume. Changes of state are polytropic.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from mckibben.rigs.physics.compiled import ATMOSPHERE, compiled
+
+LAMINAR_RATIO = 0.98
+"""Ratio of pressures above which flow is taken as proportional to their difference."""
+
+SUBSTEPS = 4
+"""Air moves faster than muscles: substeps of every mechanical step."""
+
+MM3_PER_LITRE = 1e6
+
+
+AIR = np.dtype(
+    [
+        ("supply", "f8"),  # bar above the atmosphere
+        ("fill", "f8"),  # l/(s bar)
+        ("vent", "f8"),
+        ("critical_ratio", "f8"),
+        ("valve_time", "f8"),  # s
+        ("gain", "f8"),  # 1/bar
+        ("dead_band", "f8"),  # bar
+        ("dead_room", "f8"),  # mm³
+        ("polytropic", "f8"),
+    ],
+    align=True,
+)
+"""One regulator and its line, as the compiled physics reads it."""
+
+
+@compiled
+def flow(conductance: float, upstream: float, downstream: float, critical_ratio: float) -> float:
+    """Return the flow through an opening [bar l/s] between absolute pressures [bar]; never negative.
+
+    ``conductance`` in l/(s bar), as ISO 6358 defines it.
+    """
+    ratio = downstream / upstream
+    if ratio <= critical_ratio:
+        return conductance * upstream
+    if ratio >= 1.0:
+        return 0.0
+    width = 1.0 - critical_ratio
+    if ratio < LAMINAR_RATIO:
+        off = (ratio - critical_ratio) / width
+        return conductance * upstream * math.sqrt(1.0 - off * off)
+    off = (LAMINAR_RATIO - critical_ratio) / width
+    return (
+        conductance * upstream * math.sqrt(1.0 - off * off) * (1.0 - ratio) / (1.0 - LAMINAR_RATIO)
+    )
+
+
+@compiled
+def valve_flow(air: Any, opening: float, pressure: float) -> float:
+    """Return the flow into the muscle [bar l/s]; an opening above 0 fills, below 0 vents."""
+    inside = pressure + ATMOSPHERE
+    if opening > 0.0:
+        return flow(air.fill * opening, air.supply + ATMOSPHERE, inside, air.critical_ratio)
+    if inside > ATMOSPHERE:
+        return -flow(-air.vent * opening, inside, ATMOSPHERE, air.critical_ratio)
+    return flow(-air.vent * opening, ATMOSPHERE, inside, air.critical_ratio)
+
+
+@compiled
+def valve_target(air: Any, command: float, pressure: float) -> float:
+    """Return the opening that the regulator wants, within -1 (vent) and 1 (fill)."""
+    error = command - pressure
+    if abs(error) <= air.dead_band:
+        return 0.0
+    error -= math.copysign(air.dead_band, error)
+    return min(max(air.gain * error, -1.0), 1.0)

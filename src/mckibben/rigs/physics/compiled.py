@@ -1,0 +1,26 @@
+"""How the physics is compiled."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+import numba
+
+Function = TypeVar("Function", bound=Callable[..., Any])
+
+NEWTON_PER_BAR_MM2 = 0.1
+"""Force of one bar on one square millimetre [N]."""
+
+ATMOSPHERE = 1.013
+"""Pressure of the atmosphere [bar]."""
+
+GRAVITY = 9.81
+"""Weight of one kilogram [N]."""
+
+
+def compiled(function: Function) -> Function:
+    """Compile with exact arithmetic; nothing global, so that runs can share a process."""
+    options: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy"}
+    result: Function = numba.njit(**options)(function)
+    return result

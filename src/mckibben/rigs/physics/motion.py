@@ -1,0 +1,392 @@
+"""What muscles move: coordinates with mass, stiffness and friction, and the march through time.
+
+The coordinates are few (the end of a muscle; a disc's mean shortening and two tilts), the muscles
+act on them through fixed lever arms. Every step solves the balance of forces at its end by Newton's
+method, with the accelerations of Hilber, Hughes and Taylor (1977): second order, and quiet where
+friction sticks. Air is marched before, in substeps. One coordinate may instead be driven, as by the
+screw of a test stand.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mckibben.rigs.physics.air import MM3_PER_LITRE, SUBSTEPS, valve_flow, valve_target
+from mckibben.rigs.physics.compiled import ATMOSPHERE, compiled
+from mckibben.rigs.physics.friction import slip
+from mckibben.rigs.physics.muscle import (
+    MOST_COORDINATES,
+    chamber,
+    commit,
+    longest,
+    prepare,
+    taut_or_slack,
+)
+
+Array = NDArray[np.float64]
+Records = NDArray[np.void]
+
+ALPHA = -0.1
+"""Numerical damping of the fastest motion, of Hilber, Hughes and Taylor; 0 is none."""
+
+GAMMA = 0.5 - ALPHA
+BETA = 0.25 * (1.0 - ALPHA) ** 2
+
+TOLERANCE = 1e-8
+"""A Newton move below this ends the search [mm or rad]."""
+
+MOST_ATTEMPTS = 80
+"""Newton moves, and halvings of moves that went too far, in one step."""
+
+NO_MUSCLE = -1
+
+MM2_PER_NEWTON_PER_BAR = 10.0
+"""A force that grows by 1 N a bar comes from a room that grows by 10 mm³ a mm."""
+
+_EACH = (MOST_COORDINATES,)
+
+MECHANISM = np.dtype(
+    [
+        ("n", "i8"),  # coordinates: shortening [mm] first, then tilts [rad] if any
+        ("mass", "f8", _EACH),  # t, or t mm²
+        ("stiffness", "f8", _EACH),  # N/mm, or N mm/rad
+        ("stiffening", "f8", _EACH),  # stiffness that a bar in one muscle adds
+        ("stiffened_by", "i8"),  # that muscle
+        ("damping", "f8", _EACH),  # N s/mm, or N mm s/rad
+        ("weight", "f8", _EACH),  # N against it
+        ("guide", "f8", _EACH),  # presliding stiffness of the guide's friction [N/mm]
+        ("guide_limit", "f8", _EACH),  # N
+        ("driven", "i8"),
+        ("speed_limit", "f8"),  # of the drive [mm/s]
+    ],
+    align=True,
+)
+"""What the muscles move, as the compiled physics reads it."""
+
+MOTION = np.dtype(
+    [
+        ("place", "f8", _EACH),
+        ("speed", "f8", _EACH),
+        ("acceleration", "f8", _EACH),
+        ("balance", "f8", _EACH),  # sum of forces against motion [N]
+        ("guide", "f8", _EACH),  # force of the guide's friction [N]
+        # What the solution of a step needs:
+        ("tried", "f8", _EACH),
+        ("change", "f8", _EACH),
+        ("slopes", "f8", (MOST_COORDINATES, MOST_COORDINATES)),
+    ],
+    align=True,
+)
+"""State of the coordinates."""
+
+
+@compiled
+def beside(mechanism: Any, states: Any) -> float:
+    """Return the pressure of the muscle that the others are tied to [bar]; 0 without one."""
+    if mechanism.stiffened_by < 0:
+        return 0.0
+    return max(states[mechanism.stiffened_by].pressure, 0.0)
+
+
+@compiled
+def shortening(muscle: Any, n: int, place: Any) -> float:
+    """Return how much nearer the ends of a muscle are [mm], by the place of the coordinates."""
+    x = 0.0
+    for g in range(n):
+        x += muscle.levers[g] * place[g]
+    return x
+
+
+@compiled
+def resist(
+    muscles: Any, mechanism: Any, states: Any, motion: Any, loads: Array, step: float
+) -> None:
+    """Work out what stands against each coordinate at the place tried, and its slopes."""
+    n, tied = mechanism.n, beside(mechanism, states)
+    for g in range(n):
+        moved = motion.tried[g] - motion.place[g]
+        rub, rub_slope = slip(
+            motion.guide[g],
+            mechanism.guide[g],
+            mechanism.guide_limit[g],
+            mechanism.guide_limit[g],
+            moved,
+        )
+        stiffness = mechanism.stiffness[g] + mechanism.stiffening[g] * tied
+        damping = mechanism.damping[g] / step
+        motion.balance[g] = stiffness * motion.tried[g] + rub + damping * moved
+        motion.balance[g] += mechanism.weight[g] + loads[g]
+        for k in range(n):
+            motion.slopes[g, k] = 0.0
+        motion.slopes[g, g] = stiffness + rub_slope + damping
+    for j in range(muscles.size):
+        x = shortening(muscles[j], n, motion.tried)
+        pull, slope, _ = taut_or_slack(muscles[j], states[j], x, step)
+        for g in range(n):
+            lever = muscles[j].levers[g]
+            motion.balance[g] -= lever * pull
+            for k in range(n):
+                motion.slopes[g, k] -= lever * muscles[j].levers[k] * slope
+
+
+@compiled
+def solve(n: int, matrix: Any, right: Any) -> None:
+    """Solve a small positive definite system in place; the answer replaces ``right``."""
+    for i in range(n):
+        for k in range(i + 1, n):
+            share = matrix[k, i] / matrix[i, i]
+            right[k] -= share * right[i]
+            for m in range(i + 1, n):
+                matrix[k, m] -= share * matrix[i, m]
+    for i in range(n - 1, -1, -1):
+        for k in range(i + 1, n):
+            right[i] -= matrix[i, k] * right[k]
+        right[i] /= matrix[i, i]
+
+
+@compiled
+def within_reach(muscles: Any, n: int, place: Any) -> bool:
+    """Tell whether no muscle would be longer than its threads."""
+    spare = np.inf
+    for j in range(muscles.size):
+        spare = min(spare, shortening(muscles[j], n, place) - longest(muscles[j]))
+    return spare >= 0.0
+
+
+@compiled
+def newmark(motion: Any, g: int, step: float) -> float:
+    """Return the acceleration that takes a coordinate to the place tried."""
+    went = motion.tried[g] - motion.place[g] - step * motion.speed[g]
+    return went / (BETA * step * step) - (0.5 - BETA) / BETA * motion.acceleration[g]
+
+
+@compiled
+def move(muscles: Any, mechanism: Any, states: Any, motion: Any, loads: Array, step: float) -> None:
+    """March the coordinates through one step, pressures being those at its end."""
+    n = mechanism.n
+    before = (motion.balance[0], motion.balance[1], motion.balance[2])
+    for g in range(n):
+        coast = step * motion.speed[g] + 0.5 * step * step * motion.acceleration[g]
+        motion.tried[g] = motion.place[g] + coast
+        motion.change[g] = coast
+    first = (1.0, 1.0, 1.0)
+    worst = np.inf
+    shrunk = 1.0
+    for _ in range(MOST_ATTEMPTS):
+        size = np.inf
+        if within_reach(muscles, n, motion.tried):
+            resist(muscles, mechanism, states, motion, loads, step)
+            if worst == np.inf:
+                first = (motion.slopes[0, 0], motion.slopes[1, 1], motion.slopes[2, 2])
+            size = 0.0
+            for g in range(n):
+                inertia = mechanism.mass[g] * newmark(motion, g, step)
+                off = inertia + (1.0 + ALPHA) * motion.balance[g] - ALPHA * before[g]
+                size += off * off / first[g]
+        if size > worst or size == np.inf:
+            # Too far: halfway back, where Newton's straight line is still near the truth.
+            shrunk *= 0.5
+            if shrunk < 1e-6:
+                break
+            for g in range(n):
+                motion.tried[g] -= shrunk * motion.change[g]
+            continue
+        worst, shrunk = size, 1.0
+        for g in range(n):
+            inertia = mechanism.mass[g] * newmark(motion, g, step)
+            motion.change[g] = ALPHA * before[g] - (1.0 + ALPHA) * motion.balance[g] - inertia
+            for k in range(n):
+                motion.slopes[g, k] *= 1.0 + ALPHA
+            motion.slopes[g, g] += mechanism.mass[g] / (BETA * step * step)
+        solve(n, motion.slopes, motion.change)
+        largest = 0.0
+        for g in range(n):
+            largest = max(largest, abs(motion.change[g]))
+        if largest <= TOLERANCE:
+            break
+        for g in range(n):
+            motion.tried[g] += motion.change[g]
+    for g in range(n):
+        acceleration = newmark(motion, g, step)
+        mean = (1.0 - GAMMA) * motion.acceleration[g] + GAMMA * acceleration
+        motion.speed[g] += step * mean
+        motion.acceleration[g] = acceleration
+
+
+@compiled
+def drive(
+    muscles: Any, mechanism: Any, states: Any, motion: Any, target: float, step: float
+) -> None:
+    """March a driven coordinate towards its target, as fast as the drive can."""
+    reach = mechanism.speed_limit * step
+    moved = min(max(target - motion.place[0], -reach), reach)
+    motion.tried[0] = motion.place[0] + moved
+    motion.speed[0] = moved / step
+
+
+@compiled
+def arrive(muscles: Any, mechanism: Any, states: Any, motion: Any, step: float) -> None:
+    """Make the move to the place tried good, in the guides and in every muscle."""
+    for j in range(muscles.size):
+        x = shortening(muscles[j], mechanism.n, motion.tried)
+        pull, _, own = taut_or_slack(muscles[j], states[j], x, step)
+        states[j].tension = pull
+        commit(muscles[j], states[j], own, step)
+    for g in range(mechanism.n):
+        motion.guide[g], _ = slip(
+            motion.guide[g],
+            mechanism.guide[g],
+            mechanism.guide_limit[g],
+            mechanism.guide_limit[g],
+            motion.tried[g] - motion.place[g],
+        )
+        motion.place[g] = motion.tried[g]
+
+
+@compiled
+def breathe(
+    muscle: Any,
+    air: Any,
+    state: Any,
+    before: float,
+    after: float,
+    squeezed: float,
+    squeezing: float,
+    step: float,
+) -> None:
+    """Let a regulator fill or vent its muscle for a step, while its command goes on in a line.
+
+    ``squeezed`` is room that the muscle lost by bending [mm³], and ``squeezing`` its change [mm³/s].
+    """
+    dt = step / SUBSTEPS
+    half = math.exp(-0.5 * dt / air.valve_time)
+    pressure = state.pressure
+    for i in range(SUBSTEPS):
+        command = before + (after - before) * (i + 0.5) / SUBSTEPS
+        target = valve_target(air, command, pressure)
+        opening = target + (state.valve - target) * half
+        state.valve = target + (opening - target) * half
+        x = state.x + state.speed * dt * (i + 0.5)
+        middle = pressure
+        for stage in range(1, 3):
+            room, area, give = chamber(muscle, x, middle)
+            room += air.dead_room - squeezed
+            absolute = middle + ATMOSPHERE
+            rate = valve_flow(air, opening, middle) * MM3_PER_LITRE
+            rate -= absolute * (area * state.speed - squeezing)
+            middle = pressure + 0.5 * stage * dt * rate / (room / air.polytropic + absolute * give)
+        pressure = middle
+    state.pressure = pressure
+
+
+@compiled
+def advance(
+    muscles: Any,
+    air: Any,
+    mechanism: Any,
+    states: Any,
+    motion: Any,
+    before: Array,
+    after: Array,
+    loads_before: Array,
+    loads_after: Array,
+    target_before: float,
+    target_after: float,
+    steps: int,
+    step: float,
+) -> None:
+    """March from one sample to the next; commands and loads go on in straight lines."""
+    loads = np.empty(MOST_COORDINATES)
+    for i in range(steps):
+        start, end = i / steps, (i + 1) / steps
+        squeezed, squeezing = 0.0, 0.0
+        for g in range(mechanism.n):
+            per_place = MM2_PER_NEWTON_PER_BAR * mechanism.stiffening[g]
+            squeezed += 0.5 * per_place * motion.place[g] * motion.place[g]
+            squeezing += per_place * motion.place[g] * motion.speed[g]
+        for j in range(muscles.size):
+            rise = after[j] - before[j]
+            bent = 1.0 if j == mechanism.stiffened_by else 0.0
+            breathe(
+                muscles[j],
+                air,
+                states[j],
+                before[j] + start * rise,
+                before[j] + end * rise,
+                bent * squeezed,
+                bent * squeezing,
+                step,
+            )
+        tied = beside(mechanism, states)
+        for j in range(muscles.size):
+            prepare(muscles[j], states[j], tied, step)
+        if mechanism.driven:
+            target = target_before + end * (target_after - target_before)
+            drive(muscles, mechanism, states, motion, target, step)
+        else:
+            for g in range(mechanism.n):
+                loads[g] = loads_before[g] + end * (loads_after[g] - loads_before[g])
+            move(muscles, mechanism, states, motion, loads, step)
+        arrive(muscles, mechanism, states, motion, step)
+
+
+@compiled
+def note(muscles: Any, mechanism: Any, states: Any, motion: Any, row: Array) -> None:
+    """Write what sensors could see into a row: see `march`."""
+    n, m = mechanism.n, muscles.size
+    for g in range(n):
+        row[g] = motion.place[g]
+        row[n + g] = motion.acceleration[g]
+    for j in range(m):
+        row[2 * n + j] = states[j].pressure
+        row[2 * n + m + j] = states[j].tension
+        room, _, _ = chamber(muscles[j], states[j].x, states[j].pressure)
+        row[2 * n + 2 * m + j] = room
+        row[2 * n + 3 * m + j] = states[j].warmth
+
+
+@compiled
+def march(
+    muscles: Records,
+    air: Records,
+    mechanism: Records,
+    states: Records,
+    motion: Records,
+    commands: Array,
+    loads: Array,
+    targets: Array,
+    held: bool,
+    steps: int,
+    step: float,
+    traces: Array,
+) -> None:
+    """March through all samples, and note what sensors could see at each.
+
+    Commands have shape (n, muscles) [bar], loads (n, coordinates) [N or N mm], targets (n,) [mm].
+    Between two samples they go on in straight lines, or are held at the first. Each row of
+    ``traces`` takes place and acceleration of every coordinate, then pressure, tension, room [mm³]
+    and warmth [K] of every muscle.
+    """
+    note(muscles, mechanism[0], states, motion[0], traces[0])
+    for i in range(commands.shape[0] - 1):
+        k = i if held else i + 1
+        advance(
+            muscles,
+            air[0],
+            mechanism[0],
+            states,
+            motion[0],
+            commands[i],
+            commands[k],
+            loads[i],
+            loads[k],
+            targets[i],
+            targets[k],
+            steps,
+            step,
+        )
+        note(muscles, mechanism[0], states, motion[0], traces[i + 1])

@@ -1,0 +1,218 @@
+"""A muscle: braid, bladder, friction, creep and viscosity, in parallel.
+
+    tension = braid pull - bladder - friction - creep - viscosity
+
+A contractile muscle cannot push: where the sum is below what its buckling bears, it goes slack and
+stays longer than the distance between its ends.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from mckibben.rigs.physics.bladder import bladder_force
+from mckibben.rigs.physics.braid import acting_pressure, braid_area, braid_volume, unfolded
+from mckibben.rigs.physics.compiled import NEWTON_PER_BAR_MM2, compiled
+from mckibben.rigs.physics.creep import relax
+from mckibben.rigs.physics.friction import slip
+
+MOST_ELEMENTS = 8
+"""Friction elements that a muscle may have."""
+
+MOST_BRANCHES = 4
+"""Creep branches that a muscle may have."""
+
+MOST_COORDINATES = 3
+"""Coordinates that a muscle may act on."""
+
+SLACK_TOLERANCE = 1e-9
+"""Of the length of a slack muscle [mm]."""
+
+LEAST_ROOM = 0.05
+"""Share of its room at rest that even the longest muscle keeps for air, in its ends."""
+
+MUSCLE = np.dtype(
+    [
+        ("length", "f8"),
+        ("area", "f8"),  # cross-section at rest [mm²]
+        ("a", "f8"),
+        ("b", "f8"),
+        ("end_cap", "f8"),
+        ("contact", "f8"),  # bar
+        ("room", "f8"),  # of air at rest [mm³]
+        ("folded", "f8"),  # volume over which the bladder leaves the braid [mm³]
+        ("cos2", "f8"),
+        ("sin2", "f8"),
+        ("c10", "f8"),  # times the volume of rubber [N mm]
+        ("c01", "f8"),
+        ("n_elements", "i8"),
+        ("friction", "f8", (MOST_ELEMENTS,)),  # N/mm
+        ("contracting", "f8", (MOST_ELEMENTS,)),  # N/bar
+        ("extending", "f8", (MOST_ELEMENTS,)),
+        ("preload", "f8"),  # bar
+        ("neighbour", "f8"),  # share of the neighbour's pressure
+        ("viscosity", "f8"),  # N s/mm
+        ("n_branches", "i8"),
+        ("creep", "f8", (MOST_BRANCHES,)),  # N/mm
+        ("creep_time", "f8", (MOST_BRANCHES,)),  # s
+        ("push", "f8"),  # N
+        ("softening", "f8"),  # 1/K
+        ("heat_capacity", "f8"),  # J/K
+        ("cooling", "f8"),  # s
+        ("levers", "f8", (MOST_COORDINATES,)),  # shortening by each coordinate
+    ],
+    align=True,
+)
+"""One muscle, as the compiled physics reads it; made by `mckibben.rigs.parameters`."""
+
+MUSCLE_STATE = np.dtype(
+    [
+        ("x", "f8"),  # own shortening [mm]
+        ("speed", "f8"),
+        ("pressure", "f8"),
+        ("valve", "f8"),
+        ("warmth", "f8"),  # K above the room
+        ("tension", "f8"),
+        ("dissipated", "f8"),  # N mm since the start
+        ("friction", "f8", (MOST_ELEMENTS,)),  # N
+        ("creep", "f8", (MOST_BRANCHES,)),  # N
+        # What does not change while a step is solved:
+        ("inside", "f8"),  # N/mm²
+        ("acting", "f8"),  # N/mm², where the bladder has to reach the braid
+        ("normal", "f8"),  # bar
+        ("soft", "f8"),
+        ("kept", "f8", (MOST_BRANCHES,)),
+        ("drawn", "f8", (MOST_BRANCHES,)),  # N/mm
+    ],
+    align=True,
+)
+"""What one muscle remembers."""
+
+
+@compiled
+def prepare(muscle: Any, state: Any, beside: float, step: float) -> None:
+    """Work out what does not change while a step is solved.
+
+    ``beside`` is the pressure of the muscle that this one is tied to [bar].
+    """
+    acting, _, _ = acting_pressure(state.pressure, muscle.contact)
+    state.soft = max(1.0 - muscle.softening * state.warmth, 0.1)
+    state.inside = NEWTON_PER_BAR_MM2 * state.pressure
+    state.acting = NEWTON_PER_BAR_MM2 * acting
+    pressed = state.pressure + muscle.preload + muscle.neighbour * beside
+    state.normal = state.soft * max(pressed, 0.0)
+    for i in range(muscle.n_branches):
+        kept = math.exp(-step / muscle.creep_time[i])
+        state.kept[i] = kept
+        state.drawn[i] = muscle.creep[i] * muscle.creep_time[i] * (1.0 - kept) / step
+
+
+@compiled
+def tension(muscle: Any, state: Any, x: float, step: float) -> tuple[float, float]:
+    """Return the pull of a muscle that shortens to ``x`` within a step [N], and its slope [N/mm]."""
+    area, area_slope = braid_area(muscle.area, muscle.a, muscle.b, muscle.end_cap, muscle.length, x)
+    gained = braid_volume(muscle.area, muscle.a, muscle.b, muscle.end_cap, muscle.length, x)
+    _, reaching, change = unfolded(gained, muscle.folded)
+    pressure = state.inside + (state.acting - state.inside) * reaching
+    pressure_slope = (state.acting - state.inside) * change * area
+    rubber, rubber_slope = bladder_force(
+        muscle.c10, muscle.c01, muscle.cos2, muscle.sin2, muscle.length, x
+    )
+    pull = pressure * area - state.soft * rubber
+    slope = pressure * area_slope + pressure_slope * area - state.soft * rubber_slope
+    moved = x - state.x
+    for i in range(muscle.n_elements):
+        force, stiffness = slip(
+            state.friction[i],
+            muscle.friction[i],
+            muscle.contracting[i] * state.normal,
+            muscle.extending[i] * state.normal,
+            moved,
+        )
+        pull -= force
+        slope -= stiffness
+    for i in range(muscle.n_branches):
+        pull -= relax(state.creep[i], state.kept[i], state.drawn[i], moved)
+        slope -= state.drawn[i]
+    pull -= muscle.viscosity * moved / step
+    slope -= muscle.viscosity / step
+    return pull, slope
+
+
+@compiled
+def longest(muscle: Any) -> float:
+    """Return the (negative) shortening at which the threads would lie along the axis [mm]."""
+    return muscle.length * (1.0 - 0.999 / math.sqrt(muscle.cos2))
+
+
+@compiled
+def taut_or_slack(muscle: Any, state: Any, x: float, step: float) -> tuple[float, float, float]:
+    """Return pull [N], slope [N/mm] and own shortening [mm], where its ends are ``x`` mm nearer."""
+    pull, slope = tension(muscle, state, x, step)
+    least = -muscle.push
+    if pull >= least:
+        return pull, slope, x
+    low, high = min(state.x, x), x
+    reach, floor = 1e-3, longest(muscle)
+    while low > floor and tension(muscle, state, low, step)[0] < least:
+        high = low
+        low = max(low - reach, floor)
+        reach *= 2.0
+    own = low
+    for _ in range(100):
+        pull, slope = tension(muscle, state, own, step)
+        if pull >= least:
+            low = own
+        else:
+            high = own
+        if high - low <= SLACK_TOLERANCE:
+            break
+        own -= (pull - least) / slope
+        if not low < own < high:
+            own = 0.5 * (low + high)
+    return least, 0.0, own
+
+
+@compiled
+def commit(muscle: Any, state: Any, x: float, step: float) -> None:
+    """Make a step's move good: friction, creep, warmth and place, and count what was dissipated."""
+    moved = x - state.x
+    lost = muscle.viscosity * moved * moved / step
+    for i in range(muscle.n_elements):
+        before = state.friction[i]
+        after, _ = slip(
+            before,
+            muscle.friction[i],
+            muscle.contracting[i] * state.normal,
+            muscle.extending[i] * state.normal,
+            moved,
+        )
+        lost += after * moved + (before * before - after * after) / (2.0 * muscle.friction[i])
+        state.friction[i] = after
+    for i in range(muscle.n_branches):
+        before = state.creep[i]
+        after = relax(before, state.kept[i], state.drawn[i], moved)
+        lost += 0.5 * (before + after) * moved
+        lost += (before * before - after * after) / (2.0 * muscle.creep[i])
+        state.creep[i] = after
+    state.dissipated += lost
+    cooled = state.warmth * (1.0 - step / muscle.cooling)
+    state.warmth = cooled + 1e-3 * lost / muscle.heat_capacity
+    state.speed = moved / step
+    state.x = x
+
+
+@compiled
+def chamber(muscle: Any, x: float, pressure: float) -> tuple[float, float, float]:
+    """Return the room inside [mm³], its change with shortening [mm²] and with pressure [mm³/bar]."""
+    _, share, bend = acting_pressure(pressure, muscle.contact)
+    gained = braid_volume(muscle.area, muscle.a, muscle.b, muscle.end_cap, muscle.length, x)
+    area, _ = braid_area(muscle.area, muscle.a, muscle.b, muscle.end_cap, muscle.length, x)
+    out, reaching, _ = unfolded(gained, muscle.folded)
+    room = muscle.room + gained + (share - 1.0) * out
+    if room < LEAST_ROOM * muscle.room:
+        return LEAST_ROOM * muscle.room, 0.0, 0.0
+    return room, (1.0 + (share - 1.0) * reaching) * area, bend * out

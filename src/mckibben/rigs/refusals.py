@@ -1,0 +1,76 @@
+"""From what pydantic refuses to an error that names the field, its range and its meaning."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from pydantic import BaseModel, ValidationError
+from pydantic.fields import FieldInfo
+
+from mckibben.errors import DataError
+
+
+def refused(
+    error: ValidationError, model: type[BaseModel], file: str | Path | None = None
+) -> DataError:
+    """Return the first thing that was refused as a `DataError`."""
+    first = error.errors(include_url=False)[0]
+    place = [part for part in first["loc"] if isinstance(part, str)]
+    path = ".".join(str(part) for part in first["loc"])
+    kind = first["type"]
+    field = _field(model, place)
+    if kind == "missing":
+        return DataError(f"the parameter {path!r} is missing", file=file, remedy=_wanted(field))
+    if kind == "extra_forbidden":
+        return DataError(
+            f"there is no parameter {path!r}", file=file, remedy="correct its name, or drop it"
+        )
+    if kind == "value_error":
+        problem = str(first["ctx"]["error"])
+        where = f"{path}: " if path else ""
+        return DataError(f"{where}{problem}", file=file, remedy="change one of them")
+    given = first["input"]
+    shown = repr(given) if not isinstance(given, dict | list) else "a " + type(given).__name__
+    return DataError(
+        f"{path} is {shown}: {first['msg'][0].lower()}{first['msg'][1:]}",
+        file=file,
+        remedy=_wanted(field),
+    )
+
+
+def limits(field: FieldInfo) -> str:
+    """Return the range of a field in words, empty when it has none."""
+    words = []
+    for rule in field.metadata:
+        for name, text in (("ge", "at least"), ("gt", "above"), ("le", "at most"), ("lt", "below")):
+            bound = getattr(rule, name, None)
+            if bound is not None:
+                words.append(f"{text} {bound:g}")
+    return ", ".join(words)
+
+
+def unit(field: FieldInfo) -> str:
+    """Return the unit of a field, empty when it has none."""
+    extra = field.json_schema_extra
+    return str(extra["unit"]) if isinstance(extra, dict) and "unit" in extra else ""
+
+
+def _wanted(field: FieldInfo | None) -> str:
+    if field is None:
+        return "see mckibben rig show"
+    of_unit = f" [{unit(field)}]" if unit(field) else ""
+    bounds = limits(field)
+    return f"give the {field.description or 'section'}{of_unit}" + (f", {bounds}" if bounds else "")
+
+
+def _field(model: type[BaseModel], place: list[str]) -> FieldInfo | None:
+    found: FieldInfo | None = None
+    inner: Any = model
+    for part in place:
+        fields = getattr(inner, "model_fields", None)
+        if fields is None or part not in fields:
+            return found
+        found = fields[part]
+        inner = found.annotation
+    return found

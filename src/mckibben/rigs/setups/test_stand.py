@@ -1,0 +1,66 @@
+"""A muscle between a load cell and a screw: its length is imposed, its force measured."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, ClassVar, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mckibben.rigs.parameters import Muscle, parameter
+from mckibben.rigs.physics.motion import MECHANISM, NO_MUSCLE
+from mckibben.rigs.rig import Demands, Rig, System, Traces
+
+Array = NDArray[np.float64]
+
+
+class TestStand(Rig):
+    """One muscle in an isometric and isobaric test stand."""
+
+    __test__: ClassVar[bool] = False  # not a test, whatever its name looks like
+
+    setup: Literal["test-stand"] = "test-stand"
+    muscle: Muscle
+    drive_speed: float = parameter("fastest that the screw can go", "mm/s", gt=0, le=1000)
+
+    measurable: ClassVar[tuple[str, ...]] = ("pressure", "length", "force")
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """Pressure, and the length to hold or to go to."""
+        return ("pressure", "length")
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """What there are sensors for."""
+        return tuple(name for name in self.measurable if name in self.sensor)
+
+    def build(self) -> System:
+        """Return one muscle on one driven coordinate: the shortening of the muscle."""
+        muscles = self.muscle.record()
+        muscles["levers"][0, 0] = 1.0
+        made = np.zeros(1, MECHANISM)
+        made["n"] = 1
+        made["guide"] = 1.0
+        made["driven"] = 1
+        made["speed_limit"] = self.drive_speed
+        made["stiffened_by"] = NO_MUSCLE
+        return System(muscles, self.air.record(), made)
+
+    def demands(self, inputs: Array) -> Demands:
+        """Return the pressure asked for, and the shortening that the length asks for."""
+        return Demands(inputs[:, :1], np.zeros((len(inputs), 1)), self.muscle.length - inputs[:, 1])
+
+    def readings(self, traces: Traces, inputs: Array, zero: Array) -> Mapping[str, Array]:
+        """Return pressure, length between the ends, and the muscle's pull."""
+        del inputs, zero
+        return {
+            "pressure": traces.pressure[:, 0],
+            "length": self.muscle.length - traces.place[:, 0],
+            "force": traces.tension[:, 0],
+        }
+
+    def known(self) -> Mapping[str, Any]:
+        """Return the muscle's size."""
+        return {"rest_length": self.muscle.length, "diameter": self.muscle.diameter}

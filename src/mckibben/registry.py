@@ -45,6 +45,13 @@ PLUGINS: dict[str, dict[str, str]] = {
         "pi": "mckibben.estimators.pi:PIEstimator",
         "rdpi": "mckibben.estimators.rdpi:RDPIEstimator",
     },
+    "protocols": {
+        "activation-pressure": "mckibben.signals.protocols.activation_pressure:activation_pressure",
+        "field-models": "mckibben.signals.protocols.field_models:field_models",
+        "mpi-narmax": "mckibben.signals.protocols.mpi_narmax:mpi_narmax",
+        "multistate": "mckibben.signals.protocols.multistate:multistate",
+        "sdchm": "mckibben.signals.protocols.sdchm:sdchm",
+    },
     "published": {
         "field-models-pi": "mckibben.blocks.published.field_models:prandtl_ishlinskii",
         "mpi-narmax-mpi": "mckibben.blocks.published.mpi_narmax:modified_prandtl_ishlinskii",
@@ -53,6 +60,24 @@ PLUGINS: dict[str, dict[str, str]] = {
         "arm": "mckibben.rigs.setups.arm:Arm",
         "moving-end": "mckibben.rigs.setups.moving_end:MovingEnd",
         "test-stand": "mckibben.rigs.setups.test_stand:TestStand",
+    },
+    "signals": {
+        "binary-steps": "mckibben.signals.steps:binary_steps",
+        "chirp": "mckibben.signals.broadband:chirp",
+        "constant": "mckibben.signals.loads:constant",
+        "decaying-sine": "mckibben.signals.excitations:decaying_sine",
+        "decaying-triangle": "mckibben.signals.excitations:decaying_triangle",
+        "irregular-triangle": "mckibben.signals.excitations:irregular_triangle",
+        "multisine": "mckibben.signals.broadband:multisine",
+        "progressive-sine": "mckibben.signals.excitations:progressive_sine",
+        "progressive-triangle": "mckibben.signals.excitations:progressive_triangle",
+        "pulls": "mckibben.signals.loads:pulls",
+        "ramps": "mckibben.signals.loads:ramps",
+        "random-steps": "mckibben.signals.steps:random_steps",
+        "random-wave": "mckibben.signals.broadband:random_wave",
+        "sine": "mckibben.signals.excitations:sine",
+        "staircase": "mckibben.signals.steps:staircase",
+        "triangle": "mckibben.signals.excitations:triangle",
     },
 }
 """Group -> name -> ``"module:attribute"``. Adding a plug-in is one line here."""

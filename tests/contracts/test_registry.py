@@ -58,19 +58,40 @@ def test_every_envelope_is_registered() -> None:
 
 
 def test_every_published_model_is_registered() -> None:
-    functions = {
-        value
-        for module in modules_under("blocks/published")
-        for name, value in inspect.getmembers(module, inspect.isfunction)
-        if value.__module__ == module.__name__ and not name.startswith("_")
-    }
-    assert functions == registered("published")
+    assert functions("blocks/published") == registered("published")
 
 
 def test_every_estimator_is_registered() -> None:
     from mckibben.estimators.base import Estimator
 
     assert concrete(Estimator, "estimators", "compensators") == registered("estimators")
+
+
+def functions(folder: str) -> set[Any]:
+    """Return the public functions that the modules of a folder define."""
+    return {
+        value
+        for module in modules_under(folder)
+        for name, value in inspect.getmembers(module, inspect.isfunction)
+        if value.__module__ == module.__name__ and not name.startswith("_")
+    }
+
+
+def test_every_protocol_is_registered() -> None:
+    from mckibben.signals.protocols.protocol import protocol
+
+    assert functions("signals/protocols") == registered("protocols") | {protocol}
+    for name in PLUGINS["protocols"]:
+        assert protocol(name).name == name
+
+
+def test_every_excitation_is_registered() -> None:
+    found = {
+        function
+        for function in functions("signals")
+        if next(iter(inspect.signature(function).parameters), "") == "time"
+    }
+    assert found == registered("signals")
 
 
 def test_every_setup_is_registered() -> None:
@@ -82,7 +103,15 @@ def test_every_setup_is_registered() -> None:
 
 
 def test_every_group_is_checked_here() -> None:
-    assert set(PLUGINS) == {"blocks", "envelopes", "published", "estimators", "setups"}
+    assert set(PLUGINS) == {
+        "blocks",
+        "envelopes",
+        "estimators",
+        "protocols",
+        "published",
+        "setups",
+        "signals",
+    }
 
 
 @pytest.mark.parametrize("name", [name for name in mckibben.__all__ if not name.startswith("__")])

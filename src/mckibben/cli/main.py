@@ -19,6 +19,7 @@ from mckibben.cli.fit import fit
 from mckibben.cli.info import info
 from mckibben.cli.invert import invert
 from mckibben.cli.plot import plot
+from mckibben.cli.rig import app as rig_app
 from mckibben.cli.simulate import simulate
 from mckibben.cli.study import study
 from mckibben.errors import DataWarning, MckibbenError, ModelWarning
@@ -37,6 +38,7 @@ app = typer.Typer(
 )
 for command in (study, characterize, fit, compare, simulate, invert, plot, info):
     app.command()(command)
+app.add_typer(rig_app)
 
 
 def _show_version(wanted: bool) -> None:

@@ -100,7 +100,7 @@ class Rig(Section, ABC):
         if not self.sensor:
             raise ValueError(f"sensor: there is none; {self.measurable} can be measured")
         for name in self.inputs:
-            limits = self._range(name)
+            limits = self.limits(name)
             if not limits.low <= self._start(name) <= limits.high:
                 raise ValueError(
                     f"start: {name} at {self._start(name):g} is not within its range "
@@ -163,7 +163,7 @@ class Rig(Section, ABC):
             *sections, last = path.split(".")
             for section in sections:
                 place = place.get(section) if isinstance(place, dict) else None  # type: ignore[assignment]
-            if not isinstance(place, dict) or last not in place:
+            if not isinstance(place, dict) or (last not in place and sections != ["start"]):
                 raise DataError(
                     f"the rig {self.name!r} has no parameter {path!r}",
                     remedy=f"see mckibben rig show {self.name}",
@@ -219,7 +219,7 @@ class Rig(Section, ABC):
             }
         applied = {name: given[:, i] for i, name in enumerate(self.inputs) if name not in readings}
         for name, count in saturated.items():
-            limits = self._range(name)
+            limits = self.limits(name)
             warnings.warn(
                 DataWarning(
                     f"{name} was limited to {limits.low:g} to {limits.high:g} "
@@ -284,8 +284,8 @@ class Rig(Section, ABC):
         if running is None:
             raise DataError("the rig is not running", remedy="call reset() first")
         asked = self._asked(action)
-        low = np.array([self._range(name).low for name in self.inputs])
-        high = np.array([self._range(name).high for name in self.inputs])
+        low = np.array([self.limits(name).low for name in self.inputs])
+        high = np.array([self.limits(name).high for name in self.inputs])
         given = np.clip(asked, low, high)
         for name, limited in zip(self.inputs, given != asked, strict=True):
             if limited:
@@ -375,7 +375,7 @@ class Rig(Section, ABC):
             steps = int(np.ceil(self.settling_time / self.integration_step))
             rest = np.array([self._start(name) for name in self.inputs])
             none = np.array(
-                [min(max(0.0, self._range(n).low), self._start(n)) for n in self.inputs]
+                [min(max(0.0, self.limits(n).low), self._start(n)) for n in self.inputs]
             )
             n = int(system.mechanism["n"][0])
             weight = system.mechanism["weight"][0, :n]
@@ -391,12 +391,13 @@ class Rig(Section, ABC):
             self._rest = states, motion
         return self._rest
 
-    def _range(self, name: str) -> Range:
+    def limits(self, name: str) -> Range:
+        """Return what the hardware lets through on an input channel."""
         return self.range[name] if name in self.range else self.range[quantity(name)]
 
     def _start(self, name: str) -> float:
         rest = self.start.get(name, self.start.get(quantity(name)))
-        return self._range(name).low if rest is None else rest
+        return self.limits(name).low if rest is None else rest
 
     def _time_of(self, inputs: Recording) -> float:
         if inputs.sample_time is None:
@@ -420,7 +421,7 @@ class Rig(Section, ABC):
             )
         columns, saturated = [], {}
         for name in self.inputs:
-            limits = self._range(name)
+            limits = self.limits(name)
             asked = inputs[name] if name in inputs else np.full(len(inputs), self._start(name))
             given = np.clip(asked, limits.low, limits.high)
             count = int(np.count_nonzero(given != asked))
@@ -446,7 +447,7 @@ class Rig(Section, ABC):
             )
         if not np.isfinite(asked).all():
             name = self.inputs[int(np.flatnonzero(~np.isfinite(asked))[0])]
-            limits = self._range(name)
+            limits = self.limits(name)
             raise DataError(
                 f"the command is {asked[self.inputs.index(name)]}",
                 channel=name,

@@ -1,0 +1,30 @@
+"""What every signal asks of its arguments."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mckibben.errors import DataError
+
+Array = NDArray[np.float64]
+
+
+def as_time(given: ArrayLike) -> Array:
+    """Return times as an array, or say what is wrong with them."""
+    t = np.asarray(given, dtype=float)
+    if t.ndim != 1 or t.size == 0 or not np.isfinite(t).all():
+        raise DataError("time is not a row of finite numbers", remedy="give one time a sample")
+    return t
+
+
+def require_positive(name: str, value: float) -> None:
+    """Refuse what is not a positive number."""
+    if not 0 < value < np.inf:
+        raise DataError(f"{name} is {value}", remedy="give a positive number")
+
+
+def require_order(low: float, high: float) -> None:
+    """Refuse limits that are not finite, or not in order."""
+    if not -np.inf < low < high < np.inf:
+        raise DataError(f"high {high} is not above low {low}", remedy="give low < high")

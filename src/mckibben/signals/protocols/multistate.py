@@ -1,0 +1,80 @@
+"""The isometric and isobaric tests of a fluidic muscle.
+
+Source: A Multistate Friction Model for the Compensation of the Asymmetric Hysteresis in the Mechanical
+Response of Pneumatic Artificial Muscles, Section 2: at held lengths the pressure rises (static force);
+at held pressures of 1 to 6 bar the length is cycled (total force). Friction is identified at 4 bar.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mckibben.recording import Recording
+from mckibben.signals.excitations import irregular_triangle, triangle
+from mckibben.signals.protocols.protocol import Protocol, Run
+
+SAMPLE_TIME = 0.02
+LENGTHS = (200.0, 195.0, 190.0, 185.0, 180.0, 175.0, 170.0, 165.0, 160.0)
+"""Held in the isometric tests [mm]."""
+
+SHORTEST = {1.0: 194.5, 2.0: 188.0, 3.0: 181.0, 4.0: 172.5, 5.0: 163.0, 6.0: 160.0}
+"""Where each isobaric cycle turns [mm], by pressure [bar]: just before the static force ends."""
+
+LONGEST = 200.0
+SPEED = 2.0
+"""Of the screw [mm/s]."""
+
+CYCLES = 3
+RISE = 60.0
+"""Time in which the pressure rises to 6 bar [s]."""
+
+IDENTIFIED_AT = 4.0
+"""Pressure whose loop identifies the friction [bar]."""
+
+
+def multistate() -> Protocol:
+    """Return the isometric runs, the isobaric cycles, and one with minor loops."""
+    runs = []
+    time = np.arange(round(RISE / SAMPLE_TIME) + 1) * SAMPLE_TIME
+    for length in LENGTHS:
+        runs.append(
+            Run(
+                name=f"isometric-{length:.0f}mm",
+                role="train",
+                inputs=_inputs(6.0 * time / RISE, np.full(time.size, length)),
+                settings={"start.length": length, "start.pressure": 0.0},
+                labels={"stage": "static", "length": length},
+            )
+        )
+    for pressure, shortest in SHORTEST.items():
+        period = 2 * (LONGEST - shortest) / SPEED
+        time = np.arange(round(CYCLES * period / SAMPLE_TIME) + 1) * SAMPLE_TIME
+        gone = triangle(time, period, LONGEST - shortest)
+        runs.append(_isobaric(f"isobaric-{pressure:.0f}bar", pressure, LONGEST - gone))
+    shortest = SHORTEST[IDENTIFIED_AT]
+    time = np.arange(round(120.0 / SAMPLE_TIME) + 1) * SAMPLE_TIME
+    gone = irregular_triangle(time, 13, LONGEST - shortest, seed=4)
+    runs.append(_isobaric("isobaric-minor-loops", IDENTIFIED_AT, LONGEST - gone, minor=True))
+    return Protocol(
+        name="multistate",
+        rig="mas10-test-stand",
+        source="A Multistate Friction Model for the Compensation of the Asymmetric Hysteresis in the "
+        "Mechanical Response of Pneumatic Artificial Muscles, Section 2",
+        runs=tuple(runs),
+        notes="Lengths, speed and minor loops are ours: the paper prints none.",
+    )
+
+
+def _isobaric(name: str, pressure: float, length: np.ndarray, minor: bool = False) -> Run:
+    identifies = pressure == IDENTIFIED_AT and not minor
+    return Run(
+        name=name,
+        role="train" if identifies else "test",
+        inputs=_inputs(np.full(length.size, pressure), length),
+        settings={"start.pressure": pressure, "start.length": LONGEST},
+        labels={"stage": "friction", "pressure": pressure},
+    )
+
+
+def _inputs(pressure: np.ndarray, length: np.ndarray) -> Recording:
+    return Recording({"pressure": pressure, "length": length}, SAMPLE_TIME)

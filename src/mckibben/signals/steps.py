@@ -1,0 +1,162 @@
+"""Steps: levels that are held, so that creep and the speed of the air can be seen."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mckibben.errors import DataError
+from mckibben.signals.checking import as_time, require_order, require_positive
+
+Array = NDArray[np.float64]
+
+REGISTER_BITS = 15
+"""Length of the shift register: its sequence repeats after 2**15 - 1 holds."""
+
+
+def staircase(time: ArrayLike, levels: Sequence[float], hold: float, ramp: float = 0.0) -> Array:
+    """Return levels that are held one after another, so that creep can be seen.
+
+    Parameters
+    ----------
+    time : array_like, shape (n,)
+        Time from the start of the first hold [s].
+    levels : sequence of float
+        Values to hold; the last one is held for good.
+    hold : float
+        Time that each level is held [s], positive.
+    ramp : float
+        Time that the way to the next level takes [s]; 0 for a jump.
+
+    Raises
+    ------
+    DataError
+        On no levels, a hold that is not positive, or a negative ramp.
+
+    Examples
+    --------
+    >>> staircase([0.0, 1.0, 1.5, 2.0, 3.0], levels=(0.0, 4.0), hold=1.0, ramp=1.0).tolist()
+    [0.0, 0.0, 2.0, 4.0, 4.0]
+    """
+    t = as_time(time)
+    if not len(levels):
+        raise DataError("a staircase needs levels", remedy="give at least one")
+    require_positive("hold", hold)
+    if not ramp >= 0:
+        raise DataError(f"a ramp of {ramp} s is impossible", remedy="give 0 or more seconds")
+    heights = np.asarray(levels, dtype=float)
+    step = np.clip(np.floor(t / (hold + ramp)), 0, heights.size - 1).astype(int)
+    if ramp == 0:
+        return np.asarray(heights[step])
+    share = np.clip(t - step * (hold + ramp) - hold, 0.0, ramp) / ramp
+    after = heights[np.minimum(step + 1, heights.size - 1)]
+    return np.asarray(heights[step] + share * (after - heights[step]))
+
+
+def binary_steps(
+    time: ArrayLike,
+    high: float,
+    low: float = 0.0,
+    hold: float = 1.0,
+    ramp: float = 0.0,
+    seed: int = 0,
+) -> Array:
+    """Return pseudo-random binary steps (PRBS) between two levels, which excite all frequencies.
+
+    A shift register of 15 bits, so that high and low are equally frequent over its 32767 holds.
+
+    Parameters
+    ----------
+    time : array_like, shape (n,)
+        Time from the start of the first hold [s].
+    high, low : float
+        The two levels, high above low.
+    hold : float
+        Shortest time between two steps [s], positive.
+    ramp : float
+        Time that a step takes [s], below ``hold``; 0 for a jump.
+    seed : int
+        Where in the sequence to start.
+
+    Raises
+    ------
+    DataError
+        On high not above low, a hold that is not positive, or a ramp that does not fit into it.
+    """
+    t = as_time(time)
+    require_order(low, high)
+    n = _holds(t, hold, ramp)
+    period = 2**REGISTER_BITS - 1
+    register = 1 + int(np.random.default_rng(seed).integers(period))
+    bits = np.empty(n)
+    for i in range(n):
+        bits[i] = register & 1
+        feedback = (register ^ (register >> 1)) & 1
+        register = (register >> 1) | (feedback << (REGISTER_BITS - 1))
+    return staircase(t, (low + (high - low) * bits).tolist(), hold - ramp, ramp)
+
+
+def random_steps(
+    time: ArrayLike,
+    high: float,
+    low: float = 0.0,
+    shortest: float = 1.0,
+    longest: float = 5.0,
+    ramp: float = 0.0,
+    *,
+    seed: int,
+) -> Array:
+    """Return random levels, held for random times.
+
+    Parameters
+    ----------
+    time : array_like, shape (n,)
+        Time from the start of the first hold [s].
+    high, low : float
+        Between which levels are drawn evenly, high above low; the first is ``low``.
+    shortest, longest : float
+        Between which the times of a hold are drawn evenly [s], with the ramp that ends it.
+    ramp : float
+        Time that the way to the next level takes [s], below ``shortest``; 0 for a jump.
+    seed : int
+        Of levels and times.
+
+    Raises
+    ------
+    DataError
+        On high not above low, times that are not positive or not in order, or too long a ramp.
+    """
+    t = as_time(time)
+    require_order(low, high)
+    n = _holds(t, shortest, ramp)
+    if not shortest <= longest < np.inf:
+        raise DataError(
+            f"longest {longest} s is below shortest {shortest} s", remedy="give shortest <= longest"
+        )
+    rng = np.random.default_rng(seed)
+    levels = rng.uniform(low, high, n + 1)
+    levels[0] = low
+    ends = np.cumsum(rng.uniform(shortest, longest, n))
+    place = np.searchsorted(ends, t, side="right")
+    here, after = levels[place], levels[np.minimum(place + 1, n)]
+    if ramp == 0:
+        return np.asarray(here)
+    share = np.clip(1.0 - (np.append(ends, np.inf)[place] - t) / ramp, 0.0, 1.0)
+    return np.asarray(here + share * (after - here))
+
+
+def _holds(t: Array, hold: float, ramp: float) -> int:
+    """Return how many holds it takes to fill the time."""
+    require_positive("hold", hold)
+    if not 0 <= ramp < hold:
+        raise DataError(
+            f"a ramp of {ramp} s does not fit into a hold of {hold} s",
+            remedy="give 0 <= ramp < hold",
+        )
+    if t.min() < 0:
+        raise DataError(
+            f"time starts at {t.min():g} s", remedy="count time from the start of the first hold"
+        )
+    return int(t.max() / hold) + 1

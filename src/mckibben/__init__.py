@@ -45,6 +45,7 @@ if TYPE_CHECKING:
     from mckibben.recording import Recording as Recording
     from mckibben.report import write_report as write_report
     from mckibben.rigs import Rig as Rig
+    from mckibben.rigs import check_rig as check_rig
     from mckibben.rigs import load_rig as load_rig
 
 __version__ = version("mckibben")
@@ -72,6 +73,7 @@ _HOMES = {
     "Rig": "rigs",
     "characterize": "characterization",
     "check_block": "blocks.check",
+    "check_rig": "rigs",
     "compare": "comparison.ranking",
     "load": "blocks.saving",
     "load_rig": "rigs",

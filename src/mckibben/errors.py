@@ -60,6 +60,10 @@ class ModelError(MckibbenError):
     """A model, or a file with one, that cannot do what was asked; the text ends with a remedy."""
 
 
+class ContractError(ModelError):
+    """A block or a rig that breaks a law of its contract."""
+
+
 class DataWarning(UserWarning):
     """Something assumed or mended while reading a recording."""
 

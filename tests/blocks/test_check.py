@@ -25,12 +25,12 @@ from mckibben import (
     check_block,
 )
 from mckibben.blocks import saving
-from mckibben.blocks.check import ContractError
 from mckibben.blocks.envelopes.exponential import Exponential
 from mckibben.blocks.envelopes.tanh import Tanh
 from mckibben.blocks.fields import vector
 from mckibben.blocks.pi import PIInverse
 from mckibben.blocks.running import Stream
+from mckibben.errors import ContractError
 
 Array = NDArray[np.float64]
 Patch = Callable[[pytest.MonkeyPatch], None]

@@ -10,11 +10,9 @@ import numpy as np
 from mckibben.blocks import saving
 from mckibben.blocks.base import Block
 from mckibben.blocks.inverse_laws import EXACT, inverts
-from mckibben.blocks.trial import ContractError, Trial
+from mckibben.blocks.trial import Trial
 from mckibben.errors import DataError, ModelError
 from mckibben.recording import Recording, standard_unit
-
-__all__ = ["ContractError", "check_block"]
 
 
 def check_block(block: Block, *, sample_time: float = 0.01, seed: int = 0) -> None:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from mckibben.blocks.base import Block
 from mckibben.blocks.fields import Initial
 from mckibben.blocks.single import Ranged
-from mckibben.errors import ModelError
+from mckibben.errors import ContractError, ModelError
 
 Array = NDArray[np.float64]
 
@@ -20,10 +20,6 @@ DEFAULT_LIMITS = (0.0, 5.0)
 
 MARGIN = 0.02
 """Share of a range left out at both ends, so that rounding does not decide what is reachable."""
-
-
-class ContractError(ModelError):
-    """A block that breaks a law of the contract."""
 
 
 @dataclass

@@ -122,7 +122,7 @@ def _read(path: Path) -> dict[str, Any]:
         raise DataError(
             f"it does not begin with format = {FORMAT!r}",
             file=path,
-            remedy="start from mckibben rig show NAME --toml",
+            remedy="start from mckibben rig show NAME > FILE",
         )
     version = fields.pop("format_version", None)
     if version != FORMAT_VERSION:

@@ -5,12 +5,14 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 
 import numpy as np
 
 from mckibben.recording import Recording
 from mckibben.rigs.files import load_rig
 from mckibben.rigs.rig import Rig
+from mckibben.signals import cut
 from mckibben.signals.protocols import Protocol, Run, protocol
 
 
@@ -55,6 +57,8 @@ def record(
     def recorded(run: Run) -> Recording:
         own_seed = int(np.random.SeedSequence((seed, places[run.name])).generate_state(1)[0])
         measured = plant.changed(run.settings).run(run.inputs, own_seed)
+        if run.lead:
+            measured = replace(cut(measured, run.lead), start_time=0.0)
         return measured.with_meta(
             name=run.name, protocol=plan.name, role=run.role, labels=dict(run.labels)
         )

@@ -25,6 +25,10 @@ SETTLING_SHARE = 0.3
 """Share of the settling time in which pressure and load rise; the rest is waited."""
 
 
+ROOM_TEMPERATURE = 20.0
+"""Where every muscle starts [degC]."""
+
+
 class System(NamedTuple):
     """Muscles, regulator and mechanism, as the compiled physics reads them."""
 
@@ -203,13 +207,13 @@ class Rig(Section, ABC):
             On missing or unknown channels, or a recording without time.
         """
         given, saturated = self._applied(inputs)
-        steps = max(int(np.ceil(self._time_of(inputs) / self.integration_step - 1e-9)), 1)
         states, motion = (part.copy() for part in self._at_rest())
-        readings, extra = self._march(
-            states, motion, given, held, steps, self._time_of(inputs) / steps
-        )
+        traces = self._march(states, motion, self.demands(given), self._time_of(inputs), held)
+        # A held command is seen from the next sample on.
+        seen = np.vstack([self._resting(), given[:-1]]) if held else given
+        readings = self._readings(traces, seen)
         if ideal:
-            readings = {**readings, **extra}
+            readings |= _inside(traces)
         else:
             rng = np.random.default_rng(seed)
             noise = rng.standard_normal((len(inputs), len(self.outputs)))
@@ -258,9 +262,9 @@ class Rig(Section, ABC):
         states, motion = (part.copy() for part in self._at_rest())
         running = _Running(states, motion, np.random.default_rng(seed))
         self._running = running
-        rest = np.array([[self._start(name) for name in self.inputs]])
-        readings, _ = self._march(states, motion, rest, True, 1, self.integration_step)
-        return self._measured(readings, running)
+        rest = self._resting()
+        traces = self._march(states, motion, self.demands(rest), self.sample_time, True)
+        return self._measured(self._readings(traces, rest), running)
 
     def step(self, action: ArrayLike | Mapping[str, float]) -> Array:
         """Hold commands for one sample time and return the next measurement.
@@ -290,16 +294,11 @@ class Rig(Section, ABC):
         for name, limited in zip(self.inputs, given != asked, strict=True):
             if limited:
                 running.saturated[name] = running.saturated.get(name, 0) + 1
-        steps = max(int(np.ceil(self.sample_time / self.integration_step - 1e-9)), 1)
-        readings, _ = self._march(
-            running.states,
-            running.motion,
-            np.vstack([given, given]),
-            True,
-            steps,
-            self.sample_time / steps,
+        both = np.vstack([given, given])
+        traces = self._march(
+            running.states, running.motion, self.demands(both), self.sample_time, True
         )
-        return self._measured({name: x[-1:] for name, x in readings.items()}, running)
+        return self._measured(self._readings(traces, both), running)
 
     @property
     def saturated(self) -> Mapping[str, int]:
@@ -309,10 +308,11 @@ class Rig(Section, ABC):
     # --- inside
 
     def _measured(self, readings: Mapping[str, Array], running: _Running) -> Array:
+        """Return the last of some readings as the sensors show it."""
         noise = running.rng.standard_normal(len(self.outputs))
         return np.array(
             [
-                float(self._sensed(name, readings[name], noise[i])[0])
+                float(self._sensed(name, readings[name][-1:], noise[i])[0])
                 for i, name in enumerate(self.outputs)
             ]
         )
@@ -330,66 +330,54 @@ class Rig(Section, ABC):
         return self._system
 
     def _march(
-        self,
-        states: Records,
-        motion: Records,
-        inputs: Array,
-        held: bool,
-        steps: int,
-        step: float,
-        loads: Array | None = None,
-    ) -> tuple[dict[str, Array], dict[str, Array]]:
-        system, demands = self._built(), self.demands(inputs)
+        self, states: Records, motion: Records, demands: Demands, sample_time: float, held: bool
+    ) -> Traces:
+        """Let the physics go on through all samples, changing the states."""
+        system = self._built()
         n, m = int(system.mechanism["n"][0]), system.muscles.size
-        rows = np.empty((len(inputs), 2 * n + 4 * m))
+        rows = np.empty((len(demands.commands), 2 * n + 4 * m))
+        steps = max(int(np.ceil(sample_time / self.integration_step - 1e-9)), 1)
         march(
             *system,
             states,
             motion,
             np.ascontiguousarray(demands.commands),
-            np.ascontiguousarray(demands.loads if loads is None else loads),
+            np.ascontiguousarray(demands.loads),
             np.ascontiguousarray(demands.targets),
             held,
             steps,
-            step,
+            sample_time / steps,
             rows,
         )
-        traces = Traces(rows, n, m)
-        zero = self._zero() if loads is None else np.zeros(n)
-        readings = self.readings(traces, inputs, zero)
-        names = [""] if m == 1 else [f"_{j + 1}" for j in np.arange(m)]
-        extra = {f"volume{name}": traces.room[:, j] * 1e-3 for j, name in enumerate(names)}
-        extra |= {f"temperature{name}": 20.0 + traces.warmth[:, j] for j, name in enumerate(names)}
-        return {name: readings[name] for name in self.outputs}, extra
+        return Traces(rows, n, m)
 
-    def _zero(self) -> Array:
-        _, motion = self._at_rest()
-        return np.array(motion["place"][0]) if self.tare else np.zeros(motion["place"].shape[1])
+    def _readings(self, traces: Traces, inputs: Array) -> dict[str, Array]:
+        zero = np.zeros(traces.place.shape[1])
+        if self.tare:
+            zero = self._at_rest()[1]["place"][0, : zero.size]
+        found = self.readings(traces, inputs, zero)
+        return {name: found[name] for name in self.outputs}
 
     def _at_rest(self) -> tuple[Records, Records]:
         """Return the state after switching on: pressure and load come slowly, then all settles."""
         if self._rest is None:
             system = self._built()
-            states = np.zeros(system.muscles.size, MUSCLE_STATE)
-            motion = np.zeros(1, MOTION)
-            steps = int(np.ceil(self.settling_time / self.integration_step))
-            rest = np.array([self._start(name) for name in self.inputs])
-            none = np.array(
-                [min(max(0.0, self.limits(n).low), self._start(n)) for n in self.inputs]
-            )
-            n = int(system.mechanism["n"][0])
-            weight = system.mechanism["weight"][0, :n]
-            ramp = np.array([0.0, 1.0, 1.0])
-            inputs = none + ramp[:, None] * (rest - none)
-            loads = self.demands(inputs).loads - (1.0 - ramp)[:, None] * weight
-            for piece, share in ((slice(0, 2), SETTLING_SHARE), (slice(1, 3), 1 - SETTLING_SHARE)):
-                count = int(steps * share)
-                self._march(
-                    states, motion, inputs[piece], False, count,
-                    self.settling_time * share / count, loads[piece],
-                )  # fmt: skip
+            states, motion = np.zeros(system.muscles.size, MUSCLE_STATE), np.zeros(1, MOTION)
+            rest = self._resting()
+            off = np.clip([[max(self.limits(name).low, 0.0) for name in self.inputs]], None, rest)
+            demands = self.demands(np.vstack([off, rest, rest]))
+            weight = system.mechanism["weight"][0, : demands.loads.shape[1]]
+            demands.loads[0] -= weight
+            demands.targets[:] = demands.targets[-1]
+            for first, share in ((0, SETTLING_SHARE), (1, 1.0 - SETTLING_SHARE)):
+                part = Demands(*(column[first : first + 2] for column in demands))
+                self._march(states, motion, part, share * self.settling_time, False)
             self._rest = states, motion
         return self._rest
+
+    def _resting(self) -> Array:
+        """Return the commands at rest, shape (1, inputs)."""
+        return np.array([[self._start(name) for name in self.inputs]])
 
     def limits(self, name: str) -> Range:
         """Return what the hardware lets through on an input channel."""
@@ -462,6 +450,16 @@ class _Running:
     def __init__(self, states: Records, motion: Records, rng: np.random.Generator) -> None:
         self.states, self.motion, self.rng = states, motion, rng
         self.saturated: dict[str, int] = {}
+
+
+def _inside(traces: Traces) -> dict[str, Array]:
+    """Return what no sensor shows: volume [ml] and temperature [degC] of every muscle."""
+    m = traces.room.shape[1]
+    names = [""] if m == 1 else [f"_{j + 1}" for j in range(m)]
+    found = {f"volume{name}": 1e-3 * traces.room[:, j] for j, name in enumerate(names)}
+    return found | {
+        f"temperature{name}": ROOM_TEMPERATURE + traces.warmth[:, j] for j, name in enumerate(names)
+    }
 
 
 def quantity(channel: str) -> str:

@@ -173,20 +173,18 @@ def move(muscles: Any, mechanism: Any, states: Any, motion: Any, loads: Array, s
         coast = step * motion.speed[g] + 0.5 * step * step * motion.acceleration[g]
         motion.tried[g] = motion.place[g] + coast
         motion.change[g] = coast
-    first = (1.0, 1.0, 1.0)
+    inert = 1.0 / (BETA * step * step)
     worst = np.inf
     shrunk = 1.0
     for _ in range(MOST_ATTEMPTS):
         size = np.inf
         if within_reach(muscles, n, motion.tried):
             resist(muscles, mechanism, states, motion, loads, step)
-            if worst == np.inf:
-                first = (motion.slopes[0, 0], motion.slopes[1, 1], motion.slopes[2, 2])
             size = 0.0
             for g in range(n):
                 inertia = mechanism.mass[g] * newmark(motion, g, step)
                 off = inertia + (1.0 + ALPHA) * motion.balance[g] - ALPHA * before[g]
-                size += off * off / first[g]
+                size += off * off / (inert * mechanism.mass[g])
         if size > worst or size == np.inf:
             # Too far: halfway back, where Newton's straight line is still near the truth.
             shrunk *= 0.5
@@ -201,7 +199,7 @@ def move(muscles: Any, mechanism: Any, states: Any, motion: Any, loads: Array, s
             motion.change[g] = ALPHA * before[g] - (1.0 + ALPHA) * motion.balance[g] - inertia
             for k in range(n):
                 motion.slopes[g, k] *= 1.0 + ALPHA
-            motion.slopes[g, g] += mechanism.mass[g] / (BETA * step * step)
+            motion.slopes[g, g] += inert * mechanism.mass[g]
         solve(n, motion.slopes, motion.change)
         largest = 0.0
         for g in range(n):

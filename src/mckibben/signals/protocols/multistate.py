@@ -14,11 +14,22 @@ from mckibben.signals.excitations import irregular_triangle, triangle
 from mckibben.signals.protocols.protocol import Protocol, Run
 
 SAMPLE_TIME = 0.02
-LENGTHS = (200.0, 195.0, 190.0, 185.0, 180.0, 175.0, 170.0, 165.0, 160.0)
-"""Held in the isometric tests [mm]."""
+LENGTHS = {
+    200.0: 0.0,
+    198.0: 0.8,
+    196.0: 1.2,
+    194.0: 1.6,
+    192.0: 1.9,
+    190.0: 2.2,
+    188.0: 2.4,
+    186.0: 2.7,
+    184.0: 3.0,
+}
+"""Held in the isometric tests [mm], and the pressure from which each starts, where the muscle is just
+taut [bar]: below, it would move. Shorter ones go slack while their friction is being released."""
 
-SHORTEST = {1.0: 194.5, 2.0: 188.0, 3.0: 181.0, 4.0: 172.5, 5.0: 163.0, 6.0: 160.0}
-"""Where each isobaric cycle turns [mm], by pressure [bar]: just before the static force ends."""
+SHORTEST = {1.0: 198.2, 2.0: 194.2, 3.0: 189.7, 4.0: 185.0, 5.0: 180.5, 6.0: 176.5}
+"""Where each isobaric cycle turns [mm], by pressure [bar]: just before the muscle goes slack."""
 
 LONGEST = 200.0
 SPEED = 2.0
@@ -28,6 +39,13 @@ CYCLES = 3
 RISE = 60.0
 """Time in which the pressure rises to 6 bar [s]."""
 
+SWINGS, SWING, SWING_PERIOD = 12, 12.0, 10.0
+"""Before an isometric run the length swings at 6 bar, ever less, so that friction is left near zero:
+number of swings, the first one's amplitude [mm], and their time [s]."""
+
+VENTING = 10.0
+"""Time in which the pressure then falls to the first one [s]."""
+
 IDENTIFIED_AT = 4.0
 """Pressure whose loop identifies the friction [bar]."""
 
@@ -35,15 +53,20 @@ IDENTIFIED_AT = 4.0
 def multistate() -> Protocol:
     """Return the isometric runs, the isobaric cycles, and one with minor loops."""
     runs = []
-    time = np.arange(round(RISE / SAMPLE_TIME) + 1) * SAMPLE_TIME
-    for length in LENGTHS:
+    lead = SWINGS * SWING_PERIOD + VENTING
+    time = np.arange(round((lead + RISE) / SAMPLE_TIME) + 1) * SAMPLE_TIME
+    swung = np.clip(1.0 - time / (SWINGS * SWING_PERIOD), 0.0, 1.0)
+    swinging = SWING * swung * np.sin(2 * np.pi * time / SWING_PERIOD)
+    for length, first in LENGTHS.items():
+        rising = np.interp(time, (lead - VENTING, lead, lead + RISE), (6.0, first, 6.0))
         runs.append(
             Run(
                 name=f"isometric-{length:.0f}mm",
                 role="train",
-                inputs=_inputs(6.0 * time / RISE, np.full(time.size, length)),
-                settings={"start.length": length, "start.pressure": 0.0},
+                inputs=_inputs(rising, np.minimum(length + swinging, LONGEST)),
+                settings={"start.length": length, "start.pressure": 6.0},
                 labels={"stage": "static", "length": length},
+                lead=lead,
             )
         )
     for pressure, shortest in SHORTEST.items():

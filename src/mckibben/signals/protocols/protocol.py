@@ -29,6 +29,8 @@ class Run:
         Parameters of the rig that differ in this run, as `mckibben.Rig.changed` takes them.
     labels : mapping
         What else tells it from the others: stage of the identification, load, frequency.
+    lead : float
+        Time at the beginning that is driven but not recorded [s].
     """
 
     name: str
@@ -36,6 +38,7 @@ class Run:
     inputs: Recording
     settings: Mapping[str, Any] = field(default_factory=dict)
     labels: Mapping[str, Any] = field(default_factory=dict)
+    lead: float = 0.0
 
 
 @dataclass(frozen=True)

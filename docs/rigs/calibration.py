@@ -1,0 +1,337 @@
+"""Make the table of what the virtual rigs do beside what the papers print.
+
+Run: python docs/rigs/calibration.py            writes docs/rigs/calibration.md
+     python docs/rigs/calibration.py --stdout   prints it instead
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mckibben.blocks.published.field_models import prandtl_ishlinskii
+from mckibben.blocks.published.mpi_narmax import modified_prandtl_ishlinskii
+from mckibben.recording import Recording
+from mckibben.rigs import load_rig, record
+from mckibben.signals import sine, triangle
+from mckibben.signals.protocols import activation_pressure as activation
+from mckibben.signals.protocols import protocol
+from mckibben.signals.protocols.mpi_narmax import HIGH, LOW
+from mckibben.signals.protocols.multistate import SHORTEST
+
+Array = NDArray[np.float64]
+Row = tuple[str, str, str, str]
+
+TABLE_3 = {"12": 0.1124, "13": 0.0356, "21": 0.1521, "23": 0.2153, "31": 0.5368, "32": 0.6321}
+"""Coupling gains that the soft arm's paper prints: first the muscle driven."""
+
+CONTRACTIONS = (
+    (-4.33e-9, 3.58e-6, -1.11e-3, 1.33e-1),
+    (-1.99e-9, 8.70e-7, -4.50e-4, 2.04e-1),
+    (6.98e-9, -3.03e-6, -3.61e-4, 3.03e-1),
+)
+PRESSURES = (activation.LOWEST, activation.HIGHEST, (7.40e-11, 7.25e-8, -2.91e-5, 3.91e-1))
+"""Characteristic points 1, 2 and 4 of Table 1 of the McKibben muscle's paper, as cubics of force."""
+
+
+def recorded(name: str, wanted: Callable[[str], bool] = lambda run: True) -> dict[str, Recording]:
+    """Return the recordings of a protocol whose run names are wanted."""
+    runs = [run.name for run in protocol(name).runs if wanted(run.name)]
+    return {run.name: recording for run, recording in record(name, runs=runs)}
+
+
+def last_cycle(recording: Recording, period: float) -> Recording:
+    """Return the last whole cycle of a recording that began at a minimum of its input."""
+    assert recording.sample_time is not None
+    n = round(period / recording.sample_time)
+    whole = (len(recording) - 1) // n
+    return recording.slice((whole - 1) * n, whole * n + 1)
+
+
+def loop_width(u: Array, y: Array) -> float:
+    """Return |y_up - y_down| at mid input over the range of y [%], of a cycle from its minimum."""
+    top = int(u.argmax())
+    middle = 0.5 * (u[0] + u[top])
+    up = np.interp(middle, u[: top + 1], y[: top + 1])
+    down = np.interp(-middle, -u[top:], y[top:])
+    return float(100 * abs(down - up) / np.ptp(y))
+
+
+def span(values: list[float], digits: int = 1) -> str:
+    """Return the range of some numbers in words."""
+    return f"{min(values):.{digits}f} to {max(values):.{digits}f}"
+
+
+def soft_arm() -> Iterator[Row]:
+    """Give the rows of the soft arm."""
+    runs = recorded("sdchm", lambda name: name.startswith(("coupling", "stiffness", "gpi")))
+    widths, driven = [], []
+    for name, recording in runs.items():
+        if name.startswith("coupling"):
+            cycle = last_cycle(recording, 50.0)
+            pattern = name.rpartition("-")[2]
+            u = sine(np.arange(len(cycle)) * 0.05, 50.0, 1.3)
+            for k in (1, 2, 3):
+                width = loop_width(u, cycle[f"displacement_{k}"])
+                widths.append(width)
+                if str(k) in pattern:
+                    driven.append(width)
+    yield (
+        "loop width over the 12 patterns of Section 2.2",
+        "28.5 to 50.1 %",
+        f"{span(widths)} %",
+        "p0 = 1 bar, 1.3 bar peaks",
+    )
+    yield "of these, muscles driven", "-", f"{span(driven)} %", ""
+    stiff = {
+        p0: [
+            float(np.ptp(last_cycle(runs[f"stiffness-p0-{p0:.1f}"], 50.0)[f"displacement_{k}"]))
+            for k in (1, 2, 3)
+        ]
+        for p0 in (0.0, 0.5, 1.0, 2.5)
+    }
+    for k, (who, wanted) in enumerate(
+        (("driven muscle I", "small"), ("passive II", "sharp"), ("passive III", "sharp"))
+    ):
+        moved = ", ".join(f"{stiff[p0][k]:.1f}" for p0 in stiff)
+        change = 100 * (1 - stiff[2.5][k] / stiff[0.0][k])
+        yield (
+            f"{who}: range at p0 = 0, 0.5, 1, 2.5 bar",
+            f"{wanted} decrease (Figure 5)",
+            f"{moved} mm",
+            f"-{change:.0f} % in all",
+        )
+    for k in (1, 2, 3):
+        recording = runs[f"gpi-{k}"]
+        own = recording[f"displacement_{k}"]
+        for j in (1, 2, 3):
+            if j != k:
+                gain = float(own @ recording[f"displacement_{j}"] / (own @ own))
+                yield f"coupling gain G{k}{j}", f"{TABLE_3[f'{k}{j}']:.4f}", f"{gain:.2f}", ""
+    # The second cycle goes to 1.5 bar, over 50 s at 50 Hz.
+    rise = runs["gpi-1"].slice(2500, 3750)
+    order = np.argsort(rise["pressure_1"], kind="stable")
+    there = np.interp(1.4, rise["pressure_1"][order], rise["displacement_1"][order])
+    yield "shortening of I on its way up at 1.4 bar, p0 = 0", "about 45 mm", f"{there:.0f} mm", ""
+
+
+def hanging() -> Iterator[Row]:
+    """Give the rows of the MAS-20."""
+    runs = recorded("field-models")
+    first = runs["decaying-triangle"]
+    yield (
+        "stroke from 1.0 to 5.5 bar under 20 kg",
+        "37 mm",
+        f"{first['displacement'].max():.1f} mm",
+        "",
+    )
+    time = np.arange(1001) * 0.02
+    wave = triangle(time, 10.0, 5.5, 1.0)
+    model = np.asarray(prandtl_ishlinskii().simulate(wave))
+    moved = load_rig("mas20-hanging").run(Recording({"pressure": wave}, 0.02))["displacement"]
+    yield (
+        "loop width of the second major cycle",
+        f"{loop_width(wave[500:], model[500:]):.1f} % (its PI model)",
+        f"{loop_width(wave[500:], moved[500:]):.1f} %",
+        "",
+    )
+    yield (
+        "lowest point after the first cycle",
+        "above 0 (Figure 2)",
+        f"{first['displacement'][480:520].min():.1f} mm",
+        "memory and creep",
+    )
+
+
+def static_force(length: Array, pressure: Array | float) -> Array:
+    """Return the MAS-10's static force as its paper prints it, Eq. (3) with Table 1 [N]."""
+    return np.asarray(
+        7596 - 136.6 * pressure - 93.14 * length + 1.176 * length * pressure + 0.2758 * length**2
+    )
+
+
+def test_stand() -> Iterator[Row]:
+    """Give the rows of the MAS-10."""
+    runs = recorded("multistate")
+    off = []
+    for name, recording in runs.items():
+        if name.startswith("isometric"):
+            law = static_force(recording["length"], recording["pressure"])
+            taut = law > 0
+            off.append((recording["force"] - law)[taut])
+    error = np.concatenate(off)
+    yield (
+        "isometric force against the static law where it pulls",
+        "15.4 N RMSE (its own fit)",
+        f"{np.sqrt(np.mean(error**2)):.1f} N RMSE",
+        "9 lengths of 184 to 200 mm",
+    )
+    for pressure in SHORTEST:
+        recording = runs[f"isobaric-{pressure:.0f}bar"]
+        late = recording.slice(len(recording) * 2 // 3, len(recording))
+        extracted = late["force"] - static_force(late["length"], pressure)
+        yield (
+            f"extracted hysteresis at {pressure:.0f} bar",
+            "-117 to 129 N (Table 2)" if pressure == 4 else "-",
+            f"{extracted.min():.0f} to {extracted.max():.0f} N",
+            f"{SHORTEST[pressure]:.1f} to 200 mm",
+        )
+
+
+def rail() -> Iterator[Row]:
+    """Give the rows of the muscle on a rail."""
+    runs = recorded("mpi-narmax")
+    free = last_cycle(runs["status-1"], 10.0)
+    yield (
+        "displacement at 10 V without load",
+        "48 mm",
+        f"{runs['status-1']['displacement'].max():.1f} mm",
+        "",
+    )
+    for frequency in (0.05, 0.1, 0.2):
+        period = 1 / frequency
+        time = np.arange(round(2 * period / 0.001) + 1) * 0.001
+        wave = sine(time, period, HIGH, LOW)
+        given = Recording({"voltage": wave}, 0.001)
+        model = modified_prandtl_ishlinskii().simulate(given)["displacement"]
+        half = time.size // 2
+        cycle = last_cycle(runs[f"free-{frequency:g}Hz"], period)
+        yield (
+            f"loop width at {frequency:g} Hz, no load",
+            f"{loop_width(wave[half:], model[half:]):.1f} % (its MPI model)",
+            f"{loop_width(cycle['voltage'], cycle['displacement']):.1f} %",
+            "",
+        )
+    for name, load in (
+        ("weight-0.1Hz", "91 N"),
+        ("status-2", "10.04 kg"),
+        ("status-3", "21.75 kg"),
+    ):
+        period = 10.0 if name.startswith("weight") else 5.0
+        moved = last_cycle(runs[name], period)["displacement"]
+        yield (
+            f"stroke under {load}",
+            f"squeezed, from {np.ptp(free['displacement']):.1f} mm without (Figure 2)",
+            f"{np.ptp(moved):.1f} mm, highest point {moved.max():.1f} mm",
+            "",
+        )
+    pulled, left = runs["hand-0.1Hz"]["displacement"], runs["free-0.1Hz"]["displacement"]
+    yield (
+        "distortion by three pulls of 100 N",
+        "regional (Figure 2)",
+        f"up to {np.abs(pulled - left).max():.1f} mm",
+        "",
+    )
+    held = runs["held-6V"]
+    n = 20_000
+    force, moved = held["force"][-2 * n : -n], held["displacement"][-2 * n : -n]
+    yield (
+        "force-displacement loop at 6 V, 0 to 150 N",
+        "a loop (Figure 3)",
+        f"{np.ptp(moved):.1f} mm, {loop_width(force, -moved):.0f} % wide",
+        "",
+    )
+
+
+def mckibben() -> Iterator[Row]:
+    """Give the rows of the self-made muscle."""
+    runs = recorded("activation-pressure", lambda name: not name.startswith("random"))
+    off = []
+    for force in activation.FORCES:
+        recording = runs[f"static-{force:.0f}N"]
+        top = int(recording["pressure"].argmax())
+        # The slow cycle's middle: the static pressure lies between rise and fall.
+        rise = recording.slice(0, top)
+        fall = recording.slice(top, len(recording))
+        for contractions, pressures in zip(CONTRACTIONS, PRESSURES, strict=True):
+            contraction = float(np.polyval(contractions, force))
+            printed = 10 * float(np.polyval(pressures, force))
+            found = [_pressure_at(part, contraction) for part in (rise, fall)]
+            if None not in found:
+                off.append(0.5 * (found[0] + found[1]) - printed)  # type: ignore[operator]
+    yield (
+        "static pressure at the characteristic points of Table 1",
+        "-",
+        f"{np.sqrt(np.mean(np.square(off))):.2f} bar RMSE over {len(off)} points",
+        "reached ones of points 1, 2, 4 at 0 to 300 N; 0.3 to 3.9 bar",
+    )
+    for force in (50.0, 150.0, 300.0):
+        widths, printed = [], []
+        for frequency in activation.FREQUENCIES:
+            cycle = last_cycle(runs[f"sine-{force:.0f}N-{frequency:.1f}Hz"], 1 / frequency)
+            contraction = cycle["displacement"] / 530.0
+            widths.append(_pressure_width(contraction, cycle["pressure"]))
+            speed = np.pi * frequency * np.ptp(contraction)
+            phi = -2.19e-6 * force**3 + 9.55e-4 * force**2 - 9.42e-3 * force + 35.1
+            printed.append(2 * (0.267 * frequency + 0.667) * phi * speed / 100)
+        yield (
+            f"width in pressure at 0.5, 1, 1.5, 2 Hz, {force:.0f} N",
+            ", ".join(f"{width:.2f}" for width in printed) + " bar (2 z at our speeds)",
+            ", ".join(f"{width:.2f}" for width in widths) + " bar",
+            f"{widths[-1] / widths[0]:.1f} times wider",
+        )
+
+
+def _pressure_at(part: Recording, contraction: float) -> float | None:
+    reached = part["displacement"] / 530.0
+    if not reached.min() < contraction < reached.max():
+        return None
+    order = np.argsort(reached, kind="stable")
+    return float(np.interp(contraction, reached[order], part["pressure"][order]))
+
+
+def _pressure_width(contraction: Array, pressure: Array) -> float:
+    start = int(contraction.argmin())
+    c, p = np.roll(contraction[:-1], -start), np.roll(pressure[:-1], -start)
+    top, middle = int(c.argmax()), 0.5 * (c.min() + c.max())
+    up = np.interp(middle, np.maximum.accumulate(c[: top + 1]), p[: top + 1])
+    down = np.interp(-middle, np.maximum.accumulate(-c[top:]), p[top:])
+    return float(up - down)
+
+
+RIGS: Mapping[str, tuple[str, Callable[[], Iterator[Row]]]] = {
+    "soft-arm": ("sdchm", soft_arm),
+    "mas20-hanging": ("field-models", hanging),
+    "mas10-test-stand": ("multistate", test_stand),
+    "rail": ("mpi-narmax", rail),
+    "mckibben-530": ("activation-pressure", mckibben),
+}
+
+HEAD = """# What the virtual rigs do, beside what the papers print
+
+Made by `python docs/rigs/calibration.py`; do not edit. Each rig was recorded by its paper's protocol
+(`mckibben rig record PROTOCOL --out DIR`). A dash means that the paper prints nothing.
+"""
+
+
+def table() -> str:
+    """Return the whole page."""
+    parts = [HEAD]
+    for name, (plan, rows) in RIGS.items():
+        print(f"{name} ...", file=sys.stderr)
+        parts.append(f"## {name}\n\n{load_rig(name).title}. Protocol: `{plan}`.\n")
+        parts.append("| quantity | paper | rig | |\n|---|---|---|---|")
+        parts += [f"| {' | '.join(row)} |" for row in rows()]
+        parts.append("")
+    notes = Path(__file__).with_name("differences.md").read_text(encoding="utf-8")
+    return "\n".join([*parts, notes])
+
+
+def main() -> None:
+    """Write or print the page."""
+    arguments = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else "")
+    arguments.add_argument("--stdout", action="store_true", help="print, do not write")
+    page = table()
+    if arguments.parse_args().stdout:
+        print(page, end="")
+    else:
+        Path(__file__).with_name("calibration.md").write_text(page, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

@@ -32,11 +32,11 @@ MODELS = ("pi", "gpi", "mpi", "eupi", "rdpi")
 
 HEAD = """# A measured muscle, and a rig made from its data sheet
 
-Made by `python docs/rigs/measured.py FOLDER`; do not edit. The muscle is a Festo DMSP-10-250 measured by
-the authors of github.com/tbazina/pam_lqi_pid (not distributed here). The rig comes from data-sheet numbers
-alone (10 mm, 250 mm, 630 N at 8 bar, 25 %, and a loop of 16 %); it was driven with the measured pressures
-and read the same way. The same models, settings and splits; errors are free-running test RMSE in per cent
-of the range of displacement.
+Made by `python docs/rigs/measured.py FOLDER`; do not edit. The muscle is a Festo DMSP-10-250 measured
+by the authors of github.com/tbazina/pam_lqi_pid (not distributed here). The rig comes from data-sheet
+numbers alone (10 mm, 250 mm, 630 N at 8 bar, 25 %, and a loop of 16 %); it was driven with the measured
+pressures and read the same way. The same models, settings and splits; errors are free-running test RMSE
+in per cent of the range of displacement.
 """
 
 
@@ -92,6 +92,8 @@ def table(title: str, ranges: str, columns: dict[str, dict[str, float]]) -> list
         lines.append(f"| {name} | {cells} |")
     orders = [" < ".join(sorted(MODELS, key=column.__getitem__)) for column in columns.values()]
     lines += [
+        "",
+        f"Range: {ranges}.",
         "",
         "Order: " + "; ".join(f"{n}: {o}" for n, o in zip(columns, orders, strict=True)),
         "",

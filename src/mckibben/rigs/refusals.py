@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
@@ -61,15 +61,19 @@ def _wanted(field: FieldInfo | None) -> str:
         return "see mckibben rig show"
     of_unit = f" [{unit(field)}]" if unit(field) else ""
     bounds = limits(field)
-    return f"give the {field.description or 'section'}{of_unit}" + (f", {bounds}" if bounds else "")
+    return f"give {field.description or 'section'}{of_unit}" + (f", {bounds}" if bounds else "")
 
 
 def _field(model: type[BaseModel], place: list[str]) -> FieldInfo | None:
+    """Return the field that a place within a model names, or the last one on the way to it."""
     found: FieldInfo | None = None
     inner: Any = model
     for part in place:
-        fields = getattr(inner, "model_fields", None)
-        if fields is None or part not in fields:
+        if get_origin(inner) is dict:
+            inner = get_args(inner)[1]
+            continue
+        fields = getattr(inner, "model_fields", {})
+        if part not in fields:
             return found
         found = fields[part]
         inner = found.annotation

@@ -64,13 +64,16 @@ def flow(conductance: float, upstream: float, downstream: float, critical_ratio:
 
 @compiled
 def valve_flow(air: Any, opening: float, pressure: float) -> float:
-    """Return the flow into the muscle [bar l/s]; an opening above 0 fills, below 0 vents."""
+    """Return the flow into the muscle [bar l/s]; an opening above 0 fills, below 0 vents.
+
+    What is open lets air through both ways.
+    """
     inside = pressure + ATMOSPHERE
-    if opening > 0.0:
-        return flow(air.fill * opening, air.supply + ATMOSPHERE, inside, air.critical_ratio)
-    if inside > ATMOSPHERE:
-        return -flow(-air.vent * opening, inside, ATMOSPHERE, air.critical_ratio)
-    return flow(-air.vent * opening, ATMOSPHERE, inside, air.critical_ratio)
+    outside = air.supply + ATMOSPHERE if opening > 0.0 else ATMOSPHERE
+    conductance = air.fill * opening if opening > 0.0 else -air.vent * opening
+    if outside > inside:
+        return flow(conductance, outside, inside, air.critical_ratio)
+    return -flow(conductance, inside, outside, air.critical_ratio)
 
 
 @compiled

@@ -31,6 +31,9 @@ MOST_COORDINATES = 3
 SLACK_TOLERANCE = 1e-9
 """Of the length of a slack muscle [mm]."""
 
+MOST_CONTRACTION = 0.6
+"""Contraction at which every muscle is slack: no braid pulls so far."""
+
 LEAST_ROOM = 0.05
 """Share of its room at rest that even the longest muscle keeps for air, in its ends."""
 
@@ -151,11 +154,12 @@ def longest(muscle: Any) -> float:
 @compiled
 def taut_or_slack(muscle: Any, state: Any, x: float, step: float) -> tuple[float, float, float]:
     """Return pull [N], slope [N/mm] and own shortening [mm], where its ends are ``x`` mm nearer."""
-    pull, slope = tension(muscle, state, x, step)
-    least = -muscle.push
-    if pull >= least:
-        return pull, slope, x
-    low, high = min(state.x, x), x
+    least, most = -muscle.push, MOST_CONTRACTION * muscle.length
+    if x <= most:
+        pull, slope = tension(muscle, state, x, step)
+        if pull >= least:
+            return pull, slope, x
+    low, high = min(state.x, x), min(x, most)
     reach, floor = 1e-3, longest(muscle)
     while low > floor and tension(muscle, state, low, step)[0] < least:
         high = low

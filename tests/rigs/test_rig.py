@@ -1,0 +1,209 @@
+"""A rig as its users see it: running, stepping, saturating, and what physics should show."""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import pytest
+
+from mckibben import DataError, DataWarning
+from mckibben.recording import Recording
+from mckibben.rigs import Rig, check_rig, load_rig, rig_names
+from mckibben.signals import sine, staircase, triangle
+
+
+def commands(rig: Rig, duration: float = 3.0) -> Recording:
+    time = np.arange(0, duration, rig.sample_time)
+    waves = {}
+    for i, name in enumerate(rig.inputs):
+        limits = rig.limits(name)
+        waves[name] = sine(time, 1.5 + 0.3 * i, limits.high, limits.low)
+    return Recording(waves, rig.sample_time)
+
+
+def recording(sample_time: float | None = None, **channels: tuple[float, ...]) -> Recording:
+    return Recording({name: np.array(x) for name, x in channels.items()}, sample_time)
+
+
+@pytest.mark.parametrize("name", rig_names())
+def test_every_rig_keeps_the_contract(name: str) -> None:
+    check_rig(load_rig(name))
+
+
+@pytest.mark.parametrize("name", rig_names())
+def test_stepping_is_running_with_held_commands(name: str) -> None:
+    rig = load_rig(name)
+    given = commands(rig, 0.5)
+    run = rig.run(given, seed=3, held=True).matrix(rig.outputs)
+    stepped = [rig.reset(seed=3), *(rig.step(row) for row in given.matrix(rig.inputs)[:-1])]
+    assert np.array_equal(run, stepped)
+
+
+def test_runs_do_not_disturb_one_another() -> None:
+    rig = load_rig("mas20-hanging")
+    given = commands(rig)
+    alone = rig.run(given, seed=1)
+    rig.reset(seed=5)
+    rig.step([4.0])
+    with ThreadPoolExecutor(4) as pool:
+        others = list(pool.map(lambda seed: rig.run(given, seed=seed), [1, 2, 1, 3]))
+    assert others[0] == others[2] == alone
+    assert others[1] != alone
+    ideal = rig.run(given, ideal=True)
+    assert others[1]["displacement"] == pytest.approx(ideal["displacement"], abs=0.15)
+    assert rig.run(given, seed=7, ideal=True) == ideal
+
+
+def test_sensors_have_noise_resolution_and_offset() -> None:
+    rig = load_rig("mas20-hanging").changed({"sensor.displacement.offset": 2.0})
+    given = Recording({"pressure": np.full(2000, 3.0)}, 0.01)
+    run, ideal = rig.run(given), rig.run(given, ideal=True)
+    off = run["displacement"] - ideal["displacement"]
+    assert off.mean() == pytest.approx(2.0, abs=0.005)
+    assert off.std() == pytest.approx(0.02, rel=0.15)
+    steps = run["displacement"] / 0.01
+    assert steps == pytest.approx(np.round(steps), abs=1e-6)
+    assert rig.run(given.select(["pressure"]), seed=0) == run
+
+
+def test_a_command_beyond_the_range_saturates_and_the_recording_says_so() -> None:
+    rig = load_rig("mas20-hanging")
+    wave = np.linspace(-1.0, 9.0, 1001)
+    with pytest.warns(DataWarning, match=r"pressure was limited to 0 to 6 bar in \d+ of 1001"):
+        run = rig.run(Recording({"pressure": wave}, 0.01))
+    beyond = int(np.count_nonzero((wave < 0) | (wave > 6)))
+    assert run.meta["saturated"] == {"pressure": beyond}
+    assert run["pressure"].max() < 6.1
+    assert "saturated" not in rig.run(Recording({"pressure": wave.clip(0, 6)}, 0.01)).meta
+    rig.reset()
+    rig.step([99.0])
+    rig.step([3.0])
+    assert rig.saturated == {"pressure": 1}
+
+
+def test_the_supply_limits_the_pressure() -> None:
+    rig = load_rig("mas20-hanging").changed({"air.supply": 3.0})
+    run = rig.run(Recording({"pressure": np.full(1000, 6.0)}, 0.01), ideal=True)
+    assert run["pressure"][-1] == pytest.approx(3.0, abs=0.01)
+    assert run["pressure"].max() < 3.3  # the swinging mass presses some air back
+
+
+@pytest.mark.parametrize(
+    ("given", "match"),
+    [
+        (recording(pressure=(1.0, 2.0)), "without time.*Remedy: read it with --rate"),
+        (recording(0.01, force=(1.0, 2.0)), "has no channel 'force'.*give pressure"),
+        (recording(0.01, displacement=(1.0, 2.0)), "needs the channel 'pressure'"),
+    ],
+)
+def test_wrong_inputs_are_refused(given: Recording, match: str) -> None:
+    with pytest.raises(DataError, match=match):
+        load_rig("mas20-hanging").run(given)
+
+
+def test_wrong_actions_are_refused() -> None:
+    rig = load_rig("rail")
+    with pytest.raises(DataError, match=r"not running.*call reset"):
+        rig.step([1.0, 0.0])
+    rig.reset()
+    with pytest.raises(DataError, match=r"shape \(1,\) does not fit 2.*voltage, force"):
+        rig.step([1.0])
+    with pytest.raises(DataError, match=r"channel 'force'.*nan.*from 0 to 300 N"):
+        rig.step([1.0, np.nan])
+    with pytest.raises(DataError, match=r"no input 'pressure'.*give voltage, force"):
+        rig.step({"pressure": 1.0})
+    with pytest.raises(DataError, match="seed -1"):
+        rig.reset(seed=-1)
+    assert rig.step({"voltage": 3.0}).shape == (3,)
+
+
+def test_a_contractile_muscle_goes_slack_and_comes_back() -> None:
+    rig = load_rig("mas10-test-stand")
+    time = np.arange(0, 40.0, 0.01)
+    length = 200.0 - triangle(time, 20.0, 40.0)
+    given = Recording({"pressure": np.full(time.size, 2.0), "length": length}, 0.01)
+    run = rig.changed({"start.pressure": 2.0}).run(given, ideal=True)
+    assert run["force"].min() == 0.0
+    assert np.count_nonzero(run["force"] == 0.0) > 1000
+    assert run["force"][2000] > 100
+    assert run["force"][-1] > 0.8 * run["force"][2000]
+
+
+def test_an_arm_bends_towards_the_muscle_that_is_driven() -> None:
+    rig = load_rig("soft-arm")
+    time = np.arange(0, 10.0, 0.01)
+    run = rig.run(Recording({"pressure_1": sine(time, 20.0, 1.5)}, 0.01), ideal=True)
+    ends = [run[f"displacement_{k}"][-1] for k in (1, 2, 3)]
+    assert ends[0] > 30 > 15 > ends[1] > 0
+    pushed = rig.run(Recording({"pressure_1": 0 * time, "pressure_extensor": time / 5}, 0.01))
+    assert pushed["displacement_1"][-1] < -1.0
+
+
+def stroke(rig: Rig, **changes: object) -> float:
+    time = np.arange(0, 20.0, 0.02)
+    given = Recording({"pressure": triangle(time, 10.0, 5.0)}, 0.02)
+    run = rig.changed(changes).run(given, ideal=True)
+    return float(run["displacement"].max())
+
+
+def test_what_physics_should_show() -> None:
+    rig = load_rig("mas20-hanging")
+    heavy = {"payload": 60.0}
+    assert stroke(rig, tare=False, **heavy) < stroke(rig, tare=False) - 5
+    stiff = {"muscle.c10": 1.0}
+    assert stroke(rig, tare=False, **stiff) < stroke(rig, tare=False)
+
+
+def test_a_muscle_creeps_under_a_held_pressure() -> None:
+    rig = load_rig("mas20-hanging")
+    time = np.arange(0, 80.0, 0.02)
+    given = Recording({"pressure": staircase(time, (1.0, 3.0), 20.0)}, 0.02)
+    run = rig.run(given, ideal=True)
+    early, late = run["displacement"][1100], run["displacement"][-1]  # 2 s and 60 s after the step
+    assert early > 10
+    assert 0.2 < late - early < 5
+    none = rig.changed({"muscle.creep.stiffness": (1e-9, 1e-9)}).run(given, ideal=True)
+    assert none["displacement"][-1] - none["displacement"][1100] < 0.3 * (late - early)
+
+
+def test_warmth_is_an_option_that_softens_and_fades() -> None:
+    rig = load_rig("mckibben-530").changed(
+        {"muscle.heat.capacity": 2.0, "muscle.heat.cooling": 20.0}
+    )
+    time = np.arange(0, 60.0, 0.01)
+    wave = np.where(time < 30.0, sine(time, 0.5, 3.0, 1.0), 2.0)
+    given = Recording({"pressure": wave, "force": np.full(time.size, 100.0)}, 0.01)
+    run = rig.run(given, ideal=True)
+    assert run["temperature"][2900] > run["temperature"][0] + 1
+    assert run["temperature"][-1] < run["temperature"][2900] - 0.5
+    soft = rig.changed({"muscle.heat.softening": 0.02}).run(given, ideal=True)
+    cold = rig.changed({"muscle.heat.softening": 0.0}).run(given, ideal=True)
+    assert np.array_equal(cold["displacement"], run["displacement"])
+    drift = np.abs(soft["displacement"] - cold["displacement"])
+    assert drift[2800:2900].max() > 5 * drift[:100].max() + 0.01
+
+
+def test_filling_and_venting_differ() -> None:
+    rig = load_rig("mas20-hanging").changed({"air.gain": 100.0, "air.dead_band": 0.0})
+    given = Recording({"pressure": np.repeat([1.0, 5.0, 1.0], 400)}, 0.005)
+    pressure = rig.run(given, ideal=True, held=True)["pressure"]
+    filling = np.flatnonzero(pressure[400:800] > 4.9)[0]
+    venting = np.flatnonzero(pressure[800:] < 1.1)[0]
+    assert venting > 1.5 * filling
+
+
+def test_a_loop_widens_with_friction() -> None:
+    rig = load_rig("mas20-hanging")
+    time = np.arange(0, 40.0, 0.02)
+    given = Recording({"pressure": triangle(time, 20.0, 5.0, 1.0)}, 0.02)
+
+    def width(factor: float) -> float:
+        limits = {
+            f"muscle.friction.{way}": [factor * c for c in getattr(rig.muscle.friction, way)]  # type: ignore[attr-defined]
+            for way in ("contracting", "extending")
+        }
+        run = rig.changed(limits).run(given, ideal=True)
+        return float(run["displacement"][1750] - run["displacement"][1250])
+
+    assert 0 < width(0.1) < width(1.0) < width(2.0)

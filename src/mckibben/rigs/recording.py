@@ -13,6 +13,7 @@ from mckibben.recording import Recording
 from mckibben.rigs.files import load_rig
 from mckibben.rigs.rig import Rig
 from mckibben.signals import cut
+from mckibben.signals.checking import generator
 from mckibben.signals.protocols import Protocol, Run, protocol
 
 
@@ -52,6 +53,7 @@ def record(
     plan = protocol(what) if isinstance(what, str) else what
     plant = load_rig(plan.rig) if rig is None else rig
     wanted = plan.runs if runs is None else tuple(plan[name] for name in runs)
+    generator(seed)  # refuses what is none
     places = {run.name: place for place, run in enumerate(plan.runs)}
 
     def recorded(run: Run) -> Recording:

@@ -17,6 +17,7 @@ from mckibben.rigs.parameters import Air, Range, Section, Sensor, parameter
 from mckibben.rigs.physics.motion import MOTION, march
 from mckibben.rigs.physics.muscle import MUSCLE_STATE
 from mckibben.rigs.refusals import refused
+from mckibben.signals.checking import generator
 
 Array = NDArray[np.float64]
 Records = NDArray[np.void]
@@ -176,7 +177,7 @@ class Rig(Section, ABC):
         try:
             return type(self).model_validate(fields)
         except ValidationError as error:
-            raise refused(error, type(self)) from None
+            raise refused(error, type(self), f"rig {self.name}") from None
 
     def run(
         self, inputs: Recording, seed: int = 0, *, ideal: bool = False, held: bool = False
@@ -215,7 +216,7 @@ class Rig(Section, ABC):
         if ideal:
             readings |= _inside(traces)
         else:
-            rng = np.random.default_rng(seed)
+            rng = generator(seed)
             noise = rng.standard_normal((len(inputs), len(self.outputs)))
             readings = {
                 name: self._sensed(name, samples, noise[:, i])
@@ -257,10 +258,8 @@ class Rig(Section, ABC):
         DataError
             On a negative seed.
         """
-        if seed < 0:
-            raise DataError(f"seed {seed} is negative", remedy="give 0 or more")
         states, motion = (part.copy() for part in self._at_rest())
-        running = _Running(states, motion, np.random.default_rng(seed))
+        running = _Running(states, motion, generator(seed))
         self._running = running
         rest = self._resting()
         traces = self._march(states, motion, self.demands(rest), self.sample_time, True)

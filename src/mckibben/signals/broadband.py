@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mckibben.errors import DataError
-from mckibben.signals.checking import as_time, require_order, require_positive
+from mckibben.signals.checking import as_time, generator, require_order, require_positive
 
 Array = NDArray[np.float64]
 
@@ -56,7 +56,7 @@ def random_wave(
             f"min_frequency {min_frequency} is not within 0 and max_frequency {max_frequency}",
             remedy="give 0 <= min_frequency < max_frequency",
         )
-    rng = np.random.default_rng(seed)
+    rng = generator(seed)
     frequencies = rng.uniform(min_frequency, max_frequency, N_WAVES)
     phases = rng.uniform(0.0, 2 * np.pi, N_WAVES)
     wave = np.zeros_like(t)
@@ -109,7 +109,7 @@ def multisine(
         )
     order = np.arange(1, n + 1)
     if phases == "random":
-        shifts = np.random.default_rng(seed).uniform(0.0, 2 * np.pi, n)
+        shifts = generator(seed).uniform(0.0, 2 * np.pi, n)
     elif phases == "low-crest":
         shifts = -np.pi * order * (order - 1) / n
     else:

@@ -24,7 +24,22 @@ def require_positive(name: str, value: float) -> None:
         raise DataError(f"{name} is {value}", remedy="give a positive number")
 
 
+def require_finite(name: str, values: ArrayLike) -> Array:
+    """Return numbers as an array, or refuse those that are not finite."""
+    numbers = np.atleast_1d(np.asarray(values, dtype=float))
+    if not np.isfinite(numbers).all():
+        raise DataError(f"{name} is {values}", remedy="give finite numbers")
+    return numbers
+
+
 def require_order(low: float, high: float) -> None:
     """Refuse limits that are not finite, or not in order."""
     if not -np.inf < low < high < np.inf:
         raise DataError(f"high {high} is not above low {low}", remedy="give low < high")
+
+
+def generator(seed: int) -> np.random.Generator:
+    """Return what draws random numbers, or say that the seed is impossible."""
+    if seed < 0:
+        raise DataError(f"seed {seed} is negative", remedy="give 0 or more")
+    return np.random.default_rng(seed)

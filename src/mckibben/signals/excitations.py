@@ -8,7 +8,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mckibben.errors import DataError
-from mckibben.signals.checking import as_time, require_order, require_positive
+from mckibben.signals.checking import (
+    as_time,
+    generator,
+    require_finite,
+    require_order,
+    require_positive,
+)
 
 Array = NDArray[np.float64]
 
@@ -153,7 +159,7 @@ def irregular_triangle(
         raise DataError(f"{n_turns} turning points are too few", remedy="ask for at least 1")
     require_order(low, high)
     levels = [0.0, 1.0]
-    for share in np.random.default_rng(seed).uniform(0.1, 1.0, n_turns):
+    for share in generator(seed).uniform(0.1, 1.0, n_turns):
         far = 0.0 if levels[-1] > levels[-2] else 1.0
         levels.append(levels[-1] + share * (far - levels[-1]))
     ways = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(levels)))])
@@ -177,7 +183,8 @@ def _cycles(
 ) -> Array:
     t = as_time(time)
     require_positive("period", period)
-    heights = np.atleast_1d(np.asarray(peaks, dtype=float)) - low
+    require_finite("low", low)
+    heights = require_finite("peaks", peaks) - low
     if heights.size == 0:
         raise DataError("there are no peaks", remedy="give at least one")
     if t.min() < 0:

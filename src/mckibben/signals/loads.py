@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mckibben.errors import DataError
-from mckibben.signals.checking import as_time, require_positive
+from mckibben.signals.checking import as_time, require_finite, require_positive
 
 Array = NDArray[np.float64]
 
@@ -28,8 +28,7 @@ def constant(time: ArrayLike, value: float) -> Array:
     DataError
         On a value that is not finite.
     """
-    if not np.isfinite(value):
-        raise DataError(f"value is {value}", remedy="give a number")
+    require_finite("value", value)
     return np.full(as_time(time).shape, float(value))
 
 
@@ -56,16 +55,14 @@ def ramps(time: ArrayLike, instants: Sequence[float], values: Sequence[float]) -
     [0.0, 0.0, 10.0, 10.0]
     """
     t = as_time(time)
-    places, heights = np.asarray(instants, dtype=float), np.asarray(values, dtype=float)
+    places, heights = require_finite("instants", instants), require_finite("values", values)
     if places.shape != heights.shape or places.ndim != 1 or places.size == 0:
         raise DataError(
             f"{places.size} instants and {heights.size} values make no ramps",
             remedy="give one value an instant, and at least one",
         )
-    if not (
-        np.isfinite(places).all() and np.isfinite(heights).all() and (np.diff(places) > 0).all()
-    ):
-        raise DataError("the points are not in order", remedy="give finite, increasing instants")
+    if not (np.diff(places) > 0).all():
+        raise DataError("the points are not in order", remedy="give increasing instants")
     return np.asarray(np.interp(t, places, heights))
 
 
@@ -99,8 +96,8 @@ def pulls(
     require_positive("duration", duration)
     if n_pulls < 1:
         raise DataError(f"{n_pulls} pulls are too few", remedy="ask for at least 1")
-    if not (np.isfinite(high) and np.isfinite(low)):
-        raise DataError(f"pulls from {low} to {high}", remedy="give finite values")
+    require_finite("high", high)
+    require_finite("low", low)
     share = float(t[-1] - t[0]) / n_pulls
     if duration > share:
         raise DataError(

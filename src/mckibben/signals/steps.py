@@ -8,7 +8,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mckibben.errors import DataError
-from mckibben.signals.checking import as_time, require_order, require_positive
+from mckibben.signals.checking import (
+    as_time,
+    generator,
+    require_finite,
+    require_order,
+    require_positive,
+)
 
 Array = NDArray[np.float64]
 
@@ -44,9 +50,9 @@ def staircase(time: ArrayLike, levels: Sequence[float], hold: float, ramp: float
     if not len(levels):
         raise DataError("a staircase needs levels", remedy="give at least one")
     require_positive("hold", hold)
-    if not ramp >= 0:
+    if not 0 <= ramp < np.inf:
         raise DataError(f"a ramp of {ramp} s is impossible", remedy="give 0 or more seconds")
-    heights = np.asarray(levels, dtype=float)
+    heights = require_finite("levels", levels)
     step = np.clip(np.floor(t / (hold + ramp)), 0, heights.size - 1).astype(int)
     if ramp == 0:
         return np.asarray(heights[step])
@@ -89,7 +95,7 @@ def binary_steps(
     require_order(low, high)
     n = _holds(t, hold, ramp)
     period = 2**REGISTER_BITS - 1
-    register = 1 + int(np.random.default_rng(seed).integers(period))
+    register = 1 + int(generator(seed).integers(period))
     bits = np.empty(n)
     for i in range(n):
         bits[i] = register & 1
@@ -135,7 +141,7 @@ def random_steps(
         raise DataError(
             f"longest {longest} s is below shortest {shortest} s", remedy="give shortest <= longest"
         )
-    rng = np.random.default_rng(seed)
+    rng = generator(seed)
     levels = rng.uniform(low, high, n + 1)
     levels[0] = low
     ends = np.cumsum(rng.uniform(shortest, longest, n))

@@ -1,0 +1,183 @@
+"""mckibben rig: list, show, run, record, new."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mckibben import read
+from mckibben.rigs import load_rig, rig_names
+from tests.cli.conftest import Cli
+
+
+def test_list_names_rigs_protocols_and_signals(cli: Cli) -> None:
+    words = cli("rig", "list")
+    assert words.code == 0
+    for name in (*rig_names(), "mpi-narmax", "decaying-triangle", "pulls"):
+        assert name in words.out
+    found = json.loads(cli("rig", "list", "--json").out)
+    assert set(found["rigs"]) == set(rig_names())
+    assert found["rigs"]["rail"]["inputs"] == ["voltage", "force"]
+    assert found["protocols"]["sdchm"]["rig"] == "soft-arm"
+    assert found["signals"]["triangle"]["period"] == "number"
+
+
+def test_what_show_prints_is_a_rig(cli: Cli, tmp_path: Path) -> None:
+    shown = cli("rig", "show", "soft-arm")
+    mine = tmp_path / "mine.toml"
+    mine.write_text(shown.out.replace("disc_mass = 0.8", "disc_mass = 1.5"), encoding="utf-8")
+    assert load_rig(mine) == load_rig("soft-arm").changed({"disc_mass": 1.5})
+    assert json.loads(cli("rig", "show", str(mine), "--json").out)["disc_mass"] == 1.5
+
+
+def test_run_writes_a_recording(cli: Cli, tmp_path: Path) -> None:
+    out = tmp_path / "run.csv"
+    drive = "decaying-triangle:period=2,n_cycles=3,low=1"
+    arguments = ["rig", "run", "mas20-hanging", "--signal", drive, "--duration", 6, "--rate", 100]
+    result = cli(*arguments, "-o", out)
+    assert result.code == 0, result.err
+    assert "Written:" in result.out
+    (recording,) = read(out)
+    assert len(recording) == 601
+    assert recording["pressure"].max() == pytest.approx(6.0, abs=0.3)
+    assert recording.meta["rig"] == "mas20-hanging v1 (virtual)"
+    first = out.read_bytes()
+    cli(*arguments, "-o", out)
+    assert out.read_bytes() == first
+    cli(*arguments, "--seed", 1, "-o", out)
+    assert out.read_bytes() != first
+
+
+def test_run_drives_several_inputs_and_changes_parameters(cli: Cli, tmp_path: Path) -> None:
+    out = tmp_path / "run.parquet"
+    result = cli(
+        *("rig", "run", "rail", "--signal", "voltage=constant:value=0.1"),
+        *("--signal", "force=pulls:high=100,n_pulls=1,duration=2", "--set", "payload=2.5"),
+        *("--duration", 4, "--rate", 200, "--ideal", "--json", "-o", out),
+    )
+    assert result.code == 0, result.err
+    told = json.loads(result.out)
+    assert told["ranges"]["force"] == pytest.approx([24.5, 124.5], abs=1)
+    assert "volume" in told["ranges"]
+    assert told["saturated"] == {}
+
+
+def test_run_takes_commands_from_a_recording_and_reports_saturation(
+    cli: Cli, tmp_path: Path
+) -> None:
+    given, out = tmp_path / "given.csv", tmp_path / "run.csv"
+    rows = "\n".join(f"{0.01 * i:.2f},{0.05 * i:.2f},0" for i in range(200))
+    given.write_text(f"time,pressure,displacement\n{rows}\n", encoding="utf-8")
+    result = cli("rig", "run", "mas20-hanging", "--inputs", given, "-o", out, "--json")
+    assert result.code == 0, result.err
+    assert json.loads(result.out)["saturated"] == {"pressure": 79}
+    assert "limited to 0 to 6 bar in 79 of 200" in result.err
+
+
+def test_record_writes_runs_and_what_each_is_for(cli: Cli, tmp_path: Path) -> None:
+    result = cli("rig", "record", "field-models", "--out", tmp_path / "set")
+    assert result.code == 0, result.err
+    said = json.loads((tmp_path / "set" / "protocol.json").read_text())
+    assert [(run["file"], run["role"]) for run in said["runs"]] == [
+        ("decaying-triangle.csv", "train"),
+        ("irregular-triangle.csv", "test"),
+    ]
+    first = tmp_path / "set" / "decaying-triangle.csv"
+    stamp = first.stat().st_mtime_ns
+    (tmp_path / "set" / "irregular-triangle.csv").unlink()
+    again = cli("rig", "record", "field-models", "--out", tmp_path / "set", "--json")
+    assert json.loads(again.out)["recorded"] == ["irregular-triangle"]
+    assert first.stat().st_mtime_ns == stamp
+    other = cli("rig", "record", "field-models", "--out", tmp_path / "set", "--seed", 2)
+    assert other.code == 2
+    assert "another protocol, rig or seed" in other.err
+    assert first.stat().st_mtime_ns == stamp
+
+
+def test_a_recorded_set_can_be_studied(cli: Cli, tmp_path: Path) -> None:
+    cli("rig", "record", "activation-pressure", "--only", "150N-1.0Hz", "--out", tmp_path)
+    result = cli(
+        *(
+            "compare",
+            tmp_path / "sine-150N-1.0Hz.csv",
+            "--test",
+            tmp_path / "random-150N-1.0Hz.csv",
+        ),
+        *("--models", "pi,rdpi", "--json"),
+    )
+    assert result.code == 0, result.err
+    assert {row["model"] for row in json.loads(result.out)["rows"]} == {"pi", "rdpi"}
+
+
+def test_new_makes_a_rig_from_a_data_sheet(cli: Cli, tmp_path: Path) -> None:
+    file = tmp_path / "my muscle.toml"
+    sheet = ["--diameter", 20, "--length", 200, "--max-pressure", 6, "--max-force", 1500]
+    result = cli("rig", "new", file, *sheet, "--max-contraction", 0.25)
+    assert result.code == 0, result.err
+    assert load_rig(file).name == "my-muscle"
+    before = file.read_bytes()
+    refused = cli("rig", "new", file, *sheet, "--max-contraction", 0.2)
+    assert refused.code == 2
+    assert "--force" in refused.err
+    assert file.read_bytes() == before
+    assert cli("rig", "new", file, *sheet, "--max-contraction", 0.2, "--force").code == 0
+    out = tmp_path / "run.csv"
+    assert cli("rig", "run", file, "--signal", "sine:period=2", "-o", out).code == 0
+    assert np.ptp(read(out)[0]["displacement"]) > 30
+
+
+RUN = ["rig", "run", "rail", "-o", "x.csv"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["rig", "show", "crane"], "no rig 'crane'"),
+        (["rig", "run", "crane", "--signal", "sine", "-o", "x.csv"], "no rig 'crane'"),
+        (RUN, "--signal or by --inputs"),
+        ([*RUN, "--signal", "sine:period=2", "--inputs", "y.csv"], "one of them, not both"),
+        ([*RUN, "--inputs", "nowhere.csv"], "nowhere.csv"),
+        ([*RUN, "--signal", "wobble"], "no signal named 'wobble'"),
+        ([*RUN, "--signal", "sine"], "needs the setting 'period'"),
+        ([*RUN, "--signal", "sine:period=fast"], "cannot take period='fast'"),
+        ([*RUN, "--signal", "sine:period=nan"], "period is nan"),
+        ([*RUN, "--signal", "sine:period=-1"], "period is -1"),
+        ([*RUN, "--signal", "sine:tempo=1"], "no setting 'tempo'"),
+        ([*RUN, "--signal", "sine:period"], "not of the form SETTING=VALUE"),
+        ([*RUN, "--signal", "pressure=sine:period=1"], "no input 'pressure'"),
+        ([*RUN, "--signal", "sine:period=1", "--duration", "nan"], "cannot be recorded"),
+        ([*RUN, "--signal", "sine:period=1", "--rate", "0"], "cannot be recorded"),
+        ([*RUN, "--signal", "sine:period=1", "--seed", "-1"], "seed"),
+        ([*RUN, "--signal", "sine:period=1", "--set", "payload=-3"], "payload is -3"),
+        ([*RUN, "--signal", "sine:period=1", "--set", "payload"], "not of the form"),
+        ([*RUN, "--signal", "sine:period=1", "--set", "colour=red"], "no parameter 'colour'"),
+        (["rig", "run", "rail", "--signal", "sine:period=1", "-o", "x.xyz"], "x.xyz"),
+        (["rig", "record", "dance", "--out", "set"], "no protocol named 'dance'"),
+        (["rig", "record", "field-models", "--out", "set", "--format", "xls"], "no format 'xls'"),
+        (["rig", "record", "field-models", "--out", "set", "--only", "zz"], "'zz' in its name"),
+        (["rig", "record", "sdchm", "--out", "set", "--rig", "rail", "--only", "gpi-1"], "rail"),
+        (
+            [
+                *("rig", "new", "x.toml", "--diameter", "20", "--length", "200"),
+                *("--max-pressure", "6", "--max-force", "9", "--max-contraction", "0.25"),
+            ],
+            "pull some",
+        ),
+    ],
+)
+def test_bad_arguments_leave_with_a_remedy(
+    cli: Cli,
+    arguments: list[str],
+    said: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    result = cli(*arguments)
+    assert result.code == 2, result.err
+    assert said in result.err
+    assert "Remedy:" in result.err
+    assert "Traceback" not in result.err

@@ -28,7 +28,7 @@ def require_finite(name: str, values: ArrayLike) -> Array:
     """Return numbers as an array, or refuse those that are not finite."""
     numbers = np.atleast_1d(np.asarray(values, dtype=float))
     if not np.isfinite(numbers).all():
-        raise DataError(f"{name} is {values}", remedy="give finite numbers")
+        raise DataError(f"{name} is {values!r}", remedy="give finite numbers")
     return numbers
 
 

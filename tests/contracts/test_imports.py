@@ -17,6 +17,7 @@ LAYERS = (
     {"recording", "signals", "metrics", "characterization"},
     {"files"},
     {"rigs"},
+    {"environments"},
     {"blocks"},
     {"estimators"},
     {"compensators"},
@@ -29,6 +30,7 @@ LAYERS = (
 STANDS_ON = {
     "files": {"files", "recording", "errors", "registry", "atomic"},
     "rigs": {"rigs", "recording", "signals", "errors", "registry", "atomic"},
+    "environments": {"environments", "rigs", "recording", "signals", "errors"},
 }
 """What some members may import and no more: a rig's physics knows nothing of models."""
 

@@ -1,0 +1,317 @@
+"""Gymnasium environments: follow a reference with a virtual rig.
+
+Importing this module registers ``mckibben/RIG-vVERSION`` for every published rig that measures
+displacement (Towers et al., "Gymnasium: A Standard Interface for Reinforcement Learning Environments").
+
+>>> import gymnasium
+>>> import mckibben.environments
+>>> env = gymnasium.make("mckibben/mas20-hanging-v1")
+>>> observation, info = env.reset(seed=1)
+>>> observation, reward, terminated, truncated, info = env.step(env.action_space.sample())
+"""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from importlib.resources import files
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mckibben.errors import DataError
+
+try:
+    import gymnasium
+except ImportError as missing:
+    raise DataError(
+        "environments need the package gymnasium", remedy="pip install 'mckibben[gym]'"
+    ) from missing
+
+if TYPE_CHECKING:
+    from mckibben.recording import Recording
+    from mckibben.rigs import Rig
+
+Array = NDArray[np.float64]
+Vector = NDArray[np.float32]
+
+FASTEST = 0.3
+"""Highest frequency of the commands behind a reference [Hz]."""
+
+SLOWEST = 0.03
+"""Lowest frequency of them, so that an episode sees several turns [Hz]."""
+
+FARTHEST = 5.0
+"""Observations are clipped to this, far beyond what they reach."""
+
+SPREAD_PARAMETERS = ("muscle.c10", "muscle.friction.contracting", "muscle.friction.extending")
+"""What ``spread`` varies from episode to episode."""
+
+
+class Tracking(gymnasium.Env[Vector, Vector]):
+    """Make a rig's displacement follow a reference.
+
+    The reference is what the same rig did under hidden random commands, and so can be followed.
+
+    Action, shape (commands,), within -1 and 1: each pressure or voltage, from the lowest to the highest
+    that the hardware lets through, held for a control step.
+
+    Observation, all near -1 to 1: displacement(s) over stroke; pressure(s) over the highest command;
+    the reference(s) over stroke, now and ``preview`` steps ahead; the last action.
+
+    Reward: minus the mean absolute error over stroke, minus ``effort`` times the mean square of the
+    change of action.
+
+    Info: ``error``, ``reference``, ``displacement`` [mm] and ``pressure`` [bar], as measured.
+
+    Episodes never terminate; they are truncated after ``duration``.
+
+    Parameters
+    ----------
+    rig : str, path or Rig
+        Name, file or object; must measure displacement.
+    control_time : float, optional
+        Time that an action is held [s]; default 0.02 s, or the rig's sample time if that is longer.
+    duration : float
+        Of an episode [s], at least two control steps.
+    reference : {"random-wave", "irregular-triangle", "sine"}
+        Shape of the hidden commands.
+    preview : int
+        Reference samples ahead that the observation shows, 0 to 1000.
+    effort : float
+        Weight of changes of action, not negative.
+    load : float
+        Constant force that pulls where the rig has such an input [N].
+    spread : float
+        Relative spread of bladder stiffness and friction from episode to episode, 0 to 0.5.
+    settings : mapping, optional
+        Parameters of the rig to change, as `mckibben.Rig.changed` takes them.
+    render_mode : {None, "rgb_array"}
+        With the second, `render` draws the episode so far.
+
+    Raises
+    ------
+    DataError
+        On options outside these ranges, or a rig without displacement.
+    """
+
+    metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 10}  # noqa: RUF012  # as Gymnasium has it
+
+    def __init__(
+        self,
+        rig: str | Path | Rig = "mas20-hanging",
+        *,
+        control_time: float | None = None,
+        duration: float = 20.0,
+        reference: Literal["random-wave", "irregular-triangle", "sine"] = "random-wave",
+        preview: int = 0,
+        effort: float = 0.01,
+        load: float = 0.0,
+        spread: float = 0.0,
+        settings: Mapping[str, Any] | None = None,
+        render_mode: str | None = None,
+    ) -> None:
+        from mckibben.rigs import load_rig
+
+        plant = load_rig(rig) if isinstance(rig, str | Path) else rig
+        if control_time is None:
+            control_time = max(0.02, plant.sample_time)
+        _demand(0 < control_time <= 1, "control_time", control_time, "0 to 1 s")
+        _demand(2 * control_time <= duration <= 1e4, "duration", duration, "2 steps to 10000 s")
+        _demand(preview in range(1001), "preview", preview, "a whole number from 0 to 1000")
+        _demand(0 <= effort < np.inf, "effort", effort, "0 or more")
+        _demand(0 <= spread <= 0.5, "spread", spread, "0 to 0.5")
+        _demand(
+            reference in ("random-wave", "irregular-triangle", "sine"),
+            "reference",
+            reference,
+            "random-wave, irregular-triangle or sine",
+        )
+        _demand(render_mode in (None, "rgb_array"), "render_mode", render_mode, "rgb_array or none")
+        self._plant = plant.changed({**(settings or {}), "sample_time": control_time})
+        outputs = self._plant.outputs
+        self._moves = [i for i, name in enumerate(outputs) if name.startswith("displacement")]
+        self._bars = [i for i, name in enumerate(outputs) if name.startswith("pressure")]
+        if not self._moves:
+            raise DataError(
+                f"the rig {plant.name!r} measures no displacement", remedy="choose another rig"
+            )
+        self._commands = [name for name in self._plant.inputs if name != "force"]
+        limits = [self._plant.limits(name) for name in self._commands]
+        self._low = np.array([limit.low for limit in limits])
+        self._high = np.array([limit.high for limit in limits])
+        if load:
+            force = self._plant.limits("force") if "force" in self._plant.inputs else None
+            _demand(
+                force is not None and force.low <= load <= force.high,
+                "load",
+                load,
+                "0, or a force that the rig can take",
+            )
+        self._load = load
+        self._steps = round(duration / control_time)
+        self._shape, self._preview, self._effort, self._spread = reference, preview, effort, spread
+        self.render_mode = render_mode
+        n = len(self._commands)
+        n_seen = len(self._moves) * (2 + preview) + len(self._bars) + n
+        self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (n,), np.float32)
+        self.observation_space = gymnasium.spaces.Box(-FARTHEST, FARTHEST, (n_seen,), np.float32)
+        self._stroke = self._measured_stroke()
+        self._most_bar = max(
+            self._plant.limits(name).high * getattr(self._plant, "bar_per_volt", 1.0)
+            if name == "voltage"
+            else self._plant.limits(name).high
+            for name in self._commands
+        )
+        self._wanted = np.zeros((self._steps + preview + 1, len(self._moves)))
+        self._done: list[Array] = []
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Vector, dict[str, Any]]:
+        """Start an episode: a new reference, a rig at rest, and, with ``spread``, another muscle."""
+        super().reset(seed=seed)
+        del options
+        self._now = self._varied()
+        self._wanted = self._hidden_run(self._now)
+        measured = self._now.reset(seed=int(self.np_random.integers(2**31)))
+        self._action = np.zeros(len(self._commands))
+        self._done = [measured]
+        return self._observation(measured), self._info(measured)
+
+    def step(self, action: Vector) -> tuple[Vector, float, bool, bool, dict[str, Any]]:
+        """Hold an action for a control step."""
+        wish = np.clip(np.asarray(action, dtype=float), -1.0, 1.0)
+        commands = dict(
+            zip(
+                self._commands, self._low + 0.5 * (wish + 1) * (self._high - self._low), strict=True
+            )
+        )
+        if self._load:
+            commands["force"] = self._load
+        measured = self._now.step(commands)
+        self._done.append(measured)
+        change, self._action = wish - self._action, wish
+        info = self._info(measured)
+        reward = -float(np.mean(np.abs(info["error"]))) / self._stroke
+        reward -= self._effort * float(np.mean(change**2))
+        truncated = len(self._done) > self._steps
+        return self._observation(measured), reward, False, truncated, info
+
+    def render(self) -> Any:
+        """Return a picture of the episode so far, shape (height, width, 3), or None."""
+        if self.render_mode is None:
+            return None
+        from matplotlib.backends.backend_agg import FigureCanvasAgg
+        from matplotlib.figure import Figure
+
+        figure = Figure(figsize=(6, 3), dpi=100, layout="constrained")
+        canvas: Any = FigureCanvasAgg(figure)
+        axes = figure.subplots()
+        time = np.arange(self._steps + 1) * self._plant.sample_time
+        axes.plot(time, self._wanted[: self._steps + 1], "k", lw=0.8)
+        axes.plot(time[: len(self._done)], np.array(self._done)[:, self._moves])
+        axes.set(xlabel="time [s]", ylabel="displacement [mm]", title=self._plant.name)
+        canvas.draw()
+        return np.asarray(canvas.buffer_rgba())[:, :, :3].copy()
+
+    def _observation(self, measured: Array) -> Vector:
+        k = len(self._done) - 1
+        parts = (
+            measured[self._moves] / self._stroke,
+            measured[self._bars] / self._most_bar,
+            self._wanted[k : k + 1 + self._preview].ravel() / self._stroke,
+            self._action,
+        )
+        return np.clip(np.concatenate(parts), -FARTHEST, FARTHEST).astype(np.float32)
+
+    def _info(self, measured: Array) -> dict[str, Any]:
+        reference = self._wanted[len(self._done) - 1]
+        return {
+            "error": measured[self._moves] - reference,
+            "reference": reference.copy(),
+            "displacement": measured[self._moves],
+            "pressure": measured[self._bars],
+        }
+
+    def _varied(self) -> Rig:
+        if not self._spread:
+            return self._plant
+        fields = self._plant.model_dump()
+        settings: dict[str, Any] = {}
+        for path in SPREAD_PARAMETERS:
+            value: Any = fields
+            for part in path.split("."):
+                value = value[part]
+            factor = float(np.exp(self._spread * self.np_random.standard_normal()))
+            settings[path] = (
+                [factor * each for each in value]
+                if isinstance(value, list | tuple)
+                else factor * value
+            )
+        return self._plant.changed(settings)
+
+    def _hidden_run(self, plant: Rig) -> Array:
+        """Return what a rig does under hidden commands [mm], shape (samples, displacements)."""
+        from mckibben.signals import irregular_triangle, random_wave, sine
+
+        n = len(self._wanted)
+        time = np.arange(max(n, 2)) * plant.sample_time
+        waves = {}
+        for name, low, high in zip(self._commands, self._low, self._high, strict=True):
+            bottom, top = np.sort(self.np_random.uniform(0.0, 1.0, 2))
+            bottom, top = 0.3 * bottom, 0.6 + 0.35 * top
+            seed = int(self.np_random.integers(2**31))
+            if self._shape == "random-wave":
+                share = random_wave(time, FASTEST, top, bottom, SLOWEST, seed=seed)
+            elif self._shape == "sine":
+                share = sine(time, 1 / self.np_random.uniform(SLOWEST, FASTEST), top, bottom)
+            else:
+                turns = max(int(time[-1] * FASTEST), 1)
+                share = irregular_triangle(time, turns, top, bottom, seed=seed)
+            waves[name] = low + (high - low) * share
+        return self._ideal(plant, waves)[:n]
+
+    def _measured_stroke(self) -> float:
+        """Return the largest range of displacement when all commands rise slowly together [mm]."""
+        time = np.arange(0.0, 10.0, self._plant.sample_time)
+        rise = np.minimum(time / 8.0, 1.0)
+        waves = {
+            name: low + rise * (high - low)
+            for name, low, high in zip(self._commands, self._low, self._high, strict=True)
+            if name != "pressure_extensor"
+        }
+        return float(np.ptp(self._ideal(self._plant, waves), axis=0).max())
+
+    def _ideal(self, plant: Rig, waves: Mapping[str, Array]) -> Array:
+        from mckibben.recording import Recording
+
+        channels = dict(waves)
+        if self._load:
+            n = len(next(iter(waves.values())))
+            channels["force"] = np.full(n, self._load)
+        given: Recording = Recording(channels, plant.sample_time)
+        return plant.run(given, ideal=True).matrix([plant.outputs[i] for i in self._moves])
+
+
+def register() -> None:
+    """Register an environment for every published rig that measures displacement."""
+    for file in files("mckibben").joinpath("rigs", "published").iterdir():
+        if file.name.endswith(".toml"):
+            fields = tomllib.loads(file.read_text(encoding="utf-8"))
+            if "displacement" in fields["sensor"]:
+                gymnasium.register(
+                    id=f"mckibben/{fields['name']}-v{fields['version']}",
+                    entry_point="mckibben.environments:Tracking",
+                    kwargs={"rig": fields["name"]},
+                )
+
+
+def _demand(holds: bool, name: str, value: object, wanted: str) -> None:
+    if not holds:
+        raise DataError(f"{name} is {value!r}", remedy=f"give {wanted}")
+
+
+register()

@@ -1,0 +1,136 @@
+"""Gymnasium environments: the checker passes, the task can be solved, seeds mean something."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from mckibben import DataError
+from mckibben.rigs import load_rig, rig_names
+
+gymnasium = pytest.importorskip("gymnasium")
+
+from gymnasium.utils.env_checker import check_env  # noqa: E402
+
+import mckibben.environments as environments  # noqa: E402
+
+IDS = sorted(name for name in gymnasium.registry if name.startswith("mckibben/"))
+
+
+def test_every_rig_with_displacement_is_registered() -> None:
+    expected = {
+        f"mckibben/{name}-v{load_rig(name).version}"
+        for name in rig_names()
+        if "displacement" in load_rig(name).sensor
+    }
+    assert set(IDS) == expected
+    assert len(IDS) >= 4
+
+
+@pytest.mark.parametrize("name", IDS)
+def test_gymnasiums_own_checker_passes(name: str) -> None:
+    check_env(gymnasium.make(name, duration=1.0).unwrapped)
+
+
+def episode(env: Any, act: Callable[[np.ndarray, dict[str, Any]], Any], seed: int = 0) -> list[Any]:
+    seen, info = env.reset(seed=seed)
+    steps = []
+    while True:
+        seen, reward, terminated, truncated, info = env.step(act(seen, info))
+        steps.append((seen, reward, info))
+        assert not terminated
+        assert env.observation_space.contains(seen)
+        if truncated:
+            return steps
+
+
+class Integrator:
+    """Feedback of what the last actions made of the error, in actions over millimetres."""
+
+    def __init__(self, proportional: float, integral: float) -> None:
+        self.proportional, self.integral, self.sum = proportional, integral, -1.0
+
+    def __call__(self, seen: np.ndarray, info: dict[str, Any]) -> np.ndarray:
+        error = -float(info["error"][0])
+        self.sum = float(np.clip(self.sum + self.integral * error, -1.0, 1.0))
+        return np.clip([self.sum + self.proportional * error], -1, 1).astype(np.float32)
+
+
+@pytest.mark.parametrize("reference", ["random-wave", "irregular-triangle", "sine"])
+def test_feedback_solves_the_task_and_chance_does_not(reference: str) -> None:
+    env = gymnasium.make("mckibben/mas20-hanging-v1", duration=8.0, reference=reference)
+    rng = np.random.default_rng(0)
+    chance = episode(env, lambda *_: rng.uniform(-1, 1, 1).astype(np.float32))
+    control = episode(env, Integrator(0.015, 0.01))
+    assert len(control) == len(chance) == 400
+    errors = [
+        np.mean([abs(info["error"][0]) for _, _, info in steps[100:]])
+        for steps in (control, chance)
+    ]
+    assert errors[0] < 0.25 * errors[1]
+    assert errors[0] < 1.5
+    rewards = [sum(reward for _, reward, _ in steps) for steps in (control, chance)]
+    assert rewards[0] > rewards[1]
+
+
+def test_an_episode_is_repeatable_for_its_seed() -> None:
+    env = gymnasium.make("mckibben/soft-arm-v1", duration=1.0, preview=3, spread=0.1)
+
+    def act(seen: np.ndarray, info: dict[str, Any]) -> np.ndarray:
+        return np.full(4, 0.2, np.float32)
+
+    first, again = episode(env, act, seed=4), episode(env, act, seed=4)
+    other = episode(env, act, seed=5)
+    assert all(np.array_equal(a[0], b[0]) for a, b in zip(first, again, strict=True))
+    assert not np.array_equal(first[-1][0], other[-1][0])
+    assert first[0][0].shape == (3 * 5 + 4 + 4,)
+    assert first[-1][2]["pressure"] == pytest.approx(1.5, abs=0.1)
+
+
+def test_vectors_of_environments_run() -> None:
+    vector = gymnasium.make_vec(
+        "mckibben/rail-v1", num_envs=2, vectorization_mode="sync", duration=1.0
+    )
+    seen, _ = vector.reset(seed=1)
+    assert seen.shape == (2, 4)
+    seen, reward, *_ = vector.step(vector.action_space.sample())
+    assert reward.shape == (2,)
+
+
+def test_settings_load_and_pictures() -> None:
+    env = environments.Tracking(
+        "rail", duration=1.0, load=50.0, settings={"payload": 3.0}, render_mode="rgb_array"
+    )
+    env.reset(seed=0)
+    env.step(np.zeros(1, np.float32))
+    picture = env.render()
+    assert picture.shape == (300, 600, 3)
+    assert np.ptp(picture) > 100
+    heavy = environments.Tracking(load_rig("rail"), duration=1.0, load=250.0)
+    heavy.reset(seed=0)
+    assert heavy.step(np.ones(1, np.float32))[4]["displacement"] < 40
+
+
+@pytest.mark.parametrize(
+    ("options", "match"),
+    [
+        ({"rig": "mas10-test-stand"}, "measures no displacement"),
+        ({"rig": "crane"}, "no rig 'crane'"),
+        ({"control_time": 0.0}, "control_time is 0.0"),
+        ({"duration": 0.0}, "duration is 0.0"),
+        ({"duration": float("nan")}, "duration is nan"),
+        ({"reference": "square"}, "reference is 'square'"),
+        ({"preview": -1}, "preview is -1"),
+        ({"effort": -1.0}, "effort is -1.0"),
+        ({"spread": 2.0}, "spread is 2.0"),
+        ({"load": 5.0}, "load is 5.0"),
+        ({"settings": {"payload": -1}}, "payload is -1"),
+        ({"render_mode": "human"}, "render_mode is 'human'"),
+    ],
+)
+def test_impossible_options_are_refused(options: dict[str, Any], match: str) -> None:
+    with pytest.raises(DataError, match=f"{match}.*Remedy"):
+        environments.Tracking(**options)

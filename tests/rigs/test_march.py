@@ -218,7 +218,7 @@ def test_what_is_lost_is_what_was_dissipated() -> None:
     rig = load_rig("rail").changed({"guide_friction": 0.0})
     system, step, n = rig._built(), 5e-4, 40_000
     time = np.arange(n) * step
-    states, motion = (part.copy() for part in rig._at_rest())
+    states, motion = rig._at_rest().copy()
     before = float(states["dissipated"][0])
     stored_before = stored(rig, states, motion)
     commands = 0.6 * sine(time, 5.0, 9.0, 0.1)[:, None]

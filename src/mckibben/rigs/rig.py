@@ -2,58 +2,26 @@
 
 from __future__ import annotations
 
-import warnings
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from typing import Any, ClassVar, NamedTuple, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import PrivateAttr, ValidationError, model_validator
 
-from mckibben.errors import DataError, DataWarning
-from mckibben.recording import Recording, standard_unit
+from mckibben.errors import DataError
+from mckibben.recording import PROVENANCE, Recording
+from mckibben.rigs.commands import command_of, commands_of, limited
 from mckibben.rigs.parameters import Air, Range, Section, Sensor, parameter
-from mckibben.rigs.physics.motion import MOTION, march
-from mckibben.rigs.physics.muscle import MUSCLE_STATE
 from mckibben.rigs.refusals import refused
+from mckibben.rigs.system import Demands, State, System, Traces
 from mckibben.signals.checking import generator
 
 Array = NDArray[np.float64]
-Records = NDArray[np.void]
-
-SETTLING_SHARE = 0.3
-"""Share of the settling time in which pressure and load rise; the rest is waited."""
-
 
 ROOM_TEMPERATURE = 20.0
 """Where every muscle starts [degC]."""
-
-
-class System(NamedTuple):
-    """Muscles, regulator and mechanism, as the compiled physics reads them."""
-
-    muscles: Records
-    air: Records
-    mechanism: Records
-
-
-class Demands(NamedTuple):
-    """What drives the physics at every sample: commands, loads on the coordinates, drive's target."""
-
-    commands: Array
-    loads: Array
-    targets: Array
-
-
-class Traces:
-    """What sensors could see at every sample, by name; see `mckibben.rigs.physics.motion.march`."""
-
-    def __init__(self, rows: Array, n_coordinates: int, n_muscles: int) -> None:
-        n, m = n_coordinates, n_muscles
-        ends = np.cumsum([n, n, m, m, m])
-        parts = np.split(rows, ends, axis=1)
-        self.place, self.acceleration, self.pressure, self.tension, self.room, self.warmth = parts
 
 
 class Rig(Section, ABC):
@@ -86,7 +54,7 @@ class Rig(Section, ABC):
     """Quantities that sensors of this set-up may measure."""
 
     _system: System | None = PrivateAttr(default=None)
-    _rest: tuple[Records, Records] | None = PrivateAttr(default=None)
+    _rest: State | None = PrivateAttr(default=None)
     _running: _Running | None = PrivateAttr(default=None)
 
     @model_validator(mode="after")
@@ -207,11 +175,11 @@ class Rig(Section, ABC):
         DataError
             On missing or unknown channels, or a recording without time.
         """
-        given, saturated = self._applied(inputs)
-        states, motion = (part.copy() for part in self._at_rest())
-        traces = self._march(states, motion, self.demands(given), self._time_of(inputs), held)
+        given, saturated = commands_of(self, inputs)
+        step = float(inputs.sample_time or 0.0)  # commands_of refuses recordings without time
+        traces = self._march(self._at_rest().copy(), given, step, held)
         # A held command is seen from the next sample on.
-        seen = np.vstack([self._resting(), given[:-1]]) if held else given
+        seen = np.vstack([self.resting, given[:-1]]) if held else given
         readings = self._readings(traces, seen)
         if ideal:
             readings |= _inside(traces)
@@ -223,26 +191,13 @@ class Rig(Section, ABC):
                 for i, (name, samples) in enumerate(readings.items())
             }
         applied = {name: given[:, i] for i, name in enumerate(self.inputs) if name not in readings}
-        for name, count in saturated.items():
-            limits = self.limits(name)
-            warnings.warn(
-                DataWarning(
-                    f"{name} was limited to {limits.low:g} to {limits.high:g} "
-                    f"{standard_unit(name)} in {count} of {len(inputs)} samples, as {self.name} would"
-                ),
-                stacklevel=2,
-            )
         return Recording(
             {**applied, **readings},
             inputs.sample_time,
             units={name: "ml" for name in readings if quantity(name) == "volume"},
             start_time=inputs.start_time,
             meta={
-                **{
-                    key: value
-                    for key, value in inputs.meta.items()
-                    if key not in ("file", "sha256")
-                },
+                **{key: value for key, value in inputs.meta.items() if key not in PROVENANCE},
                 "rig": f"{self.name} v{self.version} (virtual)",
                 **self.known(),
                 **({} if ideal else {"seed": seed}),
@@ -258,12 +213,10 @@ class Rig(Section, ABC):
         DataError
             On a negative seed.
         """
-        states, motion = (part.copy() for part in self._at_rest())
-        running = _Running(states, motion, generator(seed))
+        running = _Running(self._at_rest().copy(), generator(seed))
         self._running = running
-        rest = self._resting()
-        traces = self._march(states, motion, self.demands(rest), self.sample_time, True)
-        return self._measured(self._readings(traces, rest), running)
+        traces = self._march(running.state, self.resting, self.sample_time, held=True)
+        return self._measured(self._readings(traces, self.resting), running)
 
     def step(self, action: ArrayLike | Mapping[str, float]) -> Array:
         """Hold commands for one sample time and return the next measurement.
@@ -286,18 +239,23 @@ class Rig(Section, ABC):
         running = self._running
         if running is None:
             raise DataError("the rig is not running", remedy="call reset() first")
-        asked = self._asked(action)
-        low = np.array([self.limits(name).low for name in self.inputs])
-        high = np.array([self.limits(name).high for name in self.inputs])
-        given = np.clip(asked, low, high)
-        for name, limited in zip(self.inputs, given != asked, strict=True):
-            if limited:
+        asked = command_of(self, action)
+        given = limited(self, asked)
+        for name, beyond in zip(self.inputs, given != asked, strict=True):
+            if beyond:
                 running.saturated[name] = running.saturated.get(name, 0) + 1
         both = np.vstack([given, given])
-        traces = self._march(
-            running.states, running.motion, self.demands(both), self.sample_time, True
-        )
+        traces = self._march(running.state, both, self.sample_time, held=True)
         return self._measured(self._readings(traces, both), running)
+
+    def limits(self, name: str) -> Range:
+        """Return what the hardware lets through on an input channel."""
+        return self.range[name] if name in self.range else self.range[quantity(name)]
+
+    @property
+    def resting(self) -> Array:
+        """Commands at rest, shape (1, inputs)."""
+        return np.array([[self._start(name) for name in self.inputs]])
 
     @property
     def saturated(self) -> Mapping[str, int]:
@@ -328,126 +286,39 @@ class Rig(Section, ABC):
             self._system = self.build()
         return self._system
 
-    def _march(
-        self, states: Records, motion: Records, demands: Demands, sample_time: float, held: bool
-    ) -> Traces:
-        """Let the physics go on through all samples, changing the states."""
-        system = self._built()
-        n, m = int(system.mechanism["n"][0]), system.muscles.size
-        rows = np.empty((len(demands.commands), 2 * n + 4 * m))
-        steps = max(int(np.ceil(sample_time / self.integration_step - 1e-9)), 1)
-        march(
-            *system,
-            states,
-            motion,
-            np.ascontiguousarray(demands.commands),
-            np.ascontiguousarray(demands.loads),
-            np.ascontiguousarray(demands.targets),
-            held,
-            steps,
-            sample_time / steps,
-            rows,
+    def _march(self, state: State, inputs: Array, sample_time: float, held: bool) -> Traces:
+        return self._built().run(
+            state, self.demands(inputs), sample_time, self.integration_step, held
         )
-        return Traces(rows, n, m)
 
     def _readings(self, traces: Traces, inputs: Array) -> dict[str, Array]:
         zero = np.zeros(traces.place.shape[1])
         if self.tare:
-            zero = self._at_rest()[1]["place"][0, : zero.size]
+            zero = self._at_rest().motion["place"][0, : zero.size]
         found = self.readings(traces, inputs, zero)
         return {name: found[name] for name in self.outputs}
 
-    def _at_rest(self) -> tuple[Records, Records]:
-        """Return the state after switching on: pressure and load come slowly, then all settles."""
+    def _at_rest(self) -> State:
+        """Return the state after switching on."""
         if self._rest is None:
-            system = self._built()
-            states, motion = np.zeros(system.muscles.size, MUSCLE_STATE), np.zeros(1, MOTION)
-            rest = self._resting()
-            off = np.clip([[max(self.limits(name).low, 0.0) for name in self.inputs]], None, rest)
-            demands = self.demands(np.vstack([off, rest, rest]))
-            weight = system.mechanism["weight"][0, : demands.loads.shape[1]]
-            demands.loads[0] -= weight
-            demands.targets[:] = demands.targets[-1]
-            for first, share in ((0, SETTLING_SHARE), (1, 1.0 - SETTLING_SHARE)):
-                part = Demands(*(column[first : first + 2] for column in demands))
-                self._march(states, motion, part, share * self.settling_time, False)
-            self._rest = states, motion
+            off = np.clip([[max(self.limits(n).low, 0.0) for n in self.inputs]], None, self.resting)
+            demands = self.demands(np.vstack([off, self.resting]))
+            demands.targets[0] = demands.targets[1]
+            self._rest = self._built().switched_on(
+                demands, self.settling_time, self.integration_step
+            )
         return self._rest
-
-    def _resting(self) -> Array:
-        """Return the commands at rest, shape (1, inputs)."""
-        return np.array([[self._start(name) for name in self.inputs]])
-
-    def limits(self, name: str) -> Range:
-        """Return what the hardware lets through on an input channel."""
-        return self.range[name] if name in self.range else self.range[quantity(name)]
 
     def _start(self, name: str) -> float:
         rest = self.start.get(name, self.start.get(quantity(name)))
         return self.limits(name).low if rest is None else rest
 
-    def _time_of(self, inputs: Recording) -> float:
-        if inputs.sample_time is None:
-            raise DataError(
-                "a recording without time cannot drive a rig",
-                file=inputs.source,
-                remedy="read it with --rate, or give Recording(..., sample_time=...)",
-            )
-        return inputs.sample_time
-
-    def _applied(self, inputs: Recording) -> tuple[Array, dict[str, int]]:
-        strangers = sorted(set(inputs.channels) - {*self.inputs, *self.outputs})
-        if strangers or self.inputs[0] not in inputs:
-            problem = (
-                f"the rig {self.name!r} has no channel {', '.join(map(repr, strangers))}"
-                if strangers
-                else f"the rig {self.name!r} needs the channel {self.inputs[0]!r}"
-            )
-            raise DataError(
-                problem, file=inputs.source, remedy=f"give {', '.join(self.inputs)} and no others"
-            )
-        columns, saturated = [], {}
-        for name in self.inputs:
-            limits = self.limits(name)
-            asked = inputs[name] if name in inputs else np.full(len(inputs), self._start(name))
-            given = np.clip(asked, limits.low, limits.high)
-            count = int(np.count_nonzero(given != asked))
-            if count:
-                saturated[name] = count
-            columns.append(given)
-        return np.column_stack(columns), saturated
-
-    def _asked(self, action: ArrayLike | Mapping[str, float]) -> Array:
-        if isinstance(action, Mapping):
-            strangers = sorted(set(action) - set(self.inputs))
-            if strangers:
-                raise DataError(
-                    f"the rig {self.name!r} has no input {', '.join(map(repr, strangers))}",
-                    remedy=f"give {', '.join(self.inputs)}",
-                )
-            action = [action.get(name, self._start(name)) for name in self.inputs]
-        asked = np.asarray(action, dtype=float)
-        if asked.shape != (len(self.inputs),):
-            raise DataError(
-                f"an action of shape {asked.shape} does not fit {len(self.inputs)} input(s)",
-                remedy=f"give one number each for {', '.join(self.inputs)}",
-            )
-        if not np.isfinite(asked).all():
-            name = self.inputs[int(np.flatnonzero(~np.isfinite(asked))[0])]
-            limits = self.limits(name)
-            raise DataError(
-                f"the command is {asked[self.inputs.index(name)]}",
-                channel=name,
-                remedy=f"give a number from {limits.low:g} to {limits.high:g} {standard_unit(name)}",
-            )
-        return asked
-
 
 class _Running:
     """What a rig that is being stepped remembers."""
 
-    def __init__(self, states: Records, motion: Records, rng: np.random.Generator) -> None:
-        self.states, self.motion, self.rng = states, motion, rng
+    def __init__(self, state: State, rng: np.random.Generator) -> None:
+        self.state, self.rng = state, rng
         self.saturated: dict[str, int] = {}
 
 

@@ -22,7 +22,8 @@ from pydantic import model_validator
 from mckibben.rigs.parameters import EachPositive, Muscle, Section, parameter
 from mckibben.rigs.physics.compiled import GRAVITY
 from mckibben.rigs.physics.motion import MECHANISM
-from mckibben.rigs.rig import Demands, Rig, System, Traces
+from mckibben.rigs.rig import Rig
+from mckibben.rigs.system import Demands, System, Traces
 
 Array = NDArray[np.float64]
 

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from mckibben.rigs.parameters import Muscle, parameter
 from mckibben.rigs.physics.motion import MECHANISM, NO_MUSCLE
-from mckibben.rigs.rig import Demands, Rig, System, Traces
+from mckibben.rigs.rig import Rig
+from mckibben.rigs.system import Demands, System, Traces
 
 Array = NDArray[np.float64]
 

@@ -19,9 +19,12 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from mckibben import GPI, PI, GPIEstimator, MPIEstimator, RDPIEstimator, Recording
+from mckibben import GPI, PI, GPIEstimator, MPIEstimator, RDPIEstimator, Recording, load_rig
 from mckibben.blocks.base import Block
 from mckibben.blocks.envelopes.tanh import Tanh
+from mckibben.rigs import record
+from mckibben.signals import decaying_triangle
+from mckibben.signals.protocols import protocol
 from references import Compiled, numpy_gpi, numpy_pi
 
 Array = NDArray[np.float64]
@@ -157,6 +160,27 @@ def streams() -> None:
         )
 
 
+def rigs(quick: bool) -> None:
+    """Time of virtual experiments."""
+    print("\nvirtual rigs")
+    rig = load_rig("mas20-hanging")
+    u = decaying_triangle(np.arange(20_000) / 100, 20.0, 5.5, 1.0, n_cycles=10)
+    given = Recording({"pressure": u}, 0.01)
+    rig.run(given)
+    print(f"  mas20-hanging, 200 s at 100 Hz: {best_of(3, partial(rig.run, given)):.2f} s")
+    training = [
+        run.name for run in protocol("sdchm").select("train") if run.labels["stage"] == "network"
+    ]
+    runs = training[:8] if quick else training
+    started = time.perf_counter()
+    simulated = sum(recording.duration or 0.0 for _, recording in record("sdchm", runs=runs))
+    seconds = time.perf_counter() - started
+    print(f"  soft-arm, {len(runs)} training runs, {simulated:.0f} s in all: {seconds:.1f} s")
+    rig.reset()
+    steps = best_of(3, lambda: [rig.step([3.0]) for _ in range(1000)])
+    print(f"  rig.step from Python, 10 ms of rig: {steps * 1e3:.0f} µs")
+
+
 def main() -> None:
     """Print everything."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -167,6 +191,7 @@ def main() -> None:
     kernels(quick)
     fits(quick)
     streams()
+    rigs(quick)
 
 
 if __name__ == "__main__":

@@ -18,6 +18,7 @@ from mckibben.cli.compare import compare
 from mckibben.cli.fit import fit
 from mckibben.cli.info import info
 from mckibben.cli.invert import invert
+from mckibben.cli.output import InterruptionError
 from mckibben.cli.plot import plot
 from mckibben.cli.rig import app as rig_app
 from mckibben.cli.simulate import simulate
@@ -69,6 +70,8 @@ def run() -> None:
 def _run() -> None:
     try:
         app()
+    except InterruptionError as stopped:
+        _leave(str(stopped), INTERRUPTED)
     except MckibbenError as error:
         _leave(str(error), BAD_INPUT)
     except SystemExit as leaving:

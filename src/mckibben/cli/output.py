@@ -10,6 +10,12 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from mckibben.errors import MckibbenError
+
+
+class InterruptionError(MckibbenError):
+    """Work that the user stopped; the text says what was kept."""
+
 
 def plain(value: Any) -> Any:
     """Return a value as JSON holds it: numbers that are not finite become null."""

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from mckibben.cli.options import Json, Seed
-from mckibben.cli.output import figure, make_folder, print_json, progress_bar
+from mckibben.cli.output import InterruptionError, figure, make_folder, print_json, progress_bar
 from mckibben.errors import DataError
 
 if TYPE_CHECKING:
@@ -202,11 +202,17 @@ def record(
     said = _said(plan, plant, seed, file_format)
     kept = _kept(folder, said)
     wanted = [run.name for run in runs if run.name not in kept]
-    with progress_bar(f"Recording {protocol}:") as tell:
-        finished = record_runs(plan, plant, runs=wanted, seed=seed, jobs=jobs)
-        for done, (made, recording) in enumerate(finished, start=1):
-            write(recording, folder / f"{made.name}.{file_format}")
-            tell(done / len(wanted), made.name)
+    done = 0
+    try:
+        with progress_bar(f"Recording {protocol}:") as tell:
+            for made, recording in record_runs(plan, plant, runs=wanted, seed=seed, jobs=jobs):
+                write(recording, folder / f"{made.name}.{file_format}")
+                done += 1
+                tell(done / len(wanted), made.name)
+    except KeyboardInterrupt:
+        raise InterruptionError(
+            f"Interrupted: {done} of {len(wanted)} recordings are in {folder}; the same command goes on."
+        ) from None
     if as_json:
         print_json({"folder": str(folder), "recorded": wanted, "kept": sorted(kept)})
         return

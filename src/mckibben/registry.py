@@ -15,11 +15,42 @@ from mckibben.errors import ModelError
 
 PLUGINS: dict[str, dict[str, str]] = {
     "blocks": {
+        "activation-memory": "mckibben.blocks.force.activation_memory:ActivationMemory",
+        "activation-pressure": "mckibben.blocks.force.activation_pressure:ActivationPressure",
         "affine": "mckibben.blocks.affine:Affine",
+        "bouc-wen": "mckibben.blocks.differential.bouc_wen:BoucWen",
+        "bouc-wen-inverse": "mckibben.blocks.differential.bouc_wen:BoucWenInverse",
+        "braid-equilibrium": "mckibben.blocks.braid_equilibrium:BraidEquilibrium",
+        "braid-equilibrium-inverse": "mckibben.blocks.braid_equilibrium:BraidEquilibriumInverse",
+        "chou-hannaford": "mckibben.blocks.force.chou_hannaford:ChouHannaford",
+        "creep": "mckibben.blocks.creep:Creep",
+        "creep-inverse": "mckibben.blocks.creep:CreepInverse",
+        "duhem": "mckibben.blocks.differential.duhem:Duhem",
+        "duhem-inverse": "mckibben.blocks.differential.duhem:DuhemInverse",
         "eupi": "mckibben.blocks.eupi:EUPI",
         "eupi-inverse": "mckibben.blocks.eupi:EUPIInverse",
+        "exponential": "mckibben.blocks.logarithm:Exponential",
+        "force-feedforward": "mckibben.blocks.force.feedforward:ForceFeedforward",
+        "generalized-bouc-wen": (
+            "mckibben.blocks.differential.generalized_bouc_wen:GeneralizedBoucWen"
+        ),
+        "generalized-bouc-wen-inverse": (
+            "mckibben.blocks.differential.generalized_bouc_wen:GeneralizedBoucWenInverse"
+        ),
         "gpi": "mckibben.blocks.gpi:GPI",
         "gpi-inverse": "mckibben.blocks.gpi:GPIInverse",
+        "krasnoselskii-pokrovskii": (
+            "mckibben.blocks.krasnoselskii_pokrovskii:KrasnoselskiiPokrovskii"
+        ),
+        "krasnoselskii-pokrovskii-inverse": (
+            "mckibben.blocks.krasnoselskii_pokrovskii:KrasnoselskiiPokrovskiiInverse"
+        ),
+        "logarithm": "mckibben.blocks.logarithm:Logarithm",
+        "maxwell-slip": "mckibben.blocks.maxwell_slip:MaxwellSlip",
+        "maxwell-slip-inverse": "mckibben.blocks.maxwell_slip:MaxwellSlipInverse",
+        "multistate-friction": "mckibben.blocks.force.multistate_friction:MultistateFriction",
+        "narx-network": "mckibben.blocks.dynamic.narx_network:NarxNetwork",
+        "narx-polynomial": "mckibben.blocks.dynamic.narx_polynomial:NarxPolynomial",
         "negative": "mckibben.blocks.negative:Negative",
         "parallel": "mckibben.blocks.compose:Parallel",
         "per-channel": "mckibben.blocks.compose:PerChannel",
@@ -28,10 +59,16 @@ PLUGINS: dict[str, dict[str, str]] = {
         "piecewise-linear": "mckibben.blocks.piecewise_linear:PiecewiseLinear",
         "play": "mckibben.blocks.play:Play",
         "polynomial": "mckibben.blocks.polynomial:Polynomial",
+        "polynomial-force": "mckibben.blocks.force.polynomial_force:PolynomialForce",
         "polynomial-inverse": "mckibben.blocks.polynomial:PolynomialInverse",
+        "preisach": "mckibben.blocks.preisach:Preisach",
+        "preisach-inverse": "mckibben.blocks.preisach:PreisachInverse",
+        "process-model": "mckibben.blocks.dynamic.process_model:ProcessModel",
         "rate-dependent-pi": "mckibben.blocks.rate_dependent_pi:RateDependentPI",
         "rate-dependent-pi-inverse": "mckibben.blocks.rate_dependent_pi:RateDependentPIInverse",
         "series": "mckibben.blocks.compose:Series",
+        "tondu-lopez": "mckibben.blocks.force.tondu_lopez:TonduLopez",
+        "transfer-function": "mckibben.blocks.dynamic.transfer_function:TransferFunction",
     },
     "envelopes": {
         "exponential": "mckibben.blocks.envelopes.exponential:Exponential",
@@ -53,8 +90,14 @@ PLUGINS: dict[str, dict[str, str]] = {
         "sdchm": "mckibben.signals.protocols.sdchm:sdchm",
     },
     "published": {
+        "activation-pressure-profile": (
+            "mckibben.blocks.published.activation_pressure:activation_pressure"
+        ),
+        "field-models-p2uz": "mckibben.blocks.published.field_models:process_model",
         "field-models-pi": "mckibben.blocks.published.field_models:prandtl_ishlinskii",
         "mpi-narmax-mpi": "mckibben.blocks.published.mpi_narmax:modified_prandtl_ishlinskii",
+        "multistate-friction": "mckibben.blocks.published.multistate:multistate_friction",
+        "multistate-static-force": "mckibben.blocks.published.multistate:static_force",
     },
     "setups": {
         "arm": "mckibben.rigs.setups.arm:Arm",

@@ -68,6 +68,9 @@ class Block(metaclass=Checked):
     rate_dependent: ClassVar[bool] = False
     """Whether the sample time matters to any block of this class."""
 
+    sample_time: float | None = None
+    """Time between samples that a discrete block is bound to [s]; None for any."""
+
     @property
     @abstractmethod
     def inputs(self) -> tuple[Channel, ...]:
@@ -147,6 +150,24 @@ class Block(metaclass=Checked):
         """
         n = len(self.outputs)
         return np.full(n, -np.inf), np.full(n, np.inf)
+
+    def state_at(self, first: Array, output: Array) -> Array | None:
+        """Return the state at rest at a first input where the output is known, for models of it.
+
+        None, by default, where past outputs are no part of the state.
+        """
+        del first, output
+        return None
+
+    def passes(self, low: Array, high: Array) -> tuple[Array, Array]:
+        """Return the outputs that can be reached where the inputs between two ends can be.
+
+        A block without memory must be monotone; one with memory answers with its own `reachable`.
+        """
+        if self.n_states == 0 and not self.scheduling and np.isfinite([*low, *high]).all():
+            first, second = np.sort(self.simulate(np.array([low, high])), axis=0)
+            return first, second
+        return self.reachable()
 
     # -- running -----------------------------------------------------------------------------
 

@@ -133,7 +133,7 @@ class Series(Composition):
             sample = self._sample(part, first, driven)
             states.append(part.initial_state(sample, own))
             outputs = np.empty((1, len(part.outputs)))
-            part.bind(1.0, states[-1].copy(), sample[np.newaxis], outputs)()
+            part.bind(part.sample_time or 1.0, states[-1].copy(), sample[np.newaxis], outputs)()
             driven = outputs[0]
         return np.concatenate(states)
 
@@ -201,12 +201,7 @@ class Series(Composition):
         """
         low, high = self.parts[0].reachable()
         for part in self.parts[1:]:
-            plain = part.n_states == 0 and not part.scheduling
-            if np.isfinite([*low, *high]).all() and plain:
-                low, high = np.sort(part.simulate(np.array([low, high])), axis=0)
-            else:
-                own_low, own_high = part.reachable()
-                low, high = own_low, own_high
+            low, high = part.passes(low, high)
         return low, high
 
     @classmethod

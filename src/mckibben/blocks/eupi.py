@@ -32,6 +32,7 @@ from mckibben.blocks.fields import (
     STRICT,
     ChannelField,
     Initial,
+    Rule,
     StoredInitial,
     Vector,
 )
@@ -253,7 +254,7 @@ class EUPIInverse(Inverse, Primitive):
         """The forward model's, the previous input, and the count of clipped samples."""
         return self.forward.n_states + 2
 
-    def matching_state(self, first: float, start: str) -> Array:
+    def matching_state(self, first: float, start: Rule) -> Array:
         """Return the state of the inverse of a forward model started by a named rule."""
         forward = self.forward
         low, high = forward.input_range

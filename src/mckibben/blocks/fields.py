@@ -10,7 +10,10 @@ from numpy.typing import ArrayLike
 from pydantic import BeforeValidator, ConfigDict, FiniteFloat
 from pydantic.dataclasses import dataclass as validated_dataclass
 
-Initial = Literal["first_sample", "virgin"] | Sequence[float]
+Rule = Literal["first_sample", "virgin"]
+"""Name of a starting memory."""
+
+Initial = Rule | Sequence[float]
 """Memory before the first sample."""
 
 
@@ -56,3 +59,6 @@ ChannelField = Annotated[Channel, BeforeValidator(_channel)]
 
 PRESSURE = Channel("pressure", "bar")
 DISPLACEMENT = Channel("displacement", "mm")
+FORCE = Channel("force", "N")
+LENGTH = Channel("length", "mm")
+CONTRACTION = Channel("contraction", "")

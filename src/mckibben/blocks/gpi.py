@@ -32,6 +32,7 @@ from mckibben.blocks.fields import (
     STRICT,
     ChannelField,
     Initial,
+    Rule,
     StoredInitial,
     Vector,
 )
@@ -276,7 +277,7 @@ class GPIInverse(Inverse):
         """Operators, previous input, previous reference, and the count of clipped samples."""
         return self.forward.n_states + 2
 
-    def matching_state(self, first: float, start: str) -> Array:
+    def matching_state(self, first: float, start: Rule) -> Array:
         """Return the state of the inverse of a forward model started by a named rule."""
         forward = self.forward
         r, w = np.array(forward.thresholds), np.array(forward.weights)

@@ -17,7 +17,7 @@ from pydantic import BeforeValidator, FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.blocks.base import Kernel, Primitive
-from mckibben.blocks.fields import DISPLACEMENT, STRICT, ChannelField, Initial, Vector
+from mckibben.blocks.fields import DISPLACEMENT, STRICT, ChannelField, Initial, Rule, Vector
 from mckibben.blocks.kernels import kernel
 from mckibben.blocks.refusals import parameter_vector
 from mckibben.blocks.saving import nested
@@ -195,7 +195,7 @@ class PolynomialInverse(Inverse, Primitive):
         """The count of clipped samples."""
         return 1
 
-    def matching_state(self, first: float, start: str) -> Array:
+    def matching_state(self, first: float, start: Rule) -> Array:
         """Return no samples clipped."""
         del first, start
         return np.zeros(1)

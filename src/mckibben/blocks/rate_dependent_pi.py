@@ -30,6 +30,7 @@ from mckibben.blocks.fields import (
     STRICT,
     ChannelField,
     Initial,
+    Rule,
     StoredInitial,
     Vector,
 )
@@ -253,7 +254,7 @@ class RateDependentPIInverse(Inverse, Primitive):
         """The forward model's, and the count of clipped samples."""
         return self.forward.n_states + 1
 
-    def matching_state(self, first: float, start: str) -> Array:
+    def matching_state(self, first: float, start: Rule) -> Array:
         """Return the state of the inverse of a forward model started by a named rule, at rest."""
         forward = self.forward
         r, w = np.array(forward.thresholds), np.array(forward.weights)

@@ -43,3 +43,14 @@ def needs_sample_time(kind: str, sample_time: float | None) -> float:
             "Remedy: read the recording with a time column or --rate, or give sample_time."
         )
     return sample_time
+
+
+def own_sample_time(kind: str, own: float, sample_time: float | None) -> float:
+    """Return the sample time of a discrete block, after checking that the data have the same."""
+    step = needs_sample_time(kind, sample_time)
+    if abs(step - own) > 1e-3 * own:
+        raise ModelError(
+            f"{kind!r} holds for a sample time of {own:g} s, but the data have {step:g} s. Remedy: "
+            f"resample them to {own:g} s, or identify the model again."
+        )
+    return own

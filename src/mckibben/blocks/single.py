@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mckibben.blocks.base import Block
-from mckibben.blocks.fields import Channel, Initial
+from mckibben.blocks.fields import Channel, Initial, Rule
 from mckibben.blocks.refusals import explicit_state
 from mckibben.errors import ModelError, ModelWarning
 
@@ -137,7 +137,7 @@ class Inverse(Block):
         return explicit_state(self, start)
 
     @abstractmethod
-    def matching_state(self, first: float, start: str) -> Array:
+    def matching_state(self, first: float, start: Rule) -> Array:
         """Return the state that matches a forward block started by a named rule."""
 
     @abstractmethod

@@ -55,6 +55,10 @@ def measured_start(block: Block, recording: Recording, output: str) -> Array:
     limits = getattr(_first_part(block), "input_range", None)
     if limits is not None:
         highest = max(highest, limits[1])
+    outputs = np.array([recording[channel.name][0] for channel in block.outputs])
+    known = block.state_at(first, outputs)
+    if known is not None:
+        return known
     measured = float(recording[output][0])
     place = [channel.name for channel in block.outputs].index(output)
 

@@ -6,7 +6,7 @@ import time
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, field, fields
-from typing import Annotated, Literal, Self, get_type_hints
+from typing import Annotated, ClassVar, Literal, Self, get_type_hints
 
 import numpy as np
 from annotated_types import Ge, Interval
@@ -22,7 +22,7 @@ from mckibben.blocks.negative import Negative
 from mckibben.blocks.running import run_many
 from mckibben.errors import ModelError
 from mckibben.estimators.data import Mask, TrainingData, training_data
-from mckibben.estimators.search import Progress, Swarm, Tracker
+from mckibben.estimators.search import Progress, Tracker
 from mckibben.recording import Recording
 
 Array = NDArray[np.float64]
@@ -83,35 +83,39 @@ class Estimator(BaseEstimator, ABC):  # type: ignore[misc]  # scikit-learn ships
     ----------
     input, output : str
         Channels to learn from.
-    method : {"ls", "pso-ls", "pso"}
-        Bounded least squares from many starts with linear parameters solved for; particle swarm on
-        the non-linear parameters only, the linear ones solved for; particle swarm on all parameters,
-        as the papers do it.
     initial : {"first_sample", "virgin", "fitted"}
         Memory before the first sample of every recording: as if the input had only risen; as if
         nothing had ever happened; or one number a recording fitted with the rest, the input from which
         it came down.
     seed : int
         Of everything random.
-    pso_particles, pso_iterations : int
-        Size of the swarm, and moves.
-    pso_inertia_start, pso_inertia_end : float
-        Inertia, falling linearly.
-    pso_c1, pso_c2 : float
-        Pull to the particle's own best, and to the swarm's.
     """
 
     input: str = "pressure"
     output: str = "displacement"
-    method: Literal["ls", "pso-ls", "pso"] = "ls"
     initial: Literal["first_sample", "virgin", "fitted"] = "first_sample"
     seed: Annotated[int, Ge(0)] = 0
-    pso_particles: Annotated[int, Ge(2)] = 20
-    pso_iterations: Annotated[int, Ge(1)] = 50
-    pso_inertia_start: float = 0.9
-    pso_inertia_end: float = 0.4
-    pso_c1: Annotated[float, Ge(0)] = 2.0
-    pso_c2: Annotated[float, Ge(0)] = 2.0
+
+    made_for: ClassVar[tuple[str, str] | None] = None
+    """Kinds of channel, input and output, that the model is about; None for any."""
+
+    rises: ClassVar[bool] = True
+    """Whether the block's output rises with its input, so that falling data are turned over."""
+
+    @property
+    def scheduling(self) -> tuple[str, ...]:
+        """Channels that the model is given beside the input."""
+        return ()
+
+    @classmethod
+    def objection(cls, recordings: Sequence[Recording], input: str, output: str) -> str | None:  # noqa: A002
+        """Return why the model has no place in a comparison on recordings, or None."""
+        kinds = (input.partition("_")[0], output.partition("_")[0])
+        if cls.made_for is not None and kinds != cls.made_for:
+            return f"it maps {cls.made_for[0]} to {cls.made_for[1]}"
+        needed = cls(input=input, output=output).scheduling
+        absent = [name for name in needed if any(name not in r for r in recordings)]
+        return f"it needs the channel {absent[0]!r} too" if absent else None
 
     def fit(
         self,
@@ -149,9 +153,9 @@ class Estimator(BaseEstimator, ABC):  # type: ignore[misc]  # scikit-learn ships
         del y
         started = time.perf_counter()
         self.check_settings()
-        data = training_data(recordings, self.input, self.output, rows)
+        data = training_data(recordings, self.input, self.output, rows, self.scheduling)
         tracker = Tracker(progress=progress)
-        if data.falls:
+        if self.rises and data.falls:
             rising, used = self.identify(data.negated(), tracker)
             channel = self.channels(data)["output"]
             block: Block = Series((rising, Negative(channel, channel)))
@@ -191,12 +195,6 @@ class Estimator(BaseEstimator, ABC):  # type: ignore[misc]  # scikit-learn ships
                     f"{setting.name} is {value!r}: {wanted[0].lower()}{wanted[1:]}. "
                     f"Remedy: choose {setting.name} accordingly, or leave it out."
                 ) from None
-
-    @property
-    def swarm(self) -> Swarm:
-        """The settings of the particle swarm."""
-        inertia = (self.pso_inertia_start, self.pso_inertia_end)
-        return Swarm(self.pso_particles, self.pso_iterations, inertia, self.pso_c1, self.pso_c2)
 
     def predict(self, recordings: Recording | Sequence[Recording]) -> list[Array]:
         """Return the model's free-running output on every recording."""
@@ -270,7 +268,7 @@ def simulate_all(blocks: Sequence[Block], data: TrainingData) -> Array:
     """Return the free-running outputs of blocks at the samples that count, shape (k, samples)."""
     outputs = []
     for run in data.runs:
-        many = run_many(blocks, run.history[:, np.newaxis], sample_time=run.sample_time)
+        many = run_many(blocks, run.inputs, sample_time=run.sample_time)
         trimmed = many[:, :, 0] if run.peak is None else many[:, 1:, 0]
         outputs.append(trimmed[:, run.counts])
     return np.concatenate(outputs, axis=1)

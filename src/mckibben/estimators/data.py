@@ -23,13 +23,14 @@ class Run:
     """One recording: input u and output y, shape (n,), and the mask of samples that count.
 
     ``peak`` is the input from which the run is taken to have come before its first sample, where that
-    is not below: it makes the memory at the start.
+    is not below: it makes the memory at the start. ``scheduled`` are the scheduling inputs, (n, k).
     """
 
     u: Array
     y: Array
     counts: Mask
     sample_time: float | None
+    scheduled: Array
     peak: float | None = None
 
     def condensed(self) -> Run:
@@ -42,12 +43,26 @@ class Run:
 
         kept = self.counts.copy()
         kept[reversals(self.u)] = True
-        return replace(self, u=self.u[kept], y=self.y[kept], counts=self.counts[kept])
+        return replace(
+            self,
+            u=self.u[kept],
+            y=self.y[kept],
+            counts=self.counts[kept],
+            scheduled=self.scheduled[kept],
+        )
 
     @property
     def history(self) -> Array:
         """The input with the peak before the first sample in front, if there is one."""
         return self.u if self.peak is None else np.concatenate([[self.peak], self.u])
+
+    @property
+    def inputs(self) -> Array:
+        """What a block is given: the history, then the scheduling inputs, shape (n, 1 + k)."""
+        scheduled = self.scheduled
+        if self.peak is not None:
+            scheduled = np.concatenate([scheduled[:1], scheduled])
+        return np.ascontiguousarray(np.column_stack([self.history, scheduled]))
 
     def trim(self, samples: Array) -> Array:
         """Drop what belongs to the peak from something computed over `history`."""
@@ -63,6 +78,8 @@ class TrainingData:
     output: str
     input_unit: str
     output_unit: str
+    scheduling: tuple[str, ...] = ()
+    scheduling_units: tuple[str, ...] = ()
     _memo: dict[Hashable, Array] = field(default_factory=dict, init=False, repr=False)
 
     def once(self, key: Hashable, compute: Callable[[], Array]) -> Array:
@@ -132,6 +149,7 @@ def training_data(
     input_name: str,
     output_name: str,
     rows: Sequence[Mask] | None = None,
+    scheduling: Sequence[str] = (),
 ) -> TrainingData:
     """Check recordings and return them as training data.
 
@@ -144,6 +162,8 @@ def training_data(
     rows : sequence of bool arrays, optional
         For every recording the samples that count; default all. Inputs are always used whole, since
         memory depends on them, while outputs elsewhere are never looked at.
+    scheduling : sequence of str
+        Further channels that the model is given.
 
     Raises
     ------
@@ -169,13 +189,25 @@ def training_data(
         )
     first = listed[0]
     for recording in listed:
-        _check(recording, first, input_name, output_name)
+        _check(recording, first, (input_name, output_name, *scheduling))
     runs = tuple(
-        Run(r[input_name], r[output_name], np.asarray(mask, dtype=bool), r.sample_time)
+        Run(
+            r[input_name],
+            r[output_name],
+            np.asarray(mask, dtype=bool),
+            r.sample_time,
+            r.matrix(scheduling) if scheduling else np.empty((len(r), 0)),
+        )
         for r, mask in zip(listed, masks, strict=True)
     )
     data = TrainingData(
-        runs, input_name, output_name, first.units[input_name], first.units[output_name]
+        runs,
+        input_name,
+        output_name,
+        first.units[input_name],
+        first.units[output_name],
+        tuple(scheduling),
+        tuple(first.units[name] for name in scheduling),
     )
     if data.target.size < FEWEST_SAMPLES:
         raise DataError(
@@ -197,8 +229,8 @@ def training_data(
     return data
 
 
-def _check(recording: Recording, first: Recording, input_name: str, output_name: str) -> None:
-    for name in (input_name, output_name):
+def _check(recording: Recording, first: Recording, names: Sequence[str]) -> None:
+    for name in names:
         if recording[name].size and recording.units[name] != first.units[name]:
             raise DataError(
                 f"the unit is {recording.units[name]!r} here and {first.units[name]!r} in "

@@ -17,9 +17,10 @@ from numpy.typing import NDArray
 
 from mckibben.blocks.base import Block
 from mckibben.errors import ModelError
-from mckibben.estimators.base import Estimator, simulate_all
+from mckibben.estimators.base import simulate_all
 from mckibben.estimators.data import Run, TrainingData
 from mckibben.estimators.search import Tracker, multi_start, particle_swarm, solve_linear
+from mckibben.estimators.searching import SearchingEstimator
 
 Array = NDArray[np.float64]
 
@@ -37,7 +38,7 @@ WORST = 1e150
 
 
 @dataclass(kw_only=True, repr=False, eq=False)
-class SeparableEstimator(Estimator):
+class SeparableEstimator(SearchingEstimator):
     """An estimator of a block that is linear in its weights and offset.
 
     Parameters

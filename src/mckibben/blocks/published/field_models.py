@@ -10,6 +10,7 @@ behind it to scale it to a muscle.
 
 from __future__ import annotations
 
+from mckibben.blocks.dynamic.process_model import ProcessModel
 from mckibben.blocks.fields import PRESSURE, Channel
 from mckibben.blocks.pi import PI
 
@@ -34,6 +35,19 @@ def prandtl_ishlinskii() -> PI:
         THRESHOLDS,
         (reversible + first, *others),
         input_range=INPUT_RANGE,
+        input=PRESSURE,
+        output=Channel("unscaled_displacement", ""),
+    )
+
+
+def process_model() -> ProcessModel:
+    """Return the paper's P2UZ model from pressure [bar] to displacement before scaling [-], Eq. (11)."""
+    return ProcessModel(
+        gain=6.7987,
+        time_constants=(5.7018,),
+        damping=9.1096,
+        zero_time=156.3105,
+        input_offset=INPUT_RANGE[0],
         input=PRESSURE,
         output=Channel("unscaled_displacement", ""),
     )

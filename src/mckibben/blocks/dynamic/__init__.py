@@ -1,0 +1,1 @@
+"""Dynamic models from data: transfer functions, process models, and NARX."""

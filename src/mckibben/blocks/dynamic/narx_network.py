@@ -1,0 +1,123 @@
+"""NARX model with a network: f is linear plus one layer of sigmoids or wavelets.
+
+f(x) = bias + linear . x + sum_h out_h a(hidden_h . x + shift_h), with a = tanh, or the wavelet
+a(s) = (1 - s^2) exp(-s^2 / 2). MATLAB's sigmoid and wavelet networks are of this kind. See
+`mckibben.blocks.dynamic.narx`.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import ClassVar, Literal, Self
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import FiniteFloat
+from pydantic.dataclasses import dataclass
+
+from mckibben.blocks.base import Kernel
+from mckibben.blocks.dynamic.narx import HEAD, Narx, give_output, take_input
+from mckibben.blocks.fields import STRICT, Vector
+from mckibben.blocks.kernels import kernel
+from mckibben.blocks.named import NamedParameters
+from mckibben.errors import ModelError
+
+Array = NDArray[np.float64]
+
+
+@kernel
+def narx_network_kernel(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
+    """Run the model.
+
+    After what all NARX kernels start with: number of regressors, of units, whether they are
+    wavelets, places in the state, bias, linear, then for every unit its weights, shift and output.
+    """
+    start = HEAD + int(coefficients[2])
+    n, units, wavelets = (
+        int(coefficients[start]),
+        int(coefficients[start + 1]),
+        coefficients[start + 2] > 0.0,
+    )
+    places = coefficients[start + 3 : start + 3 + n]
+    linear = coefficients[start + 3 + n : start + 4 + 2 * n]
+    hidden = coefficients[start + 4 + 2 * n :]
+    width = n + 2
+    for t in range(inputs.shape[0]):
+        take_input(inputs[t, 0], coefficients, state)
+        y = linear[0]
+        for i in range(n):
+            y += linear[1 + i] * state[int(places[i])]
+        for h in range(units):
+            s = hidden[h * width + n]
+            for i in range(n):
+                s += hidden[h * width + i] * state[int(places[i])]
+            a = (1.0 - s * s) * math.exp(-0.5 * s * s) if wavelets else math.tanh(s)
+            y += hidden[h * width + n + 1] * a
+        outputs[t, 0] = give_output(y, coefficients, state)
+
+
+@dataclass(frozen=True, kw_only=True, config=STRICT)
+class NarxNetwork(Narx, NamedParameters):
+    """NARX model with one hidden layer.
+
+    Parameters
+    ----------
+    bias : float
+        Constant of f.
+    linear : sequence of float
+        One a regressor: past outputs, inputs, operators.
+    hidden : sequence of float
+        For every unit its weights, one a regressor, then its shift, then its output.
+    activation : {"tanh", "wavelet"}
+        Of the units.
+    **others
+        As for `mckibben.blocks.dynamic.narx.Narx`.
+    """
+
+    kind: ClassVar[str] = "narx-network"
+    kernel: ClassVar[Kernel] = narx_network_kernel
+    parameters: ClassVar[tuple[str, ...]] = ("bias", "linear", "hidden")
+
+    bias: FiniteFloat
+    linear: Vector
+    hidden: Vector
+    activation: Literal["tanh", "wavelet"] = "tanh"
+
+    def __post_init__(self) -> None:
+        self.check_structure()
+        n = len(self.places)
+        if len(self.linear) != n or len(self.hidden) % (n + 2) != 0:
+            raise ModelError(
+                f"the weights of {self.kind!r} do not fit {n} regressors. Remedy: give {n} linear ones, "
+                f"and {n + 2} numbers a unit."
+            )
+
+    def coefficients(self, sample_time: float | None) -> Array:
+        """Return what the kernel reads."""
+        n = len(self.places)
+        shape = [n, len(self.hidden) // (n + 2), float(self.activation == "wavelet")]
+        weights = [self.bias, *self.linear, *self.hidden]
+        return np.array([*self.head(sample_time), *shape, *self.places, *weights])
+
+    def evaluate(self, regressors: Array) -> Array:
+        """Return the network at scaled regressors, shape (k, number of regressors)."""
+        n = len(self.places)
+        units = np.reshape(self.hidden, (-1, n + 2))
+        s = regressors @ units[:, :n].T + units[:, n]
+        a = np.tanh(s) if self.activation == "tanh" else (1 - s**2) * np.exp(-0.5 * s**2)
+        return np.asarray(self.bias + regressors @ np.array(self.linear) + a @ units[:, n + 1])
+
+    @classmethod
+    def example(cls) -> Self:
+        """Return a first-order model with two units."""
+        return cls(
+            output_lags=1,
+            input_lags=2,
+            delay=1,
+            input_scale=(2.5, 2.5),
+            output_scale=(10.0, 10.0),
+            sample_time=0.01,
+            bias=0.01,
+            linear=(0.9, 0.05, 0.03),
+            hidden=(0.5, 1.0, -0.5, 0.1, 0.02, -0.3, 0.8, 0.2, -0.2, -0.015),
+        )

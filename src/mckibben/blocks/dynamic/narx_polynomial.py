@@ -1,0 +1,142 @@
+"""Polynomial NARX model: f is a sum of products of regressors.
+
+Source: Chen, Billings and Luo 1989 (orthogonal least squares); see `mckibben.blocks.dynamic.narx`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Annotated, ClassVar, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from pydantic import BeforeValidator
+from pydantic.dataclasses import dataclass
+
+from mckibben.blocks.base import Kernel
+from mckibben.blocks.dynamic.narx import HEAD, Narx, give_output, take_input
+from mckibben.blocks.fields import STRICT, Vector
+from mckibben.blocks.kernels import kernel
+from mckibben.blocks.refusals import parameter_vector
+from mckibben.errors import ModelError
+
+Array = NDArray[np.float64]
+
+
+def _terms(value: object) -> object:
+    return tuple(tuple(term) for term in value) if isinstance(value, tuple | list) else value
+
+
+Terms = Annotated[tuple[tuple[int, ...], ...], BeforeValidator(_terms)]
+
+
+@kernel
+def narx_polynomial_kernel(
+    coefficients: Array, state: Array, inputs: Array, outputs: Array
+) -> None:
+    """Run the model.
+
+    After what all NARX kernels start with: highest degree, then for every term its weight and,
+    padded with -1, the places in the state of its factors.
+    """
+    k = HEAD + int(coefficients[2])
+    degree = int(coefficients[k])
+    terms = coefficients[k + 1 :]
+    width = degree + 1
+    for t in range(inputs.shape[0]):
+        take_input(inputs[t, 0], coefficients, state)
+        y = 0.0
+        for j in range(terms.size // width):
+            product = terms[j * width]
+            for i in range(1, width):
+                place = int(terms[j * width + i])
+                if place < 0:
+                    break
+                product *= state[place]
+            y += product
+        outputs[t, 0] = give_output(y, coefficients, state)
+
+
+@dataclass(frozen=True, kw_only=True, config=STRICT)
+class NarxPolynomial(Narx):
+    """Polynomial NARX model.
+
+    Parameters
+    ----------
+    terms : sequence of sequence of int
+        Regressors multiplied in each term, by their number: past outputs first, then inputs, then
+        operators; none for the constant. Repeated for powers.
+    weights : sequence of float
+        One a term.
+    **others
+        As for `mckibben.blocks.dynamic.narx.Narx`.
+    """
+
+    kind: ClassVar[str] = "narx-polynomial"
+    kernel: ClassVar[Kernel] = narx_polynomial_kernel
+
+    terms: Terms
+    weights: Vector
+
+    def __post_init__(self) -> None:
+        self.check_structure()
+        most = len(self.places)
+        if len(self.terms) != len(self.weights) or any(
+            not 0 <= factor < most for term in self.terms for factor in term
+        ):
+            raise ModelError(
+                f"the terms of {self.kind!r} do not fit. Remedy: give one weight a term, and factors "
+                f"between 0 and {most - 1}."
+            )
+
+    @property
+    def n_parameters(self) -> int:
+        """One a term."""
+        return len(self.weights)
+
+    def pack(self) -> Array:
+        """Return the weights."""
+        return np.array(self.weights)
+
+    def unpack(self, parameters: ArrayLike) -> Self:
+        """Return a model of the same terms with other weights."""
+        return replace(self, weights=tuple(parameter_vector(self, parameters).tolist()))
+
+    def coefficients(self, sample_time: float | None) -> Array:
+        """Return what the kernel reads."""
+        degree = max((len(term) for term in self.terms), default=0)
+        places = self.places
+        rows = [
+            [weight, *(places[f] for f in term), *[-1] * (degree - len(term))]
+            for term, weight in zip(self.terms, self.weights, strict=True)
+        ]
+        return np.array([*self.head(sample_time), degree, *np.ravel(rows)], dtype=np.float64)
+
+    def evaluate(self, regressors: Array) -> Array:
+        """Return the polynomial at scaled regressors, shape (k, number of regressors)."""
+        return products(regressors, self.terms) @ np.array(self.weights)
+
+    @classmethod
+    def example(cls) -> Self:
+        """Return a first-order model with a quadratic term and a play operator."""
+        return cls(
+            output_lags=1,
+            input_lags=2,
+            thresholds=(0.2,),
+            input_scale=(2.5, 2.5),
+            output_scale=(10.0, 10.0),
+            sample_time=0.01,
+            terms=((), (0,), (1,), (3,), (0, 1), (1, 1)),
+            weights=(0.01, 0.9, 0.05, 0.04, 0.01, -0.01),
+        )
+
+
+def products(regressors: Array, terms: tuple[tuple[int, ...], ...]) -> Array:
+    """Return the terms at regressors of shape (k, number of regressors), shape (k, number of
+    terms).
+    """
+    found = np.ones((len(regressors), len(terms)))
+    for column, term in enumerate(terms):
+        for factor in term:
+            found[:, column] *= regressors[:, factor]
+    return found

@@ -1,0 +1,259 @@
+"""Continuous-time process models P1, P1Z, P2, P2Z, P2U, P2UZ and P3 with delay, discretised
+exactly.
+
+Y(s) / U(s) = K (Tz s + 1) / D(s) exp(-Td s), D(s) = (Tp1 s + 1) (Tp2 s + 1) (Tp3 s + 1), or, for a
+pair of poles that may oscillate (U), D(s) = Tw^2 s^2 + 2 zeta Tw s + 1. Names as in MATLAB; the
+P2UZ model is Eq. (11) of "Analysis and modeling of a pneumatic artificial muscle system", whose
+zeta of 9.1 is above 1: any positive one is allowed.
+
+The input goes in straight lines from sample to sample (first-order hold), or is held (zero-order).
+Either way the response is exact, for delays between samples too: the state is carried over each
+corner of the delayed input by matrix exponentials.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, ClassVar, Literal, Self
+
+import numpy as np
+from annotated_types import Ge, Gt
+from numpy.typing import NDArray
+from pydantic import FiniteFloat
+from pydantic.dataclasses import dataclass
+
+from mckibben.blocks.base import Block, Kernel, Primitive
+from mckibben.blocks.fields import (
+    DISPLACEMENT,
+    PRESSURE,
+    STRICT,
+    ChannelField,
+    Initial,
+    StoredInitial,
+    Vector,
+)
+from mckibben.blocks.kernels import kernel
+from mckibben.blocks.named import NamedParameters
+from mckibben.blocks.refusals import explicit_state, needs_sample_time
+from mckibben.blocks.single import SingleChannel
+from mckibben.errors import ModelError
+
+Array = NDArray[np.float64]
+
+LONGEST_DELAY = 254
+"""Samples."""
+
+
+@kernel
+def process_model_kernel(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
+    """Run the model; the state is [x, past inputs, latest first].
+
+    Coefficients are [n, delay in samples, u_0, y_0, D now, D before, C, three input vectors,
+    matrix].
+    """
+    n, m = int(coefficients[0]), int(coefficients[1])
+    u0, y0 = coefficients[2], coefficients[3]
+    now, before = coefficients[4], coefficients[5]
+    c = coefficients[6:]
+    kept = state.size - 2 * n
+    for t in range(inputs.shape[0]):
+        for k in range(kept - 1, 0, -1):
+            state[n + k] = state[n + k - 1]
+        state[n] = inputs[t, 0] - u0
+        first, second, third = state[n + m], state[n + m + 1], state[n + m + 2]
+        y = now * first + before * second
+        for i in range(n):
+            x = c[n + i] * first + c[2 * n + i] * second + c[3 * n + i] * third
+            for j in range(n):
+                x += c[4 * n + i * n + j] * state[j]
+            state[n + kept + i] = x
+            y += c[i] * x
+        for i in range(n):
+            state[i] = state[n + kept + i]
+        outputs[t, 0] = y + y0
+
+
+@dataclass(frozen=True, config=STRICT)
+class ProcessModel(SingleChannel, NamedParameters, Primitive):
+    """A gain, one to three lags, perhaps a zero and a delay, about an operating point.
+
+    Parameters
+    ----------
+    gain : float
+        K, output per input at rest.
+    time_constants : sequence of float
+        Tp1, Tp2, Tp3 [s], or Tw alone where there is a damping; positive.
+    damping : float or None
+        zeta, positive; makes the pair of poles of P2U.
+    zero_time : float or None
+        Tz [s]; may be negative.
+    delay : float
+        Td [s], up to 254 samples; not negative.
+    input_offset, output_offset : float
+        The operating point.
+    hold : {"first", "zero"}
+        What the input does between samples: go on in a straight line, or stay.
+    initial : {"first_sample", "virgin"} or sequence of float
+        Default memory before the first sample: at rest at the first input, or at the operating
+        point.
+    input, output : Channel
+        Channel driven and channel given.
+    """
+
+    kind: ClassVar[str] = "process-model"
+    kernel: ClassVar[Kernel] = process_model_kernel
+    rate_dependent: ClassVar[bool] = True
+
+    gain: FiniteFloat
+    time_constants: Vector
+    damping: Annotated[FiniteFloat, Gt(0)] | None = None
+    zero_time: FiniteFloat | None = None
+    delay: Annotated[FiniteFloat, Ge(0)] = 0.0
+    input_offset: FiniteFloat = 0.0
+    output_offset: FiniteFloat = 0.0
+    hold: Literal["first", "zero"] = "first"
+    initial: StoredInitial = "first_sample"
+    input: ChannelField = PRESSURE
+    output: ChannelField = DISPLACEMENT
+
+    def __post_init__(self) -> None:
+        n = len(self.time_constants)
+        if (
+            not 1 <= n <= 3
+            or min(self.time_constants) <= 0
+            or (self.damping is not None and n != 1)
+        ):
+            raise ModelError(
+                f"{self.kind!r} has the time constants {self.time_constants}. Remedy: give one to three "
+                "positive ones [s], and one alone with a damping."
+            )
+
+    @property
+    def parameters(self) -> tuple[str, ...]:  # type: ignore[override]
+        """The fields that this structure has."""
+        optional = [n for n in ("damping", "zero_time") if getattr(self, n) is not None]
+        late = ["delay"] if self.delay > 0 else []
+        return ("gain", "time_constants", *optional, *late, "input_offset", "output_offset")
+
+    @property
+    def order(self) -> int:
+        """Number of poles."""
+        return 2 if self.damping is not None else len(self.time_constants)
+
+    @property
+    def name(self) -> str:
+        """MATLAB's name of the structure, P1 to P3 with U and Z; a delay adds D."""
+        under = "U" if self.damping is not None else ""
+        return f"P{self.order}{'D' * (self.delay > 0)}{under}{'Z' * (self.zero_time is not None)}"
+
+    @property
+    def n_states(self) -> int:
+        """Of the lags, past inputs, and as many for the lags again, to compute in."""
+        return 2 * self.order + (3 if self.delay == 0 else LONGEST_DELAY + 3)
+
+    def denominator(self) -> Array:
+        """Return D(s), descending powers."""
+        if self.damping is not None:
+            (t,) = self.time_constants
+            return np.array([t**2, 2 * self.damping * t, 1.0])
+        found = np.array([1.0])
+        for t in self.time_constants:
+            found = np.polymul(found, [t, 1.0])
+        return found
+
+    def state_space(self) -> tuple[Array, Array, Array, float]:
+        """Return A, B, C and D of the lags without delay, in controllable form, x_1 being at rest
+        u.
+
+        The state is scaled so that x = (u, 0, ..., 0) at rest, which keeps digits of slow lags.
+        """
+        d = self.denominator()
+        n = d.size - 1
+        a = np.diag(np.ones(n - 1), 1)
+        a[-1] = -d[:0:-1] / d[0]
+        b = np.zeros(n)
+        b[-1] = 1.0 / d[0]
+        c = np.zeros(n)
+        c[0] = self.gain
+        through = 0.0
+        if self.zero_time is not None:
+            if n > 1:
+                c[1] = self.gain * self.zero_time
+            else:
+                through = self.gain * self.zero_time / d[0]
+                c[0] = self.gain - through
+        return a, b, c, through
+
+    def coefficients(self, sample_time: float | None) -> Array:
+        """Return what the kernel reads, for a sample time.
+
+        Raises
+        ------
+        ModelError
+            Without a sample time, or where the delay is more than 254 samples.
+        """
+        step = needs_sample_time(self.kind, sample_time)
+        samples = self.delay / step
+        m = int(np.floor(samples + 1e-9))
+        if m > LONGEST_DELAY:
+            raise ModelError(
+                f"a delay of {self.delay:g} s is {m} samples. Remedy: a delay of at most "
+                f"{LONGEST_DELAY} samples, or a longer sample time."
+            )
+        part = min(max(samples - m, 0.0), 1.0)
+        a, b, c, through = self.state_space()
+        n = b.size
+        early, early_from, early_to = held(a, b, part * step)
+        late, late_from, late_to = held(a, b, (1 - part) * step)
+        vectors = np.zeros((3, n))
+        if self.hold == "first":
+            # the delayed input at the start of the step, at its corner, and at its end
+            start, corner, end = late @ early_from, late @ early_to + late_from, late_to
+            vectors[0] = (1 - part) * end
+            vectors[1] = part * end + corner + (1 - part) * start
+            vectors[2] = part * start
+            now, before = (1 - part) * through, part * through
+        else:
+            # until the corner the input is two samples old, then one
+            vectors[1] = late_from + late_to
+            vectors[2] = late @ (early_from + early_to)
+            now, before = (through, 0.0) if part == 0 else (0.0, through)
+        head = [n, m, self.input_offset, self.output_offset, now, before]
+        return np.concatenate([head, c, vectors.ravel(), (late @ early).ravel()])
+
+    def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
+        """Return the lags at rest: at the first input, or, virgin, at the operating point."""
+        start = self.initial if initial is None else initial
+        if not isinstance(start, str):
+            return explicit_state(self, start)
+        state = np.zeros(self.n_states)
+        if start == "first_sample":
+            state[0] = state[self.order : self.n_states - self.order] = first[0] - self.input_offset
+        return state
+
+    def inverse(self) -> Block:
+        """Refuse: the output lags the input, and the inverse would have to differentiate."""
+        raise ModelError(
+            f"{self.kind!r} ({self.name}) has no exact inverse: its output lags its input, so following "
+            "a reference would take derivatives of it. Remedy: invert a hysteresis model (cpi, gpi, "
+            "mpi), or a transfer-function identified with delay=0."
+        )
+
+    @classmethod
+    def example(cls) -> Self:
+        """Return the P2UZ model that the paper prints."""
+        return cls(6.7987, (5.7018,), 9.1096, 156.3105, 0.0, 1.0)
+
+
+def held(a: Array, b: Array, step: float) -> tuple[Array, Array, Array]:
+    """Return how a state goes on over a step, and how much of the input at its start and end joins
+    it.
+
+    For x' = A x + B v with v going in a straight line: x+ = Phi x + G v_start + H v_end.
+    """
+    from scipy.linalg import expm
+
+    n = b.size
+    whole = np.zeros((n + 2, n + 2))
+    whole[:n, :n], whole[:n, n], whole[n, n + 1] = a * step, b * step, 1.0
+    found = expm(whole)
+    return found[:n, :n], found[:n, n] - found[:n, n + 1], found[:n, n + 1]

@@ -1,0 +1,190 @@
+"""Discrete transfer function: what ARX, ARMAX, output-error and Box-Jenkins models come to
+free-running.
+
+y_t - y_0 = B(q) / F(q) (u_t - u_0),  B = b_0 + b_1 q^-1 + ...,  F = 1 + f_1 q^-1 + ...
+
+Of the models named, B / F is what a free run needs; their noise models only matter to one-step
+predictions. The inverse is F / B. It exists where the output answers at once (b_0 is not zero) and
+all zeros of B lie within the unit circle.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, ClassVar, Self
+
+import numpy as np
+from annotated_types import Gt
+from numpy.typing import NDArray
+from pydantic import FiniteFloat
+from pydantic.dataclasses import dataclass
+
+from mckibben.blocks.base import Kernel, Primitive
+from mckibben.blocks.fields import (
+    DISPLACEMENT,
+    PRESSURE,
+    STRICT,
+    ChannelField,
+    Initial,
+    StoredInitial,
+    Vector,
+)
+from mckibben.blocks.kernels import kernel
+from mckibben.blocks.named import NamedParameters
+from mckibben.blocks.refusals import explicit_state, own_sample_time
+from mckibben.blocks.single import SingleChannel
+from mckibben.errors import ModelError
+
+Array = NDArray[np.float64]
+
+
+@kernel
+def transfer_function_kernel(
+    coefficients: Array, state: Array, inputs: Array, outputs: Array
+) -> None:
+    """Run the filter in transposed direct form; coefficients are [u_0, y_0, b, f]."""
+    n = state.size
+    b, f = coefficients[2 : 3 + n], coefficients[3 + n :]
+    for t in range(inputs.shape[0]):
+        u = inputs[t, 0] - coefficients[0]
+        y = b[0] * u
+        if n > 0:
+            y += state[0]
+        for i in range(n - 1):
+            state[i] = state[i + 1] + b[i + 1] * u - f[i + 1] * y
+        if n > 0:
+            state[n - 1] = b[n] * u - f[n] * y
+        outputs[t, 0] = y + coefficients[1]
+
+
+@dataclass(frozen=True, config=STRICT)
+class TransferFunction(SingleChannel, NamedParameters, Primitive):
+    """Discrete transfer function about an operating point.
+
+    Parameters
+    ----------
+    numerator : sequence of float
+        b_0, b_1, ...; leading zeros are delays. At least one.
+    denominator : sequence of float
+        f_1, f_2, ... (the leading 1 is left out); may be empty.
+    sample_time : float
+        Time between samples that it holds for [s]; positive.
+    input_offset, output_offset : float
+        u_0 and y_0, the operating point.
+    initial : {"first_sample", "virgin"} or sequence of float
+        Default memory before the first sample: at rest at the first input, or at u_0.
+    input, output : Channel
+        Channel driven and channel given.
+    """
+
+    kind: ClassVar[str] = "transfer-function"
+    kernel: ClassVar[Kernel] = transfer_function_kernel
+    rate_dependent: ClassVar[bool] = True
+    parameters: ClassVar[tuple[str, ...]] = (
+        "numerator",
+        "denominator",
+        "input_offset",
+        "output_offset",
+    )
+
+    numerator: Vector
+    denominator: Vector
+    sample_time: Annotated[FiniteFloat, Gt(0)]
+    input_offset: FiniteFloat = 0.0
+    output_offset: FiniteFloat = 0.0
+    initial: StoredInitial = "first_sample"
+    input: ChannelField = PRESSURE
+    output: ChannelField = DISPLACEMENT
+
+    def __post_init__(self) -> None:
+        if not self.numerator:
+            raise ModelError(
+                f"{self.kind!r} has no numerator. Remedy: give one coefficient or more."
+            )
+
+    @property
+    def n_states(self) -> int:
+        """The order."""
+        return max(len(self.numerator) - 1, len(self.denominator))
+
+    @property
+    def poles(self) -> NDArray[np.complex128]:
+        """Poles in the z plane."""
+        return np.asarray(np.roots([1.0, *self.denominator]), dtype=np.complex128)
+
+    @property
+    def is_stable(self) -> bool:
+        """Whether all poles lie within the unit circle."""
+        return bool(np.all(np.abs(self.poles) < 1))
+
+    @property
+    def gain(self) -> float:
+        """Output per input at rest; infinite for an integrator."""
+        whole = 1.0 + float(np.sum(self.denominator))
+        return float(np.sum(self.numerator)) / whole if whole != 0 else float("inf")
+
+    def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
+        """Return the filter at rest: at the first input, or, virgin, at the operating point."""
+        start = self.initial if initial is None else initial
+        if start == "first_sample":
+            u = float(first[0]) - self.input_offset
+            y = self.gain * u if np.isfinite(self.gain) else 0.0
+            b, f = self._padded()
+            tails = [np.cumsum((b * u - f * y)[::-1])[::-1][1:]]
+            return np.concatenate(tails)
+        if start == "virgin":
+            return np.zeros(self.n_states)
+        return explicit_state(self, start)
+
+    def _padded(self) -> tuple[Array, Array]:
+        n = self.n_states
+        b = np.pad(np.array(self.numerator), (0, n + 1 - len(self.numerator)))
+        f = np.pad(np.array([1.0, *self.denominator]), (0, n - len(self.denominator)))
+        return b, f
+
+    def coefficients(self, sample_time: float | None) -> Array:
+        """Return [u_0, y_0, b, f].
+
+        Raises
+        ------
+        ModelError
+            Without a sample time, or at another than the model's own.
+        """
+        own_sample_time(self.kind, self.sample_time, sample_time)
+        return np.concatenate([[self.input_offset, self.output_offset], *self._padded()])
+
+    def inverse(self) -> TransferFunction:
+        """Return the filter that undoes this one.
+
+        Raises
+        ------
+        ModelError
+            If the output answers late, or a zero lies on or outside the unit circle.
+        """
+        lead = self.numerator[0]
+        if lead == 0:
+            raise ModelError(
+                f"{self.kind!r} has no inverse: its output answers a sample late. "
+                "Remedy: identify it with delay=0."
+            )
+        zeros = np.roots(self.numerator)
+        if np.any(np.abs(zeros) >= 1 - 1e-9):
+            raise ModelError(
+                f"{self.kind!r} has no inverse: a zero at |z| = {np.abs(zeros).max():.3g} would make it "
+                "unstable. Remedy: identify it with fewer coefficients in B, or invert another model."
+            )
+        b = np.array(self.numerator)
+        return TransferFunction(
+            tuple((np.array([1.0, *self.denominator]) / lead).tolist()),
+            tuple((b[1:] / lead).tolist()),
+            self.sample_time,
+            self.output_offset,
+            self.input_offset,
+            self.initial if isinstance(self.initial, str) else "first_sample",
+            self.output,
+            self.input,
+        )
+
+    @classmethod
+    def example(cls) -> Self:
+        """Return a second-order lag with a gain of 6.8 mm/bar, sampled at 100 Hz."""
+        return cls((0.9, -0.85, 0.018), (-1.2, 0.21), 0.01, 1.0, 2.0)

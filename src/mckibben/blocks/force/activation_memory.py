@@ -1,0 +1,199 @@
+"""Activation pressure by contraction and force with nonlocal memory, for use without knowing a
+frequency.
+
+p = sum_ij c_ij x^i f^j + sum_k (a_k + b_k f) S_k[e] + (d_0 + d_1 f) e',
+
+x and f the centred and scaled contraction and force, S_k[e] = e - F_{r_k}[e] stop operators. Ours,
+beside the model of "Inverse Modeling of Nonlinear Artificial Muscle Using Polynomial
+Parameterization and Particle Swarm Optimization": dry friction is carried by the operators, which
+keep it while the muscle rests and through minor loops, so what is left for the rate is the same at
+every frequency.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, ClassVar, Self
+
+import numpy as np
+from annotated_types import Ge, Interval
+from numpy.typing import NDArray
+from pydantic import FiniteFloat
+from pydantic.dataclasses import dataclass
+
+from mckibben.blocks.base import Block, Kernel, Primitive
+from mckibben.blocks.fields import (
+    CONTRACTION,
+    FORCE,
+    PRESSURE,
+    STRICT,
+    Channel,
+    ChannelField,
+    Initial,
+    StoredInitial,
+    Vector,
+)
+from mckibben.blocks.kernels import kernel
+from mckibben.blocks.memory import named_state
+from mckibben.blocks.named import NamedParameters
+from mckibben.blocks.refusals import explicit_state, needs_sample_time
+from mckibben.errors import ModelError
+
+Array = NDArray[np.float64]
+
+
+@kernel
+def activation_memory_kernel(
+    coefficients: Array, state: Array, inputs: Array, outputs: Array
+) -> None:
+    """Run the model; the state is [play operators, previous contraction, filtered rate].
+
+    Coefficients are [smoothing, gain of the rate, contraction's centre and scale, force's centre
+    and scale, degree by contraction, degree by force, c row by row, thresholds, a, b, d].
+    """
+    n = state.size - 2
+    degree, by_force = int(coefficients[6]), int(coefficients[7])
+    thresholds = 8 + (degree + 1) * (by_force + 1)
+    weights = thresholds + n
+    for t in range(inputs.shape[0]):
+        e = inputs[t, 0]
+        x = (e - coefficients[2]) / coefficients[3]
+        f = (inputs[t, 1] - coefficients[4]) / coefficients[5]
+        rate = coefficients[0] * state[n + 1] + coefficients[1] * (e - state[n])
+        p = 0.0
+        for i in range(degree, -1, -1):
+            row = 0.0
+            for j in range(by_force, -1, -1):
+                row = row * f + coefficients[8 + i * (by_force + 1) + j]
+            p = p * x + row
+        for k in range(n):
+            r = coefficients[thresholds + k]
+            state[k] = min(max(state[k], e - r), e + r)
+            p += (coefficients[weights + k] + f * coefficients[weights + n + k]) * (e - state[k])
+        p += (coefficients[weights + 2 * n] + f * coefficients[weights + 2 * n + 1]) * rate
+        state[n], state[n + 1] = e, rate
+        outputs[t, 0] = p
+
+
+@dataclass(frozen=True, config=STRICT)
+class ActivationMemory(NamedParameters, Primitive):
+    """Pressure that gives a contraction under a force, whatever the frequency.
+
+    Parameters
+    ----------
+    surface : sequence of float, length (degree + 1) (force_degree + 1)
+        c [bar], for every power of the contraction all powers of the force, ascending.
+    thresholds : sequence of float, length K
+        Of the operators, in contraction: 0 < r_0 < r_1 < ...
+    friction : sequence of float, length 2 K
+        a, then b [bar per contraction].
+    viscosity : (float, float)
+        d [bar s].
+    degree, force_degree : int
+        Of the surface.
+    input_scale, force_scale : (float, float)
+        Centre and half the range of contraction and force [N]; the latter positive.
+    rate_time_constant : float
+        Of the filter of the rate [s]; 0 for none.
+    initial : {"first_sample", "virgin"} or sequence of float
+        Default memory before the first sample: the contraction has only risen, or has never moved.
+    input, force, output : Channel
+        Contraction, force and pressure.
+    """
+
+    kind: ClassVar[str] = "activation-memory"
+    kernel: ClassVar[Kernel] = activation_memory_kernel
+    rate_dependent: ClassVar[bool] = True
+    parameters: ClassVar[tuple[str, ...]] = ("surface", "friction", "viscosity")
+
+    surface: Vector
+    thresholds: Vector
+    friction: Vector
+    viscosity: tuple[FiniteFloat, FiniteFloat]
+    degree: Annotated[int, Interval(ge=0, le=9)]
+    force_degree: Annotated[int, Interval(ge=0, le=9)]
+    input_scale: tuple[FiniteFloat, FiniteFloat]
+    force_scale: tuple[FiniteFloat, FiniteFloat]
+    rate_time_constant: Annotated[FiniteFloat, Ge(0)] = 0.0
+    initial: StoredInitial = "first_sample"
+    input: ChannelField = CONTRACTION
+    force: ChannelField = FORCE
+    output: ChannelField = PRESSURE
+
+    def __post_init__(self) -> None:
+        size = (self.degree + 1) * (self.force_degree + 1)
+        r = np.array(self.thresholds)
+        if len(self.surface) != size or len(self.friction) != 2 * r.size:
+            raise ModelError(
+                f"{self.kind!r} has {len(self.surface)} numbers in its surface and "
+                f"{len(self.friction)} of friction. Remedy: give {size} and {2 * r.size}."
+            )
+        if r.size and (r[0] <= 0 or np.any(np.diff(r) <= 0)):
+            raise ModelError(
+                f"the thresholds of {self.kind!r} are not 0 < r_0 < r_1 < ... "
+                "Remedy: sort them and drop repeated ones."
+            )
+        if not (self.input_scale[1] > 0 and self.force_scale[1] > 0):
+            raise ModelError(
+                f"{self.kind!r} has a scale that is not positive. Remedy: give (centre, half range)."
+            )
+
+    @property
+    def inputs(self) -> tuple[Channel, ...]:
+        """Contraction, then force."""
+        return (self.input, self.force)
+
+    @property
+    def outputs(self) -> tuple[Channel, ...]:
+        """Pressure."""
+        return (self.output,)
+
+    @property
+    def scheduling(self) -> tuple[str, ...]:
+        """Force."""
+        return (self.force.name,)
+
+    @property
+    def n_states(self) -> int:
+        """Operators, previous contraction, filtered rate."""
+        return len(self.thresholds) + 2
+
+    def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
+        """Return [operators, first contraction, 0]."""
+        start = self.initial if initial is None else initial
+        r = np.array(self.thresholds)
+        if start == "virgin":
+            return np.array([*np.full(r.size, first[0]), first[0], 0.0])
+        if isinstance(start, str):
+            return np.array([*named_state(start, r, first[0], first[0]), first[0], 0.0])
+        return explicit_state(self, start)
+
+    def coefficients(self, sample_time: float | None) -> Array:
+        """Return what the kernel reads.
+
+        Raises
+        ------
+        ModelError
+            Without a sample time.
+        """
+        step = needs_sample_time(self.kind, sample_time)
+        tau = self.rate_time_constant
+        smoothing = math.exp(-step / tau) if tau > 0 else 0.0
+        head = [smoothing, (1 - smoothing) / step, *self.input_scale, *self.force_scale]
+        tail = [*self.thresholds, *self.friction, *self.viscosity]
+        return np.array([*head, self.degree, self.force_degree, *self.surface, *tail])
+
+    def inverse(self) -> Block:
+        """Refuse: this model is itself the inverse of a muscle."""
+        raise ModelError(
+            f"{self.kind!r} has no inverse here: it already gives the pressure for a contraction. "
+            "Remedy: use it as the compensator, or fit pressure to contraction by another model."
+        )
+
+    @classmethod
+    def example(cls) -> Self:
+        """Return a model for contractions and forces of a few units."""
+        return cls(
+            *((2.0, 0.5, 1.5, 0.1, 0.2, 0.0), (0.2, 0.8), (0.3, 0.2, 0.1, 0.0), (0.05, 0.01)),
+            *(2, 1, (2.5, 2.5), (2.5, 2.5)),
+        )

@@ -1,0 +1,193 @@
+"""Activation pressure by contraction and force: a static cubic with a hysteresis in the rate.
+
+p = y(e, F) + gamma phi(F) e',  y = b_0 + b_1 e + b_2 e^2 + b_3 e^3.
+
+Source: "Inverse Modeling of Nonlinear Artificial Muscle Using Polynomial Parameterization and
+Particle Swarm Optimization". The cubic goes through four characteristic points (e_j, y_j), each of
+whose coordinates is a cubic of the force (Eqs. (2) to (9)); gamma is linear in the frequency of the
+excitation, and phi a cubic of the force (Eqs. (10) to (15)). That frequency is a property of a test
+signal, so this model is bound to one; `ActivationMemory` needs none.
+
+The rate e' goes through an optional first-order filter, for contractions that are measured and
+noisy.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, ClassVar, Self
+
+import numpy as np
+from annotated_types import Ge
+from numpy.typing import NDArray
+from pydantic import FiniteFloat
+from pydantic.dataclasses import dataclass
+
+from mckibben.blocks.base import Block, Kernel, Primitive
+from mckibben.blocks.fields import (
+    CONTRACTION,
+    FORCE,
+    PRESSURE,
+    STRICT,
+    Channel,
+    ChannelField,
+    Initial,
+    StoredInitial,
+    Vector,
+)
+from mckibben.blocks.kernels import kernel
+from mckibben.blocks.named import NamedParameters
+from mckibben.blocks.refusals import explicit_state, needs_sample_time
+from mckibben.errors import ModelError
+
+Array = NDArray[np.float64]
+
+POINTS = 4
+
+
+@kernel
+def cubic(coefficients: Array, first: int, x: float) -> float:
+    """Return the cubic whose coefficients, highest power first, start at ``first``."""
+    return (
+        (coefficients[first] * x + coefficients[first + 1]) * x + coefficients[first + 2]
+    ) * x + coefficients[first + 3]
+
+
+@kernel
+def activation_pressure_kernel(
+    coefficients: Array, state: Array, inputs: Array, outputs: Array
+) -> None:
+    """Run the model; the state is [previous contraction, filtered rate].
+
+    Coefficients are [smoothing, gain of the rate, gamma, phi (4), contractions (16), pressures
+    (16)].
+    """
+    for t in range(inputs.shape[0]):
+        e, force = inputs[t, 0], inputs[t, 1]
+        rate = coefficients[0] * state[1] + coefficients[1] * (e - state[0])
+        y = 0.0
+        for j in range(4):
+            share = 1.0
+            own = cubic(coefficients, 7 + 4 * j, force)
+            for k in range(4):
+                if k != j:
+                    other = cubic(coefficients, 7 + 4 * k, force)
+                    share *= (e - other) / (own - other)
+            y += share * cubic(coefficients, 23 + 4 * j, force)
+        outputs[t, 0] = y + coefficients[2] * cubic(coefficients, 3, force) * rate
+        state[0], state[1] = e, rate
+
+
+@dataclass(frozen=True, config=STRICT)
+class ActivationPressure(NamedParameters, Primitive):
+    """Pressure that gives a contraction under a force, at one frequency of excitation.
+
+    Parameters
+    ----------
+    contractions : sequence of float, length 16
+        Cubics of the force, a b c d with a of the third power, for e_1 to e_4: at the lowest point,
+        the highest, the inflection and the tangent.
+    pressures : sequence of float, length 16
+        The same for y_1 to y_4 [bar].
+    phi : sequence of float, length 4
+        Cubic of the force [bar s].
+    gamma : (float, float)
+        Slope [1/Hz] and constant of gamma by frequency.
+    frequency : float
+        Of the excitation [Hz]; not negative.
+    rate_time_constant : float
+        Of the filter of the rate [s]; 0 for none.
+    initial : {"first_sample", "virgin"} or sequence of float
+        Default memory before the first sample: at rest.
+    input, force, output : Channel
+        Contraction, force and pressure.
+    """
+
+    kind: ClassVar[str] = "activation-pressure"
+    kernel: ClassVar[Kernel] = activation_pressure_kernel
+    rate_dependent: ClassVar[bool] = True
+    parameters: ClassVar[tuple[str, ...]] = ("contractions", "pressures", "phi", "gamma")
+
+    contractions: Vector
+    pressures: Vector
+    phi: Vector
+    gamma: tuple[FiniteFloat, FiniteFloat]
+    frequency: Annotated[FiniteFloat, Ge(0)]
+    rate_time_constant: Annotated[FiniteFloat, Ge(0)] = 0.0
+    initial: StoredInitial = "first_sample"
+    input: ChannelField = CONTRACTION
+    force: ChannelField = FORCE
+    output: ChannelField = PRESSURE
+
+    def __post_init__(self) -> None:
+        sizes = (len(self.contractions), len(self.pressures), len(self.phi))
+        if sizes != (4 * POINTS, 4 * POINTS, 4):
+            raise ModelError(
+                f"{self.kind!r} has {sizes} coefficients of contractions, pressures and phi. Remedy: "
+                f"give {4 * POINTS}, {4 * POINTS} and 4."
+            )
+
+    @property
+    def inputs(self) -> tuple[Channel, ...]:
+        """Contraction, then force."""
+        return (self.input, self.force)
+
+    @property
+    def outputs(self) -> tuple[Channel, ...]:
+        """Pressure."""
+        return (self.output,)
+
+    @property
+    def scheduling(self) -> tuple[str, ...]:
+        """Force."""
+        return (self.force.name,)
+
+    @property
+    def n_states(self) -> int:
+        """Previous contraction and filtered rate."""
+        return 2
+
+    def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
+        """Return [first contraction, 0]."""
+        start = self.initial if initial is None else initial
+        if isinstance(start, str):
+            return np.array([first[0], 0.0])
+        return explicit_state(self, start)
+
+    def coefficients(self, sample_time: float | None) -> Array:
+        """Return what the kernel reads.
+
+        Raises
+        ------
+        ModelError
+            Without a sample time.
+        """
+        step = needs_sample_time(self.kind, sample_time)
+        tau = self.rate_time_constant
+        smoothing = math.exp(-step / tau) if tau > 0 else 0.0
+        gamma = self.gamma[0] * self.frequency + self.gamma[1]
+        head = [smoothing, (1 - smoothing) / step, gamma]
+        return np.array([*head, *self.phi, *self.contractions, *self.pressures])
+
+    def inverse(self) -> Block:
+        """Refuse: this model is itself the inverse of a muscle."""
+        raise ModelError(
+            f"{self.kind!r} has no inverse here: it already gives the pressure for a contraction. "
+            "Remedy: use it as the compensator, or fit pressure to contraction by another model."
+        )
+
+    @classmethod
+    def example(cls) -> Self:
+        """Return a model for contractions and forces of a few units."""
+        return cls(
+            (
+                *(0.0, 0.0, 0.0, -1.0),
+                *(0.0, 0.0, 0.01, 6.0),
+                *(0.0, 0, 0, 2.0),
+                *(0, 0.001, 0, 4.0),
+            ),
+            (*(0.0, 0.0, 0.1, 0.2), *(0.0, 0.0, 0.1, 4.0), *(0.0, 0, 0.1, 1.0), *(0, 0, 0.1, 2.0)),
+            (0.0, 0.0, 0.01, 0.3),
+            (0.27, 0.67),
+            1.0,
+        )

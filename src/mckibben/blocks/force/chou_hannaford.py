@@ -1,0 +1,77 @@
+"""Chou and Hannaford's static force law: the geometry of an inextensible braid.
+
+f = p (3 l^2 - b^2) / (4 pi n^2), with the thread's length b and its number of turns n, plus friction or
+elasticity as a constant. Source: Chou and Hannaford, "Measurement and modeling of McKibben pneumatic
+artificial muscles", 1996.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, ClassVar, Self
+
+import numpy as np
+from annotated_types import Gt
+from numpy.typing import NDArray
+from pydantic import FiniteFloat
+from pydantic.dataclasses import dataclass
+
+from mckibben.blocks.base import Kernel
+from mckibben.blocks.braid_equilibrium import NEWTONS_PER_BAR
+from mckibben.blocks.fields import FORCE, LENGTH, PRESSURE, STRICT, ChannelField
+from mckibben.blocks.force.law import ForceLaw
+from mckibben.blocks.kernels import kernel
+
+Array = NDArray[np.float64]
+
+
+@kernel
+def chou_hannaford_kernel(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
+    """Evaluate; coefficients are [force per bar and square length, square of b / 3, constant]."""
+    for t in range(inputs.shape[0]):
+        pull = inputs[t, 0] * inputs[t, 0] - coefficients[1]
+        outputs[t, 0] = inputs[t, 1] * coefficients[0] * pull + coefficients[2]
+
+
+@dataclass(frozen=True, config=STRICT)
+class ChouHannaford(ForceLaw):
+    """Force of an inextensible braid.
+
+    Parameters
+    ----------
+    thread_length : float
+        b [mm], positive.
+    turns : float
+        n, positive.
+    constant : float
+        Added [N].
+    input, pressure, output : Channel
+        Length, pressure and force.
+    """
+
+    kind: ClassVar[str] = "chou-hannaford"
+    kernel: ClassVar[Kernel] = chou_hannaford_kernel
+    parameters: ClassVar[tuple[str, ...]] = ("thread_length", "turns", "constant")
+
+    thread_length: Annotated[FiniteFloat, Gt(0)]
+    turns: Annotated[FiniteFloat, Gt(0)]
+    constant: FiniteFloat = 0.0
+    input: ChannelField = LENGTH
+    pressure: ChannelField = PRESSURE
+    output: ChannelField = FORCE
+
+    def coefficients(self, sample_time: float | None) -> Array:
+        """Return [force per bar and square length, square of b / 3, constant]."""
+        del sample_time
+        per_bar = 3 * NEWTONS_PER_BAR / (4 * math.pi * self.turns**2)
+        return np.array([per_bar, self.thread_length**2 / 3, self.constant])
+
+    def terms(self, length: Array) -> tuple[Array, Array]:
+        """Return force per pressure, and force without any."""
+        per_bar, floor, constant = self.coefficients(None).tolist()
+        return per_bar * (length * length - floor), np.full_like(length, constant)
+
+    @classmethod
+    def example(cls) -> Self:
+        """Return a law for lengths of a few millimetres."""
+        return cls(6.0, 0.5, -1.0)

@@ -1,0 +1,132 @@
+"""The pressure that gives a wished-for force at a measured length, in closed form.
+
+f = p g(l) + h(l) + s(p) f_h(l, l'), s(p) = 1 + gain (p - reference), is linear in p, so
+p = (f - h - f_h (1 - gain reference)) / (g + gain f_h). This is the feedforward compensation of
+"A Multistate Friction Model for the Compensation of the Asymmetric Hysteresis in the Mechanical Response
+of Pneumatic Artificial Muscles", Section 4.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, ClassVar, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from pydantic import BeforeValidator, InstanceOf
+from pydantic.dataclasses import dataclass
+
+from mckibben.blocks.base import Block, Run
+from mckibben.blocks.fields import STRICT, Channel, Initial
+from mckibben.blocks.force.law import ForceLaw
+from mckibben.blocks.force.multistate_friction import MultistateFriction
+from mckibben.blocks.force.polynomial_force import PolynomialForce
+from mckibben.blocks.refusals import parameter_vector
+from mckibben.blocks.saving import nested
+from mckibben.errors import ModelError
+
+Array = NDArray[np.float64]
+
+LEAST_PULL = 1e-9
+"""Force per bar below which no pressure gives a force [N/bar]."""
+
+
+@dataclass(frozen=True, config=STRICT)
+class ForceFeedforward(Block):
+    """Pressure by wished-for force and measured length.
+
+    Parameters
+    ----------
+    law : ForceLaw
+        Static force, linear in pressure.
+    friction : MultistateFriction, optional
+        What hysteresis adds.
+    """
+
+    kind: ClassVar[str] = "force-feedforward"
+
+    law: Annotated[InstanceOf[ForceLaw], BeforeValidator(nested)]
+    friction: Annotated[InstanceOf[MultistateFriction] | None, BeforeValidator(nested)] = None
+
+    def __post_init__(self) -> None:
+        self.law.terms(np.ones(1))
+        if self.friction is not None and self.friction.inputs != self.law.inputs:
+            raise ModelError(
+                "law and friction differ in their channels. Remedy: give both the same length and "
+                "pressure."
+            )
+
+    @property
+    def rate_dependent(self) -> bool:  # type: ignore[override]
+        """Whether there is friction."""
+        return self.friction is not None
+
+    @property
+    def inputs(self) -> tuple[Channel, ...]:
+        """Force wished for, then length."""
+        return (self.law.output, self.law.input)
+
+    @property
+    def outputs(self) -> tuple[Channel, ...]:
+        """Pressure."""
+        return (self.law.pressure,)
+
+    @property
+    def scheduling(self) -> tuple[str, ...]:
+        """Length."""
+        return (self.law.input.name,)
+
+    @property
+    def n_states(self) -> int:
+        """Those of the friction."""
+        return 0 if self.friction is None else self.friction.n_states
+
+    @property
+    def n_parameters(self) -> int:
+        """Those of both parts."""
+        return self.law.n_parameters + (0 if self.friction is None else self.friction.n_parameters)
+
+    def pack(self) -> Array:
+        """Return the law's parameters, then the friction's."""
+        own = [self.law.pack()]
+        return np.concatenate(own if self.friction is None else [*own, self.friction.pack()])
+
+    def unpack(self, parameters: ArrayLike) -> Self:
+        """Return a feedforward of the same structure with other parameters."""
+        vector = parameter_vector(self, parameters)
+        n = self.law.n_parameters
+        friction = None if self.friction is None else self.friction.unpack(vector[n:])
+        return type(self)(self.law.unpack(vector[:n]), friction)
+
+    def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
+        """Return the friction's state at the first length."""
+        if self.friction is None:
+            return np.empty(0)
+        return self.friction.initial_state(np.array([first[1], 0.0]), initial)
+
+    def bind(self, sample_time: float | None, state: Array, inputs: Array, outputs: Array) -> Run:
+        """Return a function that runs the friction over the lengths and solves for the pressure."""
+        n = inputs.shape[0]
+        gain, reference = 0.0, 0.0
+        lengths, slid = np.zeros((n, 2)), np.zeros((n, 1))
+        run_friction: Run | None = None
+        if self.friction is not None:
+            gain, reference = self.friction.pressure_gain, self.friction.reference_pressure
+            lengths[:, 1] = reference
+            run_friction = self.friction.bind(sample_time, state, lengths, slid)
+
+        def run() -> None:
+            lengths[:, 0] = inputs[:, 1]
+            if run_friction is not None:
+                run_friction()
+            per_bar, rest = self.law.terms(inputs[:, 1])
+            pull = per_bar + gain * slid[:, 0]
+            missing = inputs[:, 0] - rest - slid[:, 0] * (1.0 - gain * reference)
+            small = np.abs(pull) < LEAST_PULL
+            outputs[:, 0] = np.where(small, np.nan, missing / np.where(small, 1.0, pull))
+
+        return run
+
+    @classmethod
+    def example(cls) -> Self:
+        """Return a feedforward with a law that pulls at all lengths of 0 to 5 mm."""
+        return cls(PolynomialForce((50.0, 5.0), (-10.0, 5.0)), MultistateFriction.example())

@@ -1,0 +1,238 @@
+"""Multistate friction: elasto-plastic elements whose numbers differ between lengthening and
+shortening.
+
+With the rate v of the length, every element has a deflection x_i and numbers k, sigma and F_c that
+switch with the sign of v: x_i' = [sat(F_c, k x_i + sigma v) - k x_i] / sigma,  f = sum_i sat(F_c, k
+x_i + sigma v).
+
+Source: "A Multistate Friction Model for the Compensation of the Asymmetric Hysteresis in the
+Mechanical Response of Pneumatic Artificial Muscles", Eqs. (4) and (5). Its model of eleven
+parameters has one element in both directions with one stiffness, and two that act while the muscle
+shortens; that of eighteen has three in both directions.
+
+k / sigma is thousands per second, so nothing is stepped: over a sample v is constant, and while an
+element sticks x grows with v, while it slips x tends to F_c / k as an exponential, and the time at
+which one ends is in closed form. An element that acts in one direction only is released in the
+other: it gives no force, and its deflection fades by exp(-k t / sigma).
+
+Ours: friction may grow in proportion to pressure, f (1 + pressure_gain (p - reference));
+pressure_gain 0 is the paper's model.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, ClassVar, Literal, Self
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BeforeValidator, FiniteFloat
+from pydantic.dataclasses import dataclass
+
+from mckibben.blocks.base import Block, Kernel, Primitive
+from mckibben.blocks.fields import (
+    FORCE,
+    LENGTH,
+    PRESSURE,
+    STRICT,
+    Channel,
+    ChannelField,
+    Initial,
+    StoredInitial,
+    Vector,
+)
+from mckibben.blocks.kernels import kernel
+from mckibben.blocks.named import NamedParameters
+from mckibben.blocks.refusals import explicit_state, needs_sample_time
+from mckibben.errors import ModelError
+
+Array = NDArray[np.float64]
+
+Direction = Literal["shared", "both", "lengthening", "shortening"]
+SIZES: dict[str, int] = {"shared": 5, "both": 6, "lengthening": 3, "shortening": 3}
+ELEVEN: tuple[Direction, ...] = ("shared", "shortening", "shortening")
+EIGHTEEN: tuple[Direction, ...] = ("both", "both", "both")
+
+
+@kernel
+def deflected(x: float, v: float, time: float, k: float, sigma: float, limit: float) -> float:
+    """Return the deflection after a time at a constant rate; v >= 0, by symmetry."""
+    if k * x + sigma * v < -limit:
+        # slipping backwards: the spring relaxes to where it sticks
+        excess = -(k * x + limit)
+        if v == 0.0:
+            return -limit / k - excess / k * math.exp(-k * time / sigma)
+        needed = sigma / k * math.log(excess / (sigma * v))
+        if needed >= time:
+            return -limit / k - excess / k * math.exp(-k * time / sigma)
+        time -= needed
+        x = -(limit + sigma * v) / k
+    if k * x + sigma * v <= limit:
+        if v == 0.0:
+            return x
+        needed = ((limit - sigma * v) / k - x) / v
+        if needed >= time:
+            return x + v * time
+        time -= needed
+        x += v * needed
+    return limit / k + (x - limit / k) * math.exp(-k * time / sigma)
+
+
+@kernel
+def multistate_friction_kernel(
+    coefficients: Array, state: Array, inputs: Array, outputs: Array
+) -> None:
+    """Run the elements; the state is [deflections, previous length].
+
+    Coefficients are [sample time, pressure gain, reference pressure], then for every element k,
+    sigma and F_c lengthening, k, sigma and F_c shortening; F_c = 0 where it does not act.
+    """
+    n = state.size - 1
+    step = coefficients[0]
+    for t in range(inputs.shape[0]):
+        v = (inputs[t, 0] - state[n]) / step
+        state[n] = inputs[t, 0]
+        first, sign = (3, 1.0) if v >= 0.0 else (6, -1.0)
+        force = 0.0
+        for i in range(n):
+            place = first + 6 * i
+            limit = coefficients[place + 2]
+            if limit == 0.0:
+                other = 9 - first + 6 * i
+                state[i] *= math.exp(-coefficients[other] * step / coefficients[other + 1])
+                continue
+            k, sigma = coefficients[place], coefficients[place + 1]
+            x = sign * deflected(sign * state[i], sign * v, step, k, sigma, limit)
+            state[i] = x
+            force += min(max(k * x + sigma * v, -limit), limit)
+        grown = 1.0 + coefficients[1] * (inputs[t, 1] - coefficients[2])
+        outputs[t, 0] = force * grown
+
+
+def _directions(value: object) -> object:
+    return tuple(value) if isinstance(value, list) else value
+
+
+@dataclass(frozen=True, config=STRICT)
+class MultistateFriction(NamedParameters, Primitive):
+    """Friction force by length, with elements that switch with the direction of motion.
+
+    Parameters
+    ----------
+    elements : sequence of {"shared", "both", "lengthening", "shortening"}
+        What each element is: in both directions with one stiffness, in both with two, or in one
+        only.
+    values : sequence of float
+        For every element, in order, its positive numbers: k [N/mm], sigma [N s/mm] and F_c [N]
+        lengthening, then shortening; "shared" leaves the second k out.
+    pressure_gain : float
+        Growth of friction with pressure [1/bar]; 0 as in the paper.
+    reference_pressure : float
+        Pressure at which the values hold [bar].
+    initial : {"first_sample", "virgin"} or sequence of float
+        Default memory before the first sample: as if the length had only grown, or nothing
+        deflected.
+    input, pressure, output : Channel
+        Length, pressure and force.
+    """
+
+    kind: ClassVar[str] = "multistate-friction"
+    kernel: ClassVar[Kernel] = multistate_friction_kernel
+    rate_dependent: ClassVar[bool] = True
+
+    elements: Annotated[tuple[Direction, ...], BeforeValidator(_directions)]
+    values: Vector
+    pressure_gain: FiniteFloat = 0.0
+    reference_pressure: FiniteFloat = 0.0
+    initial: StoredInitial = "first_sample"
+    input: ChannelField = LENGTH
+    pressure: ChannelField = PRESSURE
+    output: ChannelField = FORCE
+
+    def __post_init__(self) -> None:
+        wanted = sum(SIZES[element] for element in self.elements)
+        if not self.elements or len(self.values) != wanted or min(self.values) <= 0:
+            raise ModelError(
+                f"{self.kind!r} with the elements {', '.join(self.elements) or 'none'} has "
+                f"{len(self.values)} values. Remedy: give {wanted} positive ones."
+            )
+
+    @property
+    def parameters(self) -> tuple[str, ...]:  # type: ignore[override]
+        """The values, and the pressure gain where there is one."""
+        return ("values", "pressure_gain") if self.pressure_gain != 0 else ("values",)
+
+    @property
+    def inputs(self) -> tuple[Channel, ...]:
+        """Length, then pressure."""
+        return (self.input, self.pressure)
+
+    @property
+    def outputs(self) -> tuple[Channel, ...]:
+        """Force."""
+        return (self.output,)
+
+    @property
+    def scheduling(self) -> tuple[str, ...]:
+        """Pressure."""
+        return (self.pressure.name,)
+
+    @property
+    def n_states(self) -> int:
+        """Deflections, and the previous length."""
+        return len(self.elements) + 1
+
+    def table(self) -> Array:
+        """Return k, sigma and F_c lengthening and shortening, shape (n, 6), F_c 0 where
+        inactive.
+        """
+        rows, values = [], list(self.values)
+        for element in self.elements:
+            own, values = values[: SIZES[element]], values[SIZES[element] :]
+            if element == "shared":
+                own = [*own[:3], own[0], *own[3:]]
+            elif element == "lengthening":
+                own = [*own, own[0], own[1], 0.0]
+            elif element == "shortening":
+                own = [own[0], own[1], 0.0, *own]
+            rows.append(own)
+        return np.array(rows)
+
+    def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
+        """Return [deflections, first length]."""
+        start = self.initial if initial is None else initial
+        if start == "first_sample":
+            table = self.table()
+            return np.array([*(table[:, 2] / table[:, 0]), first[0]])
+        if start == "virgin":
+            return np.array([*np.zeros(len(self.elements)), first[0]])
+        return explicit_state(self, start)
+
+    def coefficients(self, sample_time: float | None) -> Array:
+        """Return [sample time, pressure gain, reference pressure, table].
+
+        Raises
+        ------
+        ModelError
+            Without a sample time.
+        """
+        step = needs_sample_time(self.kind, sample_time)
+        return np.array([step, self.pressure_gain, self.reference_pressure, *self.table().ravel()])
+
+    def inverse(self) -> Block:
+        """Refuse: one force belongs to many lengths."""
+        raise ModelError(
+            f"{self.kind!r} has no inverse: while it slips, one force belongs to many lengths. Remedy: "
+            "compensate it by ForceFeedforward(law, friction), in closed form."
+        )
+
+    @classmethod
+    def example(cls) -> Self:
+        """Return the model of eleven parameters that the paper prints."""
+        return cls(
+            ELEVEN,
+            (
+                *(18.214, 4.987e-3, 128.795, 3.982e-3, 103.096),
+                *(34.738, 1.006e-3, 13.431, 1e-4, 0.988e-3, 1.256),
+            ),
+        )

@@ -1,0 +1,92 @@
+"""Static force laws that are linear in pressure and polynomial in length.
+
+f = p sum_i g_i x^i + sum_j h_j x^j,  x = (l - centre) / scale.
+
+By the orders of the two polynomials this is the bilinear-quadratic law (1, 2), Eq. (3) of "A
+Multistate Friction Model for the Compensation of the Asymmetric Hysteresis in the Mechanical
+Response of Pneumatic Artificial Muscles"; Petrovic's (2, 2); Minh's cubic (3, 3); and Schindele and
+Aschemann's (3, 4).
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, ClassVar, Self
+
+import numpy as np
+from annotated_types import Gt
+from numpy.typing import NDArray
+from pydantic import FiniteFloat
+from pydantic.dataclasses import dataclass
+
+from mckibben.blocks.base import Kernel
+from mckibben.blocks.fields import FORCE, LENGTH, PRESSURE, STRICT, ChannelField, Vector
+from mckibben.blocks.force.law import ForceLaw
+from mckibben.blocks.kernels import kernel
+from mckibben.blocks.reversible import polynomial_at
+from mckibben.errors import ModelError
+
+Array = NDArray[np.float64]
+
+
+@kernel
+def polynomial_force_kernel(
+    coefficients: Array, state: Array, inputs: Array, outputs: Array
+) -> None:
+    """Evaluate; coefficients are [centre, scale, number of g, g, h]."""
+    n = int(coefficients[2])
+    rest = coefficients.size - 3 - n
+    for t in range(inputs.shape[0]):
+        x = (inputs[t, 0] - coefficients[0]) / coefficients[1]
+        per_bar = polynomial_at(x, coefficients, 3, n)
+        outputs[t, 0] = inputs[t, 1] * per_bar + polynomial_at(x, coefficients, 3 + n, rest)
+
+
+@dataclass(frozen=True, config=STRICT)
+class PolynomialForce(ForceLaw):
+    """Force linear in pressure, polynomial in length.
+
+    Parameters
+    ----------
+    per_bar : sequence of float
+        g, ascending, [N/bar]; at least one.
+    elastic : sequence of float
+        h, ascending, [N]; at least one.
+    centre, scale : float
+        Of the length [mm]; scale positive.
+    input, pressure, output : Channel
+        Length, pressure and force.
+    """
+
+    kind: ClassVar[str] = "polynomial-force"
+    kernel: ClassVar[Kernel] = polynomial_force_kernel
+    parameters: ClassVar[tuple[str, ...]] = ("per_bar", "elastic")
+
+    per_bar: Vector
+    elastic: Vector
+    centre: FiniteFloat = 0.0
+    scale: Annotated[FiniteFloat, Gt(0)] = 1.0
+    input: ChannelField = LENGTH
+    pressure: ChannelField = PRESSURE
+    output: ChannelField = FORCE
+
+    def __post_init__(self) -> None:
+        if not self.per_bar or not self.elastic:
+            raise ModelError(
+                f"{self.kind!r} has an empty polynomial. Remedy: give one coefficient or more to each."
+            )
+
+    def coefficients(self, sample_time: float | None) -> Array:
+        """Return [centre, scale, number of g, g, h]."""
+        del sample_time
+        return np.array([self.centre, self.scale, len(self.per_bar), *self.per_bar, *self.elastic])
+
+    def terms(self, length: Array) -> tuple[Array, Array]:
+        """Return force per pressure, and force without any."""
+        x = (length - self.centre) / self.scale
+        value = np.polynomial.polynomial.polyval
+        return np.asarray(value(x, self.per_bar)), np.asarray(value(x, self.elastic))
+
+    @classmethod
+    def example(cls) -> Self:
+        """Return a bilinear-quadratic law around 3 mm."""
+        return cls((50.0, 20.0), (-10.0, 5.0, 8.0), 3.0, 2.0)

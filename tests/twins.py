@@ -7,8 +7,10 @@ one sample after another, for the input that makes the forward formula give the 
 
 from __future__ import annotations
 
+import copy
 import math
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 Rows = list[list[float]]
@@ -35,6 +37,8 @@ def bisect(function: Callable[[float], float], target: float, low: float, high: 
         return high
     for _ in range(200):
         middle = 0.5 * (low + high)
+        if middle in (low, high):
+            break
         if function(middle) < target:
             low = middle
         else:
@@ -293,20 +297,500 @@ def eupi_inverse(block: Any, inputs: Rows, sample_time: float) -> Rows:
     return _rows(outputs)
 
 
+# -- relays and ramps on a grid --------------------------------------------------------------
+
+
+def _cells(block: Any) -> list[tuple[int, int, float]]:
+    n = len(block.levels) - 1
+    pairs = [(i, j) for i in range(n) for j in range(i + 1)]
+    return [(i, j, w) for (i, j), w in zip(pairs, block.weights, strict=True)]
+
+
+def _relay_share(way: list[float], levels: Any, i: int, j: int) -> float:
+    """Share of a cell's relays that is up after the input has gone from turning point to turning point.
+
+    Off the diagonal the relays fill a square of rising and falling thresholds: those up lie below a
+    staircase, which is kept as a list of corners (highest rising, lowest falling threshold).
+    """
+    a0, a1, b0, b1 = levels[i], levels[i + 1], levels[j], levels[j + 1]
+    if i == j:
+        return min(max((way[-1] - a0) / (a1 - a0), 0.0), 1.0)
+    # for falling threshold b, relays with rising threshold up to edge(b) are up
+    pieces = [(0.0, 1.0, 0.0)]
+    for u in way:
+        x = min(max((u - a0) / (a1 - a0), 0.0), 1.0)
+        y = min(max((u - b0) / (b1 - b0), 0.0), 1.0)
+        risen = [(p, q, max(x, e) if u >= a0 else e) for p, q, e in pieces]
+        kept = []
+        for p, q, e in risen:
+            # falling through b puts every relay with a falling threshold above u down
+            if q <= y:
+                kept.append((p, q, e))
+            elif p >= y:
+                kept.append((p, q, 0.0))
+            else:
+                kept += [(p, y, e), (y, q, 0.0)]
+        pieces = kept
+    return sum((q - p) * e for p, q, e in pieces)
+
+
+class _Relays:
+    def __init__(self, block: Any, first: float) -> None:
+        self.block, self.way = block, [block.levels[0], first]
+
+    def go(self, u: float) -> float:
+        way = [*self.way, u]
+        if (way[-1] - way[-2]) * (way[-2] - way[-3]) >= 0 and len(way) > 2:
+            del way[-2]
+        self.way = [self.block.levels[0], *way] if len(way) < 2 else way
+        cells = _cells(self.block)
+        shares = [w * _relay_share(self.way, self.block.levels, i, j) for i, j, w in cells]
+        return float(self.block.offset + 2 * sum(shares))
+
+
+class _Ramps:
+    def __init__(self, block: Any, first: float) -> None:
+        self.block = block
+        self.states = [self.ramp(first, i) for i, _, _ in _cells(block)]
+
+    def ramp(self, u: float, k: int) -> float:
+        low, high = self.block.levels[k], self.block.levels[k + 1]
+        return float(min(max((u - low) / (high - low), 0.0), 1.0))
+
+    def moved(self, u: float) -> list[float]:
+        cells = zip(self.states, _cells(self.block), strict=True)
+        return [max(self.ramp(u, i), min(self.ramp(u, j), s)) for s, (i, j, _) in cells]
+
+    def output(self, u: float) -> float:
+        cells = zip(self.moved(u), _cells(self.block), strict=True)
+        return float(self.block.offset + sum(s * w for s, (_, _, w) in cells))
+
+    def go(self, u: float) -> float:
+        output = self.output(u)
+        self.states = self.moved(u)
+        return output
+
+
+# -- springs that slip, and differential equations in the input ------------------------------
+
+
+def _smooth(block: Any, u: float) -> float:
+    x = (u - block.centre) / block.scale
+    return math.fsum(c * x**power for power, c in enumerate(block.polynomial))
+
+
+class _Springs:
+    def __init__(self, block: Any, first: float) -> None:
+        self.block, self.previous = block, first
+        self.states = list(block.breakaways)
+
+    def moved(self, u: float) -> list[float]:
+        du, block = u - self.previous, self.block
+        if du >= 0:
+            return [min(s + du, r) for s, r in zip(self.states, block.breakaways, strict=True)]
+        kappa, ratio = block.stiffness_ratio, block.limit_ratio
+        pairs = zip(self.states, block.breakaways, strict=True)
+        return [max(s + kappa * du, -ratio * r) for s, r in pairs]
+
+    def output(self, u: float) -> float:
+        return _smooth(self.block, u) + _sum(self.block.weights, self.moved(u))
+
+    def go(self, u: float) -> float:
+        output = self.output(u)
+        self.states, self.previous = self.moved(u), u
+        return output
+
+
+STEPS = 200
+"""Runge-Kutta steps from sample to sample in the twins of differential equations."""
+
+STEPPED = {
+    "bouc-wen": 1000,
+    "bouc-wen-inverse": 10,
+    "duhem-inverse": 10,
+    "generalized-bouc-wen": 1000,
+    "generalized-bouc-wen-inverse": 30,
+    "multistate-friction": 1000,
+}
+"""Kinds whose twin steps through corners, or bisects over steps, and how many samples to compare."""
+
+STEP_ERROR = 1e-5
+"""Of those twins, relative to the output's range."""
+
+
+def _runge_kutta(slope: Callable[[float, float], float], y: float, u: float, end: float) -> float:
+    h = (end - u) / STEPS
+    for _ in range(STEPS):
+        k1 = slope(u, y)
+        k2 = slope(u + h / 2, y + h / 2 * k1)
+        k3 = slope(u + h / 2, y + h / 2 * k2)
+        k4 = slope(u + h, y + h * k3)
+        u, y = u + h, y + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
+    return y
+
+
+def _sign(x: float) -> float:
+    return math.copysign(1.0, x)
+
+
+class _BoucWen:
+    def __init__(self, block: Any, first: float) -> None:
+        self.block, self.previous, self.z = block, first, 1.0
+
+    def slope(self, u: float, z: float, going: float) -> float:
+        sigma = self.block.sigma
+        psi = sigma * _sign(z * going) + 1 - sigma
+        return float(self.block.rate * (1 - abs(z) ** self.block.exponent * psi))
+
+    def moved(self, u: float) -> float:
+        going = _sign(u - self.previous)
+        return _runge_kutta(lambda v, z: self.slope(v, z, going), self.z, self.previous, u)
+
+    def go(self, u: float) -> float:
+        self.z, self.previous = self.moved(u), u
+        return _smooth(self.block, u) + float(self.block.weight) * self.z
+
+
+class _GeneralizedBoucWen(_BoucWen):
+    def slope(self, u: float, z: float, going: float) -> float:
+        b, x = self.block.shape, _sign(u - self.block.centre)
+        s = _sign(z)
+        psi = s * going + b[0] * x * going + b[1] * x * s + b[2] * going + b[3] * s + b[4] * x
+        return float(self.block.rate * (1 - abs(z) ** self.block.exponent * psi))
+
+
+class _Duhem:
+    def __init__(self, block: Any, first: float) -> None:
+        self.block, self.previous = block, first
+        # a rise from far away ends on the curve that rising inputs tend to
+        far = first - 40 * block.scale / block.alpha
+        self.y = self.polynomial(block.target, far)
+        for k in range(40):
+            step = (first - far) / 40
+            self.y = self.along(far + k * step, far + (k + 1) * step)
+
+    def polynomial(self, coefficients: Any, u: float) -> float:
+        x = (u - self.block.centre) / self.block.scale
+        return math.fsum(c * x**power for power, c in enumerate(coefficients))
+
+    def along(self, start: float, end: float) -> float:
+        block, going = self.block, _sign(end - start)
+
+        def slope(u: float, y: float) -> float:
+            pull = block.alpha * going * (self.polynomial(block.target, u) - y)
+            return float((pull + self.polynomial(block.slope, u)) / block.scale)
+
+        return _runge_kutta(slope, self.y, start, end)
+
+    def go(self, u: float) -> float:
+        self.y, self.previous = self.along(self.previous, u), u
+        return self.y
+
+
+def stepping(model: Callable[[Any, float], Any]) -> Twin:
+    """Return the twin of a model that goes from input to input."""
+
+    def twin(block: Any, inputs: Rows, sample_time: float) -> Rows:
+        own = model(block, inputs[0][0])
+        return _rows([own.go(u) for u in _column(inputs)])
+
+    return twin
+
+
+# -- dynamic models --------------------------------------------------------------------------
+
+
+def transfer_function(block: Any, inputs: Rows, sample_time: float) -> Rows:
+    b, f = block.numerator, block.denominator
+    u = [row[0] - block.input_offset for row in inputs]
+    rest = u[0] * sum(b) / (1 + sum(f))
+    y: list[float] = []
+    for t in range(len(u)):
+        past_u = [u[t - k] if t >= k else u[0] for k in range(len(b))]
+        past_y = [y[t - k] if t >= k else rest for k in range(1, len(f) + 1)]
+        y.append(_sum(b, past_u) - _sum(f, past_y))
+    return _rows([value + block.output_offset for value in y])
+
+
+def process_model(block: Any, inputs: Rows, sample_time: float) -> Rows:
+    """Partial fractions of a P2UZ model whose poles are real, each integrated along straight lines."""
+    (w,), zeta, k, tz = block.time_constants, block.damping, block.gain, block.zero_time
+    root = math.sqrt(zeta * zeta - 1)
+    taus = [w * (zeta + root), w * (zeta - root)]
+    shares = [(tau - tz) / (tau - other) for tau, other in zip(taus, taus[::-1], strict=True)]
+    u = [row[0] - block.input_offset for row in inputs]
+    lags, previous = [u[0], u[0]], u[0]
+    outputs = []
+    for value in u:
+        slope = (value - previous) / sample_time
+        for i, tau in enumerate(taus):
+            ramp = value - tau * slope
+            start = previous - tau * slope
+            lags[i] = ramp + (lags[i] - start) * math.exp(-sample_time / tau)
+        previous = value
+        outputs.append(block.output_offset + k * _sum(tuple(shares), lags))
+    return _rows(outputs)
+
+
+def _narx(block: Any, inputs: Rows, function: Callable[[list[float]], float]) -> Rows:
+    (uc, us), (yc, ys) = block.input_scale, block.output_scale
+    x = [(row[0] - uc) / us for row in inputs]
+    start = block.initial_state(inputs[0])
+    past = [float(value) for value in start[: block.output_lags]][::-1]
+    operators = [x[0] - r for r in block.thresholds]
+    outputs = []
+    for t, now in enumerate(x):
+        operators = [_play(s, now, r) for s, r in zip(operators, block.thresholds, strict=True)]
+        lags = [past[-1 - k] for k in range(block.output_lags)]
+        given = [x[max(t - block.delay - k, 0)] for k in range(block.input_lags)]
+        past.append(function([*lags, *given, *operators]))
+        outputs.append(yc + ys * past[-1])
+    return _rows(outputs)
+
+
+def narx_polynomial(block: Any, inputs: Rows, sample_time: float) -> Rows:
+    def function(regressors: list[float]) -> float:
+        products = [math.prod(regressors[factor] for factor in term) for term in block.terms]
+        return _sum(block.weights, products)
+
+    return _narx(block, inputs, function)
+
+
+def narx_network(block: Any, inputs: Rows, sample_time: float) -> Rows:
+    def function(regressors: list[float]) -> float:
+        n = len(regressors)
+        y = block.bias + _sum(block.linear, regressors)
+        for first in range(0, len(block.hidden), n + 2):
+            *weights, shift, out = block.hidden[first : first + n + 2]
+            y += out * math.tanh(_sum(tuple(weights), regressors) + shift)
+        return float(y)
+
+    return _narx(block, inputs, function)
+
+
+def creep(block: Any, inputs: Rows, sample_time: float) -> Rows:
+    elements = [inputs[0][0]] * len(block.compliances)
+    outputs = []
+    for u in _column(inputs):
+        decays = [math.exp(-sample_time / tau) for tau in block.time_constants]
+        elements = [u + (x - u) * a for x, a in zip(elements, decays, strict=True)]
+        outputs.append(u + _sum(block.compliances, elements))
+    return _rows(outputs)
+
+
+def _crept(compliances: Any, elements: list[float], decays: list[float], u: float) -> float:
+    moved = [u + (x - u) * a for x, a in zip(elements, decays, strict=True)]
+    return u + _sum(compliances, moved)
+
+
+def creep_inverse(block: Any, inputs: Rows, sample_time: float) -> Rows:
+    forward = block.forward
+    elements = [inputs[0][0] / (1 + sum(forward.compliances))] * len(forward.compliances)
+    outputs = []
+    for y in _column(inputs):
+        decays = [math.exp(-sample_time / tau) for tau in forward.time_constants]
+
+        u = bisect(partial(_crept, forward.compliances, elements, decays), y, -1e3, 1e3)
+        elements = [u + (x - u) * a for x, a in zip(elements, decays, strict=True)]
+        outputs.append(u)
+    return _rows(outputs)
+
+
+# -- maps, and forces ------------------------------------------------------------------------
+
+
+def logarithm(block: Any, inputs: Rows, sample_time: float) -> Rows:
+    return _rows([math.log(u + block.offset) for u in _column(inputs)])
+
+
+def exponential(block: Any, inputs: Rows, sample_time: float) -> Rows:
+    return _rows([math.exp(u) - block.offset for u in _column(inputs)])
+
+
+def _braid_pressure(block: Any, displacement: float) -> float:
+    e = (displacement - block.offset) / block.rest_length
+    angle = block.braid_angle
+    geometry = 3 * (1 - e) ** 2 / math.tan(angle) ** 2 - 1 / math.sin(angle) ** 2
+    area = math.pi * block.diameter**2 / 4 * 0.1
+    force = block.load + block.stiffness * e + block.hardening * e**3
+    return float(force / (area * geometry))
+
+
+def braid_equilibrium(block: Any, inputs: Rows, sample_time: float) -> Rows:
+    low, high = (float(end[0]) for end in block.reachable())
+    pressures = _column(inputs)
+    return _rows([bisect(lambda x: _braid_pressure(block, x), p, low, high) for p in pressures])
+
+
+def braid_equilibrium_inverse(block: Any, inputs: Rows, sample_time: float) -> Rows:
+    return _rows([_braid_pressure(block.forward, x) for x in _column(inputs)])
+
+
+def polynomial_force(block: Any, inputs: Rows, sample_time: float) -> Rows:
+    outputs = []
+    for length, p in inputs:
+        x = (length - block.centre) / block.scale
+        pull = math.fsum(g * x**power for power, g in enumerate(block.per_bar))
+        outputs.append(p * pull + math.fsum(h * x**power for power, h in enumerate(block.elastic)))
+    return _rows(outputs)
+
+
+def chou_hannaford(block: Any, inputs: Rows, sample_time: float) -> Rows:
+    b, n = block.thread_length, block.turns
+    return _rows(
+        [
+            0.1 * p * (3 * length**2 - b**2) / (4 * math.pi * n**2) + block.constant
+            for length, p in inputs
+        ]
+    )
+
+
+def tondu_lopez(block: Any, inputs: Rows, sample_time: float) -> Rows:
+    outputs = []
+    area = math.pi * (block.diameter / 2) ** 2 * 0.1
+    tangent, sine = math.tan(block.braid_angle), math.sin(block.braid_angle)
+    for length, p in inputs:
+        e = 1 - length / block.rest_length
+        mu = block.mu[0] * math.exp(-40 * e) + block.mu[1]
+        kappa = block.kappa[0] * math.exp(-p) + block.kappa[1]
+        pull = 3 / tangent**2 * (1 - kappa * e) ** 2 - 1 / sine**2
+        outputs.append(mu * area * p * pull + block.constant)
+    return _rows(outputs)
+
+
+def _deflection_rate(numbers: tuple[float, ...], _: float, x: float) -> float:
+    k, sigma, limit, v = numbers
+    return (min(max(k * x + sigma * v, -limit), limit) - k * x) / sigma
+
+
+def multistate_friction(block: Any, inputs: Rows, sample_time: float) -> Rows:
+    """Runge-Kutta steps, so small that the stiffest element is followed."""
+    table = block.table().tolist()
+    states = [row[2] / row[0] if row[2] else 0.0 for row in table]
+    previous = inputs[0][0]
+    outputs = []
+    for length, _ in inputs:
+        v = (length - previous) / sample_time
+        previous = length
+        force = 0.0
+        for i, row in enumerate(table):
+            k, sigma, limit = row[:3] if v >= 0 else row[3:]
+            if limit == 0:
+                states[i] *= math.exp(-k * sample_time / sigma)
+                continue
+            rate = partial(_deflection_rate, (k, sigma, limit, v))
+            states[i] = _runge_kutta(rate, states[i], 0.0, sample_time)
+            force += min(max(k * states[i] + sigma * v, -limit), limit)
+        outputs.append(force)
+    return _rows(outputs)
+
+
+def _power(values: Any, x: float) -> float:
+    a, b, c, d = values
+    return float(a * x**3 + b * x**2 + c * x + d)
+
+
+def activation_pressure(block: Any, inputs: Rows, sample_time: float) -> Rows:
+    outputs = []
+    previous = inputs[0][0]
+    for e, force in inputs:
+        at = [_power(block.contractions[4 * j : 4 * j + 4], force) for j in range(4)]
+        heights = [_power(block.pressures[4 * j : 4 * j + 4], force) for j in range(4)]
+        # Newton's divided differences of the cubic through the four points
+        table = list(heights)
+        for order in range(1, 4):
+            for j in range(3, order - 1, -1):
+                table[j] = (table[j] - table[j - 1]) / (at[j] - at[j - order])
+        y = table[3]
+        for j in (2, 1, 0):
+            y = y * (e - at[j]) + table[j]
+        gamma = block.gamma[0] * block.frequency + block.gamma[1]
+        rate = (e - previous) / sample_time
+        outputs.append(y + gamma * _power(block.phi, force) * rate)
+        previous = e
+    return _rows(outputs)
+
+
+def activation_memory(block: Any, inputs: Rows, sample_time: float) -> Rows:
+    outputs = []
+    previous = inputs[0][0]
+    states = [previous - r for r in block.thresholds]
+    k = len(states)
+    for e, force in inputs:
+        x = (e - block.input_scale[0]) / block.input_scale[1]
+        f = (force - block.force_scale[0]) / block.force_scale[1]
+        states = [_play(s, e, r) for s, r in zip(states, block.thresholds, strict=True)]
+        powers = [
+            x**i * f**j for i in range(block.degree + 1) for j in range(block.force_degree + 1)
+        ]
+        stops = [e - s for s in states]
+        friction = _sum(block.friction[:k], stops) + f * _sum(block.friction[k:], stops)
+        rate = (e - previous) / sample_time
+        viscous = (block.viscosity[0] + block.viscosity[1] * f) * rate
+        outputs.append(_sum(block.surface, powers) + friction + viscous)
+        previous = e
+    return _rows(outputs)
+
+
+def _solved(model: Callable[[Any, float], Any]) -> Twin:
+    """Return the twin of an inverse: bisection on what the next output of a model would be."""
+
+    def twin(block: Any, inputs: Rows, sample_time: float) -> Rows:
+        forward = block.forward
+        low, high = forward.input_range
+        first = bisect(lambda u: float(model(forward, u).go(u)), inputs[0][0], low, high)
+        own = model(forward, first)
+        outputs = []
+        for y in _column(inputs):
+            outputs.append(bisect(lambda u: float(copy.copy(own).go(u)), y, low, high))
+            own.go(outputs[-1])
+        return _rows(outputs)
+
+    return twin
+
+
 TWINS: dict[str, Twin] = {
+    "activation-memory": activation_memory,
+    "activation-pressure": activation_pressure,
     "affine": affine,
+    "bouc-wen": stepping(_BoucWen),
+    "bouc-wen-inverse": _solved(_BoucWen),
+    "braid-equilibrium": braid_equilibrium,
+    "braid-equilibrium-inverse": braid_equilibrium_inverse,
+    "chou-hannaford": chou_hannaford,
+    "creep": creep,
+    "creep-inverse": creep_inverse,
+    "duhem": stepping(_Duhem),
+    "duhem-inverse": _solved(_Duhem),
     "eupi": eupi,
     "eupi-inverse": eupi_inverse,
+    "exponential": exponential,
+    "generalized-bouc-wen": stepping(_GeneralizedBoucWen),
+    "generalized-bouc-wen-inverse": _solved(_GeneralizedBoucWen),
     "gpi": gpi,
     "gpi-inverse": gpi_inverse,
+    "krasnoselskii-pokrovskii": stepping(_Ramps),
+    "krasnoselskii-pokrovskii-inverse": _solved(_Ramps),
+    "logarithm": logarithm,
+    "maxwell-slip": stepping(_Springs),
+    "maxwell-slip-inverse": _solved(_Springs),
+    "multistate-friction": multistate_friction,
+    "narx-network": narx_network,
+    "narx-polynomial": narx_polynomial,
     "negative": negative,
     "pi": pi,
     "pi-inverse": pi_inverse,
     "piecewise-linear": piecewise_linear,
     "play": play,
     "polynomial": polynomial,
+    "polynomial-force": polynomial_force,
     "polynomial-inverse": polynomial_inverse,
+    "preisach": stepping(_Relays),
+    "preisach-inverse": _solved(_Relays),
+    "process-model": process_model,
     "rate-dependent-pi": rate_dependent_pi,
     "rate-dependent-pi-inverse": rate_dependent_pi_inverse,
+    "tondu-lopez": tondu_lopez,
+    "transfer-function": transfer_function,
 }
 """Kind of block -> its twin."""

@@ -120,7 +120,9 @@ def test_every_public_name_is_there(name: str) -> None:
 
 
 def test_unknown_name_lists_the_known_ones() -> None:
-    with pytest.raises(ModelError, match=r"no block named .ip.*Remedy: use one of affine, eupi"):
+    with pytest.raises(
+        ModelError, match=r"no block named .ip.*Remedy: use one of activation-memory"
+    ):
         load("blocks", "ip")
 
 

@@ -260,7 +260,7 @@ class EUPIInverse(Inverse, Primitive):
         low, high = forward.input_range
 
         def output(u: float) -> float:
-            return float(forward.simulate([u], initial=start)[0])  # type: ignore[arg-type]
+            return float(forward.simulate([u], initial=start)[0])
 
         if output(low) < first < output(high):
             from scipy.optimize import brentq
@@ -268,7 +268,7 @@ class EUPIInverse(Inverse, Primitive):
             u = brentq(lambda u: output(u) - first, low, high, xtol=1e-15)
         else:
             u = low if first <= output(low) else high
-        state = forward.initial_state(np.array([u]), start)  # type: ignore[arg-type]
+        state = forward.initial_state(np.array([u]), start)
         return np.array([*state, u, 0.0])
 
     def state_from_forward(self, state: Array) -> Array:

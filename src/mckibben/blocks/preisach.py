@@ -64,9 +64,7 @@ def _place(u: float, levels: Array) -> tuple[int, float]:
 
 @kernel
 def everett(a: float, b: float, levels: Array, table: Array) -> float:
-    """Return the weight of all relays within b and a; ``table`` holds it at the levels, row by
-    row.
-    """
+    """Return the weight of all relays within b and a; ``table`` holds it at the levels, row by row."""
     n = levels.size
     i, x = _place(a, levels)
     j, y = _place(b, levels)
@@ -156,9 +154,7 @@ def preisach_kernel(coefficients: Array, state: Array, inputs: Array, outputs: A
 def preisach_inverse_kernel(
     coefficients: Array, state: Array, inputs: Array, outputs: Array
 ) -> None:
-    """Invert in closed form; coefficients as forward, the state's last number counts samples
-    clipped.
-    """
+    """Invert in closed form; coefficients as forward, the state's last number counts samples clipped."""
     n = int(coefficients[0])
     levels, table = coefficients[1 : 1 + n], coefficients[1 + n : 1 + n + n * n]
     last, y = state[2 + 2 * DEPTH], state[3 + 2 * DEPTH]

@@ -129,7 +129,7 @@ class Inverse(Block):
 
         An explicit state may be this block's own, or the forward block's.
         """
-        start = self.forward.initial if initial is None else initial
+        start: Initial = self.forward.initial if initial is None else initial
         if isinstance(start, str):
             return self.matching_state(float(first[0]), start)
         if len(start) == self.forward.n_states:

@@ -1,5 +1,4 @@
-"""Inverses without a closed form: one root a sample, for blocks whose output rises with their
-input.
+"""Inverses without a closed form: one root a sample, for blocks whose output rises with their input.
 
 The forward block gives two compiled functions: ``trial(u, memory)``, the output that an input would
 give, and ``advance(u, coefficients, state)``, which takes that step. The inverse takes the forward

@@ -132,9 +132,7 @@ class NarxPolynomial(Narx):
 
 
 def products(regressors: Array, terms: tuple[tuple[int, ...], ...]) -> Array:
-    """Return the terms at regressors of shape (k, number of regressors), shape (k, number of
-    terms).
-    """
+    """Return the terms at regressors of shape (k, number of regressors), shape (k, number of terms)."""
     found = np.ones((len(regressors), len(terms)))
     for column, term in enumerate(terms):
         for factor in term:

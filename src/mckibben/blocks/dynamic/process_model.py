@@ -1,5 +1,4 @@
-"""Continuous-time process models P1, P1Z, P2, P2Z, P2U, P2UZ and P3 with delay, discretised
-exactly.
+"""Continuous-time process models P1, P1Z, P2, P2Z, P2U, P2UZ and P3 with delay, discretised exactly.
 
 Y(s) / U(s) = K (Tz s + 1) / D(s) exp(-Td s), D(s) = (Tp1 s + 1) (Tp2 s + 1) (Tp3 s + 1), or, for a
 pair of poles that may oscillate (U), D(s) = Tw^2 s^2 + 2 zeta Tw s + 1. Names as in MATLAB; the
@@ -161,8 +160,7 @@ class ProcessModel(SingleChannel, NamedParameters, Primitive):
         return found
 
     def state_space(self) -> tuple[Array, Array, Array, float]:
-        """Return A, B, C and D of the lags without delay, in controllable form, x_1 being at rest
-        u.
+        """Return A, B, C and D of the lags without delay, in controllable form, x_1 being at rest u.
 
         The state is scaled so that x = (u, 0, ..., 0) at rest, which keeps digits of slow lags.
         """
@@ -245,8 +243,7 @@ class ProcessModel(SingleChannel, NamedParameters, Primitive):
 
 
 def held(a: Array, b: Array, step: float) -> tuple[Array, Array, Array]:
-    """Return how a state goes on over a step, and how much of the input at its start and end joins
-    it.
+    """Return how a state goes on over a step, and how much of the input at its start and end joins it.
 
     For x' = A x + B v with v going in a straight line: x+ = Phi x + G v_start + H v_end.
     """

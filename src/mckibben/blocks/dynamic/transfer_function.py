@@ -1,5 +1,4 @@
-"""Discrete transfer function: what ARX, ARMAX, output-error and Box-Jenkins models come to
-free-running.
+"""Discrete transfer function: what ARX, ARMAX, output-error and Box-Jenkins models come to free-running.
 
 y_t - y_0 = B(q) / F(q) (u_t - u_0),  B = b_0 + b_1 q^-1 + ...,  F = 1 + f_1 q^-1 + ...
 

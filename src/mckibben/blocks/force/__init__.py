@@ -1,3 +1,1 @@
-"""Force of a muscle by length and pressure: static laws, friction, and what pressure gives a
-force.
-"""
+"""Force of a muscle by length and pressure: static laws, friction, and what pressure gives a force."""

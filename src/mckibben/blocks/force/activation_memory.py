@@ -1,5 +1,4 @@
-"""Activation pressure by contraction and force with nonlocal memory, for use without knowing a
-frequency.
+"""Activation pressure by contraction and force with nonlocal memory, bound to no frequency.
 
 p = sum_ij c_ij x^i f^j + sum_k (a_k + b_k f) S_k[e] + (d_0 + d_1 f) e',
 

@@ -1,5 +1,4 @@
-"""Multistate friction: elasto-plastic elements whose numbers differ between lengthening and
-shortening.
+"""Multistate friction: elasto-plastic elements whose numbers differ between lengthening and shortening.
 
 With the rate v of the length, every element has a deflection x_i and numbers k, sigma and F_c that
 switch with the sign of v: x_i' = [sat(F_c, k x_i + sigma v) - k x_i] / sigma,  f = sum_i sat(F_c, k
@@ -183,9 +182,7 @@ class MultistateFriction(NamedParameters, Primitive):
         return len(self.elements) + 1
 
     def table(self) -> Array:
-        """Return k, sigma and F_c lengthening and shortening, shape (n, 6), F_c 0 where
-        inactive.
-        """
+        """Return k, sigma and F_c lengthening and shortening, shape (n, 6), F_c 0 where inactive."""
         rows, values = [], list(self.values)
         for element in self.elements:
             own, values = values[: SIZES[element]], values[SIZES[element] :]

@@ -14,9 +14,7 @@ REFERENCE = 4.0
 
 
 def static_force() -> PolynomialForce:
-    """Return the bilinear-quadratic law, Eq. (3) and Table 1: a_1 + a_3 l, and a_0 + a_2 l + a_4
-    l^2.
-    """
+    """Return the bilinear-quadratic law, Eq. (3) and Table 1: a_1 + a_3 l, and a_0 + a_2 l + a_4 l^2."""
     return PolynomialForce(per_bar=(-136.6, 1.176), elastic=(7596.0, -93.14, 0.2758))
 
 

@@ -190,11 +190,20 @@ class GeneralizedBoucWen(Ranged, NamedParameters, Primitive):
 
     def least_slope(self) -> float:
         """Return a lower bound of the slope of the output by the input."""
-        asymmetry = float(np.abs(self.shape).sum())
-        steepest = self.rate * (1.0 + (1.0 + asymmetry) * self.bound**self.exponent)
-        shallowest = -self.rate * ((1.0 + asymmetry) * self.bound**self.exponent - 1.0)
+        away = (1.0 + self.asymmetry) * self.bound**self.exponent - 1.0
+        shallowest = -self.rate * away
         reversible = least_slope(self.polynomial, self.centre, self.scale, self.limits)
-        return reversible + min(self.weight * shallowest, self.weight * steepest, 0.0)
+        return reversible + min(self.weight * shallowest, self.weight * self.steepest, 0.0)
+
+    @property
+    def asymmetry(self) -> float:
+        """Sum of the sizes of the shape numbers."""
+        return float(np.abs(self.shape).sum())
+
+    @property
+    def steepest(self) -> float:
+        """Largest slope of z by the input."""
+        return self.rate * (1.0 + (1.0 + self.asymmetry) * self.bound**self.exponent)
 
     @property
     def bound(self) -> float:

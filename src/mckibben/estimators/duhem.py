@@ -1,0 +1,84 @@
+"""Identification of the Duhem model."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Annotated
+
+import numpy as np
+from annotated_types import Interval
+from numpy.typing import NDArray
+
+from mckibben.blocks.base import Block
+from mckibben.blocks.differential.duhem import Duhem
+from mckibben.blocks.fields import vector
+from mckibben.estimators.data import Run, TrainingData
+from mckibben.estimators.separable import SeparableEstimator
+
+Array = NDArray[np.float64]
+
+
+@dataclass(kw_only=True, repr=False, eq=False)
+class DuhemEstimator(SeparableEstimator):
+    """Duhem model by variable projection: its output is linear in both polynomials.
+
+    Parameters
+    ----------
+    degree : int
+        Of the curve that the output tends to.
+    slope_degree : int
+        Of the slope right after a reversal.
+    """
+
+    nonnegative: bool = False
+    degree: Annotated[int, Interval(ge=1, le=9)] = 4
+    slope_degree: Annotated[int, Interval(ge=0, le=9)] = 3
+
+    def bounds(self, data: TrainingData) -> tuple[Array, Array]:
+        """Return bounds of [log alpha], alpha by half the input range."""
+        del data
+        return np.array([np.log(0.1)]), np.array([np.log(100.0)])
+
+    def guesses(self, data: TrainingData) -> list[Array]:
+        """Return a few rates."""
+        del data
+        return [np.array([np.log(alpha)]) for alpha in (0.5, 1.5, 4.0, 12.0)]
+
+    def unit(self, theta: Array, data: TrainingData) -> Duhem:
+        """Return the model with zero polynomials."""
+        low, high = data.input_range
+        half = 0.5 * (high - low)
+        return Duhem(
+            (0.0,) * (self.degree + 1),
+            (0.0,) * (self.slope_degree + 1),
+            float(np.exp(theta[0])),
+            low + half,
+            half,
+            data.input_range,
+            self.starting_rule,
+            **self.channels(data),
+        )
+
+    def basis(self, theta: Array, run: Run, data: TrainingData) -> Array:
+        """Return the output by each coefficient but the constant one, over the run's history."""
+        unit = self.unit(theta, data)
+        n = unit.n_parameters - 1
+        alone = np.column_stack([np.eye(n)[1:], np.full(n - 1, unit.alpha)])
+        return unit.simulate_many(alone, run.history).T
+
+    def build(self, theta: Array, linear: Array, offset: float, data: TrainingData) -> Block:
+        """Return the Duhem model."""
+        target = (offset, *linear[: self.degree].tolist())
+        return replace(
+            self.unit(theta, data), target=target, slope=vector(linear[self.degree :])
+        )
+
+    def parameter_bounds(self, data: TrainingData) -> tuple[Block, Array, Array]:
+        """Return the model of the first guess solved for, and bounds twice as far as it goes."""
+        theta = self.guesses(data)[1]
+        template = self.build(theta, *self._solve(theta, data), data)
+        values = template.pack()
+        span = np.maximum(np.abs(values), 0.1 * np.abs(values).max())
+        lower, upper = values - 2 * span, values + 2 * span
+        lower[-1], upper[-1] = 0.1, 100.0
+        return template, lower, upper

@@ -1,0 +1,108 @@
+"""Identification of the Maxwell-slip model, and of its modified, asymmetric form."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mckibben.blocks.base import Block
+from mckibben.blocks.fields import vector
+from mckibben.blocks.maxwell_slip import MaxwellSlip
+from mckibben.estimators.base import Operators
+from mckibben.estimators.data import Run, TrainingData
+from mckibben.estimators.loops import LoopEstimator
+from mckibben.estimators.thresholds import spread
+
+Array = NDArray[np.float64]
+
+MOST_UNEQUAL = np.log(4.0)
+
+
+@dataclass(kw_only=True, repr=False, eq=False)
+class MaxwellSlipEstimator(LoopEstimator):
+    """Maxwell-slip model by least squares.
+
+    Parameters
+    ----------
+    n_operators : int
+        Springs.
+    spacing : {"even", "dense"}
+        How the deflections at which they slip spread over half the input range.
+    """
+
+    n_operators: Operators = 8
+    spacing: Literal["even", "dense"] = "even"
+
+    def bounds(self, data: TrainingData) -> tuple[Array, Array]:
+        """Return nothing: every parameter is linear."""
+        del data
+        return np.empty(0), np.empty(0)
+
+    def guesses(self, data: TrainingData) -> list[Array]:
+        """Return nothing to guess."""
+        del data
+        return []
+
+    def shape_bounds(self, data: TrainingData) -> tuple[Array, Array]:
+        """Return bounds of both ratios."""
+        lower, upper = self.bounds(data)
+        return (np.exp(lower), np.exp(upper)) if lower.size else (np.ones(2), np.ones(2))
+
+    def springs(self, theta: Array, data: TrainingData) -> MaxwellSlip:
+        """Return the springs, without weights."""
+        low, high = data.input_range
+        limits = spread(self.n_operators + 1, high - low, self.spacing)[1:]
+        kappa, ratio = np.exp(theta) if theta.size else (1.0, 1.0)
+        nothing = (0.0,) * self.n_operators
+        return MaxwellSlip(
+            vector(limits), nothing, (0.0,), float(kappa), float(ratio), low, high - low
+        )
+
+    def loops(self, theta: Array, run: Run, data: TrainingData) -> tuple[Array, Array]:
+        """Return the deflections, and the bounds of their slopes."""
+        springs = self.springs(theta, data)
+        n = self.n_operators
+        columns = springs.simulate_many(
+            np.column_stack([np.eye(n), np.tile(springs.pack()[n:], (n, 1))]),
+            run.history,
+            initial=self.starting_rule,
+        )
+        low, high = data.input_range
+        return columns.T, np.full(n, (high - low) * max(1.0, springs.stiffness_ratio))
+
+    def assemble(
+        self, theta: Array, polynomial: Array, weights: Array, data: TrainingData
+    ) -> Block:
+        """Return the model."""
+        springs = self.springs(theta, data)
+        return MaxwellSlip(
+            springs.breakaways,
+            vector(weights),
+            vector(polynomial),
+            springs.stiffness_ratio,
+            springs.limit_ratio,
+            springs.centre,
+            springs.scale,
+            data.input_range,
+            self.starting_rule,
+            **self.channels(data),
+        )
+
+
+@dataclass(kw_only=True, repr=False, eq=False)
+class ModifiedMaxwellSlipEstimator(MaxwellSlipEstimator):
+    """Modified Maxwell-slip model: the two ratios of its directions are searched."""
+
+    def bounds(self, data: TrainingData) -> tuple[Array, Array]:
+        """Return bounds of the logarithms of both ratios."""
+        del data
+        most = np.full(2, MOST_UNEQUAL)
+        return -most, most
+
+    def guesses(self, data: TrainingData) -> list[Array]:
+        """Return the symmetric model, and slightly asymmetric ones."""
+        del data
+        return [np.array([a, b]) for a in (0.0, 0.3, -0.3) for b in (0.0, 0.3, -0.3)]

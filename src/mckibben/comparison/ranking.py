@@ -204,7 +204,10 @@ def _try_model(task: Task) -> tuple[Row, Array | None]:
         return estimator_class(**(names | dict(task.settings))).fit(recordings, rows=rows)
 
     # The folds come first: they load the compiled kernels, which the timed fit then finds ready.
-    validation = _validate(task, fitted)
+    try:
+        validation, unvalidated = _validate(task, fitted), None
+    except MckibbenError as error:  # a part of the data may be too little where all of it is enough
+        validation, unvalidated = None, str(error)
     split = task.split
     started = time.perf_counter()
     estimator = fitted(split.train, None)
@@ -219,6 +222,8 @@ def _try_model(task: Task) -> tuple[Row, Array | None]:
     ]
     diagnostics = asdict(estimator.diagnostics_)
     diagnostics.pop("covariance")
+    if unvalidated is not None:
+        diagnostics["validation_failed"] = unvalidated
     row = Row(
         model=task.model,
         n_parameters=block.n_parameters,

@@ -1,0 +1,130 @@
+"""Prediction errors of linear models, and their derivatives.
+
+A(q) y = B(q) / F(q) u + C(q) / D(q) e. Residuals are one-step prediction errors
+e = D / C (A y - B / F u - start), where start is the free response from the state before the first sample,
+one to each run, estimated with the rest. ARX has A and B, ARMAX A, B and C, output-error B and F,
+Box-Jenkins B, F, C and D.
+
+Source: Ljung, "System Identification", 1999, chapters 4 and 7.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mckibben.estimators.data import Run
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Orders:
+    """How many coefficients each polynomial has, beside the leading ones.
+
+    Parameters
+    ----------
+    b : int
+        Coefficients of B, at least 1.
+    a, f, c, d : int
+        Orders of the others.
+    delay : int
+        Samples before B's first coefficient.
+    """
+
+    b: int
+    a: int = 0
+    f: int = 0
+    c: int = 0
+    d: int = 0
+    delay: int = 0
+
+    @property
+    def poles(self) -> int:
+        """Order of the recursion from input to output: A or F, of which a model has one."""
+        return self.a + self.f
+
+    @property
+    def size(self) -> int:
+        """Parameters: B, poles, C, D and a constant."""
+        return self.b + self.poles + self.c + self.d + 1
+
+
+@dataclass(frozen=True)
+class Polynomials:
+    """The coefficients, those after the leading 1 where there is one, and the constant."""
+
+    b: Array
+    poles: Array
+    c: Array
+    d: Array
+    constant: float
+
+    @classmethod
+    def of(cls, theta: Array, orders: Orders) -> Polynomials:
+        """Return the polynomials of a parameter vector."""
+        sizes = np.cumsum([orders.b, orders.poles, orders.c, orders.d])
+        b, poles, c, d, rest = np.split(theta, sizes)
+        return cls(b, poles, c, d, float(rest[0]))
+
+
+def spectral_radius(tail: Array) -> float:
+    """Return the largest size of the roots of a polynomial with a leading 1."""
+    if tail.size == 0 or not np.isfinite(tail).all():
+        return 0.0 if tail.size == 0 else np.inf
+    return float(np.abs(np.roots([1.0, *tail])).max())
+
+
+def errors(theta: Array, orders: Orders, run: Run) -> tuple[Array, Array]:
+    """Return the prediction errors of a run without its start, and their derivatives by theta.
+
+    Returns
+    -------
+    errors : array, shape (n,)
+    jacobian : array, shape (n, size + poles)
+        By theta, then by the start of this run, in which the errors are linear.
+    """
+    from scipy.signal import lfilter
+
+    p = Polynomials.of(theta, orders)
+    poles, c, d = np.array([1.0, *p.poles]), np.array([1.0, *p.c]), np.array([1.0, *p.d])
+    n = run.u.size
+    u = run.u
+
+    def later(x: Array, samples: int) -> Array:
+        moved = np.zeros_like(x)
+        moved[samples:] = x[: x.size - samples] if samples else x
+        return moved
+
+    def by_noise(x: Array) -> Array:
+        return np.asarray(lfilter(d, c, x))
+
+    inputs = [later(u, orders.delay + i) for i in range(orders.b)]
+    driven = sum((b * x for b, x in zip(p.b, inputs, strict=True)), np.zeros(n))
+    impulses = [later(np.eye(1, n)[0], k) for k in range(orders.poles)]
+    if orders.a:
+        # equation error: the recursion is taken on measured outputs
+        gap = np.asarray(lfilter(poles, [1.0], run.y)) - driven - p.constant
+        e = by_noise(gap)
+        by_b = [-by_noise(x) for x in inputs]
+        by_poles = [by_noise(later(run.y, i + 1)) for i in range(orders.a)]
+        by_constant = -by_noise(np.ones(n))
+        starts = [-by_noise(x) for x in impulses]
+    else:
+        free = np.asarray(lfilter([1.0], poles, driven))
+        gap = run.y - free - p.constant
+        e = by_noise(gap)
+        by_b = [-by_noise(np.asarray(lfilter([1.0], poles, x))) for x in inputs]
+        behind = by_noise(np.asarray(lfilter([1.0], poles, free)))
+        by_poles = [later(behind, i + 1) for i in range(orders.f)]
+        by_constant = -by_noise(np.ones(n))
+        starts = [-by_noise(np.asarray(lfilter([1.0], poles, x))) for x in impulses]
+    whitened_e, whitened_gap = (
+        np.asarray(lfilter([1.0], c, e)),
+        np.asarray(lfilter([1.0], c, gap)),
+    )
+    by_c = [-later(whitened_e, i + 1) for i in range(orders.c)]
+    by_d = [later(whitened_gap, i + 1) for i in range(orders.d)]
+    return e, np.column_stack([*by_b, *by_poles, *by_c, *by_d, by_constant, *starts])

@@ -1,0 +1,81 @@
+"""Identification of the polynomial NARX model, without and with play operators."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated
+
+import numpy as np
+from annotated_types import Interval
+
+from mckibben.blocks.dynamic.narx import Narx
+from mckibben.blocks.dynamic.narx_polynomial import NarxPolynomial, products
+from mckibben.blocks.fields import vector
+from mckibben.errors import ModelError
+from mckibben.estimators.data import TrainingData
+from mckibben.estimators.narx.base import NarxEstimator
+from mckibben.estimators.narx.regressors import Lags
+from mckibben.estimators.narx.selection import candidate_terms, select
+from mckibben.estimators.search import Tracker
+
+MOST_CANDIDATES = 2000
+
+SELECTION_SAMPLES = 5000
+"""Samples on which terms are chosen."""
+
+
+@dataclass(kw_only=True, repr=False, eq=False)
+class NarxPolynomialEstimator(NarxEstimator):
+    """Polynomial NARX model: terms by forward orthogonal least squares, then free-run refinement.
+
+    Parameters
+    ----------
+    degree : int
+        Of the products of regressors.
+    n_terms : int
+        Most terms; half and a quarter of them are tried too, and the best free run kept.
+    """
+
+    degree: Annotated[int, Interval(ge=1, le=6)] = 3
+    n_terms: Annotated[int, Interval(ge=1, le=200)] = 16
+
+    def candidates(self, lags: Lags, data: TrainingData, tracker: Tracker) -> list[Narx]:
+        """Return models of the most telling terms: all that are allowed, half, and a quarter."""
+        del tracker
+        terms = candidate_terms(lags.size, self.degree)
+        if len(terms) > MOST_CANDIDATES:
+            raise ModelError(
+                f"{len(terms)} products of {lags.size} regressors are too many to choose from. "
+                "Remedy: use a lower degree, or fewer lags."
+            )
+        rule = self.starting_rule
+        pairs = [lags.table(run, rule) for run in data.runs]
+        regressors = np.concatenate([table for table, _ in pairs])
+        target = np.concatenate([target for _, target in pairs])
+        keep = np.linspace(0, len(target) - 1, min(len(target), SELECTION_SAMPLES)).astype(int)
+        regressors, target = regressors[keep], target[keep]
+        columns = products(regressors, terms)
+        order = select(columns, target, self.n_terms)
+        sizes = sorted({len(order), max(len(order) // 2, 1), max(len(order) // 4, 1)}, reverse=True)
+        models: list[Narx] = []
+        for size in sizes:
+            chosen = order[:size]
+            weights = np.linalg.lstsq(columns[:, chosen], target, rcond=1e-12)[0]
+            models.append(
+                NarxPolynomial(
+                    terms=tuple(terms[index] for index in chosen),
+                    weights=vector(weights),
+                    initial=rule,
+                    **lags.fields(data),
+                    **self.channels(data),
+                )
+            )
+        return models
+
+
+@dataclass(kw_only=True, repr=False, eq=False)
+class NarxPlayEstimator(NarxPolynomialEstimator):
+    """Polynomial NARX model with play operators among its regressors, so that it keeps its branch."""
+
+    n_play: Annotated[int, Interval(ge=0, le=20)] = 3
+    degree: Annotated[int, Interval(ge=1, le=6)] = 2

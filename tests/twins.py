@@ -676,7 +676,9 @@ def multistate_friction(block: Any, inputs: Rows, sample_time: float) -> Rows:
         for i, row in enumerate(table):
             k, sigma, limit = row[:3] if v >= 0 else row[3:]
             if limit == 0:
-                states[i] *= math.exp(-k * sample_time / sigma)
+                went = states[i] + v * sample_time
+                states[i] = min(went, 0.0) if v >= 0 else max(went, 0.0)
+                force += k * states[i]
                 continue
             rate = partial(_deflection_rate, (k, sigma, limit, v))
             states[i] = _runge_kutta(rate, states[i], 0.0, sample_time)
@@ -716,6 +718,7 @@ def activation_memory(block: Any, inputs: Rows, sample_time: float) -> Rows:
     previous = inputs[0][0]
     states = [previous - r for r in block.thresholds]
     k = len(states)
+    behind = [(previous - block.input_scale[0]) / block.input_scale[1]] * len(block.time_constants)
     for e, force in inputs:
         x = (e - block.input_scale[0]) / block.input_scale[1]
         f = (force - block.force_scale[0]) / block.force_scale[1]
@@ -727,7 +730,12 @@ def activation_memory(block: Any, inputs: Rows, sample_time: float) -> Rows:
         friction = _sum(block.friction[:k], stops) + f * _sum(block.friction[k:], stops)
         rate = (e - previous) / sample_time
         viscous = (block.viscosity[0] + block.viscosity[1] * f) * rate
-        outputs.append(_sum(block.surface, powers) + friction + viscous)
+        decays = [math.exp(-sample_time / tau) for tau in block.time_constants]
+        behind = [x + (b - x) * a for b, a in zip(behind, decays, strict=True)]
+        m = len(behind)
+        left = [b - x for b in behind]
+        relaxed = _sum(block.relaxation[:m], left) + f * _sum(block.relaxation[m:], left)
+        outputs.append(_sum(block.surface, powers) + friction + viscous + relaxed)
         previous = e
     return _rows(outputs)
 

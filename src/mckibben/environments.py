@@ -1,7 +1,8 @@
 """Gymnasium environments: follow a reference with a virtual rig.
 
 Importing this module registers ``mckibben/RIG-vVERSION`` for every published rig that measures
-displacement (Towers et al., "Gymnasium: A Standard Interface for Reinforcement Learning Environments").
+displacement (Towers et al., "Gymnasium: A Standard Interface for Reinforcement Learning
+Environments").
 
 >>> import gymnasium
 >>> import mckibben.environments
@@ -55,11 +56,11 @@ class Tracking(gymnasium.Env[Vector, Vector]):
 
     The reference is what the same rig did under hidden random commands, and so can be followed.
 
-    Action, shape (commands,), within -1 and 1: each pressure or voltage, from the lowest to the highest
-    that the hardware lets through, held for a control step.
+    Action, shape (commands,), within -1 and 1: each pressure or voltage, from the lowest to the
+    highest that the hardware lets through, held for a control step.
 
-    Observation, all near -1 to 1: displacement(s) over stroke; pressure(s) over the highest command;
-    the reference(s) over stroke, now and ``preview`` steps ahead; the last action.
+    Observation, all near -1 to 1: displacement(s) over stroke; pressure(s) over the highest
+    command; the reference(s) over stroke, now and ``preview`` steps ahead; the last action.
 
     Reward: minus the mean absolute error over stroke, minus ``effort`` times the mean square of the
     change of action.

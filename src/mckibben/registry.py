@@ -76,6 +76,12 @@ PLUGINS: dict[str, dict[str, str]] = {
         "tanh": "mckibben.blocks.envelopes.tanh:Tanh",
     },
     "estimators": {
+        "activation-memory": (
+            "mckibben.estimators.force.activation_memory:ActivationMemoryEstimator"
+        ),
+        "activation-pressure": (
+            "mckibben.estimators.force.activation_pressure:ActivationPressureEstimator"
+        ),
         "armax": "mckibben.estimators.linear.models:ARMAXEstimator",
         "arx": "mckibben.estimators.linear.models:ARXEstimator",
         "bj": "mckibben.estimators.linear.models:BoxJenkinsEstimator",
@@ -83,6 +89,12 @@ PLUGINS: dict[str, dict[str, str]] = {
         "cpi": "mckibben.estimators.creep_pi:CreepPIEstimator",
         "duhem": "mckibben.estimators.duhem:DuhemEstimator",
         "eupi": "mckibben.estimators.eupi:EUPIEstimator",
+        "force-bilinear": "mckibben.estimators.force.static:BilinearForceEstimator",
+        "force-chou": "mckibben.estimators.force.static:ChouHannafordEstimator",
+        "force-minh": "mckibben.estimators.force.static:MinhForceEstimator",
+        "force-petrovic": "mckibben.estimators.force.static:PetrovicForceEstimator",
+        "force-schindele": "mckibben.estimators.force.static:SchindeleForceEstimator",
+        "force-tondu": "mckibben.estimators.force.static:TonduLopezEstimator",
         "gbw": "mckibben.estimators.generalized_bouc_wen:GeneralizedBoucWenEstimator",
         "gpi": "mckibben.estimators.gpi:GPIEstimator",
         "grey-box": "mckibben.estimators.grey_box:GreyBoxEstimator",
@@ -90,6 +102,9 @@ PLUGINS: dict[str, dict[str, str]] = {
         "maxwell-slip": "mckibben.estimators.maxwell_slip:MaxwellSlipEstimator",
         "mms": "mckibben.estimators.maxwell_slip:ModifiedMaxwellSlipEstimator",
         "mpi": "mckibben.estimators.mpi:MPIEstimator",
+        "multistate": "mckibben.estimators.force.multistate:MultistateEachWayEstimator",
+        "multistate-11": "mckibben.estimators.force.multistate:MultistateEstimator",
+        "multistate-18": "mckibben.estimators.force.multistate:MultistateEighteenEstimator",
         "narx": "mckibben.estimators.narx.polynomial:NarxPolynomialEstimator",
         "narx-network": "mckibben.estimators.narx.network:NarxNetworkEstimator",
         "narx-play": "mckibben.estimators.narx.polynomial:NarxPlayEstimator",

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import replace
+from functools import cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -22,12 +25,25 @@ from mckibben import (
     RDPIEstimator,
     Recording,
 )
+from mckibben import load as load_model
 from mckibben.blocks.base import Block
+from mckibben.blocks.force.multistate_friction import MultistateFriction
+from mckibben.blocks.force.polynomial_force import PolynomialForce
+from mckibben.errors import ModelWarning
+from mckibben.estimators.searching import SearchingEstimator
 from mckibben.registry import load, names
 
 TIME = np.linspace(0, 1, 1500)
 PRESSURE = 2.5 * (1 - 0.7 * np.floor(6 * TIME).clip(0, 5) / 5) * (1 - np.cos(12 * np.pi * TIME))
 ESTIMATORS = names("estimators")
+OPERATORS = ("eupi", "gpi", "mpi", "pi", "rdpi")
+INVERTIBLE = (
+    *OPERATORS,
+    *("bouc-wen", "cpi", "gbw", "grey-box", "kp", "maxwell-slip", "mms", "preisach"),
+)
+SWARMS = tuple(n for n in ESTIMATORS if issubclass(load("estimators", n), SearchingEstimator))
+RISING = tuple(n for n in INVERTIBLE if load("estimators", n).rises)
+SLOW = ("narx", "narx-network", "narx-play")
 
 
 def recorded(block: Block, noise: float = 0.0, seed: int = 0) -> Recording:
@@ -42,8 +58,40 @@ def recorded(block: Block, noise: float = 0.0, seed: int = 0) -> Recording:
 def quick(name: str, **settings: Any) -> Any:
     """Return an estimator with settings that make it quick."""
     known = load("estimators", name)().get_params()
-    cheap = {"n_operators": 4, "n_starts": 4, "n_refined": 1, "rate_time_constant": 0.0}
+    cheap = {
+        "n_operators": 4,
+        "n_starts": 4,
+        "n_refined": 1,
+        "rate_time_constant": 0.0,
+        "n_levels": 5,
+        "n_units": 2,
+        "n_terms": 6,
+        "max_evaluations": 6,
+        "pso_particles": 6,
+        "pso_iterations": 4,
+    }
     return load("estimators", name)(**{k: v for k, v in cheap.items() if k in known} | settings)
+
+
+@cache
+def example_for(name: str) -> Recording:
+    """Return a recording with the channels that an estimator is made for."""
+    made_for = load("estimators", name).made_for
+    if made_for in (None, ("pressure", "displacement")):
+        return recorded(GPI.example(), 0.02)
+    rng = np.random.default_rng(1)
+    if made_for == ("length", "force"):
+        length = 200.0 - 3.0 * PRESSURE
+        given = Recording({"length": length, "pressure": 4.0 + 0.5 * np.sin(9 * TIME)}, 0.01)
+        friction = MultistateFriction.example().simulate(given, initial="virgin")["force"]
+        law = PolynomialForce((60.0, 20.0), (-20.0, 30.0), 192.0, 8.0).simulate(given)["force"]
+        force = friction + law + rng.standard_normal(TIME.size)
+        return given.with_channels(force=force)
+    contraction = 0.02 + 0.05 * PRESSURE
+    given = Recording({"contraction": contraction, "force": np.full(TIME.size, 100.0)}, 0.01)
+    friction = PI((0.0, 0.005, 0.02), (10.0, 3.0, 2.0), 0.5).simulate(contraction)
+    noise = 0.01 * rng.standard_normal(TIME.size)
+    return given.with_channels(pressure=friction + 20 * contraction**2 + noise)
 
 
 @pytest.fixture(scope="module")
@@ -53,19 +101,33 @@ def loop() -> Recording:
 
 
 @pytest.mark.parametrize("name", ESTIMATORS)
-def test_fit_returns_self_repeats_and_leaves_settings_and_data_alone(
-    name: str, loop: Recording
-) -> None:
-    estimator = quick(name)
-    before, samples = estimator.get_params(), loop["displacement"].copy()
+def test_fit_returns_self_repeats_and_leaves_settings_and_data_alone(name: str) -> None:
+    estimator, loop = quick(name), example_for(name)
+    before, samples = estimator.get_params(), loop[estimator.output].copy()
     assert estimator.fit(loop) is estimator
     assert estimator.get_params() == before
-    np.testing.assert_array_equal(samples, loop["displacement"])
+    np.testing.assert_array_equal(samples, loop[estimator.output])
     assert clone(estimator).fit([loop]).model_ == estimator.model_
     assert estimator.diagnostics_.n_samples == len(loop)
 
 
 @pytest.mark.parametrize("name", ESTIMATORS)
+def test_what_is_found_is_a_block_that_keeps_the_contract(name: str, tmp_path: Path) -> None:
+    estimator, loop = quick(name), example_for(name)
+    model = estimator.fit(loop).model_
+    model.save(tmp_path / "model.json")
+    assert load_model(tmp_path / "model.json") == model
+    stream = model.stream(loop.sample_time)
+    inputs = loop.matrix(channel.name for channel in model.inputs)
+    stepped = np.array([stream.step(row).copy() for row in inputs[:200]])
+    np.testing.assert_array_equal(
+        stepped[:, 0], model.simulate(loop.slice(0, 200))[estimator.output]
+    )
+    assert estimator.score(loop) > 0.3
+    assert model.n_parameters == model.pack().size
+
+
+@pytest.mark.parametrize("name", INVERTIBLE)
 def test_every_fit_can_be_inverted(name: str, loop: Recording) -> None:
     if name == "rdpi":
         loop = recorded(replace(RateDependentPI.example(), rate_weights=(0.01, 0.02, 0.01, 0.0)))
@@ -80,26 +142,31 @@ def test_every_fit_can_be_inverted(name: str, loop: Recording) -> None:
     assert error <= 1e-9 * (high - low)
 
 
-@pytest.mark.parametrize("name", ESTIMATORS)
+@pytest.mark.parametrize("name", SWARMS)
 @pytest.mark.parametrize("method", ["pso", "pso-ls"])
-def test_swarms_fit_too_and_repeat(name: str, method: str, loop: Recording) -> None:
-    settings = {"method": method, "pso_particles": 6, "pso_iterations": 4, "seed": 3}
-    first, second = (quick(name, **settings).fit(loop) for _ in range(2))
+def test_swarms_fit_too_and_repeat(name: str, method: str) -> None:
+    loop = example_for(name)
+    first, second = (quick(name, method=method, seed=3).fit(loop) for _ in range(2))
     assert first.model_ == second.model_
-    assert first.diagnostics_.rmse < 2 * np.ptp(loop["displacement"])
+    assert first.diagnostics_.rmse < 2 * np.ptp(loop[first.output])
 
 
 @pytest.mark.parametrize("name", ESTIMATORS)
-def test_outputs_that_do_not_count_are_never_looked_at(name: str, loop: Recording) -> None:
+def test_outputs_that_do_not_count_are_never_looked_at(name: str) -> None:
+    loop, output = example_for(name), quick(name).output
     mask = np.ones(len(loop), dtype=bool)
     mask[500:900] = False
-    spoilt = loop["displacement"].copy()
+    spoilt = loop[output].copy()
     spoilt[500:900] = 1e3
-    clean = quick(name).fit(loop, rows=[mask]).model_
-    assert quick(name).fit(loop.with_channels(displacement=spoilt), rows=[mask]).model_ == clean
+    settings = {"allow_unstable": True} if name in SLOW else {}
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ModelWarning)
+        clean = quick(name, **settings).fit(loop, rows=[mask]).model_
+        again = quick(name, **settings).fit(loop.with_channels(**{output: spoilt}), rows=[mask])
+    assert again.model_ == clean
 
 
-@pytest.mark.parametrize("name", ESTIMATORS)
+@pytest.mark.parametrize("name", OPERATORS)
 def test_bad_settings_and_bad_data_are_refused(name: str, loop: Recording) -> None:
     for setting, value in (
         *(("method", "magic"), ("initial", "yesterday"), ("n_operators", -1), ("n_operators", 2.5)),
@@ -141,18 +208,20 @@ def test_slope_rule_recovers_the_weights_of_a_clean_loop() -> None:
     assert fit.model_.offset == pytest.approx(truth.offset, rel=1e-6)
 
 
-@pytest.mark.parametrize("name", ESTIMATORS)
+@pytest.mark.parametrize("name", INVERTIBLE)
 def test_every_model_fits_data_of_its_own_making_to_the_noise(name: str, loop: Recording) -> None:
     truth = quick(name).fit(loop).model_
     again = quick(name, n_starts=16, n_refined=3).fit(recorded(truth, 0.02))
     assert again.diagnostics_.rmse < 0.021
 
 
-@pytest.mark.parametrize("name", ESTIMATORS)
+@pytest.mark.parametrize("name", RISING)
 def test_outputs_that_fall_are_fitted_like_those_that_rise(name: str, loop: Recording) -> None:
     length = loop.with_channels(length=200 - loop["displacement"])
     rising, falling = quick(name).fit(loop), quick(name, output="length").fit(length)
-    assert falling.diagnostics_.rmse == pytest.approx(rising.diagnostics_.rmse, rel=1e-3)
+    # the search of cpi has a flat valley, in which rounding decides where it ends
+    tolerance = 0.05 if name == "cpi" else 1e-3
+    assert falling.diagnostics_.rmse == pytest.approx(rising.diagnostics_.rmse, rel=tolerance)
     assert falling.model_.n_parameters == rising.model_.n_parameters
     low, high = (float(end[0]) for end in falling.model_.reachable())
     assert 150 < low < high < 250

@@ -54,8 +54,8 @@ class SolvedInverse(Inverse, Primitive):
         if not steepness > 0:
             raise ModelError(
                 f"{forward.kind!r} has no inverse: its output may fall while its input rises (least "
-                f"slope {steepness:.3g}). Remedy: identify it with invertible=true, or invert another "
-                "model."
+                f"slope {steepness:.3g}). Remedy: identify it with nonnegative=true where it has that "
+                "setting, or invert another model."
             )
 
     @property

@@ -45,6 +45,8 @@ def print_leaderboard(board: Leaderboard) -> None:
     for row in board.rows:
         if row.reason is not None:
             print(f"{row.model}: failed, {row.reason}")
+    if board.left_out:
+        print(f"Left out, made for other channels: {', '.join(board.left_out)}.")
 
 
 def write_leaderboard(board: Leaderboard, folder: Path) -> None:

@@ -45,7 +45,7 @@ def measured_start(block: Block, recording: Recording, output: str) -> Array:
 
     The candidates are memories of a single excursion: the input came down from a peak between the
     first sample and the highest of the block's range or the recording. The lowest peak that explains
-    the output is taken, so a model that has only risen starts from ``"first_sample"``.
+    the output is taken, so a model that has only risen starts from its own rule.
     """
     inputs = recording.matrix(channel.name for channel in block.inputs)
     first = inputs[0]
@@ -65,7 +65,7 @@ def measured_start(block: Block, recording: Recording, output: str) -> Array:
     def after(peak: float) -> tuple[float, Array]:
         history = np.repeat(first[np.newaxis], SETTLING + 1, axis=0)
         history[0, 0] = peak
-        state = block.initial_state(history[0], "first_sample")
+        state = block.initial_state(history[0], "first_sample" if peak > first[0] else None)
         outputs = np.empty((len(history), len(block.outputs)))
         block.bind(recording.sample_time or 1.0, state, history, outputs)()
         return abs(float(outputs[-1, place]) - measured), state

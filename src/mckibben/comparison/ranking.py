@@ -75,7 +75,7 @@ def compare(
     input, output : str
         Channels.
     models : "all" or sequence of str
-        Short names.
+        Short names; "all" leaves out models that are made for other channels.
     settings : mapping of str to mapping, optional
         Model name to settings of its estimator.
     n_folds : int
@@ -108,7 +108,7 @@ def compare(
         training_data([recordings[0], *tests], input, output)
     split = given_split(recordings, tests) if tests else held_out_tail(recordings, input, HELD_OUT)
     parts = tuple(folds(split.train, input, n_folds)) if n_folds >= 2 else ()
-    chosen = registry.names("estimators") if models == "all" else tuple(models)
+    chosen, left_out = _chosen(models, [*recordings, *tests], input, output)
     if jobs is not None and jobs < 1:
         raise ModelError(f"jobs is {jobs}. Remedy: give a number of at least 1, or leave it out.")
     if not chosen:
@@ -142,7 +142,26 @@ def compare(
         seed=seed,
         n_train=n_train,
         n_test=sum(lengths),
+        left_out=left_out,
     )
+
+
+def _chosen(
+    models: str | Sequence[str],
+    recordings: Sequence[Recording],
+    input: str,  # noqa: A002
+    output: str,
+) -> tuple[tuple[str, ...], dict[str, str]]:
+    """Return the models to try, and why others of "all" have no place on these recordings."""
+    if models != "all":
+        return tuple(models), {}
+    names = registry.names("estimators")
+    objections = {
+        name: registry.load("estimators", name).objection(recordings, input, output)
+        for name in names
+    }
+    left_out = {name: reason for name, reason in objections.items() if reason is not None}
+    return tuple(name for name in names if name not in left_out), left_out
 
 
 def _default_jobs(n_train: int) -> int:

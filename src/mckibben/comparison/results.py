@@ -130,6 +130,8 @@ class Leaderboard:
         The seed of everything random.
     n_train, n_test : int
         Samples.
+    left_out : mapping of str to str
+        Models that were not asked for by name and have no place on these channels, and why.
     """
 
     input: str
@@ -140,6 +142,7 @@ class Leaderboard:
     seed: int
     n_train: int
     n_test: int
+    left_out: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def best(self) -> Row | None:
@@ -156,6 +159,7 @@ class Leaderboard:
             "seed": self.seed,
             "n_train": self.n_train,
             "n_test": self.n_test,
+            "left_out": dict(self.left_out),
             "rows": [row.to_dict() for row in self.rows],
         }
 

@@ -85,8 +85,8 @@ class Estimator(BaseEstimator, ABC):  # type: ignore[misc]  # scikit-learn ships
         Channels to learn from.
     initial : {"first_sample", "virgin", "fitted"}
         Memory before the first sample of every recording: as if the input had only risen; as if
-        nothing had ever happened; or one number a recording fitted with the rest, the input from which
-        it came down.
+        nothing had ever happened; or one number a recording fitted with the rest, the input from
+        which it came down.
     seed : int
         Of everything random.
     """
@@ -279,8 +279,8 @@ def _sensitivity(
 ) -> tuple[float, Array]:
     """Return the condition of the parameters that are free, and the covariance of all.
 
-    From finite differences of the free-running output on a share of the samples. Parameters that are
-    fixed, or that the data do not determine, have NaN.
+    From finite differences of the free-running output on a share of the samples. Parameters that
+    are fixed, or that the data do not determine, have NaN.
     """
     parameters = block.pack()
     covariance = np.full((parameters.size, parameters.size), np.nan)

@@ -36,7 +36,7 @@ Array = NDArray[np.float64]
 FASTEST, SLOWEST = 3.0, 3.0
 """Of the time constants: samples, and durations of the longest run."""
 
-MOST_CREEP = 1.0
+MOST_CREEP = 0.3
 """Largest compliance of an element, relative to the immediate response."""
 
 
@@ -173,7 +173,7 @@ class CreepPIEstimator(SeparableEstimator):
         template = self.build(theta, *self._solve(theta, data), data)
         values = template.pack()
         span = np.maximum(np.abs(values), 0.1 * np.abs(values).max())
-        lower, upper = values - span, values + span
+        lower, upper = values - 0.3 * span, values + 0.3 * span
         # weights, compliances and time constants must stay positive
         n, k = self.n_operators, self.n_creep
         positive = [0, *range(1, n + 1), *range(values.size - 2 * k, values.size)]

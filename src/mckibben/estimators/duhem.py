@@ -69,9 +69,7 @@ class DuhemEstimator(SeparableEstimator):
     def build(self, theta: Array, linear: Array, offset: float, data: TrainingData) -> Block:
         """Return the Duhem model."""
         target = (offset, *linear[: self.degree].tolist())
-        return replace(
-            self.unit(theta, data), target=target, slope=vector(linear[self.degree :])
-        )
+        return replace(self.unit(theta, data), target=target, slope=vector(linear[self.degree :]))
 
     def parameter_bounds(self, data: TrainingData) -> tuple[Block, Array, Array]:
         """Return the model of the first guess solved for, and bounds twice as far as it goes."""

@@ -1,9 +1,9 @@
 """Models of a reversible, increasing polynomial and loops on top, linear in both.
 
-y = offset + sum_k a_k B_k(x) + sum_j w_j (s_j x - z_j) + sum_j v_j z_j, all of a, w and v at least 0, where x
-runs from 0 to 1 over the input's range, the B_k are integrals of Bernstein polynomials, the z_j are
-what the loops are made of, and s_j bounds the slope of z_j by x. Whatever the data, such a sum rises
-with its input, so it has an inverse; and loops may lag (w) or lead (v).
+y = offset + sum_k a_k B_k(x) + sum_j w_j (s_j x - z_j) + sum_j v_j z_j, all of a, w and v at least
+0, where x runs from 0 to 1 over the input's range, the B_k are integrals of Bernstein polynomials,
+the z_j are what the loops are made of, and s_j bounds the slope of z_j by x. Whatever the data,
+such a sum rises with its input, so it has an inverse; and loops may lag (w) or lead (v).
 """
 
 from __future__ import annotations
@@ -97,6 +97,4 @@ class LoopEstimator(SeparableEstimator):
 
 def _short(run: Run) -> Run:
     """Return the first samples of a run, enough to ask for bounds of slopes."""
-    return Run(
-        run.u[:2], run.y[:2], run.counts[:2], run.sample_time, run.scheduled[:2], run.peak
-    )
+    return Run(run.u[:2], run.y[:2], run.counts[:2], run.sample_time, run.scheduled[:2], run.peak)

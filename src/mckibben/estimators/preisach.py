@@ -78,8 +78,8 @@ class GridEstimator(SeparableEstimator):
         """Return the model without weights, and weights up to a share of the output's range."""
         template = self.grid(data)
         low, high = data.output_range
-        most = 4 * (high - low) / self.n_levels
         n = template.n_parameters - 1
+        most = 2 * (high - low) / n
         return template, np.array([*np.zeros(n), low - most]), np.array([*np.full(n, most), high])
 
 

@@ -162,10 +162,10 @@ def particle_swarm(
 ) -> Array:
     """Return the best point of a particle swarm within bounds.
 
-    Source: "High-Precision Displacement and Force Hybrid Modeling of Pneumatic Artificial Muscle Using
-    3D PI-NARMAX Model", Section 3.3: velocities from own and global best, inertia falling linearly.
-    Particles that leave the bounds stop at them, and none moves further than a fifth of the bounds at
-    a time.
+    Source: "High-Precision Displacement and Force Hybrid Modeling of Pneumatic Artificial Muscle
+    Using 3D PI-NARMAX Model", Section 3.3: velocities from own and global best, inertia falling
+    linearly. Particles that leave the bounds stop at them, and none moves further than a fifth of
+    the bounds at a time.
 
     Parameters
     ----------

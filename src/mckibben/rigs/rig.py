@@ -160,15 +160,16 @@ class Rig(Section, ABC):
         seed : int
             Of the sensor noise.
         ideal : bool
-            Read perfect sensors, and add ``volume`` [ml] and ``temperature`` [degC] of the muscle(s).
+            Read perfect sensors, and add ``volume`` [ml] and ``temperature`` [degC] of the
+            muscle(s).
         held : bool
             Hold each command until the next sample, as `step` does, rather than join them by lines.
 
         Returns
         -------
         Recording
-            On the grid of ``inputs``: what was measured, and inputs that have no sensor as they were
-            applied. ``meta["saturated"]`` counts samples whose command the hardware limited.
+            On the grid of ``inputs``: what was measured, and inputs that have no sensor as they
+            were applied. ``meta["saturated"]`` counts samples whose command the hardware limited.
 
         Raises
         ------

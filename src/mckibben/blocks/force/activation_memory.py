@@ -1,8 +1,10 @@
 """Activation pressure by contraction and force with nonlocal memory, bound to no frequency.
 
-p = sum_ij c_ij x^i f^j + sum_k (a_k + b_k f) S_k[e] + (d_0 + d_1 f) e',
+p = sum_ij c_ij x^i f^j + sum_k (a_k + b_k f) S_k[e] + (d_0 + d_1 f) e' + sum_m (g_m + h_m f) (x_m
+- x),
 
-x and f the centred and scaled contraction and force, S_k[e] = e - F_{r_k}[e] stop operators. Ours,
+x and f the centred and scaled contraction and force, S_k[e] = e - F_{r_k}[e] stop operators, and
+x_m what follows x with the time constant tau_m, as a visco-elastic muscle relaxes. Ours,
 beside the model of "Inverse Modeling of Nonlinear Artificial Muscle Using Polynomial
 Parameterization and Particle Swarm Optimization": dry friction is carried by the operators, which
 keep it while the muscle rests and through minor loops, so what is left for the rate is the same at
@@ -45,14 +47,16 @@ Array = NDArray[np.float64]
 def activation_memory_kernel(
     coefficients: Array, state: Array, inputs: Array, outputs: Array
 ) -> None:
-    """Run the model; the state is [play operators, previous contraction, filtered rate].
+    """Run the model; the state is [play operators, previous contraction, filtered rate, x_m].
 
     Coefficients are [smoothing, gain of the rate, contraction's centre and scale, force's centre
-    and scale, degree by contraction, degree by force, c row by row, thresholds, a, b, d].
+    and scale, degree by contraction, degree by force, number of x_m, c row by row, thresholds, a,
+    b, d, g, h, decays of x_m].
     """
-    n = state.size - 2
+    m = int(coefficients[8])
+    n = state.size - 2 - m
     degree, by_force = int(coefficients[6]), int(coefficients[7])
-    thresholds = 8 + (degree + 1) * (by_force + 1)
+    thresholds = 9 + (degree + 1) * (by_force + 1)
     weights = thresholds + n
     for t in range(inputs.shape[0]):
         e = inputs[t, 0]
@@ -63,13 +67,18 @@ def activation_memory_kernel(
         for i in range(degree, -1, -1):
             row = 0.0
             for j in range(by_force, -1, -1):
-                row = row * f + coefficients[8 + i * (by_force + 1) + j]
+                row = row * f + coefficients[9 + i * (by_force + 1) + j]
             p = p * x + row
         for k in range(n):
             r = coefficients[thresholds + k]
             state[k] = min(max(state[k], e - r), e + r)
             p += (coefficients[weights + k] + f * coefficients[weights + n + k]) * (e - state[k])
         p += (coefficients[weights + 2 * n] + f * coefficients[weights + 2 * n + 1]) * rate
+        for k in range(m):
+            place = weights + 2 * n + 2 + k
+            decay = coefficients[place + 2 * m]
+            state[n + 2 + k] = decay * state[n + 2 + k] + (1.0 - decay) * x
+            p += (coefficients[place] + f * coefficients[place + m]) * (state[n + 2 + k] - x)
         state[n], state[n + 1] = e, rate
         outputs[t, 0] = p
 
@@ -88,6 +97,10 @@ class ActivationMemory(NamedParameters, Primitive):
         a, then b [bar per contraction].
     viscosity : (float, float)
         d [bar s].
+    relaxation : sequence of float, length 2 M
+        g, then h [bar].
+    time_constants : sequence of float, length M
+        tau [s], positive.
     degree, force_degree : int
         Of the surface.
     input_scale, force_scale : (float, float)
@@ -103,12 +116,14 @@ class ActivationMemory(NamedParameters, Primitive):
     kind: ClassVar[str] = "activation-memory"
     kernel: ClassVar[Kernel] = activation_memory_kernel
     rate_dependent: ClassVar[bool] = True
-    parameters: ClassVar[tuple[str, ...]] = ("surface", "friction", "viscosity")
+    parameters: ClassVar[tuple[str, ...]] = ("surface", "friction", "viscosity", "relaxation")
 
     surface: Vector
     thresholds: Vector
     friction: Vector
     viscosity: tuple[FiniteFloat, FiniteFloat]
+    relaxation: Vector
+    time_constants: Vector
     degree: Annotated[int, Interval(ge=0, le=9)]
     force_degree: Annotated[int, Interval(ge=0, le=9)]
     input_scale: tuple[FiniteFloat, FiniteFloat]
@@ -132,6 +147,13 @@ class ActivationMemory(NamedParameters, Primitive):
                 f"the thresholds of {self.kind!r} are not 0 < r_0 < r_1 < ... "
                 "Remedy: sort them and drop repeated ones."
             )
+        if len(self.relaxation) != 2 * len(self.time_constants) or any(
+            tau <= 0 for tau in self.time_constants
+        ):
+            raise ModelError(
+                f"{self.kind!r} has {len(self.relaxation)} numbers of relaxation and the time constants "
+                f"{self.time_constants}. Remedy: give two to every positive time constant."
+            )
         if not (self.input_scale[1] > 0 and self.force_scale[1] > 0):
             raise ModelError(
                 f"{self.kind!r} has a scale that is not positive. Remedy: give (centre, half range)."
@@ -154,18 +176,20 @@ class ActivationMemory(NamedParameters, Primitive):
 
     @property
     def n_states(self) -> int:
-        """Operators, previous contraction, filtered rate."""
-        return len(self.thresholds) + 2
+        """Operators, previous contraction, filtered rate, and what follows."""
+        return len(self.thresholds) + 2 + len(self.time_constants)
 
     def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
-        """Return [operators, first contraction, 0]."""
+        """Return [operators, first contraction, 0, scaled first contraction]."""
         start = self.initial if initial is None else initial
+        if not isinstance(start, str):
+            return explicit_state(self, start)
         r = np.array(self.thresholds)
-        if start == "virgin":
-            return np.array([*np.full(r.size, first[0]), first[0], 0.0])
-        if isinstance(start, str):
-            return np.array([*named_state(start, r, first[0], first[0]), first[0], 0.0])
-        return explicit_state(self, start)
+        operators = np.full(r.size, first[0])
+        if start == "first_sample":
+            operators = named_state(start, r, first[0], first[0])
+        x = (first[0] - self.input_scale[0]) / self.input_scale[1]
+        return np.array([*operators, first[0], 0.0, *[x] * len(self.time_constants)])
 
     def coefficients(self, sample_time: float | None) -> Array:
         """Return what the kernel reads.
@@ -179,8 +203,10 @@ class ActivationMemory(NamedParameters, Primitive):
         tau = self.rate_time_constant
         smoothing = math.exp(-step / tau) if tau > 0 else 0.0
         head = [smoothing, (1 - smoothing) / step, *self.input_scale, *self.force_scale]
-        tail = [*self.thresholds, *self.friction, *self.viscosity]
-        return np.array([*head, self.degree, self.force_degree, *self.surface, *tail])
+        counts = [self.degree, self.force_degree, len(self.time_constants)]
+        decays = np.exp(-step / np.array(self.time_constants))
+        tail = [*self.thresholds, *self.friction, *self.viscosity, *self.relaxation, *decays]
+        return np.array([*head, *counts, *self.surface, *tail])
 
     def inverse(self) -> Block:
         """Refuse: this model is itself the inverse of a muscle."""
@@ -193,6 +219,14 @@ class ActivationMemory(NamedParameters, Primitive):
     def example(cls) -> Self:
         """Return a model for contractions and forces of a few units."""
         return cls(
-            *((2.0, 0.5, 1.5, 0.1, 0.2, 0.0), (0.2, 0.8), (0.3, 0.2, 0.1, 0.0), (0.05, 0.01)),
-            *(2, 1, (2.5, 2.5), (2.5, 2.5)),
+            surface=(2.0, 0.5, 1.5, 0.1, 0.2, 0.0),
+            thresholds=(0.2, 0.8),
+            friction=(0.3, 0.2, 0.1, 0.0),
+            viscosity=(0.05, 0.01),
+            relaxation=(0.1, 0.02),
+            time_constants=(0.5,),
+            degree=2,
+            force_degree=1,
+            input_scale=(2.5, 2.5),
+            force_scale=(2.5, 2.5),
         )

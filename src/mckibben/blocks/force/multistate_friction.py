@@ -11,8 +11,9 @@ shortens; that of eighteen has three in both directions.
 
 k / sigma is thousands per second, so nothing is stepped: over a sample v is constant, and while an
 element sticks x grows with v, while it slips x tends to F_c / k as an exponential, and the time at
-which one ends is in closed form. An element that acts in one direction only is released in the
-other: it gives no force, and its deflection fades by exp(-k t / sigma).
+which one ends is in closed form. An element that acts in one direction only is unloaded by
+motion in the other: its spring goes back with the length until it is slack, and its force with it. (The
+paper leaves this open; without, the force would jump at every reversal.)
 
 Ours: friction may grow in proportion to pressure, f (1 + pressure_gain (p - reference));
 pressure_gain 0 is the paper's model.
@@ -50,6 +51,7 @@ Array = NDArray[np.float64]
 Direction = Literal["shared", "both", "lengthening", "shortening"]
 SIZES: dict[str, int] = {"shared": 5, "both": 6, "lengthening": 3, "shortening": 3}
 ELEVEN: tuple[Direction, ...] = ("shared", "shortening", "shortening")
+EACH_WAY: tuple[Direction, ...] = ("shared", "lengthening", "shortening")
 EIGHTEEN: tuple[Direction, ...] = ("both", "both", "both")
 
 
@@ -97,8 +99,9 @@ def multistate_friction_kernel(
             place = first + 6 * i
             limit = coefficients[place + 2]
             if limit == 0.0:
-                other = 9 - first + 6 * i
-                state[i] *= math.exp(-coefficients[other] * step / coefficients[other + 1])
+                x = state[i] + v * step
+                state[i] = min(x, 0.0) if sign > 0.0 else max(x, 0.0)
+                force += coefficients[9 - first + 6 * i] * state[i]
                 continue
             k, sigma = coefficients[place], coefficients[place + 1]
             x = sign * deflected(sign * state[i], sign * v, step, k, sigma, limit)

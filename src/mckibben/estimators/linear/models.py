@@ -15,7 +15,7 @@ from mckibben.blocks.dynamic.transfer_function import TransferFunction
 from mckibben.blocks.fields import vector
 from mckibben.errors import DataError, ModelError
 from mckibben.estimators.base import Estimator
-from mckibben.estimators.data import TrainingData
+from mckibben.estimators.data import Run, TrainingData
 from mckibben.estimators.linear.polynomials import Orders, Polynomials
 from mckibben.estimators.linear.prediction_error import (
     arx,
@@ -37,6 +37,25 @@ class Noise:
     numerator: tuple[float, ...]
     denominator: tuple[float, ...]
     deviation: float
+
+
+def stretches(run: Run, shortest: int) -> list[Run]:
+    """Return the stretches of a run whose samples all count, each to be started on its own.
+
+    Predictions feed on outputs before them, which may not be looked at where they do not count.
+    """
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], run.counts, [False]])))
+    return [
+        Run(
+            run.u[start:stop],
+            run.y[start:stop],
+            run.counts[start:stop],
+            run.sample_time,
+            run.scheduled[start:stop],
+        )
+        for start, stop in edges.reshape(-1, 2)
+        if stop - start > shortest
+    ]
 
 
 @dataclass(kw_only=True, repr=False, eq=False)
@@ -87,7 +106,11 @@ class PredictionErrorEstimator(Estimator):
             )
         centre = float(np.mean(np.concatenate([run.u for run in data.runs])))
         middle = float(np.mean(data.target))
-        runs = [replace(run, u=run.u - centre, y=run.y - middle) for run in data.runs]
+        runs = [
+            replace(piece, u=piece.u - centre, y=piece.y - middle)
+            for run in data.runs
+            for piece in stretches(run, orders.size)
+        ]
         if orders.c == orders.d == orders.f == 0:
             theta = arx(runs, orders)
             tracker.saw(theta, evaluate(theta, orders, runs)[2])

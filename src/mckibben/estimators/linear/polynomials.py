@@ -1,9 +1,9 @@
 """Prediction errors of linear models, and their derivatives.
 
 A(q) y = B(q) / F(q) u + C(q) / D(q) e. Residuals are one-step prediction errors
-e = D / C (A y - B / F u - start), where start is the free response from the state before the first sample,
-one to each run, estimated with the rest. ARX has A and B, ARMAX A, B and C, output-error B and F,
-Box-Jenkins B, F, C and D.
+e = D / C (A y - B / F u - start), where start is the free response from the state before the first
+sample, one to each run, estimated with the rest. ARX has A and B, ARMAX A, B and C, output-error B
+and F, Box-Jenkins B, F, C and D.
 
 Source: Ljung, "System Identification", 1999, chapters 4 and 7.
 """

@@ -1,9 +1,9 @@
 """Prediction-error minimisation: Gauss-Newton with damping, from many starts, stable at every step.
 
-The start of every run is linear in the errors and solved for in each evaluation, so the search runs in the
-polynomials alone. A step that would leave the stable region is shortened. Several starts guard against
-local minima: the high-order ARX model reduced by Steiglitz and McBride's iteration, slow and fast lags,
-and random stable poles; the best of all is kept.
+The start of every run is linear in the errors and solved for in each evaluation, so the search
+runs in the polynomials alone. A step that would leave the stable region is shortened. Several
+starts guard against local minima: the high-order ARX model reduced by Steiglitz and McBride's
+iteration, slow and fast lags, and random stable poles; the best of all is kept.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ def admissible(theta: Array, orders: Orders) -> bool:
 
 
 def evaluate(theta: Array, orders: Orders, runs: Sequence[Run]) -> tuple[Array, Array, float]:
-    """Return errors and derivatives with every start solved for, at the samples that count, and the RMSE."""
+    """Return errors, derivatives with every start solved for, and the RMSE, where samples count."""
     found, slopes = [], []
     for run in runs:
         e, jacobian = errors(theta, orders, run)
@@ -119,11 +119,14 @@ def starting_points(runs: Sequence[Run], orders: Orders, n_starts: int, seed: in
     candidates = [_steiglitz_mcbride(runs, orders, rounds) for rounds in (0, 1, 3, 10)]
     speeds = [np.array([0.2]), np.array([0.9]), np.array([0.99, 0.9]), np.array([0.9995, 0.97])]
     for speed in speeds:
-        candidates.append(np.poly(np.resize(speed, n) * (1 - 1e-3 * np.arange(n)))[1:])
+        spread = np.resize(speed, n) * (1 - 1e-3 * np.arange(n))
+        candidates.append(np.asarray(np.poly(spread)[1:], dtype=np.float64))
     while len(candidates) < n_starts:
         poles = 1 - 10 ** rng.uniform(-4, 0, n)
-        candidates.append(np.poly(poles)[1:])
-    return [_complete(poles, runs, orders) for poles in candidates if spectral_radius(poles) < STABLE]
+        candidates.append(np.asarray(np.poly(poles)[1:], dtype=np.float64))
+    return [
+        _complete(poles, runs, orders) for poles in candidates if spectral_radius(poles) < STABLE
+    ]
 
 
 def _complete(poles: Array, runs: Sequence[Run], orders: Orders) -> Array:

@@ -137,7 +137,7 @@ class P1Estimator(ProcessModelEstimator):
 
     @property
     def structure(self) -> Structure:
-        """MATLAB\'s name."""
+        """MATLAB's name."""
         return "P1"
 
 
@@ -147,7 +147,7 @@ class P1ZEstimator(ProcessModelEstimator):
 
     @property
     def structure(self) -> Structure:
-        """MATLAB\'s name."""
+        """MATLAB's name."""
         return "P1Z"
 
 
@@ -157,7 +157,7 @@ class P2Estimator(ProcessModelEstimator):
 
     @property
     def structure(self) -> Structure:
-        """MATLAB\'s name."""
+        """MATLAB's name."""
         return "P2"
 
 
@@ -167,7 +167,7 @@ class P2ZEstimator(ProcessModelEstimator):
 
     @property
     def structure(self) -> Structure:
-        """MATLAB\'s name."""
+        """MATLAB's name."""
         return "P2Z"
 
 
@@ -177,7 +177,7 @@ class P2UEstimator(ProcessModelEstimator):
 
     @property
     def structure(self) -> Structure:
-        """MATLAB\'s name."""
+        """MATLAB's name."""
         return "P2U"
 
 
@@ -190,7 +190,7 @@ class P2UZEstimator(ProcessModelEstimator):
 
     @property
     def structure(self) -> Structure:
-        """MATLAB\'s name."""
+        """MATLAB's name."""
         return "P2UZ"
 
 
@@ -200,5 +200,5 @@ class P3Estimator(ProcessModelEstimator):
 
     @property
     def structure(self) -> Structure:
-        """MATLAB\'s name."""
+        """MATLAB's name."""
         return "P3"

@@ -6,8 +6,9 @@ import warnings
 from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import pairwise
-from typing import Annotated, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from annotated_types import Interval
@@ -67,6 +68,10 @@ class NarxEstimator(Estimator):
 
     rises: ClassVar[bool] = False
 
+    def fields(self, lags: Lags, data: TrainingData) -> dict[str, Any]:
+        """Return the fields that all NARX blocks have."""
+        return lags.fields(data) | {"initial": self.starting_rule} | self.channels(data)
+
     @abstractmethod
     def candidates(self, lags: Lags, data: TrainingData, tracker: Tracker) -> list[Narx]:
         """Return models fitted to one-step errors, the most promising first."""
@@ -116,19 +121,9 @@ class NarxEstimator(Estimator):
         """
         from scipy.optimize import least_squares
 
-        half = model.output_scale[1]
         for horizon in (*HORIZONS, None):
             pieces = segments(model, data, horizon)
-
-            def residuals(parameters: Array, pieces: Sequence[Segment] = tuple(pieces)) -> Array:
-                try:
-                    errors = segment_errors(model.unpack(parameters), data, pieces) / half
-                except KeyboardInterrupt:
-                    raise Interrupted from None
-                errors = np.clip(np.nan_to_num(errors, nan=FAR, posinf=FAR, neginf=-FAR), -FAR, FAR)
-                tracker.saw(parameters, rms(errors) * half)
-                return errors
-
+            residuals = partial(_residuals, model, data, pieces, tracker)
             start = model.pack()
             found = least_squares(
                 residuals,
@@ -140,6 +135,19 @@ class NarxEstimator(Estimator):
             )
             model = model.unpack(found.x)
         return model
+
+
+def _residuals(
+    model: Narx, data: TrainingData, pieces: Sequence[Segment], tracker: Tracker, parameters: Array
+) -> Array:
+    half = model.output_scale[1]
+    try:
+        errors = segment_errors(model.unpack(parameters), data, pieces) / half
+    except KeyboardInterrupt:
+        raise Interrupted from None
+    errors = np.clip(np.nan_to_num(errors, nan=FAR, posinf=FAR, neginf=-FAR), -FAR, FAR)
+    tracker.saw(parameters, rms(errors) * half)
+    return errors
 
 
 @dataclass(frozen=True)

@@ -45,8 +45,7 @@ class NarxNetworkEstimator(NarxEstimator):
         """Return networks fitted to one-step errors by variable projection, one a start."""
         from scipy.optimize import least_squares
 
-        rule = self.starting_rule
-        pairs = [lags.table(run, rule) for run in data.runs]
+        pairs = [lags.table(run, self.starting_rule) for run in data.runs]
         x = np.concatenate([table for table, _ in pairs])
         y = np.concatenate([target for _, target in pairs])
         keep = np.linspace(0, len(y) - 1, min(len(y), ONE_STEP_SAMPLES)).round().astype(int)
@@ -67,10 +66,13 @@ class NarxNetworkEstimator(NarxEstimator):
             )[0]
             return weights, columns @ weights - y
 
+        def residuals(first: Array) -> Array:
+            return solved(first)[1]
+
         models: list[Narx] = []
         for _ in range(self.n_starts):
             first = rng.normal(0.0, 1.0, units * (n + 1))
-            found = least_squares(lambda theta: solved(theta)[1], first, max_nfev=15, ftol=1e-6)
+            found = least_squares(residuals, first, max_nfev=15, ftol=1e-6)
             tracker.evaluations += int(found.nfev)
             weights, _ = solved(found.x)
             layer = found.x.reshape(units, n + 1)
@@ -81,9 +83,7 @@ class NarxNetworkEstimator(NarxEstimator):
                     linear=vector(weights[1 : 1 + n]),
                     hidden=vector(hidden.ravel()),
                     activation=self.activation,
-                    initial=rule,
-                    **lags.fields(data),
-                    **self.channels(data),
+                    **self.fields(lags, data),
                 )
             )
         return models

@@ -48,8 +48,7 @@ class NarxPolynomialEstimator(NarxEstimator):
                 f"{len(terms)} products of {lags.size} regressors are too many to choose from. "
                 "Remedy: use a lower degree, or fewer lags."
             )
-        rule = self.starting_rule
-        pairs = [lags.table(run, rule) for run in data.runs]
+        pairs = [lags.table(run, self.starting_rule) for run in data.runs]
         regressors = np.concatenate([table for table, _ in pairs])
         target = np.concatenate([target for _, target in pairs])
         keep = np.linspace(0, len(target) - 1, min(len(target), SELECTION_SAMPLES)).astype(int)
@@ -65,9 +64,7 @@ class NarxPolynomialEstimator(NarxEstimator):
                 NarxPolynomial(
                     terms=tuple(terms[index] for index in chosen),
                     weights=vector(weights),
-                    initial=rule,
-                    **lags.fields(data),
-                    **self.channels(data),
+                    **self.fields(lags, data),
                 )
             )
         return models

@@ -1,7 +1,7 @@
 """Forward orthogonal least squares: terms chosen one by one by how much of the output they explain.
 
-Source: Chen, Billings and Luo, "Orthogonal least squares methods and their application to non-linear system
-identification", 1989 (error reduction ratio).
+Source: Chen, Billings and Luo, "Orthogonal least squares methods and their application to
+non-linear system identification", 1989 (error reduction ratio).
 """
 
 from __future__ import annotations

@@ -1,0 +1,1 @@
+"""Identification of forces: static laws, friction, and activation pressure."""

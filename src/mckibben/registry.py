@@ -120,6 +120,11 @@ PLUGINS: dict[str, dict[str, str]] = {
         "preisach": "mckibben.estimators.preisach:PreisachEstimator",
         "rdpi": "mckibben.estimators.rdpi:RDPIEstimator",
     },
+    "papers": {
+        "activation-pressure": "mckibben.papers.activation_pressure:activation_pressure",
+        "field-models": "mckibben.papers.field_models:field_models",
+        "multistate-friction": "mckibben.papers.multistate_friction:multistate_friction",
+    },
     "protocols": {
         "activation-pressure": "mckibben.signals.protocols.activation_pressure:activation_pressure",
         "field-models": "mckibben.signals.protocols.field_models:field_models",

@@ -22,6 +22,7 @@ LAYERS = (
     {"estimators"},
     {"compensators"},
     {"comparison"},
+    {"papers"},
     {"report"},
     {"cli"},
 )

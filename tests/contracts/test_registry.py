@@ -107,6 +107,7 @@ def test_every_group_is_checked_here() -> None:
         "blocks",
         "envelopes",
         "estimators",
+        "papers",
         "protocols",
         "published",
         "setups",

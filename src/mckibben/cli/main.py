@@ -20,6 +20,7 @@ from mckibben.cli.info import info
 from mckibben.cli.invert import invert
 from mckibben.cli.output import InterruptionError
 from mckibben.cli.plot import plot
+from mckibben.cli.reproduce import reproduce
 from mckibben.cli.rig import app as rig_app
 from mckibben.cli.simulate import simulate
 from mckibben.cli.study import study
@@ -37,7 +38,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
-for command in (study, characterize, fit, compare, simulate, invert, plot, info):
+for command in (study, characterize, fit, compare, simulate, invert, plot, reproduce, info):
     app.command()(command)
 app.add_typer(rig_app)
 

@@ -127,13 +127,17 @@ def play_operators(u: Array, radii: Array, rule: str) -> Array:
 
 
 def _longest_rise(data: TrainingData) -> tuple[Run, int, int]:
-    """Return the run and the samples of the branch that rises furthest, all of it counting."""
+    """Return the run and the samples of the branch that rises furthest, all of it counting.
+
+    A rise after a fall goes before one at the start of a run, where operators may all have risen
+    already and there are no slopes to tell them apart by.
+    """
     from mckibben.signals import branches
 
-    best: tuple[float, Run, int, int] | None = None
+    best: tuple[tuple[bool, float], Run, int, int] | None = None
     for run in data.runs:
         for start, stop, direction in branches(run.u):
-            height = float(np.ptp(run.u[start:stop]))
+            height = (start > 0, float(np.ptp(run.u[start:stop])))
             if (
                 direction > 0
                 and run.counts[start:stop].all()

@@ -5,5 +5,6 @@ twice: for the page (`interactive`) and for print (`printed`).
 """
 
 from mckibben.report.page import write_report
+from mckibben.report.reproduction import write_reproduction
 
-__all__ = ["write_report"]
+__all__ = ["write_report", "write_reproduction"]

@@ -1,0 +1,122 @@
+"""mckibben reproduce: a paper's experiment again, its printed tables beside ours."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from mckibben.cli.options import Gaps, Jobs, Json, Reading, Seed
+from mckibben.cli.output import figure, make_folder, print_json, print_table, progress_bar, to_json
+from mckibben.errors import DataError
+
+if TYPE_CHECKING:
+    from mckibben.papers import Reproduction
+    from mckibben.recording import Recording
+
+
+def reproduce(
+    name: Annotated[str | None, typer.Argument(help="Paper, by short name; see --list.")] = None,
+    listed: Annotated[bool, typer.Option("--list", help="List the papers.")] = False,
+    quick: Annotated[bool, typer.Option("--quick", help="Leave out what takes long.")] = False,
+    train: Annotated[
+        Path | None,
+        typer.Option("--train", metavar="FILE", help="field-models only: your calibration run."),
+    ] = None,
+    test: Annotated[
+        Path | None,
+        typer.Option("--test", metavar="FILE", help="field-models only: your test run."),
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option("-o", "--out", help="Folder for report.html and tables.json.")
+    ] = None,
+    seed: Seed = 0,
+    jobs: Jobs = None,
+    as_json: Json = False,
+) -> None:
+    """Run a paper's protocol on its rig: its methods as published, ours, and its tables beside."""
+    if listed:
+        _list(as_json)
+        return
+    if name is None:
+        raise DataError("there is no paper to run again", remedy="name one, or give --list")
+    from mckibben import registry
+
+    registry.load("papers", name)
+    own = _own(name, train, test)
+    folder = None if out is None else make_folder(out)
+    from mckibben.papers import reproduce as run
+
+    with progress_bar(f"{name}:") as tell:
+        if own is None:
+            found = run(name, quick=quick, seed=seed, jobs=jobs, progress=tell)
+        else:
+            from mckibben.papers.field_models import on_recordings
+
+            found = on_recordings(*own, quick=quick, seed=seed, jobs=jobs, tell=tell)
+    if folder is not None:
+        from mckibben.atomic import write_text
+        from mckibben.report import write_reproduction
+
+        write_reproduction(found, folder / "report.html")
+        write_text(folder / "tables.json", to_json(found.to_dict()) + "\n")
+    if as_json:
+        print_json(found.to_dict())
+        return
+    _print(found)
+    if folder is not None:
+        print(f"Written: {folder / 'report.html'}, {folder / 'tables.json'}")
+
+
+def _own(name: str, train: Path | None, test: Path | None) -> tuple[Recording, Recording] | None:
+    """Return the user's own recordings, or None for the rig's."""
+    if train is None and test is None:
+        return None
+    if name != "field-models" or train is None or test is None:
+        raise DataError(
+            "--train and --test go together, and with field-models only",
+            remedy="give both files, or neither",
+        )
+    reading = Reading(None, None, None, Gaps.ERROR)
+    (first, *_), (second, *_) = (
+        reading.read([file], ["pressure", "displacement"]) for file in (train, test)
+    )
+    return first, second
+
+
+def _list(as_json: bool) -> None:
+    from mckibben import registry
+
+    papers = {name: _source(name) for name in registry.names("papers")}
+    if as_json:
+        print_json(papers)
+        return
+    print_table(["paper", "what it is"], [[name, source] for name, source in papers.items()])
+
+
+def _source(name: str) -> str:
+    from mckibben import registry
+
+    doc = registry.load("papers", name).__doc__ or ""
+    return str(doc.strip().splitlines()[0])
+
+
+def _cell(cell: str | float | None) -> str:
+    if cell is None:
+        return "-"
+    return figure(cell, 4) if isinstance(cell, float) else str(cell)
+
+
+def _print(found: Reproduction) -> None:
+    for table in found.tables:
+        print(f"\n{table.title}")
+        rows = [[_cell(cell) for cell in row] for row in table.rows]
+        print_table(table.columns, rows)
+        if table.note:
+            print(table.note)
+    print()
+    for sentence in found.summary:
+        print(sentence)
+    for note in found.notes:
+        print(f"Note: {note}")

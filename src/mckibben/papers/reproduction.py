@@ -1,0 +1,145 @@
+"""What a re-run of a paper holds: tables with the printed figures beside ours, and its figures."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mckibben import registry
+
+Array = NDArray[np.float64]
+Cell = str | float | None
+Progress = Callable[[float, str], None]
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table.
+
+    Parameters
+    ----------
+    title : str
+        What it shows, and which table of the paper it stands beside.
+    columns : sequence of str
+        Headings, with units.
+    rows : sequence of sequence
+        Words, numbers, or None where there is nothing to say.
+    note : str
+        How it was made; what "printed" refers to.
+    """
+
+    title: str
+    columns: tuple[str, ...]
+    rows: tuple[tuple[Cell, ...], ...]
+    note: str = ""
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the table as ``tables.json`` holds it."""
+        rows = [dict(zip(self.columns, row, strict=True)) for row in self.rows]
+        return {"title": self.title, "note": self.note, "rows": rows}
+
+
+@dataclass(frozen=True)
+class Figure:
+    """Curves on one pair of axes.
+
+    Parameters
+    ----------
+    title : str
+        What it shows, and which figure of the paper it redraws.
+    x_label, y_label : str
+        With units.
+    curves : mapping of str to (array, array)
+        Name to x and y, in order of drawing.
+    """
+
+    title: str
+    x_label: str
+    y_label: str
+    curves: Mapping[str, tuple[Array, Array]] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Reproduction:
+    """A paper's experiment, run again on its virtual rig.
+
+    Parameters
+    ----------
+    name : str
+        As registered.
+    title : str
+        Of the paper.
+    summary : sequence of str
+        What came out, one sentence each.
+    tables : sequence of Table
+    figures : sequence of Figure
+    notes : sequence of str
+        What differs from the paper.
+    """
+
+    name: str
+    title: str
+    summary: tuple[str, ...]
+    tables: tuple[Table, ...]
+    figures: tuple[Figure, ...]
+    notes: tuple[str, ...]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return all but the figures, as ``tables.json`` holds it."""
+        return {
+            "name": self.name,
+            "title": self.title,
+            "summary": list(self.summary),
+            "tables": [table.to_dict() for table in self.tables],
+            "notes": list(self.notes),
+        }
+
+
+def reproduce(
+    name: str,
+    *,
+    quick: bool = False,
+    seed: int = 0,
+    jobs: int | None = None,
+    progress: Progress | None = None,
+) -> Reproduction:
+    """Run a paper's experiment again.
+
+    Parameters
+    ----------
+    name : str
+        As ``mckibben reproduce --list`` lists it.
+    quick : bool
+        Whether to leave out what takes long: under a minute then.
+    seed : int
+        Of everything random.
+    jobs : int, optional
+        Processes; default as many as there are cores.
+    progress : callable, optional
+        Told the share of the work done, and what is next.
+
+    Raises
+    ------
+    ModelError
+        If there is no paper of that name; the text lists those there are.
+    """
+    run = registry.load("papers", name)
+    found: Reproduction = run(
+        quick=quick, seed=seed, jobs=jobs, tell=progress or (lambda share, text: None)
+    )
+    return found
+
+
+def rms(errors: Array) -> float:
+    """Return the root mean square."""
+    return float(np.sqrt(np.mean(errors**2)))
+
+
+def thinned(values: Sequence[float] | Array, most: int = 4000) -> Array:
+    """Return every k-th value, so that at most so many are left."""
+    array = np.asarray(values, dtype=np.float64)
+    return array[:: max(1, -(-array.size // most))]

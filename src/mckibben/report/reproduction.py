@@ -1,0 +1,68 @@
+"""The report of a paper's re-run: one HTML file that needs nothing but itself."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from mckibben.report import interactive, wording
+from mckibben.report.drawing import N_COLOURS, Curve, Drawing, Panel
+
+if TYPE_CHECKING:
+    from mckibben.papers import Figure, Reproduction
+
+
+def write_reproduction(found: Reproduction, path: str | Path) -> None:
+    """Write the report of a re-run as one HTML file that opens without a network.
+
+    Parameters
+    ----------
+    found : Reproduction
+        What came out.
+    path : path
+        File to write; a failure on the way leaves what was there before.
+
+    Raises
+    ------
+    OSError
+        If the file cannot be written.
+    """
+    from mckibben.atomic import write_text
+
+    write_text(path, reproduction_page(found))
+
+
+def reproduction_page(found: Reproduction) -> str:
+    """Return the report of a re-run as HTML."""
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+    from plotly.offline import get_plotlyjs
+
+    environment = Environment(
+        loader=PackageLoader("mckibben.report"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters |= {"number": wording.number}
+    environment.policies["json.dumps_kwargs"] = {"allow_nan": False, "separators": (",", ":")}
+    figures = {
+        f"figure-{place}": [interactive.plots(drawing(figure))]
+        for place, figure in enumerate(found.figures)
+    }
+    return environment.get_template("reproduction.html.j2").render(
+        found=found, figures=figures, versions=wording.versions(), plotly=get_plotlyjs()
+    )
+
+
+def drawing(figure: Figure) -> Drawing:
+    """Return a paper's figure as a drawing: what was measured in ink, models in colours on top."""
+    curves = []
+    shown = list(figure.curves.items())[: N_COLOURS + 1]
+    models = 0
+    for place, (name, (x, y)) in enumerate(shown):
+        measured = place == 0 and name in ("", "measured", "extracted")
+        models += not measured
+        colour = "measured" if measured else f"series-{(models - 1) % N_COLOURS + 1}"
+        curves.append(Curve(x, y, name, colour))
+    return Drawing((Panel(figure.x_label, figure.y_label, tuple(curves)),))

@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from mckibben.blocks.rate_dependent_pi import RateDependentPI as RateDependentPI
     from mckibben.blocks.saving import load as load
     from mckibben.characterization import characterize as characterize
+    from mckibben.comparison.orders import identify as identify
     from mckibben.comparison.ranking import compare as compare
     from mckibben.comparison.studying import study as study
     from mckibben.estimators.eupi import EUPIEstimator as EUPIEstimator
@@ -75,6 +76,7 @@ _HOMES = {
     "check_block": "blocks.check",
     "check_rig": "rigs",
     "compare": "comparison.ranking",
+    "identify": "comparison.orders",
     "load": "blocks.saving",
     "load_rig": "rigs",
     "read": "files",

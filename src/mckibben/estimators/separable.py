@@ -55,6 +55,10 @@ class SeparableEstimator(SearchingEstimator):
     n_starts: Annotated[int, Ge(1)] = 48
     n_refined: Annotated[int, Ge(1)] = 4
 
+    search_evaluations: ClassVar[int] = 15
+    polish_evaluations: ClassVar[int] = 10
+    """Most evaluations of a refinement, and of the final one on more samples."""
+
     searches_condensed: ClassVar[bool] = True
     """Whether the search may skip what lies between turning points of the input."""
 
@@ -118,7 +122,9 @@ class SeparableEstimator(SearchingEstimator):
 
             theta = particle_swarm(costs, lower, upper, self.swarm, tracker, self.seed)
         else:
-            tracker.budget = self.n_starts + self.n_refined * 15 * (lower.size + 1)
+            tracker.budget = self.n_starts + self.n_refined * self.search_evaluations * (
+                lower.size + 1
+            )
             theta = multi_start(
                 lambda point: self._residuals(point, thin),
                 self.guesses(data) + self._scattered(lower, upper),
@@ -126,7 +132,7 @@ class SeparableEstimator(SearchingEstimator):
                 upper,
                 tracker,
                 n_refined=self.n_refined,
-                max_evaluations=15,
+                max_evaluations=self.search_evaluations,
                 jacobian=self._jacobian_on(thin, lower),
             )
         return theta if tracker.interrupted else self._polish(theta, data, tracker)
@@ -157,7 +163,7 @@ class SeparableEstimator(SearchingEstimator):
             upper,
             own,
             n_refined=1,
-            max_evaluations=10,
+            max_evaluations=self.polish_evaluations,
             jacobian=self._jacobian_on(thin, lower),
         )
         tracker.evaluations, tracker.interrupted = own.evaluations, own.interrupted

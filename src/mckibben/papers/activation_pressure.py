@@ -119,7 +119,7 @@ def _table(
     rows: list[tuple[Cell, ...]] = []
     for force in forces:
         cells = [by[(force, f)] for f in FREQUENCIES for by in errors.values()]
-        rows.append((f"{force:.0f} N", *cells))
+        rows.append((f"{force:.0f}\u00a0N", *cells))
     return Table(
         f"RMSE on {title} [% of range] (its Figure 14)",
         ("force", *columns),

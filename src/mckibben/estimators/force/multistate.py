@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from mckibben.blocks.base import Block
 from mckibben.blocks.compose import Parallel
-from mckibben.blocks.fields import Channel, vector
+from mckibben.blocks.fields import Channel
 from mckibben.blocks.force.law import ForceLaw
 from mckibben.blocks.force.multistate_friction import (
     EACH_WAY,
@@ -33,6 +33,9 @@ Array = NDArray[np.float64]
 
 Structure = Literal["eleven", "each-way", "eighteen"]
 STRUCTURES = {"eleven": ELEVEN, "each-way": EACH_WAY, "eighteen": EIGHTEEN}
+LEAST_SHARE = 1e-5
+"""Least force of an element, relative to the range of the output."""
+
 ORDERS = {"bilinear": (1, 2), "petrovic": (2, 2), "minh": (3, 3), "schindele": (3, 4)}
 
 
@@ -75,9 +78,9 @@ def extract_hysteresis(
 class MultistateEstimator(SeparableEstimator):
     """Multistate friction by bounded least squares from many starts.
 
-    Every value is searched on its logarithm. A static law beside it is linear, so it is solved for; with
-    ``static="none"`` the output is taken to be the hysteresis alone, as the paper does after
-    `extract_hysteresis`.
+    Break-away lengths and relaxation times are searched; stiffnesses, and a static law, are solved
+    for. With ``static="none"`` the output is taken to be the hysteresis alone, as the paper does
+    after `extract_hysteresis`.
 
     Parameters
     ----------
@@ -101,12 +104,15 @@ class MultistateEstimator(SeparableEstimator):
     elements: Structure | tuple[Direction, ...] = "eleven"
     fit_pressure_gain: bool = False
     nonnegative: bool = False
-    n_starts: Annotated[int, Ge(1)] = 128
-    n_refined: Annotated[int, Interval(ge=1)] = 12
+    n_starts: Annotated[int, Ge(1)] = 64
+    n_refined: Annotated[int, Interval(ge=1)] = 8
 
     made_for: ClassVar[tuple[str, str] | None] = ("length", "force")
     rises: ClassVar[bool] = False
     searches_condensed: ClassVar[bool] = False
+    # where elements begin to slip makes corners in the cost, which take many short steps
+    search_evaluations: ClassVar[int] = 20
+    polish_evaluations: ClassVar[int] = 20
 
     @property
     def scheduling(self) -> tuple[str, ...]:
@@ -129,62 +135,97 @@ class MultistateEstimator(SeparableEstimator):
             )
         return super().identify(data, tracker)
 
-    # theta is log values, element by element, then the pressure gain if it is fitted
+    # An element's deflection follows from how far it goes before it slips, F_c / k, and from the time
+    # sigma / k in which it relaxes; its force is k times that. So theta is the logarithms of these
+    # lengths and times, element by element, lengthening first, then the pressure gain if it is fitted;
+    # the stiffnesses are linear.
 
-    def _scales(self, data: TrainingData) -> tuple[float, float, float]:
-        """Return a usual stiffness [N/mm], damping [N s/mm] and limit [N]."""
-        low, high = data.input_range
-        bottom, top = data.output_range
-        limit = 0.5 * (top - bottom) if self.static == "none" else 0.15 * (top - bottom)
-        stiffness = limit / (0.25 * (high - low))
-        return stiffness, stiffness * (data.sample_time or 1.0), limit
+    def _pairs(self) -> list[int]:
+        """Return how many pairs of length and time each element has."""
+        return [2 if element in ("shared", "both") else 1 for element in self.directions]
 
     def bounds(self, data: TrainingData) -> tuple[Array, Array]:
-        """Return bounds of the logarithms."""
-        k, sigma, limit = np.log(self._scales(data))
-        lower, upper = [], []
-        for element in self.directions:
-            kinds = "ksfsf" if element == "shared" else "ksf" * (SIZES[element] // 3)
-            for kind in kinds:
-                middle = {"k": k, "s": sigma, "f": limit}[kind]
-                down, up = {"k": (3, 6), "s": (7, 5), "f": (6, 2)}[kind]
-                lower.append(middle - down)
-                upper.append(middle + up)
+        """Return bounds of the logarithms, then of the gain."""
+        low, high = data.input_range
+        step = data.sample_time or 1.0
+        lengths = np.log((high - low) * np.array([0.005, 2.0]))
+        times = np.log(step * np.array([1e-2, 20.0]))
+        n = sum(self._pairs())
+        lower, upper = [lengths[0], times[0]] * n, [lengths[1], times[1]] * n
         if self.fit_pressure_gain:
             lower.append(-0.5)
             upper.append(1.0)
         return np.array(lower), np.array(upper)
 
     def guesses(self, data: TrainingData) -> list[Array]:
-        """Return elements that share the friction, and slip one after another."""
-        k, sigma, limit = self._scales(data)
-        lower, upper = self.bounds(data)
+        """Return elements that slip early and late, without delay."""
+        low, high = data.input_range
+        time = np.log(0.1 * (data.sample_time or 1.0))
         guesses = []
-        for ratio in (1.0, 3.0):
-            for quick in (1.0, 4.0):
+        for first in (0.5, 0.25, 0.1):
+            for ratio in (0.7, 0.4, 0.2):
                 theta: list[float] = []
-                for place, element in enumerate(self.directions):
-                    share = 1.0 if place == 0 else 0.3 / place
-                    stiff = quick * k * share * ratio ** (place * 0.5)
-                    numbers = [stiff, sigma, limit * share]
-                    own = [*numbers, *numbers] if element == "both" else numbers
-                    if element == "shared":
-                        own = [*numbers, sigma, limit * share]
-                    theta += np.log(own).tolist()
-                if self.fit_pressure_gain:
-                    theta.append(0.1)
-                guesses.append(np.clip(theta, lower, upper))
+                for place, pairs in enumerate(self._pairs()):
+                    length = np.log((high - low) * first * ratio**place)
+                    theta += [length, time] * pairs
+                guesses.append(np.array([*theta, *[0.1] * self.fit_pressure_gain]))
         return guesses
 
-    def friction(self, theta: Array, data: TrainingData) -> MultistateFriction:
+    def _unit(self, place: int, theta: Array) -> MultistateFriction:
+        """Return one element with stiffnesses of 1."""
+        first = 2 * sum(self._pairs()[:place])
+        element = self.directions[place]
+        own = np.exp(theta[first : first + 2 * self._pairs()[place]]).tolist()
+        values = [1.0, own[1], own[0]]
+        if element == "both":
+            values += [1.0, own[3], own[2]]
+        elif element == "shared":
+            values += [own[3], own[2]]
+        return MultistateFriction((element,), tuple(values), initial=self.starting_rule)
+
+    def _forces(self, theta: Array, run: Run, data: TrainingData) -> Array:
+        """Return the force of every element by each of its stiffnesses, over the run's history."""
+        length, pressure = run.inputs.T
+        rising = np.diff(length, prepend=length[0]) >= 0
+        columns = []
+        for place, element in enumerate(self.directions):
+            force = self._unit(place, theta).simulate(run.inputs, sample_time=run.sample_time)[:, 0]
+            columns += [force * rising, force * ~rising] if element == "both" else [force]
+        grown = 1.0
+        if self.fit_pressure_gain:
+            grown = 1.0 + float(theta[-1]) * (pressure - self._reference(data))
+        return np.column_stack(columns) * np.reshape(grown, (-1, 1))
+
+    def _reference(self, data: TrainingData) -> float:
+        """Return the pressure at which the values hold."""
+        pressures = data.once(
+            "reference pressure",
+            lambda: np.median(np.concatenate([run.scheduled[:, 0] for run in data.runs])),
+        )
+        return float(pressures)
+
+    @property
+    def n_stiffnesses(self) -> int:
+        """Linear parameters of the friction."""
+        return sum(2 if element == "both" else 1 for element in self.directions)
+
+    def friction(self, theta: Array, stiffnesses: Array, data: TrainingData) -> MultistateFriction:
         """Return the friction."""
-        n = sum(SIZES[element] for element in self.directions)
-        pressures = np.concatenate([run.scheduled[:, 0] for run in data.runs])
+        values: list[float] = []
+        given = iter(stiffnesses.tolist())
+        for place, element in enumerate(self.directions):
+            unit = self._unit(place, theta).values
+            k = next(given)
+            if element == "both":
+                other = next(given)
+                values += [k * value for value in unit[:3]] + [other * value for value in unit[3:]]
+            else:
+                values += [k * value for value in unit]
         return MultistateFriction(
             self.directions,
-            vector(np.exp(theta[:n])),
-            float(theta[n]) if self.fit_pressure_gain else 0.0,
-            float(np.median(pressures)),
+            tuple(values),
+            float(theta[-1]) if self.fit_pressure_gain else 0.0,
+            self._reference(data),
             self.starting_rule,
             **self.channels(data),
         )
@@ -195,8 +236,8 @@ class MultistateEstimator(SeparableEstimator):
         return super().channels(data) | {"pressure": pressure}
 
     def basis(self, theta: Array, run: Run, data: TrainingData) -> Array:
-        """Return the friction, then what the static law's coefficients multiply."""
-        friction = self.friction(theta, data).simulate(run.inputs, sample_time=run.sample_time)
+        """Return the forces of the elements, then what the static law's coefficients multiply."""
+        friction = self._forces(theta, run, data)
         if self.static == "none":
             return friction
         length, pressure = run.inputs.T
@@ -204,38 +245,65 @@ class MultistateEstimator(SeparableEstimator):
         return np.column_stack([friction, columns])
 
     def _solve_for(self, matrix: Array, data: TrainingData) -> tuple[Array, float]:
-        """Solve for the static law alone: the friction comes with a weight of 1."""
-        target = data.target - matrix[:, 0]
+        """Solve for positive stiffnesses, and for the static law, whose coefficients may be negative."""
+        from scipy.optimize import nnls
+
+        n = self.n_stiffnesses
+        friction, target = matrix[:, :n], data.target
         if self.static == "none":
-            return np.ones(1), 0.0
-        columns = np.column_stack([np.ones(len(matrix)), matrix[:, 1:]])
-        size = np.linalg.norm(columns, axis=0)
+            law = np.empty((len(matrix), 0))
+        else:
+            law = np.column_stack([np.ones(len(matrix)), matrix[:, n:]])
+        size = np.linalg.norm(law, axis=0)
         size[size == 0] = 1.0
-        # several runs at one pressure leave the law undetermined; the smallest is then as good as any
-        found = np.linalg.lstsq(columns / size, target, rcond=1e-9)[0] / size
-        return np.append(1.0, found[1:]), float(found[0])
+        # what the law can take up is projected out; runs at one pressure leave it undetermined
+        directions: Array
+        singular: Array
+        right: Array
+        directions, singular, right = np.linalg.svd(law / size, full_matrices=False)
+        known = singular > 1e-9 * singular.max(initial=1e-300)
+        directions = directions[:, known]
+
+        def beside(columns: Array) -> Array:
+            return np.asarray(columns - directions @ (directions.T @ columns))
+
+        scale = np.maximum(np.linalg.norm(friction, axis=0), 1e-300)
+        floor = LEAST_SHARE * np.ptp(target) / np.maximum(np.abs(friction).max(axis=0), 1e-300)
+        both = np.column_stack([beside(friction) / scale, beside(target)])
+        reduced: Array = np.linalg.qr(both, mode="r")  # type: ignore[assignment]
+        rest = reduced[:, n] - reduced[:, :n] @ (floor * scale)
+        stiffnesses = floor + nnls(reduced[:, :n], rest, maxiter=100 * n)[0] / scale
+        if self.static == "none":
+            return stiffnesses, 0.0
+        left = directions.T @ (target - friction @ stiffnesses)
+        found = (right[known].T @ (left / singular[known])) / size
+        return np.concatenate([stiffnesses, found[1:]]), float(found[0])
 
     def build(self, theta: Array, linear: Array, offset: float, data: TrainingData) -> Block:
         """Return the friction, with the static law beside it if there is one."""
-        friction = self.friction(theta, data)
+        n = self.n_stiffnesses
+        friction = self.friction(theta, linear[:n], data)
         if self.static == "none":
             return friction
         orders = ORDERS[self.static]
-        law = force_law(linear[1:], offset, orders, data.input_range, self.channels(data))
+        law = force_law(linear[n:], offset, orders, data.input_range, self.channels(data))
         return Parallel((law, friction))
 
     def parameter_bounds(self, data: TrainingData) -> tuple[Block, Array, Array]:
         """Return the block of the first guess, and bounds about it that keep it valid."""
         theta = self.guesses(data)[0]
         template = self.build(theta, *self._solve(theta, data), data)
-        lower, upper = self.bounds(data)
         n = sum(SIZES[element] for element in self.directions)
         values = template.pack()
         span = np.maximum(np.abs(values), 1e-3 * np.abs(values).max())
         below, above = values - span, values + span
-        start = values.size - theta.size
-        below[start : start + n], above[start : start + n] = np.exp(lower[:n]), np.exp(upper[:n])
-        below[start + n :], above[start + n :] = lower[n:], upper[n:]
+        start = values.size - n - self.fit_pressure_gain
+        friction = slice(start, start + n)
+        largest = np.abs(values[friction]).max()
+        below[friction] = 0.1 * np.maximum(np.abs(values[friction]), 1e-6 * largest)
+        above[friction] = 10 * np.maximum(np.abs(values[friction]), 1e-2 * largest)
+        if self.fit_pressure_gain:
+            below[-1], above[-1] = -0.5, 1.0
         return template, below, above
 
 

@@ -25,7 +25,10 @@ STABLE = 1.0 - 1e-7
 INVERTIBLE = 0.9999
 """Largest root of C."""
 
-STEPS = 40
+FIRST_STEPS, FOLLOWED, STEPS = 8, 3, 60
+"""Steps taken from every start; how many of the best, at different places, are followed; how far."""
+
+SAME = 1e-6
 SHORTEST = 1e-9
 """Relative improvement at which a descent has arrived."""
 
@@ -63,25 +66,29 @@ def minimise(
     runs: Sequence[Run], orders: Orders, starts: Sequence[Array], tracker: Tracker
 ) -> Array:
     """Return the best parameters found from all starts."""
-    tracker.budget = len(starts) * STEPS
-    best, best_cost = None, np.inf
-    for start in starts:
-        if not admissible(start, orders):
-            continue
-        theta, cost = _descend(start, orders, runs, tracker)
-        if cost < best_cost:
-            best, best_cost = theta, cost
-    assert best is not None
-    return best
+    tracker.budget = len(starts) * FIRST_STEPS + FOLLOWED * STEPS
+    begun = [
+        _descend(start, orders, runs, tracker, FIRST_STEPS)
+        for start in starts
+        if admissible(start, orders)
+    ]
+    begun.sort(key=lambda found: found[1])
+    followed: list[tuple[Array, float]] = []
+    for theta, cost in begun:
+        # starts that have come to the same place need to be followed only once
+        if all(abs(cost - other) > SAME * cost for _, other in followed):
+            followed.append((theta, cost))
+    ended = [_descend(theta, orders, runs, tracker, STEPS) for theta, _ in followed[:FOLLOWED]]
+    return min(ended, key=lambda found: found[1])[0]
 
 
 def _descend(
-    theta: Array, orders: Orders, runs: Sequence[Run], tracker: Tracker
+    theta: Array, orders: Orders, runs: Sequence[Run], tracker: Tracker, steps: int
 ) -> tuple[Array, float]:
     e, jacobian, cost = evaluate(theta, orders, runs)
     tracker.saw(theta, cost)
     damping = 1e-4
-    for _ in range(STEPS):
+    for _ in range(steps):
         size = np.maximum(np.linalg.norm(jacobian, axis=0), 1e-300)
         improved = False
         for _ in range(12):

@@ -74,5 +74,6 @@ class NarxPolynomialEstimator(NarxEstimator):
 class NarxPlayEstimator(NarxPolynomialEstimator):
     """Polynomial NARX model with play operators among its regressors, so that it keeps its branch."""
 
-    n_play: Annotated[int, Interval(ge=0, le=20)] = 3
-    degree: Annotated[int, Interval(ge=1, le=6)] = 2
+    output_lags: Annotated[int, Interval(ge=1, le=20)] = 1
+    input_lags: Annotated[int, Interval(ge=1, le=20)] = 1
+    n_play: Annotated[int, Interval(ge=0, le=20)] = 6

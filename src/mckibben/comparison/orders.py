@@ -1,0 +1,118 @@
+"""One call to identify a family of models and choose its orders by cross-validated free-run error."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import product
+from typing import Any
+
+import numpy as np
+
+from mckibben import registry
+from mckibben.comparison.free_run import run_free
+from mckibben.comparison.splits import folds
+from mckibben.errors import MckibbenError, ModelError
+from mckibben.estimators.base import Estimator
+from mckibben.recording import Recording
+
+GRIDS: Mapping[str, Mapping[str, tuple[Any, ...]]] = {
+    "arx": {"n_poles": (1, 2, 3, 4), "n_zeros": (1, 2, 3)},
+    "armax": {"n_poles": (1, 2, 3), "n_zeros": (1, 2, 3), "n_noise": (1, 2)},
+    "oe": {"n_poles": (1, 2, 3), "n_zeros": (1, 2, 3)},
+    "bj": {"n_poles": (1, 2, 3), "n_zeros": (1, 2, 3)},
+    "narx": {"output_lags": (1, 2), "input_lags": (1, 2), "n_terms": (8, 16)},
+    "narx-play": {"n_play": (3, 6), "n_terms": (8, 16)},
+    "narx-network": {"output_lags": (1, 2), "n_units": (3, 5)},
+    "pi": {"n_operators": (5, 10, 20)},
+    "gpi": {"n_operators": (5, 10, 15)},
+    "cpi": {"n_operators": (4, 6, 8), "n_creep": (1, 2, 3)},
+    "preisach": {"n_levels": (6, 10, 15)},
+    "kp": {"n_levels": (6, 10, 15)},
+}
+"""Orders tried by default."""
+
+
+@dataclass(frozen=True)
+class Choice:
+    """What `identify` found.
+
+    Parameters
+    ----------
+    estimator : Estimator
+        Fitted to all recordings with the orders chosen; its block is ``model_``.
+    orders : mapping
+        The orders chosen.
+    tried : tuple of (mapping, float, str)
+        All orders with their cross-validated free-run RMSE, infinite where they failed, and why.
+    """
+
+    estimator: Estimator
+    orders: Mapping[str, Any]
+    tried: tuple[tuple[Mapping[str, Any], float, str], ...]
+
+
+def identify(
+    recordings: Recording | Sequence[Recording],
+    family: str,
+    orders: Mapping[str, Sequence[Any]] | None = None,
+    *,
+    n_folds: int = 4,
+    **settings: Any,
+) -> Choice:
+    """Identify a family of models, its orders chosen by cross-validated free-run error.
+
+    Parameters
+    ----------
+    recordings : Recording or sequence of Recording
+        What to learn from; folds are recordings, or blocks of cycles of a single one.
+    family : str
+        Short name of a model, such as ``"oe"``.
+    orders : mapping of str to sequence, optional
+        Setting -> values to try; every combination is. Default: what is usual for the family.
+    n_folds : int
+        Parts of the cross-validation, at least 2.
+    **settings
+        Further settings of the estimator.
+
+    Returns
+    -------
+    Choice
+
+    Raises
+    ------
+    ModelError
+        On an unknown family, a family without usual orders where none are given, or where every
+        combination fails.
+    """
+    estimator_class = registry.load("estimators", family)
+    grid = orders or GRIDS.get(family)
+    if not grid:
+        raise ModelError(
+            f"there are no usual orders of {family!r}. Remedy: give orders, for instance "
+            "{'n_operators': (5, 10)}."
+        )
+    listed = [recordings] if isinstance(recordings, Recording) else list(recordings)
+    named: Estimator = estimator_class(**settings)
+    parts = tuple(folds(listed, named.input, max(n_folds, 2)))
+    tried: list[tuple[Mapping[str, Any], float, str]] = []
+    for values in product(*grid.values()):
+        combination = dict(zip(grid, values, strict=True))
+        squares, count, reason = 0.0, 0, ""
+        try:
+            for fold in parts:
+                estimator = estimator_class(**settings, **combination)
+                block = estimator.fit(fold.train, rows=fold.train_rows).model_
+                for recording, rows in zip(fold.test, fold.test_rows, strict=True):
+                    modelled = run_free(block, recording, named.output)
+                    errors = (modelled - recording[named.output])[rows]
+                    squares, count = squares + float(errors @ errors), count + errors.size
+        except MckibbenError as error:
+            reason = str(error)
+        rmse = float(np.sqrt(squares / count)) if count and not reason else float("inf")
+        tried.append((combination, rmse, reason))
+    chosen, lowest, reason = min(tried, key=lambda item: item[1])
+    if not np.isfinite(lowest):
+        raise ModelError(f"every order of {family!r} failed: {reason}")
+    fitted: Estimator = estimator_class(**settings, **chosen).fit(listed)
+    return Choice(fitted, chosen, tuple(tried))

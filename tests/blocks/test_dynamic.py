@@ -1,0 +1,99 @@
+"""Dynamic models against SciPy's filters and integrators."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Literal
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter, lsim
+
+from mckibben import ModelError
+from mckibben.blocks.creep import Creep
+from mckibben.blocks.dynamic.narx_polynomial import NarxPolynomial
+from mckibben.blocks.dynamic.process_model import ProcessModel
+from mckibben.blocks.dynamic.transfer_function import TransferFunction
+from mckibben.blocks.published.field_models import process_model
+
+STEP = 0.01
+INPUT = np.cumsum(np.random.default_rng(0).standard_normal(1500)) * 0.05
+
+STRUCTURES = {
+    "P1": ProcessModel(2.0, (0.3,)),
+    "P1Z": ProcessModel(2.0, (0.3,), None, 0.5),
+    "P2": ProcessModel(2.0, (2.0, 0.3)),
+    "P2Z": ProcessModel(2.0, (2.0, 0.3), None, -0.2),
+    "P2U": ProcessModel(2.0, (0.3,), 0.2),
+    "P2UZ": ProcessModel(2.0, (0.3,), 0.4, 1.0),
+    "P3": ProcessModel(2.0, (2.0, 0.3, 0.05)),
+}
+
+
+def continuous(model: ProcessModel) -> tuple[list[float], np.ndarray]:
+    top = [model.gain] if model.zero_time is None else [model.gain * model.zero_time, model.gain]
+    return top, model.denominator()
+
+
+@pytest.mark.parametrize("name", STRUCTURES)
+@pytest.mark.parametrize("hold", ["first", "zero"])
+def test_process_models_are_discretised_exactly(name: str, hold: Literal["first", "zero"]) -> None:
+    model = replace(STRUCTURES[name], hold=hold)
+    assert model.name == name
+    y = model.simulate(INPUT, initial="virgin", sample_time=STEP)
+    if hold == "first":
+        time = np.arange(INPUT.size + 1) * STEP
+        expected = lsim(continuous(model), np.append(0.0, INPUT), time)[1][1:]
+    else:
+        expected = lsim(continuous(model), INPUT, np.arange(INPUT.size) * STEP, interp=False)[1]
+    np.testing.assert_allclose(y, expected, atol=1e-10 * np.ptp(expected))
+
+
+@pytest.mark.parametrize("delay", [0.01, 0.0234, 0.5])
+def test_delays_between_samples_are_exact(delay: float) -> None:
+    model = replace(STRUCTURES["P2UZ"], delay=delay)
+    fine = 50
+    time = np.arange(INPUT.size * fine) * STEP / fine
+    known = np.append(-STEP, np.arange(INPUT.size) * STEP)
+    late = np.interp(time - delay, known, np.append(0.0, INPUT), left=0.0)
+    expected = lsim(continuous(model), late, time)[1][::fine]
+    y = model.simulate(INPUT, initial="virgin", sample_time=STEP)
+    np.testing.assert_allclose(y, expected, atol=1e-9 * np.ptp(expected))
+
+
+def test_the_printed_p2uz_has_the_poles_that_its_numbers_give() -> None:
+    poles = np.sort(np.roots(process_model().denominator()))
+    np.testing.assert_allclose(poles, [-3.185, -0.00966], rtol=2e-3)
+
+
+def test_a_rest_is_a_rest() -> None:
+    for model in (*STRUCTURES.values(), TransferFunction.example(), Creep.example()):
+        y = model.simulate(np.full(300, 3.0), sample_time=STEP)
+        np.testing.assert_allclose(y, y[0], rtol=1e-9)
+
+
+def test_transfer_function_is_scipys_filter() -> None:
+    model = TransferFunction.example()
+    y = model.simulate(INPUT, initial="virgin", sample_time=STEP)
+    filtered = lfilter(model.numerator, [1.0, *model.denominator], INPUT - model.input_offset)
+    np.testing.assert_allclose(y, filtered + model.output_offset, atol=1e-12)
+
+
+def test_discrete_models_refuse_another_sample_time() -> None:
+    for model in (TransferFunction.example(), NarxPolynomial.example()):
+        with pytest.raises(ModelError, match=r"holds for a sample time of 0.01 s.*resample"):
+            model.simulate(INPUT, sample_time=0.02)
+
+
+def test_models_without_an_inverse_say_why() -> None:
+    late = replace(TransferFunction.example(), numerator=(0.0, 1.0))
+    with pytest.raises(ModelError, match="answers a sample late"):
+        late.inverse()
+    with pytest.raises(ModelError, match="would make it unstable"):
+        replace(TransferFunction.example(), numerator=(1.0, -2.0)).inverse()
+    with pytest.raises(ModelError, match=r"P2UZ.*lags its input"):
+        process_model().inverse()
+    with pytest.raises(ModelError, match="nothing keeps its output rising"):
+        NarxPolynomial.example().inverse()
+    with pytest.raises(ModelError, match="254 samples"):
+        replace(STRUCTURES["P1"], delay=5.0).simulate(INPUT, sample_time=STEP)

@@ -1,0 +1,145 @@
+"""Forces: parameters recovered, hysteresis extracted, characteristic points found."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from mckibben import DataError, Recording
+from mckibben.blocks.force.multistate_friction import EACH_WAY, MultistateFriction
+from mckibben.blocks.force.tondu_lopez import TonduLopez
+from mckibben.blocks.published.activation_pressure import activation_pressure
+from mckibben.blocks.published.multistate import static_force
+from mckibben.estimators.force.activation_memory import ActivationMemoryEstimator
+from mckibben.estimators.force.activation_pressure import (
+    ActivationPressureEstimator,
+    dominant_frequency,
+)
+from mckibben.estimators.force.multistate import MultistateEstimator, extract_hysteresis
+from mckibben.estimators.force.static import (
+    BilinearForceEstimator,
+    ChouHannafordEstimator,
+    TonduLopezEstimator,
+)
+
+TRUTH = MultistateFriction(
+    EACH_WAY,
+    (*(7.0, 5e-3, 52.0, 5e-3, 90.0), *(12.0, 5e-3, 38.0), *(9.0, 5e-3, 60.0)),
+    initial="virgin",
+)
+
+
+def isometric(law: Any, noise: float = 0.5) -> list[Recording]:
+    rng = np.random.default_rng(0)
+    runs = []
+    for length in np.linspace(184.0, 200.0, 6):
+        pressure = np.linspace(0.5, 6.0, 200)
+        given = Recording({"length": np.full(200, length), "pressure": pressure}, 0.1)
+        force = law.simulate(given)["force"]
+        runs.append(given.with_channels(force=force + noise * rng.standard_normal(200)))
+    return runs
+
+
+def isobaric(pressure: float = 4.0, noise: float = 0.5) -> Recording:
+    time = np.arange(2500) * 0.02
+    length = 192.5 + 7.5 * np.cos(0.35 * time) * (1 - 0.3 * np.sin(0.05 * time))
+    rng = np.random.default_rng(1)
+    given = Recording({"length": length, "pressure": np.full(2500, pressure)}, 0.02)
+    friction = TRUTH.simulate(given)["force"]
+    static = static_force().simulate(given)["force"]
+    force = static + friction + noise * rng.standard_normal(2500)
+    return given.with_channels(force=force)
+
+
+def test_static_laws_recover_their_own_forces() -> None:
+    printed = static_force()
+    fit: Any = BilinearForceEstimator().fit(isometric(printed))
+    assert fit.diagnostics_.rmse < 0.55
+    lengths = np.array([185.0, 199.0])
+    for ours, theirs in zip(fit.model_.terms(lengths), printed.terms(lengths), strict=True):
+        np.testing.assert_allclose(ours, theirs, atol=1.0)
+    tondu = TonduLopez(200.0, 10.0, 0.42, (0.3, 0.8), (0.5, 1.1), -5.0)
+    again = TonduLopezEstimator(rest_length=200.0, diameter=10.0).fit(isometric(tondu))
+    assert again.diagnostics_.rmse < 0.55
+
+
+def test_chou_hannaford_recovers_thread_and_turns() -> None:
+    from mckibben.blocks.force.chou_hannaford import ChouHannaford
+
+    truth = ChouHannaford(260.0, 1.6, -3.0)
+    fit: Any = ChouHannafordEstimator().fit(isometric(truth))
+    np.testing.assert_allclose(fit.model_.pack()[:2], truth.pack()[:2], rtol=0.02)
+
+
+def test_extracted_hysteresis_is_what_was_put_in() -> None:
+    recording = isobaric(noise=0.0)
+    (left,) = extract_hysteresis(recording, static_force())
+    expected = TRUTH.simulate(recording)["force"]
+    np.testing.assert_allclose(left["force_hysteresis"], expected, atol=1e-9)
+    assert left.units["force_hysteresis"] == "N"
+    with pytest.raises(DataError, match="no channel 'force'"):
+        extract_hysteresis(recording.select(["length", "pressure"]), static_force())
+
+
+def test_friction_is_recovered_to_the_noise() -> None:
+    (left,) = extract_hysteresis(isobaric(), static_force())
+    fit: Any = MultistateEstimator(
+        output="force_hysteresis", static="none", elements="each-way"
+    ).fit(left)
+    assert fit.diagnostics_.rmse < 0.6
+    table, truth = fit.model_.table(), TRUTH.table()
+    # what lengthening feels from the bottom on, and shortening from the top on, is determined
+    assert table[:, 2].sum() == pytest.approx(truth[:, 2].sum(), rel=0.05)
+
+
+def test_total_force_is_identified_with_the_friction() -> None:
+    recordings = [isobaric(p) for p in (3.0, 4.0, 5.0)]
+    fit: Any = MultistateEstimator(elements="each-way").fit(recordings)
+    assert fit.diagnostics_.rmse < 1.0
+
+
+def test_growth_with_pressure_is_found() -> None:
+    growing = replace(TRUTH, pressure_gain=0.2, reference_pressure=4.0)
+    runs = []
+    for pressure in (2.0, 4.0, 6.0):
+        bare = isobaric(pressure).select(["length", "pressure"])
+        runs.append(bare.with_channels(force=growing.simulate(bare)["force"]))
+    fit: Any = MultistateEstimator(static="none", elements="each-way", fit_pressure_gain=True).fit(
+        runs
+    )
+    assert fit.model_.pressure_gain == pytest.approx(0.2, abs=0.02)
+
+
+def sines(frequency: float, force: float) -> Recording:
+    time = np.arange(1200) * 0.005
+    contraction = 0.1 - 0.03 * np.cos(2 * np.pi * frequency * time)
+    given = Recording({"contraction": contraction, "force": np.full(1200, force)}, 0.005)
+    model = replace(activation_pressure(), frequency=frequency)
+    return given.with_channels(pressure=model.simulate(given)["pressure"])
+
+
+def test_activation_pressure_finds_the_published_profile_again() -> None:
+    runs = [sines(w, f) for w in (0.5, 1.0, 2.0) for f in (0.0, 100.0, 200.0, 300.0)]
+    fit: Any = ActivationPressureEstimator(method="ls", rate_time_constant=0.0).fit(runs)
+    for recording, frequency in ((runs[0], 0.5), (runs[-1], 2.0)):
+        told = replace(fit.model_, frequency=frequency)
+        error = told.simulate(recording)["pressure"] - recording["pressure"]
+        assert np.abs(error).max() < 0.1 * np.ptp(recording["pressure"])
+    assert fit.model_.gamma[0] / fit.model_.gamma[1] == pytest.approx(0.267 / 0.667, rel=0.3)
+
+
+def test_frequency_is_read_off_the_input() -> None:
+    from mckibben.estimators.data import training_data
+
+    for frequency in (0.5, 1.5):
+        data = training_data(sines(frequency, 100.0), "contraction", "pressure", None, ["force"])
+        assert dominant_frequency(data.runs[0]) == pytest.approx(frequency, rel=0.1)
+
+
+def test_memory_needs_no_frequency() -> None:
+    runs = [sines(w, 150.0) for w in (0.5, 2.0)]
+    fit: Any = ActivationMemoryEstimator().fit(runs)
+    assert fit.diagnostics_.rmse < 0.05 * np.ptp(runs[0]["pressure"])

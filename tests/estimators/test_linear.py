@@ -1,0 +1,184 @@
+"""Prediction-error methods: against independent references, against local minima, and intervals."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.optimize import approx_fprime
+from scipy.signal import lfilter
+
+from mckibben import DataError, ModelError, Recording, identify
+from mckibben.blocks.dynamic.process_model import ProcessModel
+from mckibben.blocks.dynamic.transfer_function import TransferFunction
+from mckibben.estimators.affine_match import affine_match
+from mckibben.estimators.data import training_data
+from mckibben.estimators.linear.models import (
+    ARMAXEstimator,
+    ARXEstimator,
+    BoxJenkinsEstimator,
+    OutputErrorEstimator,
+)
+from mckibben.estimators.linear.polynomials import Orders, errors
+from mckibben.estimators.linear.process import P2UZEstimator
+
+Array = NDArray[np.float64]
+
+STEP = 0.1
+B, F = (0.5, 0.3), (-1.5, 0.7)
+C, D = (0.4, 0.1), (-0.9, 0.2)
+
+
+def recorded(
+    seed: int,
+    n: int = 1000,
+    noise: float = 0.3,
+    c: tuple[float, ...] = (),
+    d: tuple[float, ...] = (),
+) -> Recording:
+    """Return a second-order system with coloured noise on its output, driven by random levels."""
+    rng = np.random.default_rng(seed)
+    u = np.repeat(rng.uniform(0, 5, n // 10), 10) + 0.1 * rng.standard_normal(n)
+    clean = lfilter(B, [1.0, *F], u)
+    e = lfilter([1.0, *c], [1.0, *d], noise * rng.standard_normal(n))
+    return Recording({"pressure": u, "displacement": clean + e}, STEP)
+
+
+@pytest.mark.parametrize(
+    "orders",
+    [
+        Orders(b=2, a=2),
+        Orders(b=3, a=2, c=2, delay=1),
+        Orders(b=2, f=3),
+        Orders(b=2, f=2, c=2, d=2, delay=2),
+    ],
+)
+def test_derivatives_of_prediction_errors(orders: Orders) -> None:
+    run = training_data(recorded(1, 200), "pressure", "displacement").runs[0]
+    rng = np.random.default_rng(2)
+    theta = 0.2 * rng.standard_normal(orders.size)
+    weights = rng.standard_normal(200)
+    _, jacobian = errors(theta, orders, run)
+
+    def weighted(point: Array) -> float:
+        return float(weights @ errors(point, orders, run)[0])
+
+    numeric = approx_fprime(theta, weighted, 1e-7)
+    np.testing.assert_allclose(weights @ jacobian[:, : orders.size], numeric, rtol=1e-4, atol=1e-4)
+
+
+def test_prediction_errors_are_those_of_a_naive_loop() -> None:
+    orders = Orders(b=2, f=2, c=1, d=1)
+    run = training_data(recorded(3, 60), "pressure", "displacement").runs[0]
+    b, f, c, d, constant = (0.5, 0.3), (-1.2, 0.4), 0.3, -0.6, 1.5
+    w, v, e = [0.0] * 60, [0.0] * 60, [0.0] * 60
+    for t in range(60):
+        past = [(w[t - k] if t >= k else 0.0, run.u[t - k] if t >= k else 0.0) for k in (1, 2)]
+        w[t] = b[0] * run.u[t] + b[1] * past[0][1] - f[0] * past[0][0] - f[1] * past[1][0]
+        v[t] = run.y[t] - w[t] - constant
+        before_v, before_e = (v[t - 1], e[t - 1]) if t else (0.0, 0.0)
+        e[t] = v[t] + d * before_v - c * before_e
+    found, _ = errors(np.array([*b, *f, c, d, constant]), orders, run)
+    np.testing.assert_allclose(found, e, atol=1e-10)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_box_jenkins_finds_the_truth_whatever_the_noise(seed: int) -> None:
+    fit = BoxJenkinsEstimator().fit(recorded(seed, 2000, c=C, d=D))
+    model = fit.model_
+    assert isinstance(model, TransferFunction)
+    np.testing.assert_allclose(model.numerator, B, atol=0.06)
+    np.testing.assert_allclose(model.denominator, F, atol=0.03)
+    assert fit.noise_.deviation == pytest.approx(0.3, rel=0.1)
+
+
+def test_output_error_recovers_with_intervals() -> None:
+    inside = []
+    for seed in range(30):
+        fit = OutputErrorEstimator(n_starts=6).fit(recorded(seed, 600))
+        truth = np.array([*B, *F])
+        spread = np.array(fit.diagnostics_.standard_errors)[:4]
+        inside.append(np.abs(fit.model_.pack()[:4] - truth) < 1.96 * spread)
+    assert 0.85 < np.mean(inside) <= 1.0
+
+
+def test_arx_is_ordinary_least_squares() -> None:
+    recording = recorded(4, 400)
+    u, y = recording["pressure"], recording["displacement"]
+    rows = np.arange(2, 400)
+    columns = np.column_stack([u[rows], u[rows - 1], y[rows - 1], y[rows - 2], np.ones(398)])
+    expected = np.linalg.lstsq(columns, y[rows], rcond=None)[0]
+    model: Any = ARXEstimator().fit(recording).model_
+    # the start of the run is estimated too, so the first two samples tell nothing
+    np.testing.assert_allclose(model.numerator, expected[:2], rtol=1e-6)
+    np.testing.assert_allclose(model.denominator, -expected[2:4], rtol=1e-6)
+
+
+def test_armax_agrees_with_statsmodels() -> None:
+    sarimax = pytest.importorskip("statsmodels.tsa.statespace.sarimax").SARIMAX
+    rng = np.random.default_rng(5)
+    u, e = rng.standard_normal(1500), 0.3 * rng.standard_normal(1500)
+    y = lfilter([0.5], [1.0, -0.8], u) + lfilter([1.0, 0.4], [1.0, -0.8], e)
+    recording = Recording({"pressure": u, "displacement": y}, STEP)
+    ours: Any = ARMAXEstimator(n_poles=1, n_zeros=1, n_noise=1).fit(recording).model_
+    # statsmodels lets the input enter statically: the same model, its input filtered by hand
+    theirs = sarimax(y, exog=lfilter([1.0], [1.0, -0.8], u), order=(1, 0, 1)).fit(disp=False)
+    assert ours.denominator[0] == pytest.approx(-0.8, abs=0.02)
+    assert ours.numerator[0] == pytest.approx(theirs.params[0], abs=0.02)
+
+
+def test_process_model_recovers_its_own_numbers() -> None:
+    truth = ProcessModel(6.8, (1.5,), 1.4, 0.8, 0.0, 0.0, 2.0)
+    rng = np.random.default_rng(6)
+    u = np.repeat(rng.uniform(0, 5, 60), 20)
+    y = truth.simulate(u, sample_time=0.05) + 0.05 * rng.standard_normal(u.size)
+    fit = P2UZEstimator().fit(Recording({"pressure": u, "displacement": y}, 0.05))
+    assert fit.diagnostics_.rmse < 0.055
+    model = fit.model_
+    assert isinstance(model, ProcessModel)
+    assert model.gain == pytest.approx(6.8, rel=0.02)
+    np.testing.assert_allclose(
+        np.sort(np.roots(model.denominator())), np.sort(np.roots(truth.denominator())), rtol=0.15
+    )
+
+
+def test_outputs_of_several_runs_are_started_apart() -> None:
+    pieces = [recorded(seed, 400) for seed in (7, 8)]
+    raised = [pieces[0], replace(pieces[1], start_time=100.0)]
+    model: Any = OutputErrorEstimator().fit(raised).model_
+    np.testing.assert_allclose(model.denominator, F, atol=0.05)
+
+
+def test_bad_data_and_settings_are_refused() -> None:
+    recording = recorded(9, 400)
+    with pytest.raises(DataError, match="no time"):
+        OutputErrorEstimator().fit(replace(recording, sample_time=None))
+    with pytest.raises(DataError, match="too few for"):
+        OutputErrorEstimator(n_poles=10, n_zeros=10).fit(recording.slice(0, 25))
+    with pytest.raises(ModelError, match="n_zeros is 0"):
+        OutputErrorEstimator(n_zeros=0).fit(recording)
+
+
+def test_identify_chooses_orders_by_cross_validation() -> None:
+    choice = identify(
+        [recorded(s, 300) for s in range(4)], "oe", {"n_poles": (1, 2), "n_zeros": (2,)}
+    )
+    assert choice.orders == {"n_poles": 2, "n_zeros": 2}
+    assert len(choice.tried) == 2
+    with pytest.raises(ModelError, match="no usual orders of 'eupi'"):
+        identify(recorded(1), "eupi")
+
+
+def test_affine_match_by_both_rules() -> None:
+    recording = recorded(10, 400, noise=0.0)
+    model = TransferFunction((0.5, 0.3), F, STEP)
+    twisted = recording.with_channels(
+        displacement=3.0 * model.simulate(recording)["displacement"] - 7
+    )
+    for rule in ("range", "least-squares"):
+        matched = affine_match(model, twisted, rule)
+        errors_left = matched.simulate(twisted)["displacement"] - twisted["displacement"]
+        assert np.abs(errors_left).max() < 1e-9

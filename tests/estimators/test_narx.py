@@ -1,0 +1,129 @@
+"""NARX: term selection against brute force, stability, and memory."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import combinations
+
+import numpy as np
+import pytest
+
+from mckibben import ModelError, Recording
+from mckibben.blocks.dynamic.narx_polynomial import NarxPolynomial
+from mckibben.blocks.gpi import GPI
+from mckibben.comparison.memory_test import hold_test
+from mckibben.estimators.data import training_data
+from mckibben.estimators.narx.base import stable
+from mckibben.estimators.narx.polynomial import NarxPlayEstimator, NarxPolynomialEstimator
+from mckibben.estimators.narx.selection import candidate_terms, select
+from mckibben.registry import load
+
+TIME = np.arange(1500) * 0.02
+PRESSURE = 2.5 + 2.3 * np.sin(0.6 * TIME) * np.exp(-0.02 * TIME)
+
+
+def loop(noise: float = 0.02) -> Recording:
+    rng = np.random.default_rng(0)
+    y = GPI.example().simulate(PRESSURE) + noise * rng.standard_normal(TIME.size)
+    return Recording({"pressure": PRESSURE, "displacement": y}, 0.02)
+
+
+def test_selection_finds_the_terms_that_made_the_data() -> None:
+    rng = np.random.default_rng(1)
+    x = rng.uniform(-1, 1, (400, 4))
+    terms = candidate_terms(4, 3)
+    target = 1.5 * x[:, 0] - 0.8 * x[:, 1] * x[:, 2] + 0.3 * x[:, 3] ** 3
+    columns = np.column_stack([np.prod(x[:, list(t)], axis=1) for t in terms])
+    chosen = {terms[k] for k in select(columns, target + 0.01 * rng.standard_normal(400), 4)}
+    assert {(0,), (1, 2), (3, 3, 3)} <= chosen
+
+
+def test_first_choices_are_those_of_brute_force() -> None:
+    rng = np.random.default_rng(2)
+    columns = rng.standard_normal((60, 6))
+    target = rng.standard_normal(60)
+
+    def left(chosen: tuple[int, ...]) -> float:
+        part = columns[:, chosen]
+        return float(np.linalg.lstsq(part, target, rcond=None)[1][0])
+
+    order = select(columns, target, 3)
+    assert left(tuple(order[:1])) == pytest.approx(min(left(c) for c in combinations(range(6), 1)))
+    best_second = min(left((order[0], k)) for k in range(6) if k != order[0])
+    assert left(tuple(order[:2])) == pytest.approx(best_second)
+    with_all = select(columns, target, 10)
+    assert sorted(with_all) == list(range(6))
+
+
+def test_selection_agrees_with_sysidentpy() -> None:
+    model_structure = pytest.importorskip("sysidentpy.model_structure_selection")
+    basis = pytest.importorskip("sysidentpy.basis_function")
+    rng = np.random.default_rng(3)
+    u = rng.uniform(-1, 1, 500)
+    y = np.zeros(500)
+    for t in range(2, 500):
+        y[t] = 0.5 * y[t - 1] + 0.4 * u[t - 1] - 0.3 * y[t - 2] * u[t - 1]
+    theirs = model_structure.FROLS(
+        n_terms=3, xlag=2, ylag=2, basis_function=basis.Polynomial(degree=2), n_info_values=3
+    )
+    theirs.fit(X=u.reshape(-1, 1), y=y.reshape(-1, 1))
+    rows = np.arange(2, 500)
+    regressors = np.column_stack([y[rows - 1], y[rows - 2], u[rows - 1], u[rows - 2]])
+    terms = candidate_terms(4, 2)
+    columns = np.column_stack([np.prod(regressors[:, list(t)], axis=1) for t in terms])
+    ours = {terms[k] for k in select(columns, y[rows], 3)}
+    assert ours == {(0,), (2,), (1, 2)}
+    assert len(theirs.final_model) == len(ours)
+
+
+def test_refining_on_free_runs_lowers_the_free_run_error() -> None:
+    rough = NarxPolynomialEstimator(refine=False, allow_unstable=True, n_terms=6).fit(loop())
+    fine = NarxPolynomialEstimator().fit(loop())
+    assert fine.diagnostics_.rmse < rough.diagnostics_.rmse
+
+
+def test_play_operators_keep_the_branch_that_plain_narx_forgets() -> None:
+    recording = loop()
+    plain, kept = (
+        hold_test(estimator.fit(recording).model_, recording, "pressure", "displacement")
+        for estimator in (NarxPolynomialEstimator(), NarxPlayEstimator())
+    )
+    assert plain is not None
+    assert kept is not None
+    assert abs(plain) < 0.1
+    assert kept > 0.5
+
+
+def test_an_unstable_model_is_refused_unless_it_is_asked_for() -> None:
+    recording = loop()
+    data = training_data(recording, "pressure", "displacement")
+    calm = replace(
+        NarxPolynomial.example(),
+        output_scale=(0.5 * sum(data.output_range), 0.5 * float(np.ptp(data.output_range))),
+        sample_time=0.02,
+    )
+    assert stable(calm, data)
+    wild = [1.1 if term == (0,) else w for term, w in zip(calm.terms, calm.weights, strict=True)]
+    assert not stable(calm.unpack(wild), data)
+
+
+def test_a_comparison_survives_models_that_fail() -> None:
+    from mckibben import compare
+
+    recording = loop()
+    board = compare(
+        recording,
+        models=["narx", "pi"],
+        settings={"narx": {"degree": 6, "output_lags": 20, "input_lags": 20}},
+        n_folds=0,
+        jobs=1,
+    )
+    failed = {row.model: row.reason for row in board.rows if row.reason is not None}
+    assert "too many to choose from" in failed["narx"]
+    assert board.best is not None
+
+
+def test_too_many_candidates_are_refused() -> None:
+    estimator = load("estimators", "narx")(degree=5, output_lags=6, input_lags=6)
+    with pytest.raises(ModelError, match=r"products.*too many.*Remedy"):
+        estimator.fit(loop())

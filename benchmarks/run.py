@@ -19,9 +19,20 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from mckibben import GPI, PI, GPIEstimator, MPIEstimator, RDPIEstimator, Recording, load_rig
+from mckibben import (
+    GPI,
+    PI,
+    GPIEstimator,
+    MPIEstimator,
+    RDPIEstimator,
+    Recording,
+    compare,
+    load_rig,
+    registry,
+)
 from mckibben.blocks.base import Block
 from mckibben.blocks.envelopes.tanh import Tanh
+from mckibben.blocks.published.multistate import multistate_friction
 from mckibben.rigs import record
 from mckibben.signals import decaying_triangle
 from mckibben.signals.protocols import protocol
@@ -136,6 +147,41 @@ def fits(quick: bool) -> None:
         print(f"  {type(other).__name__}: {seconds:.2f} s, RMSE {other.diagnostics_.rmse:.4f} mm")
 
 
+def field() -> None:
+    """Time of every model's fit, and of all of them in one comparison, on 10 000 samples."""
+    t = 0.01 * np.arange(20_000)
+    rig = load_rig("mas20-hanging")
+    rig.reset(seed=0)
+    whole = rig.run(
+        Recording({"pressure": decaying_triangle(t, 10.0, 5.5, 1.0, n_cycles=20)}, 0.01)
+    )
+    train, test = whole.slice(0, 10_000), whole.slice(10_000, 20_000)
+    print("\nevery model of compare, hanging muscle, 10 000 samples at 100 Hz")
+    names = []
+    for name in registry.names("estimators"):
+        estimator = registry.load("estimators", name)()
+        if estimator.objection([train, test], "pressure", "displacement"):
+            continue
+        names.append(name)
+        started = time.perf_counter()
+        fitted = estimator.fit(train)
+        seconds = time.perf_counter() - started
+        print(f"  {name:>14}: {seconds:6.2f} s, RMSE {fitted.diagnostics_.rmse:.3f} mm")
+    started = time.perf_counter()
+    board = compare(train, test)
+    print(f"  compare, all {len(board.rows)}: {time.perf_counter() - started:.0f} s")
+    print("\nsimulation of 200 000 samples [ms]")
+    u = excitation(200_000)
+    for name in ("bouc-wen", "gbw", "duhem", "maxwell-slip", "preisach"):
+        block = registry.load("estimators", name)().fit(train).model_
+        print(f"  {name:>14}: {1e3 * best_of(3, partial(block.simulate, u)):.1f}")
+    friction = multistate_friction()
+    inputs = np.column_stack([200 - 3 * u, u])
+    print(
+        f"  {'multistate-11':>14}: {1e3 * best_of(3, partial(friction.simulate, inputs, sample_time=0.01)):.1f}"
+    )
+
+
 def streams() -> None:
     """Latency of one step from Python."""
     print("\nstream.step from Python [µs]")
@@ -190,6 +236,7 @@ def main() -> None:
     print(f"Python {platform.python_version()}, numba {numba.__version__}, NumPy {np.__version__}")
     kernels(quick)
     fits(quick)
+    field()
     streams()
     rigs(quick)
 

@@ -56,10 +56,10 @@ class CreepPIEstimator(SeparableEstimator):
         The largest threshold, relative to half the range of the logarithm.
     """
 
-    n_operators: Operators = 6
+    n_operators: Operators = 10
     map_size: Annotated[int, Interval(ge=1, le=12)] = 6
     n_creep: Annotated[int, Interval(ge=0, le=5)] = 2
-    threshold_share: Annotated[float, Interval(gt=0, le=1)] = 0.6
+    threshold_share: Annotated[float, Interval(gt=0, le=1)] = 1.0
     n_starts: Annotated[int, Ge(1)] = 8
     n_refined: Annotated[int, Ge(1)] = 3
 

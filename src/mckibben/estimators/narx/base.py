@@ -31,6 +31,12 @@ BOUND = 1.0
 HORIZONS = (20, 200)
 """Samples over which errors are minimised before whole runs are."""
 
+MOST_REFINED = 2
+"""Models refined over whole runs."""
+
+HORIZON_SAMPLES = 4000
+"""Samples looked at over such horizons, at most."""
+
 FAR = 10.0
 """Errors are not counted as larger than this, relative to half the output's range."""
 
@@ -90,9 +96,16 @@ class NarxEstimator(Estimator):
         lags = Lags.of(data, self.output_lags, self.input_lags, self.delay, self.n_play)
         tried: list[tuple[float, Narx]] = []
         try:
-            for model in self.candidates(lags, data, tracker):
-                refined = self._refined(model, data, tracker) if self.refine else model
-                options = [m for m in (refined, model) if self.allow_unstable or stable(m, data)]
+            started = [
+                (model, self._refined(model, HORIZONS, data, tracker) if self.refine else model)
+                for model in self.candidates(lags, data, tracker)
+            ]
+            started.sort(key=lambda pair: rms(free_run_errors(pair[1], data)))
+            for model, near in started:
+                far = near
+                if self.refine and len(tried) < MOST_REFINED:
+                    far = self._refined(near, (None,), data, tracker)
+                options = [m for m in (far, near, model) if self.allow_unstable or stable(m, data)]
                 if options:
                     best = options[0]
                     tried.append((rms(free_run_errors(best, data)), best))
@@ -113,7 +126,13 @@ class NarxEstimator(Estimator):
             )
         return chosen, data
 
-    def _refined(self, model: Narx, data: TrainingData, tracker: Tracker) -> Narx:
+    def _refined(
+        self,
+        model: Narx,
+        horizons: Sequence[int | None],
+        data: TrainingData,
+        tracker: Tracker,
+    ) -> Narx:
         """Return the model refined on errors over ever longer horizons, the last one free-running.
 
         A model that is unstable when it runs free has no slope to follow there; over short horizons,
@@ -121,8 +140,8 @@ class NarxEstimator(Estimator):
         """
         from scipy.optimize import least_squares
 
-        for horizon in (*HORIZONS, None):
-            pieces = segments(model, data, horizon)
+        for horizon in horizons:
+            pieces = some(segments(model, data, horizon), horizon)
             residuals = partial(_residuals, model, data, pieces, tracker)
             start = model.pack()
             found = least_squares(
@@ -187,6 +206,14 @@ def segments(model: Narx, data: TrainingData, horizon: int | None) -> list[Segme
                 Segment(given[start:stop], state, run.y[start:stop], run.counts[start:stop])
             )
     return found
+
+
+def some(pieces: list[Segment], horizon: int | None) -> list[Segment]:
+    """Return stretches spread evenly over all, as many as short horizons need; all of whole runs."""
+    if horizon is None:
+        return pieces
+    n = min(len(pieces), -(-HORIZON_SAMPLES // horizon))
+    return [pieces[k] for k in np.linspace(0, len(pieces) - 1, n).round().astype(int)]
 
 
 def segment_errors(model: Narx, data: TrainingData, pieces: Sequence[Segment]) -> Array:

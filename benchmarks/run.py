@@ -177,9 +177,8 @@ def field() -> None:
         print(f"  {name:>14}: {1e3 * best_of(3, partial(block.simulate, u)):.1f}")
     friction = multistate_friction()
     inputs = np.column_stack([200 - 3 * u, u])
-    print(
-        f"  {'multistate-11':>14}: {1e3 * best_of(3, partial(friction.simulate, inputs, sample_time=0.01)):.1f}"
-    )
+    seconds = best_of(3, partial(friction.simulate, inputs, sample_time=0.01))
+    print(f"  {'multistate-11':>14}: {1e3 * seconds:.1f}")
 
 
 def streams() -> None:

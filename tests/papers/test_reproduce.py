@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,8 +17,8 @@ from tests.cli.conftest import Cli, files  # noqa: F401  # a fixture
 from tests.cli.conftest import cli as cli  # a fixture
 
 
-def number(found: dict[str, object], pattern: str) -> float:
-    text = " ".join(found["summary"])  # type: ignore[call-overload]
+def number(found: dict[str, Any], pattern: str) -> float:
+    text = " ".join(found["summary"])
     match = re.search(pattern, text)
     assert match, text
     return float(match.group(1))

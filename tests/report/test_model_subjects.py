@@ -3,6 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from mckibben import registry
 from mckibben.blocks.compose import Parallel, Series
 from mckibben.blocks.gpi import GPI
 from mckibben.blocks.pi import PI
@@ -10,7 +11,7 @@ from mckibben.blocks.piecewise_linear import PiecewiseLinear
 from mckibben.blocks.play import Play
 from mckibben.blocks.rate_dependent_pi import RateDependentPI
 from mckibben.errors import ModelError
-from mckibben.report import model_subjects
+from mckibben.report import interactive, model_subjects
 from tests.report.studies_by_hand import models, study
 
 LINE = Play.example()
@@ -36,6 +37,16 @@ def test_sums_of_operators_are_found_however_nested() -> None:
     assert list(model_subjects.operator_sums(nested)) == [pi]
     assert list(model_subjects.operator_sums(gpi.inverse())) == [gpi]
     assert list(model_subjects.operator_sums(LINE)) == []
+
+
+@pytest.mark.parametrize("name", registry.names("blocks"))
+def test_any_model_is_drawn_or_refused(name: str) -> None:
+    block = registry.load("blocks", name).example()
+    if list(model_subjects.operator_sums(block)):
+        interactive.plots(model_subjects.weights({name: block}))
+    else:
+        with pytest.raises(ModelError, match="Remedy"):
+            model_subjects.weights({name: block})
 
 
 def test_weights_stand_over_their_thresholds_with_their_units() -> None:

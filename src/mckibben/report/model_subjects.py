@@ -8,6 +8,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mckibben.blocks.base import Block
+from mckibben.blocks.eupi import EUPI
+from mckibben.blocks.gpi import GPI
+from mckibben.blocks.pi import PI
+from mckibben.blocks.rate_dependent_pi import RateDependentPI
 from mckibben.errors import ModelError
 from mckibben.report.drawing import (
     N_COLOURS,
@@ -21,6 +25,8 @@ from mckibben.report.drawing import (
 
 if TYPE_CHECKING:
     from mckibben.comparison.results import InverseCheck, Leaderboard
+
+OperatorSum = PI | GPI | EUPI | RateDependentPI
 
 
 def leaderboard(board: Leaderboard) -> Drawing:
@@ -65,11 +71,11 @@ def weights(blocks: Mapping[str, Block]) -> Drawing:
             unit = part.inputs[0].unit
             threshold = "threshold on the envelopes" if part.kind == "gpi" else "threshold"
             x_label = axis_label(threshold, "" if part.kind == "gpi" else unit)
-            r = np.array(part.thresholds)  # type: ignore[attr-defined]
-            w = np.array(part.weights)  # type: ignore[attr-defined]
+            r = np.array(part.thresholds)
+            w = np.array(part.weights)
             title = model if part is block else f"{model}: {part.kind}"
             drawn = {title: w}
-            if hasattr(part, "rate_weights"):
+            if isinstance(part, RateDependentPI):
                 drawn[f"{title}, per rate"] = np.array(part.rate_weights)
             for heading, values in drawn.items():
                 stems = Curve(r, values, colour=series_colour(place), style="stems")
@@ -83,9 +89,9 @@ def weights(blocks: Mapping[str, Block]) -> Drawing:
     return Drawing(tuple(panels[:N_COLOURS]), note=note)
 
 
-def operator_sums(block: Block) -> Iterator[Block]:
+def operator_sums(block: Block) -> Iterator[OperatorSum]:
     """Yield the parts of a model, however nested, that are weighted sums of play operators."""
-    if hasattr(block, "thresholds") and hasattr(block, "weights"):
+    if isinstance(block, OperatorSum):
         yield block
     elif hasattr(block, "forward"):
         yield from operator_sums(block.forward)

@@ -26,6 +26,9 @@ from mckibben.report.drawing import (
 if TYPE_CHECKING:
     from mckibben.comparison.results import InverseCheck, Leaderboard
 
+OFF_THE_CHART = 3.0
+"""Cross-validated errors beyond so many times the largest test error would squeeze all others."""
+
 OperatorSum = PI | GPI | EUPI | RateDependentPI
 
 
@@ -47,14 +50,19 @@ def leaderboard(board: Leaderboard) -> Drawing:
     ends = np.array([row.rmse_interval or (np.nan, np.nan) for row in ranked], dtype=float)
     ends = np.where(np.isfinite(ends), ends, tested[:, np.newaxis])
     curves = [Curve(fitted, place, "fit", "input", "ticks")]
+    far = np.zeros(len(ranked), dtype=bool)
     if any(value is not None for value in chosen):
         validated = np.array([np.nan if value is None else value for value in chosen])
+        far = validated > OFF_THE_CHART * tested.max()
+        validated[far] = np.nan
         curves.append(Curve(validated, place, "cross-validation", "input", "rings"))
     interval = (ends[:, 0], ends[:, 1])
     curves.append(Curve(tested, place, "test, 95 % interval", "series-1", "dots", None, interval))
     label = axis_label("RMSE", board.unit)
     names = tuple(row.model for row in ranked)
-    return Drawing((Panel(label, "", tuple(curves), categories=names),))
+    off = [name for name, out in zip(names, far, strict=True) if out]
+    note = f"Cross-validation far to the right, not drawn: {', '.join(off)}." if off else ""
+    return Drawing((Panel(label, "", tuple(curves), categories=names),), note=note)
 
 
 def weights(blocks: Mapping[str, Block]) -> Drawing:

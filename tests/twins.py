@@ -8,6 +8,7 @@ one sample after another, for the input that makes the forward formula give the 
 from __future__ import annotations
 
 import copy
+import itertools
 import math
 from collections.abc import Callable
 from functools import partial
@@ -757,6 +758,135 @@ def _solved(model: Callable[[Any, float], Any]) -> Twin:
     return twin
 
 
+# -- several muscles -------------------------------------------------------------------------
+
+
+def coupling(block: Any, inputs: Rows, sample_time: float) -> Rows:
+    n = len(block.gains)
+    return [
+        [math.fsum(block.gains[i][j] * row[i] for i in range(n)) for j in range(n)]
+        for row in inputs
+    ]
+
+
+def fuzzy_network(block: Any, inputs: Rows, sample_time: float) -> Rows:
+    """Every rule fires by its own product, and is divided by the sum over all rules."""
+    out = []
+    width = len(block.centres) + block.constants
+    n_out = len(block.given)
+    for row in inputs:
+        answers, total = [0.0] * n_out, 0.0
+        sets = [range(len(centres)) for centres in block.centres]
+        for number, rule in enumerate(itertools.product(*sets)):
+            firing = 1.0
+            for i, s in enumerate(rule):
+                z = (row[i] - block.centres[i][s]) / block.widths[i][s]
+                firing *= math.exp(-z * z / 2)
+            total += firing
+            for j in range(n_out):
+                at = (number * n_out + j) * width
+                values = [*row, 1.0] if block.constants else row
+                own = block.consequents[at : at + width]
+                answers[j] += firing * sum(a * b for a, b in zip(own, values, strict=True))
+        out.append([answer / total for answer in answers])
+    return out
+
+
+def _rooted(
+    formula: Callable[[list[float], list[float]], list[float]], start: list[float], row: list[float]
+) -> list[float]:
+    """Return where a formula of driven and scheduling values gives the first values of a row."""
+    from scipy.optimize import root
+
+    n = len(start)
+
+    def missed(x: Any) -> list[float]:
+        return [a - b for a, b in zip(formula(list(x), row[n:]), row[:n], strict=True)]
+
+    found = root(missed, start, tol=1e-14)
+    return [float(value) for value in found.x]
+
+
+def fuzzy_network_inverse(block: Any, inputs: Rows, sample_time: float) -> Rows:
+    def formula(x: list[float], rest: list[float]) -> list[float]:
+        return fuzzy_network(block.forward, [[*x, *rest]], sample_time)[0]
+
+    last, out = [0.0] * len(block.outputs), []
+    for row in inputs:
+        last = _rooted(formula, last, row)
+        out.append(last)
+    return out
+
+
+class _Balance:
+    """A force balance at one place of its history: last displacements and stops."""
+
+    def __init__(self, block: Any, first: list[float]) -> None:
+        self.block, self.n = block, len(block.driven)
+        self.last = first
+        self.stops = [[_clip(y / r) for r in block.thresholds] for y in first]
+
+    def moved(self, y: list[float]) -> list[list[float]]:
+        return [
+            [
+                _clip(stop + (here - before) / r)
+                for stop, r in zip(stops, self.block.thresholds, strict=True)
+            ]
+            for stops, here, before in zip(self.stops, y, self.last, strict=True)
+        ]
+
+    def step(self, y: list[float]) -> None:
+        self.stops, self.last = self.moved(y), y
+
+    def pressures(self, y: list[float], scheduled: list[float]) -> list[float]:
+        block, n, m = self.block, self.n, len(self.block.thresholds)
+        powers = [1.0] + [x**d for x in scheduled for d in range(1, block.degree + 1)]
+        stops, z = self.moved(y), [value / block.scale for value in y]
+        out = []
+        for k in range(n):
+            given = list(block.forces[k])
+            springs, rest = given[: len(powers) * (1 + n)], given[len(powers) * (1 + n) :]
+            elastic, friction = rest[:3], rest[3:]
+            top = 0.0
+            for q, power in enumerate(powers):
+                own = springs[q * (1 + n) : (q + 1) * (1 + n)]
+                top += power * (own[0] + sum(s * v for s, v in zip(own[1:], z, strict=True)))
+                felt = friction[q * m : (q + 1) * m]
+                top += power * sum(f * s for f, s in zip(felt, stops[k], strict=True))
+            top += sum(e * z[k] ** d for e, d in zip(elastic, (2, 3, 4), strict=True))
+            area = block.areas[k]
+            bottom = 1.0 + sum(a * z[k] ** d for a, d in zip(area[:3], (1, 2, 3), strict=True))
+            bottom += sum(h * s for h, s in zip(area[3:], stops[k], strict=True))
+            out.append(top / bottom)
+        return out
+
+
+def _clip(value: float) -> float:
+    return min(max(value, -1.0), 1.0)
+
+
+def force_balance(block: Any, inputs: Rows, sample_time: float) -> Rows:
+    n = len(block.driven)
+    balance, out = _Balance(block, inputs[0][:n]), []
+    for row in inputs:
+        out.append(balance.pressures(row[:n], row[n:]))
+        balance.step(row[:n])
+    return out
+
+
+def force_balance_inverse(block: Any, inputs: Rows, sample_time: float) -> Rows:
+    n = len(block.outputs)
+    balance = _Balance(block.forward, [0.0] * n)
+    balance.stops = [[0.0] * len(block.forward.thresholds) for _ in range(n)]
+    out = []
+    ramp = [[*(v * step / 40 for v in inputs[0][:n]), *inputs[0][n:]] for step in range(41)]
+    for row in [*ramp, *inputs]:
+        place = _rooted(balance.pressures, balance.last, row)
+        balance.step(place)
+        out.append(place)
+    return out[len(ramp) :]
+
+
 TWINS: dict[str, Twin] = {
     "activation-memory": activation_memory,
     "activation-pressure": activation_pressure,
@@ -766,6 +896,11 @@ TWINS: dict[str, Twin] = {
     "braid-equilibrium": braid_equilibrium,
     "braid-equilibrium-inverse": braid_equilibrium_inverse,
     "chou-hannaford": chou_hannaford,
+    "coupling": coupling,
+    "force-balance": force_balance,
+    "force-balance-inverse": force_balance_inverse,
+    "fuzzy-network": fuzzy_network,
+    "fuzzy-network-inverse": fuzzy_network_inverse,
     "creep": creep,
     "creep-inverse": creep_inverse,
     "duhem": stepping(_Duhem),

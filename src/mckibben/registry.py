@@ -23,6 +23,7 @@ PLUGINS: dict[str, dict[str, str]] = {
         "braid-equilibrium": "mckibben.blocks.braid_equilibrium:BraidEquilibrium",
         "braid-equilibrium-inverse": "mckibben.blocks.braid_equilibrium:BraidEquilibriumInverse",
         "chou-hannaford": "mckibben.blocks.force.chou_hannaford:ChouHannaford",
+        "coupling": "mckibben.blocks.coupling:Coupling",
         "creep": "mckibben.blocks.creep:Creep",
         "creep-inverse": "mckibben.blocks.creep:CreepInverse",
         "duhem": "mckibben.blocks.differential.duhem:Duhem",
@@ -30,7 +31,11 @@ PLUGINS: dict[str, dict[str, str]] = {
         "eupi": "mckibben.blocks.eupi:EUPI",
         "eupi-inverse": "mckibben.blocks.eupi:EUPIInverse",
         "exponential": "mckibben.blocks.logarithm:Exponential",
+        "force-balance": "mckibben.blocks.force_balance:ForceBalance",
+        "force-balance-inverse": "mckibben.blocks.force_balance:ForceBalanceInverse",
         "force-feedforward": "mckibben.blocks.force.feedforward:ForceFeedforward",
+        "fuzzy-network": "mckibben.blocks.fuzzy_network:FuzzyNetwork",
+        "fuzzy-network-inverse": "mckibben.blocks.fuzzy_network:FuzzyNetworkInverse",
         "generalized-bouc-wen": (
             "mckibben.blocks.differential.generalized_bouc_wen:GeneralizedBoucWen"
         ),
@@ -69,6 +74,13 @@ PLUGINS: dict[str, dict[str, str]] = {
         "series": "mckibben.blocks.compose:Series",
         "tondu-lopez": "mckibben.blocks.force.tondu_lopez:TonduLopez",
         "transfer-function": "mckibben.blocks.dynamic.transfer_function:TransferFunction",
+    },
+    "coupled": {
+        "coupled-pi": "mckibben.estimators.coupled.sdchm:CoupledPIEstimator",
+        "force-balance": "mckibben.estimators.coupled.force_balance:ForceBalanceEstimator",
+        "sdchm": "mckibben.estimators.coupled.sdchm:SDCHMEstimator",
+        "sdchm-published": "mckibben.estimators.coupled.sdchm:PublishedSDCHMEstimator",
+        "tsfnn": "mckibben.estimators.coupled.sdchm:TSFNNEstimator",
     },
     "envelopes": {
         "exponential": "mckibben.blocks.envelopes.exponential:Exponential",

@@ -67,6 +67,12 @@ def test_every_estimator_is_registered() -> None:
     assert concrete(Estimator, "estimators", "compensators") == registered("estimators")
 
 
+def test_every_estimator_of_several_muscles_is_registered() -> None:
+    from mckibben.estimators.coupled.base import CoupledEstimator
+
+    assert concrete(CoupledEstimator, "estimators/coupled") - registered("coupled") == set()
+
+
 def functions(folder: str) -> set[Any]:
     """Return the public functions that the modules of a folder define."""
     return {
@@ -105,6 +111,7 @@ def test_every_setup_is_registered() -> None:
 def test_every_group_is_checked_here() -> None:
     assert set(PLUGINS) == {
         "blocks",
+        "coupled",
         "envelopes",
         "estimators",
         "papers",

@@ -68,6 +68,10 @@ class Block(metaclass=Checked):
     rate_dependent: ClassVar[bool] = False
     """Whether the sample time matters to any block of this class."""
 
+    path_dependent: ClassVar[bool] = False
+    """Whether it matters how an input goes from one turning point to the next, as where several
+    muscles find their equilibrium together."""
+
     sample_time: float | None = None
     """Time between samples that a discrete block is bound to [s]; None for any."""
 

@@ -29,6 +29,16 @@ def _plain_sequence(values: Any) -> Any:
 Vector = Annotated[tuple[FiniteFloat, ...], BeforeValidator(_plain_sequence)]
 """Finite numbers; arrays and lists are accepted and kept as a tuple."""
 
+
+def rows(value: Any) -> Any:
+    """Return a table of numbers as a field of a block holds it."""
+    listed = value.tolist() if isinstance(value, np.ndarray) else value
+    return tuple(map(_plain_sequence, listed)) if isinstance(listed, tuple | list) else listed
+
+
+Rows = Annotated[tuple[Vector, ...], BeforeValidator(rows)]
+"""Rows of finite numbers."""
+
 StoredInitial = Literal["first_sample", "virgin"] | Vector
 """`Initial` as a field of a block."""
 
@@ -56,6 +66,14 @@ def _channel(value: Any) -> Any:
 
 ChannelField = Annotated[Channel, BeforeValidator(_channel)]
 """A channel as a field of a block."""
+
+
+def _channels(values: Any) -> Any:
+    return tuple(map(_channel, values)) if isinstance(values, tuple | list) else values
+
+
+Channels = Annotated[tuple[Channel, ...], BeforeValidator(_channels)]
+"""Several channels as a field of a block."""
 
 PRESSURE = Channel("pressure", "bar")
 DISPLACEMENT = Channel("displacement", "mm")

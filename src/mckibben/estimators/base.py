@@ -5,13 +5,12 @@ from __future__ import annotations
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass, field, fields
-from typing import Annotated, ClassVar, Literal, Self, get_type_hints
+from dataclasses import dataclass, field
+from typing import Annotated, ClassVar, Literal, Self
 
 import numpy as np
 from annotated_types import Ge, Interval
 from numpy.typing import NDArray
-from pydantic import ConfigDict, TypeAdapter, ValidationError
 from sklearn.base import BaseEstimator
 from sklearn.exceptions import NotFittedError
 
@@ -20,17 +19,15 @@ from mckibben.blocks.compose import Series
 from mckibben.blocks.fields import Channel
 from mckibben.blocks.negative import Negative
 from mckibben.blocks.running import run_many
-from mckibben.errors import ModelError
 from mckibben.estimators.data import Mask, TrainingData, training_data
 from mckibben.estimators.search import Progress, Tracker
+from mckibben.estimators.settings import check_settings
 from mckibben.recording import Recording
 
 Array = NDArray[np.float64]
 
 Operators = Annotated[int, Interval(ge=1, le=1000)]
 """Number of operators."""
-
-STRICT_SETTINGS = ConfigDict(strict=True, allow_inf_nan=False)
 
 
 @dataclass(frozen=True)
@@ -183,18 +180,7 @@ class Estimator(BaseEstimator, ABC):  # type: ignore[misc]  # scikit-learn ships
         ModelError
             Naming the setting, what it is, and what it may be.
         """
-        hints = get_type_hints(type(self), include_extras=True)
-        for setting in fields(self):
-            given = getattr(self, setting.name)
-            value = given.tolist() if isinstance(given, np.generic | np.ndarray) else given
-            try:
-                TypeAdapter(hints[setting.name], config=STRICT_SETTINGS).validate_python(value)
-            except ValidationError as error:
-                wanted = error.errors()[0]["msg"]
-                raise ModelError(
-                    f"{setting.name} is {value!r}: {wanted[0].lower()}{wanted[1:]}. "
-                    f"Remedy: choose {setting.name} accordingly, or leave it out."
-                ) from None
+        check_settings(self)
 
     def predict(self, recordings: Recording | Sequence[Recording]) -> list[Array]:
         """Return the model's free-running output on every recording."""

@@ -1,0 +1,1 @@
+"""Identification of several muscles that move one another."""

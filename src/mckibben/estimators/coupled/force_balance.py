@@ -1,0 +1,144 @@
+"""Identification of a balance of forces between muscles in parallel.
+
+The error that is minimised is that of the pressures which the balance needs to be where the arm was,
+by Gauss-Newton steps on its ratio of two linear forms. It needs no run in which a muscle moves alone,
+and no search over starting points.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated
+
+import numpy as np
+from annotated_types import Ge, Gt, Interval
+from numpy.typing import NDArray
+
+from mckibben.blocks.base import Block
+from mckibben.blocks.fields import rows, vector
+from mckibben.blocks.force_balance import AREA, ForceBalance
+from mckibben.blocks.play import play_matrix
+from mckibben.errors import ModelError
+from mckibben.estimators.coupled.base import CoupledEstimator, Tell
+from mckibben.estimators.coupled.data import CoupledData, CoupledRun
+
+Array = NDArray[np.float64]
+
+LEAST_AREA = 0.05
+"""Smallest effective area on the data, relative to that at rest."""
+
+STEPS = 20
+"""Of Gauss and Newton."""
+
+MOST_SAMPLES = 30_000
+"""Samples to fit; more are thinned evenly."""
+
+
+@dataclass(kw_only=True, repr=False, eq=False)
+class ForceBalanceEstimator(CoupledEstimator):
+    """Balance of forces of muscles in parallel, scheduled by stiffness or load.
+
+    Parameters
+    ----------
+    thresholds : sequence of float
+        Travels at which friction elements break away, relative to the largest displacement.
+    degree : int
+        Highest power of what schedules.
+    ridge : float
+        Damping of the coefficients.
+    """
+
+    thresholds: tuple[Annotated[float, Gt(0)], ...] = (0.008, 0.025, 0.065, 0.16, 0.4)
+    degree: Annotated[int, Interval(ge=1, le=4)] = 2
+    ridge: Annotated[float, Ge(0)] = 1e-5
+
+    def identify(self, data: CoupledData, validation: CoupledData | None, tell: Tell) -> Block:
+        """Return the balance, solved for displacements."""
+        del validation
+        n = len(data.pressures)
+        y = data.stacked("displacements")
+        scale = float(np.abs(y).max())
+        if not scale > 0:
+            raise ModelError("no displacement ever changes. Remedy: record muscles that move.")
+        every = max(1, len(y) // MOST_SAMPLES)
+        forces, areas = [], []
+        for k in range(n):
+            tell(k / n, data.pressures[k].name)
+            tables = [self._columns(run, k, scale) for run in data.runs]
+            top = np.concatenate([a[::every] for a, _ in tables])
+            bottom = np.concatenate([b[::every] for _, b in tables])
+            p = np.concatenate([run.pressures[::every, k] for run in data.runs])
+            force, area = ratio(top, bottom, p, self.ridge)
+            forces.append(force)
+            areas.append(area)
+        low, high = float(data.lowest.min()), float(data.highest.max())
+        return ForceBalance(
+            rows(np.array(forces)),
+            rows(np.array(areas)),
+            vector(np.array(self.thresholds) * scale),
+            scale,
+            self.degree,
+            data.displacements,
+            data.scheduled,
+            data.pressures,
+            (min(low, 0.0), high),
+        ).inverse()
+
+    def _columns(self, run: CoupledRun, k: int, scale: float) -> tuple[Array, Array]:
+        """Return what the coefficients of the force and of the area multiply over a run."""
+        y = run.displacements / scale
+        powers = [np.ones(len(y))]
+        for x in run.scheduled.T:
+            powers += [x**d for d in range(1, self.degree + 1)]
+        stops = friction(y[:, k], np.array(self.thresholds))
+        columns = [power * column for power in powers for column in (np.ones(len(y)), *y.T)]
+        columns += [y[:, k] ** d for d in (2, 3, 4)]
+        columns += [power * stop for power in powers for stop in stops.T]
+        bottom = [y[:, k] ** d for d in range(1, AREA + 1)]
+        return np.column_stack(columns), np.column_stack([*bottom, stops])
+
+
+def friction(y: Array, r: Array) -> Array:
+    """Return stop operators relative to their thresholds, shape (n, m), as the block starts them."""
+    y = np.ascontiguousarray(y)
+    plays = np.empty((y.size, r.size))
+    play_matrix(y, r, y[0] - np.clip(y[0], -r, r), plays)
+    result: Array = (y[:, np.newaxis] - plays) / r
+    return result
+
+
+def ratio(top: Array, bottom: Array, p: Array, ridge: float) -> tuple[Array, Array]:
+    """Return a and b that minimise |p - top a / (1 + bottom b)|, a little damped."""
+    n, m = top.shape[1], bottom.shape[1]
+    damping = ridge * len(p) * np.eye(n + m)
+    first = np.hstack([top, -bottom * p[:, np.newaxis]])
+    values: Array = np.asarray(np.linalg.solve(first.T @ first + damping, first.T @ p), np.float64)
+
+    def cost(values: Array) -> float:
+        area = 1.0 + bottom @ values[n:]
+        if area.min() < LEAST_AREA:
+            return np.inf
+        missed = p - (top @ values[:n]) / area
+        return float(missed @ missed + ridge * len(p) * (values @ values))
+
+    least = cost(values)
+    if not np.isfinite(least):  # the linear start may have no area somewhere: begin without
+        start = np.linalg.lstsq(top, p, rcond=None)[0]
+        values = np.concatenate([start, np.zeros(m)]).astype(np.float64)
+        least = cost(values)
+    for _ in range(STEPS):
+        area = 1.0 + bottom @ values[n:]
+        found = (top @ values[:n]) / area
+        jacobian = np.hstack([top, -bottom * found[:, np.newaxis]]) / area[:, np.newaxis]
+        slope = jacobian.T @ (p - found) - ridge * len(p) * values
+        move = np.asarray(np.linalg.solve(jacobian.T @ jacobian + damping, slope), dtype=np.float64)
+        share = 1.0
+        while share > 1e-4 and not cost(values + share * move) < least:
+            share /= 2
+        if share <= 1e-4:
+            break
+        values = values + share * move
+        before, least = least, cost(values)
+        if before - least < 1e-9 * before:
+            break
+    return values[:n], values[n:]

@@ -1,0 +1,331 @@
+"""Identification of the stiffness-dependent hysteresis coupling model, SDCHM.
+
+A hysteresis block for every muscle, a coupling between them, and a fuzzy network that takes in the
+extensor's pressure, identified in three stages.
+
+Source: "Modeling and Compensation of Stiffness-Dependent Hysteresis Coupling Behavior for Parallel
+Pneumatic Artificial Muscle-Driven Soft Manipulator", Algorithm 1.
+"""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass, replace
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from annotated_types import Ge, Interval
+from numpy.typing import NDArray
+from scipy.optimize import lsq_linear
+
+from mckibben import registry
+from mckibben.blocks.base import Block
+from mckibben.blocks.compose import PerChannel, Series
+from mckibben.blocks.coupling import Coupling
+from mckibben.blocks.fields import Channel, rows, vector
+from mckibben.blocks.fuzzy_network import FuzzyNetwork
+from mckibben.blocks.pi import PI
+from mckibben.errors import DataError, ModelWarning
+from mckibben.estimators.coupled.base import CoupledEstimator, Tell
+from mckibben.estimators.coupled.data import CoupledData, CoupledRun
+from mckibben.estimators.coupled.fuzzy import Fitted, Method, fit_network
+from mckibben.estimators.pi import play_operators
+from mckibben.recording import Recording
+
+Array = NDArray[np.float64]
+
+BEYOND = 0.1
+"""How far beyond the data the inverse may go, relative to their range."""
+
+FRICTION = (0.002, 0.1)
+"""Smallest and largest threshold of a muscle's own friction, relative to its travel."""
+
+LEAST_SLOPE = 0.05
+"""Smallest slope of a displacement by itself, right after a reversal."""
+
+
+@dataclass(kw_only=True, repr=False, eq=False)
+class NetworkEstimator(CoupledEstimator):
+    """What models with a fuzzy network share.
+
+    Parameters
+    ----------
+    n_sets : int
+        Gaussian sets of every input.
+    constants : bool
+        Whether rules have a constant term; the paper's have none.
+    method : {"ls", "pso"}
+        Antecedents by variable projection, or by the paper's particle swarm.
+    ridge : float
+        Damping of the consequents, relative to each regressor's own size.
+    """
+
+    n_sets: Annotated[int, Interval(ge=1, le=6)] = 3
+    constants: bool = False
+    method: Method = "ls"
+    ridge: Annotated[float, Ge(0)] = 1e-7
+
+    def network(
+        self,
+        x: Array,
+        y: Array,
+        driven: tuple[Channel, ...],
+        data: CoupledData,
+        validation: tuple[Array, Array] | None,
+        tell: Tell,
+    ) -> FuzzyNetwork:
+        """Return a network from driven and scheduling inputs to displacements."""
+        found = fit_network(
+            x,
+            y,
+            self.n_sets,
+            constants=self.constants,
+            method=self.method,
+            ridge=self.ridge,
+            seed=self.seed,
+            validation=validation,
+            tell=lambda share: tell(share, "network"),
+        )
+        n = len(driven)
+        low, high = x[:, :n].min(axis=0), x[:, :n].max(axis=0)
+        margin = BEYOND * (high - low)
+        limits = np.column_stack([low - margin, high + margin])
+        return as_block(found, driven, data.displacements, data.scheduled, limits, self.constants)
+
+
+def as_block(
+    fitted: Fitted,
+    driven: tuple[Channel, ...],
+    given: tuple[Channel, ...],
+    scheduled: tuple[Channel, ...],
+    limits: Array,
+    constants: bool,
+) -> FuzzyNetwork:
+    """Return a fitted network as a block."""
+    n_terms = len(driven) + len(scheduled) + constants
+    consequents = fitted.consequents.reshape(-1, n_terms, len(given))
+    return FuzzyNetwork(
+        rows(fitted.sets.centres),
+        rows(fitted.sets.widths),
+        vector(np.moveaxis(consequents, 2, 1).ravel()),
+        driven,
+        given,
+        scheduled,
+        constants,
+        rows(limits),
+    )
+
+
+@dataclass(kw_only=True, repr=False, eq=False)
+class TSFNNEstimator(NetworkEstimator):
+    """Fuzzy network on the raw pressures: the paper's baseline, without memory."""
+
+    def identify(self, data: CoupledData, validation: CoupledData | None, tell: Tell) -> Block:
+        """Return the network."""
+        held = None
+        if validation is not None:
+            held = (
+                np.concatenate([run.inputs for run in validation.runs]),
+                validation.stacked("displacements"),
+            )
+        x = np.concatenate([run.inputs for run in data.runs])
+        y = data.stacked("displacements")
+        return self.network(x, y, data.pressures, data, held, tell)
+
+
+@dataclass(kw_only=True, repr=False, eq=False)
+class SDCHMEstimator(NetworkEstimator):
+    """Hysteresis of every muscle, coupling, a network scheduled by stiffness, and friction.
+
+    Where every part but the network has an exact inverse, and the network one solved for, so has the
+    whole. The last part is beyond the paper: a muscle that is moved by the others rubs in its own braid,
+    and a Prandtl-Ishlinskii memory of its own motion says so.
+
+    Parameters
+    ----------
+    memory : str
+        Model of every muscle's hysteresis: any with an exact inverse. ``cpi`` knows creep.
+    memory_settings : mapping
+        Its settings.
+    n_friction : int
+        Play operators with a dead zone behind the network, on every displacement; 0 for no such part.
+    n_rounds : int
+        Times that network and friction are fitted in turn.
+    """
+
+    constants: bool = True
+    memory: Literal["gpi", "pi", "mpi", "eupi", "cpi"] = "cpi"
+    memory_settings: dict[str, Any] | None = None
+    n_friction: Annotated[int, Interval(ge=0, le=20)] = 6
+    n_rounds: Annotated[int, Interval(ge=1, le=5)] = 2
+
+    def identify(self, data: CoupledData, validation: CoupledData | None, tell: Tell) -> Block:
+        """Return the series of all stages."""
+        chosen = [softest(data, muscle) for muscle in range(len(data.pressures))]
+        tell(0.0, "hysteresis of every muscle")
+        memories = [self.hysteresis(run, k, data) for k, run in enumerate(chosen)]
+        hysteresis = PerChannel(tuple(memories))
+        tell(0.2, "coupling")
+        coupling = coupled(memories, chosen, data)
+        front = Series((hysteresis, coupling))
+        used = {id(run) for run in chosen}
+        rest = [run for run in data.runs if id(run) not in used] or list(data.runs)
+        x = stacked_inputs(front, rest)
+        held = None
+        if validation is not None:
+            moved = np.concatenate([run.displacements for run in validation.runs])
+            held = (stacked_inputs(front, list(validation.runs)), moved)
+        target = [run.displacements for run in rest]
+        rounds = self.n_rounds if self.n_friction else 1
+        for number in range(rounds):
+
+            def told(share: float, text: str, number: int = number) -> None:
+                tell(0.25 + 0.75 * (number + share) / rounds, text)
+
+            network = self.network(
+                x,
+                np.concatenate(target),
+                data.displacements,
+                data,
+                held if number == 0 else None,
+                told,
+            )
+            if not self.n_friction:
+                return Series((hysteresis, coupling, network))
+            straight = np.split(
+                network.simulate(x), np.cumsum([len(run.displacements) for run in rest])[:-1]
+            )
+            rubbing = PerChannel(
+                tuple(
+                    self.friction(
+                        [part[:, k] for part in straight],
+                        [run.displacements[:, k] for run in rest],
+                        channel,
+                    )
+                    for k, channel in enumerate(data.displacements)
+                )
+            )
+            unrubbed = rubbing.inverse()
+            with warnings.catch_warnings():  # noise at the ends is clipped
+                warnings.simplefilter("ignore", ModelWarning)
+                target = [unrubbed.simulate(run.displacements) for run in rest]
+        return Series((hysteresis, coupling, network, rubbing))
+
+    def friction(self, given: list[Array], wanted: list[Array], channel: Channel) -> PI:
+        """Return the memory of a muscle's own motion: play operators, all partial sums positive."""
+        low = min(float(part.min()) for part in given)
+        high = max(float(part.max()) for part in given)
+        span = high - low
+        smallest = FRICTION[0] * span
+        radii = np.append(0.0, np.geomspace(smallest, FRICTION[1] * span, self.n_friction))
+        plays = np.concatenate([play_operators(part, radii, "first_sample") for part in given])
+        # weights are differences of partial sums, which must stay positive for an inverse
+        steps = np.column_stack([-np.diff(plays, axis=1), plays[:, -1]])
+        columns = np.column_stack([steps, np.ones(len(steps))])
+        lower = np.append(np.full(radii.size, LEAST_SLOPE), -np.inf)
+        y = np.concatenate(wanted)
+        gram, right = columns.T @ columns, columns.T @ y
+        factor = np.linalg.cholesky(gram + 1e-10 * np.trace(gram) * np.eye(len(gram)))
+        found = lsq_linear(factor.T, np.linalg.solve(factor, right), (lower, np.inf)).x
+        weights = np.diff(found[:-1], prepend=0.0)
+        margin = BEYOND * span
+        return PI(
+            vector(radii),
+            vector(weights),
+            float(found[-1]),
+            (low - margin, high + margin),
+            "first_sample",
+            channel,
+            channel,
+        )
+
+    def hysteresis(self, run: CoupledRun, muscle: int, data: CoupledData) -> Block:
+        """Return the hysteresis of one muscle, from a run in which it moves alone."""
+        given, wanted = data.pressures[muscle], data.displacements[muscle]
+        recording = Recording(
+            {given.name: run.pressures[:, muscle], wanted.name: run.displacements[:, muscle]},
+            run.sample_time,
+        )
+        settings = {"input": given.name, "output": wanted.name, "seed": self.seed}
+        estimator = registry.load("estimators", self.memory)(
+            **settings | (self.memory_settings or {})
+        )
+        block: Block = estimator.fit(recording).model_
+        if getattr(block, "input_range", None) is not None:
+            low, high = float(data.lowest[muscle]), float(data.highest[muscle])
+            block = replace(block, input_range=(low, high))  # type: ignore[type-var]
+        return block
+
+
+def stacked_inputs(front: Block, runs: list[CoupledRun]) -> Array:
+    """Return what the network is given over all runs: coupled hysteresis, then what schedules."""
+    return np.concatenate([np.column_stack([simulated(front, run), run.scheduled]) for run in runs])
+
+
+def simulated(block: Block, run: CoupledRun) -> Array:
+    """Return a block's outputs over a run's pressures."""
+    return block.simulate(np.ascontiguousarray(run.pressures), sample_time=run.sample_time)
+
+
+def softest(data: CoupledData, muscle: int) -> CoupledRun:
+    """Return the run to identify a muscle's hysteresis from.
+
+    It moves alone; what schedules is lowest; and the run is the longest of those.
+
+    Raises
+    ------
+    DataError
+        If the muscle never moves alone.
+    """
+    runs = data.alone(muscle)
+    if not runs:
+        raise DataError(
+            "no run moves this muscle alone, so its hysteresis cannot be told from the coupling",
+            channel=data.pressures[muscle].name,
+            remedy="add a run in which the other pressures rest, or fit force-balance",
+        )
+    if not data.scheduled:
+        return max(runs, key=lambda run: len(run.pressures))
+    lowest = min(float(run.scheduled.mean()) for run in runs)
+    span = float(np.ptp(data.stacked("scheduled"))) or 1.0
+    near = [run for run in runs if run.scheduled.mean() <= lowest + 0.02 * span]
+    return max(near, key=lambda run: len(run.pressures))
+
+
+def coupled(memories: list[Block], runs: list[CoupledRun], data: CoupledData) -> Coupling:
+    """Return the coupling: what moves with muscle i alone, by least squares on its hysteresis."""
+    n = len(memories)
+    gains = np.eye(n)
+    for i, (block, run) in enumerate(zip(memories, runs, strict=True)):
+        v = block.simulate(run.pressures[:, i], sample_time=run.sample_time)
+        for j in range(n):
+            if j != i:
+                gains[i, j] = float(v @ run.displacements[:, j]) / float(v @ v)
+    return Coupling(rows(gains), data.displacements, data.displacements)
+
+
+@dataclass(kw_only=True, repr=False, eq=False)
+class PublishedSDCHMEstimator(SDCHMEstimator):
+    """The model as its paper identifies it: GPI, coupling, and a network trained by particle swarm."""
+
+    constants: bool = False
+    method: Method = "pso"
+    memory: Literal["gpi", "pi", "mpi", "eupi", "cpi"] = "gpi"
+    n_friction: Annotated[int, Interval(ge=0, le=20)] = 0
+
+
+@dataclass(kw_only=True, repr=False, eq=False)
+class CoupledPIEstimator(SDCHMEstimator):
+    """Hysteresis of every muscle and a coupling, whatever the stiffness: a baseline."""
+
+    memory: Literal["gpi", "pi", "mpi", "eupi", "cpi"] = "gpi"
+
+    def identify(self, data: CoupledData, validation: CoupledData | None, tell: Tell) -> Block:
+        """Return the series of hysteresis and coupling."""
+        del validation
+        tell(0.0, "hysteresis of every muscle")
+        chosen = [softest(data, muscle) for muscle in range(len(data.pressures))]
+        memories = [self.hysteresis(run, k, data) for k, run in enumerate(chosen)]
+        if data.scheduled:
+            self.notes.append(f"{data.scheduled[0].name} is not used by this model")
+        return Series((PerChannel(tuple(memories)), coupled(memories, chosen, data)))

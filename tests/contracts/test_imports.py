@@ -20,7 +20,7 @@ LAYERS = (
     {"environments"},
     {"blocks"},
     {"estimators"},
-    {"compensators"},
+    {"compensators", "control"},
     {"comparison"},
     {"papers"},
     {"report"},
@@ -31,6 +31,7 @@ LAYERS = (
 STANDS_ON = {
     "files": {"files", "recording", "errors", "registry", "atomic"},
     "rigs": {"rigs", "recording", "signals", "errors", "registry", "atomic"},
+    "control": {"control", "blocks", "recording", "errors", "registry"},
     "environments": {"environments", "rigs", "recording", "signals", "errors"},
 }
 """What some members may import and no more: a rig's physics knows nothing of models."""

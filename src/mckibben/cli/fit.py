@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -24,6 +24,10 @@ from mckibben.cli.options import (
     parse_settings,
 )
 from mckibben.cli.output import figure, print_json, progress_bar
+from mckibben.errors import DataError, ModelError
+
+if TYPE_CHECKING:
+    from mckibben.recording import Recording
 
 
 def fit(
@@ -36,6 +40,12 @@ def fit(
         str | None, typer.Option("--method", help="How to search: ls, pso-ls, pso.")
     ] = None,
     settings: Settings = None,
+    validation: Annotated[
+        list[Path] | None,
+        typer.Option(
+            "--validation", metavar="FILE", help="Several muscles: stops a search; repeatable."
+        ),
+    ] = None,
     seed: Seed = 0,
     column: Columns = None,
     unit: Units = None,
@@ -44,9 +54,25 @@ def fit(
     resample: Resample = None,
     as_json: Json = False,
 ) -> None:
-    """Identify one model from recordings and save it as JSON."""
+    """Identify one model from recordings and save it as JSON.
+
+    Models of several muscles (coupled-pi, force-balance, sdchm, sdchm-published, tsfnn) find their
+    channels by name: pressure_1 ..., displacement_1 ..., and pressure_extensor where there is one.
+    """
     from mckibben import registry
 
+    if model in registry.names("coupled"):
+        reading = Reading(column, unit, rate, gaps, resample)
+        held_back = reading.read(validation or [], None)
+        _fit_coupled(
+            model, reading.read(files, None), held_back, out, method, settings, seed, as_json
+        )
+        return
+    if validation:
+        raise DataError(
+            f"--validation is for models of several muscles, not for {model!r}",
+            remedy="leave it out",
+        )
     estimator_class = registry.load("estimators", model)
     given = parse_settings(settings, model)
     recordings = Reading(column, unit, rate, gaps, resample).read(files, [input, output])
@@ -85,4 +111,57 @@ def fit(
         f"{model}: free-running RMSE {figure(found.rmse, 4)} {unit_name} on {found.n_samples} samples, "
         f"{estimator.model_.n_parameters} parameters, {found.seconds:.2f} s{stopped}"
     )
+    print(f"Written: {out}")
+
+
+def _fit_coupled(
+    model: str,
+    recordings: list[Recording],
+    held_back: list[Recording],
+    out: Path,
+    method: str | None,
+    settings: list[str] | None,
+    seed: int,
+    as_json: bool,
+) -> None:
+    """Identify a model of several muscles."""
+    from mckibben import registry
+
+    estimator_class = registry.load("coupled", model)
+    given = {"seed": seed} | parse_settings(settings, model, group="coupled")
+    if method is not None:
+        given["method"] = method
+    try:
+        estimator = estimator_class(**given)
+    except TypeError:
+        raise ModelError(
+            f"{model!r} has no setting 'method'. Remedy: leave --method out."
+        ) from None
+    with progress_bar(f"fitting {model}") as tell:
+        estimator.fit(recordings, validation=held_back, progress=tell)
+    block, found = estimator.model_, estimator.diagnostics_
+    block.save(out)
+    names = [channel.name for channel in block.outputs]
+    if as_json:
+        print_json(
+            {
+                "model": model,
+                "file": str(out),
+                "n_parameters": block.n_parameters,
+                "rmse": dict(zip(names, found.rmse, strict=True)),
+                "n_samples": found.n_samples,
+                "seconds": found.seconds,
+                "notes": list(found.notes),
+            }
+        )
+        return
+    errors = ", ".join(
+        f"{name} {figure(value, 4)} mm" for name, value in zip(names, found.rmse, strict=True)
+    )
+    print(
+        f"{model}: free-running RMSE {errors} on {found.n_samples} samples of {len(recordings)} "
+        f"recordings, {block.n_parameters} parameters, {found.seconds:.2f} s"
+    )
+    for note in found.notes:
+        print(f"Note: {note}")
     print(f"Written: {out}")

@@ -44,8 +44,8 @@ def _models(as_json: bool) -> None:
     from mckibben import registry
 
     found = {}
-    for name in registry.names("estimators"):
-        estimator = registry.load("estimators", name)
+    for group, name in ((g, n) for g in ("estimators", "coupled") for n in registry.names(g)):
+        estimator = registry.load(group, name)
         settings = {
             field.name: field.default
             for field in dataclasses.fields(estimator)

@@ -17,6 +17,8 @@ def invert(
     as_json: Json = False,
 ) -> None:
     """Write the inverse of a saved model: wished-for output in, input out."""
+    import numpy as np
+
     from mckibben.blocks.saving import load
 
     block = load(model)
@@ -27,10 +29,14 @@ def invert(
         channel.name: [float(a), float(b)]
         for channel, a, b in zip(block.outputs, low, high, strict=True)
     }
+    if not np.isfinite([*low, *high]).all():
+        reachable = {}
     if as_json:
         print_json({"file": str(out), "reachable": reachable})
         return
-    for channel in block.outputs:
+    if not reachable:
+        print("What can be reached depends on the other muscles; track says what was clipped.")
+    for channel in block.outputs if reachable else ():
         a, b = reachable[channel.name]
         print(
             f"Reachable whatever happened before: {channel.name} {figure(a, 5)} to {figure(b, 5)} "

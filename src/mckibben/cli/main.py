@@ -24,6 +24,7 @@ from mckibben.cli.reproduce import reproduce
 from mckibben.cli.rig import app as rig_app
 from mckibben.cli.simulate import simulate
 from mckibben.cli.study import study
+from mckibben.cli.track import track
 from mckibben.errors import DataWarning, MckibbenError, ModelWarning
 
 BAD_INPUT = 2
@@ -38,7 +39,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
-for command in (study, characterize, fit, compare, simulate, invert, plot, reproduce, info):
+for command in (study, characterize, fit, compare, simulate, invert, track, plot, reproduce, info):
     app.command()(command)
 app.add_typer(rig_app)
 

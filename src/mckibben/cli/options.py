@@ -125,7 +125,9 @@ def _pairs(option: str, given: list[str] | None) -> dict[str, str]:
     return pairs
 
 
-def parse_settings(given: list[str] | None, model: str) -> dict[str, Any]:
+def parse_settings(
+    given: list[str] | None, model: str, group: str = "estimators"
+) -> dict[str, Any]:
     """Return the settings of one model's estimator, checked against those it has.
 
     Values are read as JSON where they are that, else as words. A name may be preceded by a model and
@@ -135,7 +137,7 @@ def parse_settings(given: list[str] | None, model: str) -> dict[str, Any]:
 
     from mckibben import registry
 
-    known = {field.name for field in dataclasses.fields(registry.load("estimators", model))}
+    known = {field.name for field in dataclasses.fields(registry.load(group, model))}
     settings: dict[str, Any] = {}
     for item in given or []:
         name, equals, text = item.partition("=")

@@ -76,18 +76,44 @@ def firing(phi: Array) -> Array:
     return fired
 
 
+def linear_terms(x: Array, constants: bool) -> Array:
+    """Return what a consequent multiplies: the inputs, and one where there are constants."""
+    return np.column_stack([x, np.ones(len(x))]) if constants else x
+
+
 def regressors(x: Array, fired: Array, constants: bool) -> Array:
-    """Return what consequents multiply, shape (n, rules * terms)."""
-    terms = np.column_stack([x, np.ones(len(x))]) if constants else x
+    """Return what all consequents multiply, shape (n, rules * terms)."""
+    terms = linear_terms(x, constants)
     return (fired[:, :, np.newaxis] * terms[:, np.newaxis, :]).reshape(len(x), -1)
 
 
-def solve(columns: Array, y: Array, ridge: float) -> Array:
-    """Return consequents by least squares with a little damping, shape (rules * terms, outputs)."""
-    gram = columns.T @ columns
-    size = np.maximum(np.diag(gram), 1e-9 * np.diag(gram).max())
-    gram[np.diag_indices_from(gram)] += ridge * size + 1e-12 * size.max()
-    return np.asarray(np.linalg.solve(gram, columns.T @ y), dtype=np.float64)
+@dataclass(frozen=True)
+class Consequents:
+    """How consequents are solved for.
+
+    A rule's consequent is what all rules have in common plus a deviation of its own, and deviations are
+    damped: where the data say nothing, the network is then nearly linear rather than anything at all,
+    and can be inverted.
+    """
+
+    constants: bool
+    ridge: float
+
+    def solve(self, gram: Array, right: Array, n_terms: int) -> Array:
+        """Return consequents from normal equations, shape (rules * terms, outputs)."""
+        n_rules = len(gram) // n_terms
+        common = np.tile(np.eye(n_terms), (n_rules, 1))
+        parts = np.hstack([common, np.eye(len(gram))])
+        whole = parts.T @ gram @ parts
+        size = np.diag(whole)[:n_terms]
+        damping = np.concatenate([np.zeros(n_terms), np.tile(self.ridge * size, n_rules)])
+        whole[np.diag_indices_from(whole)] += damping + 1e-11 * size.max()
+        return np.asarray(parts @ np.linalg.solve(whole, parts.T @ right), dtype=np.float64)
+
+    def fit(self, x: Array, columns: Array, y: Array) -> Array:
+        """Return consequents by damped least squares, shape (rules * terms, outputs)."""
+        n_terms = x.shape[1] + self.constants
+        return self.solve(columns.T @ columns, columns.T @ y, n_terms)
 
 
 @dataclass(frozen=True)
@@ -121,41 +147,37 @@ def fit_network(
     low, high = x.min(axis=0), x.min(axis=0) + scale
     keep = np.linspace(0, len(x) - 1, min(len(x), SEARCH_SAMPLES)).round().astype(int)
     size = y.std(axis=0) + 1e-12
-    problem = _Problem(x[keep], y[keep] / size, constants, ridge)
+    solver = Consequents(constants, ridge)
+    problem = _Problem(x[keep], y[keep] / size, solver)
     start = Sets.even(low, high, n_sets)
     held = None if validation is None else (validation[0], validation[1] / size)
     search = _swarm if method == "pso" else _project
     sets = search(problem, start, low, scale, seed, held, tell)
-    whole = regressors_in_parts(x, y, sets, constants, ridge)
-    return Fitted(sets, whole)
+    return Fitted(sets, solve_in_parts(x, y, sets, solver))
 
 
-def regressors_in_parts(x: Array, y: Array, sets: Sets, constants: bool, ridge: float) -> Array:
+def solve_in_parts(x: Array, y: Array, sets: Sets, solver: Consequents) -> Array:
     """Return consequents by least squares on all samples, without a table of all regressors."""
-    gram: Array | None = None
-    right: Array | None = None
+    n_terms = x.shape[1] + solver.constants
+    n = len(sets.centres[0]) ** x.shape[1] * n_terms
+    gram, right = np.zeros((n, n)), np.zeros((n, y.shape[1]))
     for start in range(0, len(x), 8192):
         part = slice(start, start + 8192)
-        columns = regressors(x[part], firing(memberships(x[part], sets)), constants)
-        gram = columns.T @ columns + (0.0 if gram is None else gram)
-        right = columns.T @ y[part] + (0.0 if right is None else right)
-    assert gram is not None
-    assert right is not None
-    size = np.maximum(np.diag(gram), 1e-9 * np.diag(gram).max())
-    gram[np.diag_indices_from(gram)] += ridge * size + 1e-12 * size.max()
-    return np.asarray(np.linalg.solve(gram, right), dtype=np.float64)
+        columns = regressors(x[part], firing(memberships(x[part], sets)), solver.constants)
+        gram += columns.T @ columns
+        right += columns.T @ y[part]
+    return solver.solve(gram, right, n_terms)
 
 
 @dataclass(frozen=True)
 class _Problem:
     x: Array
     y: Array
-    constants: bool
-    ridge: float
+    solver: Consequents
 
     def cost(self, sets: Sets) -> float:
-        columns = regressors(self.x, firing(memberships(self.x, sets)), self.constants)
-        errors = columns @ solve(columns, self.y, self.ridge) - self.y
+        columns = regressors(self.x, firing(memberships(self.x, sets)), self.solver.constants)
+        errors = columns @ self.solver.fit(self.x, columns, self.y) - self.y
         return float(np.sqrt(np.mean(errors**2)))
 
 
@@ -253,11 +275,11 @@ def _held(
 ) -> float:
     if validation is None:
         return cost
-    columns = regressors(problem.x, firing(memberships(problem.x, sets)), problem.constants)
-    fitted = Fitted(sets, solve(columns, problem.y, problem.ridge))
+    columns = regressors(problem.x, firing(memberships(problem.x, sets)), problem.solver.constants)
+    fitted = Fitted(sets, problem.solver.fit(problem.x, columns, problem.y))
     x, y = validation
     thin = np.linspace(0, len(x) - 1, min(len(x), SEARCH_SAMPLES)).round().astype(int)
-    errors = fitted.predict(x[thin], problem.constants) - y[thin]
+    errors = fitted.predict(x[thin], problem.solver.constants) - y[thin]
     return float(np.sqrt(np.mean(errors**2)))
 
 
@@ -268,9 +290,9 @@ def _sensitivities(problem: _Problem, sets: Sets) -> tuple[Array, Array]:
     n_sets, n_out = sets.centres.shape[1], y.shape[1]
     phi = memberships(x, sets)
     fired = firing(phi)
-    columns = regressors(x, fired, problem.constants)
-    consequents = solve(columns, y, problem.ridge)
-    terms = np.column_stack([x, np.ones(n)]) if problem.constants else x
+    columns = regressors(x, fired, problem.solver.constants)
+    consequents = problem.solver.fit(x, columns, y)
+    terms = linear_terms(x, problem.solver.constants)
     answers = np.einsum("nt,rto->nro", terms, consequents.reshape(-1, terms.shape[1], n_out))
     weighted = answers * fired[:, :, np.newaxis]
     f = weighted.sum(axis=1)
@@ -288,6 +310,6 @@ def _sensitivities(problem: _Problem, sets: Sets) -> tuple[Array, Array]:
     table = derivative.reshape(n, n_out, -1)
     # what consequents can take up is projected out
     flat = table.reshape(n, -1)
-    projected = flat - columns @ solve(columns, flat, problem.ridge)
+    projected = flat - columns @ problem.solver.fit(x, columns, flat)
     jacobian = projected.reshape(n, n_out, -1).reshape(n * n_out, -1)
     return jacobian, (f - y).ravel()

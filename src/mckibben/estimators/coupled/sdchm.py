@@ -10,7 +10,7 @@ Pneumatic Artificial Muscle-Driven Soft Manipulator", Algorithm 1.
 from __future__ import annotations
 
 import warnings
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -57,13 +57,15 @@ class NetworkEstimator(CoupledEstimator):
     method : {"ls", "pso"}
         Antecedents by variable projection, or by the paper's particle swarm.
     ridge : float
-        Damping of the consequents, relative to each regressor's own size.
+        Damping of what is a rule's own, relative to the size of what it multiplies. With next to none
+        (1e-7) the network predicts best along what was recorded; but it is then undetermined where no
+        run has been, and cannot be inverted there.
     """
 
     n_sets: Annotated[int, Interval(ge=1, le=6)] = 3
     constants: bool = False
     method: Method = "ls"
-    ridge: Annotated[float, Ge(0)] = 1e-7
+    ridge: Annotated[float, Ge(0)] = 1e-3
 
     def network(
         self,
@@ -251,9 +253,6 @@ class SDCHMEstimator(NetworkEstimator):
             **settings | (self.memory_settings or {})
         )
         block: Block = estimator.fit(recording).model_
-        if getattr(block, "input_range", None) is not None:
-            low, high = float(data.lowest[muscle]), float(data.highest[muscle])
-            block = replace(block, input_range=(low, high))  # type: ignore[type-var]
         return block
 
 
@@ -310,6 +309,7 @@ class PublishedSDCHMEstimator(SDCHMEstimator):
 
     constants: bool = False
     method: Method = "pso"
+    ridge: Annotated[float, Ge(0)] = 1e-9
     memory: Literal["gpi", "pi", "mpi", "eupi", "cpi"] = "gpi"
     n_friction: Annotated[int, Interval(ge=0, le=20)] = 0
 

@@ -1,0 +1,147 @@
+"""mckibben track: close a loop on a virtual rig."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from mckibben.cli.options import Columns, Gaps, Json, Rate, Reading, Seed, Units
+from mckibben.cli.output import figure, print_json, print_table, progress_bar
+from mckibben.errors import DataError
+
+if TYPE_CHECKING:
+    from mckibben.blocks.base import Block
+    from mckibben.control import Controller
+    from mckibben.recording import Recording
+    from mckibben.rigs import Rig
+
+
+class Kind(StrEnum):
+    """Controllers."""
+
+    FEEDFORWARD = "feedforward"
+    PID = "pid"
+    FEEDFORWARD_PID = "feedforward-pid"
+    OBSERVER = "observer"
+
+
+def track(
+    compensator: Annotated[Path, typer.Argument(help="Inverse, from mckibben invert (JSON).")],
+    rig: Annotated[str, typer.Option("--rig", help="Rig, by name or file; see rig list.")],
+    reference: Annotated[
+        Path, typer.Option("--reference", metavar="FILE", help="Displacements to follow.")
+    ],
+    controller: Annotated[
+        Kind, typer.Option("--controller", help="Which controller; pid does without the inverse.")
+    ] = Kind.FEEDFORWARD,
+    out: Annotated[
+        Path | None, typer.Option("-o", "--out", help="Recording of the run to write.")
+    ] = None,
+    approach: Annotated[float, typer.Option(help="Time to reach the first reference [s].")] = 20.0,
+    settle: Annotated[float, typer.Option(help="Time after that not scored [s].")] = 0.0,
+    noise: Annotated[float, typer.Option(help="Added to measured displacements [mm].")] = 0.0,
+    delay: Annotated[int, typer.Option(help="Steps by which measurements come late.")] = 0,
+    slew: Annotated[float | None, typer.Option(help="Fastest pressure change [bar/s].")] = None,
+    pressure_loop: Annotated[
+        bool, typer.Option(help="Feed measured pressures back inside, as regulators do.")
+    ] = True,
+    seed: Seed = 0,
+    column: Columns = None,
+    unit: Units = None,
+    rate: Rate = None,
+    as_json: Json = False,
+) -> None:
+    """Let a compensator, or a controller with it, follow a reference on a virtual rig."""
+    from mckibben.blocks.saving import load
+    from mckibben.control import track as close
+    from mckibben.files import write
+    from mckibben.rigs import load_rig
+
+    block = load(compensator)
+    plant = load_rig(rig)
+    runs = Reading(column, unit, rate, Gaps.ERROR).read([reference], None, informative=False)
+    wanted = runs[0]
+    _fits(block, plant, wanted)
+    with progress_bar(f"{controller.value} on {plant.name}") as tell:
+        chosen = _controller(controller, block, plant, wanted)
+        found = close(
+            chosen,
+            plant,
+            wanted,
+            approach=approach,
+            settle=settle,
+            pressure_loop=pressure_loop,
+            noise=noise,
+            delay=delay,
+            slew=slew,
+            seed=seed,
+            progress=lambda share: tell(share, ""),
+        )
+    if out is not None:
+        write(found.recording, out)
+    if as_json:
+        print_json(
+            {
+                "controller": controller.value,
+                "rmse": dict(found.rmse),
+                "largest": dict(found.largest),
+                "clipped": found.clipped,
+                "clipping_cost": found.clipping_cost,
+                "step_time": {"median": found.step_time[0], "p99.9": found.step_time[1]},
+                "file": None if out is None else str(out),
+            }
+        )
+        return
+    rows = [
+        [name, figure(found.rmse[name], 3), figure(found.largest[name], 3)] for name in found.rmse
+    ]
+    print_table(["displacement", "RMSE [mm]", "largest [mm]"], rows)
+    if found.clipped:
+        print(
+            f"Pressures were at a limit in {found.clipped} steps; RMSE there is "
+            f"{figure(found.clipping_cost, 3)} mm above that of the other steps."
+        )
+    print(
+        f"Controller: {1e6 * found.step_time[0]:.0f} µs a step (median), "
+        f"{1e6 * found.step_time[1]:.0f} µs (99.9 %)."
+    )
+    if out is not None:
+        print(f"Written: {out}")
+
+
+def _fits(block: Block, plant: Rig, reference: Recording) -> None:
+    """Refuse a model in place of an inverse, and references without what the inverse needs."""
+    for channel in block.outputs:
+        if channel.name not in plant.inputs:
+            raise DataError(
+                f"the compensator gives {channel.name!r}, which does not drive {plant.name!r}",
+                remedy="give what mckibben invert wrote, and the rig that the model is of",
+            )
+    for channel in block.inputs:
+        if channel.name not in reference:
+            raise DataError(
+                "the compensator needs it, but the reference has no such channel",
+                file=reference.source,
+                channel=channel.name,
+                remedy="add the column",
+            )
+
+
+def _controller(kind: Kind, block: Block, plant: Rig, reference: Recording) -> Controller:
+    from mckibben.control import DisturbanceObserver, Feedforward, FeedforwardPID, tune_pid
+
+    if kind is Kind.FEEDFORWARD:
+        return Feedforward(block)
+    if kind is Kind.OBSERVER:
+        return DisturbanceObserver(block)
+    driven = {channel.name for channel in block.outputs}
+    held = {
+        name: float(reference[name][0])
+        for name in plant.inputs
+        if name in reference and name not in driven
+    }
+    pid = tune_pid(plant, sample_time=reference.sample_time or 0.02, scheduled=held)
+    return pid if kind is Kind.PID else FeedforwardPID(block, pid)

@@ -1,0 +1,36 @@
+"""What a controller is: references and measurements in, pressures out, sample by sample."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+class Controller(ABC):
+    """Asked once a control step for the pressures of n muscles."""
+
+    @abstractmethod
+    def reset(self, sample_time: float) -> None:
+        """Forget the past, and get ready for steps of so many seconds."""
+
+    @abstractmethod
+    def step(self, reference: Array, displacement: Array, scheduled: Array) -> Array:
+        """Return the pressures to apply until the next step [bar], shape (n,).
+
+        Parameters
+        ----------
+        reference : array, shape (n,)
+            Where the muscles should be at the next step [mm].
+        displacement : array, shape (n,)
+            Where they were just measured to be [mm].
+        scheduled : array, shape (s,)
+            What schedules the model: an extensor's pressure, a load.
+        """
+
+    def applied(self, pressures: Array) -> None:
+        """Learn what was applied in the end, after limits."""
+        del pressures

@@ -1,0 +1,48 @@
+"""A compensator with PID feedback on top."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mckibben.blocks.base import Block
+from mckibben.control.controller import Controller
+from mckibben.control.feedforward import Feedforward
+from mckibben.control.pid import PID
+
+Array = NDArray[np.float64]
+
+
+@dataclass
+class FeedforwardPID(Controller):
+    """Pressures of a compensator, corrected by what is measured.
+
+    The reference is where the muscles should be at the next step, the measurement is of now: feedback
+    compares the measurement with the reference of one step before.
+
+    Parameters
+    ----------
+    compensator : Block
+        From displacements, and what schedules it, to pressures.
+    pid : PID
+        Feedback, and the limits of pressure.
+    """
+
+    compensator: Block
+    pid: PID
+
+    def reset(self, sample_time: float) -> None:
+        """Start both afresh."""
+        self._ahead = Feedforward(self.compensator)
+        self._ahead.reset(sample_time)
+        self.pid.reset(sample_time)
+        self._due: Array | None = None
+
+    def step(self, reference: Array, displacement: Array, scheduled: Array) -> Array:
+        """Return the compensator's pressures with the correction."""
+        base = self._ahead.step(reference, displacement, scheduled)
+        due = displacement if self._due is None else self._due
+        self._due = reference.copy()
+        return np.clip(self.pid.correction(due, displacement, base), *self.pid.limits)

@@ -1,0 +1,248 @@
+"""Closing a loop: any controller on anything that steps like a rig."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mckibben.control.controller import Controller
+from mckibben.control.pressure_loop import PressureLoop
+from mckibben.errors import DataError, ModelError
+from mckibben.recording import Recording
+
+Array = NDArray[np.float64]
+
+
+class Plant(Protocol):
+    """What can be controlled: the step interface of rigs."""
+
+    @property
+    def name(self) -> str:
+        """Short name."""
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """Channels that drive it."""
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """Channels that it measures."""
+
+    def reset(self, seed: int = 0) -> Array:
+        """Bring it to rest and return the first measurement."""
+
+    def step(self, action: ArrayLike | Mapping[str, float]) -> Array:
+        """Hold commands for one sample time and return the next measurement."""
+
+    def limits(self, name: str) -> Any:
+        """Return what the hardware lets through on an input channel: ``low`` and ``high``."""
+
+    def changed(self, settings: Mapping[str, Any]) -> Any:
+        """Return the same plant with other settings."""
+
+
+@dataclass(frozen=True)
+class Tracked:
+    """What came of a loop.
+
+    Parameters
+    ----------
+    recording : Recording
+        References (``reference_...``), measured displacements and pressures, commands.
+    rmse, largest : mapping of str to float
+        Of every displacement after the approach [mm].
+    clipped : int
+        Steps in which pressure or its rate was at a limit.
+    clipping_cost : float
+        RMSE over those steps less RMSE over the others [mm]; 0 where there are none.
+    step_time : (float, float)
+        Median and 99.9th percentile of the controller's own time a step [s].
+    """
+
+    recording: Recording
+    rmse: Mapping[str, float]
+    largest: Mapping[str, float]
+    clipped: int
+    clipping_cost: float
+    step_time: tuple[float, float]
+
+
+def track(
+    controller: Controller,
+    plant: Plant,
+    reference: Recording,
+    *,
+    approach: float = 20.0,
+    settle: float = 0.0,
+    pressure_loop: bool = True,
+    noise: float = 0.0,
+    delay: int = 0,
+    slew: float | None = None,
+    seed: int = 0,
+    progress: Callable[[float], None] | None = None,
+) -> Tracked:
+    """Let a controller make a plant's displacements follow references.
+
+    Parameters
+    ----------
+    controller : Controller
+    plant : Plant
+        A rig; it is run at the reference's sample time, which is the control rate.
+    reference : Recording
+        Channels of displacement to follow [mm], and of what schedules the controller and is held on the
+        plant, such as ``pressure_extensor``, as they should be.
+    approach : float
+        Time to go from rest to the first reference [s], not scored.
+    settle : float
+        Time after that which is not scored either [s].
+    pressure_loop : bool
+        Whether measured pressures are fed back inside, as regulators with a sensor do.
+    noise : float
+        Standard deviation added to measured displacements [mm].
+    delay : int
+        Control steps by which measurements come late.
+    slew : float, optional
+        Fastest change of a pressure [bar/s].
+    seed : int
+        Of all noise.
+    progress : callable, optional
+        Told the share of the time that has passed.
+
+    Returns
+    -------
+    Tracked
+
+    Raises
+    ------
+    DataError
+        If the reference has no time, or no channel that the plant measures.
+    ModelError
+        On settings out of range.
+    """
+    step = reference.sample_time
+    if step is None:
+        raise DataError(
+            "the reference has no time", file=reference.source, remedy="add a time column or --rate"
+        )
+    if approach < 0 or settle < 0 or noise < 0 or delay < 0 or (slew is not None and not slew > 0):
+        raise ModelError(
+            "approach, settle, noise and delay must not be negative, and slew must be positive. "
+            "Remedy: correct the setting."
+        )
+    followed = [name for name in plant.outputs if name in reference and name.startswith("displ")]
+    if not followed:
+        raise DataError(
+            f"it has no displacement that {plant.name!r} measures",
+            file=reference.source,
+            remedy=f"give channels among {', '.join(plant.outputs)}",
+        )
+    driven, held = _roles(plant, reference)
+    starts = {f"start.{name}": float(reference[name][0]) for name in held}
+    changed = plant.changed({"sample_time": step, **starts})
+    lead = round(approach / step)
+    path = reference.matrix(followed)
+    ramp = np.linspace(0.0, 1.0, lead, endpoint=False)[:, np.newaxis] * path[0]
+    path = np.concatenate([ramp, path])
+    scheduled = reference.matrix(held) if held else np.empty((len(reference), 0))
+    scheduled = np.concatenate([np.tile(scheduled[:1], (lead, 1)), scheduled])
+
+    places = {name: place for place, name in enumerate(changed.outputs)}
+    at_y = [places[name] for name in followed]
+    at_p = [places[name] for name in driven if name in places]
+    inner = pressure_loop and len(at_p) == len(driven)
+    limits = [changed.limits(name) for name in driven]
+    low, high = (np.array([getattr(limit, end) for limit in limits]) for end in ("low", "high"))
+    loop = PressureLoop(low, high, step)
+    rng = np.random.default_rng(seed)
+    measured = changed.reset(seed)
+    late = [measured] * (delay + 1)
+    controller.reset(step)
+    n = len(path)
+    seen, commands = np.empty((n, len(measured))), np.empty((n, len(driven)))
+    clipped, times = np.zeros(n, dtype=bool), np.empty(n)
+    last: Array | None = None
+    for t in range(n):
+        seen[t] = measured
+        late = [*late[1:], measured]
+        felt = late[0][at_y] + noise * rng.standard_normal(len(at_y))
+        started = time.perf_counter()
+        wanted = controller.step(path[t], felt, scheduled[t])
+        times[t] = time.perf_counter() - started
+        if wanted.shape != low.shape or not np.isfinite(wanted).all():
+            raise ModelError(
+                f"the controller gave {wanted} for {len(driven)} muscles at {t * step:g} s. "
+                "Remedy: use a compensator made for this plant."
+            )
+        allowed = np.clip(wanted, low, high)
+        if slew is not None and last is not None:
+            allowed = np.clip(allowed, last - slew * step, last + slew * step)
+        clipped[t] = bool((np.abs(allowed - wanted) > 1e-9).any())
+        last = allowed
+        controller.applied(allowed)
+        command = loop.step(allowed, measured[at_p]) if inner else allowed
+        commands[t] = command
+        action = dict(zip(driven, command.tolist(), strict=True))
+        action |= dict(zip(held, scheduled[t].tolist(), strict=True))
+        measured = changed.step(action)
+        if progress is not None and t % 200 == 0:
+            progress(t / n)
+    # what was asked for at a step is due at the next
+    due = np.concatenate([path[:1], path[:-1]])
+    errors = seen[:, at_y] - due
+    scored = slice(lead + round(settle / step), n)
+    if scored.start >= n:
+        raise ModelError(
+            "nothing is left to score. Remedy: give a longer reference, or less settle."
+        )
+    part, at_limit = errors[scored], clipped[scored]
+    return Tracked(
+        _recorded(reference, followed, driven, due, seen, commands, scheduled, held, changed, lead),
+        dict(zip(followed, np.sqrt(np.mean(part**2, axis=0)).tolist(), strict=True)),
+        dict(zip(followed, np.abs(part).max(axis=0).tolist(), strict=True)),
+        int(at_limit.sum()),
+        _cost(part, at_limit),
+        (float(np.median(times)), float(np.quantile(times, 0.999))),
+    )
+
+
+def _roles(plant: Plant, reference: Recording) -> tuple[list[str], list[str]]:
+    """Return the inputs that the controller drives, and those that the reference holds."""
+    held = [name for name in plant.inputs if name in reference]
+    driven = [name for name in plant.inputs if name.startswith("pressure") and name not in held]
+    numbered = [name for name in driven if name.rpartition("_")[2].isdigit()]
+    return numbered or driven, held
+
+
+def _cost(errors: Array, at_limit: NDArray[np.bool_]) -> float:
+    if not at_limit.any() or at_limit.all():
+        return 0.0
+    clipped, free = (float(np.sqrt(np.mean(errors[rows] ** 2))) for rows in (at_limit, ~at_limit))
+    return clipped - free
+
+
+def _recorded(
+    reference: Recording,
+    followed: list[str],
+    driven: list[str],
+    due: Array,
+    seen: Array,
+    commands: Array,
+    scheduled: Array,
+    held: list[str],
+    plant: Plant,
+    lead: int,
+) -> Recording:
+    channels = {f"reference_{name}": due[:, k] for k, name in enumerate(followed)}
+    channels |= {name: seen[:, k] for k, name in enumerate(plant.outputs)}
+    channels |= {f"command_{name}": commands[:, k] for k, name in enumerate(driven)}
+    for k, name in enumerate(held):
+        channels.setdefault(name, scheduled[:, k])
+    units = {f"reference_{name}": "mm" for name in followed}
+    units |= {f"command_{name}": "bar" for name in driven}
+    step = reference.sample_time or 1.0
+    return Recording(channels, step, units, start_time=-lead * step, meta={"plant": plant.name})

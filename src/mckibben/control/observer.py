@@ -1,0 +1,69 @@
+"""Disturbance observer: what the model does not explain is estimated, and the reference shifted by it.
+
+The forward model runs on the applied pressures beside the plant; the low-passed difference between
+measurement and model is an output disturbance (a load, a drift, an error of the model), and the
+compensator is asked for the reference without it. With an exact inverse this is internal model control
+(Morari and Zafiriou, "Robust Process Control"): no gain to tune but the filter's time.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mckibben.blocks.base import Block
+from mckibben.control.controller import Controller
+from mckibben.errors import ModelError
+
+Array = NDArray[np.float64]
+
+
+@dataclass
+class DisturbanceObserver(Controller):
+    """A compensator and its model, side by side with the plant.
+
+    Parameters
+    ----------
+    compensator : Block
+        From displacements, and what schedules it, to pressures; its inverse is the model.
+    filter_time : float
+        Time constant of the estimate [s], positive: longer is more robust, shorter more accurate.
+    """
+
+    compensator: Block
+    filter_time: float = 0.3
+
+    def __post_init__(self) -> None:
+        if not self.filter_time > 0:
+            raise ModelError(
+                f"filter_time is {self.filter_time}. Remedy: give a positive time in seconds."
+            )
+        self._model = self.compensator.inverse()
+
+    def reset(self, sample_time: float) -> None:
+        """Start compensator, model and filter afresh."""
+        self._ahead = self.compensator.stream(sample_time)
+        self._beside = self._model.stream(sample_time)
+        self._share = 1.0 - np.exp(-sample_time / self.filter_time)
+        self._disturbance: Array | None = None
+        self._expected: Array | None = None
+        self._n_ahead, self._n_beside = len(self.compensator.inputs), len(self._model.inputs)
+        self._scheduled = np.empty(0)
+
+    def step(self, reference: Array, displacement: Array, scheduled: Array) -> Array:
+        """Return the compensator's pressures for the reference without the disturbance."""
+        if self._disturbance is None:
+            self._disturbance = np.zeros_like(reference)
+        if self._expected is not None:
+            surprise = displacement - self._expected
+            self._disturbance += self._share * (surprise - self._disturbance)
+        self._scheduled = scheduled
+        wanted = np.concatenate([reference - self._disturbance, scheduled])
+        return self._ahead.step(wanted[: self._n_ahead]).copy()
+
+    def applied(self, pressures: Array) -> None:
+        """Let the model take the step that the plant takes."""
+        taken = np.concatenate([pressures, self._scheduled])[: self._n_beside]
+        self._expected = self._beside.step(taken).copy()

@@ -1,0 +1,75 @@
+"""PID feedback, one loop a muscle.
+
+Derivative of the measurement through a first-order filter; the integral stops where pressure is at a
+limit and would be driven further (Åström and Hägglund, "Advanced PID Control", ch. 3).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mckibben.control.controller import Controller
+from mckibben.errors import ModelError
+
+Array = NDArray[np.float64]
+
+
+@dataclass
+class PID(Controller):
+    """Independent loops.
+
+    Parameters
+    ----------
+    kp : sequence of float
+        Proportional gain of every muscle [bar/mm].
+    ki : sequence of float
+        Integral gain [bar/(mm s)].
+    kd : sequence of float
+        Derivative gain [bar s/mm].
+    limits : (float, float)
+        Of pressure [bar].
+    filter_time : float
+        Of the derivative [s].
+    """
+
+    kp: tuple[float, ...]
+    ki: tuple[float, ...]
+    kd: tuple[float, ...] = ()
+    limits: tuple[float, float] = (0.0, 6.0)
+    filter_time: float = 0.1
+
+    def __post_init__(self) -> None:
+        self.kd = self.kd or (0.0,) * len(self.kp)
+        if not len(self.kp) == len(self.ki) == len(self.kd):
+            raise ModelError("kp, ki and kd differ in length. Remedy: give one a muscle of each.")
+        if not self.limits[0] < self.limits[1]:
+            raise ModelError(f"limits are {self.limits}. Remedy: give lowest, then highest.")
+
+    def reset(self, sample_time: float) -> None:
+        """Empty the integral and the filter."""
+        self._time = sample_time
+        self._integral = np.zeros(len(self.kp))
+        self._last: Array | None = None
+        self._rate = np.zeros(len(self.kp))
+
+    def step(self, reference: Array, displacement: Array, scheduled: Array) -> Array:
+        """Return pressures within the limits."""
+        del scheduled
+        return np.clip(self.correction(reference, displacement), *self.limits)
+
+    def correction(self, reference: Array, displacement: Array, base: Array | float = 0.0) -> Array:
+        """Return what feedback asks for on top of ``base``, and count it towards the integral."""
+        error = reference - displacement
+        if self._last is not None:
+            share = self._time / (self.filter_time + self._time)
+            self._rate += share * ((displacement - self._last) / self._time - self._rate)
+        self._last = displacement.copy()
+        wanted = base + np.array(self.kp) * error + self._integral - np.array(self.kd) * self._rate
+        further = ((wanted > self.limits[1]) & (error > 0)) | (
+            (wanted < self.limits[0]) & (error < 0)
+        )
+        self._integral += np.where(further, 0.0, np.array(self.ki) * self._time * error)
+        return np.asarray(wanted)

@@ -1,0 +1,94 @@
+"""Tuning PID feedback on a plant, so that it is a fair baseline.
+
+A step of every pressure from the middle of its range gives gain, time constant and dead time (at 28 and
+63 % of the response); from them SIMC's rules (Skogestad, "Simple analytic rules for model reduction and
+PID controller tuning", 2003) give the gains, with a closed-loop time constant of one's choosing.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mckibben.control.loop import Plant
+from mckibben.control.pid import PID
+from mckibben.errors import ModelError
+
+Array = NDArray[np.float64]
+
+STEP = 0.1
+"""Of pressure, relative to its range."""
+
+
+def tune_pid(
+    plant: Plant,
+    *,
+    sample_time: float = 0.02,
+    closed_loop_time: float | None = None,
+    hold: float = 15.0,
+    scheduled: dict[str, float] | None = None,
+    seed: int = 0,
+) -> PID:
+    """Return PID feedback tuned on a plant.
+
+    Parameters
+    ----------
+    plant : Plant
+        A rig with as many pressures as displacements.
+    sample_time : float
+        Of the control to come [s].
+    closed_loop_time : float, optional
+        Wished-for time constant [s]; default the dead time, or three samples if that is longer.
+    hold : float
+        Time to settle before and after the step [s].
+    scheduled : mapping, optional
+        Other inputs, held.
+    seed : int
+        Of the noise.
+
+    Raises
+    ------
+    ModelError
+        If a muscle does not move with its own pressure.
+    """
+    scheduled = scheduled or {}
+    driven = [n for n in plant.inputs if n.startswith("pressure") and n not in scheduled]
+    driven = [n for n in driven if n.rpartition("_")[2].isdigit()] or driven
+    starts = {f"start.{name}": value for name, value in scheduled.items()}
+    rig = plant.changed({"sample_time": sample_time, **starts})
+    limits = [rig.limits(name) for name in driven]
+    middle = {
+        name: 0.5 * (limit.low + limit.high) for name, limit in zip(driven, limits, strict=True)
+    }
+    n = round(hold / sample_time)
+    gains = []
+    for name, limit in zip(driven, limits, strict=True):
+        rig.reset(seed)
+        place = rig.outputs.index(name.replace("pressure", "displacement"))
+        for _ in range(n):
+            before = rig.step({**middle, **scheduled})[place]
+        size = STEP * (limit.high - limit.low)
+        moved = {**middle, name: middle[name] + size, **scheduled}
+        response = np.array([rig.step(moved)[place] for _ in range(n)]) - before
+        gains.append(_simc(response, size, sample_time, closed_loop_time, name))
+    kp, ki = zip(*gains, strict=True)
+    lowest, highest = min(limit.low for limit in limits), max(limit.high for limit in limits)
+    return PID(tuple(kp), tuple(ki), limits=(float(lowest), float(highest)))
+
+
+def _simc(
+    response: Array, size: float, step: float, wanted: float | None, name: str
+) -> tuple[float, float]:
+    final = float(response[-max(len(response) // 10, 1) :].mean())
+    if not final > 0:
+        raise ModelError(
+            f"displacement does not rise with {name}. Remedy: check the plant, or its middle pressure."
+        )
+    early = (np.argmax(response >= 0.283 * final) + 1) * step
+    late = (np.argmax(response >= 0.632 * final) + 1) * step
+    time = max(1.5 * (late - early), step)
+    dead = max(late - time, 0.5 * step)
+    closed = wanted or max(dead, 3 * step)
+    gain = final / size
+    kp = time / (gain * (closed + dead))
+    return float(kp), float(kp / min(time, 4 * (closed + dead)))

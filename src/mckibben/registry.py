@@ -136,6 +136,7 @@ PLUGINS: dict[str, dict[str, str]] = {
         "activation-pressure": "mckibben.papers.activation_pressure:activation_pressure",
         "field-models": "mckibben.papers.field_models:field_models",
         "multistate-friction": "mckibben.papers.multistate_friction:multistate_friction",
+        "sdchm": "mckibben.papers.sdchm:sdchm",
     },
     "protocols": {
         "activation-pressure": "mckibben.signals.protocols.activation_pressure:activation_pressure",
@@ -153,6 +154,7 @@ PLUGINS: dict[str, dict[str, str]] = {
         "mpi-narmax-mpi": "mckibben.blocks.published.mpi_narmax:modified_prandtl_ishlinskii",
         "multistate-friction": "mckibben.blocks.published.multistate:multistate_friction",
         "multistate-static-force": "mckibben.blocks.published.multistate:static_force",
+        "sdchm-coupling": "mckibben.blocks.published.coupling:coupling",
     },
     "setups": {
         "arm": "mckibben.rigs.setups.arm:Arm",

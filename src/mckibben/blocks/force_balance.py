@@ -313,7 +313,7 @@ class ForceBalance(ManyChannels, Primitive):
 
     def inverse(self) -> Block:
         """Return the balance solved for displacements."""
-        return ForceBalanceInverse(replace(self, pressure_range=None))
+        return ForceBalanceInverse(self)
 
     @classmethod
     def example(cls) -> Self:

@@ -132,7 +132,7 @@ def coupled_data(
                 recording.name,
                 recording.matrix(pressures),
                 recording.matrix(displacements),
-                recording.matrix(scheduling),
+                recording.matrix(scheduling) if scheduling else np.empty((len(recording), 0)),
                 recording.sample_time,
             )
         )

@@ -1,0 +1,56 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from mckibben import ModelError
+from mckibben.blocks.coupling import Coupling
+from mckibben.blocks.fields import Channel
+from mckibben.blocks.fuzzy_network import FuzzyNetwork
+from mckibben.registry import load
+
+CHANNELS = tuple(Channel(f"displacement_{k}", "mm") for k in (1, 2))
+
+
+def test_printed_gains_have_the_printed_radius() -> None:
+    assert load("published", "sdchm-coupling")().radius == pytest.approx(0.456, abs=5e-4)
+
+
+def test_jacobi_agrees_with_the_direct_solution() -> None:
+    block = Coupling.example()
+    h = np.array([[10.0, 20.0, 5.0], [0.0, 1.0, -3.0]])
+    v = block.inverse().simulate(h)
+    np.testing.assert_allclose(block.jacobi(h, tolerance=1e-12), v, atol=1e-10)
+    assert np.abs(block.jacobi(h) - v).max() < 0.02
+
+
+def test_jacobi_refuses_to_diverge_and_solves_directly_instead() -> None:
+    block = Coupling(((1.0, 1.5), (1.5, 1.0)), CHANNELS, CHANNELS)
+    with pytest.raises(ModelError, match=r"radius is 1\.5.*inverse"):
+        block.jacobi([1.0, 2.0])
+    h = np.array([[1.0, 2.0]])
+    np.testing.assert_allclose(block.simulate(block.inverse().simulate(h)), h)
+
+
+def test_singular_gains_are_refused() -> None:
+    with pytest.raises(ModelError, match=r"singular.*alone"):
+        Coupling(((1.0, 1.0), (1.0, 1.0)), CHANNELS, CHANNELS).inverse()
+
+
+@pytest.mark.parametrize("gains", [(), ((1.0,), (1.0,)), ((1.0, 2.0),)])
+def test_gains_that_are_not_square_are_refused(gains: tuple[tuple[float, ...], ...]) -> None:
+    with pytest.raises(ModelError, match="Remedy"):
+        Coupling(gains, CHANNELS, CHANNELS)
+
+
+def test_networks_do_not_underflow_far_from_all_centres() -> None:
+    block = FuzzyNetwork.example()
+    far = block.simulate(np.array([[1e6, -1e6, 50.0]]))
+    assert np.isfinite(far).all()
+
+
+def test_references_out_of_a_networks_reach_are_clipped_and_said() -> None:
+    block = FuzzyNetwork.example()
+    with pytest.warns(UserWarning, match="out of reach"):
+        given = block.inverse().simulate(np.array([[1e4, 1e4, 0.0]]))
+    assert (np.abs(given) <= 80.0).all()

@@ -40,6 +40,9 @@ def study(
     ),
     models: Models = "all",
     settings: Settings = None,
+    rig: Annotated[
+        str | None, typer.Option("--rig", help="Several muscles: rig to close a loop on.")
+    ] = None,
     seed: Seed = 0,
     jobs: Jobs = None,
     column: Columns = None,
@@ -49,14 +52,30 @@ def study(
     resample: Resample = None,
     as_json: Json = False,
 ) -> None:
-    """Say what the muscle does, rank every model, invert the best, and write a report."""
+    """Say what the muscle does, rank every model, invert the best, and write a report.
+
+    A folder stands for all recordings in it. Recordings of several muscles (pressure_1 ...,
+    displacement_1 ...) get models that couple them, and a closed loop on a virtual rig.
+    """
     import warnings
 
-    from mckibben.errors import DataWarning
+    from mckibben.errors import DataError, DataWarning
 
     chosen = chosen_models(models)
-    given = settings_of_all(settings, chosen)
     reading = Reading(column, unit, rate, gaps, resample)
+    files, validation, held_back = _expanded(files, test or [])
+    if _of_muscles(reading, files):
+        from mckibben.cli.study_muscles import study_muscles
+
+        runs, checks, tests = (
+            reading.read(some, None, informative=False) for some in (files, validation, held_back)
+        )
+        study_muscles(runs, checks, tests, out, chosen, settings, rig, seed, as_json)
+        return
+    if rig is not None:
+        raise DataError("--rig is for recordings of several muscles", remedy="leave it out")
+    files, test = [*files, *validation], held_back
+    given = settings_of_all(settings, chosen)
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", DataWarning)
         train = reading.read(files, [input, output])
@@ -127,3 +146,40 @@ def study(
     print(
         f"Written: {folder / 'report.html'}, leaderboard.csv, leaderboard.json, models, inverse.json"
     )
+
+
+def _expanded(files: list[Path], test: list[Path]) -> tuple[list[Path], list[Path], list[Path]]:
+    """Return files to fit, to validate and to test, folders replaced by what is in them."""
+    from mckibben.cli.study_muscles import roles
+
+    train: list[Path] = []
+    validation: list[Path] = []
+    tests: list[Path] = []
+    for file in files:
+        if not file.is_dir():
+            train.append(file)
+            continue
+        by_role = roles(file)
+        train += by_role.get("train", [])
+        validation += by_role.get("validation", [])
+        tests += by_role.get("test", [])
+    for file in test:
+        tests += (
+            [path for paths in roles(file).values() for path in paths] if file.is_dir() else [file]
+        )
+    return train, validation, tests
+
+
+def _of_muscles(reading: Reading, files: list[Path]) -> bool:
+    """Tell whether the first file is of several muscles; what is wrong with it is said later."""
+    import warnings
+
+    from mckibben.cli.study_muscles import is_of_muscles
+    from mckibben.errors import MckibbenError
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        try:
+            return is_of_muscles(reading.read(files[:1], None, informative=False))
+        except (MckibbenError, OSError):
+            return False

@@ -79,6 +79,10 @@ class Reproduction:
     figures : sequence of Figure
     notes : sequence of str
         What differs from the paper.
+    lead : str
+        Under the title.
+    notes_title : str
+        Over the notes.
     """
 
     name: str
@@ -87,6 +91,8 @@ class Reproduction:
     tables: tuple[Table, ...]
     figures: tuple[Figure, ...]
     notes: tuple[str, ...]
+    lead: str = "The paper's protocol on its virtual rig, its methods as published, and ours."
+    notes_title: str = "What differs from the paper"
 
     def to_dict(self) -> dict[str, Any]:
         """Return all but the figures, as ``tables.json`` holds it."""

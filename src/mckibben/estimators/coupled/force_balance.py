@@ -27,6 +27,9 @@ Array = NDArray[np.float64]
 LEAST_AREA = 0.05
 """Smallest effective area on the data, relative to that at rest."""
 
+LEVEL = 0.1
+"""Levels of what schedules are different if they differ by this share of its range."""
+
 STEPS = 20
 """Of Gauss and Newton."""
 
@@ -61,10 +64,11 @@ class ForceBalanceEstimator(CoupledEstimator):
         if not scale > 0:
             raise ModelError("no displacement ever changes. Remedy: record muscles that move.")
         every = max(1, len(y) // MOST_SAMPLES)
+        degree = self._degree(data)
         forces, areas = [], []
         for k in range(n):
             tell(k / n, data.pressures[k].name)
-            tables = [self._columns(run, k, scale) for run in data.runs]
+            tables = [self._columns(run, k, scale, degree) for run in data.runs]
             top = np.concatenate([a[::every] for a, _ in tables])
             bottom = np.concatenate([b[::every] for _, b in tables])
             p = np.concatenate([run.pressures[::every, k] for run in data.runs])
@@ -77,19 +81,32 @@ class ForceBalanceEstimator(CoupledEstimator):
             rows(np.array(areas)),
             vector(np.array(self.thresholds) * scale),
             scale,
-            self.degree,
+            degree,
             data.displacements,
             data.scheduled,
             data.pressures,
             (min(low, 0.0), high),
         ).inverse()
 
-    def _columns(self, run: CoupledRun, k: int, scale: float) -> tuple[Array, Array]:
+    def _degree(self, data: CoupledData) -> int:
+        """Return the highest power that the levels of what schedules can determine."""
+        levels = [
+            np.unique(np.round(x / (LEVEL * max(float(np.ptp(x)), 1e-9)))).size
+            for x in data.stacked("scheduled").T
+        ]
+        most = max(min([self.degree, *(n - 1 for n in levels)]), 1)
+        if most < self.degree and data.scheduled:
+            self.notes.append(
+                f"what schedules has few levels: degree {most} instead of {self.degree}"
+            )
+        return most
+
+    def _columns(self, run: CoupledRun, k: int, scale: float, degree: int) -> tuple[Array, Array]:
         """Return what the coefficients of the force and of the area multiply over a run."""
         y = run.displacements / scale
         powers = [np.ones(len(y))]
         for x in run.scheduled.T:
-            powers += [x**d for d in range(1, self.degree + 1)]
+            powers += [x**d for d in range(1, degree + 1)]
         stops = friction(y[:, k], np.array(self.thresholds))
         columns = [power * column for power in powers for column in (np.ones(len(y)), *y.T)]
         columns += [y[:, k] ** d for d in (2, 3, 4)]

@@ -1,0 +1,323 @@
+"""mckibben study, where there are several muscles: models ranked, the best inverted, a loop closed."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mckibben.cli.options import parse_settings
+from mckibben.cli.output import figure, make_folder, print_json, print_table, progress_bar, to_json
+from mckibben.errors import DataError
+
+if TYPE_CHECKING:
+    from mckibben.comparison.muscles import MuscleRow
+    from mckibben.control import Tracked
+    from mckibben.papers.reproduction import Cell
+    from mckibben.recording import Recording
+
+LONGEST = 200.0
+"""Of the reference that a loop is closed on [s]."""
+
+
+def roles(folder: Path) -> dict[str, list[Path]]:
+    """Return the recordings of a folder by role, as its protocol.json has them, or all to fit.
+
+    Raises
+    ------
+    DataError
+        If there are none.
+    """
+    from mckibben.files.formats import READERS
+
+    protocol = folder / "protocol.json"
+    found = sorted(
+        path for path in folder.iterdir() if path.suffix.casefold() in READERS and path.is_file()
+    )
+    if not found:
+        raise DataError("there is no recording in the folder", file=folder, remedy="name files")
+    if not protocol.is_file():
+        return {"train": found}
+    try:
+        runs = json.loads(protocol.read_text(encoding="utf-8"))["runs"]
+        given = {str(run["name"]): str(run["role"]) for run in runs}
+    except (ValueError, KeyError, TypeError, OSError):
+        raise DataError(
+            "its protocol.json is not readable", file=folder, remedy="repair or remove it"
+        ) from None
+    by_role: dict[str, list[Path]] = {}
+    for path in found:
+        by_role.setdefault(given.get(path.stem, "train"), []).append(path)
+    return by_role
+
+
+def study_muscles(
+    recordings: Sequence[Recording],
+    validation: Sequence[Recording],
+    tests: Sequence[Recording],
+    out: Path,
+    models: str | Sequence[str],
+    settings: list[str] | None,
+    rig: str | None,
+    seed: int,
+    as_json: bool,
+) -> None:
+    """Rank models of several muscles, invert the best that can be, track on the rig, and report."""
+    from mckibben import registry
+    from mckibben.atomic import write_text
+    from mckibben.comparison.muscles import compare_muscles, held_out_levels
+    from mckibben.papers.reproduction import Reproduction
+    from mckibben.report import write_reproduction
+
+    train, split = list(recordings), "as given"
+    if not tests:
+        train, tests, split = held_out_levels(train)
+    names = registry.names("coupled") if isinstance(models, str) else models
+    given = {name: parse_settings(settings, name, group="coupled") for name in names}
+    folder = make_folder(out)
+    with progress_bar("studying") as tell:
+        rows = compare_muscles(
+            train,
+            tests,
+            validation=validation,
+            models=models,
+            settings=given,
+            seed=seed,
+            progress=lambda share, text: tell(0.8 * share, text),
+        )
+        best = next((row for row in rows if row.inverse is not None), None)
+        plant = rig or _rig_of(recordings)
+        tell(0.85, "closing loops")
+        loops: dict[str, Tracked] = {}
+        if best is not None and plant is not None:
+            best, loops = _loops(best, rows, plant, tests, seed)
+    _write(rows, folder)
+    if best is not None and best.inverse is not None:
+        best.inverse.save(folder / "inverse.json")
+    else:
+        (folder / "inverse.json").unlink(missing_ok=True)
+    summary = _summary(rows, best, loops, plant)
+    write_reproduction(
+        Reproduction(
+            name="study",
+            title="Several muscles: models, inverses and loops",
+            summary=tuple(summary),
+            tables=_tables(rows, loops),
+            figures=_figures(rows, tests, loops),
+            notes=(
+                f"Fitted to {len(train)} runs, tested on {len(tests)}: {split}.",
+                "Every figure is free-running, on runs not used to fit.",
+            ),
+            lead="Models of muscles that move one another, ranked on runs they have not seen.",
+            notes_title="How it was done",
+        ),
+        folder / "report.html",
+    )
+    result = {
+        "folder": str(folder),
+        "split": split,
+        "rows": [row.to_dict() for row in rows],
+        "inverse": None if best is None else best.model,
+        "tracking": {name: dict(tracked.rmse) for name, tracked in loops.items()},
+    }
+    write_text(folder / "leaderboard.json", to_json(result) + "\n")
+    if as_json:
+        print_json(result)
+        return
+    for table in _tables(rows, loops):
+        print(f"\n{table.title}")
+        cells = [[_cell(cell) for cell in row] for row in table.rows]
+        print_table(list(table.columns), cells)
+    print()
+    for sentence in summary:
+        print(sentence)
+    print(f"Written: {folder / 'report.html'}, leaderboard.csv, leaderboard.json, models")
+
+
+def _cell(cell: Any) -> str:
+    if cell is None:
+        return "-"
+    return figure(cell, 3) if isinstance(cell, float) else str(cell)
+
+
+def _rig_of(recordings: Sequence[Recording]) -> str | None:
+    """Return the published rig that recordings say they come from."""
+    from mckibben.errors import MckibbenError
+    from mckibben.rigs import load_rig
+
+    named = str(recordings[0].meta.get("rig", "")).partition(" ")[0]
+    try:
+        return load_rig(named).name if named else None
+    except MckibbenError:
+        return None
+
+
+def _loops(
+    best: MuscleRow, rows: Sequence[MuscleRow], plant: str, tests: Sequence[Recording], seed: int
+) -> tuple[MuscleRow, dict[str, Tracked]]:
+    """Return what came of following a measured motion with every inverse, PID, and both.
+
+    And the model whose inverse did best by itself: to be inverted, a model must hold where no run has
+    been, which its error in prediction does not tell.
+    """
+    from mckibben.control import Controller, Feedforward, FeedforwardPID, track, tune_pid
+    from mckibben.errors import MckibbenError
+    from mckibben.recording import Recording
+    from mckibben.rigs import load_rig
+
+    rig = load_rig(plant)
+    moves = list(best.test)
+    wanted = {c.name for row in rows if row.inverse is not None for c in row.inverse.inputs}
+    held = [name for name in rig.inputs if name in wanted]
+    model = max(tests, key=lambda run: min(float(np.ptp(run[name])) for name in moves))
+    step = model.sample_time or 0.05
+    n = min(len(model), round(LONGEST / step))
+    width = max(round(0.5 / step), 1)
+    smooth = {
+        name: np.convolve(
+            np.pad(model[name][:n], width, mode="edge"), np.ones(width) / width, "same"
+        )[width : width + n]
+        for name in moves
+    }
+    reference = Recording(
+        smooth | {name: np.full(n, float(model[name].mean())) for name in held}, step
+    )
+    scheduled = {name: float(reference[name][0]) for name in held}
+    pid = tune_pid(rig, sample_time=step, scheduled=scheduled, seed=seed)
+    found: dict[str, Tracked] = {}
+
+    def follow(name: str, controller: Controller) -> float:
+        try:
+            found[name] = track(controller, rig, reference, approach=5.0, seed=seed)
+        except MckibbenError:  # an inverse that fails is left out; its model is in the table
+            return float("inf")
+        return max(found[name].rmse.values())
+
+    errors = [
+        (follow(f"{row.model} inverse", Feedforward(row.inverse)), place)
+        for place, row in enumerate(rows)
+        if row.inverse is not None
+    ]
+    best = rows[min(errors)[1]]
+    follow("PID", pid)
+    if best.inverse is not None:
+        follow(f"{best.model} inverse + PID", FeedforwardPID(best.inverse, pid))
+    return best, found
+
+
+def _write(rows: Sequence[MuscleRow], folder: Path) -> None:
+    from mckibben.atomic import write_text
+
+    (folder / "models").mkdir(exist_ok=True)
+    outputs = list(rows[0].test)
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(
+        ["model", *(f"test_rmse_{name}" for name in outputs), "worst", "n_parameters", "reason"]
+    )
+    for row in rows:
+        errors = [row.test.get(name, "") for name in outputs]
+        writer.writerow([row.model, *errors, row.worst, row.n_parameters, row.reason or ""])
+        if row.block is not None:
+            row.block.save(folder / "models" / f"{row.model}.json")
+    write_text(folder / "leaderboard.csv", text.getvalue())
+
+
+def _summary(
+    rows: Sequence[MuscleRow],
+    best: MuscleRow | None,
+    loops: dict[str, Tracked],
+    plant: str | None,
+) -> list[str]:
+    first = rows[0]
+    if first.block is None:
+        return [f"No model could be fitted: {first.reason}"]
+    said = [
+        f"Best on unseen runs: {first.model}, {first.mean:.3g} mm RMSE on average over "
+        f"{len(first.test)} displacements."
+    ]
+    if best is None:
+        said.append("No model here has an inverse.")
+    else:
+        chosen = ", which tracked best by itself" if loops else ""
+        said.append(f"inverse.json is the inverse of {best.model}{chosen}.")
+    if loops:
+        errors = {name: max(tracked.rmse.values()) for name, tracked in loops.items()}
+        listed = ", ".join(f"{name} {value:.2g} mm" for name, value in errors.items())
+        said.append(f"Following a measured motion on {plant}, worst muscle's RMSE: {listed}.")
+    elif plant is None:
+        said.append("No loop was closed: name a virtual rig with --rig to see the inverse at work.")
+    return said
+
+
+def _tables(rows: Sequence[MuscleRow], loops: dict[str, Tracked]) -> tuple[Any, ...]:
+    from mckibben.papers.reproduction import Table
+
+    outputs = list(rows[0].test)
+    ranked: tuple[tuple[Cell, ...], ...] = tuple(
+        (
+            row.model,
+            *(row.test.get(name) for name in outputs),
+            row.worst if row.block is not None else None,
+            row.n_parameters,
+            row.seconds,
+            "yes" if row.inverse is not None else "no",
+            row.reason or "",
+        )
+        for row in rows
+    )
+    columns = ("model", *(f"{name} RMSE [mm]" for name in outputs))
+    board = Table(
+        "Models on unseen runs",
+        (*columns, "largest error [mm]", "parameters", "fit [s]", "inverse", "failed because"),
+        ranked,
+    )
+    if not loops:
+        return (board,)
+    tracked: tuple[tuple[Cell, ...], ...] = tuple(
+        (name, *(found.rmse[y] for y in found.rmse), found.clipped) for name, found in loops.items()
+    )
+    names = tuple(f"{name} RMSE [mm]" for name in next(iter(loops.values())).rmse)
+    return (
+        board,
+        Table("Following a measured motion on the rig", ("controller", *names, "clipped"), tracked),
+    )
+
+
+def _figures(
+    rows: Sequence[MuscleRow], tests: Sequence[Recording], loops: dict[str, Tracked]
+) -> tuple[Any, ...]:
+    from mckibben.papers.reproduction import Figure, thinned
+
+    shown = [row for row in rows if row.block is not None][:3]
+    if not shown:
+        return ()
+    run = tests[0]
+    modelled = {row.model: row.block.simulate(run) for row in shown if row.block is not None}
+    figures = []
+    for name in shown[0].test:
+        curves = {"measured": (thinned(run.time), thinned(run[name]))}
+        curves |= {k: (thinned(run.time), thinned(v[name])) for k, v in modelled.items()}
+        figures.append(Figure(f"{run.name}: {name}", "time [s]", "displacement [mm]", curves))
+    if loops:
+        first = next(iter(loops.values()))
+        for name in first.rmse:
+            reference = first.recording[f"reference_{name}"]
+            curves = {"reference": (thinned(first.recording.time), thinned(reference))}
+            for controller, found in loops.items():
+                y = found.recording[name]
+                curves[controller] = (thinned(found.recording.time), thinned(y))
+            figures.append(Figure(f"Loop: {name}", "time [s]", "displacement [mm]", curves))
+    return tuple(figures)
+
+
+def is_of_muscles(recordings: Sequence[Recording]) -> bool:
+    """Tell whether recordings are of several muscles."""
+    return bool(recordings) and all(
+        "pressure_1" in recording and "displacement_1" in recording for recording in recordings
+    )

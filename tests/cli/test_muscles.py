@@ -1,0 +1,106 @@
+"""Several muscles from the command line: fit, invert, track, study."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mckibben import Recording, write
+from mckibben.rigs import record
+from tests.cli.conftest import Cli
+
+LEVELS = ("0.0", "1.2", "2.5")
+
+
+@pytest.fixture(scope="module")
+def arm(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder of runs of the soft arm at three stiffnesses."""
+    folder = tmp_path_factory.mktemp("arm")
+    names = [
+        f"network-p0-{p0}-drive-{pattern}" for p0 in LEVELS for pattern in ("1", "2", "3", "123")
+    ]
+    roles = []
+    for run, recording in record("sdchm", runs=names):
+        write(recording, folder / f"{run.name}.csv")
+        roles.append({"name": run.name, "role": run.role})
+    reference = {f"displacement_{k}": np.full(400, 30.0) for k in (1, 2, 3)}
+    reference["displacement_1"] = 30.0 + 4.0 * np.sin(np.linspace(0, 4 * np.pi, 400))
+    reference["pressure_extensor"] = np.full(400, 1.2)
+    (folder / "more").mkdir()
+    write(Recording(reference, 0.05), folder / "more" / "reference.csv")
+    return folder
+
+
+def test_from_recordings_to_a_closed_loop(cli: Cli, arm: Path, tmp_path: Path) -> None:
+    model, inverse, run = (tmp_path / name for name in ("model.json", "inverse.json", "run.csv"))
+    result = cli("fit", "force-balance", *sorted(arm.glob("*.csv")), "-o", model, "--json")
+    assert result.code == 0, result.err
+    assert max(json.loads(result.out)["rmse"].values()) < 2.0
+    first = next(iter(sorted(arm.glob("*drive-1.csv"))))
+    result = cli("simulate", model, first, "-o", run, "--json")
+    assert result.code == 0, result.err
+    assert set(json.loads(result.out)["metrics"]) == {f"displacement_{k}" for k in (1, 2, 3)}
+    assert cli("invert", model, "-o", inverse).code == 0
+    reference = arm / "more" / "reference.csv"
+    given = ["--rig", "soft-arm", "--reference", reference, "--json"]
+    blind = cli("track", inverse, *given)
+    seeing = cli("track", inverse, *given, "--controller", "feedforward-pid", "-o", run)
+    for result in (blind, seeing):
+        assert result.code == 0, result.err
+    errors = [max(json.loads(result.out)["rmse"].values()) for result in (blind, seeing)]
+    assert errors[1] < 0.5 * errors[0]
+    assert "reference_displacement_1" in run.read_text().splitlines()[0]
+
+
+def test_study_of_a_folder_closes_the_loop(cli: Cli, arm: Path, tmp_path: Path) -> None:
+    out = tmp_path / "study"
+    result = cli("study", arm, "-o", out, "--models", "force-balance,coupled-pi", "--json")
+    assert result.code == 0, result.err
+    found = json.loads(result.out)
+    assert found["inverse"] == "force-balance"
+    assert "1.2 bar held out" in found["split"]
+    errors = {name: max(rmse.values()) for name, rmse in found["tracking"].items()}
+    assert errors["force-balance inverse + PID"] < errors["force-balance inverse"]
+    for name in ("report.html", "leaderboard.csv", "leaderboard.json", "inverse.json"):
+        assert (out / name).is_file()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["track", "nowhere.json", "--rig", "soft-arm", "--reference", "x.csv"], "nowhere.json"),
+        (["study", "EMPTY", "-o", "x"], "no recording"),
+        (["fit", "pi", "FILE", "-o", "x.json", "--validation", "FILE"], "several muscles"),
+        (["fit", "coupled-pi", "FILE", "-o", "x.json", "--set", "luck=1"], "no setting 'luck'"),
+        (["fit", "sdchm", "ONE", "-o", "x.json"], "no channel pressure_1"),
+        (["study", "ONE", "-o", "x", "--rig", "soft-arm"], "several muscles"),
+    ],
+)
+def test_bad_calls_leave_with_a_remedy(
+    cli: Cli, arm: Path, tmp_path: Path, arguments: list[str], said: str
+) -> None:
+    one = tmp_path / "one.csv"
+    u = np.linspace(0, 3, 100)
+    write(Recording({"pressure": u, "displacement": 2 * u}, 0.1), one)
+    (tmp_path / "empty").mkdir()
+    places = {
+        "FILE": next(iter(sorted(arm.glob("*.csv")))),
+        "EMPTY": tmp_path / "empty",
+        "ONE": one,
+    }
+    result = cli(*[places.get(word, word) for word in arguments])
+    assert result.code == 2
+    assert said in result.err
+    assert "Traceback" not in result.err
+
+
+def test_a_model_in_place_of_its_inverse_is_refused(cli: Cli, arm: Path, tmp_path: Path) -> None:
+    model = tmp_path / "model.json"
+    assert cli("fit", "force-balance", *sorted(arm.glob("*.csv")), "-o", model).code == 0
+    reference = arm / "more" / "reference.csv"
+    result = cli("track", model, "--rig", "soft-arm", "--reference", reference)
+    assert result.code == 2
+    assert "does not drive" in result.err

@@ -818,6 +818,35 @@ def fuzzy_network_inverse(block: Any, inputs: Rows, sample_time: float) -> Rows:
     return out
 
 
+def coupled_memory(block: Any, inputs: Rows, sample_time: float) -> Rows:
+    n = len(block.inputs)
+    lagged = [list(inputs[0]) for _ in block.lags]
+    plays = [
+        [
+            [min(max(0.0, x - r), x + r) for r in radii]
+            for x, radii in zip(row, block.thresholds, strict=True)
+        ]
+        for row in lagged
+    ]
+    out = []
+    for row in inputs:
+        for own, felt, tau in zip(lagged, plays, block.lags, strict=True):
+            keep = math.exp(-sample_time / tau)
+            for i in range(n):
+                own[i] = keep * own[i] + (1 - keep) * row[i]
+                felt[i] = [
+                    min(max(s, own[i] - r), own[i] + r)
+                    for s, r in zip(felt[i], block.thresholds[i], strict=True)
+                ]
+        terms = [1.0, *(x for own in lagged for x in own)]
+        terms += [s for felt in plays for own in felt for s in own]
+        for power in range(2, block.degree + 1):
+            for chosen in itertools.combinations_with_replacement(range(n), power):
+                terms.append(math.prod(lagged[0][i] for i in chosen))
+        out.append([math.fsum(a * b for a, b in zip(w, terms, strict=True)) for w in block.readout])
+    return out
+
+
 class _Balance:
     """A force balance at one place of its history: last displacements and stops."""
 
@@ -896,6 +925,7 @@ TWINS: dict[str, Twin] = {
     "braid-equilibrium": braid_equilibrium,
     "braid-equilibrium-inverse": braid_equilibrium_inverse,
     "chou-hannaford": chou_hannaford,
+    "coupled-memory": coupled_memory,
     "coupling": coupling,
     "force-balance": force_balance,
     "force-balance-inverse": force_balance_inverse,

@@ -23,6 +23,7 @@ PLUGINS: dict[str, dict[str, str]] = {
         "braid-equilibrium": "mckibben.blocks.braid_equilibrium:BraidEquilibrium",
         "braid-equilibrium-inverse": "mckibben.blocks.braid_equilibrium:BraidEquilibriumInverse",
         "chou-hannaford": "mckibben.blocks.force.chou_hannaford:ChouHannaford",
+        "coupled-memory": "mckibben.blocks.coupled_memory:CoupledMemory",
         "coupling": "mckibben.blocks.coupling:Coupling",
         "creep": "mckibben.blocks.creep:Creep",
         "creep-inverse": "mckibben.blocks.creep:CreepInverse",
@@ -76,6 +77,7 @@ PLUGINS: dict[str, dict[str, str]] = {
         "transfer-function": "mckibben.blocks.dynamic.transfer_function:TransferFunction",
     },
     "coupled": {
+        "coupled-memory": "mckibben.estimators.coupled.memory:CoupledMemoryEstimator",
         "coupled-pi": "mckibben.estimators.coupled.sdchm:CoupledPIEstimator",
         "force-balance": "mckibben.estimators.coupled.force_balance:ForceBalanceEstimator",
         "sdchm": "mckibben.estimators.coupled.sdchm:SDCHMEstimator",

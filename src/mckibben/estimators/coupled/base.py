@@ -6,7 +6,7 @@ import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Annotated, Self
+from typing import Annotated, ClassVar, Self
 
 import numpy as np
 from annotated_types import Ge
@@ -64,6 +64,9 @@ class CoupledEstimator(BaseEstimator, ABC):  # type: ignore[misc]  # scikit-lear
     scheduling: tuple[str, ...] | None = None
     seed: Annotated[int, Ge(0)] = 0
 
+    paired: ClassVar[bool] = True
+    """Whether there must be a displacement to every pressure."""
+
     def fit(
         self,
         recordings: Recording | Sequence[Recording],
@@ -104,6 +107,8 @@ class CoupledEstimator(BaseEstimator, ABC):  # type: ignore[misc]  # scikit-lear
         names = (self.pressures, self.displacements, self.scheduling)
         data = coupled_data(listed, *names)
         held_back = coupled_data(list(validation), *names) if validation else None
+        if self.paired:
+            data.check_pairs(listed[0].source)
         self.notes: list[str] = []
         self.model_ = self.identify(data, held_back, progress or (lambda share, text: None))
         errors = np.concatenate(

@@ -72,6 +72,16 @@ class CoupledData:
                 found.append(run)
         return found
 
+    def check_pairs(self, source: str | None) -> None:
+        """Refuse data without one displacement to every pressure."""
+        n_pressures, n_displacements = len(self.pressures), len(self.displacements)
+        if n_pressures != n_displacements:
+            raise DataError(
+                f"there are {n_pressures} pressures and {n_displacements} displacements",
+                file=source,
+                remedy="record as many of both, or fit coupled-memory or tsfnn",
+            )
+
     def stacked(self, what: str) -> Array:
         """Return a field of all runs, one under another."""
         return np.concatenate([getattr(run, what) for run in self.runs])
@@ -105,12 +115,6 @@ def coupled_data(
                 file=first.source,
                 remedy=f"name the columns {what}_1, {what}_2 and so on, or use --column",
             )
-    if len(pressures) != len(displacements):
-        raise DataError(
-            f"there are {len(pressures)} pressures and {len(displacements)} displacements",
-            file=first.source,
-            remedy="record as many of both, or name those that belong together",
-        )
     runs = []
     for recording in recordings:
         for name in (*pressures, *displacements, *scheduling):

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import warnings
 from dataclasses import dataclass
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from annotated_types import Ge, Interval
@@ -121,6 +121,8 @@ def as_block(
 @dataclass(kw_only=True, repr=False, eq=False)
 class TSFNNEstimator(NetworkEstimator):
     """Fuzzy network on the raw pressures: the paper's baseline, without memory."""
+
+    paired: ClassVar[bool] = False
 
     def identify(self, data: CoupledData, validation: CoupledData | None, tell: Tell) -> Block:
         """Return the network."""

@@ -847,6 +847,37 @@ def coupled_memory(block: Any, inputs: Rows, sample_time: float) -> Rows:
     return out
 
 
+def recurrent_fuzzy_network(block: Any, inputs: Rows, sample_time: float) -> Rows:
+    """Queues of past values, a dictionary of memberships, and rules one by one."""
+    first = inputs[0]
+    ys = [first[0]] * block.output_lags
+    us = [first[0]] * block.input_lags
+    loads = [[value] * block.scheduling_lags for value in first[1:]]
+    n, sets = block.n_regressors, block.n_sets
+    last = {(i, s): 0.0 for i in range(n) for s in range(sets)}
+    out = []
+    for row in inputs:
+        x = [*ys, row[0], *us]
+        for now, past in zip(row[1:], loads, strict=True):
+            x += [now, *past]
+        for (i, s), before in list(last.items()):
+            z = x[i] - block.centres[i][s] + block.feedbacks[i][s] * before
+            last[i, s] = math.exp(-z * z / (2 * block.widths[i][s] ** 2))
+        top = bottom = 0.0
+        for number, rule in enumerate(itertools.product(range(sets), repeat=n)):
+            firing = math.prod(last[i, s] for i, s in enumerate(rule))
+            own = block.consequents[number * (n + 1) : (number + 1) * (n + 1)]
+            bottom += firing
+            top += firing * sum(a * b for a, b in zip(own, [*x, 1.0], strict=True))
+        ys = [top / bottom, *ys][: block.output_lags]
+        us = [row[0], *us][: block.input_lags]
+        loads = [
+            [now, *past][: block.scheduling_lags] for now, past in zip(row[1:], loads, strict=True)
+        ]
+        out.append([top / bottom])
+    return out
+
+
 class _Balance:
     """A force balance at one place of its history: last displacements and stops."""
 
@@ -964,6 +995,7 @@ TWINS: dict[str, Twin] = {
     "rate-dependent-pi": rate_dependent_pi,
     "rate-dependent-pi-inverse": rate_dependent_pi_inverse,
     "tondu-lopez": tondu_lopez,
+    "recurrent-fuzzy-network": recurrent_fuzzy_network,
     "transfer-function": transfer_function,
 }
 """Kind of block -> its twin."""

@@ -72,6 +72,9 @@ PLUGINS: dict[str, dict[str, str]] = {
         "process-model": "mckibben.blocks.dynamic.process_model:ProcessModel",
         "rate-dependent-pi": "mckibben.blocks.rate_dependent_pi:RateDependentPI",
         "rate-dependent-pi-inverse": "mckibben.blocks.rate_dependent_pi:RateDependentPIInverse",
+        "recurrent-fuzzy-network": (
+            "mckibben.blocks.recurrent_fuzzy_network:RecurrentFuzzyNetwork"
+        ),
         "series": "mckibben.blocks.compose:Series",
         "tondu-lopez": "mckibben.blocks.force.tondu_lopez:TonduLopez",
         "transfer-function": "mckibben.blocks.dynamic.transfer_function:TransferFunction",

@@ -83,6 +83,7 @@ PLUGINS: dict[str, dict[str, str]] = {
         "coupled-memory": "mckibben.estimators.coupled.memory:CoupledMemoryEstimator",
         "coupled-pi": "mckibben.estimators.coupled.sdchm:CoupledPIEstimator",
         "force-balance": "mckibben.estimators.coupled.force_balance:ForceBalanceEstimator",
+        "mpi-narmax": "mckibben.estimators.coupled.mpi_narmax:MPINarmaxEstimator",
         "sdchm": "mckibben.estimators.coupled.sdchm:SDCHMEstimator",
         "sdchm-published": "mckibben.estimators.coupled.sdchm:PublishedSDCHMEstimator",
         "tsfnn": "mckibben.estimators.coupled.sdchm:TSFNNEstimator",
@@ -140,6 +141,7 @@ PLUGINS: dict[str, dict[str, str]] = {
     "papers": {
         "activation-pressure": "mckibben.papers.activation_pressure:activation_pressure",
         "field-models": "mckibben.papers.field_models:field_models",
+        "mpi-narmax": "mckibben.papers.mpi_narmax:mpi_narmax",
         "multistate-friction": "mckibben.papers.multistate_friction:multistate_friction",
         "sdchm": "mckibben.papers.sdchm:sdchm",
     },

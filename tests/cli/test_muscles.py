@@ -75,7 +75,7 @@ def test_study_of_a_folder_closes_the_loop(cli: Cli, arm: Path, tmp_path: Path) 
         (["study", "EMPTY", "-o", "x"], "no recording"),
         (["fit", "pi", "FILE", "-o", "x.json", "--validation", "FILE"], "several muscles"),
         (["fit", "coupled-pi", "FILE", "-o", "x.json", "--set", "luck=1"], "no setting 'luck'"),
-        (["fit", "sdchm", "ONE", "-o", "x.json"], "no channel pressure_1"),
+        (["fit", "sdchm", "REST", "-o", "x.json"], "no channel displacement_1"),
         (["study", "ONE", "-o", "x", "--rig", "soft-arm"], "several muscles"),
     ],
 )
@@ -85,11 +85,14 @@ def test_bad_calls_leave_with_a_remedy(
     one = tmp_path / "one.csv"
     u = np.linspace(0, 3, 100)
     write(Recording({"pressure": u, "displacement": 2 * u}, 0.1), one)
+    rest = tmp_path / "rest.csv"
+    write(Recording({"pressure": u, "force": 2 * u}, 0.1), rest)
     (tmp_path / "empty").mkdir()
     places = {
         "FILE": next(iter(sorted(arm.glob("*.csv")))),
         "EMPTY": tmp_path / "empty",
         "ONE": one,
+        "REST": rest,
     }
     result = cli(*[places.get(word, word) for word in arguments])
     assert result.code == 2

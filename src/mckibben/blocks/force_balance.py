@@ -305,8 +305,8 @@ class ForceBalance(ManyChannels, Primitive):
         """Warn of references that would need pressures out of range."""
         if state[-1] > 0:
             warnings.warn(
-                f"{int(state[-1])} samples need pressures beyond {self.pressure_range} bar and were "
-                "clipped there",
+                f"{int(state[-1])} samples need {self.given[0].name} beyond {self.pressure_range} "
+                f"{self.given[0].unit} and were clipped there",
                 ModelWarning,
                 stacklevel=4,
             )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -213,9 +213,17 @@ def track(
 def _roles(plant: Plant, reference: Recording) -> tuple[list[str], list[str]]:
     """Return the inputs that the controller drives, and those that the reference holds."""
     held = [name for name in plant.inputs if name in reference]
-    driven = [name for name in plant.inputs if name.startswith("pressure") and name not in held]
-    numbered = [name for name in driven if name.rpartition("_")[2].isdigit()]
-    return numbered or driven, held
+    return actuated(plant, held), held
+
+
+def actuated(plant: Plant, held: Collection[str]) -> list[str]:
+    """Return the inputs of a plant that move its muscles: pressures or voltages that are not held."""
+    driven = [
+        name
+        for name in plant.inputs
+        if name.startswith(("pressure", "voltage")) and name not in held
+    ]
+    return [name for name in driven if name.rpartition("_")[2].isdigit()] or driven
 
 
 def _cost(errors: Array, at_limit: NDArray[np.bool_]) -> float:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from mckibben.control.loop import Plant
+from mckibben.control.loop import Plant, actuated
 from mckibben.control.pid import PID
 from mckibben.errors import ModelError
 
@@ -52,8 +52,7 @@ def tune_pid(
         If a muscle does not move with its own pressure.
     """
     scheduled = scheduled or {}
-    driven = [n for n in plant.inputs if n.startswith("pressure") and n not in scheduled]
-    driven = [n for n in driven if n.rpartition("_")[2].isdigit()] or driven
+    driven = actuated(plant, scheduled)
     starts = {f"start.{name}": value for name, value in scheduled.items()}
     rig = plant.changed({"sample_time": sample_time, **starts})
     limits = [rig.limits(name) for name in driven]
@@ -64,7 +63,9 @@ def tune_pid(
     gains = []
     for name, limit in zip(driven, limits, strict=True):
         rig.reset(seed)
-        place = rig.outputs.index(name.replace("pressure", "displacement"))
+        place = rig.outputs.index(
+            name.replace("pressure", "displacement").replace("voltage", "displacement")
+        )
         for _ in range(n):
             before = rig.step({**middle, **scheduled})[place]
         size = STEP * (limit.high - limit.low)

@@ -51,10 +51,11 @@ class CoupledEstimator(BaseEstimator, ABC):  # type: ignore[misc]  # scikit-lear
     Parameters
     ----------
     pressures, displacements : sequence of str, optional
-        Channels; default ``pressure_1`` and so on, as many as there are.
+        Channels; default ``pressure_1`` and so on, as many as there are; or, of a single muscle,
+        ``voltage`` or else ``pressure``, and ``displacement``.
     scheduling : sequence of str, optional
         Channels that schedule the model: an extensor's pressure, a load, a temperature. Default
-        ``pressure_extensor`` where there is one.
+        ``pressure_extensor`` and ``force``, where there are any.
     seed : int
         Of everything random.
     """

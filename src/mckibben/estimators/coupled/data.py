@@ -21,6 +21,9 @@ MOVES = 0.1
 RESTS = 0.03
 """An input rests where it stays below this share of that range above its lowest value."""
 
+SCHEDULES = ("pressure_extensor", "force")
+"""Channels that schedule a model by default, where there are any."""
+
 FEWEST_SAMPLES = 50
 """Fewer samples than this identify nothing of several muscles."""
 
@@ -104,14 +107,16 @@ def coupled_data(
     if not recordings:
         raise DataError("there are no recordings", remedy="give at least one")
     first = recordings[0]
-    pressures = list(pressures or numbered(first, "pressure"))
-    displacements = list(displacements or numbered(first, "displacement"))
+    pressures = list(pressures or numbered(first, "pressure") or one(first, "voltage", "pressure"))
+    displacements = list(
+        displacements or numbered(first, "displacement") or one(first, "displacement")
+    )
     if scheduling is None:
-        scheduling = [name for name in ("pressure_extensor",) if name in first]
+        scheduling = [name for name in SCHEDULES if name in first]
     for what, names in (("pressure", pressures), ("displacement", displacements)):
         if not names:
             raise DataError(
-                f"there is no channel {what}_1",
+                f"there is no channel {what}_1, nor {what}",
                 file=first.source,
                 remedy=f"name the columns {what}_1, {what}_2 and so on, or use --column",
             )
@@ -155,6 +160,11 @@ def coupled_data(
                 remedy="give recordings in which every muscle is driven",
             )
     return data
+
+
+def one(recording: Recording, *names: str) -> list[str]:
+    """Return the first of some channels that a recording has, if any."""
+    return [name for name in names if name in recording][:1]
 
 
 def numbered(recording: Recording, quantity: str) -> list[str]:

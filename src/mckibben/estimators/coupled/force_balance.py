@@ -27,6 +27,9 @@ Array = NDArray[np.float64]
 LEAST_AREA = 0.05
 """Smallest effective area on the data, relative to that at rest."""
 
+LIMITED = ("bar", "V")
+"""Units of what the hardware limits."""
+
 LEVEL = 0.1
 """Levels of what schedules are different if they differ by this share of its range."""
 
@@ -76,6 +79,8 @@ class ForceBalanceEstimator(CoupledEstimator):
             forces.append(force)
             areas.append(area)
         low, high = float(data.lowest.min()), float(data.highest.max())
+        # pressures and voltages have limits; a force that is estimated has none
+        limited = data.pressures[0].unit in LIMITED
         return ForceBalance(
             rows(np.array(forces)),
             rows(np.array(areas)),
@@ -85,7 +90,7 @@ class ForceBalanceEstimator(CoupledEstimator):
             data.displacements,
             data.scheduled,
             data.pressures,
-            (min(low, 0.0), high),
+            (min(low, 0.0), high) if limited else None,
         ).inverse()
 
     def _degree(self, data: CoupledData) -> int:

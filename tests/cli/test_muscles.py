@@ -10,6 +10,7 @@ import pytest
 
 from mckibben import Recording, write
 from mckibben.rigs import record
+from mckibben.signals import resample
 from tests.cli.conftest import Cli
 
 LEVELS = ("0.0", "1.2", "2.5")
@@ -107,3 +108,30 @@ def test_a_model_in_place_of_its_inverse_is_refused(cli: Cli, arm: Path, tmp_pat
     result = cli("track", model, "--rig", "soft-arm", "--reference", reference)
     assert result.code == 2
     assert "does not drive" in result.err
+
+
+def test_study_under_loads_ranks_one_model_for_all(cli: Cli, tmp_path: Path) -> None:
+    folder = tmp_path / "rail"
+    folder.mkdir()
+    names = ["status-1", "status-2", "training-pulls-100N", "status-4"]
+    for run, recording in record("mpi-narmax", runs=names):
+        write(resample(recording, 0.05), folder / f"{run.name}.csv")
+    (folder / "protocol.json").write_text(
+        json.dumps(
+            {
+                "runs": [
+                    {"name": name, "role": "test" if name == "status-4" else "train"}
+                    for name in names
+                ]
+            }
+        )
+    )
+    given = ["--models", "force-balance", "--load", "force", "-o", tmp_path / "out", "--json"]
+    result = cli("study", folder, *given)
+    assert result.code == 0, result.err
+    rows = json.loads(result.out)["rows"]
+    assert rows[0]["model"] == "force-balance"
+    assert any("98 N" in row["model"] for row in rows[1:])
+    result = cli("study", folder, "--load", "weight", "-o", tmp_path / "out")
+    assert result.code == 2
+    assert "weight" in result.err

@@ -43,6 +43,12 @@ def study(
     rig: Annotated[
         str | None, typer.Option("--rig", help="Several muscles: rig to close a loop on.")
     ] = None,
+    load: Annotated[
+        str | None,
+        typer.Option(
+            "--load", metavar="CHANNEL", help="Load that varies: one model for all loads."
+        ),
+    ] = None,
     seed: Seed = 0,
     jobs: Jobs = None,
     column: Columns = None,
@@ -55,7 +61,8 @@ def study(
     """Say what the muscle does, rank every model, invert the best, and write a report.
 
     A folder stands for all recordings in it. Recordings of several muscles (pressure_1 ...,
-    displacement_1 ...) get models that couple them, and a closed loop on a virtual rig.
+    displacement_1 ...) get models that couple them, and a closed loop on a virtual rig. With --load
+    force, models that are told the load are ranked against one model for every load.
     """
     import warnings
 
@@ -64,13 +71,13 @@ def study(
     chosen = chosen_models(models)
     reading = Reading(column, unit, rate, gaps, resample)
     files, validation, held_back = _expanded(files, test or [])
-    if _of_muscles(reading, files):
+    if load is not None or _of_muscles(reading, files):
         from mckibben.cli.study_muscles import study_muscles
 
         runs, checks, tests = (
             reading.read(some, None, informative=False) for some in (files, validation, held_back)
         )
-        study_muscles(runs, checks, tests, out, chosen, settings, rig, seed, as_json)
+        study_muscles(runs, checks, tests, out, chosen, settings, rig, load, seed, as_json)
         return
     if rig is not None:
         raise DataError("--rig is for recordings of several muscles", remedy="leave it out")

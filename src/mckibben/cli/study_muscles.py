@@ -21,6 +21,9 @@ if TYPE_CHECKING:
     from mckibben.papers.reproduction import Cell
     from mckibben.recording import Recording
 
+LOADED = ("coupled-memory", "force-balance", "mpi-narmax")
+"""Models that are told the load."""
+
 LONGEST = 200.0
 """Of the reference that a loop is closed on [s]."""
 
@@ -64,19 +67,30 @@ def study_muscles(
     models: str | Sequence[str],
     settings: list[str] | None,
     rig: str | None,
+    load: str | None,
     seed: int,
     as_json: bool,
 ) -> None:
     """Rank models of several muscles, invert the best that can be, track on the rig, and report."""
     from mckibben import registry
     from mckibben.atomic import write_text
-    from mckibben.comparison.muscles import compare_muscles, held_out_levels
+    from mckibben.comparison.muscles import compare_muscles, held_out_levels, per_load
     from mckibben.papers.reproduction import Reproduction
     from mckibben.report import write_reproduction
 
     train, split = list(recordings), "as given"
     if not tests:
         train, tests, split = held_out_levels(train)
+    if load is not None:
+        models = LOADED if isinstance(models, str) else models
+        for run in (*train, *tests):
+            if load not in run:
+                raise DataError(
+                    "there is no such channel to tell the load",
+                    file=run.source,
+                    channel=load,
+                    remedy="name it with --column, or leave --load out",
+                )
     names = registry.names("coupled") if isinstance(models, str) else models
     given = {name: parse_settings(settings, name, group="coupled") for name in names}
     folder = make_folder(out)
@@ -85,11 +99,18 @@ def study_muscles(
             train,
             tests,
             validation=validation,
-            models=models,
-            settings=given,
+            models=names,
+            settings={
+                name: ({} if load is None else {"scheduling": (load,)}) | own
+                for name, own in given.items()
+            },
             seed=seed,
             progress=lambda share, text: tell(0.8 * share, text),
         )
+        if load is not None and rows[0].block is not None:
+            driven = rows[0].block.inputs[0].name
+            single = per_load(train, tests, load=load, input=driven, seed=seed)
+            rows = tuple(sorted((*rows, *single), key=lambda row: row.mean))
         best = next((row for row in rows if row.inverse is not None), None)
         plant = rig or _rig_of(recordings)
         tell(0.85, "closing loops")
@@ -224,7 +245,8 @@ def _write(rows: Sequence[MuscleRow], folder: Path) -> None:
         errors = [row.test.get(name, "") for name in outputs]
         writer.writerow([row.model, *errors, row.worst, row.n_parameters, row.reason or ""])
         if row.block is not None:
-            row.block.save(folder / "models" / f"{row.model}.json")
+            named = "".join(c if c.isalnum() or c in "-." else "-" for c in row.model)
+            row.block.save(folder / "models" / f"{named}.json")
     write_text(folder / "leaderboard.csv", text.getvalue())
 
 

@@ -173,3 +173,50 @@ def held_out_levels(
     test = list(recordings[HELD_OUT - 1 :: HELD_OUT])
     train = [r for place, r in enumerate(recordings) if place % HELD_OUT != HELD_OUT - 1]
     return train, test, "every third run held out"
+
+
+def per_load(
+    train: Sequence[Recording],
+    test: Sequence[Recording],
+    *,
+    load: str = "force",
+    input: str = "voltage",  # noqa: A002
+    output: str = "displacement",
+    model: str = "mpi",
+    seed: int = 0,
+) -> tuple[MuscleRow, ...]:
+    """Return one model of a single muscle for every load it was recorded under, tested on all loads.
+
+    Parameters
+    ----------
+    train, test : sequence of Recording
+        Each training run is taken to be at its mean load.
+    load, input, output : str
+        Channels.
+    model : str
+        Short name of the model to fit to each run.
+    seed : int
+        Of everything random.
+    """
+    rows = []
+    for run in train:
+        name = f"{model} at {run[load].mean():.0f} {run.units[load]} ({run.name})"
+        try:
+            estimator = registry.load("estimators", model)(input=input, output=output, seed=seed)
+            estimator.fit(run)
+            block: Block = estimator.model_
+            errors = np.concatenate([block.simulate(r)[output] - r[output] for r in test])
+            rows.append(
+                MuscleRow(
+                    name,
+                    block.n_parameters,
+                    estimator.diagnostics_.seconds,
+                    {output: estimator.diagnostics_.rmse},
+                    {output: float(np.sqrt(np.mean(errors**2)))},
+                    float(np.abs(errors).max()),
+                    block,
+                )
+            )
+        except MckibbenError as error:
+            rows.append(MuscleRow(name, reason=str(error)))
+    return tuple(rows)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+import warnings
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 from sklearn.base import BaseEstimator
 
 from mckibben.blocks.base import Block
+from mckibben.errors import ModelWarning
 from mckibben.estimators.coupled.data import CoupledData, coupled_data
 from mckibben.estimators.settings import check_settings
 from mckibben.recording import Recording
@@ -112,9 +114,15 @@ class CoupledEstimator(BaseEstimator, ABC):  # type: ignore[misc]  # scikit-lear
             data.check_pairs(listed[0].source)
         self.notes: list[str] = []
         self.model_ = self.identify(data, held_back, progress or (lambda share, text: None))
-        errors = np.concatenate(
-            [self.predict_run(run.inputs, run.sample_time) - run.displacements for run in data.runs]
-        )
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always", ModelWarning)
+            errors = np.concatenate(
+                [
+                    self.predict_run(run.inputs, run.sample_time) - run.displacements
+                    for run in data.runs
+                ]
+            )
+        self.notes += sorted({str(warning.message) for warning in caught})
         self.diagnostics_ = CoupledDiagnostics(
             tuple(np.sqrt(np.mean(errors**2, axis=0)).tolist()),
             len(errors),

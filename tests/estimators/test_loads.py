@@ -1,0 +1,72 @@
+"""Models that are told the load, on the rail."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from mckibben import DataError, Recording, registry
+from mckibben.comparison.muscles import compare_muscles, per_load
+from mckibben.rigs import record
+from mckibben.signals import resample
+
+NAMES = ("status-1", "status-2", "status-3", "training-pulls-100N", "status-4")
+
+
+@pytest.fixture(scope="module")
+def runs() -> dict[str, Recording]:
+    return {
+        run.name: resample(recording, 0.05)
+        for run, recording in record("mpi-narmax", runs=list(NAMES))
+    }
+
+
+@pytest.fixture(scope="module")
+def train(runs: dict[str, Recording]) -> list[Recording]:
+    return [runs[name] for name in NAMES[:4]]
+
+
+def test_one_model_for_all_loads_beats_one_for_each(
+    runs: dict[str, Recording], train: list[Recording]
+) -> None:
+    test = [runs["status-4"]]
+    told = {row.model: row for row in compare_muscles(train, test, models=["force-balance"])}
+    single = per_load(train, test)
+    assert len(single) == len(train)
+    best = min(row.mean for row in single)
+    assert told["force-balance"].mean < 0.4 * best
+    assert "98 N" in single[1].model
+
+
+@pytest.mark.parametrize("memory", ["mpi", "rdpi"])
+def test_mpi_narmax_runs_free_under_a_load(
+    memory: str, runs: dict[str, Recording], train: list[Recording]
+) -> None:
+    estimator_class = registry.load("coupled", "mpi-narmax")
+    first = estimator_class(method="ls", memory=memory).fit(train)
+    assert first.model_ == estimator_class(method="ls", memory=memory).fit(train).model_
+    assert first.diagnostics_.rmse[0] < 3.0
+    output = first.model_.simulate(runs["status-4"])["displacement"]
+    assert np.abs(output).max() < 70.0
+
+
+def test_force_is_estimated_from_pressure_and_displacement(
+    runs: dict[str, Recording], train: list[Recording]
+) -> None:
+    model = registry.load("coupled", "force-balance")(
+        pressures=("force",), scheduling=("pressure",), ridge=1e-7
+    ).fit(train)
+    run = runs["status-4"]
+    estimated = model.model_.inverse().simulate(run)["force"]
+    assert np.sqrt(np.mean((estimated - run["force"]) ** 2)) < 0.08 * np.ptp(run["force"])
+
+
+def test_a_load_is_asked_for(runs: dict[str, Recording]) -> None:
+    bare = runs["status-1"].select(["voltage", "displacement"])
+    with pytest.raises(DataError, match="force"):
+        registry.load("coupled", "mpi-narmax")().fit(bare)
+
+
+def test_runs_of_different_rates_are_refused(train: list[Recording]) -> None:
+    with pytest.raises(DataError, match="resample"):
+        registry.load("coupled", "mpi-narmax")().fit([train[0], resample(train[1], 0.1)])

@@ -5,8 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mckibben import DataError, Recording, registry
+from mckibben import DataError, ModelError, Recording, load_rig, registry
 from mckibben.comparison.muscles import compare_muscles, per_load
+from mckibben.control import EstimatedLoad, Feedforward, track
+from mckibben.estimators.coupled.force_estimate import fit_force_estimate
 from mckibben.rigs import record
 from mckibben.signals import resample
 
@@ -70,3 +72,46 @@ def test_a_load_is_asked_for(runs: dict[str, Recording]) -> None:
 def test_runs_of_different_rates_are_refused(train: list[Recording]) -> None:
     with pytest.raises(DataError, match="resample"):
         registry.load("coupled", "mpi-narmax")().fit([train[0], resample(train[1], 0.1)])
+
+
+def test_a_trust_region_finds_what_even_sets_do_not(train: list[Recording]) -> None:
+    estimator_class = registry.load("coupled", "mpi-narmax")
+    even, refined = (
+        estimator_class(method=method, n_sets=2).fit(train) for method in ("ls", "trust-region")
+    )
+    assert refined.diagnostics_.rmse[0] <= 1.02 * even.diagnostics_.rmse[0]
+
+
+def test_force_comes_with_an_interval_from_runs_left_out(
+    runs: dict[str, Recording], train: list[Recording]
+) -> None:
+    found = fit_force_estimate(train)
+    run = found.estimate(runs["status-4"])
+    inside = (run["force_low"] <= run["force"]) & (run["force"] <= run["force_high"])
+    assert inside.mean() >= 0.9
+    with pytest.raises(DataError, match="at least three"):
+        fit_force_estimate(train[:2])
+    with pytest.raises(DataError, match="level"):
+        fit_force_estimate(train, level=1.5)
+
+
+def test_an_estimated_load_serves_as_well_as_a_measured_one(train: list[Recording]) -> None:
+    model = registry.load("coupled", "force-balance")().fit(train).model_
+    rig = load_rig("rail")
+    t = np.arange(600) * 0.05
+    reference = Recording(
+        {
+            "displacement": 20.0 + 10.0 * np.sin(0.2 * np.pi * t),
+            "force": 50.0 - 50.0 * np.cos(0.1 * np.pi * t),
+        },
+        0.05,
+    )
+    told = Feedforward(model.inverse())
+    guessed = EstimatedLoad(told, fit_force_estimate(train).block)
+    errors = [
+        track(c, rig, reference, approach=5.0, settle=5.0).rmse["displacement"]
+        for c in (told, guessed)
+    ]
+    assert errors[1] < 1.5 * errors[0]
+    with pytest.raises(ModelError, match="filter_time"):
+        EstimatedLoad(told, model, filter_time=0.0)

@@ -1,6 +1,7 @@
 """Controllers, and loops closed on anything that steps like a rig."""
 
 from mckibben.control.controller import Controller as Controller
+from mckibben.control.estimated_load import EstimatedLoad as EstimatedLoad
 from mckibben.control.feedforward import Feedforward as Feedforward
 from mckibben.control.feedforward_pid import FeedforwardPID as FeedforwardPID
 from mckibben.control.loop import Tracked as Tracked

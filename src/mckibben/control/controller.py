@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +31,10 @@ class Controller(ABC):
         scheduled : array, shape (s,)
             What schedules the model: an extensor's pressure, a load.
         """
+
+    def reads(self, readings: Mapping[str, float]) -> None:
+        """Learn all that was just measured, by channel, before `step`."""
+        del readings
 
     def applied(self, pressures: Array) -> None:
         """Learn what was applied in the end, after limits."""

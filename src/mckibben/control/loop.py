@@ -170,7 +170,10 @@ def track(
         seen[t] = measured
         late = [*late[1:], measured]
         felt = late[0][at_y] + noise * rng.standard_normal(len(at_y))
+        readings = dict(zip(changed.outputs, late[0].tolist(), strict=True))
+        readings |= dict(zip(followed, felt.tolist(), strict=True))
         started = time.perf_counter()
+        controller.reads(readings)
         wanted = controller.step(path[t], felt, scheduled[t])
         times[t] = time.perf_counter() - started
         if wanted.shape != low.shape or not np.isfinite(wanted).all():

@@ -10,7 +10,7 @@ PI-NARMAX Model", Sections 3 and 4.
 from __future__ import annotations
 
 import warnings
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated, Literal
 
 import numpy as np
@@ -37,6 +37,15 @@ INERTIA = (0.9, 0.4)
 
 ROUNDS = 8
 """Times that consequents are solved for with the network's own free-running past."""
+
+HORIZONS = (0.25, 0.5, 1.0)
+"""Parts of the runs over which the trust region's steps are taken, one after another."""
+
+TRUST_STEPS = 6
+"""Of the trust region at each horizon."""
+
+FAR = 100.0
+"""Errors count for no more [mm]."""
 
 SEARCH_SAMPLES = 6000
 """Samples of all runs on which the swarm compares free runs, from the start of each."""
@@ -71,8 +80,9 @@ class MPINarmaxEstimator(CoupledEstimator):
     memory : {"mpi", "rdpi"}
         Hysteresis in front: without rate, or with weights by rate as in the paper, which leads astray
         where the runs under load are faster than the one without.
-    method : {"pso", "ls"}
-        Antecedents by the paper's particle swarm, or even ones; consequents by least squares.
+    method : {"pso", "ls", "trust-region"}
+        Antecedents and feedbacks by the paper's particle swarm; even and none; or refined from those on
+        the free-running error, over ever longer parts of the runs. Consequents by least squares always.
     ridge : float
         Damping of what is a rule's own.
     """
@@ -82,7 +92,7 @@ class MPINarmaxEstimator(CoupledEstimator):
     input_lags: Annotated[int, Interval(ge=0, le=3)] = 0
     scheduling_lags: Annotated[int, Interval(ge=0, le=3)] = 0
     memory: Literal["mpi", "rdpi"] = "mpi"
-    method: Literal["pso", "ls"] = "pso"
+    method: Literal["pso", "ls", "trust-region"] = "pso"
     ridge: Annotated[float, Gt(0)] = 1e-4
 
     def identify(self, data: CoupledData, validation: CoupledData | None, tell: Tell) -> Block:
@@ -101,7 +111,11 @@ class MPINarmaxEstimator(CoupledEstimator):
         low, high = problem.ranges
         even = Sets.even(low, high, self.n_sets)
         still = np.zeros_like(even.centres)
-        chosen = (even, still) if self.method == "ls" else problem.swarm(even, self.seed, tell)
+        chosen = (even, still)
+        if self.method == "pso":
+            chosen = problem.swarm(even, self.seed, tell)
+        elif self.method == "trust-region":
+            chosen = problem.refined(even, still, tell)
         tell(0.9, "network")
         network = problem.best(*chosen)
         return Series((hysteresis, network))
@@ -268,26 +282,62 @@ class _Problem:
                     return False
         return True
 
-    def swarm(self, even: Sets, seed: int, tell: Tell) -> tuple[Sets, Array]:
-        """Return centres, widths and feedbacks by particle swarm on the free-running error."""
-        rng = np.random.default_rng(seed)
+    @property
+    def bounds(self) -> tuple[Array, Array, Array]:
+        """Bounds of centres, widths and feedbacks, and the range that belongs to each set."""
         low, high = self.ranges
         span = np.repeat((high - low)[:, np.newaxis], self.estimator.n_sets, axis=1).ravel()
         base = np.repeat(low[:, np.newaxis], self.estimator.n_sets, axis=1).ravel()
         lower = np.concatenate([base, 0.15 * span, -0.3 * span])
         upper = np.concatenate([base + span, 1.0 * span, 0.3 * span])
+        return lower, upper, span
+
+    def shortened(self, most: int) -> _Problem:
+        """Return the same problem on the start of every run."""
+        return replace(
+            self,
+            inputs=tuple(np.ascontiguousarray(u[:most]) for u in self.inputs),
+            targets=tuple(y[:most] for y in self.targets),
+        )
+
+    def refined(self, even: Sets, still: Array, tell: Tell) -> tuple[Sets, Array]:
+        """Return antecedents and feedbacks refined on free runs over ever longer horizons."""
+        from scipy.optimize import least_squares
+
+        lower, upper, span = self.bounds
+        n = even.vector.size
+        values = np.clip(np.concatenate([even.vector, still.ravel()]), lower, upper)
+        longest = max(len(y) for y in self.targets)
+        for place, share in enumerate(HORIZONS):
+            part = self.shortened(round(share * longest))
+
+            def missed(x: Array, part: _Problem = part) -> Array:
+                network = part.solved(
+                    even.replaced(x[:n]), x[n:].reshape(still.shape), part.targets
+                )
+                pairs = zip(part.free_runs(network), part.targets, strict=True)
+                errors = np.concatenate([z - y for z, y in pairs])
+                return np.clip(np.nan_to_num(errors, nan=FAR, posinf=FAR, neginf=-FAR), -FAR, FAR)
+
+            tell(0.1 + 0.8 * place / len(HORIZONS), f"horizon {share:g}")
+            found = least_squares(
+                missed,
+                values,
+                bounds=(lower, upper),
+                x_scale=np.tile(span, 3),
+                max_nfev=TRUST_STEPS,
+            )
+            values = found.x
+        return even.replaced(values[:n]), values[n:].reshape(still.shape)
+
+    def swarm(self, even: Sets, seed: int, tell: Tell) -> tuple[Sets, Array]:
+        """Return centres, widths and feedbacks by particle swarm on the free-running error."""
+        rng = np.random.default_rng(seed)
+        lower, upper, span = self.bounds
         places = rng.uniform(lower, upper, (PARTICLES, lower.size))
         places[0] = np.concatenate([even.vector, np.zeros(span.size)])
         speeds = np.zeros_like(places)
-        most = max(SEARCH_SAMPLES // len(self.inputs), 100)
-        thin = _Problem(
-            self.estimator,
-            tuple(np.ascontiguousarray(u[:most]) for u in self.inputs),
-            tuple(y[:most] for y in self.targets),
-            self.step,
-            self.free,
-            self.data,
-        )
+        thin = self.shortened(max(SEARCH_SAMPLES // len(self.inputs), 100))
 
         def split(place: Array) -> tuple[Sets, Array]:
             n = even.vector.size

@@ -136,6 +136,7 @@ def study_muscles(
             ),
             lead="Models of muscles that move one another, ranked on runs they have not seen.",
             notes_title="How it was done",
+            command=f"mckibben study FILES{'' if load is None else f' --load {load}'} -o {out}",
         ),
         folder / "report.html",
     )

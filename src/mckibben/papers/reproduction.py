@@ -83,6 +83,8 @@ class Reproduction:
         Under the title.
     notes_title : str
         Over the notes.
+    command : str
+        What makes it again; default ``mckibben reproduce`` with its name.
     """
 
     name: str
@@ -93,6 +95,7 @@ class Reproduction:
     notes: tuple[str, ...]
     lead: str = "The paper's protocol on its virtual rig, its methods as published, and ours."
     notes_title: str = "What differs from the paper"
+    command: str = ""
 
     def to_dict(self) -> dict[str, Any]:
         """Return all but the figures, as ``tables.json`` holds it."""

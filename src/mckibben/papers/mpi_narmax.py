@@ -254,8 +254,8 @@ def _reported(
         notes=(
             "The rig's physics is not the paper's muscle: levels differ.",
             f"Recorded at 1 kHz, resampled to {1 / SAMPLE_TIME:g} Hz.",
-            "Weights by rate, fitted at 0.1 Hz, lead astray at 0.2 Hz; ours has none, and antecedents refined "
-            "by trust region.",
+            "Weights by rate, fitted at 0.1 Hz, lead astray at 0.2 Hz; ours has none, and antecedents "
+            "refined by trust region.",
             "The paper leaves open what its swarm searches: here antecedents and feedbacks, on the "
             "free-running error; consequents by least squares.",
             "How the hand pulls is ours.",

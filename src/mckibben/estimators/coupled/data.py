@@ -125,10 +125,10 @@ def coupled_data(
         for name in (*pressures, *displacements, *scheduling):
             if name not in recording:
                 raise DataError(
-                    "the channel is absent, but other recordings have it",
+                    "the model needs it, and the recording has no such channel",
                     file=recording.source,
                     channel=name,
-                    remedy="give all recordings the same channels",
+                    remedy="give all recordings the same channels, or name others",
                 )
         if len(recording) < FEWEST_SAMPLES:
             raise DataError(

@@ -11,12 +11,13 @@ from __future__ import annotations
 from typing import Annotated, ClassVar, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 from pydantic import BeforeValidator
 from pydantic.dataclasses import dataclass
 
+from mckibben.blocks.backward import Backward
 from mckibben.blocks.base import Kernel, Primitive
-from mckibben.blocks.fields import DISPLACEMENT, STRICT, Channel, ChannelField, Initial, Vector
+from mckibben.blocks.fields import DISPLACEMENT, STRICT, ChannelField, Initial, Vector
 from mckibben.blocks.kernels import kernel
 from mckibben.blocks.named import NamedParameters
 from mckibben.blocks.refusals import explicit_state, needs_sample_time
@@ -135,7 +136,7 @@ class Creep(SingleChannel, NamedParameters, Primitive):
 
 
 @dataclass(frozen=True, config=STRICT)
-class CreepInverse(Primitive):
+class CreepInverse(Backward, Primitive):
     """Inverse of `Creep`, in closed form.
 
     Parameters
@@ -151,32 +152,9 @@ class CreepInverse(Primitive):
     forward: Annotated[Creep, BeforeValidator(nested)]
 
     @property
-    def inputs(self) -> tuple[Channel, ...]:
-        """The forward block's output."""
-        return self.forward.outputs
-
-    @property
-    def outputs(self) -> tuple[Channel, ...]:
-        """The forward block's input."""
-        return self.forward.inputs
-
-    @property
     def n_states(self) -> int:
         """Those of the forward block."""
         return self.forward.n_states
-
-    @property
-    def n_parameters(self) -> int:
-        """Those of the forward block."""
-        return self.forward.n_parameters
-
-    def pack(self) -> Array:
-        """Return the forward block's parameters."""
-        return self.forward.pack()
-
-    def unpack(self, parameters: ArrayLike) -> Self:
-        """Return the inverse of a forward block with other parameters."""
-        return type(self)(self.forward.unpack(parameters))
 
     def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
         """Return the elements at rest: where the first output is held, or, virgin, at 0."""
@@ -188,10 +166,6 @@ class CreepInverse(Primitive):
     def coefficients(self, sample_time: float | None) -> Array:
         """Return those of the forward block."""
         return self.forward.coefficients(sample_time)
-
-    def inverse(self) -> Creep:
-        """Return the forward block."""
-        return self.forward
 
     @classmethod
     def example(cls) -> Self:

@@ -29,6 +29,7 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic import BeforeValidator, FiniteFloat, InstanceOf
 from pydantic.dataclasses import dataclass
 
+from mckibben.blocks.backward import Backward
 from mckibben.blocks.base import Block, Kernel, Primitive
 from mckibben.blocks.fields import STRICT, Channel, Channels, Initial, Rows, Vector, rows, vector
 from mckibben.blocks.kernels import kernel
@@ -340,7 +341,7 @@ def numerator_width(n: int, n_scheduled: int, degree: int, n_thresholds: int) ->
 
 
 @dataclass(frozen=True, config=STRICT)
-class ForceBalanceInverse(Primitive):
+class ForceBalanceInverse(Backward, Primitive):
     """From pressures of n muscles to their displacements, solved for in every sample.
 
     Parameters
@@ -356,37 +357,9 @@ class ForceBalanceInverse(Primitive):
     forward: Annotated[InstanceOf[ForceBalance], BeforeValidator(nested)]
 
     @property
-    def inputs(self) -> tuple[Channel, ...]:
-        """Pressures, then what schedules."""
-        return (*self.forward.given, *self.forward.scheduled)
-
-    @property
-    def scheduling(self) -> tuple[str, ...]:
-        """What schedules the balance."""
-        return self.forward.scheduling
-
-    @property
-    def outputs(self) -> tuple[Channel, ...]:
-        """Displacements."""
-        return self.forward.driven
-
-    @property
     def n_states(self) -> int:
         """As the balance; the last one counts samples that could not be solved."""
         return self.forward.n_states
-
-    @property
-    def n_parameters(self) -> int:
-        """Those of the balance."""
-        return self.forward.n_parameters
-
-    def pack(self) -> Array:
-        """Return the balance's parameters."""
-        return self.forward.pack()
-
-    def unpack(self, parameters: ArrayLike) -> Self:
-        """Return the solution of a balance with other parameters."""
-        return replace(self, forward=self.forward.unpack(parameters))
 
     def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
         """Return the state of an arm that went in small steps from its rest to the first pressures."""
@@ -415,10 +388,6 @@ class ForceBalanceInverse(Primitive):
                 ModelWarning,
                 stacklevel=4,
             )
-
-    def inverse(self) -> Block:
-        """Return the balance."""
-        return self.forward
 
     @classmethod
     def example(cls) -> Self:

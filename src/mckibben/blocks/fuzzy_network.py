@@ -21,6 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic import BeforeValidator, InstanceOf
 from pydantic.dataclasses import dataclass
 
+from mckibben.blocks.backward import Backward
 from mckibben.blocks.base import Block, Kernel, Primitive
 from mckibben.blocks.fields import STRICT, Channel, Channels, Initial, Rows, Vector, vector
 from mckibben.blocks.kernels import kernel
@@ -298,7 +299,7 @@ class FuzzyNetwork(ManyChannels, Primitive):
 
 
 @dataclass(frozen=True, config=STRICT)
-class FuzzyNetworkInverse(Primitive):
+class FuzzyNetworkInverse(Backward, Primitive):
     """A fuzzy network solved for its driven inputs, sample by sample, within their limits.
 
     Parameters
@@ -314,37 +315,9 @@ class FuzzyNetworkInverse(Primitive):
     forward: Annotated[InstanceOf[FuzzyNetwork], BeforeValidator(nested)]
 
     @property
-    def inputs(self) -> tuple[Channel, ...]:
-        """The network's outputs, then what schedules it."""
-        return (*self.forward.given, *self.forward.scheduled)
-
-    @property
-    def scheduling(self) -> tuple[str, ...]:
-        """What schedules the network."""
-        return self.forward.scheduling
-
-    @property
-    def outputs(self) -> tuple[Channel, ...]:
-        """The network's driven inputs."""
-        return self.forward.driven
-
-    @property
     def n_states(self) -> int:
         """The last solution, and the count of samples clipped."""
         return len(self.outputs) + 1
-
-    @property
-    def n_parameters(self) -> int:
-        """The network's."""
-        return self.forward.n_parameters
-
-    def pack(self) -> Array:
-        """Return the network's parameters."""
-        return self.forward.pack()
-
-    def unpack(self, parameters: ArrayLike) -> Self:
-        """Return the inverse of a network with other parameters."""
-        return replace(self, forward=self.forward.unpack(parameters))
 
     @property
     def box(self) -> Array:
@@ -383,10 +356,6 @@ class FuzzyNetworkInverse(Primitive):
                 ModelWarning,
                 stacklevel=4,
             )
-
-    def inverse(self) -> Block:
-        """Return the network."""
-        return self.forward
 
     @classmethod
     def example(cls) -> Self:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import warnings
 from abc import abstractmethod
-from typing import Any, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
+from mckibben.blocks.backward import Backward
 from mckibben.blocks.base import Block
 from mckibben.blocks.fields import Channel, Initial, Rule
 from mckibben.blocks.refusals import explicit_state
@@ -79,45 +79,12 @@ class Ranged(SingleChannel):
         return np.empty(0)
 
 
-class Inverse(Block):
+class Inverse(Backward):
     """The inverse of a `Ranged` block: wished-for output in, input out.
 
     References beyond what the input range can reach are clipped there, and `simulate` says so. The
     last state counts the samples clipped.
     """
-
-    forward: Any
-
-    @property
-    def inputs(self) -> tuple[Channel, ...]:
-        """The forward block's output."""
-        outputs: tuple[Channel, ...] = self.forward.outputs
-        return outputs
-
-    @property
-    def outputs(self) -> tuple[Channel, ...]:
-        """The forward block's input."""
-        inputs: tuple[Channel, ...] = self.forward.inputs
-        return inputs
-
-    @property
-    def n_parameters(self) -> int:
-        """Those of the forward block."""
-        return int(self.forward.n_parameters)
-
-    def pack(self) -> Array:
-        """Return the forward block's parameters."""
-        parameters: Array = self.forward.pack()
-        return parameters
-
-    def unpack(self, parameters: ArrayLike) -> Self:
-        """Return the inverse of a forward block with other parameters."""
-        return type(self)(self.forward.unpack(parameters))  # type: ignore[call-arg]
-
-    def inverse(self) -> Block:
-        """Return the forward block."""
-        forward: Block = self.forward
-        return forward
 
     def reachable(self) -> tuple[Array, Array]:
         """Return the input range of the forward block, each end of shape (1,)."""

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from mckibben.blocks.base import Block
 from mckibben.blocks.differential.bouc_wen import BoucWen
 from mckibben.blocks.fields import vector
+from mckibben.estimators.best_of import best_of_settings
 from mckibben.estimators.data import Run, TrainingData
 from mckibben.estimators.loops import LoopEstimator
 from mckibben.estimators.search import Tracker
@@ -82,25 +83,3 @@ class BoucWenEstimator(LoopEstimator):
             self.starting_rule,
             **self.channels(data),
         )
-
-
-def best_of_settings(
-    estimator: LoopEstimator,
-    setting: str,
-    values: tuple[int, ...],
-    data: TrainingData,
-    tracker: Tracker,
-) -> tuple[Block, TrainingData]:
-    """Return what an estimator finds with the value of a setting that fits best."""
-    found = []
-    for value in values:
-        own = Tracker(progress=tracker.progress)
-        settings = estimator.get_params() | {setting: value}
-        found.append((*type(estimator)(**settings).identify(data, own), own))
-        tracker.evaluations += own.evaluations
-        if own.interrupted:
-            tracker.interrupted = True
-            break
-    block, chosen, best = min(found, key=lambda item: item[2].best_cost)
-    tracker.best_cost, tracker.best = best.best_cost, best.best
-    return block, chosen

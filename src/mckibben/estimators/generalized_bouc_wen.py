@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from mckibben.blocks.base import Block
 from mckibben.blocks.differential.generalized_bouc_wen import GeneralizedBoucWen
 from mckibben.blocks.fields import vector
-from mckibben.estimators.bouc_wen import best_of_settings
+from mckibben.estimators.best_of import best_of_settings
 from mckibben.estimators.data import Run, TrainingData
 from mckibben.estimators.loops import LoopEstimator
 from mckibben.estimators.search import Tracker

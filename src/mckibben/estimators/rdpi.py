@@ -13,6 +13,7 @@ from mckibben.blocks.base import Block
 from mckibben.blocks.fields import vector
 from mckibben.blocks.rate_dependent_pi import RateDependentPI
 from mckibben.errors import DataError
+from mckibben.estimators.best_of import best_of_settings
 from mckibben.estimators.data import Run, TrainingData
 from mckibben.estimators.mpi import MPIEstimator
 from mckibben.estimators.pi import play_operators
@@ -50,18 +51,8 @@ class RDPIEstimator(MPIEstimator):
             )
         if self.rate_time_constant is not None:
             return super().identify(data, tracker)
-        found = []
-        for samples in (0, 5, 25):
-            own = Tracker(progress=tracker.progress)
-            settings = self.get_params() | {"rate_time_constant": samples * step}
-            found.append((*type(self)(**settings).identify(data, own), own))
-            tracker.evaluations += own.evaluations
-            if own.interrupted:
-                tracker.interrupted = True
-                break
-        block, chosen, best = min(found, key=lambda item: item[2].best_cost)
-        tracker.best_cost, tracker.best = best.best_cost, best.best
-        return block, chosen
+        values = [samples * step for samples in (0, 5, 25)]
+        return best_of_settings(self, "rate_time_constant", values, data, tracker)
 
     def rate(self, run: Run) -> Array:
         """Return the filtered rate of the run's input, per second."""

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from mckibben.report import interactive, model_subjects, subjects, wording
 from mckibben.report.drawing import N_COLOURS, POINTS, Drawing, series_colour
 from mckibben.report.shown import Shown, drawn, shown
+from mckibben.report.templating import template
 
 if TYPE_CHECKING:
     from mckibben.comparison.results import Leaderboard, Row, Study
@@ -45,22 +46,12 @@ def write_report(study: Study, path: str | Path) -> None:
 
 def page(study: Study) -> str:
     """Return the report of a study as HTML."""
-    from jinja2 import Environment, PackageLoader, StrictUndefined
     from plotly.offline import get_plotlyjs
 
-    environment = Environment(
-        loader=PackageLoader("mckibben.report"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    environment.filters |= {"number": wording.number, "percent": wording.percent}
-    environment.policies["json.dumps_kwargs"] = {"allow_nan": False, "separators": (",", ":")}
     every = shown(study)
     pictured = drawn(every)
     figures, left_out = _figures(study, pictured)
-    return environment.get_template("report.html.j2").render(
+    return template("report.html.j2").render(
         study=study,
         board=study.leaderboard,
         shown=every,

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from mckibben.report import interactive, wording
 from mckibben.report.drawing import N_COLOURS, Curve, Drawing, Panel
+from mckibben.report.templating import template
 
 if TYPE_CHECKING:
     from mckibben.papers import Figure, Reproduction
@@ -34,23 +35,13 @@ def write_reproduction(found: Reproduction, path: str | Path) -> None:
 
 def reproduction_page(found: Reproduction) -> str:
     """Return the report of a re-run as HTML."""
-    from jinja2 import Environment, PackageLoader, StrictUndefined
     from plotly.offline import get_plotlyjs
 
-    environment = Environment(
-        loader=PackageLoader("mckibben.report"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    environment.filters |= {"number": wording.number}
-    environment.policies["json.dumps_kwargs"] = {"allow_nan": False, "separators": (",", ":")}
     figures = {
         f"figure-{place}": [interactive.plots(drawing(figure))]
         for place, figure in enumerate(found.figures)
     }
-    return environment.get_template("reproduction.html.j2").render(
+    return template("reproduction.html.j2").render(
         found=found, figures=figures, versions=wording.versions(), plotly=get_plotlyjs()
     )
 

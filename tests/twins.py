@@ -947,6 +947,28 @@ def force_balance_inverse(block: Any, inputs: Rows, sample_time: float) -> Rows:
     return out[len(ramp) :]
 
 
+def pid(block: Any, inputs: Rows, sample_time: float) -> Rows:
+    n = len(block.driven)
+    lowest, highest = block.limits
+    integrals, rates = [0.0] * n, [0.0] * n
+    last = due = inputs[0][n : 2 * n]
+    share, outputs = sample_time / (block.filter_time + sample_time), []
+    for row in inputs:
+        references, measured, bases = row[:n], row[n : 2 * n], row[2 * n :] or [0.0] * n
+        asked = due if block.late else references
+        out = []
+        for k in range(n):
+            error, slope = asked[k] - measured[k], (measured[k] - last[k]) / sample_time
+            rates[k] = (1.0 - share) * rates[k] + share * slope
+            wanted = bases[k] + block.kp[k] * error + integrals[k] - block.kd[k] * rates[k]
+            if not ((wanted > highest and error > 0) or (wanted < lowest and error < 0)):
+                integrals[k] += block.ki[k] * error * sample_time
+            out.append(max(lowest, min(highest, wanted)))
+        last, due = measured, references
+        outputs.append(out)
+    return outputs
+
+
 TWINS: dict[str, Twin] = {
     "activation-memory": activation_memory,
     "activation-pressure": activation_pressure,
@@ -983,6 +1005,7 @@ TWINS: dict[str, Twin] = {
     "narx-polynomial": narx_polynomial,
     "negative": negative,
     "pi": pi,
+    "pid": pid,
     "pi-inverse": pi_inverse,
     "piecewise-linear": piecewise_linear,
     "play": play,

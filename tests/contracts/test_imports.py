@@ -19,7 +19,7 @@ LAYERS = (
     {"rigs"},
     {"environments"},
     {"blocks"},
-    {"estimators"},
+    {"estimators", "export"},
     {"compensators", "control"},
     {"comparison"},
     {"papers"},
@@ -31,6 +31,7 @@ LAYERS = (
 STANDS_ON = {
     "files": {"files", "recording", "errors", "registry", "atomic"},
     "rigs": {"rigs", "recording", "signals", "errors", "registry", "atomic"},
+    "export": {"export", "blocks", "errors", "registry", "atomic"},
     "control": {"control", "blocks", "recording", "errors", "registry"},
     "environments": {"environments", "rigs", "recording", "signals", "errors"},
 }

@@ -127,3 +127,22 @@ def test_bad_loops_are_refused() -> None:
         PID((1.0, 2.0), (1.0,))
     with pytest.raises(ModelError, match="filter_time"):
         DisturbanceObserver(BLOCK.inverse(), filter_time=0.0)
+
+
+@pytest.mark.parametrize("behind", [False, True])
+def test_a_controller_as_a_block_gives_the_same_pressures(behind: bool) -> None:
+    pid = PID((0.05,), (0.2,), (0.002,), limits=(0.0, 2.0))
+    controller = FeedforwardPID(BLOCK.inverse(), pid) if behind else pid
+    stream = controller.block().stream(0.02)
+    controller.reset(0.02)
+    rng = np.random.default_rng(0)
+    wanted = np.cumsum(rng.normal(0.0, 0.3, 400)) + 10.0
+    for value, noise in zip(wanted, rng.normal(0.0, 1.0, 400), strict=True):
+        reference, measured = np.array([value]), np.array([value + noise])
+        expected = controller.step(reference, measured, np.empty(0))
+        np.testing.assert_allclose(stream.step([value, value + noise]), expected, atol=1e-13)
+
+
+def test_a_controller_that_is_no_block_says_so() -> None:
+    with pytest.raises(ModelError, match=r"DisturbanceObserver is no block.*Remedy:"):
+        DisturbanceObserver(BLOCK.inverse()).block()

@@ -96,6 +96,11 @@ class Block(metaclass=Checked):
         """Length of the state vector."""
 
     @property
+    def n_scratch(self) -> int:
+        """How many numbers a step computes in beside the state, for code that cannot allocate."""
+        return 0
+
+    @property
     @abstractmethod
     def n_parameters(self) -> int:
         """Length of the parameter vector, `pack`."""

@@ -43,6 +43,11 @@ class Composition(Block):
         return sum(part.n_states for part in self.parts)
 
     @property
+    def n_scratch(self) -> int:
+        """The scratch of all parts."""
+        return sum(part.n_scratch for part in self.parts)
+
+    @property
     def n_parameters(self) -> int:
         """The parameters of all parts."""
         return sum(part.n_parameters for part in self.parts)

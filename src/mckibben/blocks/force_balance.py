@@ -264,6 +264,11 @@ class ForceBalance(ManyChannels, Primitive):
         return n + n * len(self.thresholds) + 1
 
     @property
+    def n_scratch(self) -> int:
+        """Stops and their slopes, displacements and a gradient."""
+        return 2 * len(self.driven) * (len(self.thresholds) + 1)
+
+    @property
     def n_parameters(self) -> int:
         """All forces and areas."""
         return sum(map(len, (*self.forces, *self.areas)))
@@ -360,6 +365,12 @@ class ForceBalanceInverse(Backward, Primitive):
     def n_states(self) -> int:
         """As the balance; the last one counts samples that could not be solved."""
         return self.forward.n_states
+
+    @property
+    def n_scratch(self) -> int:
+        """As the balance, a residual and a matrix, and inputs on the way to the first."""
+        n = len(self.outputs)
+        return self.forward.n_scratch + n + n * n + len(self.inputs)
 
     def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
         """Return the state of an arm that went in small steps from its rest to the first pressures."""

@@ -226,6 +226,11 @@ class FuzzyNetwork(ManyChannels, Primitive):
         return 0
 
     @property
+    def n_scratch(self) -> int:
+        """Memberships."""
+        return len(self.centres) * max(map(len, self.centres))
+
+    @property
     def n_parameters(self) -> int:
         """Centres, widths and consequents."""
         return 2 * sum(map(len, self.centres)) + len(self.consequents)
@@ -318,6 +323,12 @@ class FuzzyNetworkInverse(Backward, Primitive):
     def n_states(self) -> int:
         """The last solution, and the count of samples clipped."""
         return len(self.outputs) + 1
+
+    @property
+    def n_scratch(self) -> int:
+        """Memberships, all inputs, five vectors of driven inputs, and a matrix."""
+        m = len(self.outputs)
+        return self.forward.n_scratch + len(self.inputs) + m * (m + 5)
 
     @property
     def box(self) -> Array:

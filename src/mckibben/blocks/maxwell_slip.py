@@ -161,6 +161,11 @@ class MaxwellSlip(Ranged, NamedParameters, Primitive):
         """Deflections and the previous input."""
         return len(self.breakaways) + 1
 
+    @property
+    def n_scratch(self) -> int:
+        """What single precision loses of the deflections."""
+        return len(self.breakaways)
+
     def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
         """Return [deflections, first input]."""
         start = self.initial if initial is None else initial
@@ -222,6 +227,11 @@ class MaxwellSlipInverse(SolvedInverse):
     kernel: ClassVar[Kernel] = maxwell_slip_inverse_kernel
 
     forward: Annotated[MaxwellSlip, BeforeValidator(nested)]
+
+    @property
+    def n_scratch(self) -> int:
+        """As the forward model."""
+        return self.forward.n_scratch
 
     @classmethod
     def example(cls) -> Self:

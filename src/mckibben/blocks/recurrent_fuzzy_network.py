@@ -183,6 +183,11 @@ class RecurrentFuzzyNetwork(ManyChannels, Primitive):
         return past + self.n_regressors * self.n_sets
 
     @property
+    def n_scratch(self) -> int:
+        """The regressors."""
+        return self.n_regressors
+
+    @property
     def n_parameters(self) -> int:
         """Centres, widths, feedbacks and consequents."""
         return 3 * self.n_regressors * self.n_sets + len(self.consequents)

@@ -15,6 +15,7 @@ import typer
 from mckibben import __version__
 from mckibben.cli.characterize import characterize
 from mckibben.cli.compare import compare
+from mckibben.cli.export import app as export_app
 from mckibben.cli.fit import fit
 from mckibben.cli.info import info
 from mckibben.cli.invert import invert
@@ -41,6 +42,7 @@ app = typer.Typer(
 )
 for command in (study, characterize, fit, compare, simulate, invert, track, plot, reproduce, info):
     app.command()(command)
+app.add_typer(export_app)
 app.add_typer(rig_app)
 
 

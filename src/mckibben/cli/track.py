@@ -40,6 +40,10 @@ def track(
     out: Annotated[
         Path | None, typer.Option("-o", "--out", help="Recording of the run to write.")
     ] = None,
+    controller_out: Annotated[
+        Path | None,
+        typer.Option("--controller-out", help="Controller to write (JSON), for export."),
+    ] = None,
     approach: Annotated[float, typer.Option(help="Time to reach the first reference [s].")] = 20.0,
     settle: Annotated[float, typer.Option(help="Time after that not scored [s].")] = 0.0,
     noise: Annotated[float, typer.Option(help="Added to measured displacements [mm].")] = 0.0,
@@ -82,6 +86,8 @@ def track(
         )
     if out is not None:
         write(found.recording, out)
+    if controller_out is not None:
+        chosen.block(block).save(controller_out)
     if as_json:
         print_json(
             {
@@ -92,6 +98,7 @@ def track(
                 "clipping_cost": found.clipping_cost,
                 "step_time": {"median": found.step_time[0], "p99.9": found.step_time[1]},
                 "file": None if out is None else str(out),
+                "controller_file": None if controller_out is None else str(controller_out),
             }
         )
         return

@@ -8,6 +8,9 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from mckibben.blocks.base import Block
+from mckibben.errors import ModelError
+
 Array = NDArray[np.float64]
 
 
@@ -35,6 +38,25 @@ class Controller(ABC):
     def reads(self, readings: Mapping[str, float]) -> None:
         """Learn all that was just measured, by channel, before `step`."""
         del readings
+
+    def block(self, compensator: Block | None = None) -> Block:
+        """Return the controller as a block, to be saved, streamed and exported.
+
+        Parameters
+        ----------
+        compensator : Block, optional
+            Whose channels name references and pressures, for feedback that stands alone.
+
+        Raises
+        ------
+        ModelError
+            If it is not one.
+        """
+        del compensator
+        raise ModelError(
+            f"{type(self).__name__} is no block that could be saved or exported. "
+            "Remedy: use a compensator, PID feedback, or both together."
+        )
 
     def applied(self, pressures: Array) -> None:
         """Learn what was applied in the end, after limits."""

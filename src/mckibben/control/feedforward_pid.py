@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mckibben.blocks.base import Block
+from mckibben.blocks.feedforward_feedback import FeedforwardFeedback
+from mckibben.blocks.fields import Channel
 from mckibben.control.controller import Controller
 from mckibben.control.feedforward import Feedforward
 from mckibben.control.pid import PID
@@ -46,3 +48,11 @@ class FeedforwardPID(Controller):
         due = displacement if self._due is None else self._due
         self._due = reference.copy()
         return np.clip(self.pid.correction(due, displacement, base), *self.pid.limits)
+
+    def block(self, compensator: Block | None = None) -> FeedforwardFeedback:
+        """Return compensator and feedback as one block."""
+        ahead = compensator or self.compensator
+        n = len(ahead.inputs) - len(ahead.scheduling)
+        bases = tuple(Channel(f"{c.name}_base", c.unit) for c in ahead.outputs)
+        feedback = self.pid.feedback(ahead.inputs[:n], ahead.outputs, bases=bases)
+        return FeedforwardFeedback(ahead, feedback)

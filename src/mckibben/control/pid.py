@@ -11,6 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from mckibben.blocks.base import Block
+from mckibben.blocks.fields import Channel
+from mckibben.blocks.pid import PIDFeedback
 from mckibben.control.controller import Controller
 from mckibben.errors import ModelError
 
@@ -73,3 +76,40 @@ class PID(Controller):
         )
         self._integral += np.where(further, 0.0, np.array(self.ki) * self._time * error)
         return np.asarray(wanted)
+
+    def block(self, compensator: Block | None = None) -> PIDFeedback:
+        """Return these loops as a block; channels are a compensator's, or by number."""
+        n = len(self.kp)
+        references, pressures = _channels(compensator, n)
+        return self.feedback(references, pressures)
+
+    def feedback(
+        self,
+        references: tuple[Channel, ...],
+        pressures: tuple[Channel, ...],
+        *,
+        bases: tuple[Channel, ...] = (),
+    ) -> PIDFeedback:
+        """Return these loops as a block of given channels; with bases, behind a compensator."""
+        measured = tuple(Channel(f"{c.name}_measured", c.unit) for c in references)
+        return PIDFeedback(
+            self.kp,
+            self.ki,
+            self.kd,
+            self.limits,
+            self.filter_time,
+            references,
+            (*measured, *bases),
+            pressures,
+            late=bool(bases),
+        )
+
+
+def _channels(compensator: Block | None, n: int) -> tuple[tuple[Channel, ...], tuple[Channel, ...]]:
+    if compensator is not None:
+        return compensator.inputs[:n], compensator.outputs
+    numbers = range(1, n + 1)
+    return (
+        tuple(Channel(f"displacement_{k}", "mm") for k in numbers),
+        tuple(Channel(f"pressure_{k}", "bar") for k in numbers),
+    )

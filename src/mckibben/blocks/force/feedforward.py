@@ -81,6 +81,11 @@ class ForceFeedforward(Block):
         return 0 if self.friction is None else self.friction.n_states
 
     @property
+    def n_scratch(self) -> int:
+        """That of the friction."""
+        return 0 if self.friction is None else self.friction.n_scratch
+
+    @property
     def n_parameters(self) -> int:
         """Those of both parts."""
         return self.law.n_parameters + (0 if self.friction is None else self.friction.n_parameters)

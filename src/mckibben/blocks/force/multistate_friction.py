@@ -198,6 +198,11 @@ class MultistateFriction(NamedParameters, Primitive):
             rows.append(own)
         return np.array(rows)
 
+    @property
+    def n_scratch(self) -> int:
+        """What single precision loses of the deflections."""
+        return len(self.elements)
+
     def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
         """Return [deflections, first length]."""
         start = self.initial if initial is None else initial

@@ -1,0 +1,90 @@
+"""mckibben export: a model as C99, or as an FMU."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from mckibben.cli.options import Json
+from mckibben.cli.output import print_json
+
+if TYPE_CHECKING:
+    from mckibben.blocks.base import Block
+
+app = typer.Typer(
+    name="export",
+    help="A model as code for elsewhere: c, fmu.",
+    no_args_is_help=True,
+    add_completion=False,
+    rich_markup_mode=None,
+)
+
+Model = Annotated[
+    Path, typer.Argument(metavar="MODEL", help="Model, inverse or controller (JSON).")
+]
+Name = Annotated[
+    str | None, typer.Option("--name", help="Of functions and files. Default: the file's name.")
+]
+SampleTime = Annotated[
+    float | None,
+    typer.Option("--sample-time", metavar="SECONDS", help="Time between steps, where it matters."),
+]
+Inverse = Annotated[bool, typer.Option("--inverse", help="Export the model's inverse.")]
+Overwrite = Annotated[
+    bool, typer.Option("--overwrite", help="Replace what an export wrote there before.")
+]
+
+
+class Version(StrEnum):
+    """Of the Functional Mock-up Interface."""
+
+    TWO = "2.0"
+    THREE = "3.0"
+
+
+def _loaded(model: Path, inverse: bool) -> Block:
+    from mckibben.blocks.saving import load
+
+    block = load(model)
+    return block.inverse() if inverse else block
+
+
+@app.command("c")
+def export_c(
+    model: Model,
+    out: Annotated[Path, typer.Option("-o", "--out", metavar="DIR", help="Folder to write.")],
+    name: Name = None,
+    sample_time: SampleTime = None,
+    float32: Annotated[bool, typer.Option("--float32", help="Single precision.")] = False,
+    inverse: Inverse = False,
+    check: Annotated[
+        bool, typer.Option("--check", help="Compile it here and run its self-test.")
+    ] = False,
+    overwrite: Overwrite = False,
+    as_json: Json = False,
+) -> None:
+    """Write C99 that compiles as it is: on a PC, a microcontroller, Arduino, MATLAB."""
+    from mckibben.export import export_c as write_c
+    from mckibben.export.c.building import self_test
+    from mckibben.export.naming import name_from
+
+    chosen = name or name_from(model)
+    write_c(
+        _loaded(model, inverse),
+        out,
+        name=chosen,
+        sample_time=sample_time,
+        single=float32,
+        overwrite=overwrite,
+    )
+    told = self_test(out, chosen) if check else None
+    files = sorted(path.relative_to(out).as_posix() for path in out.rglob("*") if path.is_file())
+    if as_json:
+        print_json({"folder": str(out), "name": chosen, "files": files, "self_test": told})
+        return
+    if told is not None:
+        print(told)
+    print(f"Written: {out} ({len(files)} files; start with {out / 'README.md'})")

@@ -1,0 +1,5 @@
+"""Models as code for elsewhere: C99 for microcontrollers, FMUs for simulators."""
+
+from __future__ import annotations
+
+from mckibben.export.c.project import export_c as export_c

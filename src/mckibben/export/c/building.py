@@ -1,0 +1,160 @@
+"""Compiling exported C on this machine, to check it and to call it."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import shutil
+import subprocess
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mckibben.errors import ModelError
+
+Array = NDArray[np.float64]
+
+FLAGS = (
+    "-std=c99",
+    "-O2",
+    "-Wall",
+    "-Wextra",
+    "-Wconversion",
+    "-Wdouble-promotion",
+    "-Werror",
+    "-pedantic",
+    "-ffp-contract=off",
+)
+"""What exported C compiles with, cleanly."""
+
+TIMEOUT = 300.0
+"""Of the compiler and of a self-test [s]."""
+
+
+def compiler() -> str:
+    """Return the C compiler of this machine: $CC, cc, gcc or clang.
+
+    Raises
+    ------
+    ModelError
+        If there is none.
+    """
+    for name in (os.environ.get("CC"), "cc", "gcc", "clang"):
+        found = shutil.which(name) if name else None
+        if found:
+            return found
+    raise ModelError(
+        "there is no C compiler on this machine. Remedy: install gcc or clang, or leave --check out "
+        "and compile the folder elsewhere."
+    )
+
+
+def compile_c(sources: Sequence[Path], out: Path, *, options: Sequence[str] = ()) -> None:
+    """Compile C files into a program or a library.
+
+    Raises
+    ------
+    ModelError
+        If there is no compiler, or it refuses; the text gives its first complaint.
+    """
+    command = [compiler(), *FLAGS, *options, "-o", str(out), *map(str, sources), "-lm"]
+    found = subprocess.run(command, capture_output=True, text=True, timeout=TIMEOUT, check=False)
+    if found.returncode != 0:
+        raise ModelError(
+            f"the exported C does not compile: {found.stderr.strip()[:500]} "
+            "Remedy: report it, with the model."
+        )
+
+
+def self_test(folder: Path, name: str) -> str:
+    """Compile an exported folder elsewhere, run its self-test, and return what it says.
+
+    Raises
+    ------
+    ModelError
+        If it does not compile, or its results are not those of Python.
+    """
+    with tempfile.TemporaryDirectory() as place:
+        program = Path(place) / "selftest"
+        sources = sorted((folder / "src").glob("*.c"))
+        test = folder / "test" / f"{name}_selftest.c"
+        compile_c([*sources, test], program, options=[f"-I{folder / 'src'}"])
+        found = subprocess.run(
+            [str(program)], capture_output=True, text=True, timeout=TIMEOUT, check=False
+        )
+    if found.returncode != 0:
+        raise ModelError(
+            f"the exported C does not give Python's numbers: {found.stdout.strip()} "
+            "Remedy: report it, with the model."
+        )
+    return found.stdout.strip()
+
+
+class CompiledModel:
+    """Exported C, compiled and called from Python.
+
+    Parameters
+    ----------
+    folder : Path
+        Written by `export_c`.
+    name : str
+        Given there.
+    n_inputs, n_outputs : int
+        Of the model.
+    options : sequence of str
+        More for the compiler.
+    """
+
+    SIZE = 1 << 20
+    """Bytes set aside for a model's struct."""
+
+    def __init__(
+        self,
+        folder: Path,
+        name: str,
+        n_inputs: int,
+        n_outputs: int,
+        *,
+        options: Sequence[str] = (),
+    ) -> None:
+        sources = sorted((folder / "src").glob("*.c"))
+        single = "MCK_FLOAT32" in (folder / "src" / "mck_precision.h").read_text()
+        self._type = np.float32 if single else np.float64
+        self._n_inputs, self._n_outputs = n_inputs, n_outputs
+        with tempfile.TemporaryDirectory() as place:
+            library = Path(place) / f"{name}.so"
+            compile_c(sources, library, options=["-shared", "-fPIC", *options])
+            self._library = ctypes.CDLL(str(library))
+        self._model = ctypes.create_string_buffer(self.SIZE)
+        self._init = getattr(self._library, f"{name}_init")
+        self._reset = getattr(self._library, f"{name}_reset")
+        self._step = getattr(self._library, f"{name}_step")
+        self._step.argtypes = [ctypes.c_void_p] * 3
+        self._init(self._model)
+
+    def reset(self) -> None:
+        """Forget everything."""
+        self._reset(self._model)
+
+    def run(self, inputs: ArrayLike) -> tuple[Array, NDArray[np.int64]]:
+        """Step over inputs, shape (n, n_inputs), from where it is.
+
+        Returns
+        -------
+        outputs : array, shape (n, n_outputs)
+        statuses : array of int, shape (n,)
+        """
+        given = np.ascontiguousarray(inputs, dtype=self._type)
+        outputs = np.zeros((len(given), self._n_outputs), dtype=self._type)
+        statuses = np.zeros(len(given), dtype=np.int64)
+        model = ctypes.addressof(self._model)
+        for k in range(len(given)):
+            statuses[k] = self._step(
+                model,
+                given.ctypes.data + k * given.strides[0],
+                outputs.ctypes.data + k * outputs.strides[0],
+            )
+        return outputs.astype(np.float64), statuses

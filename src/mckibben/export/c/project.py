@@ -1,0 +1,279 @@
+"""A model as a folder of C99 that compiles as it is: on a PC, a microcontroller, Arduino, MATLAB."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Mapping
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from mckibben.blocks.base import Block
+from mckibben.blocks.fields import Channel
+from mckibben.blocks.saving import to_dict
+from mckibben.errors import ModelError
+from mckibben.export.c.costs import cost_of
+from mckibben.export.c.literals import literal, rows
+from mckibben.export.c.parts import PRIMITIVES
+from mckibben.export.c.vectors import vectors
+from mckibben.export.c.wiring import Call, Wiring
+from mckibben.export.folders import write_folder
+from mckibben.export.naming import identifier, macros, said
+
+if TYPE_CHECKING:
+    from jinja2 import Environment
+
+TOLERANCES = {False: "1e-9", True: "1e-4"}
+"""Of the self-test, relative to the range: in double and in single precision."""
+
+SHARED = ("mck.h",)
+
+
+def export_c(
+    block: Block,
+    folder: str | Path,
+    *,
+    name: str = "model",
+    sample_time: float | None = None,
+    single: bool = False,
+    overwrite: bool = False,
+) -> Path:
+    """Write a model as a folder of C99, with a self-test whose vectors Python computed.
+
+    The same model gives the same bytes.
+
+    Parameters
+    ----------
+    block : Block
+        Any block: a model, an inverse, a controller, a composition.
+    folder : str or Path
+        To write; must not exist, or be empty.
+    name : str
+        Prefix of functions and files: a letter, then letters, digits and underscores.
+    sample_time : float, optional
+        Time between steps [s], positive; needed by rate-dependent blocks.
+    single : bool
+        Single instead of double precision.
+    overwrite : bool
+        Whether a folder that an export wrote before may be replaced.
+
+    Returns
+    -------
+    Path
+        The folder.
+
+    Raises
+    ------
+    ModelError
+        If the name will not do, the sample time is missing or wrong, or a part has no C.
+    DataError
+        If the folder is in the way or cannot be written.
+    """
+    folder = Path(folder)
+    files = c_files(block, name=name, sample_time=sample_time, single=single)
+    write_folder(folder, {path: text.encode() for path, text in files.items()}, overwrite=overwrite)
+    return folder
+
+
+def c_files(
+    block: Block, *, name: str = "model", sample_time: float | None = None, single: bool = False
+) -> dict[str, str]:
+    """Return the files of `export_c`, text by path in the folder."""
+    identifier(name)
+    content = described(block, name=name, sample_time=sample_time, single=single)
+    tests = vectors(block, content["sample_time"], single=single)
+    content |= {
+        "tolerance": TOLERANCES[single],
+        "n_samples": len(tests.inputs),
+        "input_rows": [_row(row, single) for row in tests.inputs],
+        "output_rows": [_row(row, single) for row in tests.outputs],
+        "ranges": _row(tests.ranges, single),
+    }
+    return {
+        **source_files(content),
+        "CMakeLists.txt": _render("CMakeLists.txt.j2", content),
+        "README.md": _render("README.md.j2", content),
+        "library.properties": _render("library.properties.j2", content),
+        f"examples/{name}/{name}.ino": _render("sketch.ino.j2", content),
+        f"matlab/{name}_mex.c": _render("mex.c.j2", content),
+        "matlab/build.m": _render("build.m.j2", content),
+        f"test/{name}_selftest.c": _render("selftest.c.j2", content),
+        "model.json": json.dumps(to_dict(block), indent=2, allow_nan=False) + "\n",
+    }
+
+
+def source_files(content: Mapping[str, Any]) -> dict[str, str]:
+    """Return the C of a model and of the primitives that it uses, text by path."""
+    name, primitives = content["name"], content["primitives"]
+    precision = "#define MCK_FLOAT32\n" if content["single"] else ""
+    about = "/* Whether numbers are float instead of double. */\n"
+    return {
+        f"src/{name}.h": _render("model.h.j2", content),
+        f"src/{name}.c": _render("model.c.j2", content),
+        "src/mck_precision.h": about + precision,
+        **{f"src/{path.name}": path.read_text(encoding="utf-8") for path in primitives},
+    }
+
+
+def described(
+    block: Block, *, name: str, sample_time: float | None, single: bool
+) -> dict[str, Any]:
+    """Return all that the templates say of a model."""
+    from mckibben import __version__
+
+    step = checked_sample_time(block, sample_time)
+    wiring = Wiring(block, step)
+    primitives = primitives_of(wiring.calls)
+    inputs, outputs = _told(block.inputs), _told(block.outputs)
+    cost, size = cost_of(wiring), 4 if single else 8
+    n_numbers = max(wiring.n_numbers, 1)
+    calls = [_call(call, index, single) for index, call in enumerate(wiring.calls)]
+    order = {id(call): told for call, told in zip(wiring.calls, calls, strict=True)}
+    constants = sum(call.part.coefficients.size for call in wiring.calls)
+    return {
+        "name": name,
+        "version": __version__,
+        "single": single,
+        "bytes": size,
+        "sample_time": step,
+        "step_words": f"{step!r} s" if step else "sample",
+        "period": round(1e6 * (step or 0.01)),
+        "inputs": inputs,
+        "outputs": outputs,
+        "constants": _constants(inputs, outputs, step),
+        "calls": calls,
+        "kinds": [call["kind"] for call in calls],
+        "steps": [order[id(item)] if isinstance(item, Call) else item for item in wiring.steps],
+        "given": wiring.outputs,
+        "n_signals": wiring.n_signals,
+        "n_numbers": n_numbers,
+        "n_states": sum(call["n_states"] for call in calls),
+        "explicit": any(call["state_rows"] for call in calls),
+        "primitives": primitives,
+        "headers": sorted({f"{call.part.source.stem}.h" for call in wiring.calls}),
+        "sources": [f"{name}.c", *(path.name for path in primitives if path.suffix == ".c")],
+        "ram": size * (n_numbers + len(outputs)) + size,
+        "flash": size * constants + 32 * len(calls),
+        "usual": cost.usual,
+        "worst": cost.worst,
+    }
+
+
+def checked_sample_time(block: Block, sample_time: float | None) -> float | None:
+    """Return the time between steps of a model; None where it has none.
+
+    Raises
+    ------
+    ModelError
+        If it is missing, not positive, or not the block's own.
+    """
+    if sample_time is not None and not 0 < sample_time < float("inf"):
+        raise ModelError(
+            f"the sample time is {sample_time}. Remedy: give a positive time in seconds."
+        )
+    if not block.rate_dependent:
+        return None
+    step = sample_time if sample_time is not None else own_time(block)
+    if step is None:
+        raise ModelError(
+            f"{block.kind!r} depends on the rate. Remedy: give the time between steps, "
+            "--sample-time SECONDS."
+        )
+    return step
+
+
+def own_time(block: Block) -> float | None:
+    """Return the sample time that a block, or a part of it, is bound to."""
+    if block.sample_time is not None:
+        return block.sample_time
+    for part in getattr(block, "parts", ()):
+        step = own_time(part)
+        if step is not None:
+            return step
+    return None
+
+
+def primitives_of(calls: list[Call]) -> list[Path]:
+    """Return the files that parts need, those that they include too, by name."""
+    wanted = [PRIMITIVES / shared for shared in SHARED]
+    wanted += [call.part.source for call in calls]
+    found: dict[str, Path] = {}
+    while wanted:
+        path = wanted.pop()
+        if path.name in found:
+            continue
+        found[path.name] = path
+        if path.suffix == ".c":
+            wanted.append(path.with_suffix(".h"))
+        elif path.with_suffix(".c").is_file():
+            wanted.append(path.with_suffix(".c"))
+        for name in re.findall(r'#include "(\w+\.h)"', path.read_text(encoding="utf-8")):
+            if name != "mck_precision.h":
+                own = path.with_name(name)
+                wanted.append(own if own.is_file() else PRIMITIVES / name)
+    return [found[name] for name in sorted(found)]
+
+
+def _call(call: Call, index: int, single: bool) -> dict[str, Any]:
+    part, block = call.part, call.part.block
+    given = ", ".join(said(channel.name) for channel in block.inputs)
+    gives = ", ".join(said(channel.name) for channel in block.outputs)
+    return {
+        "index": index,
+        "kind": block.kind,
+        "words": f"{block.kind}: {given} to {gives}",
+        "function": part.function,
+        "inputs": call.inputs,
+        "first_state": call.first_state,
+        "first_output": call.first_output,
+        "rule": part.rule,
+        "n_coefficients": part.coefficients.size,
+        "n_states": block.n_states,
+        "n_inputs": len(block.inputs),
+        "n_outputs": len(block.outputs),
+        "rows": rows(part.coefficients, single=single) or ["0"],
+        "state_rows": [] if part.state is None else rows(part.state, single=single),
+    }
+
+
+def _told(channels: tuple[Channel, ...]) -> list[dict[str, str]]:
+    return [{"name": said(channel.name), "unit": said(channel.unit) or "1"} for channel in channels]
+
+
+def _constants(
+    inputs: list[dict[str, str]], outputs: list[dict[str, str]], step: float | None
+) -> list[tuple[str, str, str]]:
+    told: list[tuple[str, str, str]] = [
+        ("N_INPUTS", str(len(inputs)), ""),
+        ("N_OUTPUTS", str(len(outputs)), ""),
+    ]
+    for way, channels in (("IN", inputs), ("OUT", outputs)):
+        endings = macros([channel["name"] for channel in channels])
+        told += [
+            (f"{way}_{ending}", str(place), channels[place]["unit"])
+            for place, ending in enumerate(endings)
+        ]
+    return [*told, ("SAMPLE_TIME", repr(step), "s")] if step else told
+
+
+def _row(values: Any, single: bool) -> str:
+    return ", ".join(literal(float(value), single=single) for value in values)
+
+
+@cache
+def _environment() -> Environment:
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
+    return Environment(
+        loader=PackageLoader("mckibben.export.c"),
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+        autoescape=False,  # C, not HTML: texts come through `said`
+    )
+
+
+def _render(template: str, content: Mapping[str, Any]) -> str:
+    return _environment().get_template(template).render(content)

@@ -1,0 +1,67 @@
+"""Names and texts from a model file made safe to stand in generated sources.
+
+A model file may come from anyone: its channel names and units are arbitrary text.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from pathlib import Path
+
+from mckibben.errors import ModelError
+
+_WORDS = """
+auto break case char const continue default do double else enum extern float for goto if inline int
+long register restrict return short signed sizeof static struct switch typedef union unsigned void
+volatile while bool true false class delete new operator private protected public template this
+throw try catch namespace using virtual friend main
+"""
+
+RESERVED = frozenset(_WORDS.split())
+"""Words of C and C++, which no model can be named by."""
+
+LONGEST = 40
+
+
+def identifier(name: str) -> str:
+    """Return a name that may prefix C functions and macros, or refuse it.
+
+    Raises
+    ------
+    ModelError
+        If it is not a letter followed by letters, digits and underscores, is a word of C or C++, or
+        starts like the package's own functions.
+    """
+    if (
+        not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", name)
+        or len(name) > LONGEST
+        or name.lower() in RESERVED
+        or name.lower().startswith("mck")
+    ):
+        raise ModelError(
+            f"{name!r:.60} cannot name C functions. Remedy: give --name a letter and then letters, "
+            f"digits or underscores, at most {LONGEST}, no word of C, and not starting with mck."
+        )
+    return name
+
+
+def name_from(path: Path) -> str:
+    """Return an identifier like a file's name: what does not fit becomes an underscore."""
+    words = re.sub(r"[^A-Za-z0-9_]+", "_", path.stem).strip("_")[:LONGEST]
+    fits = words and words[0].isalpha() and words.lower() not in RESERVED
+    return words if fits and not words.lower().startswith("mck") else f"model_{words}".rstrip("_")
+
+
+def said(text: str) -> str:
+    """Return text for a comment or a string of a source file: all but harmless characters replaced."""
+    return re.sub(r"[^A-Za-z0-9_ .,()^%/+=:-]|//|/\*|\*/", "_", text)[:80]
+
+
+def macros(names: Sequence[str]) -> list[str]:
+    """Return macro endings for channels, all different."""
+    found: list[str] = []
+    for number, name in enumerate(names, start=1):
+        ending = re.sub(r"[^A-Z0-9]+", "_", name.upper()).strip("_") or f"CHANNEL_{number}"
+        found.append(ending if ending not in found else f"{ending}_{number}")
+    return found

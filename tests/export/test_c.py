@@ -1,0 +1,254 @@
+"""Exported C gives Python's numbers, to the bit or nearly, for every block and composition."""
+
+from __future__ import annotations
+
+import shutil
+import warnings
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from mckibben import Block, Channel, ModelError, ModelWarning, Series
+from mckibben.blocks.coupling import Coupling
+from mckibben.blocks.feedforward_feedback import FeedforwardFeedback
+from mckibben.blocks.fuzzy_network import FuzzyNetwork
+from mckibben.blocks.gpi import GPI
+from mckibben.blocks.recurrent_fuzzy_network import RecurrentFuzzyNetwork
+from mckibben.blocks.trial import input_limits, wander
+from mckibben.export import export_c
+from mckibben.export.c.building import CompiledModel
+from mckibben.registry import load, names
+
+Array = NDArray[np.float64]
+
+pytestmark = pytest.mark.skipif(
+    not (shutil.which("cc") or shutil.which("gcc")), reason="there is no C compiler"
+)
+
+SAMPLE_TIME = 0.01
+DOUBLE, SINGLE = 1e-12, 1e-4
+"""Largest difference allowed, relative to the range."""
+
+STEPS = 100_000
+SLOW = {"force-balance-inverse", "fuzzy-network-inverse", "recurrent-fuzzy-network"}
+"""Solved by Newton's method, or slow in Python: fewer steps."""
+
+
+def channels(stem: str, unit: str, n: int = 3) -> tuple[Channel, ...]:
+    return tuple(Channel(f"{stem}_{k}", unit) for k in range(1, n + 1))
+
+
+def sdchm() -> Block:
+    """Return hysteresis of three muscles, coupling, and a network scheduled by an extensor."""
+    pressures, own = channels("pressure", "bar"), channels("displacement_free", "mm")
+    coupled, given = channels("displacement_coupled", "mm"), channels("displacement", "mm")
+    muscles = [
+        replace(load("blocks", kind).example(), input=pressure, output=free)
+        for kind, pressure, free in zip(("pi", "gpi", "eupi"), pressures, own, strict=True)
+    ]
+    gains = ((1.0, 0.1, 0.05), (0.08, 1.0, 0.1), (0.02, 0.12, 1.0))
+    centres, widths, n = (0.0, 20.0), (15.0, 15.0), 3
+    consequents = [
+        1.0 + 0.1 * rule / 16 if j == i else 0.05 * (i - 1)
+        for rule in range(16)
+        for j in range(n)
+        for i in range(n + 1)
+    ]
+    network = FuzzyNetwork(
+        (centres,) * n + ((0.0, 2.5),),
+        (widths,) * n + ((1.0, 1.2),),
+        tuple(consequents),
+        coupled,
+        given,
+        (Channel("pressure_extensor", "bar"),),
+        False,
+        ((-40.0, 60.0),) * n,
+    )
+    return Series((load("blocks", "per-channel")(muscles), Coupling(gains, own, coupled), network))
+
+
+def mpi_narmax() -> Block:
+    """Return a Prandtl-Ishlinskii model and a recurrent network behind it, under a load."""
+    network = RecurrentFuzzyNetwork.example()
+    return Series((replace(load("blocks", "pi").example(), output=network.driven[0]), network))
+
+
+def virgin(kind: str) -> Block:
+    return replace(load("blocks", kind).example(), initial="virgin")
+
+
+MODELS: dict[str, Block] = {
+    **{kind: load("blocks", kind).example() for kind in names("blocks")},
+    "SDCHM": sdchm(),
+    "SDIHC": sdchm().inverse(),
+    "MPI-NARMAX": mpi_narmax(),
+    "explicit start": replace(load("blocks", "pi").example(), initial=(0.1, 0.2, 0.3, 0.4)),
+    **{
+        f"virgin {kind}": virgin(kind)
+        for kind in ("pi", "gpi", "preisach", "duhem", "krasnoselskii-pokrovskii", "maxwell-slip")
+    },
+    **{
+        f"virgin {kind} inverse": virgin(kind).inverse()
+        for kind in ("pi", "gpi", "preisach", "duhem", "bouc-wen", "eupi")
+    },
+    "virgin narx": virgin("narx-network"),
+}
+
+
+def envelopes(kind: str) -> Block:
+    rising, falling = load("envelopes", kind).examples()
+    return replace(GPI.example(), rising=rising, falling=falling)
+
+
+MODELS |= {f"gpi {kind}": envelopes(kind) for kind in names("envelopes")}
+MODELS |= {f"gpi {kind} inverse": envelopes(kind).inverse() for kind in names("envelopes")}
+
+
+def path_for(block: Block, seed: int, n: int) -> Array:
+    """Return inputs with minor loops and holds over the block's range, shape (n, n_inputs)."""
+    rng = np.random.default_rng(seed)
+    pace = 200 if block.rate_dependent else 12
+    inputs = wander(*input_limits(block), rng, pace, max(n // pace, 3) + 2)
+    return np.resize(inputs, (n, inputs.shape[1]))
+
+
+def changed(block: Block, rng: np.random.Generator) -> Block:
+    """Return a block of other parameters nearby, as far as they make one."""
+    parameters = block.pack()
+    for size in (0.1, 0.03, 0.01, 0.0):
+        try:
+            return block.unpack(parameters * (1 + size * rng.uniform(-1, 1, parameters.size)))
+        except ModelError:
+            continue
+    return block
+
+
+def compiled(block: Block, folder: Path, **settings: Any) -> CompiledModel:
+    export_c(block, folder, name="muscle", sample_time=SAMPLE_TIME, **settings)
+    return CompiledModel(folder, "muscle", len(block.inputs), len(block.outputs))
+
+
+def simulated(block: Block, inputs: Array) -> Array:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ModelWarning)
+        return block.simulate(inputs, sample_time=SAMPLE_TIME)
+
+
+def difference(outputs: Array, expected: Array) -> float:
+    """Return the largest difference, relative to the range of each output."""
+    span = np.ptp(expected, axis=0) + 1e-6 * np.abs(expected).max(axis=0) + 1e-300
+    return float((np.abs(outputs - expected) / span).max())
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_double_precision_is_python(name: str, tmp_path: Path) -> None:
+    block = changed(MODELS[name], np.random.default_rng(len(name)))
+    n = 5_000 if block.kind in SLOW or "SD" in name else STEPS
+    inputs = path_for(block, 1, n)
+    outputs, statuses = compiled(block, tmp_path / "c").run(inputs)
+    assert not statuses.any()
+    assert difference(outputs, simulated(block, inputs)) <= DOUBLE
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_one_parameter_changed_is_seen(name: str, tmp_path: Path) -> None:
+    """The comparison has teeth: a hair's change of one number fails it."""
+    block = MODELS[name]
+    if block.n_parameters == 0:
+        pytest.skip("it has no parameters")
+    parameters, inputs = block.pack(), path_for(block, 1, 2000)
+    outputs, _ = compiled(block, tmp_path / "c").run(inputs)
+    seen = 0
+    for place in np.unique(np.linspace(0, parameters.size - 1, 5).astype(int)):
+        other = parameters.copy()
+        other[place] = other[place] * (1 + 1e-6) + 1e-6
+        try:
+            expected = simulated(block.unpack(other), inputs)
+        except ModelError:
+            continue
+        seen += difference(outputs, expected) > DOUBLE
+    assert seen > 0
+
+
+@pytest.mark.parametrize("name", [name for name in MODELS if name != "SDIHC"])
+def test_single_precision_is_near(name: str, tmp_path: Path) -> None:
+    block = MODELS[name]
+    inputs = path_for(block, 2, 20_000).astype(np.float32).astype(np.float64)
+    if block.kind in SLOW or "SD" in name:
+        inputs = inputs[:3000]
+    outputs, statuses = compiled(block, tmp_path / "c", single=True).run(inputs)
+    assert not statuses.any()
+    expected = simulated(block, inputs)
+    if isinstance(block, FeedforwardFeedback):
+        span = np.array(block.feedback.limits)
+        assert (np.abs(outputs - expected) <= SINGLE * np.ptp(span)).all()
+    else:
+        assert difference(outputs, expected) <= SINGLE
+
+
+def test_single_precision_inverse_gives_the_motion_wished_for(tmp_path: Path) -> None:
+    """Where envelopes leave a plateau, several pressures give one displacement: any of them will do."""
+    forward = sdchm()
+    pressures = path_for(forward, 2, 3000)
+    wanted = simulated(forward, pressures).astype(np.float32).astype(np.float64)
+    references = np.column_stack([wanted, pressures[:, 3]])
+    given, _ = compiled(forward.inverse(), tmp_path / "c", single=True).run(references)
+    assert (
+        difference(simulated(forward, np.column_stack([given, pressures[:, 3]])), wanted) <= SINGLE
+    )
+
+
+DRIFTING = (
+    "creep",
+    "gpi-inverse",
+    "maxwell-slip",
+    "multistate-friction",
+    "narx-network",
+    "pi",
+    "preisach",
+    "process-model",
+)
+
+
+@pytest.mark.parametrize("name", DRIFTING)
+def test_single_precision_does_not_drift(name: str, tmp_path: Path) -> None:
+    block = MODELS[name]
+    inputs = path_for(block, 3, 1_000_000).astype(np.float32).astype(np.float64)
+    outputs, _ = compiled(block, tmp_path / "c", single=True).run(inputs)
+    expected = simulated(block, inputs)
+    assert difference(outputs[-100_000:], expected[-100_000:]) <= SINGLE
+
+
+@pytest.mark.parametrize("name", ["pi", "gpi-inverse", "SDCHM", "process-model"])
+def test_bad_inputs_change_nothing(name: str, tmp_path: Path) -> None:
+    """NaN and infinity are skipped: memory and outputs are as if they had never come."""
+    block = MODELS[name]
+    good = path_for(block, 4, 300)
+    bad, kept = good.copy(), np.ones(len(good), dtype=bool)
+    for row, value in ((0, np.nan), (7, np.inf), (8, -np.inf), (150, np.nan)):
+        bad[row, row % good.shape[1]], kept[row] = value, False
+    outputs, statuses = compiled(block, tmp_path / "c").run(bad)
+    np.testing.assert_array_equal(statuses, np.where(kept, 0, 1))
+    assert difference(outputs[kept], simulated(block, good[kept])) <= DOUBLE
+    assert not outputs[0].any()
+    np.testing.assert_array_equal(outputs[[7, 8, 150]], outputs[[6, 6, 149]])
+
+
+def test_outputs_are_always_finite(tmp_path: Path) -> None:
+    block = load("blocks", "polynomial")((0.0, 1e200, 1e200))
+    outputs, statuses = compiled(block, tmp_path / "c").run([[1.0], [1e200], [2.0]])
+    np.testing.assert_array_equal(statuses, [0, 2, 0])
+    assert outputs[1] == outputs[0]
+
+
+def test_reset_makes_the_next_step_a_first_one(tmp_path: Path) -> None:
+    block = MODELS["SDIHC"]
+    model, inputs = compiled(block, tmp_path / "c"), path_for(block, 5, 50)
+    first, _ = model.run(inputs)
+    model.reset()
+    again, _ = model.run(inputs)
+    np.testing.assert_array_equal(first, again)

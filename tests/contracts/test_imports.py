@@ -19,7 +19,7 @@ LAYERS = (
     {"rigs"},
     {"environments"},
     {"blocks"},
-    {"estimators", "export"},
+    {"estimators", "export", "stream"},
     {"compensators", "control"},
     {"comparison"},
     {"papers"},
@@ -32,6 +32,7 @@ STANDS_ON = {
     "files": {"files", "recording", "errors", "registry", "atomic"},
     "rigs": {"rigs", "recording", "signals", "errors", "registry", "atomic"},
     "export": {"export", "blocks", "errors", "registry", "atomic"},
+    "stream": {"stream", "blocks", "errors"},
     "control": {"control", "blocks", "recording", "errors", "registry"},
     "environments": {"environments", "rigs", "recording", "signals", "errors"},
 }

@@ -88,3 +88,48 @@ def export_c(
     if told is not None:
         print(told)
     print(f"Written: {out} ({len(files)} files; start with {out / 'README.md'})")
+
+
+@app.command("fmu")
+def export_fmu(
+    model: Model,
+    out: Annotated[Path, typer.Option("-o", "--out", metavar="FILE", help="FMU to write (.fmu).")],
+    fmi: Annotated[Version, typer.Option("--fmi", help="Version of the interface.")] = Version.TWO,
+    name: Name = None,
+    sample_time: SampleTime = None,
+    inverse: Inverse = False,
+    platforms: Annotated[
+        str,
+        typer.Option(
+            "--platforms",
+            metavar="all|none|NAME,...",
+            help="linux, windows, macos, macos-arm, linux-arm; all that can be built here, or none.",
+        ),
+    ] = "all",
+    overwrite: Overwrite = False,
+    as_json: Json = False,
+) -> None:
+    """Write an FMU for co-simulation, for Simulink-like tools: C inside, libraries built here."""
+    import zipfile
+
+    from mckibben.export import export_fmu as write_fmu
+    from mckibben.export.naming import name_from
+
+    named = [word.strip() for word in platforms.split(",")]
+    write_fmu(
+        _loaded(model, inverse),
+        out,
+        name=name or name_from(model),
+        version=fmi.value,
+        sample_time=sample_time,
+        platforms=None if platforms == "all" else [] if platforms == "none" else named,
+        overwrite=overwrite,
+    )
+    with zipfile.ZipFile(out) as archive:
+        built = [path for path in archive.namelist() if path.startswith("binaries/")]
+    if as_json:
+        print_json({"file": str(out), "fmi": fmi.value, "libraries": built})
+        return
+    for path in built:
+        print(f"Library: {path}")
+    print(f"Written: {out} (FMI {fmi.value})")

@@ -3,3 +3,4 @@
 from __future__ import annotations
 
 from mckibben.export.c.project import export_c as export_c
+from mckibben.export.fmu.unit import export_fmu as export_fmu

@@ -48,8 +48,11 @@ def identifier(name: str) -> str:
 
 def name_from(path: Path) -> str:
     """Return an identifier like a file's name: what does not fit becomes an underscore."""
-    words = re.sub(r"[^A-Za-z0-9_]+", "_", path.stem).strip("_")[:LONGEST]
-    fits = words and words[0].isalpha() and words.lower() not in RESERVED
+    from mckibben.registry import names
+
+    words = re.sub(r"[^A-Za-z0-9_]+", "_", path.stem).strip("_")[: LONGEST - 6]
+    taken = RESERVED | {kind.replace("-", "_") for kind in names("blocks")}
+    fits = words and words[0].isalpha() and words.lower() not in taken
     return words if fits and not words.lower().startswith("mck") else f"model_{words}".rstrip("_")
 
 

@@ -14,12 +14,10 @@ def literal(value: float, *, single: bool = False) -> str:
     """Return a number as a C constant, exact in its precision.
 
     >>> literal(0.1), literal(0.1, single=True), literal(3.0), literal(float("inf"))
-    ('0.1', '0.1f', '3.0', 'INFINITY')
+    ('0.1', '0.1f', '3.0', 'MCK_INFINITY')
     """
     if math.isinf(value):
-        return "INFINITY" if value > 0 else "-INFINITY"
-    if math.isnan(value):
-        return "NAN"
+        return "MCK_INFINITY" if value > 0 else "-MCK_INFINITY"
     if not single:
         return repr(float(value))
     # what single precision cannot hold becomes its largest number, not infinity

@@ -16,7 +16,7 @@ from mckibben.errors import ModelError
 from mckibben.export.c.costs import cost_of
 from mckibben.export.c.literals import literal, rows
 from mckibben.export.c.parts import PRIMITIVES
-from mckibben.export.c.vectors import vectors
+from mckibben.export.c.vectors import Vectors, vectors
 from mckibben.export.c.wiring import Call, Wiring
 from mckibben.export.folders import write_folder
 from mckibben.export.naming import identifier, macros, said
@@ -80,26 +80,30 @@ def c_files(
     block: Block, *, name: str = "model", sample_time: float | None = None, single: bool = False
 ) -> dict[str, str]:
     """Return the files of `export_c`, text by path in the folder."""
-    identifier(name)
     content = described(block, name=name, sample_time=sample_time, single=single)
     tests = vectors(block, content["sample_time"], single=single)
-    content |= {
+    content |= test_content(tests, single=single)
+    return {
+        **source_files(content),
+        "CMakeLists.txt": render("CMakeLists.txt.j2", content),
+        "README.md": render("README.md.j2", content),
+        "library.properties": render("library.properties.j2", content),
+        f"examples/{name}/{name}.ino": render("sketch.ino.j2", content),
+        f"matlab/{name}_mex.c": render("mex.c.j2", content),
+        "matlab/build.m": render("build.m.j2", content),
+        f"test/{name}_selftest.c": render("selftest.c.j2", content),
+        "model.json": json.dumps(to_dict(block), indent=2, allow_nan=False) + "\n",
+    }
+
+
+def test_content(tests: Vectors, *, single: bool) -> dict[str, Any]:
+    """Return test vectors as the templates write them."""
+    return {
         "tolerance": TOLERANCES[single],
         "n_samples": len(tests.inputs),
         "input_rows": [_row(row, single) for row in tests.inputs],
         "output_rows": [_row(row, single) for row in tests.outputs],
         "ranges": _row(tests.ranges, single),
-    }
-    return {
-        **source_files(content),
-        "CMakeLists.txt": _render("CMakeLists.txt.j2", content),
-        "README.md": _render("README.md.j2", content),
-        "library.properties": _render("library.properties.j2", content),
-        f"examples/{name}/{name}.ino": _render("sketch.ino.j2", content),
-        f"matlab/{name}_mex.c": _render("mex.c.j2", content),
-        "matlab/build.m": _render("build.m.j2", content),
-        f"test/{name}_selftest.c": _render("selftest.c.j2", content),
-        "model.json": json.dumps(to_dict(block), indent=2, allow_nan=False) + "\n",
     }
 
 
@@ -109,8 +113,8 @@ def source_files(content: Mapping[str, Any]) -> dict[str, str]:
     precision = "#define MCK_FLOAT32\n" if content["single"] else ""
     about = "/* Whether numbers are float instead of double. */\n"
     return {
-        f"src/{name}.h": _render("model.h.j2", content),
-        f"src/{name}.c": _render("model.c.j2", content),
+        f"src/{name}.h": render("model.h.j2", content),
+        f"src/{name}.c": render("model.c.j2", content),
         "src/mck_precision.h": about + precision,
         **{f"src/{path.name}": path.read_text(encoding="utf-8") for path in primitives},
     }
@@ -122,9 +126,14 @@ def described(
     """Return all that the templates say of a model."""
     from mckibben import __version__
 
+    identifier(name)
     step = checked_sample_time(block, sample_time)
     wiring = Wiring(block, step)
     primitives = primitives_of(wiring.calls)
+    if name.lower() in {path.stem for path in primitives}:
+        raise ModelError(
+            f"{name!r} is what a part of the model is called. Remedy: give another --name."
+        )
     inputs, outputs = _told(block.inputs), _told(block.outputs)
     cost, size = cost_of(wiring), 4 if single else 8
     n_numbers = max(wiring.n_numbers, 1)
@@ -275,5 +284,6 @@ def _environment() -> Environment:
     )
 
 
-def _render(template: str, content: Mapping[str, Any]) -> str:
+def render(template: str, content: Mapping[str, Any]) -> str:
+    """Return a template of this folder filled in."""
     return _environment().get_template(template).render(content)

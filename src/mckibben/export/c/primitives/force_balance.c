@@ -187,7 +187,7 @@ void mck_force_balance_inverse_step(const mck_part *part, mck_real *state, const
     const model f = read_model(part, state);
     mck_real *residual = f.gradient + f.n;
     mck_real *matrix = residual + f.n;
-    mck_real before = (mck_real)INFINITY;
+    mck_real before = MCK_INFINITY;
     int solved = 0;
     for (int j = 0; j < f.n; j++) {
         f.y[j] = state[j];

@@ -10,7 +10,7 @@
 static void memberships_of(mck_real x, int sets, const mck_real *centres, const mck_real *widths,
                            mck_real *memberships)
 {
-    mck_real largest = (mck_real)-INFINITY;
+    mck_real largest = -MCK_INFINITY;
     for (int s = 0; s < sets; s++) {
         const mck_real z = (x - centres[s]) / widths[s];
         memberships[s] = MCK_R(-0.5) * z * z;
@@ -160,7 +160,7 @@ static mck_real search(const workspace *w, mck_real *state, const mck_real *in)
 {
     const int m = w->m;
     const mck_real solved = MCK_SOLVED * size_of(in, m);
-    mck_real least = (mck_real)INFINITY;
+    mck_real least = MCK_INFINITY;
     mck_real share = MCK_R(1.0);
     for (int i = 0; i < w->n; i++) {
         w->x[i] = i < m ? state[i] : in[i];
@@ -206,7 +206,7 @@ void mck_fuzzy_network_inverse_start(const mck_part *part, mck_real *state, cons
     static const mck_real shares[5] = {MCK_R(0.02), MCK_R(0.25), MCK_R(0.5), MCK_R(0.75),
                                        MCK_R(0.98)};
     const workspace w = work_in(part, state);
-    mck_real least = (mck_real)INFINITY;
+    mck_real least = MCK_INFINITY;
     for (int i = 0; i < w.m; i++) {
         w.kept[i] = MCK_R(0.5) * (w.low[i] + w.high[i]);
     }

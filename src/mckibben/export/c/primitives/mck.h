@@ -64,6 +64,8 @@ typedef double mck_real;
 #define MCK_SOLVED MCK_EITHER(1e-11, 1e-5)    /* relative: residuals below count as solved */
 #define MCK_NOTHING MCK_EITHER(1e-300, 1e-37) /* weights below do not count */
 
+#define MCK_INFINITY ((mck_real)INFINITY)
+
 /* Memory before the first sample: as if the input had only risen to it, or as if nothing had ever
  * happened. */
 #define MCK_FIRST_SAMPLE 0

@@ -1,0 +1,204 @@
+/* FMI 2.0 for co-simulation. What a unit of this kind has no use for is in fmi2_refused.c. */
+#include <stdlib.h>
+#include <string.h>
+
+#include "fmi2Functions.h"
+#include "unit.h"
+
+const char *fmi2GetTypesPlatform(void) { return fmi2TypesPlatform; }
+
+const char *fmi2GetVersion(void) { return fmi2Version; }
+
+fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean loggingOn, size_t nCategories,
+                               const fmi2String categories[])
+{
+    (void)c;
+    (void)loggingOn;
+    (void)nCategories;
+    (void)categories;
+    return fmi2OK;
+}
+
+fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2String fmuGUID,
+                              fmi2String fmuResourceLocation,
+                              const fmi2CallbackFunctions *functions, fmi2Boolean visible,
+                              fmi2Boolean loggingOn)
+{
+    (void)instanceName;
+    (void)fmuResourceLocation;
+    (void)functions;
+    (void)visible;
+    (void)loggingOn;
+    if (fmuType != fmi2CoSimulation || fmuGUID == NULL || strcmp(fmuGUID, UNIT_TOKEN) != 0) {
+        return NULL;
+    }
+    unit *self = malloc(sizeof *self);
+    if (self != NULL) {
+        unit_reset(self);
+    }
+    return self;
+}
+
+void fmi2FreeInstance(fmi2Component c) { free(c); }
+
+fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean toleranceDefined, fmi2Real tolerance,
+                               fmi2Real startTime, fmi2Boolean stopTimeDefined, fmi2Real stopTime)
+{
+    unit *self = c;
+    (void)toleranceDefined;
+    (void)tolerance;
+    (void)stopTimeDefined;
+    (void)stopTime;
+    self->start = startTime;
+    self->time = startTime;
+    return fmi2OK;
+}
+
+fmi2Status fmi2EnterInitializationMode(fmi2Component c)
+{
+    (void)c;
+    return fmi2OK;
+}
+
+fmi2Status fmi2ExitInitializationMode(fmi2Component c)
+{
+    (void)c;
+    return fmi2OK;
+}
+
+fmi2Status fmi2Terminate(fmi2Component c)
+{
+    (void)c;
+    return fmi2OK;
+}
+
+fmi2Status fmi2Reset(fmi2Component c)
+{
+    unit_reset(c);
+    return fmi2OK;
+}
+
+fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, fmi2Real value[])
+{
+    for (size_t i = 0; i < nvr; i++) {
+        if (!unit_get(c, vr[i], &value[i])) {
+            return fmi2Error;
+        }
+    }
+    return fmi2OK;
+}
+
+fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
+                       const fmi2Real value[])
+{
+    for (size_t i = 0; i < nvr; i++) {
+        if (!unit_set(c, vr[i], value[i])) {
+            return fmi2Error;
+        }
+    }
+    return fmi2OK;
+}
+
+fmi2Status fmi2GetInteger(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
+                          fmi2Integer value[])
+{
+    const unit *self = c;
+    for (size_t i = 0; i < nvr; i++) {
+        if (vr[i] != UNIT_STATUS) {
+            return fmi2Error;
+        }
+        value[i] = self->status;
+    }
+    return fmi2OK;
+}
+
+fmi2Status fmi2DoStep(fmi2Component c, fmi2Real currentCommunicationPoint,
+                      fmi2Real communicationStepSize, fmi2Boolean noSetFMUStatePriorToCurrentPoint)
+{
+    unit *self = c;
+    (void)noSetFMUStatePriorToCurrentPoint;
+    if (!unit_advance(self, currentCommunicationPoint, communicationStepSize)) {
+        return fmi2Error;
+    }
+    return self->status == 0 ? fmi2OK : fmi2Warning;
+}
+
+fmi2Status fmi2GetStatus(fmi2Component c, const fmi2StatusKind s, fmi2Status *value)
+{
+    (void)c;
+    (void)s;
+    *value = fmi2OK;
+    return fmi2OK;
+}
+
+fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind s, fmi2Real *value)
+{
+    const unit *self = c;
+    if (s != fmi2LastSuccessfulTime) {
+        return fmi2Discard;
+    }
+    *value = self->time;
+    return fmi2OK;
+}
+
+fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *FMUstate)
+{
+    if (*FMUstate == NULL) {
+        *FMUstate = malloc(sizeof(unit));
+    }
+    if (*FMUstate == NULL) {
+        return fmi2Error;
+    }
+    memcpy(*FMUstate, c, sizeof(unit));
+    return fmi2OK;
+}
+
+fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate FMUstate)
+{
+    memcpy(c, FMUstate, sizeof(unit));
+    return fmi2OK;
+}
+
+fmi2Status fmi2FreeFMUstate(fmi2Component c, fmi2FMUstate *FMUstate)
+{
+    (void)c;
+    free(*FMUstate);
+    *FMUstate = NULL;
+    return fmi2OK;
+}
+
+fmi2Status fmi2SerializedFMUstateSize(fmi2Component c, fmi2FMUstate FMUstate, size_t *size)
+{
+    (void)c;
+    (void)FMUstate;
+    *size = sizeof(unit);
+    return fmi2OK;
+}
+
+fmi2Status fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate FMUstate, fmi2Byte bytes[],
+                                 size_t size)
+{
+    (void)c;
+    if (size < sizeof(unit)) {
+        return fmi2Error;
+    }
+    memcpy(bytes, FMUstate, sizeof(unit));
+    return fmi2OK;
+}
+
+fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte bytes[], size_t size,
+                                   fmi2FMUstate *FMUstate)
+{
+    (void)c;
+    if (size != sizeof(unit)) {
+        return fmi2Error;
+    }
+    if (*FMUstate == NULL) {
+        *FMUstate = malloc(sizeof(unit));
+    }
+    if (*FMUstate == NULL) {
+        return fmi2Error;
+    }
+    memcpy(*FMUstate, bytes, sizeof(unit));
+    return fmi2OK;
+}

@@ -1,0 +1,177 @@
+"""mckibben export: folders and files, and what becomes of bad requests and hostile models."""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from mckibben.registry import load
+from tests.cli.conftest import Cli
+
+needs_compiler = pytest.mark.skipif(
+    not (shutil.which("cc") or shutil.which("gcc")), reason="there is no C compiler"
+)
+
+HOSTILE = [
+    "*/ int evil(void) { return 1; } /*",
+    '"); system("true"); ("',
+    "\\",
+    "a\nint evil;",
+    "??/",
+    "<script>alert(1)</script>",
+    "&evil;",
+    "]]>",
+    "{{ 7 * 7 }}",
+    "%s%n",
+    "// evil",
+    "ü漢字",
+    "",
+]
+
+
+def done(cli: Cli, *arguments: object) -> str:
+    """Return what a command prints that has to succeed."""
+    result = cli(*arguments)
+    assert result.code == 0, result.err
+    return result.out
+
+
+def refused(cli: Cli, *arguments: object) -> str:
+    """Return what a command prints that has to refuse bad input."""
+    result = cli(*arguments)
+    assert result.code == 2
+    return result.err
+
+
+def saved(kind: str, folder: Path) -> Path:
+    path = folder / f"{kind}.json"
+    load("blocks", kind).example().save(path)
+    return path
+
+
+@needs_compiler
+@pytest.mark.parametrize("options", [[], ["--float32"], ["--inverse"]])
+def test_a_folder_that_compiles_as_it_is(options: list[str], cli: Cli, tmp_path: Path) -> None:
+    model = saved("gpi", tmp_path)
+    result = done(cli, "export", "c", model, "-o", tmp_path / "out", "--check", "--json", *options)
+    told = json.loads(result)
+    assert told["name"] == "model_gpi"
+    assert "largest difference" in told["self_test"]
+    assert {"README.md", "CMakeLists.txt", "library.properties", "model.json"} <= set(told["files"])
+    assert (tmp_path / "out" / "examples" / "model_gpi" / "model_gpi.ino").is_file()
+
+
+def test_the_same_model_gives_the_same_bytes(cli: Cli, tmp_path: Path) -> None:
+    model = saved("series", tmp_path)
+    for folder in ("a", "b"):
+        done(cli, "export", "c", model, "-o", tmp_path / folder, "--name", "muscle")
+    for path in sorted((tmp_path / "a").rglob("*")):
+        if path.is_file():
+            other = tmp_path / "b" / path.relative_to(tmp_path / "a")
+            assert other.read_bytes() == path.read_bytes()
+
+
+def test_a_folder_in_the_way_stays_as_it_is(cli: Cli, tmp_path: Path) -> None:
+    model, folder = saved("pi", tmp_path), tmp_path / "out"
+    folder.mkdir()
+    (folder / "precious.txt").write_text("mine")
+    assert "not empty" in refused(cli, "export", "c", model, "-o", folder)
+    assert "precious.txt" in refused(cli, "export", "c", model, "-o", folder, "--overwrite")
+    assert [path.name for path in folder.iterdir()] == ["precious.txt"]
+    (folder / "precious.txt").unlink()
+    done(cli, "export", "c", model, "-o", folder, "--name", "first")
+    assert "not empty" in refused(cli, "export", "c", model, "-o", folder, "--name", "first")
+    done(cli, "export", "c", model, "-o", folder, "--name", "first", "--overwrite", "--float32")
+    assert "FLOAT32" in (folder / "src" / "mck_precision.h").read_text()
+    assert not list(tmp_path.glob(".*"))
+
+
+@pytest.mark.parametrize(
+    ("options", "told"),
+    [
+        (["--name", "int"], "cannot name C functions"),
+        (["--name", "a b"], "cannot name C functions"),
+        (["--name", "x;system()"], "cannot name C functions"),
+        (["--name", "mck_thing"], "cannot name C functions"),
+        (["--name", "é"], "cannot name C functions"),
+        (["--name", "a" * 50], "cannot name C functions"),
+        (["--name", "creep", "--sample-time", "1"], "what a part of the model is called"),
+        ([], "depends on the rate"),
+        (["--sample-time", "0"], "sample time is 0.0"),
+        (["--sample-time", "nan"], "sample time is nan"),
+    ],
+)
+def test_bad_requests_get_one_sentence(
+    options: list[str], told: str, cli: Cli, tmp_path: Path
+) -> None:
+    model = saved("creep", tmp_path)
+    error = refused(cli, "export", "c", model, "-o", tmp_path / "out", *options)
+    assert told in error
+    assert "Remedy:" in error
+    assert not (tmp_path / "out").exists()
+
+
+def test_what_is_no_model_is_refused(cli: Cli, tmp_path: Path) -> None:
+    (tmp_path / "bad.json").write_text('{"format": "mckibben-model", "version": 1, "kind": "pi"')
+    for form, out in (("c", "out"), ("fmu", "out.fmu")):
+        error = refused(cli, "export", form, tmp_path / "bad.json", "-o", tmp_path / out)
+        assert "not readable as a model" in error
+        assert not (tmp_path / out).exists()
+
+
+def hostile(text: str, folder: Path) -> Path:
+    """Return a saved model whose channels are named and measured by any text."""
+    content: dict[str, Any] = load("blocks", "per-channel").example().to_dict()
+    for part in content["parts"]:
+        part["input"]["name"] += text
+        part["input"]["unit"] = text
+        part["output"]["name"] += text
+    path = folder / "hostile.json"
+    path.write_text(json.dumps(content))
+    return path
+
+
+@needs_compiler
+@pytest.mark.parametrize("text", HOSTILE)
+def test_hostile_names_become_harmless_text(text: str, cli: Cli, tmp_path: Path) -> None:
+    """Whatever a model file calls its channels, comments stay comments and strings strings."""
+    model = hostile(text, tmp_path)
+    done(cli, "export", "c", model, "-o", tmp_path / "out", "--check", "--name", "muscle")
+    done(cli, "export", "c", hostile("", tmp_path), "-o", tmp_path / "plain", "--name", "muscle")
+    for path in (tmp_path / "out").rglob("*.[chm]"):
+        other = tmp_path / "plain" / path.relative_to(tmp_path / "out")
+        assert bare(path.read_text()) == bare(other.read_text())
+
+
+def bare(source: str) -> str:
+    """Return C or MATLAB without comments, and without the names that channels give to macros."""
+    source = re.sub(r"/\*.*?\*/", "", source, flags=re.S)
+    source = re.sub(r"#define MUSCLE_(IN|OUT)_\w+", "#define CHANNEL", source)
+    return re.sub(r"^ *%.*$", "", source, flags=re.M)
+
+
+@needs_compiler
+@pytest.mark.parametrize("text", HOSTILE)
+def test_hostile_names_make_valid_units(text: str, cli: Cli, tmp_path: Path) -> None:
+    validation = pytest.importorskip("fmpy.validation")
+    for version in ("2.0", "3.0"):
+        out = tmp_path / f"{version}.fmu"
+        options = ["--fmi", version, "--platforms", "none", "--name", "muscle"]
+        done(cli, "export", "fmu", hostile(text, tmp_path), "-o", out, *options)
+        assert validation.validate_fmu(str(out)) == []
+
+
+@needs_compiler
+def test_an_fmu_from_the_command_line(cli: Cli, tmp_path: Path) -> None:
+    out = tmp_path / "muscle.fmu"
+    options = ["--platforms", "linux", "--inverse", "--json"]
+    told = json.loads(done(cli, "export", "fmu", saved("pi", tmp_path), "-o", out, *options))
+    assert told["libraries"] == ["binaries/linux64/model_pi.so"]
+    assert "exists already" in refused(cli, "export", "fmu", saved("pi", tmp_path), "-o", out)
+    error = refused(cli, "export", "fmu", saved("pi", tmp_path), "-o", tmp_path / "x.zip")
+    assert "ends in .fmu" in error

@@ -1,0 +1,130 @@
+"""Exported C under the checkers of others: sanitizers, cppcheck, MISRA, C++, Octave."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mckibben.export import export_c
+from mckibben.export.c.parts import PRIMITIVES
+from tests.export.test_c import MODELS, SAMPLE_TIME, difference, path_for, simulated
+
+DOCS = Path(__file__).parents[2] / "docs" / "deploy"
+SHOWN = ("SDIHC", "MPI-NARMAX", "preisach-inverse", "multistate-friction", "feedforward-feedback")
+
+
+def needs(program: str) -> pytest.MarkDecorator:
+    return pytest.mark.skipif(shutil.which(program) is None, reason=f"there is no {program}")
+
+
+def run(command: Sequence[str | Path], cwd: Path) -> str:
+    found = subprocess.run(
+        [str(word) for word in command], cwd=cwd, capture_output=True, text=True, check=False
+    )
+    assert found.returncode == 0, found.stdout + found.stderr
+    return found.stdout + found.stderr
+
+
+@needs("clang")
+@pytest.mark.parametrize("single", [False, True])
+@pytest.mark.parametrize("name", MODELS)
+def test_sanitizers_find_nothing(name: str, single: bool, tmp_path: Path) -> None:
+    folder = export_c(MODELS[name], tmp_path / "c", sample_time=SAMPLE_TIME, single=single)
+    sanitizers = "-fsanitize=address,undefined,float-cast-overflow"
+    warnings = ["-Wall", "-Wextra", "-Wconversion", "-Wdouble-promotion", "-Werror", "-pedantic"]
+    sources = [*sorted((folder / "src").glob("*.c")), folder / "test" / "model_selftest.c"]
+    command = ["clang", "-std=c99", "-O1", "-ffp-contract=off", *warnings, sanitizers]
+    command += ["-fno-sanitize-recover=all", "-Isrc"]
+    run([*command, *sources, "-lm", "-o", "selftest"], folder)
+    run([folder / "selftest"], folder)
+
+
+@needs("cppcheck")
+def test_cppcheck_finds_nothing(tmp_path: Path) -> None:
+    (tmp_path / "mck_precision.h").write_text("")
+    command = ["cppcheck", "--std=c99", "--enable=warning,style,performance,portability", "-q"]
+    command += ["--error-exitcode=2", "--suppress=missingIncludeSystem", f"-I{tmp_path}"]
+    run([*command, *sorted(PRIMITIVES.glob("*.c"))], PRIMITIVES)
+
+
+@needs("cppcheck")
+def test_misra_findings_are_those_that_are_justified(tmp_path: Path) -> None:
+    (tmp_path / "mck_precision.h").write_text("")
+    command = ["cppcheck", "--std=c99", "--addon=misra", "-q", f"-I{tmp_path}"]
+    told = run([*command, *sorted(PRIMITIVES.glob("*.c"))], PRIMITIVES)
+    found = set(re.findall(r"misra-c2012-([\d.]+)", told))
+    page = (DOCS / "misra.md").read_text(encoding="utf-8")
+    listed = {
+        rule
+        for row in re.findall(r"^\| ([\d., ]+) \|", page, flags=re.M)
+        for rule in row.split(", ")
+    }
+    assert found, "the add-on did not run"
+    assert found == listed
+
+
+@needs("g++")
+@pytest.mark.parametrize("name", SHOWN)
+def test_cplusplus_can_include_and_link_it(name: str, tmp_path: Path) -> None:
+    block = MODELS[name]
+    folder = export_c(block, tmp_path / "c", name="muscle", sample_time=SAMPLE_TIME)
+    main = folder / "main.cpp"
+    n_in, n_out = len(block.inputs), len(block.outputs)
+    main.write_text(
+        '#include "muscle.h"\n'
+        f"int main() {{ muscle_model m; mck_real in[{n_in}] = {{}}, out[{n_out}];\n"
+        "muscle_init(&m); return muscle_step(&m, in, out); }\n"
+    )
+    for source in sorted((folder / "src").glob("*.c")):
+        run(["gcc", "-std=c99", "-c", source, "-o", source.with_suffix(".o")], folder)
+    objects = sorted((folder / "src").glob("*.o"))
+    run(["g++", "-Wall", "-Werror", "-Isrc", main, *objects, "-o", "main"], folder)
+    run([folder / "main"], folder)
+
+
+@needs("gcc")
+def test_only_mathematics_is_asked_of_the_library(tmp_path: Path) -> None:
+    allowed = {"atan", "atanh", "exp", "expm1", "log", "log1p", "sqrt", "tan", "tanh"}
+    for index, block in enumerate(MODELS.values()):
+        folder = export_c(block, tmp_path / f"c{index}", sample_time=SAMPLE_TIME)
+        objects = []
+        for source in sorted((folder / "src").glob("*.c")):
+            objects.append(source.with_suffix(".o"))
+            command = ["gcc", "-std=c99", "-O2", "-fno-stack-protector", "-fno-pie", "-c"]
+            run([*command, source, "-o", objects[-1]], folder)
+        undefined = set(re.findall(r" U (\w+)", run(["nm", "-u", *objects], folder)))
+        foreign = {name for name in undefined if not name.startswith(("mck_", "model_", "_GLOBAL"))}
+        assert foreign <= allowed | {"memset", "memcpy", "memmove"}, "which compilers add"
+        writable = run(["nm", *objects], folder)
+        assert not re.findall(r" [bBdD] ", writable), "nothing is kept outside the struct"
+
+
+@needs("mkoctfile")
+def test_octave_gives_pythons_numbers(tmp_path: Path) -> None:
+    block = MODELS["SDIHC"]
+    folder = export_c(block, tmp_path / "c", name="muscle", sample_time=SAMPLE_TIME)
+    inputs = path_for(block, 1, 200)
+    expected = simulated(block, inputs)
+    inputs.astype("<f8").tofile(folder / "u.bin")
+    script = f"""
+        run(fullfile('matlab', 'build.m')); addpath('matlab');
+        f = fopen('u.bin'); u = fread(f, [{len(block.inputs)} Inf], 'double')'; fclose(f);
+        [y, status] = muscle_mex(u);
+        muscle_mex('reset');
+        z = [muscle_mex('step', u(1:50, :)); muscle_mex('step', u(51:end, :))];
+        f = fopen('y.bin', 'w'); fwrite(f, [y status z]', 'double'); fclose(f);
+        try muscle_mex(u(:, 1)); fprintf('taken'); catch e; fprintf('%s', e.message); end
+    """
+    told = run(["octave-cli", "--no-gui", "--norc", "--eval", script], folder)
+    assert "give a real double matrix of 4 column" in told
+    table = np.fromfile(folder / "y.bin").reshape(len(inputs), -1)
+    n = len(block.outputs)
+    assert difference(table[:, :n], expected) <= 1e-12
+    assert not table[:, n].any()
+    np.testing.assert_array_equal(table[:, n + 1 :], table[:, :n])

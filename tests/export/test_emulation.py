@@ -1,0 +1,49 @@
+"""Every block runs on an emulated microcontroller and gives Python's numbers."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from mckibben import ModelError
+from mckibben.export.c import emulation
+from mckibben.export.c.emulation import emulate, missing_tools
+from tests.export.test_c import MODELS, SAMPLE_TIME, SINGLE
+
+emulated = pytest.mark.skipif(
+    bool(missing_tools()), reason=f"not on this machine: {', '.join(missing_tools())}"
+)
+
+
+@emulated
+@pytest.mark.parametrize("name", [name for name in MODELS if name != "SDIHC"])
+def test_a_cortex_m4f_gives_pythons_numbers(name: str) -> None:
+    found = emulate(MODELS[name], sample_time=SAMPLE_TIME)
+    assert found.difference <= SINGLE
+    assert found.instructions.min() > 0
+    assert 0 < found.ram < 32 * 1024
+    assert 0 < found.stack < 32 * 1024
+    assert found.flash > 0
+
+
+@emulated
+def test_a_parameter_changed_is_seen() -> None:
+    block = MODELS["gpi-inverse"]
+    parameters = block.pack()
+    parameters[0] *= 1.01
+    other = emulate(block.unpack(parameters), sample_time=SAMPLE_TIME)
+    own = emulate(block, sample_time=SAMPLE_TIME)
+    difference = np.abs(other.outputs - own.expected.outputs[: len(other.outputs)])
+    assert (difference / own.expected.ranges).max() > SINGLE
+
+
+@emulated
+def test_instructions_are_repeatable() -> None:
+    first, again = (emulate(MODELS["pi"]).instructions for _ in range(2))
+    np.testing.assert_array_equal(first, again)
+
+
+def test_missing_tools_are_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(emulation, "EMULATOR", "qemu-system-absent")
+    with pytest.raises(ModelError, match=r"qemu-system-absent.*Remedy: install"):
+        emulate(MODELS["pi"])

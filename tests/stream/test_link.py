@@ -1,0 +1,88 @@
+"""The link gives the newest good packet, and drops all else."""
+
+from __future__ import annotations
+
+import socket
+import struct
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from mckibben import DataError
+from mckibben.stream import UDPLink
+from mckibben.stream.link import packed, unpacked
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+
+
+@given(st.integers(0, 2**32 - 1), st.lists(st.floats(width=64), max_size=128))
+def test_packets_keep_every_bit(sequence: int, values: list[float]) -> None:
+    content = unpacked(packed(sequence, values))
+    assert content is not None
+    assert content[0] == sequence
+    assert content[1].tobytes() == np.array(values, dtype=float).tobytes()
+
+
+@given(st.binary(max_size=200))
+def test_noise_is_no_packet(noise: bytes) -> None:
+    assert unpacked(noise) is None
+
+
+@given(st.data())
+def test_a_flipped_bit_is_seen(data: st.DataObject) -> None:
+    packet = bytearray(packed(7, [1.0, -2.0]))
+    place = data.draw(st.integers(0, 8 * len(packet) - 1))
+    packet[place // 8] ^= 1 << place % 8
+    assert unpacked(bytes(packet)) is None
+
+
+def test_both_ways_and_the_newest_wins() -> None:
+    with UDPLink(size=2) as one, UDPLink(one.address, size=1) as other:
+        for k in range(5):
+            other.send([float(k), 0.5])
+        np.testing.assert_array_equal(one.newest(timeout=2.0), [4.0, 0.5])
+        assert one.newest() is None
+        one.send([9.0])
+        np.testing.assert_array_equal(other.newest(timeout=2.0), [9.0])
+
+
+def test_late_repeated_and_foreign_packets_are_dropped() -> None:
+    with UDPLink(size=1) as link, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
+        wrong_size, old = packed(11, [1.0, 2.0]), packed(9, [3.0])
+        for packet in (packed(10, [5.0]), packed(10, [6.0]), old, wrong_size, b"hello"):
+            sender.sendto(packet, link.address)
+        np.testing.assert_array_equal(link.newest(timeout=2.0), [5.0])
+        link.newest(timeout=0.2)
+        assert link.dropped == 4
+
+
+def test_sequence_numbers_wrap_around() -> None:
+    with UDPLink(size=1) as link, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
+        sender.sendto(packed(2**32 - 1, [1.0]), link.address)
+        np.testing.assert_array_equal(link.newest(timeout=2.0), [1.0])
+        sender.sendto(packed(3, [2.0]), link.address)
+        np.testing.assert_array_equal(link.newest(timeout=2.0), [2.0])
+
+
+def test_a_count_that_lies_is_no_packet() -> None:
+    packet = bytearray(packed(1, [1.0]))
+    struct.pack_into("<I", packet, 8, 2**31)
+    assert unpacked(bytes(packet)) is None
+
+
+def test_bad_settings_name_a_remedy() -> None:
+    with pytest.raises(DataError, match="give 1 to 128"):
+        UDPLink(size=0)
+    with UDPLink(size=1) as link, pytest.raises(DataError, match="cannot be listened on"):
+        UDPLink(bind=link.address, size=1)
+
+
+def test_a_controller_follows_a_robot_in_another_process() -> None:
+    command = [sys.executable, str(EXAMPLES / "robot_loop.py"), "--duration", "6"]
+    said = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    assert float(said.split("within ")[1].split(" mm")[0]) < 1.0

@@ -24,6 +24,7 @@ LAYERS = (
     {"comparison"},
     {"papers"},
     {"report"},
+    {"app"},
     {"cli"},
 )
 """Lowest first."""

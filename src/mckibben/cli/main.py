@@ -13,6 +13,7 @@ from typing import Annotated
 import typer
 
 from mckibben import __version__
+from mckibben.cli.app import app as workbench
 from mckibben.cli.characterize import characterize
 from mckibben.cli.compare import compare
 from mckibben.cli.export import app as export_app
@@ -42,6 +43,7 @@ app = typer.Typer(
 )
 for command in (study, characterize, fit, compare, simulate, invert, track, plot, reproduce, info):
     app.command()(command)
+app.command("app")(workbench)
 app.add_typer(export_app)
 app.add_typer(rig_app)
 

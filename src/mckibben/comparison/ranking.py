@@ -19,6 +19,7 @@ from mckibben.comparison.memory_test import memory_test
 from mckibben.comparison.results import Leaderboard, Row
 from mckibben.comparison.splits import Fold, Mask, Split, folds, given_split, held_out_tail
 from mckibben.errors import MckibbenError, ModelError
+from mckibben.estimators.search import Progress
 from mckibben.metrics import score
 from mckibben.recording import Recording
 
@@ -58,6 +59,7 @@ def compare(
     seed: int = 0,
     jobs: int | None = None,
     progress: Callable[[str, float], None] | None = None,
+    watch: Callable[[str, float, float], None] | None = None,
 ) -> Leaderboard:
     """Fit and rank models on the same data with the same seeds.
 
@@ -87,6 +89,9 @@ def compare(
         joblib backend chosen outside, such as Dask's or Ray's, is used, for as many models at once.
     progress : callable, optional
         Told the model just finished and the share of all that are.
+    watch : callable, optional
+        Told, while a model is fitted to all of the training set, its name, the share of the search that
+        is done, and the least cost so far; only where models are fitted in this process (``jobs=1``).
 
     Returns
     -------
@@ -130,7 +135,7 @@ def compare(
         for model in chosen
     ]
     n_train = sum(len(recording) for recording in split.train)
-    tried = _run_tasks(tasks, jobs or _default_jobs(n_train), progress)
+    tried = _run_tasks(tasks, jobs or _default_jobs(n_train), progress, watch)
     lengths = [int(rows.sum()) for rows in split.test_rows]
     described = split.described + (f", {len(parts)}-fold cross-validation" if parts else "")
     return Leaderboard(
@@ -174,7 +179,10 @@ def _default_jobs(n_train: int) -> int:
 
 
 def _run_tasks(
-    tasks: Sequence[Task], jobs: int, progress: Callable[[str, float], None] | None
+    tasks: Sequence[Task],
+    jobs: int,
+    progress: Callable[[str, float], None] | None,
+    watch: Callable[[str, float, float], None] | None,
 ) -> list[tuple[Row, Array | None]]:
     from joblib import Parallel, delayed
     from joblib.parallel import get_active_backend
@@ -188,7 +196,9 @@ def _run_tasks(
             return_as="generator_unordered" if one_by_one else "list",
             max_nbytes=None,
         )
-        for index, result in pool(delayed(_try_numbered)(i, task) for i, task in enumerate(tasks)):
+        seen = watch if workers == 1 and one_by_one else None
+        calls = (delayed(_try_numbered)(i, task, seen) for i, task in enumerate(tasks))
+        for index, result in pool(calls):
             results[index] = result
             if progress is not None:
                 progress(tasks[index].model, len(results) / len(tasks))
@@ -201,26 +211,38 @@ def _run_tasks(
     ]
 
 
-def _try_numbered(index: int, task: Task) -> tuple[int, tuple[Row, Array | None]]:
-    return index, try_model(task)
+Watch = Callable[[str, float, float], None]
 
 
-def try_model(task: Task) -> tuple[Row, Array | None]:
+def _try_numbered(
+    index: int, task: Task, watch: Watch | None
+) -> tuple[int, tuple[Row, Array | None]]:
+    return index, try_model(task, watch)
+
+
+def try_model(task: Task, watch: Watch | None = None) -> tuple[Row, Array | None]:
     """Fit, cross-validate and test one model; return its row, and its errors on the test set."""
     try:
-        return _try_model(task)
+        return _try_model(task, watch)
     except MckibbenError as error:
         return Row(task.model, reason=str(error)), None
     except Exception as error:  # one model must not take the comparison down, whatever it does
         return Row(task.model, reason=f"{type(error).__name__}: {error}"), None
 
 
-def _try_model(task: Task) -> tuple[Row, Array | None]:
+def _try_model(task: Task, watch: Watch | None) -> tuple[Row, Array | None]:
     estimator_class = registry.load("estimators", task.model)
     names = {"input": task.input, "output": task.output}
 
-    def fitted(recordings: Sequence[Recording], rows: Sequence[Mask] | None) -> Any:
-        return estimator_class(**(names | dict(task.settings))).fit(recordings, rows=rows)
+    def fitted(
+        recordings: Sequence[Recording], rows: Sequence[Mask] | None, tell: Progress | None = None
+    ) -> Any:
+        estimator = estimator_class(**(names | dict(task.settings)))
+        return estimator.fit(recordings, rows=rows, progress=tell)
+
+    def seen(share: float, cost: float) -> None:
+        if watch is not None:
+            watch(task.model, share, cost)
 
     # The folds come first: they load the compiled kernels, which the timed fit then finds ready.
     try:
@@ -229,7 +251,7 @@ def _try_model(task: Task) -> tuple[Row, Array | None]:
         validation, unvalidated = None, str(error)
     split = task.split
     started = time.perf_counter()
-    estimator = fitted(split.train, None)
+    estimator = fitted(split.train, None, None if watch is None else seen)
     seconds = time.perf_counter() - started
     block: Block = estimator.model_
     on_train = [run_free(block, recording, task.output) for recording in split.train]

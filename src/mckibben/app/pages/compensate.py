@@ -1,0 +1,339 @@
+"""Compensate: a wished-for motion, what can be reached, the pressures, and a closed loop on a rig."""
+
+from __future__ import annotations
+
+import asyncio
+
+import numpy as np
+from nicegui import ui
+from nicegui.events import MouseEventArguments, UploadEventArguments
+
+from mckibben.app import plots
+from mckibben.app.desk import Desk, guarded, named, on_event, tell
+from mckibben.app.work import compensated, reference_recording
+from mckibben.errors import DataError, MckibbenError
+from mckibben.files import read, write
+from mckibben.recording import Recording
+
+CONTROLLERS = {
+    "feedforward": "compensator alone",
+    "feedforward-pid": "compensator and PID",
+    "observer": "compensator and disturbance observer",
+    "pid": "PID alone",
+}
+
+WIDTH, HEIGHT = 600, 220
+"""Of the place to draw in [px]."""
+
+
+def build(desk: Desk) -> None:
+    """Build the page."""
+    selects: list[ui.select] = []
+
+    def found() -> list[str]:
+        return [name for name in desk.workspace.models() if _invertible(desk, name)]
+
+    @ui.refreshable
+    def shown() -> None:
+        names = found()
+        if not names:
+            ui.label(
+                "Fit a model that can be inverted first, under Models: pi, gpi, mpi, cpi, preisach."
+            )
+            return
+        with ui.row().classes("w-full items-end gap-3"):
+            model = named(
+                ui.select(names, value=names[0], label="Model to invert").classes("min-w-52"),
+                "invert",
+            )
+            step = ui.number("Time between steps [s]", value=0.02, min=1e-4, max=10.0).classes(
+                "w-44"
+            )
+        selects[:] = [model]
+        Editor(desk, model, step)
+
+    def more() -> None:
+        # what is being drawn must not vanish because a fit has ended
+        if selects:
+            selects[0].set_options(found())
+        else:
+            shown.refresh()
+
+    desk.when("results", more)
+    shown()
+
+
+def _invertible(desk: Desk, name: str) -> bool:
+    try:
+        block = desk.workspace.model(name)
+        block.inverse()
+    except MckibbenError:
+        return False
+    return len(block.inputs) == len(block.outputs) == 1 and not block.kind.endswith("-inverse")
+
+
+def _reach(desk: Desk, model: str) -> tuple[float, float]:
+    low, high = desk.workspace.model(model).reachable()
+    if not (np.isfinite(low[0]) and np.isfinite(high[0])):
+        seen = [r[desk.output] for r in desk.workspace.with_role("train")] or [np.array([0.0, 1.0])]
+        return min(float(y.min()) for y in seen), max(float(y.max()) for y in seen)
+    return float(low[0]), float(high[0])
+
+
+class Editor:
+    """A reference, drawn by clicks, written as points, or loaded; and what comes of it.
+
+    Parameters
+    ----------
+    desk : Desk
+    model, step : element
+        Whose values are the model to invert and the time between steps [s].
+    """
+
+    def __init__(self, desk: Desk, model: ui.select, step: ui.number) -> None:
+        self.desk, self.model, self.step = desk, model, step
+        self.low, self.high = _reach(desk, str(model.value))
+        self.file: Recording | None = None
+        with ui.row().classes("w-full items-start gap-4"):
+            with ui.column().classes("min-w-80 flex-1"):
+                self._inputs()
+            self.results = ui.column().classes("min-w-96 flex-[2]")
+        model.on_value_change(self._other_model)
+
+    def _inputs(self) -> None:
+        ui.label("Reference").classes("text-lg")
+        ui.label("Click in the frame from left to right, write points, or load a file.")
+        self.duration = ui.number("Duration [s]", value=20.0, min=0.1).classes("w-32")
+        self.frame = named(
+            ui.interactive_image(size=(WIDTH, HEIGHT), cross=True, on_mouse=self._clicked)
+            .classes("w-full border")
+            .style(f"aspect-ratio: {WIDTH} / {HEIGHT}"),
+            "draw",
+        )
+        self.text = named(
+            ui.textarea("Points: time [s] and displacement [mm], one pair a line").classes(
+                "w-full"
+            ),
+            "points",
+        )
+        self.text.on_value_change(self._drawn)
+        with ui.row():
+            ui.button("Clear", on_click=lambda: self.text.set_value("")).props("outline")
+            named(ui.button("A wave", on_click=self._wave).props("outline"), "wave")
+            named(ui.button("Show pressures", on_click=guarded(self._show)), "show-pressures")
+        ui.upload(
+            label="or a file with displacement over time",
+            auto_upload=True,
+            on_upload=on_event(self._loaded),
+        ).classes("w-full")
+
+    @property
+    def _seconds(self) -> float:
+        return float(self.duration.value or 20.0)
+
+    def _other_model(self) -> None:
+        self.low, self.high = _reach(self.desk, str(self.model.value))
+        self.results.clear()
+        self._drawn()
+
+    def _wave(self) -> None:
+        a, b = (self.low + share * (self.high - self.low) for share in (0.2, 0.8))
+        times = np.linspace(0.0, self._seconds, 41)
+        values = 0.5 * (a + b) - 0.5 * (b - a) * np.cos(4 * np.pi * times / times[-1])
+        pairs = zip(times, values, strict=True)
+        self.text.set_value("\n".join(f"{time:.6g} {value:.6g}" for time, value in pairs))
+
+    def _clicked(self, event: MouseEventArguments) -> None:
+        time = self._seconds * event.image_x / WIDTH
+        value = self.high - (self.high - self.low) * event.image_y / HEIGHT
+        self.text.set_value(f"{self.text.value or ''}\n{time:.4g} {value:.4g}".strip())
+
+    def _drawn(self) -> None:
+        """Draw the points into the frame; lines that are none yet are passed over."""
+        self.file = None
+        try:
+            points = _points(self.text.value or "")
+        except DataError:
+            points = []
+        places = [
+            (WIDTH * t / self._seconds, HEIGHT * (self.high - v) / (self.high - self.low))
+            for t, v in points
+        ]
+        line = " ".join(f"{x:.1f},{y:.1f}" for x, y in places)
+        dots = "".join(
+            f'<circle cx="{x:.1f}" cy="{y:.1f}" r="3" fill="#0072b2" />' for x, y in places[:200]
+        )
+        self.frame.set_content(
+            f'<polyline points="{line}" fill="none" stroke="#0072b2" stroke-width="2" />{dots}'
+        )
+
+    async def _loaded(self, event: UploadEventArguments) -> None:
+        path = self.desk.workspace.keep_upload(event.file.name, await event.file.read())
+        (recording,) = await asyncio.to_thread(lambda: read(path, informative=False))
+        self.file = recording
+        await self._show()
+
+    def _wished(self) -> Recording:
+        channel = self.desk.workspace.model(str(self.model.value)).outputs[0].name
+        if self.file is not None:
+            return self.file.select([channel])
+        step = float(self.step.value or 0.02)
+        return reference_recording(_points(self.text.value or ""), step, channel)
+
+    async def _show(self) -> None:
+        desk, reference, name = self.desk, self._wished(), str(self.model.value)
+        given, notes = await asyncio.to_thread(compensated, desk.workspace, name, reference)
+        file = f"{desk.workspace.new_name('runs', 'reference')}.csv"
+        write(reference, desk.workspace.path("runs", file))
+        call = f"mckibben.load('models/{name}.json').inverse().simulate(reference)"
+        desk.did(f"inverted {name}", call)
+        self.results.clear()
+        with self.results:
+            _pressures(desk, name, reference, given, notes)
+            _loops(desk, name, file)
+
+
+def _points(text: str) -> list[tuple[float, float]]:
+    """Return pairs of numbers, one a line.
+
+    Raises
+    ------
+    DataError
+        On a line that is not two numbers.
+    """
+    points = []
+    for row, line in enumerate(filter(None, (part.strip() for part in text.splitlines())), start=1):
+        words = line.replace(",", " ").replace(";", " ").split()
+        try:
+            time, value = map(float, words)
+        except ValueError:
+            raise DataError(
+                f"{line!r:.40} is not a time and a displacement",
+                row=row,
+                remedy="write two numbers a line",
+            ) from None
+        points.append((time, value))
+    return points
+
+
+def _pressures(
+    desk: Desk, name: str, reference: Recording, given: Recording, notes: list[str]
+) -> None:
+    block = desk.workspace.model(name)
+    wanted, pressure = block.outputs[0], block.inputs[0]
+    ui.label("Shaded: what can be reached whatever happened before").classes("text-xs opacity-70")
+    named(
+        ui.plotly(
+            plots.lines(
+                [("reference", reference.time, reference[wanted.name], "series-1")],
+                x="time [s]",
+                y=f"{wanted.name} [{wanted.unit}]",
+                dark=desk.dark,
+                bands=(_reach(desk, name),),
+            )
+        ).classes("w-full"),
+        "reference-plot",
+    )
+    named(
+        ui.plotly(
+            plots.lines(
+                [(pressure.name, given.time, given[pressure.name], "series-2")],
+                x="time [s]",
+                y=f"{pressure.name} [{pressure.unit}]",
+                dark=desk.dark,
+            )
+        ).classes("w-full"),
+        "pressure-plot",
+    )
+    for note in notes:
+        ui.label(note).classes("text-warning")
+    content = "time_s,pressure_bar\n" + "\n".join(
+        f"{t:.9g},{p:.9g}" for t, p in zip(given.time, given[pressure.name], strict=True)
+    )
+    ui.button(
+        "Pressures as CSV", on_click=lambda: ui.download(content.encode(), f"{name}-pressures.csv")
+    ).props("outline")
+
+
+def _loops(desk: Desk, model: str, reference: str) -> None:
+    from mckibben.rigs import load_rig, rig_names
+
+    rigs = [
+        name
+        for name in rig_names()
+        if {"pressure"} == {c for c in load_rig(name).inputs if c.startswith("pressure")}
+        and "displacement" in load_rig(name).outputs
+    ]
+    ui.label("Closed loop on a virtual rig").classes("text-lg")
+    with ui.row().classes("items-end"):
+        rig = named(ui.select(rigs, value=rigs[0], label="Rig").classes("min-w-48"), "loop-rig")
+        kinds = named(
+            ui.select(
+                CONTROLLERS,
+                value=["feedforward", "feedforward-pid"],
+                multiple=True,
+                label="Controllers",
+            ).classes("min-w-64"),
+            "controllers",
+        )
+
+        def start() -> None:
+            if not rig.value or not kinds.value:
+                tell("Choose a rig and a controller.")
+            for kind in kinds.value:
+                name = desk.workspace.new_name("runs", f"{model}-{kind}")
+                call = f"track({kind} of {model!r}, load_rig({rig.value!r}), reference)"
+                desk.jobs.submit(
+                    "loop",
+                    {"model": model, "controller": kind, "rig": rig.value, "reference": reference}
+                    | {"name": name, "call": call, "title": name},
+                )
+                desk.did(f"closed the loop: {name}", call)
+            desk.changed("jobs")
+
+        named(ui.button("Run", on_click=start), "run-loop")
+
+    @ui.refreshable
+    def shown() -> None:
+        names = [
+            name
+            for name in desk.workspace.names("runs")
+            if (desk.workspace.read_json("runs", name) or {}).get("model") == model
+        ]
+        rows = []
+        for name in names:
+            found = desk.workspace.read_json("runs", name) or {}
+            rms = ", ".join(f"{value:.3g}" for value in found.get("rmse", {}).values())
+            worst = ", ".join(f"{value:.3g}" for value in found.get("largest", {}).values())
+            rows.append(
+                {"name": name, "controller": found.get("controller"), "rig": found.get("rig")}
+                | {"rmse": rms, "largest": worst, "clipped": found.get("clipped")}
+                | {"step": f"{found.get('step_us', float('nan')):.0f}"}
+            )
+        if not rows:
+            return
+        labels = ("Run", "Controller", "Rig", "RMSE [mm]", "Largest [mm]", "Clipped", "Step [µs]")
+        columns = [
+            {"name": key, "field": key, "label": label, "align": "left"}
+            for key, label in zip(rows[0], labels, strict=True)
+        ]
+        named(ui.table(rows=rows, columns=columns, row_key="name").props("dense flat"), "runs")
+        curves: list[tuple[str, plots.Array, plots.Array, str]] = []
+        for place, name in enumerate(names[-4:]):
+            try:
+                (run_,) = read(desk.workspace.path("runs", f"{name}.csv"), informative=False)
+            except MckibbenError:
+                continue
+            if not curves:
+                curves.append(("reference", run_.time, run_["reference_displacement"], "measured"))
+            curves.append((name, run_.time, run_["displacement"], f"series-{place + 1}"))
+        if curves:
+            named(
+                ui.plotly(
+                    plots.lines(curves, x="time [s]", y="displacement [mm]", dark=desk.dark)
+                ).classes("w-full"),
+                "loop-runs",
+            )
+
+    desk.when("runs", shown.refresh)
+    shown()

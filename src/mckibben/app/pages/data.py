@@ -1,0 +1,378 @@
+"""Data: files and virtual rigs in, problems explained, roles, and cutting by dragging."""
+
+from __future__ import annotations
+
+import asyncio
+from typing import Any
+
+from nicegui import ui
+from nicegui.events import UploadEventArguments
+
+from mckibben import registry
+from mckibben.app import plots, scripts
+from mckibben.app.desk import Desk, guarded, named, on_event, tell
+from mckibben.app.workspace import LARGEST_UPLOAD
+from mckibben.errors import DataError, MckibbenError
+from mckibben.files import formats, read
+from mckibben.files.table import Column
+from mckibben.recording import Recording
+from mckibben.report import subjects
+
+EXAMPLE = "field-models"
+"""Protocol whose runs are the example."""
+
+MAPPED = ("time", "pressure", "displacement", "length", "force", "voltage")
+"""Channels that columns can be mapped to by hand."""
+
+
+def build(desk: Desk) -> None:
+    """Build the page."""
+    with ui.row().classes("w-full gap-4 items-start"):
+        with ui.column().classes("min-w-64 flex-1"):
+            _sources(desk)
+        with ui.column().classes("min-w-80 flex-[2]"):
+            _list(desk)
+    _preview(desk)
+
+
+def _sources(desk: Desk) -> None:
+    ui.label("Add recordings").classes("text-lg")
+    named(
+        ui.upload(
+            label="Drop files here: CSV, TSV, Parquet, MAT, HDF5, TDMS",
+            multiple=True,
+            auto_upload=True,
+            max_file_size=LARGEST_UPLOAD,
+            on_upload=on_event(lambda event: _uploaded(desk, event)),
+            on_rejected=lambda: tell(f"A file has more than {LARGEST_UPLOAD // 2**20} MiB."),
+        ).classes("w-full"),
+        "upload",
+    )
+    with ui.row().classes("items-center"):
+        named(ui.button("Open the example", on_click=lambda: _example(desk)), "example")
+        named(ui.button("From a virtual rig", on_click=lambda: _rig(desk)).props("outline"), "rig")
+
+
+def _example(desk: Desk) -> None:
+    from mckibben.signals.protocols import protocol
+
+    runs = [run.name for run in protocol(EXAMPLE).runs]
+    _record(desk, EXAMPLE, runs)
+
+
+def _record(desk: Desk, protocol: str, runs: list[str]) -> None:
+    call = f"mckibben.rigs.record(protocol({protocol!r}), load_rig(...), runs={runs!r}, seed=0)"
+    desk.jobs.submit(
+        "record",
+        {
+            "protocol": protocol,
+            "runs": runs,
+            "seed": 0,
+            "call": call,
+            "title": f"record {protocol}",
+        },
+    )
+    desk.changed("jobs")
+    ui.notify("Recording in the background.")
+
+
+def _rig(desk: Desk) -> None:
+    from mckibben.signals.protocols import protocol
+
+    with ui.dialog() as dialog, ui.card().classes("w-96"):
+        ui.label("Runs of a paper's protocol, on its virtual rig").classes("text-lg")
+        names = list(registry.names("protocols"))
+        chosen = named(
+            ui.select(names, value=EXAMPLE, label="Protocol").classes("w-full"), "protocol"
+        )
+        runs = named(
+            ui.select([], multiple=True, label="Runs").classes("w-full").props("use-chips"), "runs"
+        )
+
+        def listed() -> None:
+            found = [run.name for run in protocol(str(chosen.value)).runs]
+            runs.set_options(found, value=found[: min(2, len(found))])
+
+        chosen.on_value_change(listed)
+        listed()
+
+        def record() -> None:
+            if runs.value:
+                _record(desk, str(chosen.value), list(runs.value))
+                dialog.close()
+
+        with ui.row():
+            named(ui.button("Record", on_click=record), "record")
+            ui.button("Close", on_click=dialog.close).props("flat")
+    dialog.open()
+
+
+async def _uploaded(desk: Desk, event: UploadEventArguments) -> None:
+    content = await event.file.read()
+    path = desk.workspace.keep_upload(event.file.name, content)
+    await _take(desk, path.name, event.file.name, {})
+
+
+async def _take(desk: Desk, kept: str, shown: str, options: dict[str, Any]) -> bool:
+    """Read an uploaded file and add its recordings; where that fails, ask how it is to be read."""
+    path = desk.workspace.path("uploads", kept)
+    try:
+        recordings = await asyncio.to_thread(lambda: read(path, informative=False, **options))
+    except MckibbenError as error:
+        await _ask(desk, kept, shown, options, error)
+        return False
+    call = scripts.read_call(str(path), options)
+    for recording in recordings:
+        desk.workspace.add(recording, origin=f"file {shown}", call=call)
+    desk.settle_channels()
+    desk.did(f"read {shown}", call)
+    desk.changed("recordings")
+    ui.notify(f"{shown}: {len(recordings)} recording(s)")
+    return True
+
+
+async def _ask(
+    desk: Desk, kept: str, shown: str, options: dict[str, Any], error: MckibbenError
+) -> None:
+    """Show why a file could not be read, what is in it, and let columns and units be named."""
+    path = desk.workspace.path("uploads", kept)
+    try:
+        tables = await asyncio.to_thread(formats.tables, path)
+        columns = [column.header for column in tables[0].columns]
+        first = [
+            {column.header: _cell(column, row) for column in tables[0].columns} for row in range(5)
+        ]
+    except (MckibbenError, IndexError):
+        tell(f"{shown}: {error}")
+        return
+    with ui.dialog() as dialog, ui.card().classes("w-full max-w-4xl"):
+        ui.label(f"{shown} needs help").classes("text-lg")
+        named(ui.label(str(error)).classes("text-negative"), "problem")
+        ui.table(
+            rows=first,
+            columns=[{"name": c, "label": c, "field": c, "align": "right"} for c in columns],
+        ).classes("w-full").props("dense flat")
+        picks: dict[str, tuple[Any, Any]] = {}
+        with ui.grid(columns=3).classes("items-center"):
+            for channel in MAPPED:
+                ui.label(channel)
+                column = ui.select(["", *columns], value="", label="Column").props("dense")
+                unit = ui.input("Unit", placeholder="as the header says").props("dense")
+                picks[channel] = named(column, f"column-{channel}"), named(unit, f"unit-{channel}")
+        rate = ui.number("Samples per second, without a column of times", min=0).classes("w-80")
+        gaps = ui.select(["error", "split", "interpolate"], value="error", label="Gaps in time")
+
+        async def again() -> None:
+            chosen: dict[str, Any] = {
+                "columns": {name: pick[0].value for name, pick in picks.items() if pick[0].value},
+                "units": {name: pick[1].value for name, pick in picks.items() if pick[1].value},
+                "gaps": gaps.value,
+            }
+            if rate.value:
+                chosen["rate"] = float(rate.value)
+            dialog.close()
+            await _take(desk, kept, shown, chosen)
+
+        with ui.row():
+            named(ui.button("Read it so", on_click=guarded(again)), "read-again")
+            ui.button("Leave it", on_click=dialog.close).props("flat")
+    dialog.open()
+
+
+def _cell(column: Column, row: int) -> str:
+    cells = column.texts if column.values is None else column.values.tolist()[:5]
+    return f"{cells[row]}" if row < len(cells) else ""
+
+
+def _list(desk: Desk) -> None:
+    ui.label("Recordings").classes("text-lg")
+
+    @ui.refreshable
+    def shown() -> None:
+        entries = desk.workspace.entries()
+        if not entries:
+            with named(ui.card().classes("w-full"), "empty"):
+                ui.label("Nothing here yet.").classes("text-base")
+                ui.label(
+                    "Drop a recording of your muscle on the left: pressure and displacement over "
+                    "time. Or open the example, a virtual muscle with a hanging load."
+                )
+            return
+        for entry in entries:
+            _row(desk, entry.name)
+        known = desk.workspace.channels()
+        desk.settle_channels()
+        with ui.row().classes("items-center"):
+            for side in ("input", "output"):
+                ui.select(
+                    known or [getattr(desk, side)],
+                    value=getattr(desk, side) if getattr(desk, side) in known else None,
+                    label=side.capitalize(),
+                    on_change=lambda event, side=side: _chosen(desk, side, event.value),
+                ).classes("min-w-40")
+
+    desk.when("recordings", shown.refresh)
+    shown()
+
+
+def _chosen(desk: Desk, side: str, channel: str) -> None:
+    setattr(desk, side, channel)
+    desk.changed("channels")
+
+
+def _row(desk: Desk, name: str) -> None:
+    entry = desk.workspace.entry(name)
+    try:
+        recording = desk.workspace.recording(name)
+    except MckibbenError as error:
+        ui.label(f"{name}: {error}").classes("text-negative")
+        return
+    duration = "" if recording.duration is None else f", {recording.duration:.4g} s"
+    with named(ui.row().classes("items-center w-full gap-2"), f"recording-{name}"):
+        with ui.column().classes("gap-0 flex-1 min-w-40"):
+            ui.label(name).classes("font-medium")
+            listed = ", ".join(f"{c} [{recording.units[c] or '-'}]" for c in recording.channels)
+            ui.label(f"{len(recording)} samples{duration}; {listed}").classes("text-xs opacity-70")
+        named(
+            ui.toggle(
+                ["train", "test", "unused"],
+                value=entry.role,
+                on_change=lambda event: _set_role(desk, name, event.value),
+            ).props("dense"),
+            f"role-{name}",
+        )
+        ui.button(icon="show_chart", on_click=lambda: _show(desk, name)).props(
+            f'flat dense aria-label="Show {name}"'
+        ).tooltip("Show")
+        ui.button(icon="delete", on_click=lambda: _remove(desk, name)).props(
+            f'flat dense aria-label="Remove {name}"'
+        ).tooltip("Remove")
+
+
+def _set_role(desk: Desk, name: str, role: Any) -> None:
+    desk.workspace.set_role(name, role)
+    desk.changed("channels")
+
+
+def _remove(desk: Desk, name: str) -> None:
+    desk.workspace.remove(name)
+    desk.changed("recordings", "channels")
+
+
+def _show(desk: Desk, name: str) -> None:
+    desk.preview = name
+    desk.changed("preview")
+
+
+def _preview(desk: Desk) -> None:
+    """Show a recording over time; dragging across it selects a part to keep or to split at."""
+    part: dict[str, float] = {}
+
+    @ui.refreshable
+    def shown() -> None:
+        name = desk.preview
+        entries = [entry.name for entry in desk.workspace.entries()]
+        if name not in entries:
+            name = entries[0] if entries else None
+        if name is None:
+            return
+        part.clear()
+        recording = desk.workspace.recording(name)
+        ui.label(f"{name}: drag across the plot to select a part").classes("text-lg")
+        channels = list(recording.channels)[:4]
+        time_plot(desk, recording, channels, "preview-plot", part)
+        with ui.row():
+            for text, action in (("Keep only the selection", _keep), ("Split there", _split)):
+                named(
+                    ui.button(
+                        text, on_click=lambda action=action: _cut(desk, name, part, action)
+                    ).props("outline"),
+                    text.split()[0].lower(),
+                )
+
+    desk.when("recordings", shown.refresh)
+    desk.when("preview", shown.refresh)
+    desk.when("theme", shown.refresh)
+    shown()
+
+
+def time_plot(
+    desk: Desk,
+    recording: Recording,
+    channels: list[str],
+    name: str,
+    part: dict[str, float] | None = None,
+) -> None:
+    """Plot channels over time; panning and zooming thin the samples anew, on the server."""
+    drawing = subjects.time_course([recording], channels, plots.POINTS)
+    (figure,) = plots.figures(drawing, dark=desk.dark, height=170 * len(channels) + 60)
+    figure["layout"]["dragmode"] = "zoom" if part is None else "select"
+    figure["layout"]["selectdirection"] = "h"
+    plot = named(ui.plotly(figure).classes("w-full"), name)
+    whole = (float(recording.time[0]), float(recording.time[-1]))
+
+    def moved(event: Any) -> None:
+        given = event.args or {}
+        low, high = given.get("xaxis.range[0]"), given.get("xaxis.range[1]")
+        if given.get("xaxis.autorange"):
+            low, high = whole
+        if isinstance(low, int | float) and isinstance(high, int | float):
+            places = list(range(len(channels)))
+            seen = plots.window(recording, channels, low, high)
+            update = {"x": [curve["x"] for curve in seen], "y": [curve["y"] for curve in seen]}
+            plot.run_plot_method("restyle", update, places)
+
+    def selected(event: Any) -> None:
+        ends = (event.args or {}).get("range", {})
+        ends = next((value for key, value in ends.items() if key.startswith("x")), None)
+        if part is not None and isinstance(ends, list) and len(ends) == 2:
+            part["low"], part["high"] = sorted(map(float, ends))
+
+    plot.on("plotly_relayout", moved)
+    plot.on("plotly_selected", selected)
+
+
+def _cut(desk: Desk, name: str, part: dict[str, float], action: Any) -> None:
+    try:
+        if not part:
+            raise DataError("nothing is selected", remedy="drag across the plot first")
+        action(desk, name, part)
+    except MckibbenError as error:
+        tell(error)
+        return
+    desk.changed("recordings", "channels")
+
+
+def _places(recording: Recording, part: dict[str, float]) -> tuple[int, int]:
+    step = recording.sample_time or 1.0
+    low = round((part["low"] - recording.start_time) / step)
+    high = round((part["high"] - recording.start_time) / step) + 1
+    low, high = max(low, 0), min(high, len(recording))
+    if high - low < 2:
+        raise DataError("the selection holds fewer than two samples", remedy="select more")
+    return low, high
+
+
+def _pieces(desk: Desk, name: str, cuts: list[tuple[int, int]]) -> None:
+    entry, recording = desk.workspace.entry(name), desk.workspace.recording(name)
+    for low, high in cuts:
+        if high - low >= 2:
+            desk.workspace.add(
+                recording.slice(low, high),
+                origin=f"samples {low + 1} to {high} of {name}",
+                call=f"{entry.call}[0].slice({low}, {high})",
+                role=entry.role,
+                name=name,
+            )
+    desk.workspace.set_role(name, "unused")
+    desk.did(f"cut {name}", f"recording.slice(...), {cuts}")
+
+
+def _keep(desk: Desk, name: str, part: dict[str, float]) -> None:
+    _pieces(desk, name, [_places(desk.workspace.recording(name), part)])
+
+
+def _split(desk: Desk, name: str, part: dict[str, float]) -> None:
+    recording = desk.workspace.recording(name)
+    low, _ = _places(recording, part)
+    _pieces(desk, name, [(0, low), (low, len(recording))])

@@ -1,0 +1,294 @@
+"""Models: choose, fit in the background, rank, and see why."""
+
+from __future__ import annotations
+
+import asyncio
+import dataclasses
+import math
+from typing import Any
+
+import numpy as np
+from nicegui import ui
+
+from mckibben import registry
+from mckibben.app import plots, scripts
+from mckibben.app.desk import Desk, guarded, named, on_event, tell
+from mckibben.app.jobs import ENDED, RUNNING, Job, parse_settings
+from mckibben.comparison.free_run import run_free
+from mckibben.errors import MckibbenError, ModelError
+from mckibben.report import subjects, wording
+
+SENSIBLE = ("pi", "gpi", "mpi", "cpi", "preisach")
+"""Models to start with."""
+
+
+def build(desk: Desk) -> None:
+    """Build the page."""
+    settings: dict[str, str] = {}
+    with ui.row().classes("w-full items-end gap-3"):
+        chosen = named(
+            ui.select(_offered(), value=list(SENSIBLE), multiple=True, label="Models to fit")
+            .classes("min-w-80 flex-1")
+            .props("use-chips"),
+            "models",
+        )
+        _names_only(chosen)
+        ui.button("Settings", on_click=lambda: _settings(list(chosen.value), settings)).props(
+            "flat"
+        )
+        named(ui.button("Fit", on_click=lambda: _fit(desk, list(chosen.value), settings)), "fit")
+    with ui.row().classes("w-full items-start gap-4"):
+        with ui.column().classes("min-w-72 flex-1"):
+            _running(desk)
+        with ui.column().classes("min-w-96 flex-[2]"):
+            _leaderboard(desk)
+
+
+def _names_only(chosen: ui.select) -> None:
+    """Show the short names of what is chosen; the menu describes them."""
+
+    def show() -> None:
+        chosen.props(f'display-value="{", ".join(chosen.value or []) or "none"}"')
+
+    chosen.on_value_change(show)
+    show()
+
+
+def _offered() -> dict[str, str]:
+    return {
+        name: f"{name}: {registry.load('estimators', name).__doc__.strip().splitlines()[0]}"
+        for name in registry.names("estimators")
+    }
+
+
+def _settings(models: list[str], kept: dict[str, str]) -> None:
+    """Show every setting of the models with its default; lines of name=value change them."""
+    with ui.dialog() as dialog, ui.card().classes("w-full max-w-3xl"):
+        ui.label("Settings, one name=value a line; empty for the defaults").classes("text-lg")
+        for model in models:
+            known = [
+                f"{field.name}={field.default}"
+                for field in dataclasses.fields(registry.load("estimators", model))
+                if field.default is not dataclasses.MISSING
+                and field.name not in ("input", "output")
+            ]
+            ui.label(f"{model}: {', '.join(known)}").classes("text-xs opacity-70")
+            ui.textarea(model, value=kept.get(model, "")).classes("w-full").on_value_change(
+                lambda event, model=model: kept.__setitem__(model, event.value)
+            )
+        ui.button("Done", on_click=dialog.close)
+    dialog.open()
+
+
+def _fit(desk: Desk, models: list[str], settings: dict[str, str]) -> None:
+    if not desk.workspace.with_role("train"):
+        tell(
+            "There is no recording to train on. Remedy: add one under Data, with the role 'train'."
+        )
+        return
+    for model in models:
+        given = parse_settings(settings.get(model, ""))
+        known = {field.name for field in dataclasses.fields(registry.load("estimators", model))}
+        unknown = sorted(set(given) - known)
+        if unknown:
+            tell(
+                f"{model} has no setting {unknown[0]!r}. Remedy: use one of {', '.join(sorted(known))}."
+            )
+            continue
+        name = desk.workspace.new_name("models", model)
+        busy = {job.given.get("name") for job in desk.jobs.active()}
+        while name in busy:
+            name += "x"
+        call = scripts.fit_call(desk.workspace, model, desk.channels, given, 0)
+        desk.jobs.submit(
+            "fit",
+            {"model": model, "name": name, "input": desk.input, "output": desk.output}
+            | {"settings": given, "seed": 0, "call": call, "title": name},
+        )
+        desk.did(f"started fitting {model}", call)
+    desk.changed("jobs")
+
+
+def _running(desk: Desk) -> None:
+    ui.label("Fits").classes("text-lg")
+
+    @ui.refreshable
+    def shown() -> None:
+        fits = [job for job in desk.jobs.jobs.values() if job.kind == "fit"]
+        if not fits:
+            ui.label("None yet.").classes("opacity-70")
+        for job in reversed(fits[-12:]):
+            _job(desk, job)
+        _best_so_far(desk, fits)
+
+    desk.when("jobs", shown.refresh)
+    desk.when("theme", shown.refresh)
+    shown()
+
+
+def _job(desk: Desk, job: Job) -> None:
+    told = desk.jobs.progress(job.name)
+    with named(ui.row().classes("items-center w-full gap-2 no-wrap"), f"job-{job.title}"):
+        ui.label(job.title).classes("w-28")
+        if job.state in ENDED:
+            ui.label(f"{job.state}: {job.message}").classes("flex-1 text-xs")
+            if job.state != "done":
+                ui.button(icon="replay", on_click=lambda: _again(desk, job)).props(
+                    'flat dense aria-label="Again"'
+                )
+            ui.button(icon="close", on_click=lambda: _forget(desk, job)).props(
+                'flat dense aria-label="Forget"'
+            )
+            return
+        share = told[-1][1] if told and job.state == RUNNING else 0.0
+        ui.linear_progress(value=round(share, 2), show_value=False).classes("flex-1")
+        ui.label(job.state).classes("text-xs")
+        named(
+            ui.button("Cancel", on_click=lambda: _cancel(desk, job)).props("flat dense"),
+            f"cancel-{job.title}",
+        )
+
+
+def _cancel(desk: Desk, job: Job) -> None:
+    desk.jobs.cancel(job.name)
+    desk.changed("jobs")
+
+
+def _forget(desk: Desk, job: Job) -> None:
+    desk.jobs.forget(job.name)
+    desk.changed("jobs")
+
+
+def _again(desk: Desk, job: Job) -> None:
+    desk.jobs.submit(job.kind, job.given)
+    desk.jobs.forget(job.name)
+    desk.changed("jobs")
+
+
+def _best_so_far(desk: Desk, fits: list[Job]) -> None:
+    """Plot the least cost that each search has found, over time."""
+    curves = []
+    for place, job in enumerate(fits[-6:]):
+        told = [(s, cost) for s, _, cost in desk.jobs.progress(job.name) if math.isfinite(cost)]
+        if len(told) >= 2:
+            seconds, costs = np.array(told).T
+            curves.append((job.title, seconds, costs, f"series-{place % 6 + 1}"))
+    if curves:
+        ui.label("Best so far").classes("text-sm")
+        figure = plots.lines(
+            curves, x="time [s]", y=f"training RMSE of {desk.output}", dark=desk.dark
+        )
+        figure["layout"]["yaxis"]["type"] = "log"
+        named(ui.plotly(figure).classes("w-full"), "best-so-far")
+
+
+COLUMNS = (
+    ("name", "Model"),
+    ("rmse", "Test RMSE"),
+    ("interval", "95 % interval"),
+    ("r2", "R² [%]"),
+    ("cv", "CV RMSE"),
+    ("train", "Train RMSE"),
+    ("memory", "Memory"),
+    ("parameters", "Parameters"),
+    ("seconds", "Fit [s]"),
+)
+
+
+def _leaderboard(desk: Desk) -> None:
+    ui.label("Leaderboard: free-running, on data not used to fit").classes("text-lg")
+
+    @ui.refreshable
+    def shown() -> None:
+        rows = [_row(result) for result in desk.workspace.results()]
+        if not rows:
+            ui.label("Fit models to see them ranked here.").classes("opacity-70")
+            return
+        table = named(
+            ui.table(
+                rows=rows,
+                columns=[
+                    {"name": key, "label": label, "field": key, "sortable": True}
+                    | {"align": "left" if key == "name" else "right"}
+                    for key, label in COLUMNS
+                ],
+                row_key="name",
+                selection="multiple",
+            )
+            .classes("w-full")
+            .props("dense flat"),
+            "leaderboard",
+        )
+        ui.label(
+            "Memory: 1 where the model keeps rising and falling branches as far apart as the data do, "
+            "0 where it forgot. Select one or two models to look closer."
+        ).classes("text-xs opacity-70")
+        place = named(ui.column().classes("w-full"), "closer")
+
+        async def closer() -> None:
+            place.clear()
+            names = [row["name"] for row in table.selected][:2]
+            if names:
+                await _closer(desk, names, place)
+
+        table.on_select(on_event(lambda _: closer()))
+        table.selected = rows[:1]
+        ui.timer(0.05, guarded(closer), once=True)
+
+    desk.when("results", shown.refresh)
+    desk.when("theme", shown.refresh)
+    shown()
+
+
+def _row(result: dict[str, Any]) -> dict[str, Any]:
+    test, train = result.get("test") or {}, result.get("train") or {}
+    interval = test.get("rmse_interval")
+    memory = (result.get("memory") or {}).get("gap_ratio")
+    number = wording.number
+    return {
+        "name": result["name"],
+        "rmse": number(test.get("rmse")),
+        "interval": f"{number(interval[0])} to {number(interval[1])}" if interval else "",
+        "r2": number(100 * test["r2"], 4) if test.get("r2") is not None else "",
+        "cv": number(result.get("validation_rmse")),
+        "train": number(train.get("rmse")),
+        "memory": number(memory, 2),
+        "parameters": result.get("n_parameters"),
+        "seconds": number(result.get("fit_seconds"), 2),
+    }
+
+
+async def _closer(desk: Desk, names: list[str], place: Any) -> None:
+    """Show measured against modelled, residuals and parameters, of one model or two side by side."""
+    recordings = desk.workspace.with_role("test") or desk.workspace.with_role("train")
+    recording = recordings[0]
+    blocks = {name: desk.workspace.model(name) for name in names}
+    known = desk.workspace.with_role("train")
+
+    def modelled() -> dict[str, Any]:
+        return {
+            name: run_free(block, recording, desk.output, known) for name, block in blocks.items()
+        }
+
+    try:
+        outputs = await asyncio.to_thread(modelled)
+    except MckibbenError as error:
+        raise ModelError(f"{', '.join(names)} on {recording.name}: {error}") from None
+    with place:
+        ui.label(f"On {recording.name}").classes("text-base")
+        drawings = (
+            subjects.fit_over_time(recording, desk.output, outputs),
+            subjects.fit_loops(recording, desk.input, desk.output, outputs),
+            subjects.residuals(recording, desk.input, desk.output, outputs),
+        )
+        for number, drawing in enumerate(drawings):
+            with ui.row().classes("w-full"):
+                for figure in plots.figures(drawing, dark=desk.dark, height=360):
+                    figure["layout"]["showlegend"] = True
+                    plot = ui.plotly(figure).classes("flex-1 min-w-72")
+                    named(plot, f"closer-{number}")
+        with ui.row().classes("w-full items-start"):
+            for name, block in blocks.items():
+                content = {key: value for key, value in block.to_dict().items() if key != "format"}
+                with ui.expansion(f"Parameters of {name}").classes("flex-1"):
+                    ui.json_editor({"content": {"json": content}, "readOnly": True})

@@ -1,0 +1,151 @@
+"""Drawings as plotly.js reads them in the workbench: thinned on the server, coloured for the theme."""
+
+from __future__ import annotations
+
+import base64
+import re
+from functools import cache
+from importlib import resources
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mckibben.recording import Recording
+from mckibben.report import interactive
+from mckibben.report.drawing import Drawing, over_time
+
+Array = NDArray[np.float64]
+Json = dict[str, Any]
+
+POINTS = 4000
+"""Most points of a curve sent to the page."""
+
+CONFIG: Json = {
+    "displaylogo": False,
+    "modeBarButtonsToRemove": ["lasso2d", "sendDataToCloud"],
+}
+
+
+@cache
+def colours(dark: bool) -> dict[str, str]:
+    """Return the report's colours, by name, for a light or a dark page."""
+    style = resources.files("mckibben.report").joinpath("templates/report.css").read_text("utf-8")
+    light, _, rest = style.partition("@media")
+    found = dict(re.findall(r"--([\w-]+):\s*(#[0-9a-fA-F]{3,8})", light))
+    if dark:
+        found |= dict(re.findall(r"--([\w-]+):\s*(#[0-9a-fA-F]{3,8})", rest.partition("@media")[0]))
+    return found
+
+
+def figures(drawing: Drawing, *, dark: bool = False, height: int = 420) -> list[Json]:
+    """Return a drawing as figures for `nicegui.ui.plotly`."""
+    palette = colours(dark)
+    return [_figure(plot, palette, height) for plot in interactive.plots(drawing)]
+
+
+def _figure(plot: Json, palette: dict[str, str], height: int) -> Json:
+    plot = _resolved(plot, palette)
+    layout = plot["layout"]
+    axis = {
+        "gridcolor": palette["grid"],
+        "linecolor": palette["rule"],
+        "zerolinecolor": palette["rule"],
+    }
+    for key in [key for key in layout if key.startswith(("xaxis", "yaxis"))]:
+        layout[key] = axis | layout[key]
+    layout |= {
+        "height": height,
+        "margin": {"l": 64, "r": 16, "t": 40, "b": 48},
+        "paper_bgcolor": "rgba(0,0,0,0)",
+        "plot_bgcolor": "rgba(0,0,0,0)",
+        "font": {"color": palette["ink"], "family": "system-ui, sans-serif", "size": 13},
+        "legend": {"orientation": "h", "y": 1.08},
+        "uirevision": "kept",
+    }
+    return {"data": plot["data"], "layout": layout, "config": CONFIG}
+
+
+def _resolved(value: Any, palette: dict[str, str]) -> Any:
+    """Return plain numbers for packed ones, and colours for their names."""
+    if isinstance(value, dict):
+        if set(value) == {"base", "f4"}:
+            numbers = np.frombuffer(base64.b64decode(value["f4"]), dtype="<f4").astype(float)
+            return _listed(numbers + value["base"])
+        return {key: _resolved(item, palette) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_resolved(item, palette) for item in value]
+    if isinstance(value, str) and value.startswith("--"):
+        return palette.get(value[2:], value)
+    return value
+
+
+def _listed(values: Array) -> list[float | None]:
+    return [None if np.isnan(value) else float(f"{value:.7g}") for value in values]
+
+
+def window(recording: Recording, channels: list[str], low: float, high: float) -> list[Json]:
+    """Return channels over a part of time, thinned anew, as ``x`` and ``y`` for `Plotly.restyle`.
+
+    Parameters
+    ----------
+    recording : Recording
+    channels : list of str
+    low, high : float
+        Ends of the part [s].
+    """
+    step = recording.sample_time or 1.0
+    first = max(int((low - recording.start_time) / step) - 1, 0)
+    last = min(int((high - recording.start_time) / step) + 2, len(recording))
+    if last - first < 2:
+        first, last = max(min(first, len(recording) - 2), 0), len(recording)
+    time = recording.start_time + step * np.arange(first, last, dtype=np.float64)
+    found = []
+    for channel in channels:
+        t, y = over_time(time, recording[channel][first:last], POINTS)
+        found.append({"x": _listed(t), "y": _listed(y)})
+    return found
+
+
+def lines(
+    curves: list[tuple[str, Array, Array, str]],
+    *,
+    x: str,
+    y: str,
+    dark: bool = False,
+    height: int = 320,
+    bands: tuple[tuple[float, float], ...] = (),
+) -> Json:
+    """Return named curves in one plane, with bands that shade a range of y."""
+    palette = colours(dark)
+    data = []
+    for name, at, values, colour in curves:
+        t, v = over_time(np.asarray(at, float), np.asarray(values, float), POINTS)
+        line = {"color": palette[colour], "width": 1.6}
+        data.append(
+            {"type": "scatter", "mode": "lines", "name": name, "x": _listed(t), "y": _listed(v)}
+            | {"line": line}
+        )
+    shapes = [
+        {
+            "type": "rect",
+            "xref": "paper",
+            "x0": 0,
+            "x1": 1,
+            "y0": low,
+            "y1": high,
+            "line": {"width": 0},
+        }
+        | {"fillcolor": palette["accent"], "opacity": 0.12, "layer": "below"}
+        for low, high in bands
+    ]
+    plot = {
+        "data": data,
+        "layout": {
+            "xaxis": {"title": {"text": x}},
+            "yaxis": {"title": {"text": y}},
+            "shapes": shapes,
+            "showlegend": len(curves) > 1,
+        },
+    }
+    return _figure(plot, palette, height)

@@ -1,0 +1,89 @@
+"""The calls behind the clicks: what the workbench does, as Python and as a command."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from mckibben.app.workspace import Workspace
+
+
+def read_call(path: str, options: Mapping[str, Any]) -> str:
+    """Return the call that reads a file."""
+    given = "".join(f", {name}={value!r}" for name, value in options.items() if value)
+    return f"mckibben.read({path!r}{given})"
+
+
+def fit_call(
+    workspace: Workspace,
+    model: str,
+    channels: tuple[str, str],
+    settings: Mapping[str, Any],
+    seed: int,
+) -> str:
+    """Return the call that fits and ranks a model on the recordings in use."""
+    given = f", settings={ {model: dict(settings)}!r}" if settings else ""
+    return (
+        f"mckibben.compare(train, test, input={channels[0]!r}, output={channels[1]!r}, "
+        f"models=[{model!r}]{given}, seed={seed})"
+    )
+
+
+def fit_command(
+    workspace: Workspace,
+    models: Sequence[str],
+    channels: tuple[str, str],
+    settings: Mapping[str, Mapping[str, Any]],
+) -> str:
+    """Return the command that ranks models on the recordings in use."""
+    train, test = (_files(workspace, role) for role in ("train", "test"))
+    words = ["mckibben", "compare", *train]
+    words += [word for path in test for word in ("--test", path)]
+    words += ["--models", ",".join(models), "--input", channels[0], "--output", channels[1]]
+    for model, own in settings.items():
+        words += [
+            word for name, value in own.items() for word in ("--set", f"{model}.{name}={value}")
+        ]
+    return shlex.join(words)
+
+
+def script(workspace: Workspace, models: Sequence[str], channels: tuple[str, str]) -> str:
+    """Return a Python script that does again what was done: read, fit, rank, invert, save."""
+    lines = ['"""What was done in the workbench, as a script."""', "", "import mckibben", ""]
+    for role in ("train", "test"):
+        paths = _files(workspace, role)
+        listed = ", ".join(f"*mckibben.read({path!r}, informative=False)" for path in paths)
+        lines.append(f"{role} = [{listed}]")
+    lines += [
+        "",
+        f"board = mckibben.compare(train, test, input={channels[0]!r}, output={channels[1]!r},",
+    ]
+    settings = {}
+    for model in models:
+        result = workspace.read_json("results", model) or {}
+        if result.get("settings"):
+            settings[str(result.get("model", model))] = result["settings"]
+    kinds = [str((workspace.read_json("results", m) or {}).get("model", m)) for m in models]
+    lines.append(f"    models={kinds!r}, settings={settings!r})")
+    lines += [
+        'print(board.to_frame()[["model", "test.rmse"]])',
+        "",
+        "for row in board.rows:",
+        "    if row.block is not None:",
+        '        row.block.save(f"{row.model}.json")',
+        "",
+        "best = board.best.block",
+        "try:",
+        "    inverse = best.inverse()",
+        "except mckibben.ModelError as error:",
+        "    print(error)",
+        "else:",
+        '    inverse.save("inverse.json")',
+        "",
+    ]
+    return "\n".join(lines)
+
+
+def _files(workspace: Workspace, role: str) -> list[str]:
+    return [str(entry.path) for entry in workspace.entries() if entry.role == role]

@@ -1,0 +1,36 @@
+"""mckibben app: the workbench in the browser."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from mckibben.errors import DataError
+
+
+def app(
+    folder: Annotated[
+        Path, typer.Argument(help="Workspace: a folder that holds everything; made if missing.")
+    ] = Path("workbench"),
+    host: Annotated[
+        str,
+        typer.Option("--host", help="Address to listen on; others than this machine need a token."),
+    ] = "127.0.0.1",
+    port: Annotated[int, typer.Option("--port", help="Port; 0 for any free one.")] = 8750,
+    token: Annotated[
+        str | None, typer.Option("--token", help="Token to demand; made up where one is needed.")
+    ] = None,
+    show: Annotated[bool, typer.Option("--show/--no-show", help="Open a browser.")] = True,
+) -> None:
+    """Open the workbench: data, loops, models, compensation and code in the browser."""
+    import importlib.util
+
+    if importlib.util.find_spec("nicegui") is None:
+        raise DataError(
+            "the workbench is not installed", remedy="install it: pip install 'mckibben[app]'"
+        )
+    from mckibben.app.server import serve
+
+    serve(folder, host=host, port=port, token=token, show=show)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 import shutil
+import subprocess
 from pathlib import Path
 from typing import Any
 
@@ -87,7 +88,7 @@ def test_a_folder_in_the_way_stays_as_it_is(cli: Cli, tmp_path: Path) -> None:
     done(cli, "export", "c", model, "-o", folder, "--name", "first")
     assert "not empty" in refused(cli, "export", "c", model, "-o", folder, "--name", "first")
     done(cli, "export", "c", model, "-o", folder, "--name", "first", "--overwrite", "--float32")
-    assert "FLOAT32" in (folder / "src" / "mck_precision.h").read_text()
+    assert "FLOAT32" in (folder / "src" / "mck_config.h").read_text()
     assert not list(tmp_path.glob(".*"))
 
 
@@ -114,6 +115,46 @@ def test_bad_requests_get_one_sentence(
     assert told in error
     assert "Remedy:" in error
     assert not (tmp_path / "out").exists()
+
+
+def test_what_was_changed_since_is_not_replaced(cli: Cli, tmp_path: Path) -> None:
+    model, folder = saved("pi", tmp_path), tmp_path / "out"
+    done(cli, "export", "c", model, "-o", folder, "--name", "first")
+    sketch = folder / "examples" / "first" / "first.ino"
+    sketch.write_text("mine")
+    told = refused(cli, "export", "c", model, "-o", folder, "--name", "first", "--overwrite")
+    assert "first.ino" in told
+    assert sketch.read_text() == "mine"
+
+
+def test_a_folder_of_ones_own_with_the_same_names_is_not_replaced(cli: Cli, tmp_path: Path) -> None:
+    folder = tmp_path / "mine"
+    folder.mkdir()
+    model = folder / "model.json"
+    load("blocks", "pi").example().save(model)
+    before = model.read_bytes()
+    assert "model.json" in refused(cli, "export", "c", model, "-o", folder, "--overwrite")
+    assert model.read_bytes() == before
+
+
+@needs_compiler
+@pytest.mark.parametrize("name", ["test", "all", "help", "clean", "install", "m", "package"])
+def test_names_that_builders_know_do_not_confuse_them(name: str, cli: Cli, tmp_path: Path) -> None:
+    if shutil.which("cmake") is None:
+        pytest.skip("there is no cmake")
+    folder = tmp_path / "out"
+    done(cli, "export", "c", saved("pi", tmp_path), "-o", folder, "--name", name)
+    for command in (["-S", folder, "-B", tmp_path / "b"], ["--build", tmp_path / "b"]):
+        subprocess.run(["cmake", *map(str, command)], check=True, capture_output=True)
+    subprocess.run(["ctest", "--test-dir", str(tmp_path / "b")], check=True, capture_output=True)
+
+
+@pytest.mark.parametrize("name", ["math", "stdio", "unit", "unit_model", "fmi2"])
+def test_names_of_headers_are_refused(name: str, cli: Cli, tmp_path: Path) -> None:
+    model = saved("pi", tmp_path)
+    for form, out in (("c", "out"), ("fmu", "out.fmu")):
+        told = refused(cli, "export", form, model, "-o", tmp_path / out, "--name", name)
+        assert "cannot name C functions" in told
 
 
 def test_what_is_no_model_is_refused(cli: Cli, tmp_path: Path) -> None:

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import importlib.util
+from pathlib import Path
+
 import numpy as np
 import pytest
 
-from mckibben import ModelError
+from mckibben import Block, ModelError
 from mckibben.export.c import emulation
 from mckibben.export.c.emulation import emulate, missing_tools
 from tests.export.test_c import MODELS, SAMPLE_TIME, SINGLE
@@ -28,13 +31,35 @@ def test_a_cortex_m4f_gives_pythons_numbers(name: str) -> None:
 
 @emulated
 def test_a_parameter_changed_is_seen() -> None:
-    block = MODELS["gpi-inverse"]
+    block = MODELS["pi"]
     parameters = block.pack()
-    parameters[0] *= 1.01
-    other = emulate(block.unpack(parameters), sample_time=SAMPLE_TIME)
-    own = emulate(block, sample_time=SAMPLE_TIME)
-    difference = np.abs(other.outputs - own.expected.outputs[: len(other.outputs)])
-    assert (difference / own.expected.ranges).max() > SINGLE
+    parameters[0] *= 1.001
+    other, own = emulate(block.unpack(parameters)), emulate(block)
+    np.testing.assert_array_equal(other.expected.inputs, own.expected.inputs)
+    difference = np.abs(other.outputs - own.expected.outputs) / own.expected.ranges
+    assert difference.max() > SINGLE
+
+
+def papers_compositions() -> dict[str, Block]:
+    path = Path(__file__).parents[2] / "benchmarks" / "microcontroller.py"
+    spec = importlib.util.spec_from_file_location("microcontroller", path)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return dict(module.compositions())
+
+
+@emulated
+@pytest.mark.parametrize(
+    ("name", "budget"),
+    [("SDIHC, learned inverse of the network", 40_000), ("GPI inverse, 10 operators", 1_500)],
+)
+def test_inverses_keep_within_their_budget(name: str, budget: int) -> None:
+    found = emulate(papers_compositions()[name], sample_time=SAMPLE_TIME)
+    assert found.difference <= SINGLE
+    assert found.instructions.max() <= budget
+    assert found.ram + found.stack < 32 * 1024
 
 
 @emulated

@@ -187,6 +187,31 @@ def test_communication_steps_may_be_longer_or_shorter_than_the_models(tmp_path: 
         assert result["displacement_output"][-1] == pytest.approx(expected[39, 0], rel=1e-12)
 
 
+@needs_compiler
+@pytest.mark.parametrize("version", VERSIONS)
+def test_time_that_goes_back_or_too_far_is_an_error(version: str, tmp_path: Path) -> None:
+    fmpy = pytest.importorskip("fmpy")
+    path = exported(MODELS["creep"], tmp_path, version)
+    description, place = fmpy.read_model_description(str(path)), fmpy.extract(str(path))
+    for steps in ([(1.0, 0.01), (0.5, 0.01)], [(0.0, 1e300)], [(0.0, 0.0)], [(0.0, -1.0)]):
+        unit = fmpy.instantiate_fmu(place, description, "CoSimulation")
+        if version == "2.0":
+            unit.setupExperiment(startTime=0.0)
+        unit.enterInitializationMode()
+        unit.exitInitializationMode()
+        for time, step in steps[:-1]:
+            unit.doStep(time, step)
+        with pytest.raises(Exception, match=r"(?i)error|status"):
+            unit.doStep(*steps[-1])
+        unit.freeInstance()
+    shutil.rmtree(place)
+
+
+def test_fmi_2_has_no_name_for_some_platforms(tmp_path: Path) -> None:
+    with pytest.raises(ModelError, match=r"no name for linux-arm.*Remedy: ask for FMI 3.0"):
+        exported(MODELS["pi"], tmp_path, "2.0", platforms=["linux-arm"])
+
+
 def test_the_same_model_gives_the_same_bytes(tmp_path: Path) -> None:
     for folder in (tmp_path / "a", tmp_path / "b"):
         folder.mkdir()

@@ -75,6 +75,27 @@ def test_a_count_that_lies_is_no_packet() -> None:
     assert unpacked(bytes(packet)) is None
 
 
+def test_a_peer_that_starts_again_is_heard() -> None:
+    with UDPLink(size=1) as link, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
+        for sequence, value in ((900, 1.0), (1, 2.0), (2, 3.0)):
+            sender.sendto(packed(sequence, [value]), link.address)
+            np.testing.assert_array_equal(link.newest(timeout=2.0), [value])
+
+
+def test_only_the_peer_that_was_named_is_heard() -> None:
+    with UDPLink(size=1) as robot, UDPLink(robot.address, size=1) as link:
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger:
+            stranger.sendto(packed(5, [666.0]), link.address)
+        assert link.newest(timeout=0.3) is None
+        link.send([1.0])
+        np.testing.assert_array_equal(robot.newest(timeout=2.0), [1.0])
+
+
+def test_a_peer_out_of_reach_is_no_error() -> None:
+    with UDPLink(("192.0.2.1", 9), size=1) as link:
+        link.send([1.0])
+
+
 def test_bad_settings_name_a_remedy() -> None:
     with pytest.raises(DataError, match="give 1 to 128"):
         UDPLink(size=0)

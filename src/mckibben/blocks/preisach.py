@@ -185,6 +185,23 @@ def preisach_inverse_kernel(
     state[2 + 2 * DEPTH], state[3 + 2 * DEPTH] = last, y
 
 
+def checked_memory(state: Array, kind: str) -> Array:
+    """Return a memory after checking that its depth and direction can be ones.
+
+    Raises
+    ------
+    ModelError
+        If they cannot: they say where in the memory to go on.
+    """
+    depth, direction = state[0], state[1]
+    if depth not in range(1, DEPTH + 1) or direction not in (1.0, -1.0):
+        raise ModelError(
+            f"the memory of {kind!r} has depth {depth:g} and direction {direction:g}. Remedy: give a "
+            f"depth of 1 to {DEPTH}, a direction of 1 or -1, or 'first_sample'."
+        )
+    return state
+
+
 @dataclass(frozen=True, config=STRICT)
 class Preisach(Ranged, NamedParameters, Primitive):
     """Preisach model on a triangular grid.
@@ -262,7 +279,7 @@ class Preisach(Ranged, NamedParameters, Primitive):
             ends = np.array([high, low])
             way = [middle + part * (end - middle) for part in share for end in ends]
         else:
-            return explicit_state(self, start)
+            return checked_memory(explicit_state(self, start), self.kind)
         state = np.zeros(self.n_states)
         state[0], state[1], state[2], state[2 + DEPTH] = 1.0, 1.0, low, self.offset
         state[2 + 2 * DEPTH], state[3 + 2 * DEPTH] = low, self.offset
@@ -339,6 +356,10 @@ class PreisachInverse(Inverse, Primitive):
             reached = forward.simulate([middle], initial=start)[0]
             below, above = (middle, above) if reached < first else (below, middle)
         return np.array([*forward.initial_state(np.array([below]), start), 0.0])
+
+    def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
+        """Return the memory before the first sample; see `mckibben.blocks.single.Inverse`."""
+        return checked_memory(super().initial_state(first, initial), self.kind)
 
     def state_from_forward(self, state: Array) -> Array:
         """Return the state that matches a state of the forward model."""

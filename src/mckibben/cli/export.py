@@ -52,6 +52,19 @@ def _loaded(model: Path, inverse: bool) -> Block:
     return block.inverse() if inverse else block
 
 
+def _emulated(block: Block, sample_time: float | None) -> str:
+    from mckibben.errors import ModelError
+    from mckibben.export.c.emulation import emulate as run
+    from mckibben.export.c.project import TOLERANCES
+
+    found = run(block, sample_time=sample_time)
+    if not found.difference <= float(TOLERANCES[True]):
+        raise ModelError(
+            f"{found}: these are not Python's numbers. Remedy: use double precision, or report it."
+        )
+    return str(found)
+
+
 @app.command("c")
 def export_c(
     model: Model,
@@ -63,6 +76,12 @@ def export_c(
     check: Annotated[
         bool, typer.Option("--check", help="Compile it here and run its self-test.")
     ] = False,
+    emulate: Annotated[
+        bool,
+        typer.Option(
+            "--emulate", help="Run it on an emulated Cortex-M4F too, in single precision (QEMU)."
+        ),
+    ] = False,
     overwrite: Overwrite = False,
     as_json: Json = False,
 ) -> None:
@@ -72,8 +91,9 @@ def export_c(
     from mckibben.export.naming import name_from
 
     chosen = name or name_from(model)
+    block = _loaded(model, inverse)
     write_c(
-        _loaded(model, inverse),
+        block,
         out,
         name=chosen,
         sample_time=sample_time,
@@ -81,12 +101,16 @@ def export_c(
         overwrite=overwrite,
     )
     told = self_test(out, chosen) if check else None
+    ran = _emulated(block, sample_time) if emulate else None
     files = sorted(path.relative_to(out).as_posix() for path in out.rglob("*") if path.is_file())
     if as_json:
-        print_json({"folder": str(out), "name": chosen, "files": files, "self_test": told})
+        print_json(
+            {"folder": str(out), "name": chosen, "files": files, "self_test": told}
+            | {"emulation": ran}
+        )
         return
-    if told is not None:
-        print(told)
+    for line in filter(None, (told, ran)):
+        print(line)
     print(f"Written: {out} ({len(files)} files; start with {out / 'README.md'})")
 
 

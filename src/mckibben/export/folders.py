@@ -1,13 +1,20 @@
-"""Folders are written whole: under a temporary name, then renamed."""
+"""Folders are written whole: under a temporary name, then renamed.
+
+Each holds a manifest with a digest of every file, by which a later export knows what it may replace:
+only what an export wrote, and nobody has changed since.
+"""
 
 from __future__ import annotations
 
+import hashlib
 import os
 import shutil
 from collections.abc import Mapping
 from pathlib import Path
 
 from mckibben.errors import DataError
+
+MANIFEST = "manifest.sha256"
 
 
 def write_folder(folder: Path, files: Mapping[str, bytes], *, overwrite: bool = False) -> None:
@@ -20,62 +27,75 @@ def write_folder(folder: Path, files: Mapping[str, bytes], *, overwrite: bool = 
     files : mapping of str to bytes
         Contents by relative path.
     overwrite : bool
-        Whether a folder that is there and not empty may be replaced; only one whose files an export
-        wrote.
+        Whether what an export wrote there before may be replaced.
 
     Raises
     ------
     DataError
-        If there is something of that name and it is not to be replaced, or it cannot be written.
+        If there is something of that name that is not to be replaced, or it cannot be written.
     """
+    folder = folder.absolute()
     if folder.is_symlink() or (folder.exists() and not folder.is_dir()):
         raise DataError(
             "there is a file of that name", file=folder, remedy="name a folder of its own"
         )
-    taken = folder.is_dir() and any(folder.iterdir())
-    if taken and not overwrite:
-        raise DataError(
-            "the folder exists and is not empty", file=folder, remedy="name another, or --overwrite"
-        )
-    if taken:
-        _check_own(folder, files)
-    if not folder.absolute().parent.is_dir():
+    if folder.is_dir() and any(folder.iterdir()):
+        if not overwrite:
+            raise DataError(
+                "the folder exists and is not empty",
+                file=folder,
+                remedy="name another, or --overwrite",
+            )
+        _check_own(folder)
+    if not folder.parent.is_dir():
         raise DataError("its folder does not exist", file=folder, remedy="create the folder first")
-    new = folder.absolute().with_name(f".{folder.absolute().name}.{os.getpid()}.part")
-    old = new.with_suffix(".old")
+    new = folder.with_name(f".{folder.name}.{os.getpid()}.part")
+    old = folder.with_name(f".{folder.name}.{os.getpid()}.old")
     try:
-        for path, content in files.items():
+        for path, content in {**files, MANIFEST: _manifest(files)}.items():
             target = new / path
             target.parent.mkdir(parents=True, exist_ok=True)
             target.write_bytes(content)
         if folder.exists():
-            folder.absolute().rename(old)
-        new.rename(folder.absolute())
+            folder.rename(old)
+        new.rename(folder)
     except OSError as error:
-        if old.exists() and not folder.exists():
-            old.rename(folder.absolute())
         raise DataError(
             f"it cannot be written ({error.strerror or error})",
             file=folder,
             remedy="give a path in a folder that can be written to",
         ) from None
     finally:
+        # whatever happened in between, one of the two is there
+        if old.exists() and not folder.exists():
+            old.rename(folder)
         shutil.rmtree(new, ignore_errors=True)
         shutil.rmtree(old, ignore_errors=True)
 
 
-def _check_own(folder: Path, files: Mapping[str, bytes]) -> None:
-    """Refuse to replace a folder that holds anything that this export would not write itself."""
-    kept = {
-        path.relative_to(folder).as_posix()
-        for path in folder.rglob("*")
-        if path.is_file() or path.is_symlink()
-    }
-    foreign = sorted(kept - set(files))
-    if foreign:
-        raise DataError(
-            f"the folder holds {len(foreign)} file(s) that are not of this export, such as "
-            f"{foreign[0]}",
-            file=folder,
-            remedy="move them away, or name another folder",
-        )
+def _manifest(files: Mapping[str, bytes]) -> bytes:
+    lines = [f"{_digest(content)}  {path}\n" for path, content in sorted(files.items())]
+    return "".join(lines).encode()
+
+
+def _digest(content: bytes) -> str:
+    return hashlib.sha256(content).hexdigest()
+
+
+def _check_own(folder: Path) -> None:
+    """Refuse to replace a folder that holds anything but what an export wrote."""
+    try:
+        lines = (folder / MANIFEST).read_text(encoding="utf-8").splitlines()
+    except (OSError, UnicodeError):
+        lines = []
+    written = {line[66:]: line[:64] for line in lines}
+    found = [path for path in folder.rglob("*") if path.is_file() or path.is_symlink()]
+    for path in sorted(found):
+        name = path.relative_to(folder).as_posix()
+        own = not path.is_symlink() and written.get(name) == _digest(path.read_bytes())
+        if name != MANIFEST and not own:
+            raise DataError(
+                f"{name} in it was not written by an export, or has been changed since",
+                file=folder,
+                remedy="move it away, or name another folder",
+            )

@@ -18,8 +18,14 @@ volatile while bool true false class delete new operator private protected publi
 throw try catch namespace using virtual friend main
 """
 
-RESERVED = frozenset(_WORDS.split())
-"""Words of C and C++, which no model can be named by."""
+_HEADERS = """
+assert complex ctype errno fenv float inttypes iso646 limits locale math mex setjmp signal stdarg
+stdatomic stdbool stddef stdint stdio stdlib string tgmath time uchar wchar unit unit_model fmi2 fmi3
+fmi2_refused fmi3_refused
+"""
+
+RESERVED = frozenset((*_WORDS.split(), *_HEADERS.split()))
+"""Words of C and C++, and headers that a model's own would stand before."""
 
 LONGEST = 40
 
@@ -41,7 +47,8 @@ def identifier(name: str) -> str:
     ):
         raise ModelError(
             f"{name!r:.60} cannot name C functions. Remedy: give --name a letter and then letters, "
-            f"digits or underscores, at most {LONGEST}, no word of C, and not starting with mck."
+            f"digits or underscores, at most {LONGEST}, no word of C or name of its headers, and not "
+            "starting with mck."
         )
     return name
 
@@ -66,5 +73,7 @@ def macros(names: Sequence[str]) -> list[str]:
     found: list[str] = []
     for number, name in enumerate(names, start=1):
         ending = re.sub(r"[^A-Z0-9]+", "_", name.upper()).strip("_") or f"CHANNEL_{number}"
-        found.append(ending if ending not in found else f"{ending}_{number}")
+        while ending in found:
+            ending += f"_{number}"
+        found.append(ending)
     return found

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 import time
+from collections import deque
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
@@ -18,6 +19,9 @@ from numpy.typing import NDArray
 from mckibben.errors import ModelError
 
 Array = NDArray[np.float64]
+
+KEPT = 1_000_000
+"""Steps that statistics are of, at most: the latest."""
 
 SPIN = 0.0005
 """Before a deadline, how long to watch the clock instead of sleeping [s]: sleep is never exact."""
@@ -84,8 +88,8 @@ class FixedRate:
     duration: float = math.inf
     clock: Callable[[], float] = time.perf_counter
     sleep: Callable[[float], None] = time.sleep
-    _lateness: list[float] = field(default_factory=list, init=False, repr=False)
-    _work: list[float] = field(default_factory=list, init=False, repr=False)
+    _lateness: deque[float] = field(default_factory=deque, init=False, repr=False)
+    _work: deque[float] = field(default_factory=deque, init=False, repr=False)
     _missed: int = field(default=0, init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -102,7 +106,8 @@ class FixedRate:
 
     def __iter__(self) -> Iterator[int]:
         """Give the number of every deadline, from 0, at its time."""
-        self._lateness, self._work, self._missed = [], [], 0
+        self._lateness, self._work = deque(maxlen=KEPT), deque(maxlen=KEPT)
+        self._missed = 0
         n = math.inf if math.isinf(self.duration) else round(self.duration / self.period)
         start, number = self.clock(), 0
         while number < n:

@@ -59,9 +59,11 @@ class UDPLink:
     Parameters
     ----------
     peer : (str, int), optional
-        Address to send to; default the one that the last good packet came from.
-    bind : (str, int)
-        Own address; port 0 for any free one.
+        Address to send to, and the only one listened to; default the one that the last good packet
+        came from.
+    bind : (str, int), optional
+        Own address; port 0 for any free one. Default this machine alone, or all of its networks where
+        the peer is on another.
     size : int
         Numbers in each packet that is expected; others are dropped.
     """
@@ -70,12 +72,16 @@ class UDPLink:
         self,
         peer: tuple[str, int] | None = None,
         *,
-        bind: tuple[str, int] = ("127.0.0.1", 0),
+        bind: tuple[str, int] | None = None,
         size: int,
     ) -> None:
         if not 0 < size <= MOST:
             raise DataError(f"a packet of {size} numbers", remedy=f"give 1 to {MOST}")
-        self._peer, self._size = peer, size
+        self._fixed = None if peer is None else (socket.gethostbyname(peer[0]), peer[1])
+        self._peer, self._size = self._fixed, size
+        if bind is None:
+            near = self._fixed is None or self._fixed[0].startswith("127.")
+            bind = ("127.0.0.1" if near else "", 0)
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         try:
             self._socket.bind(bind)
@@ -102,7 +108,7 @@ class UDPLink:
         packet = packed(self._sequence, np.asarray(values, dtype=np.float64).tolist())
         try:
             self._socket.sendto(packet, self._peer)
-        except (ConnectionError, BlockingIOError):
+        except OSError:  # nobody listens, or there is no way there
             self.dropped += 1
 
     def newest(self, timeout: float = 0.0) -> Array | None:
@@ -123,14 +129,22 @@ class UDPLink:
             except ConnectionError:
                 continue
             content = unpacked(packet)
-            if content is None or content[1].size != self._size or not self._is_newer(content[0]):
+            foreign = self._fixed is not None and sender != self._fixed
+            if (
+                foreign
+                or content is None
+                or content[1].size != self._size
+                or not self._is_newer(content[0])
+            ):
                 self.dropped += 1
                 continue
             self._seen, found = content
             self._peer = (str(sender[0]), int(sender[1]))
 
     def _is_newer(self, sequence: int) -> bool:
-        return self._seen < 0 or 0 < (sequence - self._seen) % (2 * HALF) < HALF
+        # a peer that starts again counts from 1
+        restarted = sequence == 1 and self._seen != 1
+        return self._seen < 0 or restarted or 0 < (sequence - self._seen) % (2 * HALF) < HALF
 
     def close(self) -> None:
         """Close the socket."""

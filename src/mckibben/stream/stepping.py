@@ -51,6 +51,8 @@ class Step:
             self._last[:] = outputs
         else:
             self.status = self.BAD_OUTPUT
+            if not np.isfinite(self._stream.state).all():
+                self._stream.reset()  # the memory is lost: the next step starts it afresh
         return self._last.copy()
 
     def reset(self) -> None:

@@ -121,7 +121,7 @@ class CompiledModel:
         options: Sequence[str] = (),
     ) -> None:
         sources = sorted((folder / "src").glob("*.c"))
-        single = "MCK_FLOAT32" in (folder / "src" / "mck_precision.h").read_text()
+        single = "MCK_FLOAT32" in (folder / "src" / "mck_config.h").read_text()
         self._type = np.float32 if single else np.float64
         self._n_inputs, self._n_outputs = n_inputs, n_outputs
         with tempfile.TemporaryDirectory() as place:

@@ -19,7 +19,7 @@ from mckibben.export.c.wiring import Wiring
 USUAL_TRIALS, MOST_TRIALS = 12, 600
 """Of an inverse solved by bracketing: on smooth references, and at worst."""
 
-USUAL_NEWTON, MOST_NEWTON = 3, 40
+USUAL_NEWTON, MOST_NEWTON = 3, 60
 """Steps of Newton's method, on smooth references and at worst."""
 
 

@@ -68,6 +68,16 @@ class Emulated:
         """Largest difference from Python, relative to the range of each output."""
         return float((np.abs(self.outputs - self.expected.outputs) / self.expected.ranges).max())
 
+    def __str__(self) -> str:
+        """Return one sentence."""
+        steps = self.instructions[1:]
+        return (
+            f"on an emulated Cortex-M4F: largest difference {self.difference:.2g} of the range, "
+            f"{np.median(steps):.0f} instructions a step, at most {steps.max():.0f}, the first "
+            f"{self.instructions[0]:.0f}; {self.ram} bytes of RAM, {self.stack} of stack, "
+            f"{self.flash} of flash"
+        )
+
 
 def missing_tools() -> list[str]:
     """Return the programs that emulation needs and this machine has not."""

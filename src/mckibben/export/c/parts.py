@@ -70,6 +70,32 @@ class Part:
         return self.block.n_states > 0
 
 
+def starts_at_rest(block: Block) -> bool:
+    """Tell whether a part's first output is the same at any sample time."""
+    return not block.rate_dependent or _starting(block) == "first_sample"
+
+
+def check_single(block: Block) -> None:
+    """Refuse places that single precision cannot tell apart.
+
+    Raises
+    ------
+    ModelError
+        If two knots, levels or thresholds that follow one another become one.
+    """
+    owners = [block, getattr(block, "forward", None)]
+    owners += [getattr(owner, side, None) for owner in owners[:2] for side in ("rising", "falling")]
+    for owner in owners:
+        for name in ("knots", "values", "levels", "thresholds", "breakaways"):
+            places = getattr(owner, name, ())
+            flat = places if all(isinstance(place, float) for place in places) else ()
+            if np.any(np.diff(np.array(flat, dtype=np.float32)) <= 0) and np.all(np.diff(flat) > 0):
+                raise ModelError(
+                    f"{name} of {block.kind!r} are too close for single precision. "
+                    "Remedy: export in double precision, or identify with fewer of them."
+                )
+
+
 def part_of(block: Block, sample_time: float | None) -> Part:
     """Return a block as a part.
 
@@ -95,7 +121,7 @@ def part_of(block: Block, sample_time: float | None) -> Part:
 
 def _starting(block: Block) -> object:
     """Return the rule, or the memory itself, that a block starts from."""
-    for owner in (block, getattr(block, "forward", None)):
+    for owner in (block, *(getattr(block, name, None) for name in ("forward", "friction"))):
         start = getattr(owner, "initial", None)
         if start is not None:
             return start

@@ -15,7 +15,8 @@ from mckibben.blocks.saving import to_dict
 from mckibben.errors import ModelError
 from mckibben.export.c.costs import cost_of
 from mckibben.export.c.literals import literal, rows
-from mckibben.export.c.parts import PRIMITIVES
+from mckibben.export.c.parts import PRIMITIVES, check_single
+from mckibben.export.c.rounding import warn_of_rounding
 from mckibben.export.c.vectors import Vectors, vectors
 from mckibben.export.c.wiring import Call, Wiring
 from mckibben.export.folders import write_folder
@@ -110,13 +111,15 @@ def test_content(tests: Vectors, *, single: bool) -> dict[str, Any]:
 def source_files(content: Mapping[str, Any]) -> dict[str, str]:
     """Return the C of a model and of the primitives that it uses, text by path."""
     name, primitives = content["name"], content["primitives"]
-    precision = "#define MCK_FLOAT32\n" if content["single"] else ""
-    about = "/* Whether numbers are float instead of double. */\n"
+    texts = {path.name: path.read_text(encoding="utf-8") for path in primitives}
+    headers = "".join(text for file, text in texts.items() if file.endswith(".h"))
+    functions = re.findall(r"^\w[\w ]*\b\*?(mck_\w+)\(", headers, flags=re.M)
+    exported = {**content, "functions": sorted(set(functions))}
     return {
         f"src/{name}.h": render("model.h.j2", content),
         f"src/{name}.c": render("model.c.j2", content),
-        "src/mck_precision.h": about + precision,
-        **{f"src/{path.name}": path.read_text(encoding="utf-8") for path in primitives},
+        "src/mck_config.h": render("mck_config.h.j2", exported),
+        **{f"src/{file}": text for file, text in texts.items()},
     }
 
 
@@ -129,6 +132,10 @@ def described(
     identifier(name)
     step = checked_sample_time(block, sample_time)
     wiring = Wiring(block, step)
+    if single:
+        for call in wiring.calls:
+            check_single(call.part.block)
+            warn_of_rounding(call.part.block, step)
     primitives = primitives_of(wiring.calls)
     if name.lower() in {path.stem for path in primitives}:
         raise ModelError(
@@ -154,6 +161,7 @@ def described(
         "calls": calls,
         "kinds": [call["kind"] for call in calls],
         "steps": [order[id(item)] if isinstance(item, Call) else item for item in wiring.steps],
+        "stateful": [call for call in calls if call["n_states"]],
         "given": wiring.outputs,
         "n_signals": wiring.n_signals,
         "n_numbers": n_numbers,
@@ -218,7 +226,7 @@ def primitives_of(calls: list[Call]) -> list[Path]:
         elif path.with_suffix(".c").is_file():
             wanted.append(path.with_suffix(".c"))
         for name in re.findall(r'#include "(\w+\.h)"', path.read_text(encoding="utf-8")):
-            if name != "mck_precision.h":
+            if name != "mck_config.h":
                 own = path.with_name(name)
                 wanted.append(own if own.is_file() else PRIMITIVES / name)
     return [found[name] for name in sorted(found)]

@@ -10,7 +10,7 @@ from mckibben.blocks.base import Block
 from mckibben.blocks.compose import Parallel, PerChannel, Series
 from mckibben.blocks.feedforward_feedback import FeedforwardFeedback
 from mckibben.errors import ModelError
-from mckibben.export.c.parts import Part, part_of
+from mckibben.export.c.parts import Part, part_of, starts_at_rest
 
 DEEPEST = 50
 """Compositions in compositions."""
@@ -87,7 +87,13 @@ class Wiring:
     def _series(self, block: Series, given: Sequence[str], depth: int) -> list[str]:
         by_name = dict(zip((channel.name for channel in block.inputs), given, strict=True))
         signals: list[str] | None = None
-        for part in block.parts:
+        for number, part in enumerate(block.parts):
+            if number < len(block.parts) - 1 and not starts_at_rest(part):
+                raise ModelError(
+                    f"{part.kind!r} starts from a memory of its own and depends on the rate, so parts "
+                    "behind it would start from another sample than in Python. Remedy: start it from "
+                    "'first_sample'."
+                )
             scheduled = [by_name[name] for name in part.scheduling]
             n_driven = len(part.inputs) - len(scheduled)
             driven = list(given[:n_driven]) if signals is None else signals

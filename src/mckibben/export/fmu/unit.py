@@ -104,11 +104,17 @@ def export_fmu(
         raise DataError("an FMU is a file that ends in .fmu", file=path, remedy="name it so")
     if path.exists() and not overwrite:
         raise DataError("the file exists already", file=path, remedy="name another, or --overwrite")
-    wanted = buildable() if platforms is None else list(platforms)
+    offered = [name for name in buildable() if version == "3.0" or PLATFORMS[name].fmi2]
+    wanted = offered if platforms is None else list(platforms)
     unknown = [platform for platform in wanted if platform not in PLATFORMS]
     if unknown:
         raise ModelError(
             f"there is no platform {unknown[0]!r}. Remedy: use one of {', '.join(PLATFORMS)}."
+        )
+    nameless = [name for name in wanted if version == "2.0" and not PLATFORMS[name].fmi2]
+    if nameless:
+        raise ModelError(
+            f"FMI 2.0 has no name for {nameless[0]}. Remedy: ask for FMI 3.0, or other platforms."
         )
     if platforms is None and not wanted:
         raise ModelError(

@@ -15,7 +15,7 @@
 
 #include <math.h>
 
-#include "mck_precision.h"
+#include "mck_config.h"
 
 #ifdef __FAST_MATH__
 #error "compile without -ffast-math: infinity, NaN and the order of operations have a meaning here"

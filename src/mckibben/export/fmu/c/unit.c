@@ -2,6 +2,8 @@
 
 #include <math.h>
 
+#define MOST_STEPS 1e7 /* of the model in one communication step */
+
 static const double first_inputs[UNIT_N_INPUTS] = UNIT_START;
 
 void unit_reset(unit *self)
@@ -35,12 +37,15 @@ static void take_step(unit *self)
 
 int unit_advance(unit *self, double time, double h)
 {
-    if (!(h > 0.0) || !isfinite(h) || !isfinite(time)) {
+    if (!(h > 0.0) || !isfinite(h) || !isfinite(time) || time < self->time - 1e-6 * (h + 1.0)) {
         return 0;
     }
 #ifdef UNIT_SAMPLE_TIME
     /* a hair early is in time: importers add up their steps */
     const double due = floor((time + h - self->start) / UNIT_SAMPLE_TIME + 1e-6);
+    if (due - self->steps > MOST_STEPS) {
+        return 0;
+    }
     while (self->steps < due) {
         take_step(self);
     }

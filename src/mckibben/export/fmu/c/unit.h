@@ -22,7 +22,7 @@ typedef struct {
 void unit_reset(unit *self);
 
 /* Go on by h. A model with a sample time takes the steps that are due by then; one without takes one
- * step. Returns 0 where time goes back or by nothing. */
+ * step. Returns 0 where time goes back or by nothing, or by more than can be meant. */
 int unit_advance(unit *self, double time, double h);
 
 /* Both return 0 where there is no such variable. */

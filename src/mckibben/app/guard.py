@@ -63,11 +63,14 @@ class Guard:
             await _answer(send, 403, reason, [])
 
     def _objection(self, headers: dict[str, str]) -> str | None:
-        host = urlsplit(f"//{headers.get('host', '')}").hostname
+        try:
+            host = urlsplit(f"//{headers.get('host', '')}").hostname
+        except ValueError:
+            host = None
         if self.hosts is not None and host not in self.hosts:
             return "This address is not the workbench's."
         origin = headers.get("origin")
-        if origin is not None and urlsplit(origin).netloc != headers.get("host"):
+        if origin is not None and origin.partition("://")[2] != headers.get("host"):
             return "Another page may not use the workbench."
         return None
 

@@ -4,26 +4,31 @@ from __future__ import annotations
 
 import contextlib
 import socket
+import threading
 from collections.abc import Callable
+from importlib import import_module
 from pathlib import Path
-from types import ModuleType
 
 from nicegui import app, ui
 
+from mckibben import registry
 from mckibben.app.desk import Desk, named
 from mckibben.app.guard import LOCAL, Guard, new_token
 from mckibben.app.jobs import Job, Jobs
-from mckibben.app.pages import compensate, data, look, models, takeaway
 from mckibben.app.workspace import Workspace
 from mckibben.errors import DataError
 
-PAGES: dict[str, tuple[str, ModuleType]] = {
-    "Data": ("folder_open", data),
-    "Look": ("timeline", look),
-    "Models": ("leaderboard", models),
-    "Compensate": ("sync_alt", compensate),
-    "Take away": ("download", takeaway),
+PAGES = {
+    "Data": ("folder_open", "data"),
+    "Look": ("timeline", "look"),
+    "Models": ("leaderboard", "models"),
+    "Compensate": ("sync_alt", "compensate"),
+    "Take away": ("download", "takeaway"),
 }
+"""Icon and module of each page; a module is loaded when its page is opened, or nothing else is to do."""
+
+IDLE = 1.0
+"""After the first page is there, when to load what the others need [s]."""
 
 HEAD = """
 <style>:focus-visible { outline: 2px solid #56b4e9; outline-offset: 2px }</style>
@@ -60,7 +65,8 @@ def build(workspace: Workspace, jobs: Jobs) -> None:
         ui.button(icon="contrast", on_click=lambda: _switch(desk, dark)).props(
             'flat dense color=white aria-label="Light or dark"'
         )
-    with ui.tab_panels(tabs, value=tab["Data"]).classes("w-full bg-transparent") as panels:
+    panels = ui.tab_panels(tabs, value=tab["Data"], animated=False)
+    with panels.classes("w-full bg-transparent"):
         built: set[str] = set()
         holders = {}
         for name in PAGES:
@@ -124,7 +130,7 @@ def _fill(desk: Desk, name: str, holders: dict[str, ui.column], built: set[str])
     if name in PAGES and name not in built:
         built.add(name)
         with holders[name]:
-            PAGES[name][1].build(desk)
+            import_module(f"mckibben.app.pages.{PAGES[name][1]}").build(desk)
 
 
 def _log(desk: Desk) -> None:
@@ -144,6 +150,19 @@ def _log(desk: Desk) -> None:
         shown()
 
 
+def _load_the_rest() -> None:
+    """Load what all pages need, in a thread, so that opening one does not wait for it."""
+    for _, module in PAGES.values():
+        import_module(f"mckibben.app.pages.{module}")
+    import_module("mckibben.app.preloaded")
+    for name in registry.names("estimators"):
+        registry.load("estimators", name)
+
+
+def _print(text: str) -> None:
+    print(text, flush=True)
+
+
 def serve(
     folder: str | Path,
     *,
@@ -151,7 +170,7 @@ def serve(
     port: int = 8750,
     token: str | None = None,
     show: bool = True,
-    announce: Callable[[str], None] = print,
+    announce: Callable[[str], None] = _print,
 ) -> None:
     """Serve the workbench over a workspace until it is stopped.
 
@@ -168,7 +187,7 @@ def serve(
     show : bool
         Whether to open the page in a browser.
     announce : callable
-        Told the address.
+        Told the address when the server starts.
 
     Raises
     ------
@@ -185,11 +204,17 @@ def serve(
     app.add_middleware(Guard, host=host, token=token)
     app.on_shutdown(jobs.close)
 
+    idle = threading.Timer(IDLE, _load_the_rest)
+    idle.daemon = True
+
     @ui.page("/", title="mckibben")
     def page() -> None:
         build(workspace, jobs)
+        if not idle.is_alive() and not idle.finished.is_set():
+            idle.start()
 
-    announce(f"Workbench over {workspace.folder}: {address} (Ctrl-C ends it)")
+    told = f"Workbench over {workspace.folder}: {address} (Ctrl-C ends it)"
+    app.on_startup(lambda: announce(told))
     with contextlib.suppress(KeyboardInterrupt):
         ui.run(
             host=host,

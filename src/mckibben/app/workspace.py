@@ -12,14 +12,14 @@ import time
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from mckibben.atomic import replacing, write_text
-from mckibben.blocks.base import Block
-from mckibben.blocks.saving import load
 from mckibben.errors import DataError, MckibbenError
-from mckibben.files import read, write
-from mckibben.recording import Recording
+
+if TYPE_CHECKING:  # loaded when they are first used, so that the page is there at once
+    from mckibben.blocks.base import Block
+    from mckibben.recording import Recording
 
 Role = Literal["train", "test", "unused"]
 
@@ -190,6 +190,8 @@ class Workspace:
         name: str | None = None,
     ) -> Entry:
         """Keep a recording."""
+        from mckibben.files import write
+
         chosen = self.new_name("recordings", name or recording.name)
         path = self._recording_path(chosen, len(recording))
         write(recording.with_meta(name=chosen), path)
@@ -259,6 +261,8 @@ class Workspace:
 
     def recording(self, name: str) -> Recording:
         """Return a recording; it is read once."""
+        from mckibben.files import read
+
         path = self.entry(name).path
         changed = path.stat().st_mtime
         kept = self._read.get(path)
@@ -300,6 +304,8 @@ class Workspace:
         ModelError
             If it is missing or damaged.
         """
+        from mckibben.blocks.saving import load
+
         return load(self.path("models", f"{name}.json"))
 
     def results(self) -> list[dict[str, Any]]:

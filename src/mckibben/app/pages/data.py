@@ -3,20 +3,20 @@
 from __future__ import annotations
 
 import asyncio
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from nicegui import ui
 from nicegui.events import UploadEventArguments
 
 from mckibben import registry
-from mckibben.app import plots, scripts
+from mckibben.app import scripts
 from mckibben.app.desk import Desk, guarded, named, on_event, tell
 from mckibben.app.workspace import LARGEST_UPLOAD
 from mckibben.errors import DataError, MckibbenError
-from mckibben.files import formats, read
-from mckibben.files.table import Column
-from mckibben.recording import Recording
-from mckibben.report import subjects
+
+if TYPE_CHECKING:
+    from mckibben.files.table import Column
+    from mckibben.recording import Recording
 
 EXAMPLE = "field-models"
 """Protocol whose runs are the example."""
@@ -115,6 +115,8 @@ async def _uploaded(desk: Desk, event: UploadEventArguments) -> None:
 
 async def _take(desk: Desk, kept: str, shown: str, options: dict[str, Any]) -> bool:
     """Read an uploaded file and add its recordings; where that fails, ask how it is to be read."""
+    from mckibben.files import read
+
     path = desk.workspace.path("uploads", kept)
     try:
         recordings = await asyncio.to_thread(lambda: read(path, informative=False, **options))
@@ -135,6 +137,8 @@ async def _ask(
     desk: Desk, kept: str, shown: str, options: dict[str, Any], error: MckibbenError
 ) -> None:
     """Show why a file could not be read, what is in it, and let columns and units be named."""
+    from mckibben.files import formats
+
     path = desk.workspace.path("uploads", kept)
     try:
         tables = await asyncio.to_thread(formats.tables, path)
@@ -304,6 +308,9 @@ def time_plot(
     part: dict[str, float] | None = None,
 ) -> None:
     """Plot channels over time; panning and zooming thin the samples anew, on the server."""
+    from mckibben.app import plots
+    from mckibben.report import subjects
+
     drawing = subjects.time_course([recording], channels, plots.POINTS)
     (figure,) = plots.figures(drawing, dark=desk.dark, height=170 * len(channels) + 60)
     figure["layout"]["dragmode"] = "zoom" if part is None else "select"

@@ -1,0 +1,115 @@
+"""How quick the workbench is: first paint, clicks while two fits run, pan and zoom of a million samples.
+
+    python benchmarks/workbench.py
+
+Wants Debian's chromium. Takes about a minute.
+"""
+
+from __future__ import annotations
+
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from playwright.sync_api import Error, sync_playwright
+
+import mckibben
+
+CHROMIUM = "/usr/bin/chromium"
+OPTIONS = [
+    "--no-sandbox",
+    "--disable-dev-shm-usage",
+    "--disable-gpu",
+    "--disable-background-networking",
+]
+SAMPLES = 1_000_000
+
+ZOOM = """async ([low, high]) => {
+  const plot = document.querySelector('[data-testid=preview-plot]');
+  const {Plotly} = await import('nicegui-plotly');
+  const start = performance.now();
+  const redrawn = new Promise(
+    done => plot.once('plotly_restyle', () => done(performance.now() - start)));
+  await Plotly.relayout(plot, {'xaxis.range[0]': low, 'xaxis.range[1]': high});
+  return await redrawn;
+}"""
+
+
+def recording(path: Path) -> None:
+    """Write a recording of a million samples."""
+    rng = np.random.default_rng(0)
+    t = np.arange(SAMPLES) * 0.001
+    pressure = 2.5 - 2 * np.cos(2 * np.pi * t / 7) * np.cos(2 * np.pi * t / 311)
+    displacement = 6 * pressure + 0.05 * rng.normal(size=SAMPLES)
+    channels = {"pressure": pressure, "displacement": displacement}
+    mckibben.write(mckibben.Recording(channels, 0.001), path)
+
+
+def told(what: str, seconds: list[float], target: float) -> None:
+    middle, worst = statistics.median(seconds), max(seconds)
+    print(f"{what}: median {middle:.3f} s, at most {worst:.3f} s (target {target} s)")
+
+
+def walk(page: Any, address: str, started: float, folder: Path) -> None:
+    while True:
+        opened = time.perf_counter()
+        try:
+            page.goto(address)
+            break
+        except Error:  # not listening yet
+            time.sleep(0.02)
+    page.get_by_test_id("example").wait_for()
+    told("first paint after the page was opened", [time.perf_counter() - opened], 2.0)
+    told("first paint after the command was started", [time.perf_counter() - started], 2.0)
+
+    recording(folder / "long.parquet")
+    page.locator("input[type=file]").first.set_input_files(str(folder / "long.parquet"))
+    page.get_by_test_id("recording-long").wait_for()
+    page.get_by_role("button", name="Show long").click()
+    time.sleep(3)
+    zooms = [page.evaluate(ZOOM, [40 * k, 40 * k + 30 * (1 + k % 4)]) / 1e3 for k in range(20)]
+    told(f"pan and zoom of {SAMPLES} samples", zooms, 0.3)
+
+    page.get_by_role("button", name="Remove long").click()
+    page.get_by_test_id("example").click()
+    page.get_by_test_id("recording-irregular-triangle").wait_for(timeout=60_000)
+    page.get_by_test_id("tab-models").click()
+    page.get_by_test_id("fit").click()
+    time.sleep(3)
+    clicks = []
+    for _ in range(10):
+        for name, sign in (("tab-data", "upload"), ("tab-models", "fit")):
+            start = time.perf_counter()
+            page.get_by_test_id(name).click()
+            page.get_by_test_id(sign).wait_for()
+            clicks.append(time.perf_counter() - start)
+    busy = page.get_by_test_id("busy").inner_text()
+    told(f"change of page while fits run ({busy or 'they had ended'})", clicks, 0.2)
+
+
+def main() -> None:
+    with tempfile.TemporaryDirectory() as place, sync_playwright() as play:
+        browser = play.chromium.launch(executable_path=CHROMIUM, args=OPTIONS)
+        page = browser.new_page(viewport={"width": 1280, "height": 900})
+        started = time.perf_counter()
+        command = [sys.executable, "-m", "mckibben.cli.main", "app", str(Path(place) / "ws")]
+        process = subprocess.Popen(
+            [*command, "--port", "0", "--no-show"], stdout=subprocess.PIPE, text=True
+        )
+        assert process.stdout is not None
+        address = next(w for w in process.stdout.readline().split() if w.startswith("http"))
+        try:
+            walk(page, address, started, Path(place))
+        finally:
+            process.terminate()
+            process.wait()
+            browser.close()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,197 @@
+"""Jobs run in processes of their own, can be cancelled, and lose nothing that was finished."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from mckibben import Recording
+from mckibben.app.jobs import Jobs, parse_settings
+from mckibben.app.workspace import Workspace
+from mckibben.rigs import load_rig
+from mckibben.signals import decaying_triangle
+
+PATIENCE = 120.0
+
+KILLS = int(os.environ.get("MCKIBBEN_KILLS", "3"))
+"""How often the workbench is killed at a random moment."""
+
+
+def filled(folder: Path) -> Workspace:
+    """Return a workspace with a short recording to train on."""
+    workspace = Workspace(folder)
+    time_ = np.arange(600) * 0.1
+    pressure = decaying_triangle(time_, period=10.0, high=5.0, low=1.0)
+    found = load_rig("mas20-hanging").run(Recording({"pressure": pressure}, 0.1))
+    workspace.add(found, origin="a test", call="", name="run")
+    return workspace
+
+
+def fit(model: str, name: str, **settings: Any) -> dict[str, Any]:
+    channels = {"input": "pressure", "output": "displacement"}
+    return {"model": model, "name": name, "settings": settings, "title": name} | channels
+
+
+def wait(jobs: Jobs) -> None:
+    until = time.monotonic() + PATIENCE
+    while jobs.active():
+        assert time.monotonic() < until, "the jobs do not end"
+        jobs.poll()
+        time.sleep(0.05)
+
+
+def test_a_fit_leaves_a_model_and_its_figures(tmp_path: Path) -> None:
+    workspace = filled(tmp_path)
+    jobs = Jobs(workspace, at_once=1)
+    job = jobs.submit("fit", fit("gpi", "first"))
+    wait(jobs)
+    assert (job.state, job.message[:9]) == ("done", "test RMSE")
+    assert workspace.model("first").kind == "gpi"
+    (row,) = workspace.results()
+    assert row["test"]["rmse"] > 0
+    assert row["test"]["rmse_interval"][0] <= row["test"]["rmse"] <= row["test"]["rmse_interval"][1]
+    told = jobs.progress(job.name)
+    assert told[0][1] == 0.0
+    assert any(np.isfinite(cost) for _, _, cost in told)
+
+
+def test_failures_say_why(tmp_path: Path) -> None:
+    workspace = filled(tmp_path)
+    jobs = Jobs(workspace, at_once=2)
+    bad = jobs.submit("fit", fit("gpi", "a", n_operators=-1))
+    none = jobs.submit("fit", fit("pi", "b") | {"input": "voltage"})
+    wait(jobs)
+    assert bad.state == none.state == "failed"
+    assert "n_operators" in bad.message
+    assert "voltage" in none.message
+    assert workspace.results() == []
+
+
+def test_cancelled_at_once_and_restarted(tmp_path: Path) -> None:
+    workspace = filled(tmp_path)
+    jobs = Jobs(workspace, at_once=1)
+    slow = jobs.submit("fit", fit("gpi", "slow", method="pso"))
+    waiting = jobs.submit("fit", fit("pi", "quick"))
+    while slow.state != "running":
+        jobs.poll()
+    started = time.monotonic()
+    jobs.cancel(slow.name)
+    assert time.monotonic() - started < 3.0
+    assert slow.state == "cancelled"
+    wait(jobs)
+    assert waiting.state == "done"
+    assert workspace.models() == ["quick"]
+    jobs.forget(slow.name)
+    assert slow.name not in Jobs(workspace).jobs
+
+
+def test_a_protocol_is_recorded(tmp_path: Path) -> None:
+    workspace = Workspace(tmp_path)
+    jobs = Jobs(workspace)
+    jobs.submit("record", {"protocol": "field-models", "runs": ["decaying-triangle"]})
+    wait(jobs)
+    (entry,) = workspace.entries()
+    assert entry.role == "train"
+    assert "mas20-hanging" in entry.origin
+
+
+SCRIPT = """
+import sys, time
+from mckibben.app.jobs import Jobs
+from mckibben.app.workspace import Workspace
+from tests.app.test_jobs import fit
+workspace = Workspace(sys.argv[1])
+jobs = Jobs(workspace, at_once=2)
+if __name__ == "__main__":
+    for number in range(6):
+        jobs.submit("fit", fit("pi", f"m{number}", n_operators=5 + number))
+    print("ready", flush=True)
+    while jobs.active():
+        jobs.poll()
+        time.sleep(0.02)
+    time.sleep(60)
+"""
+
+
+def killed(folder: Path, after: float) -> None:
+    """Start a batch of fits, and kill the workbench after a time."""
+    script = folder.parent / "batch.py"
+    script.write_text(SCRIPT)
+    process = subprocess.Popen(
+        [sys.executable, str(script), str(folder)],
+        stdout=subprocess.PIPE,
+        env=os.environ | {"PYTHONPATH": str(Path(__file__).parents[2])},
+    )
+    assert process.stdout is not None
+    process.stdout.readline()
+    time.sleep(after)
+    process.send_signal(signal.SIGKILL)
+    process.wait()
+    process.stdout.close()
+
+
+def check_after_kill(folder: Path) -> int:
+    """Demand that everything finished is there and whole; return how many fits were finished."""
+    workspace = Workspace(folder)
+    finished = 0
+    for name in workspace.names("jobs"):
+        content = workspace.read_json("jobs", name)
+        assert content is not None, f"{name} is damaged"
+        if content["state"] == "done":
+            finished += 1
+            model = content["given"]["name"]
+            assert workspace.model(model).kind == "pi"
+            result = workspace.read_json("results", model)
+            assert result is not None
+            assert result["test"]["rmse"] > 0
+    for name in workspace.names("models"):
+        assert workspace.model(name).kind == "pi"
+    for name in workspace.names("results"):
+        assert workspace.read_json("results", name) is not None
+    assert len(workspace.with_role("train")) == 1
+    reopened = Jobs(workspace)
+    assert {job.state for job in reopened.jobs.values()} <= {"done", "interrupted"}
+    return finished
+
+
+def test_killed_while_it_fits_it_keeps_what_was_finished(tmp_path: Path) -> None:
+    rng = np.random.default_rng(0)
+    counts = []
+    for round_, after in enumerate(rng.uniform(0.5, 9.0, KILLS)):
+        folder = tmp_path / f"{round_}" / "ws"
+        folder.parent.mkdir()
+        filled(folder)
+        killed(folder, float(after))
+        counts.append(check_after_kill(folder))
+    assert max(counts) > 0
+
+
+def test_jobs_end_with_the_workbench(tmp_path: Path) -> None:
+    folder = tmp_path / "ws"
+    filled(folder)
+    killed(folder, 1.0)
+    time.sleep(2.5)
+    before = sorted(path.name for path in (folder / "results").iterdir())
+    time.sleep(2.0)
+    assert sorted(path.name for path in (folder / "results").iterdir()) == before
+
+
+@pytest.mark.parametrize(
+    ("text", "settings"),
+    [
+        ("", {}),
+        ("n_operators=12", {"n_operators": 12}),
+        ("a=1\nb=true, c=word", {"a": 1, "b": True, "c": "word"}),
+        ("broken", {"broken": ""}),
+    ],
+)
+def test_settings_are_read_from_lines(text: str, settings: dict[str, Any]) -> None:
+    assert parse_settings(text) == settings

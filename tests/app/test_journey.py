@@ -1,0 +1,208 @@
+"""A real browser walks the whole way, from the example to a C folder, and asks nobody else."""
+
+from __future__ import annotations
+
+import io
+import os
+import shutil
+import subprocess
+import sys
+import time
+import urllib.request
+import zipfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+playwright = pytest.importorskip("playwright.sync_api")
+
+BROWSER = shutil.which("chromium")
+SLOW = 90_000
+"""Milliseconds to wait for fits on a busy machine."""
+
+OPTIONS = [
+    "--no-sandbox",
+    "--disable-dev-shm-usage",
+    "--disable-gpu",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+]
+
+pytestmark = pytest.mark.skipif(BROWSER is None, reason="there is no chromium")
+
+
+@pytest.fixture
+def address(tmp_path: Path) -> Iterator[str]:
+    """Start the workbench on a free port, and give its address."""
+    command = [sys.executable, "-m", "mckibben.cli.main", "app", str(tmp_path / "ws")]
+    plain = {name: value for name, value in os.environ.items() if "PYTEST" not in name}
+    process = subprocess.Popen(
+        [*command, "--port", "0", "--no-show"], stdout=subprocess.PIPE, text=True, env=plain
+    )
+    assert process.stdout is not None
+    line = process.stdout.readline()
+    assert "Workbench over" in line, line
+    address = next(word for word in line.split() if word.startswith("http"))
+    answering(address)
+    yield address
+    process.terminate()
+    process.wait(20)
+    process.stdout.close()
+
+
+def answering(address: str) -> None:
+    """Wait until the server answers."""
+    for _ in range(200):
+        try:
+            urllib.request.urlopen(address, timeout=5).close()
+        except OSError:
+            time.sleep(0.05)
+        else:
+            return
+    raise AssertionError("the workbench does not answer")
+
+
+@pytest.fixture
+def page(address: str) -> Iterator[Any]:
+    """Open the workbench in a browser that tells of foreign requests and errors."""
+    with playwright.sync_playwright() as play:
+        browser = play.chromium.launch(executable_path=BROWSER, args=OPTIONS)
+        page = browser.new_page(viewport={"width": 1280, "height": 900})
+        foreign: list[str] = []
+        errors: list[str] = []
+
+        def asked(request: Any) -> None:
+            if not request.url.startswith((address, "data:", "blob:")):
+                foreign.append(request.url)
+
+        page.on("request", asked)
+        page.on("console", lambda said: errors.append(said.text) if said.type == "error" else None)
+        page.on("pageerror", lambda error: errors.append(str(error)))
+        page.goto(address)
+        yield page
+        browser.close()
+        assert foreign == []
+        assert errors == []
+
+
+def seen(page: Any, name: str, timeout: float = SLOW) -> Any:
+    place = page.get_by_test_id(name).first
+    place.wait_for(timeout=timeout)
+    return place
+
+
+def downloaded(page: Any, name: str) -> bytes:
+    with page.expect_download(timeout=SLOW) as download:
+        seen(page, name).click()
+    return Path(download.value.path()).read_bytes()
+
+
+def test_from_the_example_to_a_c_folder(page: Any, tmp_path: Path) -> None:
+    assert "Nothing here yet" in seen(page, "empty").inner_text()
+    seen(page, "example").click()
+    seen(page, "recording-irregular-triangle")
+    seen(page, "preview-plot")
+
+    seen(page, "tab-look").click()
+    seen(page, "loop-plot")
+    page.get_by_text("asymmetric loop").wait_for(timeout=SLOW)
+
+    seen(page, "tab-models").click()
+    seen(page, "models").click()
+    for name in ("cpi", "mpi", "preisach"):
+        page.get_by_role("option", name=f"{name}: ").click()
+    page.keyboard.press("Escape")
+    seen(page, "fit").click()
+    seen(page, "leaderboard").get_by_text("gpi").wait_for(timeout=SLOW)
+    seen(page, "closer-0")
+
+    seen(page, "tab-compensate").click()
+    seen(page, "wave").click()
+    page.wait_for_function(
+        "document.querySelector('[data-testid=points]').value.split('\\n').length > 10"
+        " || [...document.querySelectorAll('textarea')].some(t => t.value.split('\\n').length > 10)"
+    )
+    seen(page, "show-pressures").click()
+    seen(page, "pressure-plot")
+    seen(page, "run-loop").click()
+    page.get_by_test_id("runs").get_by_text("feedforward-pid").first.wait_for(timeout=SLOW)
+
+    seen(page, "tab-take").click()
+    with zipfile.ZipFile(io.BytesIO(downloaded(page, "take-c"))) as archive:
+        names = archive.namelist()
+        archive.extractall(tmp_path)
+    assert any(name.endswith("CMakeLists.txt") for name in names)
+    if shutil.which("cc"):
+        from mckibben.export.c.building import self_test
+
+        folder = tmp_path / names[0].split("/")[0]
+        assert "largest difference" in self_test(folder, folder.name.removesuffix("-c"))
+    assert downloaded(page, "take-json").startswith(b'{\n  "format": "mckibben-model"')
+    assert b"mckibben.compare" in downloaded(page, "take-script")
+    assert downloaded(page, "take-figure").startswith(b"%PDF")
+    seen(page, "take-report").click()
+    assert b"<html" in downloaded(page, "get-report")
+    assert "models=" in page.locator("body").inner_text()
+
+
+def upload(page: Any, name: str, content: bytes) -> None:
+    page.locator("input[type=file]").first.set_input_files(
+        {"name": name, "mimeType": "text/csv", "buffer": content}
+    )
+
+
+def test_a_file_that_needs_help_is_mapped_by_hand(page: Any) -> None:
+    t = np.arange(200) * 0.05
+    rows = [f"{a:.3f};{300 + 100 * np.sin(a):.3f};{10 * np.cos(a):.3f}" for a in t]
+    seen(page, "upload")
+    upload(page, "rig.csv", ("t_s;P1;laser\n" + "\n".join(rows)).encode())
+    problem = seen(page, "problem").inner_text()
+    assert "Remedy" in problem
+    for channel, column in (("pressure", "P1"), ("displacement", "laser")):
+        page.get_by_test_id(f"column-{channel}").click()
+        page.get_by_role("option", name=column, exact=True).click()
+    page.get_by_label("Unit").nth(1).fill("kPa")
+    page.get_by_label("Unit").nth(2).fill("mm")
+    seen(page, "read-again").click()
+    assert "pressure [bar]" in seen(page, "recording-rig").inner_text()
+
+
+@pytest.mark.parametrize(
+    ("name", "content"),
+    [
+        ("../../evil.csv", b"pressure_bar,displacement_mm\n1,2\n"),
+        ("empty.csv", b"\n"),
+        ("<img src=x onerror=alert(1)>.csv", b"a,b\nx,y\n"),
+        ("noise.mat", bytes(range(256)) * 20),
+        ("bomb.parquet", b"PAR1" + b"\0" * 100),
+    ],
+)
+def test_hostile_files_get_a_message(page: Any, name: str, content: bytes) -> None:
+    seen(page, "upload")
+    upload(page, name, content)
+    page.get_by_text("Remedy").first.wait_for(timeout=20_000)
+    assert seen(page, "empty").is_visible()
+
+
+def test_it_fits_a_narrow_window_in_the_dark_and_the_keyboard(page: Any) -> None:
+    page.emulate_media(color_scheme="dark")
+    page.set_viewport_size({"width": 800, "height": 700})
+    page.reload()
+    seen(page, "example")
+    width = page.evaluate("document.documentElement.scrollWidth")
+    assert width <= 800
+    page.wait_for_function("document.body.classList.contains('body--dark')")
+    seen(page, "example").focus()
+    page.keyboard.press("Enter")
+    seen(page, "recording-decaying-triangle")
+    seen(page, "tab-data").focus()
+    page.keyboard.press("ArrowRight")
+    page.keyboard.press("Enter")
+    seen(page, "loop-plot")
+    assert page.evaluate("document.documentElement.scrollWidth") <= 800

@@ -9,6 +9,7 @@ import typer
 
 from mckibben.cli.options import (
     Columns,
+    Dask,
     Files,
     GapPolicy,
     Gaps,
@@ -42,6 +43,7 @@ def compare(
     settings: Settings = None,
     seed: Seed = 0,
     jobs: Jobs = None,
+    dask: Dask = None,
     column: Columns = None,
     unit: Units = None,
     rate: Rate = None,
@@ -56,10 +58,11 @@ def compare(
     train = reading.read(files, [input, output])
     tests = reading.read(test or [], [input, output])
     from mckibben.cli.leaderboards import print_leaderboard, write_leaderboard
+    from mckibben.comparison.cluster import on_cluster
     from mckibben.comparison.ranking import compare as rank
 
     folder = None if out is None else make_folder(out)
-    with progress_bar("comparing") as tell:
+    with on_cluster(dask), progress_bar("comparing") as tell:
         board = rank(
             train,
             tests,

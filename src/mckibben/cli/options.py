@@ -68,6 +68,12 @@ Settings = Annotated[
     ),
 ]
 Jobs = Annotated[int | None, typer.Option("--jobs", help="Processes. Default: as many as cores.")]
+Dask = Annotated[
+    str | None,
+    typer.Option(
+        "--dask", metavar="ADDRESS", help="Fit on a Dask cluster: its scheduler's address."
+    ),
+]
 
 
 _POLICIES: dict[Gaps, Literal["error", "split", "interpolate"]] = {

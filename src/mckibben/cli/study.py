@@ -9,6 +9,7 @@ import typer
 
 from mckibben.cli.options import (
     Columns,
+    Dask,
     Files,
     GapPolicy,
     Gaps,
@@ -51,6 +52,7 @@ def study(
     ] = None,
     seed: Seed = 0,
     jobs: Jobs = None,
+    dask: Dask = None,
     column: Columns = None,
     unit: Units = None,
     rate: Rate = None,
@@ -93,10 +95,11 @@ def study(
     folder = make_folder(out)
 
     from mckibben.cli.leaderboards import print_leaderboard, write_leaderboard
+    from mckibben.comparison.cluster import on_cluster
     from mckibben.comparison.studying import study as find
     from mckibben.report import write_report
 
-    with progress_bar("studying") as tell:
+    with on_cluster(dask), progress_bar("studying") as tell:
         found = find(
             train,
             tests,

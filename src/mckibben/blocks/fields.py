@@ -54,7 +54,15 @@ STRICT = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
 
 @validated_dataclass(frozen=True, config=STRICT)
 class Channel:
-    """Name and unit of an input or output."""
+    """Name and unit of an input or output.
+
+    Parameters
+    ----------
+    name : str
+        As recordings call it.
+    unit : str
+        Of the package: bar, mm, N, s, rad and their kin; empty for none.
+    """
 
     name: str
     unit: str

@@ -89,6 +89,11 @@ def save(block: Block, path: str | Path) -> None:
 def load(path: str | Path) -> Block:
     """Read a block saved as JSON.
 
+    Parameters
+    ----------
+    path : str or Path
+        File that `Block.save` or a command wrote.
+
     Raises
     ------
     ModelError

@@ -69,6 +69,9 @@ def track(
     runs = Reading(column, unit, rate, Gaps.ERROR).read([reference], None, informative=False)
     wanted = runs[0]
     _fits(block, plant, wanted)
+    # pressures recorded with the reference are not what the compensator will give
+    given = {channel.name for channel in block.outputs}
+    wanted = wanted.select([name for name in wanted.channels if name not in given])
     with progress_bar(f"{controller.value} on {plant.name}") as tell:
         chosen = _controller(controller, block, plant, wanted)
         found = close(

@@ -1,0 +1,39 @@
+"""How the documentation is built; run `python docs/build.py`."""
+
+from mckibben import __version__
+
+project = "mckibben"
+author = "the developers of mckibben"
+copyright = "the developers of mckibben"  # noqa: A001  # Sphinx's name
+version = release = __version__
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx.ext.viewcode"]
+html_theme = "furo"
+html_title = "mckibben"
+exclude_patterns = ["_build", "gallery", "templates/__pycache__", "README.md"]
+myst_enable_extensions = ["dollarmath", "deflist"]
+myst_heading_anchors = 3
+autodoc_default_options = {"members": True, "show-inheritance": True}
+autodoc_member_order = "bysource"
+autodoc_typehints = "none"
+autodoc_preserve_defaults = True
+napoleon_numpy_docstring = True
+napoleon_google_docstring = False
+napoleon_use_ivar = True
+napoleon_use_rtype = False
+suppress_warnings = ["myst.xref_missing", "myst.header", "ref.python"]
+
+FOREIGN = ("set_fit_request", "set_score_request", "get_metadata_routing")
+"""Members that scikit-learn adds, and documents elsewhere."""
+
+
+def setup(app):
+    """Leave out what is not ours, and let mathematics in docstrings be text."""
+
+    def skip(app, what, name, member, skipped, options):
+        return True if name in FOREIGN else None
+
+    def plain(app, what, name, member, options, lines):
+        lines[:] = [line.replace("|", r"\|") if "`" not in line else line for line in lines]
+
+    app.connect("autodoc-skip-member", skip)
+    app.connect("autodoc-process-docstring", plain)

@@ -1,0 +1,11 @@
+"""A model that has seen one recording, running free on another."""
+
+import sys
+
+import mckibben
+from mckibben.report.figures import plot_model
+
+(train,) = mckibben.read("examples/decaying-triangle.csv")
+(test,) = mckibben.read("examples/irregular-triangle.csv")
+model = mckibben.GPIEstimator(n_operators=12, envelope="piecewise-linear").fit(train).model_
+plot_model(model, [test], "loops", sys.argv[1])

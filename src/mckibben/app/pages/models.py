@@ -27,9 +27,9 @@ def build(desk: Desk) -> None:
     settings: dict[str, str] = {}
     with ui.row().classes("w-full items-end gap-3"):
         chosen = named(
-            ui.select(_offered(), value=list(SENSIBLE), multiple=True, label="Models to fit")
-            .classes("min-w-80 flex-1")
-            .props("use-chips"),
+            ui.select(
+                _offered(), value=list(SENSIBLE), multiple=True, label="Models to fit"
+            ).classes("min-w-80 flex-1"),
             "models",
         )
         _names_only(chosen)

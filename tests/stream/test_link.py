@@ -104,6 +104,6 @@ def test_bad_settings_name_a_remedy() -> None:
 
 
 def test_a_controller_follows_a_robot_in_another_process() -> None:
-    command = [sys.executable, str(EXAMPLES / "robot_loop.py"), "--duration", "6"]
+    command = [sys.executable, str(EXAMPLES / "robot_loop.py"), "--duration", "4"]
     said = subprocess.run(command, capture_output=True, text=True, check=True).stdout
     assert float(said.split("within ")[1].split(" mm")[0]) < 1.0

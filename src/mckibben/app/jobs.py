@@ -22,7 +22,7 @@ WAITING, RUNNING, DONE, FAILED = "waiting", "running", "done", "failed"
 CANCELLED, INTERRUPTED = "cancelled", "interrupted"
 ENDED = (DONE, FAILED, CANCELLED, INTERRUPTED)
 
-KINDNESS = 10
+KINDNESS = 5
 """Niceness of jobs, so that the page stays quick."""
 
 WATCH = 0.5

@@ -93,6 +93,20 @@ def self_test(folder: Path, name: str) -> str:
     return found.stdout.strip()
 
 
+LOOP = """
+#include "{name}.h"
+
+void {name}_loop({name}_model *self, const mck_real *in, mck_real *out, int *statuses, long n);
+
+void {name}_loop({name}_model *self, const mck_real *in, mck_real *out, int *statuses, long n)
+{{
+    for (long k = 0; k < n; k++) {{
+        statuses[k] = {name}_step(self, in + k * {n_in}, out + k * {n_out});
+    }}
+}}
+"""
+
+
 class CompiledModel:
     """Exported C, compiled and called from Python.
 
@@ -125,14 +139,16 @@ class CompiledModel:
         self._type = np.float32 if single else np.float64
         self._n_inputs, self._n_outputs = n_inputs, n_outputs
         with tempfile.TemporaryDirectory() as place:
-            library = Path(place) / f"{name}.so"
-            compile_c(sources, library, options=["-shared", "-fPIC", *options])
+            library, loop = Path(place) / f"{name}.so", Path(place) / "loop.c"
+            loop.write_text(LOOP.format(name=name, n_in=n_inputs, n_out=n_outputs))
+            found = [f"-I{folder / 'src'}", "-shared", "-fPIC", *options]
+            compile_c([*sources, loop], library, options=found)
             self._library = ctypes.CDLL(str(library))
         self._model = ctypes.create_string_buffer(self.SIZE)
         self._init = getattr(self._library, f"{name}_init")
         self._reset = getattr(self._library, f"{name}_reset")
-        self._step = getattr(self._library, f"{name}_step")
-        self._step.argtypes = [ctypes.c_void_p] * 3
+        self._loop = getattr(self._library, f"{name}_loop")
+        self._loop.argtypes = [*[ctypes.c_void_p] * 4, ctypes.c_long]
         self._init(self._model)
 
     def reset(self) -> None:
@@ -149,12 +165,7 @@ class CompiledModel:
         """
         given = np.ascontiguousarray(inputs, dtype=self._type)
         outputs = np.zeros((len(given), self._n_outputs), dtype=self._type)
-        statuses = np.zeros(len(given), dtype=np.int64)
-        model = ctypes.addressof(self._model)
-        for k in range(len(given)):
-            statuses[k] = self._step(
-                model,
-                given.ctypes.data + k * given.strides[0],
-                outputs.ctypes.data + k * outputs.strides[0],
-            )
-        return outputs.astype(np.float64), statuses
+        statuses = np.zeros(len(given), dtype=np.intc)
+        addresses = (array.ctypes.data for array in (given, outputs, statuses))
+        self._loop(ctypes.addressof(self._model), *addresses, len(given))
+        return outputs.astype(np.float64), statuses.astype(np.int64)

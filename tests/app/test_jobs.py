@@ -121,8 +121,8 @@ if __name__ == "__main__":
 """
 
 
-def killed(folder: Path, after: float) -> None:
-    """Start a batch of fits, and kill the workbench after a time."""
+def killed(folder: Path, after: float, finished: int = 0) -> None:
+    """Start a batch of fits, and kill the workbench a time after so many have ended."""
     script = folder.parent / "batch.py"
     script.write_text(SCRIPT)
     process = subprocess.Popen(
@@ -132,6 +132,9 @@ def killed(folder: Path, after: float) -> None:
     )
     assert process.stdout is not None
     process.stdout.readline()
+    until = time.monotonic() + PATIENCE
+    while len(list((folder / "results").glob("*.json"))) < finished and time.monotonic() < until:
+        time.sleep(0.02)
     time.sleep(after)
     process.send_signal(signal.SIGKILL)
     process.wait()
@@ -165,12 +168,15 @@ def check_after_kill(folder: Path) -> int:
 def test_killed_while_it_fits_it_keeps_what_was_finished(tmp_path: Path) -> None:
     rng = np.random.default_rng(0)
     counts = []
-    for round_, after in enumerate(rng.uniform(0.5, 9.0, KILLS)):
+    moments = zip(rng.uniform(0.0, 1.0, KILLS), rng.integers(0, 6, KILLS), strict=True)
+    for round_, (after, finished) in enumerate(moments):
         folder = tmp_path / f"{round_}" / "ws"
         folder.parent.mkdir()
         filled(folder)
-        killed(folder, float(after))
+        killed(folder, float(after), int(finished))
         counts.append(check_after_kill(folder))
+        # of those with a result, one may have been killed before it said so
+        assert counts[-1] >= finished - 2
     assert max(counts) > 0
 
 

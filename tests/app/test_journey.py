@@ -173,21 +173,22 @@ def test_a_file_that_needs_help_is_mapped_by_hand(page: Any) -> None:
     assert "pressure [bar]" in seen(page, "recording-rig").inner_text()
 
 
-@pytest.mark.parametrize(
-    ("name", "content"),
-    [
-        ("../../evil.csv", b"pressure_bar,displacement_mm\n1,2\n"),
-        ("empty.csv", b"\n"),
-        ("<img src=x onerror=alert(1)>.csv", b"a,b\nx,y\n"),
-        ("noise.mat", bytes(range(256)) * 20),
-        ("bomb.parquet", b"PAR1" + b"\0" * 100),
-    ],
-)
-def test_hostile_files_get_a_message(page: Any, name: str, content: bytes) -> None:
-    seen(page, "upload")
-    upload(page, name, content)
-    page.get_by_text("Remedy").first.wait_for(timeout=20_000)
-    assert seen(page, "empty").is_visible()
+HOSTILE = {
+    "../../evil.csv": b"pressure_bar,displacement_mm\n1,2\n",
+    "empty.csv": b"\n",
+    "<img src=x onerror=alert(1)>.csv": b"a,b\nx,y\n",
+    "noise.mat": bytes(range(256)) * 20,
+    "bomb.parquet": b"PAR1" + b"\0" * 100,
+}
+
+
+def test_hostile_files_get_a_message(page: Any) -> None:
+    for name, content in HOSTILE.items():
+        seen(page, "upload")
+        upload(page, name, content)
+        page.get_by_text("Remedy").first.wait_for(timeout=SLOW)
+        assert seen(page, "empty").is_visible()
+        page.reload()
 
 
 def test_it_fits_a_narrow_window_in_the_dark_and_the_keyboard(page: Any) -> None:
@@ -206,3 +207,23 @@ def test_it_fits_a_narrow_window_in_the_dark_and_the_keyboard(page: Any) -> None
     page.keyboard.press("Enter")
     seen(page, "loop-plot")
     assert page.evaluate("document.documentElement.scrollWidth") <= 800
+
+
+def test_a_part_is_kept_by_dragging_across_the_plot(page: Any) -> None:
+    seen(page, "example").click()
+    seen(page, "recording-decaying-triangle")
+    area = seen(page, "preview-plot").locator(".nsewdrag").first
+    area.wait_for()
+    box = area.bounding_box()
+    page.mouse.move(box["x"] + 0.25 * box["width"], box["y"] + 0.5 * box["height"])
+    page.mouse.down()
+    page.mouse.move(box["x"] + 0.5 * box["width"], box["y"] + 0.6 * box["height"], steps=5)
+    page.mouse.up()
+    page.wait_for_timeout(500)
+    seen(page, "keep").click()
+    kept = seen(page, "recording-decaying-triangle-2").inner_text()
+    samples = int(kept.split(" samples")[0].split()[-1])
+    assert 1000 < samples < 1250
+    seen(page, "role-decaying-triangle").locator("[aria-pressed=true]").get_by_text(
+        "unused"
+    ).wait_for()

@@ -11,6 +11,7 @@ import pytest
 from mckibben import Block, ModelError
 from mckibben.export.c import emulation
 from mckibben.export.c.emulation import emulate, missing_tools
+from mckibben.registry import names
 from tests.export.test_c import MODELS, SAMPLE_TIME, SINGLE
 
 emulated = pytest.mark.skipif(
@@ -19,7 +20,7 @@ emulated = pytest.mark.skipif(
 
 
 @emulated
-@pytest.mark.parametrize("name", [name for name in MODELS if name != "SDIHC"])
+@pytest.mark.parametrize("name", [*names("blocks"), "SDCHM", "MPI-NARMAX", "virgin preisach"])
 def test_a_cortex_m4f_gives_pythons_numbers(name: str) -> None:
     found = emulate(MODELS[name], sample_time=SAMPLE_TIME)
     assert found.difference <= SINGLE

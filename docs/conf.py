@@ -12,7 +12,12 @@ html_title = "mckibben"
 exclude_patterns = ["_build", "gallery", "templates/__pycache__", "README.md"]
 myst_enable_extensions = ["dollarmath", "deflist"]
 myst_heading_anchors = 3
-autodoc_default_options = {"members": True, "show-inheritance": True}
+autodoc_default_options = {
+    "members": True,
+    "show-inheritance": True,
+    # scikit-learn adds these, and documents them elsewhere
+    "exclude-members": "set_fit_request, set_score_request, set_predict_request, get_metadata_routing",
+}
 autodoc_member_order = "bysource"
 autodoc_typehints = "none"
 autodoc_preserve_defaults = True
@@ -22,18 +27,11 @@ napoleon_use_ivar = True
 napoleon_use_rtype = False
 suppress_warnings = ["myst.xref_missing", "myst.header", "ref.python"]
 
-FOREIGN = ("set_fit_request", "set_score_request", "get_metadata_routing")
-"""Members that scikit-learn adds, and documents elsewhere."""
-
 
 def setup(app):
-    """Leave out what is not ours, and let mathematics in docstrings be text."""
-
-    def skip(app, what, name, member, skipped, options):
-        return True if name in FOREIGN else None
+    """Let mathematics in docstrings be text."""
 
     def plain(app, what, name, member, options, lines):
         lines[:] = [line.replace("|", r"\|") if "`" not in line else line for line in lines]
 
-    app.connect("autodoc-skip-member", skip)
     app.connect("autodoc-process-docstring", plain)

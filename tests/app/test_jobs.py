@@ -21,7 +21,7 @@ from mckibben.signals import decaying_triangle
 
 PATIENCE = 120.0
 
-KILLS = int(os.environ.get("MCKIBBEN_KILLS", "3"))
+KILLS = int(os.environ.get("MCKIBBEN_KILLS", "2"))
 """How often the workbench is killed at a random moment."""
 
 

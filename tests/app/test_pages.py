@@ -82,6 +82,20 @@ def test_what_is_there_is_shown(tmp_path: Path) -> None:
     visit(workspace, look)
 
 
+def test_a_damaged_recording_is_told_and_harms_nothing_else(tmp_path: Path) -> None:
+    workspace = filled(tmp_path)
+    workspace.entry("run").path.write_text("pressure,displacement\n1,x\n")
+
+    async def look(user: User) -> None:
+        await user.should_see("Remedy")
+        user.find(marker="tab-look").click()
+        await user.should_see("Add recordings with an input and an output first")
+        user.find(marker="tab-models").click()
+        user.find(marker="fit").click()
+
+    visit(workspace, look)
+
+
 def test_fitting_without_a_recording_is_answered(tmp_path: Path) -> None:
     async def look(user: User) -> None:
         user.find(marker="tab-models").click()

@@ -203,6 +203,7 @@ def serve(
     address += f"?token={token}" if token else ""
     app.add_middleware(Guard, host=host, token=token)
     app.on_shutdown(jobs.close)
+    app.timer(TICK, jobs.poll)  # whether or not a page is open
 
     idle = threading.Timer(IDLE, _load_the_rest)
     idle.daemon = True

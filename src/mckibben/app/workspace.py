@@ -10,6 +10,7 @@ import json
 import re
 import time
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -229,7 +230,7 @@ class Workspace:
         )
 
     def entries(self) -> list[Entry]:
-        """Return all recordings that can be read; damaged ones are passed over."""
+        """Return all recordings that are described; their files may still be damaged."""
         found = []
         for name in self.names("recordings"):
             try:
@@ -277,8 +278,12 @@ class Workspace:
         return [self.recording(entry.name) for entry in self.entries() if entry.role == role]
 
     def channels(self) -> list[str]:
-        """Return the channels that all recordings in use have."""
-        used = [self.recording(e.name) for e in self.entries() if e.role != "unused"]
+        """Return the channels that all recordings in use have; damaged ones are passed over."""
+        used = []
+        for entry in self.entries():
+            if entry.role != "unused":
+                with suppress(MckibbenError):
+                    used.append(self.recording(entry.name))
         if not used:
             return []
         return [name for name in used[0].channels if all(name in one for one in used[1:])]

@@ -281,7 +281,11 @@ def _preview(desk: Desk) -> None:
         if name is None:
             return
         part.clear()
-        recording = desk.workspace.recording(name)
+        try:
+            recording = desk.workspace.recording(name)
+        except MckibbenError as error:
+            ui.label(f"{name}: {error}").classes("text-negative")
+            return
         ui.label(f"{name}: drag across the plot to select a part").classes("text-lg")
         channels = list(recording.channels)[:4]
         time_plot(desk, recording, channels, "preview-plot", part)

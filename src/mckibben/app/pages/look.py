@@ -46,7 +46,11 @@ def _plots(desk: Desk, chosen: ui.select) -> None:
 
     @ui.refreshable
     def drawn() -> None:
-        recording = desk.workspace.recording(str(chosen.value))
+        try:
+            recording = desk.workspace.recording(str(chosen.value))
+        except MckibbenError as error:
+            ui.label(str(error)).classes("text-negative")
+            return
         found = cycles(recording[desk.input])
         with ui.row().classes("items-center w-full"):
             colour = named(

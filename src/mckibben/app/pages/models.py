@@ -81,7 +81,7 @@ def _settings(models: list[str], kept: dict[str, str]) -> None:
 
 
 def _fit(desk: Desk, models: list[str], settings: dict[str, str]) -> None:
-    if not desk.workspace.with_role("train"):
+    if all(entry.role != "train" for entry in desk.workspace.entries()):
         tell(
             "There is no recording to train on. Remedy: add one under Data, with the role 'train'."
         )

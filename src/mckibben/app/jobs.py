@@ -6,7 +6,6 @@ whole or not at all. Killing the workbench ends its jobs, and loses nothing that
 
 from __future__ import annotations
 
-import json
 import multiprocessing
 import os
 import threading
@@ -24,9 +23,6 @@ ENDED = (DONE, FAILED, CANCELLED, INTERRUPTED)
 
 KINDNESS = 5
 """Niceness of jobs, so that the page stays quick."""
-
-WATCH = 0.5
-"""How often a job looks whether the workbench is still there [s]."""
 
 TELLING = 0.2
 """Least time between two lines of progress [s]."""
@@ -206,7 +202,7 @@ def run(folder: str, name: str, kind: str, given: dict[str, Any]) -> None:
 
     if hasattr(os, "nice"):
         os.nice(KINDNESS)
-    threading.Thread(target=_die_with, args=(os.getppid(),), daemon=True).start()
+    threading.Thread(target=_end_with_the_workbench, daemon=True).start()
     workspace = Workspace(folder)
     path = workspace.path("jobs", f"{name}.progress")
     started, last = time.monotonic(), -TELLING
@@ -231,10 +227,11 @@ def run(folder: str, name: str, kind: str, given: dict[str, Any]) -> None:
     note(workspace, name, kind, given, state, message)
 
 
-def _die_with(parent: int) -> None:
-    while os.getppid() == parent:
-        time.sleep(WATCH)
-    os._exit(1)
+def _end_with_the_workbench() -> None:
+    workbench = multiprocessing.parent_process()
+    if workbench is not None:
+        workbench.join()  # whoever forked this process, and whenever
+        os._exit(1)
 
 
 def _context() -> Any:
@@ -248,11 +245,10 @@ def _context() -> Any:
 
 def parse_settings(text: str) -> dict[str, Any]:
     """Return settings given as ``name=value`` lines, values as JSON where they are that."""
+    from mckibben.estimators.settings import setting_value
+
     settings: dict[str, Any] = {}
     for line in filter(None, (part.strip() for part in text.replace(",", "\n").splitlines())):
         name, _, value = line.partition("=")
-        try:
-            settings[name.strip()] = json.loads(value)
-        except ValueError:
-            settings[name.strip()] = value.strip()
+        settings[name.strip()] = setting_value(value.strip())
     return settings

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -16,7 +15,6 @@ def read_call(path: str, options: Mapping[str, Any]) -> str:
 
 
 def fit_call(
-    workspace: Workspace,
     model: str,
     channels: tuple[str, str],
     settings: Mapping[str, Any],
@@ -28,24 +26,6 @@ def fit_call(
         f"mckibben.compare(train, test, input={channels[0]!r}, output={channels[1]!r}, "
         f"models=[{model!r}]{given}, seed={seed})"
     )
-
-
-def fit_command(
-    workspace: Workspace,
-    models: Sequence[str],
-    channels: tuple[str, str],
-    settings: Mapping[str, Mapping[str, Any]],
-) -> str:
-    """Return the command that ranks models on the recordings in use."""
-    train, test = (_files(workspace, role) for role in ("train", "test"))
-    words = ["mckibben", "compare", *train]
-    words += [word for path in test for word in ("--test", path)]
-    words += ["--models", ",".join(models), "--input", channels[0], "--output", channels[1]]
-    for model, own in settings.items():
-        words += [
-            word for name, value in own.items() for word in ("--set", f"{model}.{name}={value}")
-        ]
-    return shlex.join(words)
 
 
 def script(workspace: Workspace, models: Sequence[str], channels: tuple[str, str]) -> str:

@@ -79,7 +79,6 @@ def build(workspace: Workspace, jobs: Jobs) -> None:
     told: dict[str, int] = {}
 
     def tick() -> None:
-        jobs.poll()
         active = jobs.active()
         busy.set_text(f"{len(active)} job(s)" if active else "")
         moved = False

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
@@ -142,6 +141,7 @@ def parse_settings(
     import dataclasses
 
     from mckibben import registry
+    from mckibben.estimators.settings import setting_value
 
     known = {field.name for field in dataclasses.fields(registry.load(group, model))}
     settings: dict[str, Any] = {}
@@ -157,11 +157,7 @@ def parse_settings(
                 f"--set {item!r}: {model!r} has no setting {name!r}. "
                 f"Remedy: use one of {', '.join(sorted(known))}."
             )
-        try:
-            value = json.loads(text)
-        except ValueError:
-            value = None if text.lower() == "none" else text
-        settings[name] = tuple(value) if isinstance(value, list) else value
+        settings[name] = setting_value(text)
     return settings
 
 

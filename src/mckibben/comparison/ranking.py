@@ -25,6 +25,7 @@ from mckibben.recording import Recording
 
 Array = NDArray[np.float64]
 Settings = Mapping[str, Mapping[str, Any]]
+Watch = Callable[[str, float, float], None]
 
 HELD_OUT = 0.25
 """Share of the input's travel that is held out where no test recording is given."""
@@ -59,7 +60,7 @@ def compare(
     seed: int = 0,
     jobs: int | None = None,
     progress: Callable[[str, float], None] | None = None,
-    watch: Callable[[str, float, float], None] | None = None,
+    watch: Watch | None = None,
 ) -> Leaderboard:
     """Fit and rank models on the same data with the same seeds.
 
@@ -182,7 +183,7 @@ def _run_tasks(
     tasks: Sequence[Task],
     jobs: int,
     progress: Callable[[str, float], None] | None,
-    watch: Callable[[str, float, float], None] | None,
+    watch: Watch | None,
 ) -> list[tuple[Row, Array | None]]:
     from joblib import Parallel, delayed
     from joblib.parallel import get_active_backend
@@ -209,9 +210,6 @@ def _run_tasks(
         results.get(index, (Row(task.model, reason="interrupted before it was fitted"), None))
         for index, task in enumerate(tasks)
     ]
-
-
-Watch = Callable[[str, float, float], None]
 
 
 def _try_numbered(

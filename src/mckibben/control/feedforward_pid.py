@@ -11,7 +11,6 @@ from mckibben.blocks.base import Block
 from mckibben.blocks.feedforward_feedback import FeedforwardFeedback
 from mckibben.blocks.fields import Channel
 from mckibben.control.controller import Controller
-from mckibben.control.feedforward import Feedforward
 from mckibben.control.pid import PID
 
 Array = NDArray[np.float64]
@@ -37,17 +36,13 @@ class FeedforwardPID(Controller):
 
     def reset(self, sample_time: float) -> None:
         """Start both afresh."""
-        self._ahead = Feedforward(self.compensator)
-        self._ahead.reset(sample_time)
-        self.pid.reset(sample_time)
-        self._due: Array | None = None
+        self._taken = len(self.compensator.scheduling)
+        self._stream = self.block().stream(sample_time)
 
     def step(self, reference: Array, displacement: Array, scheduled: Array) -> Array:
         """Return the compensator's pressures with the correction."""
-        base = self._ahead.step(reference, displacement, scheduled)
-        due = displacement if self._due is None else self._due
-        self._due = reference.copy()
-        return np.clip(self.pid.correction(due, displacement, base), *self.pid.limits)
+        given = np.concatenate([reference, displacement, scheduled[: self._taken]])
+        return self._stream.step(given).copy()
 
     def block(self, compensator: Block | None = None) -> FeedforwardFeedback:
         """Return compensator and feedback as one block."""

@@ -1,8 +1,4 @@
-"""PID feedback, one loop a muscle.
-
-Derivative of the measurement through a first-order filter; the integral stops where pressure is at a
-limit and would be driven further (Åström and Hägglund, "Advanced PID Control", ch. 3).
-"""
+"""PID feedback, one loop a muscle, in a closed loop; the law is `mckibben.blocks.pid`."""
 
 from __future__ import annotations
 
@@ -53,29 +49,12 @@ class PID(Controller):
 
     def reset(self, sample_time: float) -> None:
         """Empty the integral and the filter."""
-        self._time = sample_time
-        self._integral = np.zeros(len(self.kp))
-        self._last: Array | None = None
-        self._rate = np.zeros(len(self.kp))
+        self._stream = self.block().stream(sample_time)
 
     def step(self, reference: Array, displacement: Array, scheduled: Array) -> Array:
         """Return pressures within the limits."""
         del scheduled
-        return np.clip(self.correction(reference, displacement), *self.limits)
-
-    def correction(self, reference: Array, displacement: Array, base: Array | float = 0.0) -> Array:
-        """Return what feedback asks for on top of ``base``, and count it towards the integral."""
-        error = reference - displacement
-        if self._last is not None:
-            share = self._time / (self.filter_time + self._time)
-            self._rate += share * ((displacement - self._last) / self._time - self._rate)
-        self._last = displacement.copy()
-        wanted = base + np.array(self.kp) * error + self._integral - np.array(self.kd) * self._rate
-        further = ((wanted > self.limits[1]) & (error > 0)) | (
-            (wanted < self.limits[0]) & (error < 0)
-        )
-        self._integral += np.where(further, 0.0, np.array(self.ki) * self._time * error)
-        return np.asarray(wanted)
+        return self._stream.step(np.concatenate([reference, displacement])).copy()
 
     def block(self, compensator: Block | None = None) -> PIDFeedback:
         """Return these loops as a block; channels are a compensator's, or by number."""

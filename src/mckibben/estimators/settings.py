@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import fields
 from typing import Any, get_type_hints
 
@@ -11,6 +12,15 @@ from pydantic import ConfigDict, TypeAdapter, ValidationError
 from mckibben.errors import ModelError
 
 STRICT_SETTINGS = ConfigDict(strict=True, allow_inf_nan=False)
+
+
+def setting_value(text: str) -> Any:
+    """Return a setting that was written as text: JSON where it is that, else ``none`` or a word."""
+    try:
+        value = json.loads(text)
+    except ValueError:
+        value = None if text.lower() == "none" else text
+    return tuple(value) if isinstance(value, list) else value
 
 
 def check_settings(estimator: Any) -> None:

@@ -7,14 +7,19 @@ only what an export wrote, and nobody has changed since.
 from __future__ import annotations
 
 import hashlib
+import io
 import os
 import shutil
+import zipfile
 from collections.abc import Mapping
 from pathlib import Path
 
 from mckibben.errors import DataError
 
 MANIFEST = "manifest.sha256"
+
+OLDEST = (1980, 1, 1, 0, 0, 0)
+"""Date of the files in a zip, so that the same model gives the same bytes."""
 
 
 def write_folder(folder: Path, files: Mapping[str, bytes], *, overwrite: bool = False) -> None:
@@ -99,3 +104,15 @@ def _check_own(folder: Path) -> None:
                 file=folder,
                 remedy="move it away, or name another folder",
             )
+
+
+def zipped(files: Mapping[str, bytes]) -> bytes:
+    """Return files, by their path, as a zip; the same files give the same bytes."""
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
+        for path in sorted(files):
+            entry = zipfile.ZipInfo(path, OLDEST)
+            entry.compress_type = zipfile.ZIP_DEFLATED
+            entry.external_attr = 0o644 << 16
+            archive.writestr(entry, files[path])
+    return buffer.getvalue()

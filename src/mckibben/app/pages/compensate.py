@@ -259,10 +259,10 @@ def _loops(desk: Desk, model: str, reference: str) -> None:
     from mckibben.rigs import load_rig, rig_names
 
     rigs = [
-        name
-        for name in rig_names()
-        if {"pressure"} == {c for c in load_rig(name).inputs if c.startswith("pressure")}
-        and "displacement" in load_rig(name).outputs
+        rig.name
+        for rig in map(load_rig, rig_names())
+        if [c for c in rig.inputs if c.startswith("pressure")] == ["pressure"]
+        and "displacement" in rig.outputs
     ]
     ui.label("Closed loop on a virtual rig").classes("text-lg")
     with ui.row().classes("items-end"):

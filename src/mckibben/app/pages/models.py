@@ -99,7 +99,7 @@ def _fit(desk: Desk, models: list[str], settings: dict[str, str]) -> None:
         busy = {job.given.get("name") for job in desk.jobs.active()}
         while name in busy:
             name += "x"
-        call = scripts.fit_call(desk.workspace, model, desk.channels, given, 0)
+        call = scripts.fit_call(model, desk.channels, given, 0)
         desk.jobs.submit(
             "fit",
             {"model": model, "name": name, "input": desk.input, "output": desk.output}

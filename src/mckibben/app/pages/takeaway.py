@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import io
-import zipfile
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +10,7 @@ from nicegui import ui
 
 from mckibben.app import scripts
 from mckibben.app.desk import Desk, guarded, named
+from mckibben.atomic import replacing
 from mckibben.blocks.base import Block
 from mckibben.errors import DataError
 
@@ -84,6 +83,7 @@ def _code(desk: Desk, model: Any, inverse: Any, step: Any) -> None:
 
         async def as_c() -> None:
             from mckibben.export import export_c
+            from mckibben.export.folders import zipped
 
             name = name_from(Path(f"{_stem(model, inverse)}.json"))
             folder = desk.workspace.path("takeaway", f"{name}-c")
@@ -98,7 +98,8 @@ def _code(desk: Desk, model: Any, inverse: Any, step: Any) -> None:
                 )
             )
             path = desk.workspace.path("takeaway", f"{name}-c.zip")
-            path.write_bytes(_zipped(folder))
+            with replacing(path) as new:
+                new.write_bytes(zipped(_contents(folder)))
             flag = " --float32" if single.value else ""
             _hand_over(desk, path, f"mckibben export c {model.value}.json -o {folder.name}{flag}")
 
@@ -225,10 +226,7 @@ def _hand_over(desk: Desk, path: Path, call: str) -> None:
     ui.notify(f"Also kept as {path}")
 
 
-def _zipped(folder: Path) -> bytes:
-    buffer = io.BytesIO()
-    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
-        for path in sorted(folder.rglob("*")):
-            if path.is_file():
-                archive.write(path, path.relative_to(folder.parent))
-    return buffer.getvalue()
+def _contents(folder: Path) -> dict[str, bytes]:
+    """Return the files of a folder by their path, the folder's own name first."""
+    files = (path for path in folder.rglob("*") if path.is_file())
+    return {path.relative_to(folder.parent).as_posix(): path.read_bytes() for path in files}

@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 import ctypes
-import os
-import shutil
-import subprocess
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
@@ -14,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mckibben.errors import ModelError
+from mckibben.export.programs import own_compiler, run
 
 Array = NDArray[np.float64]
 
@@ -30,27 +28,6 @@ FLAGS = (
 )
 """What exported C compiles with, cleanly."""
 
-TIMEOUT = 300.0
-"""Of the compiler and of a self-test [s]."""
-
-
-def compiler() -> str:
-    """Return the C compiler of this machine: $CC, cc, gcc or clang.
-
-    Raises
-    ------
-    ModelError
-        If there is none.
-    """
-    for name in (os.environ.get("CC"), "cc", "gcc", "clang"):
-        found = shutil.which(name) if name else None
-        if found:
-            return found
-    raise ModelError(
-        "there is no C compiler on this machine. Remedy: install gcc or clang, or leave --check out "
-        "and compile the folder elsewhere."
-    )
-
 
 def compile_c(sources: Sequence[Path], out: Path, *, options: Sequence[str] = ()) -> None:
     """Compile C files into a program or a library.
@@ -60,13 +37,14 @@ def compile_c(sources: Sequence[Path], out: Path, *, options: Sequence[str] = ()
     ModelError
         If there is no compiler, or it refuses; the text gives its first complaint.
     """
-    command = [compiler(), *FLAGS, *options, "-o", str(out), *map(str, sources), "-lm"]
-    found = subprocess.run(command, capture_output=True, text=True, timeout=TIMEOUT, check=False)
-    if found.returncode != 0:
+    compiler = own_compiler()
+    if compiler is None:
         raise ModelError(
-            f"the exported C does not compile: {found.stderr.strip()[:500]} "
-            "Remedy: report it, with the model."
+            "there is no C compiler on this machine. Remedy: install gcc or clang, or leave --check "
+            "out and compile the folder elsewhere."
         )
+    command = [compiler, *FLAGS, *options, "-o", str(out), *map(str, sources), "-lm"]
+    run(command, "the exported C does not compile")
 
 
 def self_test(folder: Path, name: str) -> str:
@@ -82,15 +60,7 @@ def self_test(folder: Path, name: str) -> str:
         sources = sorted((folder / "src").glob("*.c"))
         test = folder / "test" / f"{name}_selftest.c"
         compile_c([*sources, test], program, options=[f"-I{folder / 'src'}"])
-        found = subprocess.run(
-            [str(program)], capture_output=True, text=True, timeout=TIMEOUT, check=False
-        )
-    if found.returncode != 0:
-        raise ModelError(
-            f"the exported C does not give Python's numbers: {found.stdout.strip()} "
-            "Remedy: report it, with the model."
-        )
-    return found.stdout.strip()
+        return run([str(program)], "the exported C does not give Python's numbers").strip()
 
 
 LOOP = """

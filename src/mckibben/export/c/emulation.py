@@ -6,7 +6,6 @@ What is counted are instructions, exactly and repeatably, not cycles: QEMU knows
 from __future__ import annotations
 
 import shutil
-import subprocess
 import tempfile
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,6 +17,7 @@ from mckibben.blocks.base import Block
 from mckibben.errors import ModelError
 from mckibben.export.c.project import described, render, source_files, test_content
 from mckibben.export.c.vectors import Vectors, vectors
+from mckibben.export.programs import run
 
 Array = NDArray[np.float64]
 
@@ -32,8 +32,6 @@ FLAGS = (
 
 TICKS_PER_INSTRUCTION = 1.6
 """Of the 25 MHz timer, an instruction taking 64 ns of the emulator's time (icount shift 6)."""
-
-TIMEOUT = 300.0
 
 
 @dataclass(frozen=True)
@@ -147,11 +145,4 @@ def _build(folder: Path) -> int:
 
 
 def _run(*command: str) -> str:
-    found = subprocess.run(command, capture_output=True, text=True, timeout=TIMEOUT, check=False)
-    if found.returncode != 0:
-        complaint = found.stderr.strip() or found.stdout.strip()
-        raise ModelError(
-            f"{command[0]} failed ({found.returncode}): {complaint[:500]} Remedy: report it, with "
-            "the model."
-        )
-    return found.stdout
+    return run(command, f"{command[0]} failed")

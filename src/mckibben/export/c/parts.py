@@ -64,11 +64,6 @@ class Part:
     rule: str
     state: Array | None
 
-    @property
-    def has_start(self) -> bool:
-        """Whether there is memory to start."""
-        return self.block.n_states > 0
-
 
 def starts_at_rest(block: Block) -> bool:
     """Tell whether a part's first output is the same at any sample time."""

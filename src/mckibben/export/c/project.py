@@ -5,14 +5,14 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Mapping
-from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from mckibben.blocks.base import Block
 from mckibben.blocks.fields import Channel
 from mckibben.blocks.saving import to_dict
 from mckibben.errors import ModelError
+from mckibben.export import templating
 from mckibben.export.c.costs import cost_of
 from mckibben.export.c.literals import literal, rows
 from mckibben.export.c.parts import PRIMITIVES, check_single
@@ -21,9 +21,6 @@ from mckibben.export.c.vectors import Vectors, vectors
 from mckibben.export.c.wiring import Call, Wiring
 from mckibben.export.folders import write_folder
 from mckibben.export.naming import identifier, macros, said
-
-if TYPE_CHECKING:
-    from jinja2 import Environment
 
 TOLERANCES = {False: "1e-9", True: "1e-4"}
 """Of the self-test, relative to the range: in double and in single precision."""
@@ -278,20 +275,6 @@ def _row(values: Any, single: bool) -> str:
     return ", ".join(literal(float(value), single=single) for value in values)
 
 
-@cache
-def _environment() -> Environment:
-    from jinja2 import Environment, PackageLoader, StrictUndefined
-
-    return Environment(
-        loader=PackageLoader("mckibben.export.c"),
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        keep_trailing_newline=True,
-        autoescape=False,  # C, not HTML: texts come through `said`
-    )
-
-
 def render(template: str, content: Mapping[str, Any]) -> str:
     """Return a template of this folder filled in."""
-    return _environment().get_template(template).render(content)
+    return templating.render("mckibben.export.c", template, content)

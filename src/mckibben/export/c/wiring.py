@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from itertools import accumulate
 
 from mckibben.blocks.base import Block
 from mckibben.blocks.compose import Parallel, PerChannel, Series
@@ -111,8 +110,3 @@ class Wiring:
         first = self.n_signals
         self.n_signals += count
         return [f"signals[{first + index}]" for index in range(count)]
-
-
-def starts(lengths: Sequence[int]) -> list[int]:
-    """Return where each of several tables starts in one."""
-    return [0, *accumulate(lengths)][:-1]

@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 import importlib.util
-import os
 import platform
 import shutil
-import subprocess
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from mckibben.errors import ModelError
+from mckibben.export.programs import own_compiler, run
 
 FLAGS = ("-std=c99", "-O2", "-s", "-ffp-contract=off", "-shared")
-TIMEOUT = 600.0
 
 
 @dataclass(frozen=True)
@@ -76,16 +74,12 @@ def _command(name: str) -> list[str] | None:
     if importlib.util.find_spec("ziglang") is not None:
         return [sys.executable, "-m", "ziglang", "cc", "-target", PLATFORMS[name].zig]
     if name == own_platform():
-        found = next((path for path in map(shutil.which, _compilers()) if path), None)
+        found = own_compiler()
         return [found] if found else None
     if name == "windows":
         mingw = shutil.which("x86_64-w64-mingw32-gcc")
         return [mingw, "-Wl,--no-insert-timestamp", "-static-libgcc"] if mingw else None
     return None
-
-
-def _compilers() -> list[str]:
-    return [name for name in (os.environ.get("CC"), "cc", "gcc", "clang") if name]
 
 
 def build_library(name: str, folder: Path, sources: Sequence[str], out: Path) -> None:
@@ -104,16 +98,8 @@ def build_library(name: str, folder: Path, sources: Sequence[str], out: Path) ->
         )
     position = [] if PLATFORMS[name].suffix == ".dll" else ["-fPIC"]
     maths = [] if PLATFORMS[name].suffix != ".so" else ["-lm"]
-    found = subprocess.run(
+    run(
         [*command, *FLAGS, *position, "-I.", *sources, *maths, "-o", str(out)],
-        cwd=folder,
-        capture_output=True,
-        text=True,
-        timeout=TIMEOUT,
-        check=False,
+        f"the FMU does not compile for {name}",
+        folder=folder,
     )
-    if found.returncode != 0:
-        raise ModelError(
-            f"the FMU does not compile for {name}: {found.stderr.strip()[:500]} "
-            "Remedy: report it, with the model."
-        )

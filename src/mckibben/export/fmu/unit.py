@@ -9,14 +9,11 @@ Source: FMI 2.0.4 and 3.0.1, Modelica Association.
 from __future__ import annotations
 
 import hashlib
-import io
 import json
 import tempfile
-import zipfile
 from collections.abc import Mapping, Sequence
-from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -25,12 +22,11 @@ from mckibben.blocks.base import Block
 from mckibben.blocks.saving import to_dict
 from mckibben.blocks.trial import input_limits
 from mckibben.errors import DataError, ModelError
+from mckibben.export import templating
 from mckibben.export.c.literals import literal
 from mckibben.export.c.project import described, source_files
 from mckibben.export.fmu.toolchains import PLATFORMS, build_library, buildable
-
-if TYPE_CHECKING:
-    from jinja2 import Environment
+from mckibben.export.folders import zipped
 
 Version = Literal["2.0", "3.0"]
 
@@ -52,9 +48,6 @@ BASE_UNITS: dict[str, dict[str, str] | None] = {
     "1": {},
 }
 """What units are of the SI; others are named without."""
-
-OLDEST = (1980, 1, 1, 0, 0, 0)
-"""Date of the files in the zip, so that the same model gives the same bytes."""
 
 
 def export_fmu(
@@ -124,7 +117,7 @@ def export_fmu(
     files = fmu_files(block, name=name, version=version, sample_time=sample_time)
     files |= _libraries(files, name, version, wanted)
     with replacing(path) as new:
-        new.write_bytes(_zipped(files))
+        new.write_bytes(zipped(files))
     return path
 
 
@@ -222,30 +215,5 @@ def _libraries(
     return built
 
 
-def _zipped(files: Mapping[str, bytes]) -> bytes:
-    buffer = io.BytesIO()
-    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
-        for path in sorted(files):
-            entry = zipfile.ZipInfo(path, OLDEST)
-            entry.compress_type = zipfile.ZIP_DEFLATED
-            entry.external_attr = 0o644 << 16
-            archive.writestr(entry, files[path])
-    return buffer.getvalue()
-
-
-@cache
-def _environment() -> Environment:
-    from jinja2 import Environment, PackageLoader, StrictUndefined
-
-    return Environment(
-        loader=PackageLoader("mckibben.export.fmu"),
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        keep_trailing_newline=True,
-        autoescape=lambda template: template is not None and ".h." not in template,
-    )
-
-
 def _render(template: str, content: Mapping[str, Any]) -> str:
-    return _environment().get_template(template).render(content)
+    return templating.render("mckibben.export.fmu", template, content)

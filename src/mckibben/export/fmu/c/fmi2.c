@@ -143,14 +143,7 @@ fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind s, fmi2Real *
 
 fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *FMUstate)
 {
-    if (*FMUstate == NULL) {
-        *FMUstate = malloc(sizeof(unit));
-    }
-    if (*FMUstate == NULL) {
-        return fmi2Error;
-    }
-    memcpy(*FMUstate, c, sizeof(unit));
-    return fmi2OK;
+    return unit_keep(c, FMUstate) ? fmi2OK : fmi2Error;
 }
 
 fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate FMUstate)
@@ -193,12 +186,5 @@ fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte bytes[], size
     if (size != sizeof(unit)) {
         return fmi2Error;
     }
-    if (*FMUstate == NULL) {
-        *FMUstate = malloc(sizeof(unit));
-    }
-    if (*FMUstate == NULL) {
-        return fmi2Error;
-    }
-    memcpy(*FMUstate, bytes, sizeof(unit));
-    return fmi2OK;
+    return unit_keep(bytes, FMUstate) ? fmi2OK : fmi2Error;
 }

@@ -145,14 +145,7 @@ fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 currentCommunicationPoi
 
 fmi3Status fmi3GetFMUState(fmi3Instance instance, fmi3FMUState *FMUState)
 {
-    if (*FMUState == NULL) {
-        *FMUState = malloc(sizeof(unit));
-    }
-    if (*FMUState == NULL) {
-        return fmi3Error;
-    }
-    memcpy(*FMUState, instance, sizeof(unit));
-    return fmi3OK;
+    return unit_keep(instance, FMUState) ? fmi3OK : fmi3Error;
 }
 
 fmi3Status fmi3SetFMUState(fmi3Instance instance, fmi3FMUState FMUState)
@@ -195,12 +188,5 @@ fmi3Status fmi3DeserializeFMUState(fmi3Instance instance, const fmi3Byte seriali
     if (size != sizeof(unit)) {
         return fmi3Error;
     }
-    if (*FMUState == NULL) {
-        *FMUState = malloc(sizeof(unit));
-    }
-    if (*FMUState == NULL) {
-        return fmi3Error;
-    }
-    memcpy(*FMUState, serializedState, sizeof(unit));
-    return fmi3OK;
+    return unit_keep(serializedState, FMUState) ? fmi3OK : fmi3Error;
 }

@@ -1,6 +1,8 @@
 #include "unit.h"
 
 #include <math.h>
+#include <stdlib.h>
+#include <string.h>
 
 #define MOST_STEPS 1e7 /* of the model in one communication step */
 
@@ -74,5 +76,17 @@ int unit_set(unit *self, unsigned reference, double value)
         return 0;
     }
     self->inputs[reference] = value;
+    return 1;
+}
+
+int unit_keep(const void *bytes, void **kept)
+{
+    if (*kept == NULL) {
+        *kept = malloc(sizeof(unit));
+    }
+    if (*kept == NULL) {
+        return 0;
+    }
+    memcpy(*kept, bytes, sizeof(unit));
     return 1;
 }

@@ -25,6 +25,10 @@ void unit_reset(unit *self);
  * step. Returns 0 where time goes back or by nothing, or by more than can be meant. */
 int unit_advance(unit *self, double time, double h);
 
+/* Keep a copy of a unit, where `kept` points or in new memory; bytes may be one's own or serialised.
+ * Returns 0 where there is no memory. */
+int unit_keep(const void *bytes, void **kept);
+
 /* Both return 0 where there is no such variable. */
 int unit_get(const unit *self, unsigned reference, double *value);
 int unit_set(unit *self, unsigned reference, double value);

@@ -13,7 +13,7 @@ import mckibben
 SOURCE = Path(mckibben.__file__).parent
 
 LAYERS = (
-    {"errors", "registry", "atomic"},
+    {"errors", "registry", "atomic", "threads"},
     {"recording", "signals", "metrics", "characterization"},
     {"files"},
     {"rigs"},

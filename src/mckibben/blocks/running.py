@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -12,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from mckibben.blocks.base import Block
 from mckibben.blocks.fields import Initial
+from mckibben.threads import cores
 
 Array = NDArray[np.float64]
 
@@ -79,7 +79,7 @@ def run_many(
             state = blocks[index].initial_state(inputs[0], initial)
             blocks[index].bind(sample_time, state, inputs, outputs[index])()
 
-    workers = min(os.cpu_count() or 1, len(blocks))
+    workers = min(cores(), len(blocks))
     if workers == 1:
         run(range(len(blocks)))
     else:

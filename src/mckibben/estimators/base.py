@@ -23,6 +23,7 @@ from mckibben.estimators.data import Mask, TrainingData, training_data
 from mckibben.estimators.search import Progress, Tracker
 from mckibben.estimators.settings import check_settings
 from mckibben.recording import Recording
+from mckibben.threads import one_blas_thread
 
 Array = NDArray[np.float64]
 
@@ -148,6 +149,15 @@ class Estimator(BaseEstimator, ABC):  # type: ignore[misc]  # scikit-learn ships
             On settings out of range.
         """
         del y
+        with one_blas_thread():
+            return self._fit(recordings, rows, progress)
+
+    def _fit(
+        self,
+        recordings: Recording | Sequence[Recording],
+        rows: Sequence[Mask] | None,
+        progress: Progress | None,
+    ) -> Self:
         started = time.perf_counter()
         self.check_settings()
         data = training_data(recordings, self.input, self.output, rows, self.scheduling)

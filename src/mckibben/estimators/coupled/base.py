@@ -19,6 +19,7 @@ from mckibben.errors import ModelWarning
 from mckibben.estimators.coupled.data import CoupledData, coupled_data
 from mckibben.estimators.settings import check_settings
 from mckibben.recording import Recording
+from mckibben.threads import one_blas_thread
 
 Array = NDArray[np.float64]
 Tell = Callable[[float, str], None]
@@ -104,6 +105,15 @@ class CoupledEstimator(BaseEstimator, ABC):  # type: ignore[misc]  # scikit-lear
             On settings out of range.
         """
         del y
+        with one_blas_thread():
+            return self._fit(recordings, validation, progress)
+
+    def _fit(
+        self,
+        recordings: Recording | Sequence[Recording],
+        validation: Sequence[Recording],
+        progress: Tell | None,
+    ) -> Self:
         started = time.perf_counter()
         check_settings(self)
         listed = [recordings] if isinstance(recordings, Recording) else list(recordings)

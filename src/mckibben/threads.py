@@ -1,0 +1,51 @@
+"""How many cores a call may use.
+
+Matrices here are small: linear algebra on all cores takes longer than on one, and many times as long
+beside other work. So it gets one thread, and cores are for models, folds and starts that are independent.
+"""
+
+from __future__ import annotations
+
+import os
+import threading
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+
+_lock = threading.Lock()
+_inside = 0
+_limits = ExitStack()
+_cores: int | None = None
+
+
+def cores() -> int:
+    """Return how many cores this process may use."""
+    if _cores is not None:
+        return _cores
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def use_cores(n: int) -> None:
+    """Let this process use so many cores from now on."""
+    global _cores
+    _cores = n
+
+
+@contextmanager
+def one_blas_thread() -> Iterator[None]:
+    """Give linear algebra one thread, in the whole process, until the last one inside leaves."""
+    global _inside
+    with _lock:
+        if _inside == 0:
+            from threadpoolctl import threadpool_limits
+
+            _limits.enter_context(threadpool_limits(1, user_api="blas"))
+        _inside += 1
+    try:
+        yield
+    finally:
+        with _lock:
+            _inside -= 1
+            if _inside == 0:
+                _limits.close()

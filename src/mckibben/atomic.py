@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import json
+import math
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 from mckibben.errors import DataError
 
@@ -42,3 +45,23 @@ def write_text(path: str | Path, text: str) -> None:
     """Write a text file in UTF-8; what was there before stays until all is written."""
     with replacing(path) as new:
         new.write_text(text, encoding="utf-8", newline="")
+
+
+def to_json(value: Any) -> str:
+    """Return a value as indented JSON text; numbers that are not finite become null."""
+    return json.dumps(_plain(value), indent=2, allow_nan=False, ensure_ascii=False)
+
+
+def write_json(path: str | Path, value: Any) -> None:
+    """Write a value as JSON, likewise."""
+    write_text(path, to_json(value) + "\n")
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value

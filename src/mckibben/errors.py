@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 
 class MckibbenError(Exception):
@@ -45,6 +47,13 @@ class DataError(MckibbenError):
         self.channel = channel
         self.row = row
         super().__init__(problem)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Tell how it is made again in another process."""
+        made = partial(
+            type(self), remedy=self.remedy, file=self.file, channel=self.channel, row=self.row
+        )
+        return made, (self.problem,)
 
     def __str__(self) -> str:
         where = [] if self.file is None else [str(self.file)]

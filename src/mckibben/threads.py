@@ -1,7 +1,7 @@
 """How many cores a call may use.
 
 Matrices here are small: linear algebra on all cores takes longer than on one, and many times as long
-beside other work. So it gets one thread, and cores are for models, folds and starts that are independent.
+beside other work. So it gets one thread, and cores are for models, folds and starts.
 """
 
 from __future__ import annotations

@@ -4,14 +4,17 @@ import json
 import sys
 import types
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
 from mckibben import GPI, PI, DataError, ModelError, PIEstimator, Recording, compare, registry
-from mckibben.comparison.ranking import Task, try_model
+from mckibben.comparison.results import Leaderboard, Standing
 from mckibben.comparison.splits import folds, given_split, held_out_tail
+from mckibben.comparison.trying import Data, errors_on_test, joined, parts_of, try_part
+from mckibben.estimators.base import Estimator
 from mckibben.signals import irregular_triangle, triangle
 
 TIME = np.arange(0, 24, 0.02)
@@ -157,12 +160,106 @@ def test_bad_input_is_refused_at_once(train: Recording) -> None:
 
 
 def test_interrupt_keeps_what_is_finished(train: Recording, test_set: Recording) -> None:
-    def impatient(model: str, share: float) -> None:
+    def impatient(board: Leaderboard) -> None:
         raise KeyboardInterrupt
 
-    board = compare(train, test_set, models=["pi", "mpi"], n_folds=0, jobs=1, progress=impatient)
-    assert board.rows[0].model == "pi"
-    assert "interrupted" in str(board.rows[1].reason)
+    board = compare(train, test_set, models=["mpi", "pi"], n_folds=0, jobs=1, found=impatient)
+    assert [row.model for row in board.rows] == ["pi"]
+    assert board.pending == ("mpi",)
+    assert board.to_dict()["pending"] == ["mpi"]
+
+
+def test_interrupt_within_a_fit_leaves_no_half_searched_model(
+    train: Recording, test_set: Recording
+) -> None:
+    def impatient(model: str, share: float, cost: float) -> None:
+        if model == "gpi" and share > 0.1:
+            raise KeyboardInterrupt
+
+    board = compare(train, test_set, models=["gpi", "pi"], n_folds=0, jobs=1, watch=impatient)
+    assert [row.model for row in board.rows] == ["pi"]
+    assert board.pending == ("gpi",)
+
+
+def test_progress_reads_as_a_person_would_say_it(train: Recording, test_set: Recording) -> None:
+    told: list[Standing] = []
+    compare(train, test_set, models=["gpi", "pi"], n_folds=0, jobs=1, progress=told.append)
+    assert [(one.done, one.fitting) for one in told] == [
+        (0, ("pi",)),
+        (1, ()),
+        (1, ("gpi",)),
+        (2, ()),
+    ]
+    assert str(told[2]).startswith("1 of 2, fitting gpi; best so far pi ")
+    assert str(told[2]).endswith(" mm")
+
+
+def test_going_on_recomputes_nothing_that_was_finished(
+    train: Recording, test_set: Recording, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def impatient(board: Leaderboard) -> None:
+        if len(board.rows) == 2:
+            raise KeyboardInterrupt
+
+    models = ["pi", "maxwell-slip", "mpi"]
+    how: dict[str, Any] = {"models": models, "n_folds": 2, "jobs": 1, "folder": tmp_path}
+    whole = compare(train, test_set, **how)
+    assert not list(tmp_path.iterdir())
+    stopped = compare(train, test_set, found=impatient, **how)
+    assert len(stopped.rows) == 2
+    (left,) = stopped.pending
+    fits: list[str] = []
+    fit = Estimator.fit
+
+    def counted(self: Any, *args: Any, **kwargs: Any) -> Any:
+        fits.append(type(self).__name__)
+        return fit(self, *args, **kwargs)
+
+    monkeypatch.setattr(Estimator, "fit", counted)
+    gone_on = compare(train, test_set, **how)
+    assert set(fits) == {registry.load("estimators", left).__name__}
+    assert without_times(gone_on) == without_times(whole)
+    assert [row.block for row in gone_on.rows] == [row.block for row in whole.rows]
+    assert [row.diagnostics.keys() for row in gone_on.rows] == [
+        row.diagnostics.keys() for row in whole.rows
+    ]
+    assert not list(tmp_path.iterdir())
+
+
+def test_what_was_kept_of_other_data_or_settings_is_not_used(
+    train: Recording, test_set: Recording, tmp_path: Path
+) -> None:
+    def impatient(board: Leaderboard) -> None:
+        raise KeyboardInterrupt
+
+    how: dict[str, Any] = {"models": ["pi", "mpi"], "n_folds": 0, "jobs": 1}
+    compare(train, test_set, folder=tmp_path, found=impatient, **how)
+    (kept,) = (tmp_path / "unfinished").iterdir()
+    other = {"pi": {"thresholds": (0.0, 0.5)}}
+    changed = compare(train, test_set, folder=tmp_path, settings=other, **how)
+    assert changed.to_dict() != compare(train, test_set, **how).to_dict()
+    assert without_times(changed) == without_times(compare(train, test_set, settings=other, **how))
+    compare(train, test_set, folder=tmp_path, found=impatient, **how)
+    kept.write_text(kept.read_text()[:100])
+    assert without_times(compare(train, test_set, folder=tmp_path, **how)) == without_times(
+        compare(train, test_set, **how)
+    )
+
+
+def test_long_recordings_are_thinned_and_that_is_said(
+    train: Recording, test_set: Recording
+) -> None:
+    board = compare(train, test_set, models=["gpi"], n_folds=0, jobs=1, most_samples=400)
+    assert board.n_train == 400
+    assert "every 3 one is used" in board.notes[0]
+    whole = compare(train, test_set, models=["gpi"], n_folds=0, jobs=1)
+    assert not whole.notes
+    thinned, all_samples = board.rows[0].test, whole.rows[0].test
+    assert thinned is not None
+    assert all_samples is not None
+    assert thinned.rmse < 1.5 * all_samples.rmse
+    with pytest.raises(DataError, match="too few to fit"):
+        compare(train, test_set, models=["gpi"], most_samples=3)
 
 
 def test_cross_validation_over_recordings_never_mixes_them(
@@ -208,13 +305,28 @@ def test_whole_recordings_are_held_out_where_there_are_many(train: Recording) ->
     assert kept + sum(int(rows.sum()) for rows in split.test_rows) >= len(train) - len(split.test)
 
 
-def test_a_task_runs_on_its_own(train: Recording, test_set: Recording) -> None:
-    task = Task("pi", {"seed": 0}, given_split([train], [test_set]), (), "pressure", "displacement")
-    row, errors = try_model(task)
-    assert isinstance(row.block, PI)
-    assert errors is not None
+@pytest.mark.parametrize("split", [False, True])
+def test_parts_of_a_model_make_the_same_row(
+    train: Recording, test_set: Recording, split: bool
+) -> None:
+    data = Data(
+        given_split([train], [test_set]),
+        tuple(folds([train], "pressure", 3)),
+        "pressure",
+        "displacement",
+    )
+    parts = parts_of("pi", {"seed": 0}, 3, split)
+    assert len(parts) == (3 if split else 1)
+    tried = joined([try_part(data, part, lambda *_: None) for part in parts])
+    row = tried.row
+    assert row is not None
     assert row.test is not None
+    assert isinstance(row.block, PI)
+    errors = errors_on_test(tried.outputs, data)
     assert row.test.rmse == pytest.approx(float(np.sqrt(np.mean(errors**2))))
+    alone = compare(train, test_set, models=["pi"], n_folds=3, jobs=1).rows[0]
+    assert row.validation_rmse == alone.validation_rmse
+    assert row.block == alone.block
 
 
 def test_dask_backend_gives_the_same_table(train: Recording, test_set: Recording) -> None:

@@ -6,9 +6,7 @@ whole or not at all. Killing the workbench ends its jobs, and loses nothing that
 
 from __future__ import annotations
 
-import multiprocessing
 import os
-import threading
 import time
 from dataclasses import dataclass, field
 from multiprocessing.process import BaseProcess
@@ -16,6 +14,8 @@ from pathlib import Path
 from typing import Any
 
 from mckibben.app.workspace import Workspace
+from mckibben.threads import cores
+from mckibben.workers import context, end_with_parent, prepare
 
 WAITING, RUNNING, DONE, FAILED = "waiting", "running", "done", "failed"
 CANCELLED, INTERRUPTED = "cancelled", "interrupted"
@@ -72,8 +72,7 @@ class Jobs:
 
     def __init__(self, workspace: Workspace, at_once: int | None = None) -> None:
         self.workspace = workspace
-        self.at_once = at_once or os.cpu_count() or 1
-        self._context = _context()
+        self.at_once = at_once or cores()
         self.jobs: dict[str, Job] = {}
         for name in workspace.names("jobs"):
             content = workspace.read_json("jobs", name)
@@ -162,7 +161,8 @@ class Jobs:
         return self.workspace.path("jobs", f"{name}.progress")
 
     def _start(self, job: Job) -> None:
-        job.process = self._context.Process(
+        prepare()
+        job.process = context().Process(
             target=run,
             args=(str(self.workspace.folder), job.name, job.kind, job.given),
             daemon=True,
@@ -202,7 +202,7 @@ def run(folder: str, name: str, kind: str, given: dict[str, Any]) -> None:
 
     if hasattr(os, "nice"):
         os.nice(KINDNESS)
-    threading.Thread(target=_end_with_the_workbench, daemon=True).start()
+    end_with_parent()
     workspace = Workspace(folder)
     path = workspace.path("jobs", f"{name}.progress")
     started, last = time.monotonic(), -TELLING
@@ -225,22 +225,6 @@ def run(folder: str, name: str, kind: str, given: dict[str, Any]) -> None:
         except Exception as error:  # a job that fails must say so, whatever it did
             message, state = f"{type(error).__name__}: {error}", FAILED
     note(workspace, name, kind, given, state, message)
-
-
-def _end_with_the_workbench() -> None:
-    workbench = multiprocessing.parent_process()
-    if workbench is not None:
-        workbench.join()  # whoever forked this process, and whenever
-        os._exit(1)
-
-
-def _context() -> Any:
-    """Return how processes start: from a server that has loaded the library, where there can be one."""
-    if "forkserver" in multiprocessing.get_all_start_methods():
-        context = multiprocessing.get_context("forkserver")
-        context.set_forkserver_preload(["mckibben.app.preloaded"])
-        return context
-    return multiprocessing.get_context("spawn")
 
 
 def parse_settings(text: str) -> dict[str, Any]:

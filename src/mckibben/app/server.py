@@ -17,6 +17,7 @@ from mckibben.app.guard import LOCAL, Guard, new_token
 from mckibben.app.jobs import Job, Jobs
 from mckibben.app.workspace import Workspace
 from mckibben.errors import DataError
+from mckibben.workers import PRELOADED
 
 PAGES = {
     "Data": ("folder_open", "data"),
@@ -153,7 +154,8 @@ def _load_the_rest() -> None:
     """Load what all pages need, in a thread, so that opening one does not wait for it."""
     for _, module in PAGES.values():
         import_module(f"mckibben.app.pages.{module}")
-    import_module("mckibben.app.preloaded")
+    for module in (*PRELOADED, "mckibben.app.work"):
+        import_module(module)
     for name in registry.names("estimators"):
         registry.load("estimators", name)
 

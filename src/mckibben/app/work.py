@@ -118,7 +118,7 @@ def report(workspace: Workspace, given: dict[str, Any], tell: Tell) -> str:
         settings=given.get("settings") or None,
         seed=int(given.get("seed", 0)),
         jobs=1,
-        progress=lambda _, share: tell(share, float("nan")),
+        progress=lambda standing: tell(standing.done / standing.total, float("nan")),
     )
     path = workspace.path("takeaway", "report.html")
     write_report(found, path)

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from mckibben.cli.options import (
+    MOST_SAMPLES,
     Columns,
     Dask,
     Files,
@@ -18,9 +19,11 @@ from mckibben.cli.options import (
     Json,
     Models,
     Output,
+    Quick,
     Rate,
     Reading,
     Resample,
+    Samples,
     Seed,
     Settings,
     Test,
@@ -29,6 +32,7 @@ from mckibben.cli.options import (
     settings_of_all,
 )
 from mckibben.cli.output import make_folder, print_json, progress_bar
+from mckibben.cli.stopping import stop_short, stoppable
 
 
 def compare(
@@ -37,6 +41,7 @@ def compare(
     input: Input = "pressure",  # noqa: A002
     output: Output = "displacement",
     models: Models = "all",
+    quick: Quick = False,
     out: Annotated[
         Path | None, typer.Option("-o", "--out", help="Folder for leaderboard.json and .csv.")
     ] = None,
@@ -49,36 +54,51 @@ def compare(
     rate: Rate = None,
     gaps: GapPolicy = Gaps.ERROR,
     resample: Resample = None,
+    samples: Samples = MOST_SAMPLES,
     as_json: Json = False,
 ) -> None:
-    """Fit and rank models: cross-validated, tested on data not used to fit, free-running."""
-    chosen = chosen_models(models)
-    given = settings_of_all(settings, chosen)
-    reading = Reading(column, unit, rate, gaps, resample)
-    train = reading.read(files, [input, output])
-    tests = reading.read(test or [], [input, output])
-    from mckibben.cli.leaderboards import print_leaderboard, write_leaderboard
-    from mckibben.comparison.cluster import on_cluster
-    from mckibben.comparison.ranking import compare as rank
+    """Fit and rank models: cross-validated, tested on data not used to fit, free-running.
+
+    A folder stands for all recordings in it. Ctrl-C stops at once; with -o what is finished is kept, and
+    the same command goes on from there.
+    """
+    from mckibben import workers
+    from mckibben.files.folders import expanded
 
     folder = None if out is None else make_folder(out)
-    with on_cluster(dask), progress_bar("comparing") as tell:
-        board = rank(
-            train,
-            tests,
-            input=input,
-            output=output,
-            models=chosen,
-            settings=given,
-            seed=seed,
-            jobs=jobs,
-            progress=lambda model, share: tell(share, f"{model} done"),
-        )
-    if folder is not None:
-        write_leaderboard(board, folder)
-    if as_json:
-        print_json(board.to_dict())
-        return
-    print_leaderboard(board)
-    if folder is not None:
-        print(f"Written: {folder / 'leaderboard.json'}, {folder / 'leaderboard.csv'}")
+    with stoppable(folder):
+        if jobs != 1 and dask is None:
+            workers.prepare()
+        chosen = chosen_models(models, quick)
+        given = settings_of_all(settings, chosen)
+        reading = Reading(column, unit, rate, gaps, resample)
+        fitted, checked, held_back = expanded(files, test or [])
+        train = reading.read([*fitted, *checked], [input, output])
+        tests = reading.read(held_back, [input, output])
+        from mckibben.cli.leaderboards import print_leaderboard
+        from mckibben.comparison.cluster import on_cluster
+        from mckibben.comparison.ranking import compare as rank
+        from mckibben.report import write_leaderboard
+
+        with on_cluster(dask), progress_bar("comparing", plainly=True) as tell:
+            board = rank(
+                train,
+                tests,
+                input=input,
+                output=output,
+                models=chosen,
+                settings=given,
+                seed=seed,
+                jobs=jobs,
+                most_samples=samples,
+                folder=folder,
+                progress=lambda standing: tell(standing.done / standing.total, str(standing)),
+                found=None if folder is None else lambda board: write_leaderboard(board, folder),
+            )
+        if as_json:
+            print_json(board.to_dict())
+        else:
+            print_leaderboard(board)
+            if folder is not None:
+                print(f"Written: {folder / 'leaderboard.json'}, {folder / 'leaderboard.csv'}")
+        stop_short(board)

@@ -57,9 +57,20 @@ Seed = Annotated[int, typer.Option("--seed", help="Of everything random.")]
 Models = Annotated[
     str,
     typer.Option(
-        "--models", metavar="all|NAME,...", help="Models, by short name; see info --models."
+        "--models",
+        metavar="all|quick|NAME,...",
+        help="Models, by short name; see info --models. quick: a choice that takes seconds.",
     ),
 ]
+Quick = Annotated[bool, typer.Option("--quick", help="Same as --models quick.")]
+Samples = Annotated[
+    int,
+    typer.Option(
+        "--samples", metavar="N", help="Samples to fit to at most: longer recordings are thinned."
+    ),
+]
+MOST_SAMPLES = 100_000
+"""As `mckibben.comparison.ranking` has it, which takes long to import."""
 Settings = Annotated[
     list[str] | None,
     typer.Option(
@@ -161,9 +172,13 @@ def parse_settings(
     return settings
 
 
-def chosen_models(given: str) -> str | list[str]:
-    """Return ``"all"`` or the list of names."""
-    return given if given == "all" else [name.strip() for name in given.split(",") if name.strip()]
+def chosen_models(given: str, quick: bool = False) -> str | list[str]:
+    """Return ``"all"``, ``"quick"`` or the list of names."""
+    if quick and given != "all":
+        raise ModelError("--quick and --models exclude each other. Remedy: leave one out.")
+    if given in ("all", "quick"):
+        return "quick" if quick else given
+    return [name.strip() for name in given.split(",") if name.strip()]
 
 
 def settings_of_all(given: list[str] | None, models: str | list[str]) -> dict[str, dict[str, Any]]:
@@ -172,6 +187,8 @@ def settings_of_all(given: list[str] | None, models: str | list[str]) -> dict[st
 
     from mckibben import registry
 
+    if not given:
+        return {}
     names = registry.names("estimators") if isinstance(models, str) else models
     found: dict[str, dict[str, Any]] = {}
     used: set[str] = set()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import sys
 from collections.abc import Callable, Iterator, Sequence
@@ -10,27 +9,15 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from mckibben.atomic import to_json
 from mckibben.errors import MckibbenError
+
+BAR = 12
+"""Characters of a progress bar: the words beside it fit a terminal of 80 columns."""
 
 
 class InterruptionError(MckibbenError):
     """Work that the user stopped; the text says what was kept."""
-
-
-def plain(value: Any) -> Any:
-    """Return a value as JSON holds it: numbers that are not finite become null."""
-    if isinstance(value, dict):
-        return {str(key): plain(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [plain(item) for item in value]
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value
-
-
-def to_json(value: Any) -> str:
-    """Return a value as indented JSON text."""
-    return json.dumps(plain(value), indent=2, allow_nan=False, ensure_ascii=False)
 
 
 def print_json(value: Any) -> None:
@@ -65,15 +52,33 @@ def figure(value: float | None, digits: int = 3) -> str:
 
 
 @contextmanager
-def progress_bar(what: str) -> Iterator[Callable[[float, str], None]]:
-    """Show progress on standard error while it is a terminal; yields what to tell it."""
+def progress_bar(what: str, *, plainly: bool = False) -> Iterator[Callable[[float, str], None]]:
+    """Show progress on standard error; yields what to tell the share done and where it stands.
+
+    Parameters
+    ----------
+    what : str
+        Work in hand.
+    plainly : bool
+        Whether to print a line for every step where standard error is no terminal; else nothing.
+    """
     if not sys.stderr.isatty():
-        yield lambda share, text: None
+        last = -1.0
+
+        def line(share: float, text: str) -> None:
+            nonlocal last
+            if plainly and share > last:
+                print(text, file=sys.stderr, flush=True)
+                last = share
+
+        yield line
         return
     from rich.console import Console
-    from rich.progress import Progress
+    from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn
 
-    with Progress(console=Console(stderr=True), transient=True) as bar:
+    # no estimate of the time left: what is left takes longest, and the estimate would jump
+    columns = (SpinnerColumn(), BarColumn(BAR), TextColumn("{task.description}", markup=False))
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task(what, total=1.0)
 
         def tell(share: float, text: str) -> None:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from mckibben.cli.options import Gaps, Jobs, Json, Reading, Seed
-from mckibben.cli.output import figure, make_folder, print_json, print_table, progress_bar, to_json
+from mckibben.cli.output import figure, make_folder, print_json, print_table, progress_bar
+from mckibben.cli.stopping import stoppable
 from mckibben.errors import DataError
 
 if TYPE_CHECKING:
@@ -35,44 +37,68 @@ def reproduce(
     jobs: Jobs = None,
     as_json: Json = False,
 ) -> None:
-    """Run a paper's protocol on its rig: its methods as published, ours, and its tables beside."""
+    """Run a paper's protocol on its rig: its methods as published, ours, and its tables beside.
+
+    Ctrl-C stops at once; with -o what is recorded and fitted is kept, and the same command goes on.
+    """
     if listed:
         _list(as_json)
         return
     if name is None:
         raise DataError("there is no paper to run again", remedy="name one, or give --list")
-    from mckibben import registry
+    from mckibben import registry, threads, workers
 
-    registry.load("papers", name)
-    own = _own(name, train, test)
     folder = None if out is None else make_folder(out)
+    with stoppable(folder):
+        registry.load("papers", name)
+        own = _own(name, train, test)
+        given = {"name": name, "quick": quick, "seed": seed, "jobs": jobs, "folder": folder} | own
+        # in a process of its own, which can be ended whatever it is at
+        with (
+            progress_bar(f"{name}:", plainly=True) as tell,
+            workers.Workers(1, cores=jobs or threads.cores()) as one,
+        ):
+            told = _once_a_word(tell)
+            (outcome,) = one.results(_again, [given], told)
+            found: Reproduction = outcome.result()
+        if folder is not None:
+            from mckibben.atomic import write_json
+            from mckibben.report import write_reproduction
+
+            write_reproduction(found, folder / "report.html")
+            write_json(folder / "tables.json", found.to_dict())
+        if as_json:
+            print_json(found.to_dict())
+            return
+        _print(found)
+        if folder is not None:
+            print(f"Written: {folder / 'report.html'}, {folder / 'tables.json'}")
+
+
+def _again(common: None, given: dict[str, Any], tell: Callable[..., None]) -> Reproduction:
+    """Run a paper again in a worker's process."""
     from mckibben.papers import reproduce as run
 
-    with progress_bar(f"{name}:") as tell:
-        if own is None:
-            found = run(name, quick=quick, seed=seed, jobs=jobs, progress=tell)
-        else:
-            from mckibben.papers.field_models import on_recordings
-
-            found = on_recordings(*own, quick=quick, seed=seed, jobs=jobs, tell=tell)
-    if folder is not None:
-        from mckibben.atomic import write_text
-        from mckibben.report import write_reproduction
-
-        write_reproduction(found, folder / "report.html")
-        write_text(folder / "tables.json", to_json(found.to_dict()) + "\n")
-    if as_json:
-        print_json(found.to_dict())
-        return
-    _print(found)
-    if folder is not None:
-        print(f"Written: {folder / 'report.html'}, {folder / 'tables.json'}")
+    return run(**given, progress=tell)
 
 
-def _own(name: str, train: Path | None, test: Path | None) -> tuple[Recording, Recording] | None:
-    """Return the user's own recordings, or None for the rig's."""
+def _once_a_word(tell: Callable[[float, str], None]) -> Callable[..., None]:
+    """Return what passes on progress when there is news."""
+    last = ""
+
+    def told(index: int, *what: Any) -> None:
+        nonlocal last
+        if what and what[1] != last:
+            last = what[1]
+            tell(*what)
+
+    return told
+
+
+def _own(name: str, train: Path | None, test: Path | None) -> dict[str, Recording]:
+    """Return the user's own recordings, or nothing for the rig's."""
     if train is None and test is None:
-        return None
+        return {}
     if name != "field-models" or train is None or test is None:
         raise DataError(
             "--train and --test go together, and with field-models only",
@@ -82,7 +108,7 @@ def _own(name: str, train: Path | None, test: Path | None) -> tuple[Recording, R
     (first, *_), (second, *_) = (
         reading.read([file], ["pressure", "displacement"]) for file in (train, test)
     )
-    return first, second
+    return {"train": first, "test": second}
 
 
 def _list(as_json: bool) -> None:

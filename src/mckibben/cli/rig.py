@@ -354,8 +354,7 @@ def _said(plan: Any, rig: Rig, seed: int, file_format: str) -> dict[str, Any]:
 
 def _kept(folder: Path, said: dict[str, Any]) -> set[str]:
     """Write what the folder is to hold, and return the runs that it holds already."""
-    from mckibben.atomic import write_text
-    from mckibben.cli.output import to_json
+    from mckibben.atomic import to_json, write_text
 
     text, place = to_json(said) + "\n", folder / "protocol.json"
     if place.exists() and place.read_text(encoding="utf-8") != text:

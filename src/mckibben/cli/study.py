@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from mckibben.cli.options import (
+    MOST_SAMPLES,
     Columns,
     Dask,
     Files,
@@ -18,9 +20,11 @@ from mckibben.cli.options import (
     Json,
     Models,
     Output,
+    Quick,
     Rate,
     Reading,
     Resample,
+    Samples,
     Seed,
     Settings,
     Test,
@@ -29,6 +33,11 @@ from mckibben.cli.options import (
     settings_of_all,
 )
 from mckibben.cli.output import figure, make_folder, print_json, progress_bar
+from mckibben.cli.stopping import stop_short, stoppable
+from mckibben.errors import DataError, DataWarning
+
+if TYPE_CHECKING:
+    from mckibben.comparison.results import Study
 
 
 def study(
@@ -40,6 +49,7 @@ def study(
         "study"
     ),
     models: Models = "all",
+    quick: Quick = False,
     settings: Settings = None,
     rig: Annotated[
         str | None, typer.Option("--rig", help="Several muscles: rig to close a loop on.")
@@ -58,132 +68,129 @@ def study(
     rate: Rate = None,
     gaps: GapPolicy = Gaps.ERROR,
     resample: Resample = None,
+    samples: Samples = MOST_SAMPLES,
     as_json: Json = False,
 ) -> None:
     """Say what the muscle does, rank every model, invert the best, and write a report.
+
+    Results are written as they come. Ctrl-C stops at once, and the same command goes on from there.
 
     A folder stands for all recordings in it. Recordings of several muscles (pressure_1 ...,
     displacement_1 ...) get models that couple them, and a closed loop on a virtual rig. With --load
     force, models that are told the load are ranked against one model for every load.
     """
-    import warnings
+    from mckibben import workers
+    from mckibben.files.folders import expanded
 
-    from mckibben.errors import DataError, DataWarning
-
-    chosen = chosen_models(models)
-    reading = Reading(column, unit, rate, gaps, resample)
-    files, validation, held_back = _expanded(files, test or [])
-    if load is not None or _of_muscles(reading, files):
-        from mckibben.cli.study_muscles import study_muscles
-
-        runs, checks, tests = (
-            reading.read(some, None, informative=False) for some in (files, validation, held_back)
-        )
-        study_muscles(runs, checks, tests, out, chosen, settings, rig, load, seed, as_json)
-        return
-    if rig is not None:
-        raise DataError("--rig is for recordings of several muscles", remedy="leave it out")
-    files, test = [*files, *validation], held_back
-    given = settings_of_all(settings, chosen)
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always", DataWarning)
-        train = reading.read(files, [input, output])
-        tests = reading.read(test or [], [input, output])
-    notes = [str(warning.message) for warning in caught]
-    for note in notes:
-        typer.echo(f"Note: {note}", err=True)
     folder = make_folder(out)
+    with stoppable(folder):
+        if jobs != 1 and dask is None:
+            workers.prepare()
+        chosen = chosen_models(models, quick)
+        reading = Reading(column, unit, rate, gaps, resample)
+        train, validation, tests = expanded(files, test or [])
+        if load is not None or _of_muscles(reading, train):
+            from mckibben.cli.study_muscles import study_muscles
 
-    from mckibben.cli.leaderboards import print_leaderboard, write_leaderboard
-    from mckibben.comparison.cluster import on_cluster
-    from mckibben.comparison.studying import study as find
-    from mckibben.report import write_report
+            runs, checks, held_back = (
+                reading.read(some, None, informative=False) for some in (train, validation, tests)
+            )
+            study_muscles(
+                runs, checks, held_back, folder, chosen, settings, rig, load, seed, jobs, as_json
+            )
+            return
+        if rig is not None:
+            raise DataError("--rig is for recordings of several muscles", remedy="leave it out")
+        given = settings_of_all(settings, chosen)
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always", DataWarning)
+            recordings = reading.read([*train, *validation], [input, output])
+            held_out = reading.read(tests, [input, output])
+        notes = [str(warning.message) for warning in caught]
+        for note in notes:
+            typer.echo(f"Note: {note}", err=True)
 
-    with on_cluster(dask), progress_bar("studying") as tell:
-        found = find(
-            train,
-            tests,
-            input=input,
-            output=output,
-            models=chosen,
-            settings=given,
-            seed=seed,
-            jobs=jobs,
-            progress=lambda model, share: tell(share, f"{model} done"),
-            notes=notes,
-        )
-    board = found.leaderboard
-    write_leaderboard(board, folder)
-    (folder / "models").mkdir(exist_ok=True)
-    for row in board.rows:
-        if row.block is not None:
-            row.block.save(folder / "models" / f"{row.model}.json")
-    if found.inverse is not None:
-        found.inverse.inverse.save(folder / "inverse.json")
-    else:
-        (folder / "inverse.json").unlink(missing_ok=True)
-    write_report(found, folder / "report.html")
-    if as_json:
-        print_json(
-            {
-                "folder": str(folder),
-                "characterization": found.characterization.to_dict(),
-                "leaderboard": board.to_dict(),
-                "inverse": None
-                if found.inverse is None
-                else {
-                    "model": found.inverse.model,
-                    "error": found.inverse.error,
-                    "reachable": list(found.inverse.reachable),
-                },
-            }
-        )
-        return
-    for sentence in found.characterization.sentences:
+        from mckibben.comparison.cluster import on_cluster
+        from mckibben.comparison.studying import study as find
+        from mckibben.report import StudyFolder
+
+        results = StudyFolder(folder)
+
+        def found(so_far: Study) -> None:
+            results.take(so_far)
+            if not so_far.leaderboard.rows and not as_json:
+                _say(so_far, folder)
+
+        with on_cluster(dask), progress_bar("studying", plainly=True) as tell:
+            done = find(
+                recordings,
+                held_out,
+                input=input,
+                output=output,
+                models=chosen,
+                settings=given,
+                seed=seed,
+                jobs=jobs,
+                most_samples=samples,
+                folder=folder,
+                progress=lambda standing: tell(standing.done / standing.total, str(standing)),
+                found=found,
+                notes=notes,
+            )
+        if done.leaderboard.pending:
+            results.take(done, last=True)
+        if as_json:
+            print_json(_described(done, folder))
+        else:
+            _conclude(done, folder)
+        stop_short(done.leaderboard)
+
+
+def _say(study: Study, folder: Path) -> None:
+    """Print what the muscle does, before any model is fitted."""
+    for sentence in study.characterization.sentences:
         print(sentence)
+    print(f"Drawn: {folder / 'report.html'}, which grows with every model fitted.\n", flush=True)
+
+
+def _conclude(study: Study, folder: Path) -> None:
+    from mckibben.cli.leaderboards import print_leaderboard
+
+    print_leaderboard(study.leaderboard)
     print()
-    print_leaderboard(board)
-    print()
-    if found.inverse is None:
-        print("No model here has an inverse.")
-    else:
-        low, high = found.inverse.reachable
+    if study.inverse is not None:
+        low, high = study.inverse.reachable
         print(
-            f"Inverse of {found.inverse.model}: follows any reference from {figure(low, 4)} to "
-            f"{figure(high, 4)} {board.unit} on the model itself, largest error "
-            f"{found.inverse.error:.1e} of that range."
+            f"Inverse of {study.inverse.model}: follows any reference from {figure(low, 4)} to "
+            f"{figure(high, 4)} {study.leaderboard.unit} on the model itself, largest error "
+            f"{study.inverse.error:.1e} of that range."
         )
+    elif not study.leaderboard.pending:
+        print("No model here has an inverse.")
     print(
-        f"Written: {folder / 'report.html'}, leaderboard.csv, leaderboard.json, models, inverse.json"
+        f"Written: {folder / 'report.html'}, leaderboard.csv, leaderboard.json, models"
+        + ("" if study.inverse is None else ", inverse.json")
     )
 
 
-def _expanded(files: list[Path], test: list[Path]) -> tuple[list[Path], list[Path], list[Path]]:
-    """Return files to fit, to validate and to test, folders replaced by what is in them."""
-    from mckibben.cli.study_muscles import roles
-
-    train: list[Path] = []
-    validation: list[Path] = []
-    tests: list[Path] = []
-    for file in files:
-        if not file.is_dir():
-            train.append(file)
-            continue
-        by_role = roles(file)
-        train += by_role.get("train", [])
-        validation += by_role.get("validation", [])
-        tests += by_role.get("test", [])
-    for file in test:
-        tests += (
-            [path for paths in roles(file).values() for path in paths] if file.is_dir() else [file]
-        )
-    return train, validation, tests
+def _described(study: Study, folder: Path) -> dict[str, Any]:
+    inverse = study.inverse
+    return {
+        "folder": str(folder),
+        "characterization": study.characterization.to_dict(),
+        "leaderboard": study.leaderboard.to_dict(),
+        "inverse": None
+        if inverse is None
+        else {
+            "model": inverse.model,
+            "error": inverse.error,
+            "reachable": list(inverse.reachable),
+        },
+    }
 
 
 def _of_muscles(reading: Reading, files: list[Path]) -> bool:
     """Tell whether the first file is of several muscles; what is wrong with it is said later."""
-    import warnings
-
     from mckibben.cli.study_muscles import is_of_muscles
     from mckibben.errors import MckibbenError
 

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import csv
 import io
-import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from mckibben.atomic import write_json
 from mckibben.cli.options import parse_settings
-from mckibben.cli.output import figure, make_folder, print_json, print_table, progress_bar, to_json
+from mckibben.cli.output import figure, print_json, print_table, progress_bar
 from mckibben.errors import DataError
 
 if TYPE_CHECKING:
@@ -28,55 +28,23 @@ LONGEST = 200.0
 """Of the reference that a loop is closed on [s]."""
 
 
-def roles(folder: Path) -> dict[str, list[Path]]:
-    """Return the recordings of a folder by role, as its protocol.json has them, or all to fit.
-
-    Raises
-    ------
-    DataError
-        If there are none.
-    """
-    from mckibben.files.formats import READERS
-
-    protocol = folder / "protocol.json"
-    found = sorted(
-        path for path in folder.iterdir() if path.suffix.casefold() in READERS and path.is_file()
-    )
-    if not found:
-        raise DataError("there is no recording in the folder", file=folder, remedy="name files")
-    if not protocol.is_file():
-        return {"train": found}
-    try:
-        runs = json.loads(protocol.read_text(encoding="utf-8"))["runs"]
-        given = {str(run["name"]): str(run["role"]) for run in runs}
-    except (ValueError, KeyError, TypeError, OSError):
-        raise DataError(
-            "its protocol.json is not readable", file=folder, remedy="repair or remove it"
-        ) from None
-    by_role: dict[str, list[Path]] = {}
-    for path in found:
-        by_role.setdefault(given.get(path.stem, "train"), []).append(path)
-    return by_role
-
-
 def study_muscles(
     recordings: Sequence[Recording],
     validation: Sequence[Recording],
     tests: Sequence[Recording],
-    out: Path,
+    folder: Path,
     models: str | Sequence[str],
     settings: list[str] | None,
     rig: str | None,
     load: str | None,
     seed: int,
+    jobs: int | None,
     as_json: bool,
 ) -> None:
     """Rank models of several muscles, invert the best that can be, track on the rig, and report."""
     from mckibben import registry
-    from mckibben.atomic import write_text
-    from mckibben.comparison.muscles import compare_muscles, held_out_levels, per_load
-    from mckibben.papers.reproduction import Reproduction
-    from mckibben.report import write_reproduction
+    from mckibben.comparison.kept import Kept
+    from mckibben.comparison.muscles import QUICK, compare_muscles, held_out_levels, per_load
 
     train, split = list(recordings), "as given"
     if not tests:
@@ -91,63 +59,44 @@ def study_muscles(
                     channel=load,
                     remedy="name it with --column, or leave --load out",
                 )
-    names = registry.names("coupled") if isinstance(models, str) else models
-    given = {name: parse_settings(settings, name, group="coupled") for name in names}
-    folder = make_folder(out)
-    with progress_bar("studying") as tell:
+    if isinstance(models, str):
+        models = QUICK if models == "quick" else registry.names("coupled")
+    given = {name: parse_settings(settings, name, group="coupled") for name in models}
+    results = _Results(
+        folder, f"fitted to {len(train)} runs, tested on {len(tests)}: {split}", tests
+    )
+    results.command = f"mckibben study FILES{'' if load is None else f' --load {load}'} -o {folder}"
+    plant = rig or _rig_of(recordings)
+    loops: dict[str, Tracked] = {}
+    with progress_bar("studying", plainly=True) as tell:
         rows = compare_muscles(
             train,
             tests,
             validation=validation,
-            models=names,
+            models=models,
             settings={
                 name: ({} if load is None else {"scheduling": (load,)}) | own
                 for name, own in given.items()
             },
             seed=seed,
-            progress=lambda share, text: tell(0.8 * share, text),
+            jobs=jobs,
+            folder=folder,
+            progress=lambda standing: tell(0.8 * standing.done / standing.total, str(standing)),
+            found=results.so_far,
         )
         if load is not None and rows[0].block is not None:
+            tell(0.8, "one model for every load")
             driven = rows[0].block.inputs[0].name
-            single = per_load(train, tests, load=load, input=driven, seed=seed)
+            single = per_load(train, tests, load=load, input=driven, seed=seed, jobs=jobs)
             rows = tuple(sorted((*rows, *single), key=lambda row: row.mean))
         best = next((row for row in rows if row.inverse is not None), None)
-        plant = rig or _rig_of(recordings)
-        tell(0.85, "closing loops")
-        loops: dict[str, Tracked] = {}
         if best is not None and plant is not None:
+            tell(0.85, "closing loops")
             best, loops = _loops(best, rows, plant, tests, seed)
-    _write(rows, folder)
+    result = results.take(rows, best, loops, plant)
     if best is not None and best.inverse is not None:
         best.inverse.save(folder / "inverse.json")
-    else:
-        (folder / "inverse.json").unlink(missing_ok=True)
-    summary = _summary(rows, best, loops, plant)
-    write_reproduction(
-        Reproduction(
-            name="study",
-            title="Several muscles: models, inverses and loops",
-            summary=tuple(summary),
-            tables=_tables(rows, loops),
-            figures=_figures(rows, tests, loops),
-            notes=(
-                f"Fitted to {len(train)} runs, tested on {len(tests)}: {split}.",
-                "Every figure is free-running, on runs not used to fit.",
-            ),
-            lead="Models of muscles that move one another, ranked on runs they have not seen.",
-            notes_title="How it was done",
-            command=f"mckibben study FILES{'' if load is None else f' --load {load}'} -o {out}",
-        ),
-        folder / "report.html",
-    )
-    result = {
-        "folder": str(folder),
-        "split": split,
-        "rows": [row.to_dict() for row in rows],
-        "inverse": None if best is None else best.model,
-        "tracking": {name: dict(tracked.rmse) for name, tracked in loops.items()},
-    }
-    write_text(folder / "leaderboard.json", to_json(result) + "\n")
+    Kept(folder).clear()
     if as_json:
         print_json(result)
         return
@@ -156,9 +105,62 @@ def study_muscles(
         cells = [[_cell(cell) for cell in row] for row in table.rows]
         print_table(list(table.columns), cells)
     print()
-    for sentence in summary:
+    for sentence in _summary(rows, best, loops, plant):
         print(sentence)
     print(f"Written: {folder / 'report.html'}, leaderboard.csv, leaderboard.json, models")
+
+
+class _Results:
+    """The folder of results, written as models are finished."""
+
+    command = ""
+
+    def __init__(self, folder: Path, split: str, tests: Sequence[Recording]) -> None:
+        self._folder, self._split, self._tests = folder, split, tests
+        (folder / "inverse.json").unlink(missing_ok=True)  # of an earlier study
+
+    def so_far(self, rows: Sequence[MuscleRow]) -> None:
+        """Write what is finished, while more models are fitted."""
+        self.take(rows, None, {}, None, whole=False)
+
+    def take(
+        self,
+        rows: Sequence[MuscleRow],
+        best: MuscleRow | None,
+        loops: Mapping[str, Tracked],
+        plant: str | None,
+        whole: bool = True,
+    ) -> dict[str, Any]:
+        """Write models, leaderboard and report as far as they are; return the leaderboard."""
+        from mckibben.papers.reproduction import Reproduction
+        from mckibben.report import write_reproduction
+
+        _write(rows, self._folder)
+        summary = _summary(rows, best, loops, plant) if whole else ["More models are being fitted."]
+        found = Reproduction(
+            name="study",
+            title="Several muscles: models, inverses and loops",
+            summary=tuple(summary),
+            tables=_tables(rows, loops),
+            figures=_figures(rows, self._tests, loops),
+            notes=(
+                f"{self._split[0].upper()}{self._split[1:]}.",
+                "Every figure is free-running, on runs not used to fit.",
+            ),
+            lead="Models of muscles that move one another, ranked on runs they have not seen.",
+            notes_title="How it was done",
+            command=self.command,
+        )
+        write_reproduction(found, self._folder / "report.html")
+        result = {
+            "folder": str(self._folder),
+            "split": self._split,
+            "rows": [row.to_dict() for row in rows],
+            "inverse": None if best is None else best.model,
+            "tracking": {name: dict(tracked.rmse) for name, tracked in loops.items()},
+        }
+        write_json(self._folder / "leaderboard.json", result)
+        return result
 
 
 def _cell(cell: Any) -> str:
@@ -254,7 +256,7 @@ def _write(rows: Sequence[MuscleRow], folder: Path) -> None:
 def _summary(
     rows: Sequence[MuscleRow],
     best: MuscleRow | None,
-    loops: dict[str, Tracked],
+    loops: Mapping[str, Tracked],
     plant: str | None,
 ) -> list[str]:
     first = rows[0]
@@ -278,7 +280,7 @@ def _summary(
     return said
 
 
-def _tables(rows: Sequence[MuscleRow], loops: dict[str, Tracked]) -> tuple[Any, ...]:
+def _tables(rows: Sequence[MuscleRow], loops: Mapping[str, Tracked]) -> tuple[Any, ...]:
     from mckibben.papers.reproduction import Table
 
     outputs = list(rows[0].test)
@@ -313,7 +315,7 @@ def _tables(rows: Sequence[MuscleRow], loops: dict[str, Tracked]) -> tuple[Any, 
 
 
 def _figures(
-    rows: Sequence[MuscleRow], tests: Sequence[Recording], loops: dict[str, Tracked]
+    rows: Sequence[MuscleRow], tests: Sequence[Recording], loops: Mapping[str, Tracked]
 ) -> tuple[Any, ...]:
     from mckibben.papers.reproduction import Figure, thinned
 

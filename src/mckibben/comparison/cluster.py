@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import sys
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from importlib import import_module
 from typing import Any
 
 from mckibben.errors import DataError
+from mckibben.threads import one_blas_thread
+from mckibben.workers import Outcome, Work
 
 PATIENCE = 10
 """How long to wait for the scheduler to answer [s]."""
@@ -60,3 +63,30 @@ def on_cluster(address: str | None) -> Iterator[None]:
             yield
     finally:
         client.close()
+
+
+def outer_backend() -> bool:
+    """Tell whether a joblib backend of another kind than its own processes was chosen outside."""
+    if "joblib" not in sys.modules:
+        return False
+    from joblib.parallel import LokyBackend, get_active_backend
+
+    return not isinstance(get_active_backend()[0], LokyBackend)
+
+
+def in_backend(work: Work, common: Any, items: Sequence[Any]) -> Iterator[Outcome]:
+    """Yield what comes of every item on the joblib backend that was chosen outside."""
+    from joblib import Parallel, delayed
+    from joblib.parallel import get_active_backend
+
+    backend, wanted = get_active_backend()
+    workers = int(backend.effective_n_jobs(wanted or -1))
+    way = "generator_unordered" if backend.supports_return_generator else "list"
+    pool = Parallel(n_jobs=min(workers, len(items)), return_as=way, max_nbytes=None)
+    # what is common is one argument, and the same object: Dask sends it to each worker once
+    yield from pool(delayed(_called)(work, common, i, item) for i, item in enumerate(items))
+
+
+def _called(work: Work, common: Any, index: int, item: Any) -> Outcome:
+    with one_blas_thread():
+        return Outcome(index, work(common, item, lambda *_: None))

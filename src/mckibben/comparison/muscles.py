@@ -2,19 +2,33 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from pathlib import Path
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mckibben import registry
 from mckibben.blocks.base import Block
+from mckibben.comparison.kept import Kept
+from mckibben.comparison.results import Standing
 from mckibben.errors import DataError, MckibbenError
 from mckibben.recording import Recording
+from mckibben.threads import cores
+from mckibben.workers import Outcome, Tell, Workers, all_of, in_turn
 
 Array = NDArray[np.float64]
+Runs = tuple[Recording, ...]
+Data = tuple[Runs, Runs, Runs]
+"""To fit, to test on, and to validate with."""
+
+Item = tuple[str, Mapping[str, Any]]
+"""A model's short name, and its settings."""
+
+QUICK = ("coupled-memory", "coupled-pi", "force-balance")
+"""Models that are fitted in seconds."""
 
 HELD_OUT = 3
 """Every so many-th level of what schedules, or run, is held out where no test runs are given."""
@@ -41,6 +55,8 @@ class MuscleRow:
     reason : str or None
         Why it failed.
     """
+
+    __pydantic_config__: ClassVar[dict[str, bool]] = {"arbitrary_types_allowed": True}
 
     model: str
     n_parameters: int = 0
@@ -79,7 +95,10 @@ def compare_muscles(
     models: str | Sequence[str] = "all",
     settings: Mapping[str, Mapping[str, Any]] | None = None,
     seed: int = 0,
-    progress: Callable[[float, str], None] | None = None,
+    jobs: int | None = None,
+    folder: str | Path | None = None,
+    progress: Callable[[Standing], None] | None = None,
+    found: Callable[[tuple[MuscleRow, ...]], None] | None = None,
 ) -> tuple[MuscleRow, ...]:
     """Fit models of several muscles and rank them on other runs, free-running.
 
@@ -89,14 +108,21 @@ def compare_muscles(
         Channels ``pressure_1`` ..., ``displacement_1`` ... and what schedules.
     validation : sequence of Recording
         To stop searches early.
-    models : "all" or sequence of str
+    models : "all", "quick" or sequence of str
         Short names.
     settings : mapping of str to mapping, optional
         By model.
     seed : int
         Of everything random.
+    jobs : int, optional
+        Processes; default as many as there are cores and models.
+    folder : path, optional
+        Where finished models are kept, so that a comparison that was stopped goes on from there;
+        whoever calls clears it.
     progress : callable, optional
-        Told the share of the work done, and what is next.
+        Told how far it is.
+    found : callable, optional
+        Told the rows so far, whenever a model is finished.
 
     Returns
     -------
@@ -110,21 +136,62 @@ def compare_muscles(
     """
     if not test:
         raise DataError("there is no run to test on", remedy="give --test, or more runs")
-    names = registry.names("coupled") if models == "all" else tuple(models)
-    classes = [registry.load("coupled", name) for name in names]
-    rows = []
-    for place, (name, estimator_class) in enumerate(zip(names, classes, strict=True)):
+    names = {"all": registry.names("coupled"), "quick": QUICK}.get(str(models), tuple(models))
+    efforts = {name: registry.load("coupled", name).effort for name in names}
+    items = [
+        (name, {"seed": seed} | dict((settings or {}).get(name, {})))
+        for name in sorted(names, key=efforts.__getitem__)
+    ]
+    data = (tuple(train), tuple(test), tuple(validation))
+    kept = Kept(folder, data)
+    rows = {name: row for name, s in items if (row := kept.get(name, MuscleRow, s)) is not None}
+    remaining = [item for item in items if item[0] not in rows]
+    begun: list[str] = []
+
+    def ranked() -> tuple[MuscleRow, ...]:
+        return tuple(sorted(rows.values(), key=lambda row: row.mean))
+
+    def told(index: int, *_: Any) -> None:
+        begun.append(remaining[index][0])
+        tell()
+
+    def tell() -> None:
+        best = next((f"{row.model} {row.mean:.3g} mm" for row in ranked() if row.block), "")
+        fitting = tuple(name for name in begun if name not in rows)
         if progress is not None:
-            progress(place / len(names), name)
-        try:
-            given = {"seed": seed} | dict((settings or {}).get(name, {}))
-            estimator = estimator_class(**given).fit(list(train), validation=list(validation))
-            rows.append(_row(name, estimator, test))
-        except MckibbenError as error:
-            rows.append(MuscleRow(name, reason=str(error)))
-        except Exception as error:  # one model must not take the comparison down, whatever it does
-            rows.append(MuscleRow(name, reason=f"{type(error).__name__}: {error}"))
-    return tuple(sorted(rows, key=lambda row: row.mean))
+            progress(Standing(len(rows), len(items), fitting, best))
+
+    for outcome in _outcomes(data, remaining, min(jobs or cores(), len(remaining)), told):
+        name, own = remaining[outcome.index]
+        rows[name] = outcome.value or MuscleRow(name, reason=str(outcome.error))
+        if outcome.error is None:
+            kept.put(name, rows[name], own)
+        tell()
+        if found is not None:
+            found(ranked())
+    return ranked()
+
+
+def _outcomes(
+    data: Data, items: Sequence[Item], n: int, told: Callable[..., None]
+) -> Iterator[Outcome]:
+    if n <= 1:
+        yield from in_turn(_try, data, items, told)
+        return
+    with Workers(n, data) as workers:
+        yield from workers.results(_try, items, told)
+
+
+def _try(data: Data, item: Item, tell: Tell) -> MuscleRow:
+    del tell
+    (train, test, validation), (name, settings) = data, item
+    try:
+        estimator = registry.load("coupled", name)(**settings)
+        return _row(name, estimator.fit(list(train), validation=list(validation)), test)
+    except MckibbenError as error:
+        return MuscleRow(name, reason=str(error))
+    except Exception as error:  # one model must not take the comparison down, whatever it does
+        return MuscleRow(name, reason=f"{type(error).__name__}: {error}")
 
 
 def _row(name: str, estimator: Any, test: Sequence[Recording]) -> MuscleRow:
@@ -184,6 +251,7 @@ def per_load(
     output: str = "displacement",
     model: str = "mpi",
     seed: int = 0,
+    jobs: int | None = None,
 ) -> tuple[MuscleRow, ...]:
     """Return one model of a single muscle for every load it was recorded under, tested on all loads.
 
@@ -197,26 +265,31 @@ def per_load(
         Short name of the model to fit to each run.
     seed : int
         Of everything random.
+    jobs : int, optional
+        Processes; default as many as there are cores.
     """
-    rows = []
-    for run in train:
-        name = f"{model} at {run[load].mean():.0f} {run.units[load]} ({run.name})"
-        try:
-            estimator = registry.load("estimators", model)(input=input, output=output, seed=seed)
-            estimator.fit(run)
-            block: Block = estimator.model_
-            errors = np.concatenate([block.simulate(r)[output] - r[output] for r in test])
-            rows.append(
-                MuscleRow(
-                    name,
-                    block.n_parameters,
-                    estimator.diagnostics_.seconds,
-                    {output: estimator.diagnostics_.rmse},
-                    {output: float(np.sqrt(np.mean(errors**2)))},
-                    float(np.abs(errors).max()),
-                    block,
-                )
-            )
-        except MckibbenError as error:
-            rows.append(MuscleRow(name, reason=str(error)))
-    return tuple(rows)
+    names = [f"{model} at {run[load].mean():.0f} {run.units[load]} ({run.name})" for run in train]
+    how = {"input": input, "output": output, "seed": seed}
+    items = [(name, model, how, run, tuple(test)) for name, run in zip(names, train, strict=True)]
+    return tuple(all_of(_try_single, items, jobs))
+
+
+def _try_single(common: None, item: Any, tell: Tell) -> MuscleRow:
+    del common, tell
+    name, model, how, run, test = item
+    output = how["output"]
+    try:
+        estimator = registry.load("estimators", model)(**how).fit(run)
+    except MckibbenError as error:
+        return MuscleRow(name, reason=str(error))
+    block: Block = estimator.model_
+    errors = np.concatenate([block.simulate(r)[output] - r[output] for r in test])
+    return MuscleRow(
+        name,
+        block.n_parameters,
+        estimator.diagnostics_.seconds,
+        {output: estimator.diagnostics_.rmse},
+        {output: float(np.sqrt(np.mean(errors**2)))},
+        float(np.abs(errors).max()),
+        block,
+    )

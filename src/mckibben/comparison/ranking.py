@@ -2,26 +2,36 @@
 
 from __future__ import annotations
 
-import os
-import time
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
+from contextlib import closing
+from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mckibben import registry
-from mckibben.blocks.base import Block
 from mckibben.comparison.bootstrap import BlockBootstrap, interval
-from mckibben.comparison.free_run import run_free
-from mckibben.comparison.memory_test import memory_test
-from mckibben.comparison.results import Leaderboard, Row
-from mckibben.comparison.splits import Fold, Mask, Split, folds, given_split, held_out_tail
-from mckibben.errors import MckibbenError, ModelError
-from mckibben.estimators.search import Progress
-from mckibben.metrics import score
+from mckibben.comparison.cluster import in_backend, outer_backend
+from mckibben.comparison.kept import Kept
+from mckibben.comparison.results import Leaderboard, Row, Standing
+from mckibben.comparison.splits import folds, given_split, held_out_tail
+from mckibben.comparison.trying import (
+    Data,
+    Part,
+    Tried,
+    errors_on_test,
+    joined,
+    outputs_of,
+    parts_of,
+    try_part,
+)
+from mckibben.errors import ModelError
 from mckibben.recording import Recording
+from mckibben.signals import made_manageable
+from mckibben.threads import cores, one_blas_thread
+from mckibben.workers import Outcome, Workers, in_turn
 
 Array = NDArray[np.float64]
 Settings = Mapping[str, Mapping[str, Any]]
@@ -30,22 +40,17 @@ Watch = Callable[[str, float, float], None]
 HELD_OUT = 0.25
 """Share of the input's travel that is held out where no test recording is given."""
 
-TIMED_SAMPLES = 20_000
+N_FOLDS = 4
+"""Parts of the cross-validation."""
 
-WORTH_A_PROCESS = 10_000
-"""Training samples below which starting processes takes longer than it saves."""
+MOST_SAMPLES = 100_000
+"""Samples to fit, and to test on; longer recordings are thinned."""
 
+QUICK = ("bouc-wen", "cpi", "gpi", "kp", "maxwell-slip", "mpi", "p2uz", "pi")
+"""Models that are good or well known, and fitted in seconds."""
 
-@dataclass(frozen=True)
-class Task:
-    """What a worker needs to try one model."""
-
-    model: str
-    settings: Mapping[str, Any]
-    split: Split
-    folds: tuple[Fold, ...]
-    input: str
-    output: str
+WORTH_A_PROCESS = 4.0
+"""Seconds of work below which starting processes takes longer than it saves."""
 
 
 def compare(
@@ -56,17 +61,21 @@ def compare(
     output: str = "displacement",
     models: str | Sequence[str] = "all",
     settings: Settings | None = None,
-    n_folds: int = 4,
+    n_folds: int = N_FOLDS,
     seed: int = 0,
     jobs: int | None = None,
-    progress: Callable[[str, float], None] | None = None,
+    most_samples: int = MOST_SAMPLES,
+    folder: str | Path | None = None,
+    progress: Callable[[Standing], None] | None = None,
+    found: Callable[[Leaderboard], None] | None = None,
     watch: Watch | None = None,
 ) -> Leaderboard:
     """Fit and rank models on the same data with the same seeds.
 
     Every figure is free-running. Models are fitted on the training recordings, cross-validated within
     them (over recordings, or over blocks of cycles of a single one), and ranked on the test recordings,
-    which nothing else looks at. A model that fails is a row with its reason.
+    which nothing else looks at. A model that fails is a row with its reason. An interrupt ends the work
+    at once; the leaderboard then holds what was finished, and names what is pending.
 
     Parameters
     ----------
@@ -77,8 +86,9 @@ def compare(
         training recordings, which is then left out of training.
     input, output : str
         Channels.
-    models : "all" or sequence of str
-        Short names; "all" leaves out models that are made for other channels.
+    models : "all", "quick" or sequence of str
+        Short names; "all" leaves out models that are made for other channels, "quick" is a choice that
+        takes seconds.
     settings : mapping of str to mapping, optional
         Model name to settings of its estimator.
     n_folds : int
@@ -86,13 +96,21 @@ def compare(
     seed : int
         Of everything random.
     jobs : int, optional
-        Processes; default as many as there are cores and models, or one for short recordings. A
-        joblib backend chosen outside, such as Dask's or Ray's, is used, for as many models at once.
+        Processes, which share the models and their folds; default as many as there are cores, or none
+        for little work. A joblib backend chosen outside, such as Dask's or Ray's, is used instead.
+        Results are the same to the bit.
+    most_samples : int
+        Longer recordings are thinned to so many samples to fit, and to test on, turning points kept.
+    folder : path, optional
+        Where finished models are kept until all are, so that a comparison that was stopped and is
+        called again goes on from there.
     progress : callable, optional
-        Told the model just finished and the share of all that are.
+        Told how far it is whenever that changes.
+    found : callable, optional
+        Told the leaderboard of the models finished, whenever one is.
     watch : callable, optional
         Told, while a model is fitted to all of the training set, its name, the share of the search that
-        is done, and the least cost so far; only where models are fitted in this process (``jobs=1``).
+        is done, and the least cost so far; not on joblib's backends.
 
     Returns
     -------
@@ -105,51 +123,260 @@ def compare(
     ModelError
         On unknown models.
     """
+    plan = plan_of(
+        train,
+        test,
+        input=input,
+        output=output,
+        models=models,
+        settings=settings,
+        n_folds=n_folds,
+        seed=seed,
+        most_samples=most_samples,
+    )
+    kept, board = plan.kept(folder), plan.board()
+    try:
+        with closing(
+            ranked(plan, jobs=jobs, kept=kept, progress=progress, watch=watch)
+        ) as rankings:
+            for ranking in rankings:
+                board = ranking.board
+                if found is not None:
+                    found(board)
+    except KeyboardInterrupt:
+        if not board.rows:
+            raise
+    if not board.pending:
+        kept.clear()
+    return board
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What is to be compared, on what.
+
+    Parameters
+    ----------
+    data : Data
+        What all models are given.
+    settings : mapping of str to mapping
+        Every model's short name, cheapest first, and the settings of its estimator.
+    unit : str
+        Of the output.
+    described : str
+        How the data were split, in words.
+    seed : int
+        Of everything random.
+    left_out : mapping of str to str
+        Models without a place on these channels, and why.
+    notes : tuple of str
+        What was done to the recordings.
+    """
+
+    data: Data
+    settings: Mapping[str, Mapping[str, Any]]
+    unit: str
+    described: str
+    seed: int
+    left_out: Mapping[str, str]
+    notes: tuple[str, ...]
+
+    def kept(self, folder: str | Path | None) -> Kept:
+        """Return where finished models are kept."""
+        return Kept(folder, self.data)
+
+    @property
+    def n_scored(self) -> list[int]:
+        """Samples of every test recording that are scored."""
+        return [int(rows.sum()) for rows in self.data.split.test_rows]
+
+    def board(self, rows: Sequence[Row] = ()) -> Leaderboard:
+        """Return the leaderboard of the models that are finished."""
+        done = {row.model for row in rows}
+        return Leaderboard(
+            input=self.data.input,
+            output=self.data.output,
+            unit=self.unit,
+            rows=tuple(rows),
+            split=self.described,
+            seed=self.seed,
+            n_train=sum(len(recording) for recording in self.data.split.train),
+            n_test=sum(self.n_scored),
+            left_out=self.left_out,
+            pending=tuple(model for model in self.settings if model not in done),
+            notes=self.notes,
+        )
+
+
+@dataclass(frozen=True)
+class Ranking:
+    """A leaderboard, perhaps of a part of the models, and what they give.
+
+    Parameters
+    ----------
+    board : Leaderboard
+        Models finished.
+    outputs : mapping of str to tuple of array
+        Model name to its free-running output on every training recording, then every test recording.
+    """
+
+    board: Leaderboard
+    outputs: Mapping[str, tuple[Array, ...]] = field(repr=False)
+
+
+def plan_of(
+    train: Recording | Sequence[Recording],
+    test: Recording | Sequence[Recording],
+    *,
+    input: str,  # noqa: A002
+    output: str,
+    models: str | Sequence[str],
+    settings: Settings | None,
+    n_folds: int,
+    seed: int,
+    most_samples: int = MOST_SAMPLES,
+) -> Plan:
+    """Return what a comparison is to do; see `compare`."""
     from mckibben.estimators.data import training_data
 
-    recordings = _listed(train)
-    tests = _listed(test)
+    recordings, tests = _listed(train), _listed(test)
     training_data(recordings, input, output)
     if tests:
         training_data([recordings[0], *tests], input, output)
+    recordings, tests, notes = made_manageable(recordings, tests, input, most_samples)
     split = given_split(recordings, tests) if tests else held_out_tail(recordings, input, HELD_OUT)
     parts = tuple(folds(split.train, input, n_folds)) if n_folds >= 2 else ()
     chosen, left_out = _chosen(models, [*recordings, *tests], input, output)
-    if jobs is not None and jobs < 1:
-        raise ModelError(f"jobs is {jobs}. Remedy: give a number of at least 1, or leave it out.")
     if not chosen:
         raise ModelError(
             "there are no models to compare. "
             f"Remedy: name some of {', '.join(registry.names('estimators'))}, or all."
         )
-    for model in chosen:
-        registry.load("estimators", model)
-    tasks = [
-        Task(
-            model,
-            {"seed": seed} | dict((settings or {}).get(model, {})),
-            split,
-            parts,
-            input,
-            output,
-        )
-        for model in chosen
-    ]
-    n_train = sum(len(recording) for recording in split.train)
-    tried = _run_tasks(tasks, jobs or _default_jobs(n_train), progress, watch)
-    lengths = [int(rows.sum()) for rows in split.test_rows]
-    described = split.described + (f", {len(parts)}-fold cross-validation" if parts else "")
-    return Leaderboard(
-        input=input,
-        output=output,
+    efforts = {model: registry.load("estimators", model).effort for model in chosen}
+    given = settings or {}
+    return Plan(
+        data=Data(split, parts, input, output),
+        settings={
+            model: {"seed": seed} | dict(given.get(model, {}))
+            for model in sorted(chosen, key=efforts.__getitem__)
+        },
         unit=recordings[0].units[output],
-        rows=_ranked(tried, BlockBootstrap(lengths, seed)),
-        split=described,
+        described=split.described + (f", {len(parts)}-fold cross-validation" if parts else ""),
         seed=seed,
-        n_train=n_train,
-        n_test=sum(lengths),
         left_out=left_out,
+        notes=notes,
     )
+
+
+def ranked(
+    plan: Plan,
+    *,
+    jobs: int | None,
+    kept: Kept,
+    progress: Callable[[Standing], None] | None = None,
+    watch: Watch | None = None,
+) -> Generator[Ranking]:
+    """Yield the ranking whenever a model is finished, cheap models first; the last one is whole."""
+    if jobs is not None and jobs < 1:
+        raise ModelError(f"jobs is {jobs}. Remedy: give a number of at least 1, or leave it out.")
+    data = plan.data
+    finished: dict[str, Tried] = {}
+    for model, settings in plan.settings.items():
+        row = kept.get(model, Row, settings)
+        if row is not None:
+            outputs = () if row.block is None else outputs_of(row.block, data)
+            finished[model] = Tried(row, outputs)
+    remaining = {m: s for m, s in plan.settings.items() if m not in finished}
+    efforts = {m: _effort(m, data) for m in remaining}
+    workers = jobs or (cores() if sum(efforts.values()) > WORTH_A_PROCESS else 1)
+    large = sum(efforts.values()) / (4 * workers)
+    parts = [
+        part
+        for model, settings in remaining.items()
+        for part in parts_of(
+            model, settings, len(data.folds), workers > 1 and efforts[model] > large
+        )
+    ]
+    bootstrap = BlockBootstrap(plan.n_scored, plan.seed)
+    begun: list[str] = []
+
+    def current() -> Ranking:
+        return _ranking(plan, finished, bootstrap)
+
+    def tell() -> None:
+        if progress is not None:
+            working = tuple(model for model in begun if model not in finished)
+            progress(Standing(len(finished), len(plan.settings), working, _best(current().board)))
+
+    def told(index: int, *what: float) -> None:
+        model = parts[index].model
+        if not what and model not in begun:
+            begun.append(model)
+            tell()
+        if what and watch is not None:
+            watch(model, *what)
+
+    if finished:
+        yield current()
+    pieces: dict[str, list[Tried]] = {model: [] for model in remaining}
+    for outcome in _outcomes(data, parts, workers, told):
+        model = parts[outcome.index].model
+        if outcome.error is None:
+            pieces[model].append(outcome.value)
+        else:
+            pieces[model].append(Tried(Row(model, reason=str(outcome.error))))
+        if len(pieces[model]) == sum(part.model == model for part in parts):
+            finished[model] = joined(pieces[model])
+            if outcome.error is None:
+                kept.put(model, finished[model].row, remaining[model])
+            tell()
+            yield current()
+
+
+def _outcomes(
+    data: Data, parts: Sequence[Part], n: int, told: Callable[..., None]
+) -> Iterator[Outcome]:
+    if outer_backend():
+        yield from in_backend(try_part, data, parts)
+    elif n == 1:
+        with one_blas_thread():
+            yield from in_turn(try_part, data, parts, told)
+    else:
+        with Workers(min(n, len(parts)), data) as workers:
+            yield from workers.results(try_part, parts, told)
+
+
+def _effort(model: str, data: Data) -> float:
+    """Return about how many seconds it takes to try a model."""
+    samples = sum(len(recording) for recording in data.split.train)
+    fits = 1 + len(data.folds)
+    return float(registry.load("estimators", model).effort * fits * max(samples, 2000) / 10_000)
+
+
+def _ranking(plan: Plan, finished: Mapping[str, Tried], bootstrap: BlockBootstrap) -> Ranking:
+    done = [
+        (tried.row, bootstrap.rmse(errors_on_test(tried.outputs, plan.data)))
+        for tried in finished.values()
+        if tried.row is not None and tried.row.test is not None
+    ]
+    done.sort(key=lambda item: (_rmse(item[0]), item[0].model))
+    rows = [
+        replace(
+            row,
+            rmse_interval=interval(samples),
+            difference_interval=interval(samples - done[0][1]),
+        )
+        for row, samples in done
+    ]
+    failed = [t.row for t in finished.values() if t.row is not None and t.row.test is None]
+    failed.sort(key=lambda row: row.model)
+    outputs = {row.model: finished[row.model].outputs for row in rows}
+    return Ranking(plan.board([*rows, *failed]), outputs)
+
+
+def _best(board: Leaderboard) -> str:
+    best = board.best
+    return "" if best is None else f"{best.model} {_rmse(best):.3g} {board.unit}".strip()
 
 
 def _chosen(
@@ -159,167 +386,15 @@ def _chosen(
     output: str,
 ) -> tuple[tuple[str, ...], dict[str, str]]:
     """Return the models to try, and why others of "all" have no place on these recordings."""
-    if models != "all":
-        return tuple(models), {}
-    names = registry.names("estimators")
+    if models not in ("all", "quick"):
+        return tuple(dict.fromkeys(models)), {}
+    names = registry.names("estimators") if models == "all" else QUICK
     objections = {
         name: registry.load("estimators", name).objection(recordings, input, output)
         for name in names
     }
     left_out = {name: reason for name, reason in objections.items() if reason is not None}
     return tuple(name for name in names if name not in left_out), left_out
-
-
-def _default_jobs(n_train: int) -> int:
-    from joblib.parallel import LokyBackend, get_active_backend
-
-    backend, wanted = get_active_backend()
-    if not isinstance(backend, LokyBackend):
-        return int(backend.effective_n_jobs(wanted or -1))
-    return 1 if n_train < WORTH_A_PROCESS else os.cpu_count() or 1
-
-
-def _run_tasks(
-    tasks: Sequence[Task],
-    jobs: int,
-    progress: Callable[[str, float], None] | None,
-    watch: Watch | None,
-) -> list[tuple[Row, Array | None]]:
-    from joblib import Parallel, delayed
-    from joblib.parallel import get_active_backend
-
-    workers = min(jobs, len(tasks))
-    one_by_one = get_active_backend()[0].supports_return_generator
-    results: dict[int, tuple[Row, Array | None]] = {}
-    try:
-        pool = Parallel(
-            n_jobs=workers,
-            return_as="generator_unordered" if one_by_one else "list",
-            max_nbytes=None,
-        )
-        seen = watch if workers == 1 and one_by_one else None
-        calls = (delayed(_try_numbered)(i, task, seen) for i, task in enumerate(tasks))
-        for index, result in pool(calls):
-            results[index] = result
-            if progress is not None:
-                progress(tasks[index].model, len(results) / len(tasks))
-    except KeyboardInterrupt:
-        if not results:
-            raise
-    return [
-        results.get(index, (Row(task.model, reason="interrupted before it was fitted"), None))
-        for index, task in enumerate(tasks)
-    ]
-
-
-def _try_numbered(
-    index: int, task: Task, watch: Watch | None
-) -> tuple[int, tuple[Row, Array | None]]:
-    return index, try_model(task, watch)
-
-
-def try_model(task: Task, watch: Watch | None = None) -> tuple[Row, Array | None]:
-    """Fit, cross-validate and test one model; return its row, and its errors on the test set."""
-    try:
-        return _try_model(task, watch)
-    except MckibbenError as error:
-        return Row(task.model, reason=str(error)), None
-    except Exception as error:  # one model must not take the comparison down, whatever it does
-        return Row(task.model, reason=f"{type(error).__name__}: {error}"), None
-
-
-def _try_model(task: Task, watch: Watch | None) -> tuple[Row, Array | None]:
-    estimator_class = registry.load("estimators", task.model)
-    names = {"input": task.input, "output": task.output}
-
-    def fitted(
-        recordings: Sequence[Recording], rows: Sequence[Mask] | None, tell: Progress | None = None
-    ) -> Any:
-        estimator = estimator_class(**(names | dict(task.settings)))
-        return estimator.fit(recordings, rows=rows, progress=tell)
-
-    def seen(share: float, cost: float) -> None:
-        if watch is not None:
-            watch(task.model, share, cost)
-
-    # The folds come first: they load the compiled kernels, which the timed fit then finds ready.
-    try:
-        validation, unvalidated = _validate(task, fitted), None
-    except MckibbenError as error:  # a part of the data may be too little where all of it is enough
-        validation, unvalidated = None, str(error)
-    split = task.split
-    started = time.perf_counter()
-    estimator = fitted(split.train, None, None if watch is None else seen)
-    seconds = time.perf_counter() - started
-    block: Block = estimator.model_
-    on_train = [run_free(block, recording, task.output) for recording in split.train]
-    on_test = [run_free(block, recording, task.output, split.train) for recording in split.test]
-    scored = [modelled[rows] for modelled, rows in zip(on_test, split.test_rows, strict=True)]
-    measured = [
-        recording[task.output][rows]
-        for recording, rows in zip(split.test, split.test_rows, strict=True)
-    ]
-    diagnostics = asdict(estimator.diagnostics_)
-    diagnostics.pop("covariance")
-    if unvalidated is not None:
-        diagnostics["validation_failed"] = unvalidated
-    row = Row(
-        model=task.model,
-        n_parameters=block.n_parameters,
-        fit_seconds=seconds,
-        step_ns=_step_cost(block, split.train[0]),
-        train=score(
-            np.concatenate([recording[task.output] for recording in split.train]),
-            np.concatenate(on_train),
-        ),
-        test=score(np.concatenate(measured), np.concatenate(scored)),
-        validation_rmse=validation,
-        memory=memory_test(block, split.test, on_test, task.input, task.output),
-        block=block,
-        diagnostics=diagnostics,
-    )
-    return row, np.concatenate(scored) - np.concatenate(measured)
-
-
-def _validate(task: Task, fitted: Callable[..., Any]) -> float | None:
-    if not task.folds:
-        return None
-    squares, count = 0.0, 0
-    for fold in task.folds:
-        block = fitted(fold.train, fold.train_rows).model_
-        for recording, rows in zip(fold.test, fold.test_rows, strict=True):
-            errors = (run_free(block, recording, task.output) - recording[task.output])[rows]
-            squares, count = squares + float(errors @ errors), count + errors.size
-    return float(np.sqrt(squares / count))
-
-
-def _step_cost(block: Block, recording: Recording) -> float:
-    inputs = np.resize(
-        recording.matrix(channel.name for channel in block.inputs),
-        (TIMED_SAMPLES, len(block.inputs)),
-    )
-    times = []
-    for _ in range(3):
-        started = time.perf_counter()
-        block.simulate(inputs, sample_time=recording.sample_time)
-        times.append(time.perf_counter() - started)
-    return min(times) / TIMED_SAMPLES * 1e9
-
-
-def _ranked(
-    tried: Sequence[tuple[Row, Array | None]], bootstrap: BlockBootstrap
-) -> tuple[Row, ...]:
-    done = [(row, bootstrap.rmse(errors)) for row, errors in tried if errors is not None]
-    done.sort(key=lambda item: _rmse(item[0]))
-    rows = [
-        replace(
-            row,
-            rmse_interval=interval(samples),
-            difference_interval=interval(samples - done[0][1]),
-        )
-        for row, samples in done
-    ]
-    return (*rows, *(row for row, errors in tried if errors is None))
 
 
 def _rmse(row: Row) -> float:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -75,6 +75,8 @@ class Row:
         What the estimator says of the fit.
     """
 
+    __pydantic_config__: ClassVar[dict[str, bool]] = {"arbitrary_types_allowed": True}
+
     model: str
     reason: str | None = None
     n_parameters: int = 0
@@ -132,6 +134,10 @@ class Leaderboard:
         Samples.
     left_out : mapping of str to str
         Models that were not asked for by name and have no place on these channels, and why.
+    pending : tuple of str
+        Models that were not finished when this was made.
+    notes : tuple of str
+        What was done to the recordings before.
     """
 
     input: str
@@ -143,6 +149,8 @@ class Leaderboard:
     n_train: int
     n_test: int
     left_out: Mapping[str, str] = field(default_factory=dict)
+    pending: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
 
     @property
     def best(self) -> Row | None:
@@ -160,6 +168,8 @@ class Leaderboard:
             "n_train": self.n_train,
             "n_test": self.n_test,
             "left_out": dict(self.left_out),
+            "pending": list(self.pending),
+            "notes": list(self.notes),
             "rows": [row.to_dict() for row in self.rows],
         }
 
@@ -168,6 +178,36 @@ class Leaderboard:
         import pandas as pd
 
         return pd.json_normalize([row.to_dict() for row in self.rows])
+
+
+@dataclass(frozen=True)
+class Standing:
+    """How far a comparison is.
+
+    Parameters
+    ----------
+    done, total : int
+        Models.
+    fitting : tuple of str
+        Models in work, the latest last.
+    best : str
+        The best model so far, with its error, in words; empty before there is one.
+    """
+
+    done: int
+    total: int
+    fitting: tuple[str, ...] = ()
+    best: str = ""
+
+    def __str__(self) -> str:
+        """Return it as a person would say it.
+
+        >>> str(Standing(12, 28, ("gpi",), "cpi 0.27 mm"))
+        '12 of 28, fitting gpi; best so far cpi 0.27 mm'
+        """
+        fitting = f", fitting {', '.join(self.fitting)}" if self.fitting else ""
+        best = f"; best so far {self.best}" if self.best else ""
+        return f"{self.done} of {self.total}{fitting}{best}"
 
 
 @dataclass(frozen=True)

@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Sequence
+from contextlib import closing
+from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mckibben.blocks.base import Block
 from mckibben.characterization import characterize
-from mckibben.comparison.free_run import run_free
-from mckibben.comparison.ranking import HELD_OUT, Settings, compare
-from mckibben.comparison.results import InverseCheck, Leaderboard, Study
-from mckibben.comparison.splits import given_split, held_out_tail
+from mckibben.comparison.ranking import MOST_SAMPLES, N_FOLDS, Settings, plan_of, ranked
+from mckibben.comparison.results import InverseCheck, Leaderboard, Standing, Study
 from mckibben.errors import ModelError, ModelWarning
 from mckibben.recording import Recording
 
@@ -35,15 +36,23 @@ def study(
     settings: Settings | None = None,
     seed: int = 0,
     jobs: int | None = None,
-    progress: Callable[[str, float], None] | None = None,
+    most_samples: int = MOST_SAMPLES,
+    folder: str | Path | None = None,
+    progress: Callable[[Standing], None] | None = None,
+    found: Callable[[Study], None] | None = None,
     notes: Sequence[str] = (),
 ) -> Study:
     """Characterize recordings, rank models on them, and invert the best that can be inverted.
 
+    An interrupt ends the work at once; the study then holds what was finished.
+
     Parameters
     ----------
-    train, test, input, output, models, settings, seed, jobs, progress
+    train, test, input, output, models, settings, seed, jobs, most_samples, folder, progress
         As for `compare`.
+    found : callable, optional
+        Told the study as far as it is: when it is known what the muscle does, before any model is
+        fitted, then whenever a model is finished.
     notes : sequence of str
         What was assumed or mended while reading, to be passed on.
 
@@ -58,36 +67,44 @@ def study(
     """
     recordings = [train] if isinstance(train, Recording) else list(train)
     tests = [test] if isinstance(test, Recording) else list(test)
-    found = characterize([*recordings, *tests], input, output)
-    board = compare(
+    plan = plan_of(
         recordings,
         tests,
         input=input,
         output=output,
         models=models,
         settings=settings,
+        n_folds=N_FOLDS,
         seed=seed,
-        jobs=jobs,
-        progress=progress,
+        most_samples=most_samples,
     )
-    split = given_split(recordings, tests) if tests else held_out_tail(recordings, input, HELD_OUT)
-    predictions = {
-        row.model: tuple(
-            run_free(row.block, recording, output, split.train if index >= len(split.train) else ())
-            for index, recording in enumerate((*split.train, *split.test))
-        )
-        for row in board.rows
-        if row.block is not None
-    }
-    return Study(
-        train=split.train,
-        test=split.test,
-        characterization=found,
-        leaderboard=board,
-        predictions=predictions,
-        inverse=invert_best(board, recordings[0]),
-        notes=tuple(notes),
+    kept = plan.kept(folder)
+    so_far = Study(
+        train=plan.data.split.train,
+        test=plan.data.split.test,
+        characterization=characterize([*recordings, *tests], input, output),
+        leaderboard=plan.board(),
+        predictions={},
+        inverse=None,
+        notes=(*notes, *plan.notes),
     )
+    if found is not None:
+        found(so_far)
+    try:
+        with closing(ranked(plan, jobs=jobs, kept=kept, progress=progress)) as rankings:
+            for ranking in rankings:
+                so_far = replace(so_far, leaderboard=ranking.board, predictions=ranking.outputs)
+                if ranking.board.pending and found is not None:
+                    found(so_far)
+    except KeyboardInterrupt:
+        if not so_far.leaderboard.rows:
+            raise
+        return so_far
+    so_far = replace(so_far, inverse=invert_best(so_far.leaderboard, recordings[0]))
+    if found is not None:
+        found(so_far)
+    kept.clear()
+    return so_far
 
 
 def invert_best(board: Leaderboard, recording: Recording) -> InverseCheck | None:

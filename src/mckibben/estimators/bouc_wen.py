@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +30,8 @@ class BoucWenEstimator(LoopEstimator):
     exponent : {1, 2}, optional
         n. Default: the better of both on the training data.
     """
+
+    effort: ClassVar[float] = 0.6
 
     exponent: Literal[1, 2] | None = None
 

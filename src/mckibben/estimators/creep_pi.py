@@ -56,6 +56,8 @@ class CreepPIEstimator(SeparableEstimator):
         The largest threshold, relative to half the range of the logarithm.
     """
 
+    effort: ClassVar[float] = 2.0
+
     n_operators: Operators = 10
     map_size: Annotated[int, Interval(ge=1, le=12)] = 6
     n_creep: Annotated[int, Interval(ge=0, le=5)] = 2

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 import numpy as np
 from annotated_types import Interval
@@ -29,6 +29,8 @@ class DuhemEstimator(SeparableEstimator):
     slope_degree : int
         Of the slope right after a reversal.
     """
+
+    effort: ClassVar[float] = 1.2
 
     nonnegative: bool = False
     degree: Annotated[int, Interval(ge=1, le=9)] = 4

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 from annotated_types import Ge
@@ -38,6 +38,8 @@ class EUPIEstimator(SeparableEstimator):
     spacing : {"even", "dense"}
         How thresholds spread over half the input range.
     """
+
+    effort: ClassVar[float] = 0.4
 
     n_operators: Operators = 10
     spacing: Literal["even", "dense"] = "even"

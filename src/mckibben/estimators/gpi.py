@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 from annotated_types import Interval
@@ -49,6 +49,8 @@ class GPIEstimator(SeparableEstimator):
     spacing : {"even", "dense"}
         How thresholds spread under the first rule.
     """
+
+    effort: ClassVar[float] = 0.8
 
     n_operators: Annotated[int, Interval(ge=0, le=1000)] = 10
     envelope: Literal["tanh", "piecewise-linear", "exponential"] = "tanh"

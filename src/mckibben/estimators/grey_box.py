@@ -51,6 +51,8 @@ class GreyBoxEstimator(SeparableEstimator):
         Of the muscle at rest [mm]; scales load and stiffness, and nothing else.
     """
 
+    effort: ClassVar[float] = 3.0
+
     n_operators: Operators = 6
     n_creep: Annotated[int, Interval(ge=0, le=5)] = 2
     diameter: Annotated[float, Gt(0)] = 20.0

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +32,8 @@ class MaxwellSlipEstimator(LoopEstimator):
     spacing : {"even", "dense"}
         How the deflections at which they slip spread over half the input range.
     """
+
+    effort: ClassVar[float] = 0.03
 
     n_operators: Operators = 8
     spacing: Literal["even", "dense"] = "even"
@@ -95,6 +97,8 @@ class MaxwellSlipEstimator(LoopEstimator):
 @dataclass(kw_only=True, repr=False, eq=False)
 class ModifiedMaxwellSlipEstimator(MaxwellSlipEstimator):
     """Modified Maxwell-slip model: the two ratios of its directions are searched."""
+
+    effort: ClassVar[float] = 1.0
 
     def bounds(self, data: TrainingData) -> tuple[Array, Array]:
         """Return bounds of the logarithms of both ratios."""

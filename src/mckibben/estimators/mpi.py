@@ -48,6 +48,8 @@ class MPIEstimator(SeparableEstimator):
         Straight lines of the map, or degree of the polynomial.
     """
 
+    effort: ClassVar[float] = 0.25
+
     n_operators: Operators = 10
     spacing: Literal["even", "dense"] = "even"
     output_map: Literal["piecewise-linear", "polynomial", "free-polynomial", "odd-polynomial"] = (

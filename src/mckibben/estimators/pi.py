@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 from annotated_types import Len
@@ -43,6 +43,8 @@ class PIEstimator(SeparableEstimator):
     thresholds : sequence of float, optional
         Thresholds themselves, instead.
     """
+
+    effort: ClassVar[float] = 0.01
 
     method: Literal["ls", "pso-ls", "pso", "slopes"] = "ls"  # type: ignore[assignment]
     n_operators: Operators = 10

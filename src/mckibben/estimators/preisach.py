@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 import numpy as np
 from annotated_types import Interval
@@ -87,6 +87,8 @@ class GridEstimator(SeparableEstimator):
 class PreisachEstimator(GridEstimator):
     """Preisach model by (non-negative) least squares on its cells."""
 
+    effort: ClassVar[float] = 0.15
+
     def grid(self, data: TrainingData) -> Preisach:
         """Return the Preisach model without weights."""
         n = self.n_levels * (self.n_levels + 1) // 2
@@ -97,6 +99,8 @@ class PreisachEstimator(GridEstimator):
 @dataclass(kw_only=True, repr=False, eq=False)
 class KrasnoselskiiPokrovskiiEstimator(GridEstimator):
     """Krasnosel'skii-Pokrovskii model by (non-negative) least squares on its operators."""
+
+    effort: ClassVar[float] = 0.15
 
     def grid(self, data: TrainingData) -> KrasnoselskiiPokrovskii:
         """Return the Krasnosel'skii-Pokrovskii model without weights."""

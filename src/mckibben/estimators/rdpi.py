@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 import numpy as np
 from annotated_types import Ge
@@ -38,6 +38,8 @@ class RDPIEstimator(MPIEstimator):
         Time constant of the filter of the rate [s]; 0 as in the paper, which suits commanded inputs.
         Default: the best on the training data of none, 5 and 25 samples.
     """
+
+    effort: ClassVar[float] = 1.0
 
     rate_time_constant: Annotated[float, Ge(0)] | None = None
 

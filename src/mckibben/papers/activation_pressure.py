@@ -13,11 +13,12 @@ import numpy as np
 from mckibben.blocks.force.activation_memory import ActivationMemory
 from mckibben.blocks.force.activation_pressure import ActivationPressure
 from mckibben.blocks.published.activation_pressure import activation_pressure as printed_profile
+from mckibben.comparison.kept import Kept
 from mckibben.estimators.force.activation_memory import ActivationMemoryEstimator
 from mckibben.estimators.force.activation_pressure import ActivationPressureEstimator
+from mckibben.papers.keeping import fitted, recorded
 from mckibben.papers.reproduction import Cell, Figure, Progress, Reproduction, Table, rms, thinned
 from mckibben.recording import Recording
-from mckibben.rigs import record
 from mckibben.signals.protocols import protocol
 from mckibben.signals.protocols.activation_pressure import FORCES, FREQUENCIES
 
@@ -33,7 +34,7 @@ Model = ActivationPressure | ActivationMemory
 
 
 def activation_pressure(
-    *, quick: bool, seed: int, jobs: int | None, tell: Progress
+    *, quick: bool, seed: int, jobs: int | None, tell: Progress, kept: Kept
 ) -> Reproduction:
     """Run sines and random waves at every force, and identify both models on the sines."""
     del jobs
@@ -46,17 +47,19 @@ def activation_pressure(
     ]
     sines: dict[Condition, Recording] = {}
     waves: dict[Condition, Recording] = {}
-    for done, (run, recording) in enumerate(record(plan, runs=names, seed=seed), start=1):
+    for run, recording in recorded(
+        kept, plan.name, names, seed, lambda share, text: tell(0.8 * share, text)
+    ):
         contraction = recording["displacement"] / REST_LENGTH
         whole = recording.with_channels({"contraction": ""}, contraction=contraction)
         condition = (float(run.labels["force"]), float(run.labels["frequency"]))
         (sines if run.labels["stage"] == "hysteresis" else waves)[condition] = whole
-        tell(0.8 * done / len(names), f"recorded {run.name}")
     train = list(sines.values())
     tell(0.82, "the paper's model, by particle swarm")
-    theirs = ActivationPressureEstimator(method="pso", seed=seed).fit(train).model_
+    swarm = ActivationPressureEstimator(method="pso", seed=seed)
+    theirs = fitted(kept, THEIRS, swarm, train).block
     tell(0.9, "ours")
-    ours = ActivationMemoryEstimator(seed=seed).fit(train).model_
+    ours = fitted(kept, OURS, ActivationMemoryEstimator(seed=seed), train).block
     assert isinstance(theirs, ActivationPressure)
     assert isinstance(ours, ActivationMemory)
     tables = []

@@ -11,6 +11,7 @@ import numpy as np
 
 from mckibben.blocks.base import Block
 from mckibben.blocks.published.field_models import THRESHOLDS
+from mckibben.comparison.kept import Kept
 from mckibben.comparison.ranking import compare
 from mckibben.comparison.results import Leaderboard
 from mckibben.errors import MckibbenError
@@ -21,6 +22,7 @@ from mckibben.estimators.linear.process import P2UZEstimator
 from mckibben.estimators.narx.network import NarxNetworkEstimator
 from mckibben.estimators.pi import PIEstimator
 from mckibben.metrics import score
+from mckibben.papers.keeping import fitted
 from mckibben.papers.reproduction import Cell, Figure, Progress, Reproduction, Table, thinned
 from mckibben.recording import Recording
 from mckibben.rigs import record
@@ -54,19 +56,22 @@ def published(seed: int) -> dict[str, Estimator]:
     }
 
 
-def field_models(*, quick: bool, seed: int, jobs: int | None, tell: Progress) -> Reproduction:
-    """Run the calibration and test of the rig, the paper's methods, and the field."""
-    tell(0.0, "recording")
-    recordings = {run.name: recording for run, recording in record("field-models", seed=seed)}
-    train, test = recordings["decaying-triangle"], recordings["irregular-triangle"]
-    return on_recordings(train, test, quick=quick, seed=seed, jobs=jobs, tell=tell)
-
-
-def on_recordings(
-    train: Recording, test: Recording, *, quick: bool, seed: int, jobs: int | None, tell: Progress
+def field_models(
+    *,
+    quick: bool,
+    seed: int,
+    jobs: int | None,
+    tell: Progress,
+    kept: Kept,
+    train: Recording | None = None,
+    test: Recording | None = None,
 ) -> Reproduction:
-    """Do what the paper does on any calibration and test recording of pressure and displacement."""
-    models, failures = _as_published(train, seed, tell)
+    """Run the calibration and test of the rig, or given ones: the paper's methods, and the field."""
+    if train is None or test is None:
+        tell(0.0, "recording")
+        recordings = {run.name: recording for run, recording in record("field-models", seed=seed)}
+        train, test = recordings["decaying-triangle"], recordings["irregular-triangle"]
+    models, failures = _as_published(train, seed, tell, kept)
     tell(0.2, "the whole field")
     board = compare(
         train,
@@ -75,8 +80,11 @@ def on_recordings(
         n_folds=0 if quick else 4,
         seed=seed,
         jobs=jobs,
-        progress=lambda model, share: tell(0.2 + 0.75 * share, f"{model} done"),
+        folder=kept.folder and kept.folder / "field",
+        progress=lambda standing: tell(0.2 + 0.75 * standing.done / standing.total, str(standing)),
     )
+    if board.pending:
+        raise KeyboardInterrupt
     paper = {name: _errors(model, train, test) for name, model in models.items()}
     best = board.best
     assert best is not None
@@ -118,15 +126,15 @@ def on_recordings(
 
 
 def _as_published(
-    train: Recording, seed: int, tell: Progress
+    train: Recording, seed: int, tell: Progress, kept: Kept
 ) -> tuple[dict[str, Block], list[str]]:
     models: dict[str, Block] = {}
     failures = []
     for place, (name, estimator) in enumerate(published(seed).items()):
         tell(0.05 + 0.04 * place, name)
         try:
-            fitted = estimator.fit(train).model_
-            models[name] = affine_match(fitted, train, "range")
+            found = fitted(kept, name, estimator, train).block
+            models[name] = affine_match(found, train, "range")
         except MckibbenError as error:
             failures.append(f"{name} failed here: {error}")
     return models, failures

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from mckibben import registry
 from mckibben.blocks.base import Block
+from mckibben.comparison.kept import Kept
 from mckibben.control import (
     Controller,
     EstimatedLoad,
@@ -26,9 +27,10 @@ from mckibben.control import (
 )
 from mckibben.errors import ModelWarning
 from mckibben.estimators.coupled.force_estimate import ForceEstimate, fit_force_estimate
+from mckibben.papers.keeping import fitted, recorded
 from mckibben.papers.reproduction import Cell, Figure, Progress, Reproduction, Table, rms, thinned
 from mckibben.recording import Recording
-from mckibben.rigs import load_rig, record
+from mckibben.rigs import load_rig
 from mckibben.signals import resample
 
 Array = NDArray[np.float64]
@@ -63,14 +65,19 @@ HOUR = 3600.0
 """Of the random load under which models run free [s]."""
 
 
-def mpi_narmax(*, quick: bool, seed: int, jobs: int | None, tell: Progress) -> Reproduction:
+def mpi_narmax(
+    *, quick: bool, seed: int, jobs: int | None, tell: Progress, kept: Kept
+) -> Reproduction:
     """Run statuses 1 to 4 and the pulls on the rail, and identify models with and without force."""
     del jobs
-    recordings = {}
-    for run, recording in record("mpi-narmax", runs=[*STATUSES, PULLS], seed=seed):
-        recordings[run.name] = resample(recording, SAMPLE_TIME)
-        tell(0.1, f"recorded {run.name}")
-    models, facts = _models(recordings, quick, seed, tell)
+    names = [*STATUSES, PULLS]
+    recordings = {
+        run.name: resample(recording, SAMPLE_TIME)
+        for run, recording in recorded(
+            kept, "mpi-narmax", names, seed, lambda share, text: tell(0.15 * share, text)
+        )
+    }
+    models, facts = _models(recordings, quick, seed, tell, kept)
     tell(0.75, "force")
     estimate = fit_force_estimate([recordings[name] for name in TRAINING])
     estimated = _estimated(estimate, recordings)
@@ -82,7 +89,7 @@ def mpi_narmax(*, quick: bool, seed: int, jobs: int | None, tell: Progress) -> R
 
 
 def _models(
-    recordings: Mapping[str, Recording], quick: bool, seed: int, tell: Progress
+    recordings: Mapping[str, Recording], quick: bool, seed: int, tell: Progress, kept: Kept
 ) -> tuple[dict[str, Block], list[tuple[Cell, ...]]]:
     models: dict[str, Block] = {}
     facts: list[tuple[Cell, ...]] = []
@@ -91,9 +98,10 @@ def _models(
         tell(0.15 + 0.1 * place, name)
         estimator = registry.load("estimators", "rdpi")(
             input="voltage", rate_time_constant=5 * SAMPLE_TIME, seed=seed
-        ).fit(recordings[status])
-        models[name] = estimator.model_
-        facts.append((name, estimator.diagnostics_.seconds, models[name].n_parameters))
+        )
+        found = fitted(kept, name, estimator, recordings[status])
+        models[name] = found.block
+        facts.append((name, found.seconds, found.block.n_parameters))
     train = [recordings[name] for name in TRAINING]
     swarm = {"method": "ls"} if quick else {}
     chosen: dict[str, tuple[str, dict[str, Any]]] = {
@@ -106,9 +114,10 @@ def _models(
         tell(0.5, name)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", ModelWarning)
-            fitted = registry.load("coupled", model)(seed=seed, **settings).fit(train)
-        models[name] = fitted.model_
-        facts.append((name, fitted.diagnostics_.seconds, models[name].n_parameters))
+            estimator = registry.load("coupled", model)(seed=seed, **settings)
+            found = fitted(kept, name, estimator, train)
+        models[name] = found.block
+        facts.append((name, found.seconds, found.block.n_parameters))
     return models, facts
 
 

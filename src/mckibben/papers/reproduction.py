@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mckibben import registry
+from mckibben.comparison.kept import Kept
+from mckibben.threads import one_blas_thread
 
 Array = NDArray[np.float64]
 Cell = str | float | None
@@ -114,7 +117,9 @@ def reproduce(
     quick: bool = False,
     seed: int = 0,
     jobs: int | None = None,
+    folder: str | Path | None = None,
     progress: Progress | None = None,
+    **own: Any,
 ) -> Reproduction:
     """Run a paper's experiment again.
 
@@ -128,8 +133,13 @@ def reproduce(
         Of everything random.
     jobs : int, optional
         Processes; default as many as there are cores.
+    folder : path, optional
+        Where recordings and models are kept until all is done, so that a re-run that was stopped and
+        is called again goes on from there.
     progress : callable, optional
         Told the share of the work done, and what is next.
+    **own
+        What the paper's function takes beside: ``train`` and ``test`` of ``field-models``.
 
     Raises
     ------
@@ -137,9 +147,17 @@ def reproduce(
         If there is no paper of that name; the text lists those there are.
     """
     run = registry.load("papers", name)
-    found: Reproduction = run(
-        quick=quick, seed=seed, jobs=jobs, tell=progress or (lambda share, text: None)
-    )
+    kept = Kept(folder, name, quick, seed)
+    with one_blas_thread():
+        found: Reproduction = run(
+            quick=quick,
+            seed=seed,
+            jobs=jobs,
+            tell=progress or (lambda share, text: None),
+            kept=kept,
+            **own,
+        )
+    kept.clear()
     return found
 
 

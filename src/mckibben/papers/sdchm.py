@@ -6,7 +6,6 @@ Pneumatic Artificial Muscle-Driven Soft Manipulator".
 
 from __future__ import annotations
 
-import os
 import warnings
 from collections.abc import Mapping
 from typing import Any
@@ -18,7 +17,9 @@ from mckibben import registry
 from mckibben.blocks.base import Block
 from mckibben.blocks.compose import Series
 from mckibben.blocks.coupling import Coupling
+from mckibben.blocks.fuzzy_network import FuzzyNetwork
 from mckibben.blocks.published.coupling import coupling as printed_coupling
+from mckibben.comparison.kept import Kept
 from mckibben.control import (
     PID,
     Controller,
@@ -33,11 +34,13 @@ from mckibben.errors import ModelWarning
 from mckibben.estimators.coupled.data import coupled_data
 from mckibben.estimators.coupled.fuzzy import fit_network
 from mckibben.estimators.coupled.sdchm import as_block, stacked_inputs
+from mckibben.papers.keeping import fitted, recorded
 from mckibben.papers.reproduction import Cell, Figure, Progress, Reproduction, Table, rms, thinned
 from mckibben.recording import Recording
-from mckibben.rigs import load_rig, record
+from mckibben.rigs import load_rig
 from mckibben.signals.protocols import protocol
 from mckibben.signals.protocols.sdchm import PATTERNS, PERIOD, PREDICTION
+from mckibben.workers import Tell, all_of
 
 Array = NDArray[np.float64]
 Scores = dict[str, tuple[float, float]]
@@ -100,17 +103,17 @@ LOADS = (0.0, 1.0, 2.0)
 """Beyond the paper: of the reference [Hz], and on the disc [kg]."""
 
 
-def sdchm(*, quick: bool, seed: int, jobs: int | None, tell: Progress) -> Reproduction:
+def sdchm(*, quick: bool, seed: int, jobs: int | None, tell: Progress, kept: Kept) -> Reproduction:
     """Run the arm's protocol, identify the coupled models, and track with their inverses."""
-    runs = _recorded(quick, seed, tell)
+    runs = _recorded(quick, seed, tell, kept)
     train = [r for role, stage, r in runs.values() if role == "train"]
     validation = [r for role, stage, r in runs.values() if role == "validation"]
     orders = _orders(runs["gpi-1"][2], (5, 10) if quick else tuple(ORDERS), seed, tell)
-    models, times = _models(train, validation, quick, seed, tell)
+    models, times = _models(train, validation, quick, seed, tell, kept)
     tell(0.7, "closed loops")
     rig = load_rig("soft-arm")
     pid = tune_pid(rig, sample_time=CONTROL_TIME, scheduled={EXTENSOR: 1.0}, seed=seed)
-    compensators = _compensators(models, train, quick, seed)
+    compensators = _compensators(models, train, quick, seed, kept)
     controllers: dict[str, Controller] = {
         **{name: Feedforward(block) for name, block in compensators.items()},
         "PID": pid,
@@ -127,7 +130,9 @@ def sdchm(*, quick: bool, seed: int, jobs: int | None, tell: Progress) -> Reprod
     return _reported(runs, orders, models, times, found, references, beyond, quick)
 
 
-def _recorded(quick: bool, seed: int, tell: Progress) -> dict[str, tuple[str, str, Recording]]:
+def _recorded(
+    quick: bool, seed: int, tell: Progress, kept: Kept
+) -> dict[str, tuple[str, str, Recording]]:
     levels = {"train": QUICK_TRAINING, "validation": QUICK_VALIDATION}
     names = []
     for run in protocol("sdchm").runs:
@@ -138,13 +143,13 @@ def _recorded(quick: bool, seed: int, tell: Progress) -> dict[str, tuple[str, st
             wanted = stage in ("hysteresis", "prediction")
         if wanted:
             names.append(run)
-    kept: dict[str, tuple[str, str, Recording]] = {}
-    for done, (run, recording) in enumerate(
-        record("sdchm", runs=[run.name for run in names], seed=seed), start=1
-    ):
-        kept[run.name] = (run.role, str(run.labels["stage"]), recording)
-        tell(0.3 * done / len(names), f"recorded {run.name}")
-    return kept
+    chosen = [run.name for run in names]
+    return {
+        run.name: (run.role, str(run.labels["stage"]), recording)
+        for run, recording in recorded(
+            kept, "sdchm", chosen, seed, lambda share, text: tell(0.3 * share, text)
+        )
+    }
 
 
 def _orders(run: Recording, orders: tuple[int, ...], seed: int, tell: Progress) -> Table:
@@ -177,7 +182,12 @@ def _orders(run: Recording, orders: tuple[int, ...], seed: int, tell: Progress) 
 
 
 def _models(
-    train: list[Recording], validation: list[Recording], quick: bool, seed: int, tell: Progress
+    train: list[Recording],
+    validation: list[Recording],
+    quick: bool,
+    seed: int,
+    tell: Progress,
+    kept: Kept,
 ) -> tuple[dict[str, Block], dict[str, float]]:
     swarm = {"method": "ls"} if quick else {"method": "pso"}
     paper = {"memory_settings": {"threshold_rule": "paper"}}
@@ -197,14 +207,14 @@ def _models(
     for place, (name, (model, settings)) in enumerate(chosen.items()):
         tell(0.32 + 0.06 * place, name)
         estimator = registry.load("coupled", model)(seed=seed, **settings)
-        estimator.fit(train, validation=validation)
-        models[name], times[name] = estimator.model_, estimator.diagnostics_.seconds
+        found = fitted(kept, name, estimator, train, validation=validation)
+        models[name], times[name] = found.block, found.seconds
     models.setdefault(OURS, models["SDIHC, ours"])
     return models, times
 
 
 def _compensators(
-    models: Mapping[str, Block], train: list[Recording], quick: bool, seed: int
+    models: Mapping[str, Block], train: list[Recording], quick: bool, seed: int, kept: Kept
 ) -> dict[str, Block]:
     """Return all inverses, the paper's with its network trained from displacements to couplings."""
     published, individual = models[PUBLISHED], models["individual"]
@@ -215,21 +225,25 @@ def _compensators(
     rest = [run for run in data.runs if "gpi" not in run.name] or list(data.runs)
     x = stacked_inputs(Series((hysteresis, coupling)), rest)
     y = np.concatenate([np.column_stack([r.displacements, r.scheduled]) for r in rest])
-    learned = fit_network(
-        y,
-        x[:, :3],
-        3,
-        constants=False,
-        method="ls" if quick else "pso",
-        ridge=1e-9,
-        seed=seed,
-    )
     limits = np.column_stack([y[:, :3].min(axis=0), y[:, :3].max(axis=0)])
-    swapped = as_block(
-        learned, data.displacements, network.inputs[:3], data.scheduled, limits, False
-    )
+
+    def swapped() -> FuzzyNetwork:
+        learned = fit_network(
+            y,
+            x[:, :3],
+            3,
+            constants=False,
+            method="ls" if quick else "pso",
+            ridge=1e-9,
+            seed=seed,
+        )
+        return as_block(
+            learned, data.displacements, network.inputs[:3], data.scheduled, limits, False
+        )
+
+    inverse_network = kept.once("learned inverse", FuzzyNetwork, swapped, x, y)
     return {
-        "SDIHC, the paper's": Series((swapped, coupling.inverse(), hysteresis.inverse())),
+        "SDIHC, the paper's": Series((inverse_network, coupling.inverse(), hysteresis.inverse())),
         "individual inverse": individual.parts[0].inverse(),
         "SDIHC, ours": models["SDIHC, ours"].inverse(),
         BALANCE: models[BALANCE].inverse(),
@@ -266,25 +280,26 @@ def _try(
         return track(controller, rig, reference, settle=settle, seed=seed, noise=noise)
 
 
+def _tried(
+    common: None, trial: tuple[Controller, Recording, int, float, float], _: Tell
+) -> Tracked:
+    return _try(*trial)
+
+
 def _tracked(
     controllers: Mapping[str, Controller],
     references: Mapping[str, Recording],
     jobs: int | None,
     seed: int,
 ) -> dict[tuple[str, str], Tracked]:
-    from joblib import Parallel, delayed
-
     keys = [(name, task) for name in controllers for task in references]
-    results = Parallel(n_jobs=jobs or os.cpu_count() or 1)(
-        delayed(_try)(controllers[name], references[task], seed, 0.0, 0.0) for name, task in keys
-    )
+    trials = [(controllers[name], references[task], seed, 0.0, 0.0) for name, task in keys]
+    results = all_of(_tried, trials, jobs)
     return dict(zip(keys, results, strict=True))
 
 
 def _beyond(compensator: Block, pid: PID, jobs: int | None, seed: int) -> Table:
     """Return what higher frequencies and unmodelled loads do to every controller."""
-    from joblib import Parallel, delayed
-
     kinds: dict[str, Controller] = {
         BALANCE: Feedforward(compensator),
         "PID": pid,
@@ -300,9 +315,10 @@ def _beyond(compensator: Block, pid: PID, jobs: int | None, seed: int) -> Table:
         channels[OUTPUTS[0]] = 33.0 + 6.0 * np.sin(2 * np.pi * frequency * time)
         return Recording(channels | {EXTENSOR: np.full(time.size, 0.7)}, CONTROL_TIME)
 
-    results = Parallel(n_jobs=jobs or os.cpu_count() or 1)(
-        delayed(_try)(kinds[name], reference(frequency), seed, load, 0.0)
-        for name, (frequency, load) in keys
+    results = all_of(
+        _tried,
+        [(kinds[name], reference(frequency), seed, load, 0.0) for name, (frequency, load) in keys],
+        jobs,
     )
     errors = {key: max(found.rmse.values()) for key, found in zip(keys, results, strict=True)}
     rows = tuple((name, *(errors[name, trial] for trial in trials)) for name in kinds)

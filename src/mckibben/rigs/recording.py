@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
@@ -15,6 +14,7 @@ from mckibben.rigs.rig import Rig
 from mckibben.signals import cut
 from mckibben.signals.checking import generator
 from mckibben.signals.protocols import Protocol, Run, protocol
+from mckibben.threads import cores
 
 
 def record(
@@ -65,7 +65,7 @@ def record(
             name=run.name, protocol=plan.name, role=run.role, labels=dict(run.labels)
         )
 
-    n_threads = os.cpu_count() or 1 if jobs is None else jobs
+    n_threads = cores() if jobs is None else jobs
     with ThreadPoolExecutor(max_workers=n_threads) as pool:
         pending = [pool.submit(recorded, run) for run in wanted]
         try:

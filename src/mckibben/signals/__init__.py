@@ -3,6 +3,8 @@
 from mckibben.signals.broadband import chirp as chirp
 from mckibben.signals.broadband import multisine as multisine
 from mckibben.signals.broadband import random_wave as random_wave
+from mckibben.signals.coarsening import coarsened as coarsened
+from mckibben.signals.coarsening import made_manageable as made_manageable
 from mckibben.signals.excitations import decaying_sine as decaying_sine
 from mckibben.signals.excitations import decaying_triangle as decaying_triangle
 from mckibben.signals.excitations import irregular_triangle as irregular_triangle

@@ -8,7 +8,7 @@ and no search over starting points.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 import numpy as np
 from annotated_types import Ge, Gt, Interval
@@ -53,6 +53,8 @@ class ForceBalanceEstimator(CoupledEstimator):
     ridge : float
         Damping of the coefficients.
     """
+
+    effort: ClassVar[float] = 0.2
 
     thresholds: tuple[Annotated[float, Gt(0)], ...] = (0.008, 0.025, 0.065, 0.16, 0.4)
     degree: Annotated[int, Interval(ge=1, le=4)] = 2

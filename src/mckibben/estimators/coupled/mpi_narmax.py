@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import warnings
 from dataclasses import dataclass, replace
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 from annotated_types import Gt, Interval
@@ -86,6 +86,8 @@ class MPINarmaxEstimator(CoupledEstimator):
     ridge : float
         Damping of what is a rule's own.
     """
+
+    effort: ClassVar[float] = 6.0
 
     n_sets: Annotated[int, Interval(ge=1, le=4)] = 3
     output_lags: Annotated[int, Interval(ge=1, le=3)] = 1

@@ -122,6 +122,8 @@ def as_block(
 class TSFNNEstimator(NetworkEstimator):
     """Fuzzy network on the raw pressures: the paper's baseline, without memory."""
 
+    effort: ClassVar[float] = 5.0
+
     paired: ClassVar[bool] = False
 
     def identify(self, data: CoupledData, validation: CoupledData | None, tell: Tell) -> Block:
@@ -156,6 +158,8 @@ class SDCHMEstimator(NetworkEstimator):
     n_rounds : int
         Times that network and friction are fitted in turn.
     """
+
+    effort: ClassVar[float] = 20.0
 
     constants: bool = True
     memory: Literal["gpi", "pi", "mpi", "eupi", "cpi"] = "cpi"
@@ -308,6 +312,8 @@ def coupled(memories: list[Block], runs: list[CoupledRun], data: CoupledData) ->
 @dataclass(kw_only=True, repr=False, eq=False)
 class PublishedSDCHMEstimator(SDCHMEstimator):
     """The model as its paper identifies it: GPI, coupling, and a network trained by particle swarm."""
+
+    effort: ClassVar[float] = 25.0
 
     constants: bool = False
     method: Method = "pso"

@@ -41,6 +41,8 @@ class ActivationMemoryEstimator(SeparableEstimator):
         Of the filter of the rate [s]; default three samples.
     """
 
+    effort: ClassVar[float] = 1.0
+
     input: str = "contraction"
     output: str = "pressure"
     force: str = "force"

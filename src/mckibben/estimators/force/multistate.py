@@ -318,4 +318,6 @@ class MultistateEighteenEstimator(MultistateEstimator):
 class MultistateEachWayEstimator(MultistateEstimator):
     """Multistate friction with one shared element and one for each direction: eleven parameters."""
 
+    effort: ClassVar[float] = 3.0
+
     elements: Structure | tuple[Direction, ...] = "each-way"

@@ -149,6 +149,8 @@ class ARXEstimator(PredictionErrorEstimator):
         Order of A.
     """
 
+    effort: ClassVar[float] = 0.02
+
     n_poles: Order = 2
 
     @property
@@ -167,6 +169,8 @@ class ARMAXEstimator(ARXEstimator):
         Order of C.
     """
 
+    effort: ClassVar[float] = 1.2
+
     n_noise: Order = 2
 
     @property
@@ -184,6 +188,8 @@ class OutputErrorEstimator(PredictionErrorEstimator):
     n_poles : int
         Order of F.
     """
+
+    effort: ClassVar[float] = 1.0
 
     n_poles: Order = 2
 
@@ -204,6 +210,8 @@ class BoxJenkinsEstimator(OutputErrorEstimator):
     n_noise, n_noise_poles : int
         Orders of C and D.
     """
+
+    effort: ClassVar[float] = 1.5
 
     n_noise: Order = 2
     n_noise_poles: Order = 2

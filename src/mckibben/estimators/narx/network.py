@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 from annotated_types import Interval
@@ -36,6 +36,8 @@ class NarxNetworkEstimator(NarxEstimator):
     n_starts : int
         Random first layers tried.
     """
+
+    effort: ClassVar[float] = 6.0
 
     n_units: Annotated[int, Interval(ge=1, le=100)] = 5
     activation: Literal["tanh", "wavelet"] = "tanh"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 import numpy as np
 from annotated_types import Interval
@@ -35,6 +35,8 @@ class NarxPolynomialEstimator(NarxEstimator):
     n_terms : int
         Most terms; half and a quarter of them are tried too, and the best free run kept.
     """
+
+    effort: ClassVar[float] = 4.0
 
     degree: Annotated[int, Interval(ge=1, le=6)] = 3
     n_terms: Annotated[int, Interval(ge=1, le=200)] = 16
@@ -73,6 +75,8 @@ class NarxPolynomialEstimator(NarxEstimator):
 @dataclass(kw_only=True, repr=False, eq=False)
 class NarxPlayEstimator(NarxPolynomialEstimator):
     """Polynomial NARX model with play operators among its regressors, so that it keeps its branch."""
+
+    effort: ClassVar[float] = 1.8
 
     output_lags: Annotated[int, Interval(ge=1, le=20)] = 1
     input_lags: Annotated[int, Interval(ge=1, le=20)] = 1

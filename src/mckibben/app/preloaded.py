@@ -1,9 +1,0 @@
-"""What jobs need, loaded once by the process that they are forked from."""
-
-from __future__ import annotations
-
-import mckibben.app.work as work
-import mckibben.comparison.ranking as ranking
-import mckibben.control as control
-
-__all__ = ["control", "ranking", "work"]

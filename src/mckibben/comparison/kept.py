@@ -1,0 +1,154 @@
+"""Finished parts of long work, kept in a folder as they come: what was stopped goes on from there.
+
+Each is a JSON file that a person can read, under a digest of all that it depends on: the data, settings,
+seed, and the program itself. What is under another digest is not used.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import shutil
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, fields, is_dataclass, replace
+from functools import cache
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+
+import mckibben
+from mckibben.atomic import write_text
+from mckibben.blocks.base import Block
+from mckibben.blocks.saving import from_dict, to_dict
+from mckibben.errors import MckibbenError
+
+Result = TypeVar("Result")
+
+FOLDER = "unfinished"
+"""Within the folder of results; it goes when all is done."""
+
+
+class Kept:
+    """What is finished of some long work.
+
+    Parameters
+    ----------
+    folder : path or None
+        Of the results; None to keep nothing.
+    depends : object
+        What everything depends on: anything that `digest` takes.
+    """
+
+    def __init__(self, folder: str | Path | None, *depends: object) -> None:
+        self.folder = None if folder is None else Path(folder)
+        self._folder = None if folder is None else Path(folder) / FOLDER
+        self._digest = digest(program(), depends) if folder is not None else ""
+
+    def get(self, name: str, kind: type[Result], *depends: object) -> Result | None:
+        """Return what was kept under a name, if it depends on the same; else None.
+
+        Parameters
+        ----------
+        name : str
+            Of the part, such as a model's.
+        kind : type
+            A block, or a dataclass of numbers, words and blocks.
+        depends : object
+            What this part depends on beside what everything does.
+        """
+        try:
+            content = json.loads(self._path(name, depends).read_text(encoding="utf-8"))
+            return _from_json(kind, content)
+        except (OSError, ValueError, TypeError, KeyError, MckibbenError):
+            return None  # absent or damaged: it is computed again
+
+    def put(self, name: str, result: object, *depends: object) -> None:
+        """Keep a part."""
+        if self._folder is not None:
+            self._folder.mkdir(parents=True, exist_ok=True)
+            write_text(self._path(name, depends), json.dumps(_to_json(result)) + "\n")
+
+    def once(
+        self, name: str, kind: type[Result], compute: Callable[[], Result], *depends: object
+    ) -> Result:
+        """Return what was kept under a name, or compute it and keep it."""
+        found = self.get(name, kind, *depends)
+        if found is None:
+            found = compute()
+            self.put(name, found, *depends)
+        return found
+
+    def file(self, name: str, ending: str, *depends: object) -> Path | None:
+        """Return where a part is to be kept that is no JSON, or None to keep nothing."""
+        if self._folder is None:
+            return None
+        self._folder.mkdir(parents=True, exist_ok=True)
+        return self._path(name, depends, ending)
+
+    def clear(self) -> None:
+        """Forget everything: all is done."""
+        if self._folder is not None:
+            shutil.rmtree(self._folder, ignore_errors=True)
+
+    def _path(self, name: str, depends: object, ending: str = ".json") -> Path:
+        if self._folder is None:
+            return Path()
+        plain = "".join(c if c.isalnum() or c in "-." else "-" for c in name)
+        return self._folder / f"{plain}-{digest(self._digest, depends)[:16]}{ending}"
+
+
+def digest(*what: object) -> str:
+    """Return a digest of numbers, words, arrays, and mappings, sequences or dataclasses of those."""
+    hashed = hashlib.sha256()
+
+    def take(value: object) -> None:
+        if isinstance(value, np.ndarray):
+            hashed.update(f"{value.dtype}{value.shape}".encode())
+            hashed.update(np.ascontiguousarray(value).tobytes())
+        elif is_dataclass(value) and not isinstance(value, type):
+            take({f.name: getattr(value, f.name) for f in fields(value) if f.compare})
+        elif isinstance(value, Mapping):
+            take([(str(key), value[key]) for key in sorted(value, key=str)])
+        elif isinstance(value, list | tuple):
+            hashed.update(f"[{len(value)}".encode())
+            for item in value:
+                take(item)
+        else:
+            hashed.update(f"{type(value).__name__} {value!r};".encode())
+
+    take(what)
+    return hashed.hexdigest()
+
+
+@cache
+def program() -> str:
+    """Return a digest of the package's own source: another version may find other models."""
+    home = Path(mckibben.__file__).parent
+    return digest({str(p.relative_to(home)): p.read_bytes() for p in sorted(home.rglob("*.py"))})
+
+
+def _to_json(value: Any) -> Any:
+    if isinstance(value, Block):
+        return to_dict(value)
+    if not is_dataclass(value) or isinstance(value, type):
+        raise TypeError(f"{type(value).__name__} is neither a block nor a dataclass")
+    blocks = {f.name: getattr(value, f.name) for f in fields(value)}
+    blocks = {name: block for name, block in blocks.items() if isinstance(block, Block)}
+    plain = asdict(replace(value, **dict.fromkeys(blocks)))
+    return plain | {name: to_dict(block) for name, block in blocks.items()}
+
+
+def _from_json(kind: type[Result], content: Any) -> Result:
+    if issubclass(kind, Block):
+        block: Any = from_dict(content)
+        return block
+    from pydantic import TypeAdapter
+
+    blocks = {
+        name: from_dict(value)
+        for name, value in content.items()
+        if isinstance(value, Mapping) and "format" in value
+    }
+    plain: Any = TypeAdapter(kind).validate_python(content | dict.fromkeys(blocks))
+    return replace(plain, **blocks)

@@ -1,0 +1,213 @@
+"""Trying one model: fitted, cross-validated, run free and scored; in parts that processes can share."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mckibben import registry
+from mckibben.blocks.base import Block
+from mckibben.comparison.free_run import run_free
+from mckibben.comparison.memory_test import memory_test
+from mckibben.comparison.results import Row
+from mckibben.comparison.splits import Fold, Mask, Split
+from mckibben.errors import MckibbenError
+from mckibben.estimators.search import Progress
+from mckibben.metrics import score
+from mckibben.recording import Recording
+
+Array = NDArray[np.float64]
+
+TIMED_SAMPLES = 20_000
+
+
+@dataclass(frozen=True)
+class Data:
+    """What all models are given.
+
+    Parameters
+    ----------
+    split : Split
+        Data to fit and to test on.
+    folds : tuple of Fold
+        Parts of the cross-validation within the training data.
+    input, output : str
+        Channels.
+    """
+
+    split: Split
+    folds: tuple[Fold, ...]
+    input: str
+    output: str
+
+
+@dataclass(frozen=True)
+class Part:
+    """Part of trying a model: the folds to cross-validate on, and whether to fit to everything.
+
+    Parameters
+    ----------
+    model : str
+        Short name.
+    settings : mapping
+        Of its estimator.
+    folds : tuple of int
+        Places of folds. They come first: they load the compiled kernels, which the fit that is timed
+        then finds ready.
+    whole : bool
+        Whether to fit to all of the training data, and to test.
+    """
+
+    model: str
+    settings: Mapping[str, Any]
+    folds: tuple[int, ...]
+    whole: bool
+
+
+@dataclass(frozen=True)
+class Tried:
+    """What came of a part, or of all parts of a model together.
+
+    Parameters
+    ----------
+    row : Row or None
+        Of the leaderboard; None in parts that do not fit the whole.
+    outputs : tuple of array
+        Free-running output on every training recording, then every test recording.
+    squares, count : float, int
+        Sum and number of squared errors of the cross-validation.
+    invalid : str or None
+        Why a fold could not be fitted.
+    """
+
+    row: Row | None = None
+    outputs: tuple[Array, ...] = ()
+    squares: float = 0.0
+    count: int = 0
+    invalid: str | None = None
+
+
+def parts_of(model: str, settings: Mapping[str, Any], n_folds: int, split: bool) -> list[Part]:
+    """Return the parts of trying a model: one, or as many as there are folds."""
+    if not split or n_folds < 2:
+        return [Part(model, settings, tuple(range(n_folds)), whole=True)]
+    others = [Part(model, settings, (k,), whole=False) for k in range(1, n_folds)]
+    return [Part(model, settings, (0,), whole=True), *others]
+
+
+def try_part(data: Data, part: Part, tell: Callable[..., None]) -> Tried:
+    """Do a part of trying a model; whatever goes wrong is in the row."""
+    try:
+        return _try(data, part, tell)
+    except MckibbenError as error:
+        return Tried(Row(part.model, reason=str(error)))
+    except Exception as error:  # one model must not take the comparison down, whatever it does
+        return Tried(Row(part.model, reason=f"{type(error).__name__}: {error}"))
+
+
+def joined(parts: Sequence[Tried]) -> Tried:
+    """Return what came of all parts of a model, as one."""
+    failed = [tried for tried in parts if tried.row is not None and tried.row.reason is not None]
+    if failed:
+        return failed[0]
+    (whole,) = (tried for tried in parts if tried.row is not None)
+    assert whole.row is not None
+    invalid = next((tried.invalid for tried in parts if tried.invalid is not None), None)
+    squares, count = (sum(getattr(tried, name) for tried in parts) for name in ("squares", "count"))
+    if invalid is not None:
+        noted = dict(whole.row.diagnostics) | {"validation_failed": invalid}
+        return replace(whole, row=replace(whole.row, diagnostics=noted))
+    validation = float(np.sqrt(squares / count)) if count else None
+    return replace(whole, row=replace(whole.row, validation_rmse=validation))
+
+
+def outputs_of(block: Block, data: Data) -> tuple[Array, ...]:
+    """Return a model's free-running output on every training recording, then every test recording."""
+    split = data.split
+    on_train = [run_free(block, recording, data.output) for recording in split.train]
+    on_test = [run_free(block, recording, data.output, split.train) for recording in split.test]
+    return (*on_train, *on_test)
+
+
+def errors_on_test(outputs: Sequence[Array], data: Data) -> Array:
+    """Return the errors at all samples of the test that are scored."""
+    scored, measured = _tested(outputs, data)
+    return scored - measured
+
+
+def _tested(outputs: Sequence[Array], data: Data) -> tuple[Array, Array]:
+    split = data.split
+    on_test = outputs[len(split.train) :]
+    rows = list(zip(on_test, split.test, split.test_rows, strict=True))
+    return (
+        np.concatenate([modelled[kept] for modelled, _, kept in rows]),
+        np.concatenate([recording[data.output][kept] for _, recording, kept in rows]),
+    )
+
+
+def _try(data: Data, part: Part, tell: Callable[..., None]) -> Tried:
+    estimator_class = registry.load("estimators", part.model)
+    settings = {"input": data.input, "output": data.output} | dict(part.settings)
+
+    def fitted(
+        recordings: Sequence[Recording], rows: Sequence[Mask] | None, progress: Progress | None
+    ) -> Any:
+        estimator = estimator_class(**settings).fit(recordings, rows=rows, progress=progress)
+        if estimator.diagnostics_.interrupted:
+            raise KeyboardInterrupt  # a search cut short is no model to be ranked
+        return estimator
+
+    squares, count, invalid = 0.0, 0, None
+    try:
+        for fold in (data.folds[place] for place in part.folds):
+            block = fitted(fold.train, fold.train_rows, None).model_
+            for recording, rows in zip(fold.test, fold.test_rows, strict=True):
+                errors = (run_free(block, recording, data.output) - recording[data.output])[rows]
+                squares, count = squares + float(errors @ errors), count + errors.size
+    except MckibbenError as error:  # a part of the data may be too little where all of it is enough
+        invalid = str(error)
+    if not part.whole:
+        return Tried(squares=squares, count=count, invalid=invalid)
+    split = data.split
+    started = time.perf_counter()
+    estimator = fitted(split.train, None, tell)
+    seconds = time.perf_counter() - started
+    block = estimator.model_
+    outputs = outputs_of(block, data)
+    on_train, on_test = outputs[: len(split.train)], outputs[len(split.train) :]
+    diagnostics = asdict(estimator.diagnostics_)
+    diagnostics.pop("covariance")
+    scored, measured = _tested(outputs, data)
+    row = Row(
+        model=part.model,
+        n_parameters=block.n_parameters,
+        fit_seconds=seconds,
+        step_ns=_step_cost(block, split.train[0]),
+        train=score(
+            np.concatenate([recording[data.output] for recording in split.train]),
+            np.concatenate(on_train),
+        ),
+        test=score(measured, scored),
+        memory=memory_test(block, split.test, on_test, data.input, data.output),
+        block=block,
+        diagnostics=diagnostics,
+    )
+    return Tried(row, outputs, squares, count, invalid)
+
+
+def _step_cost(block: Block, recording: Recording) -> float:
+    inputs = np.resize(
+        recording.matrix(channel.name for channel in block.inputs),
+        (TIMED_SAMPLES, len(block.inputs)),
+    )
+    times = []
+    for _ in range(3):
+        started = time.perf_counter()
+        block.simulate(inputs, sample_time=recording.sample_time)
+        times.append(time.perf_counter() - started)
+    return min(times) / TIMED_SAMPLES * 1e9

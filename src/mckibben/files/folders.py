@@ -1,0 +1,66 @@
+"""Folders of recordings, and what each recording in them is for."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+
+from mckibben.errors import DataError
+from mckibben.files.formats import READERS
+
+
+def roles(folder: Path) -> dict[str, list[Path]]:
+    """Return the recordings of a folder by role, as its protocol.json has them, or all to train.
+
+    Raises
+    ------
+    DataError
+        If there are none.
+    """
+    protocol = folder / "protocol.json"
+    found = sorted(
+        path for path in folder.iterdir() if path.suffix.casefold() in READERS and path.is_file()
+    )
+    if not found:
+        raise DataError("there is no recording in the folder", file=folder, remedy="name files")
+    if not protocol.is_file():
+        return {"train": found}
+    try:
+        runs = json.loads(protocol.read_text(encoding="utf-8"))["runs"]
+        given = {str(run["name"]): str(run["role"]) for run in runs}
+    except (ValueError, KeyError, TypeError, OSError):
+        raise DataError(
+            "its protocol.json is not readable", file=folder, remedy="repair or remove it"
+        ) from None
+    by_role: dict[str, list[Path]] = {}
+    for path in found:
+        by_role.setdefault(given.get(path.stem, "train"), []).append(path)
+    return by_role
+
+
+def expanded(
+    files: Sequence[Path], test: Sequence[Path]
+) -> tuple[list[Path], list[Path], list[Path]]:
+    """Return files to train, to validate and to test on, folders replaced by what is in them.
+
+    Parameters
+    ----------
+    files : sequence of Path
+        Files to train on; of folders, each recording has its own role.
+    test : sequence of Path
+        Files to test on; of folders, everything.
+
+    Raises
+    ------
+    DataError
+        On a folder without recordings.
+    """
+    found: dict[str, list[Path]] = {"train": [], "validation": [], "test": []}
+    for file in files:
+        for role, paths in (roles(file) if file.is_dir() else {"train": [file]}).items():
+            found.setdefault(role, []).extend(paths)
+    for file in test:
+        inside = roles(file).values() if file.is_dir() else [[file]]
+        found["test"] += [path for paths in inside for path in paths]
+    return found["train"], found["validation"], found["test"]

@@ -1,0 +1,74 @@
+"""What a re-run has recorded and fitted, kept so that one that was stopped goes on from there."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+from mckibben.blocks.base import Block
+from mckibben.comparison.kept import Kept
+from mckibben.files import read, write
+from mckibben.recording import Recording
+from mckibben.rigs import record
+from mckibben.signals.protocols import protocol
+from mckibben.signals.protocols.protocol import Run
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """What a fit gave.
+
+    Parameters
+    ----------
+    block : Block
+        The model.
+    rmse : float or tuple of float
+        Its free-running error on the data fitted, of every output.
+    seconds : float
+        That the fit took.
+    """
+
+    __pydantic_config__: ClassVar[dict[str, bool]] = {"arbitrary_types_allowed": True}
+
+    block: Block
+    rmse: float | tuple[float, ...]
+    seconds: float
+
+
+def fitted(
+    kept: Kept, name: str, estimator: Any, recordings: Recording | Sequence[Recording], **how: Any
+) -> Fitted:
+    """Return what an estimator finds on recordings, or found before the work was stopped."""
+
+    def fit() -> Fitted:
+        estimator.fit(recordings, **how)
+        said = estimator.diagnostics_
+        return Fitted(estimator.model_, said.rmse, said.seconds)
+
+    settings = (type(estimator).__name__, estimator.get_params())
+    return kept.once(name, Fitted, fit, settings, recordings, how)
+
+
+def recorded(
+    kept: Kept,
+    name: str,
+    runs: Sequence[str],
+    seed: int,
+    tell: Callable[[float, str], None],
+) -> Iterator[tuple[Run, Recording]]:
+    """Yield runs of a protocol on its rig, in their order, those recorded before read from disk."""
+    plan = protocol(name)
+    files = {run: kept.file(run, ".parquet", name, seed) for run in runs}
+    missing = [run for run, file in files.items() if file is None or not file.exists()]
+    fresh = record(plan, runs=missing, seed=seed)
+    for done, run in enumerate(runs, start=1):
+        file = files[run]
+        if file is None:
+            _, recording = next(fresh)
+        else:
+            if run in missing:
+                write(next(fresh)[1], file)
+            (recording,) = read(file, informative=False)  # the same whether it was there or not
+        tell(done / len(runs), f"recorded {run}")
+        yield plan[run], recording

@@ -18,7 +18,7 @@ import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from multiprocessing import connection, forkserver
+from multiprocessing import connection, forkserver, resource_tracker
 from types import ModuleType
 from typing import Any, Self
 
@@ -203,6 +203,7 @@ def prepare() -> None:
     """Start loading what processes will need, in the background; call it as early as can be."""
     if context().get_start_method() != "forkserver":
         return
+    resource_tracker.ensure_running()  # which else unblocks signals
     before = {name: os.environ.get(name) for name in ONE_THREAD}
     os.environ.update(dict.fromkeys(ONE_THREAD, "1"))
     # blocked signals stay blocked in whatever is started: no worker ever hears Ctrl-C

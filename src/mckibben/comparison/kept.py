@@ -41,7 +41,6 @@ class Kept:
     """
 
     def __init__(self, folder: str | Path | None, *depends: object) -> None:
-        self.folder = None if folder is None else Path(folder)
         self._folder = None if folder is None else Path(folder) / FOLDER
         self._digest = digest(program(), depends) if folder is not None else ""
 
@@ -78,6 +77,10 @@ class Kept:
             found = compute()
             self.put(name, found, *depends)
         return found
+
+    def inside(self, name: str) -> Path | None:
+        """Return a folder for a part that keeps its own parts, or None to keep nothing."""
+        return None if self._folder is None else self._folder / name
 
     def file(self, name: str, ending: str, *depends: object) -> Path | None:
         """Return where a part is to be kept that is no JSON, or None to keep nothing."""

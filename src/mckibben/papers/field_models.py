@@ -80,7 +80,7 @@ def field_models(
         n_folds=0 if quick else 4,
         seed=seed,
         jobs=jobs,
-        folder=kept.folder and kept.folder / "field",
+        folder=kept.inside("field"),
         progress=lambda standing: tell(0.2 + 0.75 * standing.done / standing.total, str(standing)),
     )
     if board.pending:

@@ -1,0 +1,146 @@
+"""Ctrl-C sent to the real commands at random moments.
+
+``MCKIBBEN_STOPS=20 pytest tests/cli/test_stopping.py`` stops each command twenty times.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from mckibben import GPI, Recording, write
+from mckibben.signals import irregular_triangle, triangle
+
+STOPS = int(os.environ.get("MCKIBBEN_STOPS", "3"))
+
+PROMPT = 2.0
+"""Within which a command stops [s]."""
+
+SLACK = 1.5
+"""For a machine that has more to do than this [s]."""
+
+MODELS = "pi,maxwell-slip,kp,mpi,p1,bouc-wen,gpi"
+
+
+@pytest.fixture(scope="module")
+def recordings(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
+    folder = tmp_path_factory.mktemp("recordings")
+    time_ = np.arange(0, 60, 0.02)
+    paths = []
+    for name, u in (
+        ("train", triangle(time_, 4.0, [5.0, 4.2, 3.4, 2.6, 1.8, 1.0])),
+        ("test", irregular_triangle(time_, 12, 5.0, seed=3)),
+    ):
+        y = GPI.example().simulate(u) + 0.02 * np.random.default_rng(0).standard_normal(u.size)
+        paths.append(folder / f"{name}.csv")
+        write(Recording({"pressure": u, "displacement": y}, 0.02), paths[-1])
+    return paths[0], paths[1]
+
+
+def begin(*words: str | Path) -> subprocess.Popen[str]:
+    program = "from mckibben.cli.main import run; run()"
+    return subprocess.Popen(
+        [sys.executable, "-c", program, *map(str, words)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+
+
+def stopped(moment: float, *words: str | Path) -> tuple[int, str, float]:
+    """Send Ctrl-C as a terminal does, to all processes of the command, after so many seconds."""
+    process = begin(*words)
+    time.sleep(moment)
+    started = time.monotonic()
+    if process.poll() is None:
+        os.killpg(process.pid, signal.SIGINT)
+    said = process.communicate(timeout=60)[1]
+    return process.returncode, said, time.monotonic() - started
+
+
+def finished(folder: Path) -> dict[str, dict[str, Any]]:
+    """Return the rows that are kept, by model."""
+    kept = [json.loads(path.read_text()) for path in (folder / "unfinished").glob("*.json")]
+    return {row["model"]: row for row in kept if "model" in row}
+
+
+@pytest.mark.parametrize("command", ["compare", "study"])
+def test_a_stopped_comparison_keeps_what_is_finished_and_goes_on(
+    command: str, recordings: tuple[Path, Path], tmp_path: Path
+) -> None:
+    train, test = recordings
+    rng = np.random.default_rng(0)
+    whole = time.monotonic()
+    words = (command, train, "--test", test, "--models", MODELS, "--jobs", "2")
+    process = begin(*words, "-o", tmp_path / "first")
+    process.communicate()
+    whole = time.monotonic() - whole
+    assert process.returncode == 0
+    for round_ in range(STOPS):
+        folder = tmp_path / str(round_)
+        code, said, took = stopped(float(rng.uniform(0.5, whole)), *words, "-o", folder)
+        if code == 0:
+            continue  # it was done before
+        assert code == 130, said
+        assert "Stopp" in said or "Interrupted" in said
+        assert "Traceback" not in said
+        assert took < PROMPT + SLACK
+        assert not list(folder.rglob("*.part"))
+        kept = finished(folder) if folder.is_dir() else {}
+        process = begin(*words, "-o", folder)
+        process.communicate()
+        assert process.returncode == 0
+        board = json.loads((folder / "leaderboard.json").read_text())
+        rows = {row["model"]: row for row in board["rows"]}
+        assert set(rows) == set(MODELS.split(","))
+        assert board["pending"] == []
+        for model, row in kept.items():  # seconds are never the same twice: these were not refitted
+            assert rows[model]["fit_seconds"] == row["fit_seconds"]
+        assert not (folder / "unfinished").exists()
+
+
+def test_a_stopped_rerun_keeps_what_is_finished_and_goes_on(tmp_path: Path) -> None:
+    words = ("reproduce", "field-models", "--quick", "-o", tmp_path)
+    process = begin(*words)
+    assert process.stderr is not None
+    for line in process.stderr:  # until something is finished
+        if line.startswith("4 of "):
+            break
+    started = time.monotonic()
+    os.killpg(process.pid, signal.SIGINT)
+    said = process.communicate(timeout=60)[1]
+    assert time.monotonic() - started < PROMPT + SLACK
+    assert process.returncode == 130
+    assert "the same command goes on" in said
+    kept = {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*.json")}
+    assert len(kept) >= 4 + 3  # of the field, and of the paper
+    process = begin(*words)
+    assert process.stderr is not None
+    shown = process.stderr.read()
+    process.communicate()
+    assert process.returncode == 0
+    assert "\n3 of " not in shown
+    assert {path.name for path in tmp_path.iterdir()} == {"report.html", "tables.json"}
+
+
+def test_a_second_signal_ends_at_once(recordings: tuple[Path, Path], tmp_path: Path) -> None:
+    process = begin("compare", recordings[0], "--models", "gpi", "-o", tmp_path)
+    time.sleep(1.5)
+    started = time.monotonic()
+    for _ in range(2):
+        os.kill(process.pid, signal.SIGINT)
+        time.sleep(0.1)
+    said = process.communicate(timeout=60)[1]
+    assert process.returncode in (130, -signal.SIGINT)
+    assert "Traceback" not in said
+    assert time.monotonic() - started < PROMPT + SLACK

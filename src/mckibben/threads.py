@@ -1,7 +1,8 @@
 """How many cores a call may use.
 
 Matrices here are small: linear algebra on all cores takes longer than on one, and many times as long
-beside other work. So it gets one thread, and cores are for models, folds and starts that are independent.
+beside other work. So it gets one thread, and cores are for models, folds and starts that are
+independent.
 """
 
 from __future__ import annotations
@@ -38,6 +39,7 @@ def one_blas_thread() -> Iterator[None]:
     global _inside
     with _lock:
         if _inside == 0:
+            import scipy.linalg  # noqa: F401  # limits hold for what is loaded, and it has its own BLAS
             from threadpoolctl import threadpool_limits
 
             _limits.enter_context(threadpool_limits(1, user_api="blas"))

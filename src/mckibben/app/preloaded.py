@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import numba
+import scipy.optimize as optimize
+
 import mckibben.app.work as work
 import mckibben.comparison.ranking as ranking
 import mckibben.control as control
 
-__all__ = ["control", "ranking", "work"]
+__all__ = ["control", "numba", "optimize", "ranking", "work"]

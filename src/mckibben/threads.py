@@ -38,6 +38,7 @@ def one_blas_thread() -> Iterator[None]:
     global _inside
     with _lock:
         if _inside == 0:
+            import scipy.linalg  # noqa: F401  # limits hold for what is loaded, and it has its own BLAS
             from threadpoolctl import threadpool_limits
 
             _limits.enter_context(threadpool_limits(1, user_api="blas"))

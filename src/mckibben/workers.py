@@ -25,7 +25,7 @@ from typing import Any, Self
 from mckibben import threads
 from mckibben.errors import MckibbenError
 
-PRELOADED = ("mckibben.comparison.ranking", "mckibben.control")
+PRELOADED = ("mckibben.comparison.ranking", "mckibben.control", "numba", "scipy.optimize")
 """What the server loads, so that no process has to."""
 
 ONE_THREAD = (

@@ -13,7 +13,7 @@ import mckibben
 SOURCE = Path(mckibben.__file__).parent
 
 LAYERS = (
-    {"errors", "registry", "atomic", "threads", "workers"},
+    {"errors", "registry", "atomic", "threads", "workers", "compiling"},
     {"recording", "signals", "metrics", "characterization"},
     {"files"},
     {"rigs"},
@@ -31,7 +31,10 @@ LAYERS = (
 
 STANDS_ON = {
     "files": {"files", "recording", "errors", "registry", "atomic"},
-    "rigs": {"rigs", "recording", "signals", "errors", "registry", "atomic", "threads"},
+    "rigs": {
+        *("rigs", "recording", "signals", "errors", "registry", "atomic"),
+        *("compiling", "threads"),
+    },
     "export": {"export", "blocks", "errors", "registry", "atomic"},
     "stream": {"stream", "blocks", "errors"},
     "control": {"control", "blocks", "recording", "errors", "registry"},

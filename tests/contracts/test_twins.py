@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numba.core.dispatcher import Dispatcher
 
 from mckibben.blocks.trial import Trial
+from mckibben.compiling import Deferred
 from mckibben.registry import load, names
 from tests.twins import ENVELOPES, STEP_ERROR, STEPPED, TWINS
 
@@ -23,7 +23,7 @@ def kernels_in(module: str) -> list[str]:
     return [
         name
         for name, value in members
-        if isinstance(value, Dispatcher) and value.__module__ == module
+        if isinstance(value, Deferred) and value.__module__ == module
     ]
 
 

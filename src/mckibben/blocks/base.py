@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic import ValidationError
 
 from mckibben.blocks.fields import Channel, Initial
+from mckibben.compiling import resolved
 from mckibben.errors import DataError, ModelError
 from mckibben.recording import Recording
 
@@ -359,5 +360,5 @@ class Primitive(Block):
 
     def bind(self, sample_time: float | None, state: Array, inputs: Array, outputs: Array) -> Run:
         """Return a function that runs the kernel in place."""
-        run, coefficients = type(self).kernel, self.coefficients(sample_time)
+        run, coefficients = resolved(type(self).kernel), self.coefficients(sample_time)
         return lambda: run(coefficients, state, inputs, outputs)

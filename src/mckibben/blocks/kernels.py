@@ -1,4 +1,4 @@
-"""How kernels are compiled, and the two that every play-type inverse shares.
+"""How kernels are compiled.
 
 A kernel is a numba function ``kernel(coefficients, state, inputs, outputs)`` on float64 arrays:
 one pass over time, the state changed in place, nothing allocated, nothing global. The same compiled
@@ -10,14 +10,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, TypeVar
 
-import numba
+from mckibben.compiling import deferred
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 
 def kernel(function: Function) -> Function:
     """Compile with exact arithmetic, for everything but weighted sums."""
-    return _compile(function, fastmath=False)
+    return deferred(function)
 
 
 def summing_kernel(function: Function) -> Function:
@@ -25,11 +25,9 @@ def summing_kernel(function: Function) -> Function:
 
     Minima, maxima, NaN and infinity keep their meaning.
     """
-    return _compile(function, fastmath={"reassoc", "contract"})
+    return deferred(function, fastmath={"reassoc", "contract"})
 
 
-def _compile(function: Function, **options: Any) -> Function:
-    compiled: Function = numba.njit(cache=True, nogil=True, error_model="numpy", **options)(
-        function
-    )
-    return compiled
+def inlined(function: Function) -> Function:
+    """Compile into each kernel that calls it, for functions that take functions."""
+    return deferred(function, inline="always")

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
-import numba
+from mckibben.blocks.kernels import inlined
 
 
-@numba.njit(inline="always", nogil=True, error_model="numpy")
+@inlined
 def solve_near(
     evaluate: Any, target: float, start: float, lowest: float, highest: float, memory: Any
 ) -> tuple[float, bool]:

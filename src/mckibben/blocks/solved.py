@@ -11,12 +11,12 @@ from __future__ import annotations
 
 from typing import Any
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
 from mckibben.blocks.base import Primitive
 from mckibben.blocks.fields import Rule
+from mckibben.blocks.kernels import inlined
 from mckibben.blocks.root import solve_near
 from mckibben.blocks.single import Inverse
 from mckibben.errors import ModelError
@@ -24,7 +24,7 @@ from mckibben.errors import ModelError
 Array = NDArray[np.float64]
 
 
-@numba.njit(inline="always", nogil=True, error_model="numpy")
+@inlined
 def solve_samples(
     trial: Any, advance: Any, coefficients: Array, state: Array, inputs: Array, outputs: Array
 ) -> None:

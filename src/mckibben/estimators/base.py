@@ -11,8 +11,6 @@ from typing import Annotated, ClassVar, Literal, Self
 import numpy as np
 from annotated_types import Ge, Interval
 from numpy.typing import NDArray
-from sklearn.base import BaseEstimator
-from sklearn.exceptions import NotFittedError
 
 from mckibben.blocks.base import Block
 from mckibben.blocks.compose import Series
@@ -20,6 +18,7 @@ from mckibben.blocks.fields import Channel
 from mckibben.blocks.negative import Negative
 from mckibben.blocks.running import run_many
 from mckibben.estimators.data import Mask, TrainingData, training_data
+from mckibben.estimators.parameters import Parametrised
 from mckibben.estimators.search import Progress, Tracker
 from mckibben.estimators.settings import check_settings
 from mckibben.recording import Recording
@@ -74,7 +73,7 @@ class Diagnostics:
 
 
 @dataclass(kw_only=True, repr=False, eq=False)
-class Estimator(BaseEstimator, ABC):  # type: ignore[misc]  # scikit-learn ships no types
+class Estimator(Parametrised, ABC):
     """Settings common to all estimators; see scikit-learn for ``get_params``, ``clone`` and the like.
 
     Parameters
@@ -218,6 +217,8 @@ class Estimator(BaseEstimator, ABC):  # type: ignore[misc]  # scikit-learn ships
             Before `fit`.
         """
         if not hasattr(self, "model_"):
+            from sklearn.exceptions import NotFittedError
+
             raise NotFittedError(f"{type(self).__name__} is not fitted yet: call fit first")
         block: Block = self.model_
         return block

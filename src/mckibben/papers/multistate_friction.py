@@ -10,7 +10,6 @@ from dataclasses import replace
 from typing import get_args
 
 import numpy as np
-from sklearn.base import clone
 
 from mckibben import registry
 from mckibben.blocks.base import Block
@@ -90,7 +89,7 @@ def multistate_friction(
             output=HYSTERESIS, static="none", elements=name, initial="first_sample", seed=seed
         )
         found[name] = estimator.fit(loop)
-        alone = clone(estimator).set_params(initial="virgin").fit(from_rest).model_
+        alone = replace(estimator, initial="virgin").fit(from_rest).model_
         totals[NAMES[name]] = _total(law, alone)
     tell(0.85, "other models of hysteresis")
     others = {}

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import numba
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from mckibben.compiling import deferred
 from mckibben.errors import DataError
 
 Array = NDArray[np.float64]
@@ -179,7 +179,7 @@ def whole_cycles(x: Array, turns: Indices) -> list[slice]:
     return found
 
 
-@numba.njit(cache=True, nogil=True)
+@deferred
 def _turns(x: Array, threshold: float, found: Indices) -> int:
     """Write the turning points into ``found``; return how many there are."""
     n, count, way = x.size, 1, 0

@@ -12,11 +12,11 @@ from typing import Annotated, ClassVar, Self
 import numpy as np
 from annotated_types import Ge
 from numpy.typing import NDArray
-from sklearn.base import BaseEstimator
 
 from mckibben.blocks.base import Block
 from mckibben.errors import ModelWarning
 from mckibben.estimators.coupled.data import CoupledData, coupled_data
+from mckibben.estimators.parameters import Parametrised
 from mckibben.estimators.settings import check_settings
 from mckibben.recording import Recording
 from mckibben.threads import one_blas_thread
@@ -48,7 +48,7 @@ class CoupledDiagnostics:
 
 
 @dataclass(kw_only=True, repr=False, eq=False)
-class CoupledEstimator(BaseEstimator, ABC):  # type: ignore[misc]  # scikit-learn ships no types
+class CoupledEstimator(Parametrised, ABC):
     """Settings common to all estimators of several muscles.
 
     Parameters

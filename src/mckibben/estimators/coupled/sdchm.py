@@ -16,7 +16,6 @@ from typing import Annotated, Any, ClassVar, Literal
 import numpy as np
 from annotated_types import Ge, Interval
 from numpy.typing import NDArray
-from scipy.optimize import lsq_linear
 
 from mckibben import registry
 from mckibben.blocks.base import Block
@@ -221,6 +220,8 @@ class SDCHMEstimator(NetworkEstimator):
 
     def friction(self, given: list[Array], wanted: list[Array], channel: Channel) -> PI:
         """Return the memory of a muscle's own motion: play operators, all partial sums positive."""
+        from scipy.optimize import lsq_linear
+
         low = min(float(part.min()) for part in given)
         high = max(float(part.max()) for part in given)
         span = high - low

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, TypeVar
 
-import numba
+from mckibben.compiling import deferred
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -21,6 +21,4 @@ GRAVITY = 9.81
 
 def compiled(function: Function) -> Function:
     """Compile with exact arithmetic; nothing global, so that runs can share a process."""
-    options: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy"}
-    result: Function = numba.njit(**options)(function)
-    return result
+    return deferred(function)

@@ -1,0 +1,124 @@
+"""Importing loads little; a kernel is compiled when it is first run, once, and found again."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from threading import Barrier
+
+import cloudpickle
+import numpy as np
+import pytest
+
+from mckibben.blocks.pi import PI, PIInverse, pi_kernel
+from mckibben.compiling import Deferred, deferred, resolved
+
+HEAVY = {"sklearn", "numba", "scipy.optimize", "pandas", "joblib", "pint", "plotly"}
+"""Half a second to several, each."""
+
+WRITTEN = """
+from mckibben.compiling import deferred
+
+@deferred
+def half(x):
+    return 0.5 * x
+
+@deferred
+def quarter(x):
+    return half(half(x))
+
+@deferred
+def unused(x):
+    return x
+"""
+
+RUN = """
+import written
+assert written.quarter(8.0) == 2.0
+stats = getattr(written.quarter.dispatcher, "stats", None)
+print(stats and (sum(stats.cache_hits.values()), sum(stats.cache_misses.values())))
+print(written.unused._dispatcher)
+"""
+
+
+def printed(code: str, folder: Path, **environment: str) -> list[str]:
+    """Return the lines that a fresh process prints."""
+    run = subprocess.run(
+        [sys.executable, "-c", code],
+        cwd=folder,
+        env=os.environ | environment,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    return run.stdout.split("\n")[:-1]
+
+
+def double(x: float) -> float:
+    return 2.0 * x
+
+
+@pytest.mark.parametrize(
+    "first",
+    [
+        "import mckibben; mckibben.GPIEstimator",
+        "from mckibben import registry\n"
+        "for group, names in registry.PLUGINS.items():\n"
+        "    for name in names: registry.load(group, name)",
+        "from mckibben import PI, GPIEstimator\n"
+        "assert repr(GPIEstimator()) and PI((0.0,), (1.0,), 0.0, (0.0, 5.0)).inverse()",
+    ],
+    ids=["estimator", "every plug-in", "made"],
+)
+def test_importing_loads_nothing_heavy(first: str, tmp_path: Path) -> None:
+    tell = f"import sys; print(*sorted({HEAVY} & set(sys.modules)))"
+    assert printed(f"{first}\n{tell}", tmp_path) == [""]
+    assert "scipy.optimize" in printed(f"{first}\nimport scipy.optimize\n{tell}", tmp_path)[0]
+
+
+def test_kernels_that_call_kernels_are_found_compiled_by_the_next_process(tmp_path: Path) -> None:
+    (tmp_path / "written.py").write_text(WRITTEN)
+    here = str(tmp_path / "cache")
+    assert printed(RUN, tmp_path, NUMBA_CACHE_DIR=here) == ["(0, 1)", "None"]
+    assert printed(RUN, tmp_path, NUMBA_CACHE_DIR=here) == ["(1, 0)", "None"]
+
+
+def test_kernels_run_uncompiled(tmp_path: Path) -> None:
+    (tmp_path / "written.py").write_text(WRITTEN)
+    assert printed(RUN, tmp_path, NUMBA_DISABLE_JIT="1") == ["None", "None"]
+    code = (
+        "from mckibben.registry import load\n"
+        "for kind in ('gpi', 'duhem'):\n"
+        "    block = load('blocks', kind).example()\n"
+        "    print(block.inverse().simulate(block.simulate([1.0, 3.0, 2.0])).round(9).tolist())"
+    )
+    assert printed(code, tmp_path, NUMBA_DISABLE_JIT="1") == 2 * ["[1.0, 3.0, 2.0]"]
+
+
+def test_threads_that_ask_at_once_share_one_function() -> None:
+    kernel, together = deferred(double), Barrier(8)
+
+    def ask() -> object:
+        together.wait()
+        return resolved(kernel)
+
+    with ThreadPoolExecutor(8) as pool:
+        found = [pool.submit(ask) for _ in range(8)]
+    assert len({id(one.result()) for one in found}) == 1
+
+
+def test_nothing_stands_between_a_stream_and_the_compiled_kernel() -> None:
+    assert isinstance(pi_kernel, Deferred)
+    assert PI.kernel is pi_kernel
+    assert resolved(PIInverse.kernel) is resolved(resolved(PIInverse.kernel))
+    assert not isinstance(resolved(pi_kernel), Deferred)
+
+
+def test_kernels_travel_to_other_processes() -> None:
+    kernel = deferred(double)
+    for _ in range(2):  # before it is compiled, and after
+        assert cloudpickle.loads(cloudpickle.dumps(kernel))(3.0) == 6.0
+        np.testing.assert_equal(kernel(3.0), 6.0)

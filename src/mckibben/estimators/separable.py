@@ -96,9 +96,9 @@ class SeparableEstimator(SearchingEstimator):
         here = self.matrix(theta, data) @ linear
         _, upper = self.bounds(data)
         columns = []
-        for index, step in enumerate(DIFFERENCE * np.maximum(1.0, np.abs(theta))):
+        for index in range(theta.size):
             moved = theta.copy()
-            moved[index] += step if theta[index] + step <= upper[index] else -step
+            moved[index] += difference(theta[index], upper[index])
             there = self.matrix(moved, data) @ linear
             columns.append((there - here) / (moved[index] - theta[index]))
         return np.column_stack(columns)
@@ -265,6 +265,12 @@ class SeparableEstimator(SearchingEstimator):
 def counting(data: TrainingData, over_history: Callable[[Run], Array]) -> Array:
     """Return what is computed over the runs' histories, at the samples that count, of all runs."""
     return np.concatenate([run.trim(over_history(run))[run.counts] for run in data.runs])
+
+
+def difference(value: float, upper: float) -> float:
+    """Return a step for finite differences that stays within the upper bound."""
+    step = DIFFERENCE * max(1.0, abs(value))
+    return step if value + step <= upper else -step
 
 
 def _rms(residuals: Array) -> float:

@@ -569,6 +569,16 @@ def narx_network(block: Any, inputs: Rows, sample_time: float) -> Rows:
     return _narx(block, inputs, function)
 
 
+def fed_back(slopes: Rows, by_past: Rows) -> Rows:
+    """Return the derivatives of a free run, from those of f by parameters and by past outputs."""
+    found: Rows = []
+    for own, shares in zip(slopes, by_past, strict=True):
+        past = found[::-1][: len(shares)]
+        pairs = list(zip(shares, past, strict=False))
+        found.append([s + sum(share * row[j] for share, row in pairs) for j, s in enumerate(own)])
+    return found
+
+
 def creep(block: Any, inputs: Rows, sample_time: float) -> Rows:
     elements = [inputs[0][0]] * len(block.compliances)
     outputs = []

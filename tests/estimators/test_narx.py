@@ -14,9 +14,11 @@ from mckibben.blocks.gpi import GPI
 from mckibben.comparison.memory_test import hold_test
 from mckibben.estimators.data import training_data
 from mckibben.estimators.narx.base import stable
+from mckibben.estimators.narx.free_run import FreeRuns, feed_back, segments
 from mckibben.estimators.narx.polynomial import NarxPlayEstimator, NarxPolynomialEstimator
 from mckibben.estimators.narx.selection import candidate_terms, select
 from mckibben.registry import load
+from tests.twins import fed_back
 
 TIME = np.arange(1500) * 0.02
 PRESSURE = 2.5 + 2.3 * np.sin(0.6 * TIME) * np.exp(-0.02 * TIME)
@@ -74,6 +76,41 @@ def test_selection_agrees_with_sysidentpy() -> None:
     ours = {terms[k] for k in select(columns, y[rows], 3)}
     assert ours == {(0,), (2,), (1, 2)}
     assert len(theirs.final_model) == len(ours)
+
+
+@pytest.mark.parametrize("horizon", [None, 20])
+@pytest.mark.parametrize("kind", ["narx-polynomial", "tanh", "wavelet"])
+def test_slopes_of_free_runs_are_those_of_finite_differences(
+    kind: str, horizon: int | None
+) -> None:
+    data = training_data(loop(), "pressure", "displacement")
+    scales = {"sample_time": 0.02, "output_scale": (0.0, 3.0), "delay": 2, "thresholds": (0.1, 0.4)}
+    hidden = np.random.default_rng(0).normal(0, 0.2, 14).tolist()
+    network = {"linear": (0.8, 0.1, 0.1, 0.05, 0.0), "hidden": hidden, "activation": kind}
+    terms = {"terms": ((), (0,), (3, 0), (1, 2)), "weights": (0.02, 0.9, 0.05, -0.04)}
+    polynomial = kind == "narx-polynomial"
+    block = load("blocks", kind if polynomial else "narx-network").example()
+    model = replace(block, **scales, **(terms if polynomial else network))
+    runs = FreeRuns(model, 0.02, segments(model, data, horizon))
+    parameters, step = model.pack(), 1e-6
+    differences = [
+        (
+            runs.errors(model.unpack(parameters + move))
+            - runs.errors(model.unpack(parameters - move))
+        )
+        / (2 * step)
+        for move in step * np.eye(parameters.size)
+    ]
+    slopes = runs.slopes(model)
+    np.testing.assert_allclose(slopes, np.transpose(differences), atol=1e-6 * np.ptp(slopes))
+
+
+def test_feeding_back_agrees_with_its_twin() -> None:
+    rng = np.random.default_rng(4)
+    slopes, by_past = rng.standard_normal((50, 3)), rng.uniform(-0.5, 0.5, (50, 2))
+    expected = fed_back(slopes.tolist(), by_past.tolist())
+    feed_back(slopes, by_past)
+    np.testing.assert_allclose(slopes, expected, rtol=1e-12)
 
 
 def test_refining_on_free_runs_lowers_the_free_run_error() -> None:

@@ -4,6 +4,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import lsq_linear
 
+from mckibben import Recording
+from mckibben.blocks.compose import Series
+from mckibben.blocks.creep import Creep
+from mckibben.blocks.pi import PI
+from mckibben.estimators.data import training_data
 from mckibben.estimators.search import (
     Swarm,
     Tracker,
@@ -11,6 +16,10 @@ from mckibben.estimators.search import (
     particle_swarm,
     solve_linear,
 )
+from mckibben.estimators.separable import SeparableEstimator
+from mckibben.registry import load
+
+CPI = Series((PI.example(), Creep.example()))
 
 
 @given(st.integers(0, 10_000), st.booleans())
@@ -40,6 +49,22 @@ def test_nearly_parallel_columns_are_solved_without_squaring_the_condition() -> 
     basis = np.column_stack([t, t + 1e-7 * np.sin(9 * t)])
     x, offset = solve_linear(basis, basis @ [2.0, 1.0] + 5, nonnegative=False)
     np.testing.assert_allclose([*x, offset], [2, 1, 5], rtol=1e-6)
+
+
+@pytest.mark.parametrize("name", ["mpi", "cpi", "grey-box"])
+def test_moves_in_closed_form_are_those_of_finite_differences(name: str) -> None:
+    time = np.arange(800) * 0.05
+    pressure = 2.5 + 2.3 * np.sin(0.6 * time) * np.exp(-0.02 * time)
+    y = CPI.simulate(pressure, sample_time=0.05)
+    recording = Recording({"pressure": pressure, "displacement": y}, 0.05)
+    data = training_data(recording, "pressure", "displacement")
+    estimator = load("estimators", name)()
+    lower, upper = estimator.bounds(data)
+    theta = 0.999 * np.clip(estimator.guesses(data)[0], lower, upper) + 0.0005 * (lower + upper)
+    linear, _ = solve_linear(estimator.matrix(theta, data), data.target, nonnegative=True)
+    moves = estimator.moves(theta, linear, data)
+    differences = SeparableEstimator.moves(estimator, theta, linear, data)
+    np.testing.assert_allclose(moves, differences, atol=2e-4 * np.abs(moves).max())
 
 
 def valley(point: np.ndarray) -> np.ndarray:

@@ -167,6 +167,24 @@ class BraidEquilibrium(Memoryless, NamedParameters, Primitive):
         head = [self.load, self.stiffness, self.hardening, area, a, b, least, largest]
         return np.array([*head, self.rest_length, self.offset])
 
+    def slopes(self, displacement: Array) -> tuple[Array, Array]:
+        """Return how displacements of equilibrium move, shapes (n,) and (n, 4).
+
+        By pressure; and by load, stiffness, hardening and braid angle. Where the muscle goes no
+        further, it does not move.
+        """
+        c = self.coefficients(None)
+        e = (displacement - self.offset) / self.rest_length
+        sine, cosine = math.sin(self.braid_angle), math.cos(self.braid_angle)
+        pull = c[3] * (c[4] * (1.0 - e) ** 2 - c[5])
+        pressure = (c[0] + e * (c[1] + c[2] * e * e)) / pull
+        by_contraction = c[1] + 3.0 * c[2] * e * e + 2.0 * pressure * c[3] * c[4] * (1.0 - e)
+        by_angle = c[3] * (2.0 * cosine - 6.0 * cosine * (1.0 - e) ** 2) / sine**3
+        inside = (e > c[6]) & (e < c[7]) & (by_contraction > 0.0)
+        share = np.where(inside, self.rest_length / np.where(inside, by_contraction, 1.0), 0.0)
+        loads = np.column_stack([np.ones_like(e), e, e**3, -pressure * by_angle])
+        return pull * share, -share[:, np.newaxis] * loads
+
     def reachable(self) -> tuple[Array, Array]:
         """Return the displacements at the least and largest contraction, each of shape (1,)."""
         c = self.coefficients(None)

@@ -54,6 +54,22 @@ def slip(s: float, du: float, limit: float, stiffness: float, ratio: float) -> f
 
 
 @kernel
+def slip_matrix(
+    u: Array, limits: Array, stiffness: float, ratio: float, s: Array, deflections: Array
+) -> None:
+    """Run springs side by side: ``deflections[t, i]`` is that of spring i after sample t.
+
+    Shapes: u (n,), limits and s (N,), deflections (n, N). Changes the deflections ``s`` at the start.
+    """
+    before = u[0]
+    for t in range(u.size):
+        for i in range(limits.size):
+            s[i] = slip(s[i], u[t] - before, limits[i], stiffness, ratio)
+            deflections[t, i] = s[i]
+        before = u[t]
+
+
+@kernel
 def _advance(u: float, c: Array, state: Array) -> None:
     n, m = state.size - 1, int(c[0])
     du = u - state[n]

@@ -28,7 +28,12 @@ from mckibben.estimators.data import Run, TrainingData
 from mckibben.estimators.output_maps import PolynomialMap
 from mckibben.estimators.pi import play_operators
 from mckibben.estimators.search import Tracker
-from mckibben.estimators.separable import LEAST_REVERSIBLE, SeparableEstimator
+from mckibben.estimators.separable import (
+    LEAST_REVERSIBLE,
+    SeparableEstimator,
+    counting,
+    difference,
+)
 from mckibben.estimators.thresholds import spread
 
 Array = NDArray[np.float64]
@@ -126,14 +131,42 @@ class CreepPIEstimator(SeparableEstimator):
 
     def basis(self, theta: Array, run: Run, data: TrainingData) -> Array:
         """Return the pieces of the map over the run's history, with their creep."""
+        x, _ = self.argument(theta, run, data)
+        return with_creep(
+            PolynomialMap(self.map_size).pieces(x), *self.creep(theta), run.sample_time
+        )
+
+    def argument(self, theta: Array, run: Run, data: TrainingData) -> tuple[Array, Array]:
+        """Return the argument of the map, 0 to 1, and its derivatives by the relative weights."""
         weights = theta[: self.n_operators]
         offset, radii = self.memory(theta, data)
         low, high = self._logs(offset, data)
-        along = Logarithm(offset).simulate(run.history)
-        level = play_operators(along, radii, self.starting_rule) @ weights
+        operators = play_operators(
+            Logarithm(offset).simulate(run.history), radii, self.starting_rule
+        )
         bottom, top = float(weights @ (low - radii)), float(weights @ (high - radii))
-        pieces = PolynomialMap(self.map_size).pieces((level - bottom) / (top - bottom))
-        return with_creep(pieces, *self.creep(theta), run.sample_time)
+        x = (operators @ weights - bottom) / (top - bottom)
+        above = operators - (low - radii)
+        return x, (above - x[:, np.newaxis] * (high - low)) / (top - bottom)
+
+    def moves(self, theta: Array, linear: Array, data: TrainingData) -> Array:
+        """Return how the output moves with the non-linear parameters, the linear ones held."""
+        n, k = self.n_operators, self.n_creep
+        pieces = PolynomialMap(self.map_size)
+        step = difference(theta[n], self.bounds(data)[1][n])
+        raised = theta + step * (np.arange(theta.size) == n)
+
+        def of(run: Run) -> Array:
+            x, by_weights = self.argument(theta, run, data)
+            by_offset = (self.argument(raised, run, data)[0] - x) / step
+            slopes = pieces.slopes(x) @ linear
+            at_once = slopes[:, np.newaxis] * np.column_stack([by_weights, by_offset])
+            taus, compliances = np.exp(theta[n + 1 : n + 1 + k]), theta[n + 1 + k :]
+            crept = with_creep(at_once, taus, compliances, run.sample_time)
+            given = pieces.pieces(x) @ linear
+            return np.column_stack([crept, creep_moves(given, taus, compliances, run.sample_time)])
+
+        return counting(data, of)
 
     def least(self, matrix: Array, data: TrainingData) -> Array:
         """Return a little of every piece, so that the map increases everywhere."""
@@ -199,3 +232,19 @@ def with_creep(
         creep_kernel(coefficients, state, given, out)
         crept[:, k] = out[:, 0]
     return crept
+
+
+def creep_moves(given: Array, taus: Array, compliances: Array, step: float | None) -> Array:
+    """Return how something with creep moves with log time constants, then compliances, (n, 2 k)."""
+    from scipy.signal import lfilter
+
+    if len(taus) == 0:
+        return np.empty((given.size, 0))
+    assert step is not None
+    elements, by_time = [], []
+    for tau, compliance in zip(taus, compliances, strict=True):
+        crept = with_creep(given[:, np.newaxis], [tau], np.ones(1), step)[:, 0]
+        elements.append(crept - given)
+        late = compliance * step / tau * (elements[-1] - given)
+        by_time.append(np.asarray(lfilter([1.0], [1.0, -np.exp(-step / tau)], late)))
+    return np.column_stack([*by_time, *elements])

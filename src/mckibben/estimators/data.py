@@ -91,7 +91,13 @@ class TrainingData:
     @property
     def input_range(self) -> tuple[float, float]:
         """Lowest and highest input of all runs."""
-        return min(run.u.min() for run in self.runs), max(run.u.max() for run in self.runs)
+        low, high = self.once(
+            "input range",
+            lambda: np.array(
+                [min(run.u.min() for run in self.runs), max(run.u.max() for run in self.runs)]
+            ),
+        ).tolist()
+        return low, high
 
     @property
     def output_range(self) -> tuple[float, float]:
@@ -102,7 +108,7 @@ class TrainingData:
     @property
     def target(self) -> Array:
         """Outputs that count, of all runs, shape (number of counting samples,)."""
-        return np.concatenate([run.y[run.counts] for run in self.runs])
+        return self.once("target", lambda: np.concatenate([run.y[run.counts] for run in self.runs]))
 
     @property
     def sample_time(self) -> float | None:

@@ -66,7 +66,7 @@ class DuhemEstimator(SeparableEstimator):
         unit = self.unit(theta, data)
         n = unit.n_parameters - 1
         alone = np.column_stack([np.eye(n)[1:], np.full(n - 1, unit.alpha)])
-        return unit.simulate_many(alone, run.history).T
+        return np.column_stack([unit.unpack(row).simulate(run.history) for row in alone])
 
     def build(self, theta: Array, linear: Array, offset: float, data: TrainingData) -> Block:
         """Return the Duhem model."""

@@ -20,15 +20,26 @@ from mckibben.blocks.braid_equilibrium import BraidEquilibrium
 from mckibben.blocks.compose import Series
 from mckibben.blocks.creep import Creep
 from mckibben.blocks.fields import Channel, vector
-from mckibben.blocks.logarithm import Exponential, Logarithm
+from mckibben.blocks.logarithm import FLOOR, Exponential, Logarithm
 from mckibben.blocks.pi import PI
 from mckibben.errors import DataError
 from mckibben.estimators.base import Operators
-from mckibben.estimators.creep_pi import FASTEST, MOST_CREEP, SLOWEST, with_creep
+from mckibben.estimators.creep_pi import (
+    FASTEST,
+    MOST_CREEP,
+    SLOWEST,
+    creep_moves,
+    with_creep,
+)
 from mckibben.estimators.data import Run, TrainingData
 from mckibben.estimators.pi import play_operators
 from mckibben.estimators.search import Tracker
-from mckibben.estimators.separable import LEAST_REVERSIBLE, SeparableEstimator
+from mckibben.estimators.separable import (
+    LEAST_REVERSIBLE,
+    SeparableEstimator,
+    counting,
+    difference,
+)
 from mckibben.estimators.thresholds import spread
 
 Array = NDArray[np.float64]
@@ -150,11 +161,42 @@ class GreyBoxEstimator(SeparableEstimator):
 
     def basis(self, theta: Array, run: Run, data: TrainingData) -> Array:
         """Return the contraction over the run's history, with its creep."""
-        logarithm, radii, weights = self.memory(theta, data)
-        left = play_operators(logarithm.simulate(run.history), radii, self.starting_rule) @ weights
-        pressure = logarithm.inverse().simulate(left)
+        pressure, _ = self.pressure(theta, run, data)
         contraction = self.braid(theta, data).simulate(pressure)
         return with_creep(contraction[:, np.newaxis], *self.creep(theta), run.sample_time)
+
+    def pressure(self, theta: Array, run: Run, data: TrainingData) -> tuple[Array, Array]:
+        """Return the pressure left for the braid, and its derivatives by the relative weights."""
+        logarithm, radii, weights = self.memory(theta, data)
+        along = logarithm.simulate(run.history)
+        operators = play_operators(along, radii, self.starting_rule)
+        left = operators @ weights
+        pressure = logarithm.inverse().simulate(left)
+        steepness = np.maximum(pressure + logarithm.offset, FLOOR) / theta[: self.n_operators].sum()
+        return pressure, steepness[:, np.newaxis] * (operators - left[:, np.newaxis])
+
+    def moves(self, theta: Array, linear: Array, data: TrainingData) -> Array:
+        """Return how the output moves with the non-linear parameters, the linear one held."""
+        n, k = self.n_operators, self.n_creep
+        braid = self.braid(theta, data)
+        step = difference(theta[n], self.bounds(data)[1][n])
+        raised = theta + step * (np.arange(theta.size) == n)
+        # loads and stiffnesses are searched by their logarithms, the angle as it is
+        factors = np.append(np.exp(theta[n + 1 : n + 4]), 1.0)
+        taus, compliances = np.exp(theta[n + PHYSICS :][:k]), theta[n + PHYSICS + k :]
+
+        def of(run: Run) -> Array:
+            pressure, by_weights = self.pressure(theta, run, data)
+            by_offset = (self.pressure(raised, run, data)[0] - pressure) / step
+            given = braid.simulate(pressure)
+            by_pressure, by_physics = braid.slopes(given)
+            driven = by_pressure[:, np.newaxis] * np.column_stack([by_weights, by_offset])
+            at_once = linear[0] * np.column_stack([driven, by_physics * factors])
+            crept = with_creep(at_once, taus, compliances, run.sample_time)
+            late = creep_moves(linear[0] * given, taus, compliances, run.sample_time)
+            return np.column_stack([crept, late])
+
+        return counting(data, of)
 
     def build(self, theta: Array, linear: Array, offset: float, data: TrainingData) -> Series:
         """Return the series: logarithm, friction, its exponential, the braid, and creep."""

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from mckibben.blocks.base import Block
 from mckibben.blocks.fields import vector
-from mckibben.blocks.maxwell_slip import MaxwellSlip
+from mckibben.blocks.maxwell_slip import MaxwellSlip, slip_matrix
 from mckibben.estimators.base import Operators
 from mckibben.estimators.data import Run, TrainingData
 from mckibben.estimators.loops import LoopEstimator
@@ -67,13 +67,13 @@ class MaxwellSlipEstimator(LoopEstimator):
         """Return the deflections, and the bounds of their slopes."""
         springs = self.springs(theta, data)
         n = self.n_operators
-        columns = springs.simulate_many(
-            np.column_stack([np.eye(n), np.tile(springs.pack()[n:], (n, 1))]),
-            run.history,
-            initial=self.starting_rule,
-        )
+        u = run.history
+        start = springs.initial_state(u[:1], self.starting_rule)[:n]
+        deflections = np.empty((u.size, n))
+        limits = np.array(springs.breakaways)
+        slip_matrix(u, limits, springs.stiffness_ratio, springs.limit_ratio, start, deflections)
         low, high = data.input_range
-        return columns.T, np.full(n, (high - low) * max(1.0, springs.stiffness_ratio))
+        return deflections, np.full(n, (high - low) * max(1.0, springs.stiffness_ratio))
 
     def assemble(
         self, theta: Array, polynomial: Array, weights: Array, data: TrainingData

@@ -128,25 +128,14 @@ class MPIEstimator(SeparableEstimator):
         low, high = self.level(theta, data)
         return self.map.pieces((operators @ theta - low) / (high - low))
 
-    def jacobian(self, theta: Array, data: TrainingData) -> Array | None:
-        """Return the derivatives of the residuals with the linear parameters solved for.
-
-        Kaufman's form: the derivative of the map's argument times the map's slope, less what the linear
-        parameters that are free would take up of it.
-        """
+    def moves(self, theta: Array, linear: Array, data: TrainingData) -> Array:
+        """Return the derivative of the map's argument times the slope of the map."""
         operators = data.once(self.operators_key, lambda: counting(data, self._operators_of(data)))
         lowest, highest = self._ends(data)
         low, high = float(theta @ lowest), float(theta @ highest)
         x = (operators @ theta - low) / (high - low)
-        pieces = self.map.pieces(x)
-        linear, _ = self._solve_for(pieces, data)
-        by_argument = self.map.slopes(x) @ linear
         moved = (operators - lowest - np.outer(x, highest - lowest)) / (high - low)
-        derivative = by_argument[:, np.newaxis] * moved
-        free = linear > 1.01 * self.least(pieces, data) if self.solves_nonnegative else linear != 0
-        taken = np.column_stack([np.ones(x.size), pieces[:, free]])
-        directions = np.linalg.qr(taken)[0]
-        return np.asarray(derivative - directions @ (directions.T @ derivative))
+        return np.asarray((self.map.slopes(x) @ linear)[:, np.newaxis] * moved)
 
     def least(self, matrix: Array, data: TrainingData) -> Array:
         """Return a little of every piece, so that the map increases everywhere."""

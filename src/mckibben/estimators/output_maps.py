@@ -7,6 +7,7 @@ inverse.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -76,16 +77,16 @@ class PolynomialMap(OutputMap):
 
     def pieces(self, x: Array) -> Array:
         """Return the integral from 0 of every Bernstein polynomial of degree ``size - 1``."""
-        return np.asarray(np.polynomial.polynomial.polyval(x, self._basis().T).T, dtype=np.float64)
+        return np.asarray(np.vander(x, self.size + 1, increasing=True) @ bernstein(self.size).T)
 
     def slopes(self, x: Array) -> Array:
         """Return every Bernstein polynomial."""
-        derivatives = np.polynomial.polynomial.polyder(self._basis(), axis=1)
-        return np.asarray(np.polynomial.polynomial.polyval(x, derivatives.T).T, dtype=np.float64)
+        derivatives = bernstein(self.size)[:, 1:] * np.arange(1, self.size + 1)
+        return np.asarray(np.vander(x, self.size, increasing=True) @ derivatives.T)
 
     def powers(self, weights: Array) -> Array:
         """Return the weighted sum of the pieces in ascending powers, shape (size + 1,)."""
-        return np.asarray(weights @ self._basis())
+        return np.asarray(weights @ bernstein(self.size))
 
     def build(
         self, weights: Array, offset: float, low: float, high: float, channel: Channel
@@ -98,17 +99,20 @@ class PolynomialMap(OutputMap):
         middle, half = 0.5 * (low + high), 0.5 * (high - low)
         return Polynomial(vector(centred), middle, half, (low, high), channel, channel)
 
-    def _basis(self) -> Array:
-        """Return the power-basis coefficients of all pieces, shape (size, size + 1)."""
-        from scipy.special import comb
 
-        degree = self.size - 1
-        powers = np.zeros((self.size, self.size + 1))
-        for k in range(self.size):
-            for j in range(degree - k + 1):
-                share = comb(degree, k) * comb(degree - k, j) * (-1.0) ** j
-                powers[k, k + j + 1] = share / (k + j + 1)
-        return powers
+@lru_cache
+def bernstein(size: int) -> Array:
+    """Return the powers of the integrals of all Bernstein polynomials, shape (size, size + 1)."""
+    from scipy.special import comb
+
+    degree = size - 1
+    powers = np.zeros((size, size + 1))
+    for k in range(size):
+        for j in range(degree - k + 1):
+            share = comb(degree, k) * comb(degree - k, j) * (-1.0) ** j
+            powers[k, k + j + 1] = share / (k + j + 1)
+    powers.setflags(write=False)
+    return powers
 
 
 class FreePolynomialMap(PolynomialMap):

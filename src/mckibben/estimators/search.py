@@ -110,6 +110,13 @@ def multi_start(
             raise Interrupted from None
         return r
 
+    def slopes(point: Array) -> Array:
+        assert jacobian is not None
+        try:
+            return jacobian(point)
+        except KeyboardInterrupt:
+            raise Interrupted from None
+
     inside = [np.clip(start, lower, upper) for start in starts]
     try:
         costs = [float(np.mean(evaluate(start) ** 2)) for start in inside]
@@ -118,7 +125,7 @@ def multi_start(
             least_squares(
                 evaluate,
                 np.clip(inside[index], lower + margin, upper - margin),
-                jac="2-point" if jacobian is None else jacobian,
+                jac="2-point" if jacobian is None else slopes,
                 bounds=(lower, upper),
                 x_scale=np.maximum(upper - lower, 1e-12),
                 max_nfev=max_evaluations,

@@ -33,6 +33,9 @@ POLISH_SAMPLES = 20_000
 LEAST_REVERSIBLE = 1e-3
 """Least share of the output's range that the operator without dead zone gives."""
 
+DIFFERENCE = 1.5e-8
+"""Step of finite differences, relative to parameters, of which none is counted as less than 1."""
+
 WORST = 1e150
 """Cost of parameters whose output overflows; its square is still a number."""
 
@@ -85,10 +88,36 @@ class SeparableEstimator(SearchingEstimator):
         For particle swarms over all parameters.
         """
 
-    def jacobian(self, theta: Array, data: TrainingData) -> Array | None:
-        """Return the derivatives of the residuals, shape (samples, m), or None where unknown."""
-        del theta, data
-        return None
+    def moves(self, theta: Array, linear: Array, data: TrainingData) -> Array:
+        """Return how the output moves with the non-linear parameters, the linear ones held.
+
+        Shape (samples that count, m); by finite differences of the basis.
+        """
+        here = self.matrix(theta, data) @ linear
+        _, upper = self.bounds(data)
+        columns = []
+        for index in range(theta.size):
+            moved = theta.copy()
+            moved[index] += difference(theta[index], upper[index])
+            there = self.matrix(moved, data) @ linear
+            columns.append((there - here) / (moved[index] - theta[index]))
+        return np.column_stack(columns)
+
+    def jacobian(self, theta: Array, data: TrainingData) -> Array:
+        """Return the derivatives of the residuals with the linear parameters solved for.
+
+        Shape (samples that count, m). Kaufman's form: how the output moves, less what the linear
+        parameters that are free would take up of it.
+        """
+        matrix = self.matrix(theta, data)
+        if not np.isfinite(matrix).all():
+            return np.zeros((len(matrix), theta.size))
+        linear, _ = self._solve_for(matrix, data)
+        moves = self.moves(theta, linear, data)
+        free = linear > 1.01 * self.least(matrix, data) if self.solves_nonnegative else linear != 0
+        taken = np.column_stack([np.ones(len(matrix)), matrix[:, free]])
+        directions = np.linalg.qr(taken)[0]
+        return np.asarray(moves - directions @ (directions.T @ moves))
 
     def identify(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
         """Return the block found, and the data with the memories at the start that belong to it."""
@@ -122,9 +151,7 @@ class SeparableEstimator(SearchingEstimator):
 
             theta = particle_swarm(costs, lower, upper, self.swarm, tracker, self.seed)
         else:
-            tracker.budget = self.n_starts + self.n_refined * self.search_evaluations * (
-                lower.size + 1
-            )
+            tracker.budget = self.n_starts + self.n_refined * self.search_evaluations
             theta = multi_start(
                 lambda point: self._residuals(point, thin),
                 self.guesses(data) + self._scattered(lower, upper),
@@ -133,14 +160,9 @@ class SeparableEstimator(SearchingEstimator):
                 tracker,
                 n_refined=self.n_refined,
                 max_evaluations=self.search_evaluations,
-                jacobian=self._jacobian_on(thin, lower),
+                jacobian=lambda point: self.jacobian(point, thin),
             )
         return theta if tracker.interrupted else self._polish(theta, data, tracker)
-
-    def _jacobian_on(self, data: TrainingData, lower: Array) -> Callable[[Array], Array] | None:
-        if self.jacobian(lower, data) is None:
-            return None
-        return lambda theta: np.asarray(self.jacobian(theta, data))
 
     def _scattered(self, lower: Array, upper: Array) -> list[Array]:
         from scipy.stats import qmc
@@ -164,7 +186,7 @@ class SeparableEstimator(SearchingEstimator):
             own,
             n_refined=1,
             max_evaluations=self.polish_evaluations,
-            jacobian=self._jacobian_on(thin, lower),
+            jacobian=lambda point: self.jacobian(point, thin),
         )
         tracker.evaluations, tracker.interrupted = own.evaluations, own.interrupted
         return best
@@ -243,6 +265,12 @@ class SeparableEstimator(SearchingEstimator):
 def counting(data: TrainingData, over_history: Callable[[Run], Array]) -> Array:
     """Return what is computed over the runs' histories, at the samples that count, of all runs."""
     return np.concatenate([run.trim(over_history(run))[run.counts] for run in data.runs])
+
+
+def difference(value: float, upper: float) -> float:
+    """Return a step for finite differences that stays within the upper bound."""
+    step = DIFFERENCE * max(1.0, abs(value))
+    return step if value + step <= upper else -step
 
 
 def _rms(residuals: Array) -> float:

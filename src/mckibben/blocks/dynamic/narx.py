@@ -147,6 +147,13 @@ class Narx(SingleChannel, Primitive):
     def evaluate(self, regressors: Array) -> Array:
         """Return f at scaled regressors, shape (k, number of regressors), in scaled output (k,)."""
 
+    @abstractmethod
+    def slopes(self, regressors: Array) -> tuple[Array, Array]:
+        """Return the derivatives of f by the parameters, and by past outputs.
+
+        Shapes (k, n_parameters) and (k, output_lags), at scaled regressors and in scaled output.
+        """
+
     def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
         """Return the state at rest at the first input: where f gives back the output it is given.
 

@@ -103,9 +103,23 @@ class NarxNetwork(Narx, NamedParameters):
         """Return the network at scaled regressors, shape (k, number of regressors)."""
         n = len(self.places)
         units = np.reshape(self.hidden, (-1, n + 2))
-        s = regressors @ units[:, :n].T + units[:, n]
-        a = np.tanh(s) if self.activation == "tanh" else (1 - s**2) * np.exp(-0.5 * s**2)
+        a, _ = activated(self.activation, regressors @ units[:, :n].T + units[:, n])
         return np.asarray(self.bias + regressors @ np.array(self.linear) + a @ units[:, n + 1])
+
+    def slopes(self, regressors: Array) -> tuple[Array, Array]:
+        """Return the derivatives by bias, linear and hidden weights, and by past outputs."""
+        k, n = regressors.shape
+        units = np.reshape(self.hidden, (-1, n + 2))
+        weights, shifts, out = units[:, :n], units[:, n], units[:, n + 1]
+        a, steepness = activated(self.activation, regressors @ weights.T + shifts)
+        by_sum = steepness * out
+        by_hidden = np.empty((k, len(units), n + 2))
+        by_hidden[:, :, :n] = by_sum[:, :, np.newaxis] * regressors[:, np.newaxis, :]
+        by_hidden[:, :, n] = by_sum
+        by_hidden[:, :, n + 1] = a
+        by_parameters = np.column_stack([np.ones(k), regressors, by_hidden.reshape(k, -1)])
+        past = self.output_lags
+        return by_parameters, np.array(self.linear)[:past] + by_sum @ weights[:, :past]
 
     @classmethod
     def example(cls) -> Self:
@@ -121,3 +135,12 @@ class NarxNetwork(Narx, NamedParameters):
             linear=(0.9, 0.05, 0.03),
             hidden=(0.5, 1.0, -0.5, 0.1, 0.02, -0.3, 0.8, 0.2, -0.2, -0.015),
         )
+
+
+def activated(activation: str, s: Array) -> tuple[Array, Array]:
+    """Return the activation of the units at their weighted sums, and its derivative."""
+    if activation == "tanh":
+        a = np.tanh(s)
+        return a, 1 - a**2
+    bell = np.exp(-0.5 * s**2)
+    return (1 - s**2) * bell, (s**3 - 3 * s) * bell

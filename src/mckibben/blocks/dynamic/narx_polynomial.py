@@ -116,6 +116,16 @@ class NarxPolynomial(Narx):
         """Return the polynomial at scaled regressors, shape (k, number of regressors)."""
         return products(regressors, self.terms) @ np.array(self.weights)
 
+    def slopes(self, regressors: Array) -> tuple[Array, Array]:
+        """Return the products themselves, and the derivative of their sum by past outputs."""
+        by_past = np.zeros((len(regressors), self.output_lags))
+        for term, weight in zip(self.terms, self.weights, strict=True):
+            for place, factor in enumerate(term):
+                if factor < self.output_lags:
+                    others = term[:place] + term[place + 1 :]
+                    by_past[:, factor] += weight * products(regressors, (others,))[:, 0]
+        return products(regressors, self.terms), by_past
+
     @classmethod
     def example(cls) -> Self:
         """Return a first-order model with a quadratic term and a play operator."""

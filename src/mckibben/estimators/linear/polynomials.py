@@ -74,7 +74,11 @@ def spectral_radius(tail: Array) -> float:
     """Return the largest size of the roots of a polynomial with a leading 1."""
     if tail.size == 0 or not np.isfinite(tail).all():
         return 0.0 if tail.size == 0 else np.inf
-    return float(np.abs(np.roots([1.0, *tail])).max())
+    if tail.size > 2:
+        return float(np.abs(np.roots([1.0, *tail])).max())
+    a, b = float(tail[0]), float(tail[1]) if tail.size == 2 else 0.0
+    inside = a * a - 4.0 * b
+    return 0.5 * (abs(a) + inside**0.5) if inside >= 0 else b**0.5
 
 
 def errors(theta: Array, orders: Orders, run: Run) -> tuple[Array, Array]:
@@ -101,30 +105,28 @@ def errors(theta: Array, orders: Orders, run: Run) -> tuple[Array, Array]:
     def by_noise(x: Array) -> Array:
         return np.asarray(lfilter(d, c, x))
 
-    inputs = [later(u, orders.delay + i) for i in range(orders.b)]
-    driven = sum((b * x for b, x in zip(p.b, inputs, strict=True)), np.zeros(n))
-    impulses = [later(np.eye(1, n)[0], k) for k in range(orders.poles)]
+    def alone(denominator: Array, x: Array) -> Array:
+        return np.asarray(lfilter([1.0], denominator, x))
+
+    # a filter at rest answers what comes later as much later, so each is run only once
+    driven = sum((b * later(u, orders.delay + i) for i, b in enumerate(p.b)), np.zeros(n))
+    impulse = np.eye(1, n)[0]
+    by_constant = -by_noise(np.ones(n))
     if orders.a:
         # equation error: the recursion is taken on measured outputs
         gap = np.asarray(lfilter(poles, [1.0], run.y)) - driven - p.constant
-        e = by_noise(gap)
-        by_b = [-by_noise(x) for x in inputs]
-        by_poles = [by_noise(later(run.y, i + 1)) for i in range(orders.a)]
-        by_constant = -by_noise(np.ones(n))
-        starts = [-by_noise(x) for x in impulses]
+        by_input, by_start = -by_noise(u), -by_noise(impulse)
+        behind = by_noise(run.y)
     else:
-        free = np.asarray(lfilter([1.0], poles, driven))
+        free = alone(poles, driven)
         gap = run.y - free - p.constant
-        e = by_noise(gap)
-        by_b = [-by_noise(np.asarray(lfilter([1.0], poles, x))) for x in inputs]
-        behind = by_noise(np.asarray(lfilter([1.0], poles, free)))
-        by_poles = [later(behind, i + 1) for i in range(orders.f)]
-        by_constant = -by_noise(np.ones(n))
-        starts = [-by_noise(np.asarray(lfilter([1.0], poles, x))) for x in impulses]
-    whitened_e, whitened_gap = (
-        np.asarray(lfilter([1.0], c, e)),
-        np.asarray(lfilter([1.0], c, gap)),
-    )
+        by_input, by_start = -by_noise(alone(poles, u)), -by_noise(alone(poles, impulse))
+        behind = by_noise(alone(poles, free))
+    e = by_noise(gap)
+    by_b = [later(by_input, orders.delay + i) for i in range(orders.b)]
+    by_poles = [later(behind, i + 1) for i in range(orders.poles)]
+    starts = [later(by_start, k) for k in range(orders.poles)]
+    whitened_e, whitened_gap = alone(c, e), alone(c, gap)
     by_c = [-later(whitened_e, i + 1) for i in range(orders.c)]
     by_d = [later(whitened_gap, i + 1) for i in range(orders.d)]
     return e, np.column_stack([*by_b, *by_poles, *by_c, *by_d, by_constant, *starts])

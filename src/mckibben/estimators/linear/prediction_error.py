@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mckibben.estimators.data import Run
+from mckibben.estimators.descent import reduced
 from mckibben.estimators.linear.polynomials import Orders, Polynomials, errors, spectral_radius
 from mckibben.estimators.search import Tracker
 
@@ -90,10 +91,12 @@ def _descend(
     damping = 1e-4
     for _ in range(steps):
         size = np.maximum(np.linalg.norm(jacobian, axis=0), 1e-300)
+        triangle, right = reduced(jacobian / size, e)
+        rest = np.append(-right, np.zeros(size.size))
         improved = False
         for _ in range(12):
-            system = np.vstack([jacobian / size, np.sqrt(damping) * np.eye(size.size)])
-            step = np.linalg.lstsq(system, np.append(-e, np.zeros(size.size)), rcond=None)[0]
+            system = np.vstack([triangle, np.sqrt(damping) * np.eye(size.size)])
+            step = np.linalg.lstsq(system, rest, rcond=None)[0]
             tried = theta + step / size
             if admissible(tried, orders):
                 e_tried, jacobian_tried, cost_tried = evaluate(tried, orders, runs)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import warnings
 from abc import abstractmethod
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise
@@ -18,9 +17,10 @@ from mckibben.blocks.base import Block
 from mckibben.blocks.dynamic.narx import Narx
 from mckibben.errors import DataError, ModelError, ModelWarning
 from mckibben.estimators.base import Estimator
-from mckibben.estimators.data import Mask, TrainingData
+from mckibben.estimators.data import TrainingData
+from mckibben.estimators.descent import descend
+from mckibben.estimators.narx.free_run import FreeRuns, Segment, free_run_errors, segments
 from mckibben.estimators.narx.regressors import Lags
-from mckibben.estimators.pi import play_operators
 from mckibben.estimators.search import Interrupted, Tracker
 
 Array = NDArray[np.float64]
@@ -33,6 +33,9 @@ HORIZONS = (20, 200)
 
 MOST_REFINED = 2
 """Models refined over whole runs."""
+
+LEAST_GAIN = 1e-6
+"""Share of the squared error that a step of the refinement has to gain."""
 
 HORIZON_SAMPLES = 4000
 """Samples looked at over such horizons, at most."""
@@ -96,18 +99,20 @@ class NarxEstimator(Estimator):
         lags = Lags.of(data, self.output_lags, self.input_lags, self.delay, self.n_play)
         tried: list[tuple[float, Narx]] = []
         try:
-            started = [
-                (model, self._refined(model, HORIZONS, data, tracker) if self.refine else model)
-                for model in self.candidates(lags, data, tracker)
-            ]
-            started.sort(key=lambda pair: rms(free_run_errors(pair[1], data)))
-            for model, near in started:
-                far = near
+            started = []
+            for model in self.candidates(lags, data, tracker):
+                found = [model]
+                for horizon in HORIZONS if self.refine else ():
+                    found += self._refined(found[-1], horizon, data, tracker)[-1:]
+                started.append((rms(free_run_errors(found[-1], data)), found))
+            started.sort(key=lambda item: item[0])
+            for _, found in started:
                 if self.refine and len(tried) < MOST_REFINED:
-                    far = self._refined(near, (None,), data, tracker)
-                options = [m for m in (far, near, model) if self.allow_unstable or stable(m, data)]
-                if options:
-                    best = options[0]
+                    found += self._refined(found[-1], None, data, tracker)[1:]
+                # what is refined last is best, if it stays within bounds
+                options = (m for m in reversed(found) if self.allow_unstable or stable(m, data))
+                best = next(options, None)
+                if best is not None:
                     tried.append((rms(free_run_errors(best, data)), best))
         except Interrupted:
             tracker.interrupted = True
@@ -127,41 +132,34 @@ class NarxEstimator(Estimator):
         return chosen, data
 
     def _refined(
-        self,
-        model: Narx,
-        horizons: Sequence[int | None],
-        data: TrainingData,
-        tracker: Tracker,
-    ) -> Narx:
-        """Return the model refined on errors over ever longer horizons, the last one free-running.
+        self, model: Narx, horizon: int | None, data: TrainingData, tracker: Tracker
+    ) -> list[Narx]:
+        """Return models of ever smaller errors over a horizon, or over whole runs.
 
         A model that is unstable when it runs free has no slope to follow there; over short horizons,
         each started from what was measured, it has.
         """
-        from scipy.optimize import least_squares
-
-        for horizon in horizons:
-            pieces = some(segments(model, data, horizon), horizon)
-            residuals = partial(_residuals, model, data, pieces, tracker)
-            start = model.pack()
-            found = least_squares(
-                residuals,
-                start,
-                x_scale=np.maximum(np.abs(start), 1e-3 * np.abs(start).max(initial=1e-3)),
-                max_nfev=self.max_evaluations,
-                ftol=1e-6,
-                xtol=1e-9,
-            )
-            model = model.unpack(found.x)
-        return model
+        pieces = some(segments(model, data, horizon), horizon)
+        if not pieces:  # nowhere are the samples before a stretch measured
+            return []
+        runs = FreeRuns(model, data.sample_time, pieces)
+        start = model.pack()
+        path = descend(
+            partial(_errors, model, runs, tracker),
+            partial(_slopes, model, runs),
+            start,
+            np.maximum(np.abs(start), 1e-3 * np.abs(start).max(initial=1e-3)),
+            most_evaluations=self.max_evaluations,
+            least_gain=LEAST_GAIN,
+        )
+        return [model.unpack(parameters) for parameters in path]
 
 
-def _residuals(
-    model: Narx, data: TrainingData, pieces: Sequence[Segment], tracker: Tracker, parameters: Array
-) -> Array:
+def _errors(model: Narx, runs: FreeRuns, tracker: Tracker, parameters: Array) -> Array:
+    """Return errors relative to half the output's range, none counted as larger than `FAR`."""
     half = model.output_scale[1]
     try:
-        errors = segment_errors(model.unpack(parameters), data, pieces) / half
+        errors = runs.errors(model.unpack(parameters)) / half
     except KeyboardInterrupt:
         raise Interrupted from None
     errors = np.clip(np.nan_to_num(errors, nan=FAR, posinf=FAR, neginf=-FAR), -FAR, FAR)
@@ -169,43 +167,12 @@ def _residuals(
     return errors
 
 
-@dataclass(frozen=True)
-class Segment:
-    """A stretch of a run: its inputs, the state before it, its outputs, and which of them count."""
-
-    inputs: Array
-    state: Array
-    outputs: Array
-    counts: Mask
-
-
-def segments(model: Narx, data: TrainingData, horizon: int | None) -> list[Segment]:
-    """Return stretches of so many samples, each started from measured outputs; or whole runs."""
-    found = []
-    n, m = model.output_lags, model.past_inputs
-    for run in data.runs:
-        given = np.ascontiguousarray(run.u[:, np.newaxis])
-        if horizon is None:
-            state = model.state_at(given[0], run.y[:1]) if run.counts[0] else None
-            if state is None:
-                state = model.initial_state(given[0])
-            found.append(Segment(given, state, run.y, run.counts))
-            continue
-        x = (run.u - model.input_scale[0]) / model.input_scale[1]
-        y = (run.y - model.output_scale[0]) / model.output_scale[1]
-        operators = play_operators(x, np.array(model.thresholds), "first_sample")
-        first = max(n, m, 1)
-        for start in range(first, run.u.size, horizon):
-            before = np.arange(start - 1, start - 1 - n, -1)
-            if not run.counts[before].all():
-                continue
-            past = x[start - 1 - np.arange(m)]
-            state = np.concatenate([y[before], past, operators[start - 1]])
-            stop = start + horizon
-            found.append(
-                Segment(given[start:stop], state, run.y[start:stop], run.counts[start:stop])
-            )
-    return found
+def _slopes(model: Narx, runs: FreeRuns, parameters: Array) -> Array:
+    """Return the derivatives of `_errors`."""
+    here, half = model.unpack(parameters), model.output_scale[1]
+    slopes = runs.slopes(here) / half
+    slopes[~(np.abs(runs.errors(here)) < FAR * half)] = 0.0
+    return slopes
 
 
 def some(pieces: list[Segment], horizon: int | None) -> list[Segment]:
@@ -214,24 +181,6 @@ def some(pieces: list[Segment], horizon: int | None) -> list[Segment]:
         return pieces
     n = min(len(pieces), -(-HORIZON_SAMPLES // horizon))
     return [pieces[k] for k in np.linspace(0, len(pieces) - 1, n).round().astype(int)]
-
-
-def segment_errors(model: Narx, data: TrainingData, pieces: Sequence[Segment]) -> Array:
-    """Return the errors over all stretches, at the samples that count."""
-    errors = []
-    for piece in pieces:
-        outputs = np.empty_like(piece.inputs)
-        model.bind(data.sample_time, piece.state.copy(), piece.inputs, outputs)()
-        errors.append((outputs[:, 0] - piece.outputs)[piece.counts])
-    return np.concatenate(errors)
-
-
-def free_run_errors(model: Narx, data: TrainingData) -> Array:
-    """Return free-running errors at the samples that count, each run started where it was measured.
-
-    A run whose first sample does not count starts at rest, since its output may not be looked at.
-    """
-    return segment_errors(model, data, segments(model, data, None))
 
 
 def stable(model: Narx, data: TrainingData) -> bool:

@@ -10,10 +10,11 @@ from annotated_types import Interval
 from numpy.typing import NDArray
 
 from mckibben.blocks.dynamic.narx import Narx
-from mckibben.blocks.dynamic.narx_network import NarxNetwork
+from mckibben.blocks.dynamic.narx_network import NarxNetwork, activated
 from mckibben.blocks.fields import vector
 from mckibben.estimators.data import TrainingData
-from mckibben.estimators.narx.base import NarxEstimator
+from mckibben.estimators.descent import descend
+from mckibben.estimators.narx.base import LEAST_GAIN, NarxEstimator
 from mckibben.estimators.narx.regressors import Lags
 from mckibben.estimators.search import Tracker
 
@@ -21,6 +22,9 @@ Array = NDArray[np.float64]
 
 ONE_STEP_SAMPLES = 3000
 """Samples on which one-step errors are minimised."""
+
+ONE_STEP_EVALUATIONS = 15
+"""Most evaluations of a start."""
 
 
 @dataclass(kw_only=True, repr=False, eq=False)
@@ -45,39 +49,26 @@ class NarxNetworkEstimator(NarxEstimator):
 
     def candidates(self, lags: Lags, data: TrainingData, tracker: Tracker) -> list[Narx]:
         """Return networks fitted to one-step errors by variable projection, one a start."""
-        from scipy.optimize import least_squares
-
         pairs = [lags.table(run, self.starting_rule) for run in data.runs]
         x = np.concatenate([table for table, _ in pairs])
         y = np.concatenate([target for _, target in pairs])
         keep = np.linspace(0, len(y) - 1, min(len(y), ONE_STEP_SAMPLES)).round().astype(int)
-        x, y = x[keep], y[keep]
+        one_step = OneStep(x[keep], y[keep], self.n_units, self.activation, tracker)
         rng = np.random.default_rng(self.seed)
         n, units = lags.size, self.n_units
-
-        def solved(first: Array) -> tuple[Array, Array]:
-            layer = first.reshape(units, n + 1)
-            s = x @ layer[:, :n].T + layer[:, n]
-            a = np.tanh(s) if self.activation == "tanh" else (1 - s**2) * np.exp(-0.5 * s**2)
-            columns = np.column_stack([np.ones(len(y)), x, a])
-            # a little damping: neighbouring samples make the regressors nearly dependent
-            weights = np.linalg.lstsq(
-                np.vstack([columns, 1e-4 * np.eye(columns.shape[1])]),
-                np.append(y, np.zeros(columns.shape[1])),
-                rcond=None,
-            )[0]
-            return weights, columns @ weights - y
-
-        def residuals(first: Array) -> Array:
-            return solved(first)[1]
-
         models: list[Narx] = []
         for _ in range(self.n_starts):
             first = rng.normal(0.0, 1.0, units * (n + 1))
-            found = least_squares(residuals, first, max_nfev=15, ftol=1e-6)
-            tracker.evaluations += int(found.nfev)
-            weights, _ = solved(found.x)
-            layer = found.x.reshape(units, n + 1)
+            *_, found = descend(
+                one_step.errors,
+                one_step.slopes,
+                first,
+                np.ones(first.size),
+                most_evaluations=ONE_STEP_EVALUATIONS,
+                least_gain=LEAST_GAIN,
+            )
+            weights = one_step.weights(found)
+            layer = found.reshape(units, n + 1)
             hidden = np.column_stack([layer, weights[1 + n :]])
             models.append(
                 NarxNetwork(
@@ -89,3 +80,57 @@ class NarxNetworkEstimator(NarxEstimator):
                 )
             )
         return models
+
+
+class OneStep:
+    """One-step errors of networks by their hidden layers; all behind these is solved for.
+
+    Parameters
+    ----------
+    x, y : arrays, shapes (n, k) and (n,)
+        Regressors, and the outputs to give.
+    units : int
+        Of the hidden layer.
+    activation : {"tanh", "wavelet"}
+    tracker : Tracker
+        Counts evaluations.
+    """
+
+    def __init__(self, x: Array, y: Array, units: int, activation: str, tracker: Tracker) -> None:
+        self.x, self.units, self.activation, self.tracker = x, units, activation, tracker
+        # a little damping: neighbouring samples make the regressors nearly dependent
+        self._damping = 1e-4 * np.eye(1 + x.shape[1] + units)
+        self._target = np.append(y, np.zeros(len(self._damping)))
+
+    def weights(self, first: Array) -> Array:
+        """Return bias, linear weights and those of the units that suit a hidden layer best."""
+        return self._solved(self._columns(self._activated(first)[0]))
+
+    def errors(self, first: Array) -> Array:
+        """Return the errors, and the damping of the weights, with these solved for."""
+        self.tracker.evaluations += 1
+        columns = self._columns(self._activated(first)[0])
+        return np.asarray(columns @ self._solved(columns) - self._target)
+
+    def slopes(self, first: Array) -> Array:
+        """Return the derivatives of the errors, less what the weights would take up (Kaufman)."""
+        a, steepness = self._activated(first)
+        columns = self._columns(a)
+        k = self.x.shape[1]
+        by_sum = steepness * self._solved(columns)[1 + k :]
+        slopes = np.zeros((len(columns), self.units, k + 1))
+        slopes[: len(a), :, :k] = by_sum[:, :, np.newaxis] * self.x[:, np.newaxis, :]
+        slopes[: len(a), :, k] = by_sum
+        moved = slopes.reshape(len(columns), -1)
+        taken = np.linalg.qr(columns)[0]
+        return np.asarray(moved - taken @ (taken.T @ moved))
+
+    def _activated(self, first: Array) -> tuple[Array, Array]:
+        layer = first.reshape(self.units, -1)
+        return activated(self.activation, self.x @ layer[:, :-1].T + layer[:, -1])
+
+    def _columns(self, a: Array) -> Array:
+        return np.vstack([np.column_stack([np.ones(len(a)), self.x, a]), self._damping])
+
+    def _solved(self, columns: Array) -> Array:
+        return np.asarray(np.linalg.lstsq(columns, self._target, rcond=None)[0])

@@ -11,7 +11,6 @@ The names below are imported when they are first used, so that ``import mckibben
 from __future__ import annotations
 
 from importlib import import_module
-from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
 from mckibben.errors import DataError, DataWarning, MckibbenError, ModelError, ModelWarning
@@ -49,7 +48,7 @@ if TYPE_CHECKING:
     from mckibben.rigs import check_rig as check_rig
     from mckibben.rigs import load_rig as load_rig
 
-__version__ = version("mckibben")
+    __version__: str
 
 _HOMES = {
     "Affine": "blocks.affine",
@@ -97,6 +96,10 @@ __all__ = [  # the names of _HOMES are resolved by __getattr__
 
 
 def __getattr__(name: str) -> Any:
+    if name == "__version__":
+        from importlib.metadata import version
+
+        return version("mckibben")
     if name not in _HOMES:
         raise AttributeError(f"module 'mckibben' has no attribute {name!r}")
     return getattr(import_module(f"mckibben.{_HOMES[name]}"), name)

@@ -47,7 +47,7 @@ def recordings(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
 
 
 def begin(*words: str | Path) -> subprocess.Popen[str]:
-    program = "from mckibben.cli.main import run; run()"
+    program = "from mckibben.cli.entry import run; run()"
     return subprocess.Popen(
         [sys.executable, "-c", program, *map(str, words)],
         stdout=subprocess.PIPE,

@@ -12,7 +12,6 @@ from typing import Annotated
 
 import typer
 
-from mckibben import __version__
 from mckibben.cli.app import app as workbench
 from mckibben.cli.characterize import characterize
 from mckibben.cli.compare import compare
@@ -50,6 +49,8 @@ app.add_typer(rig_app)
 
 def _show_version(wanted: bool) -> None:
     if wanted:
+        from mckibben import __version__
+
         typer.echo(__version__)
         raise typer.Exit
 

@@ -59,6 +59,8 @@ def verdict(study: Study) -> list[str]:
     """Return which model is best, how good it is, and whether it can be inverted."""
     board, best = study.leaderboard, study.leaderboard.best
     if best is None or best.test is None:
+        if board.pending:
+            return ["No model is fitted yet."]
         return ["No model could be identified on these recordings."]
     n_ok = sum(row.reason is None for row in board.rows)
     between = ""
@@ -83,6 +85,8 @@ def verdict(study: Study) -> list[str]:
 
 def _invertibility(study: Study, best: Row) -> str:
     check = study.inverse
+    if check is None and study.leaderboard.pending:
+        return "The best one that can be inverted is inverted when all are fitted."
     if check is None:
         return "None of the models that worked can be inverted."
     low, high = check.reachable
@@ -98,7 +102,13 @@ def _invertibility(study: Study, best: Row) -> str:
 
 def next_steps(study: Study) -> list[str]:
     """Return what to do next, most useful first."""
-    best = study.leaderboard.best
+    best, pending = study.leaderboard.best, study.leaderboard.pending
+    if pending:
+        done, left = len(study.leaderboard.rows), len(pending)
+        return [
+            f"{done} of {done + left} models are fitted, and {_listed(pending)} to come: load this "
+            "page again while they are; if they were stopped, the same command goes on."
+        ]
     if best is None or best.test is None or best.train is None:
         return [
             "Read the reasons in the leaderboard below, then check that input and output are the "
@@ -141,7 +151,7 @@ def commands(study: Study) -> list[tuple[str, str]]:
     train, test = _files(study.train), _files(study.test)
     channels = f"--input {shlex.quote(board.input)} --output {shlex.quote(board.output)}"
     tested = "".join(f" --test {file}" for file in test if file not in train)
-    models = ",".join(sorted(row.model for row in board.rows))
+    models = ",".join(sorted((*(row.model for row in board.rows), *board.pending)))
     lines = [
         (
             "Repeat this study",

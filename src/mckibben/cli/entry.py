@@ -1,0 +1,25 @@
+"""The program's first lines: Ctrl-C while the commands are being loaded ends it with a plain word."""
+
+from __future__ import annotations
+
+import os
+import signal
+from types import FrameType
+
+
+def run() -> None:
+    """Load the commands and run the one that was typed."""
+    before = signal.signal(signal.SIGINT, _leave)
+    from mckibben.cli.main import run as command
+
+    signal.signal(signal.SIGINT, before)
+    command()
+
+
+def _leave(signum: int, frame: FrameType | None) -> None:
+    os.write(2, b"\nInterrupted before anything was begun.\n")
+    os._exit(130)
+
+
+if __name__ == "__main__":
+    run()

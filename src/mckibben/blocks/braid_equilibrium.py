@@ -35,6 +35,9 @@ NEWTONS_PER_BAR = 0.1
 SHARE = 0.995
 """Of the contraction at which the braid pulls no more: the furthest that the muscle goes."""
 
+LEAST = -0.1
+"""Contraction below which no muscle is modelled."""
+
 
 @kernel
 def balance(e: float, c: Array) -> float:
@@ -161,7 +164,7 @@ class BraidEquilibrium(Memoryless, NamedParameters, Primitive):
         area = 0.25 * math.pi * self.diameter**2 * NEWTONS_PER_BAR
         largest = SHARE * (1.0 - math.sqrt(b / a))
         # below, the bladder would have to pull harder than the load
-        least = -0.1
+        least = LEAST
         if self.stiffness > 0:
             least = max(least, -0.9 * self.load / (self.stiffness + 0.01 * self.hardening))
         head = [self.load, self.stiffness, self.hardening, area, a, b, least, largest]
@@ -171,7 +174,7 @@ class BraidEquilibrium(Memoryless, NamedParameters, Primitive):
         """Return how displacements of equilibrium move, shapes (n,) and (n, 4).
 
         By pressure; and by load, stiffness, hardening and braid angle. Where the muscle goes no
-        further, it does not move.
+        further, it moves with its limits.
         """
         c = self.coefficients(None)
         e = (displacement - self.offset) / self.rest_length
@@ -180,10 +183,19 @@ class BraidEquilibrium(Memoryless, NamedParameters, Primitive):
         pressure = (c[0] + e * (c[1] + c[2] * e * e)) / pull
         by_contraction = c[1] + 3.0 * c[2] * e * e + 2.0 * pressure * c[3] * c[4] * (1.0 - e)
         by_angle = c[3] * (2.0 * cosine - 6.0 * cosine * (1.0 - e) ** 2) / sine**3
-        inside = (e > c[6]) & (e < c[7]) & (by_contraction > 0.0)
-        share = np.where(inside, self.rest_length / np.where(inside, by_contraction, 1.0), 0.0)
         loads = np.column_stack([np.ones_like(e), e, e**3, -pressure * by_angle])
-        return pull * share, -share[:, np.newaxis] * loads
+        by_pressure = self.rest_length * pull / by_contraction
+        by_parameters = -self.rest_length * loads / by_contraction[:, np.newaxis]
+        lowest, highest = e <= c[6], e >= c[7]
+        by_pressure[lowest | highest] = 0.0
+        by_least = np.zeros(4)
+        if c[6] > LEAST:
+            stiffness = self.stiffness + 0.01 * self.hardening
+            by_least[:3] = c[6] / self.load, -c[6] / stiffness, -0.01 * c[6] / stiffness
+        by_largest = np.array([0.0, 0.0, 0.0, -SHARE * sine / (math.sqrt(3.0) * cosine**2)])
+        by_parameters[lowest] = self.rest_length * by_least
+        by_parameters[highest] = self.rest_length * by_largest
+        return by_pressure, by_parameters
 
     def reachable(self) -> tuple[Array, Array]:
         """Return the displacements at the least and largest contraction, each of shape (1,)."""

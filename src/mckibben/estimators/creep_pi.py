@@ -71,6 +71,7 @@ class CreepPIEstimator(SeparableEstimator):
     n_refined: Annotated[int, Ge(1)] = 3
 
     searches_condensed: ClassVar[bool] = False
+    search_evaluations: ClassVar[int] = 30  # the valleys are flat
 
     def identify(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
         """Return the block found, and the data with the memories at the start that belong to it."""

@@ -5,6 +5,7 @@ Run: python benchmarks/startup.py
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 import time
@@ -20,22 +21,25 @@ COMMANDS = {
     "mckibben info --models": (["-m", "mckibben.cli.main", "info", "--models"], 1.5),
     "mckibben --help": (["-m", "mckibben.cli.main", "--help"], 0.5),
 }
-"""By what is typed: arguments of Python that do the same, and the target [s]."""
+"""By what is typed: arguments of Python that do the same, and the target of wall time [s]."""
 
 
-def seconds(arguments: list[str]) -> float:
-    """Return the wall time of a fresh process."""
-    started = time.perf_counter()
+def seconds(arguments: list[str]) -> tuple[float, float]:
+    """Return the wall and processor time of a fresh process; beside other work they differ."""
+    started, before = time.perf_counter(), os.times()
     subprocess.run([sys.executable, *arguments], stdout=subprocess.DEVNULL, check=True)
-    return time.perf_counter() - started
+    wall, after = time.perf_counter() - started, os.times()
+    busy = after.children_user + after.children_system
+    return wall, busy - before.children_user - before.children_system
 
 
 def main() -> None:
-    """Print the median of every command beside its target."""
-    print(f"{'command':<52} {'median [s]':>10} {'target [s]':>10}")
+    """Print the medians of every command beside its target."""
+    print(f"{'command, medians [s]':<52} {'wall':>6} {'target':>6} {'processor':>9}")
     for name, (arguments, target) in COMMANDS.items():
         seconds(arguments)  # writes the bytecode, and brings files into memory
-        print(f"{name:<52} {median(seconds(arguments) for _ in range(RUNS)):10.2f} {target:10.1f}")
+        wall, busy = map(median, zip(*(seconds(arguments) for _ in range(RUNS)), strict=True))
+        print(f"{name:<52} {wall:6.2f} {target:6.1f} {busy:9.2f}")
 
 
 if __name__ == "__main__":

@@ -39,9 +39,9 @@ class Parametrised:
         return f"{type(self).__name__}({', '.join(changed)})"
 
     def __sklearn_tags__(self) -> Any:
-        from sklearn.utils import Tags, TargetTags
+        from sklearn.base import BaseEstimator  # scikit-learn alone asks, so it is there already
 
-        return Tags(estimator_type=None, target_tags=TargetTags(required=False))
+        return BaseEstimator().__sklearn_tags__()
 
     @classmethod
     def _names(cls) -> list[str]:

@@ -16,9 +16,6 @@ def test_springs_side_by_side_agree_with_each_alone() -> None:
     for limit, found in zip(limits.tolist(), deflections.T, strict=True):
         s, expected = limit, [limit]
         for move in np.diff(u).tolist():
-            if move >= 0:
-                s = min(s + move, limit)
-            else:
-                s = max(s + stiffness * move, -ratio * limit)
+            s = min(s + move, limit) if move >= 0 else max(s + stiffness * move, -ratio * limit)
             expected.append(s)
         np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-14)

@@ -108,7 +108,8 @@ def test_study_writes_everything(cli: Cli, files: tuple[Path, Path], tmp_path: P
     assert printed["inverse"]["error"] <= 1e-9
     written = {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
     assert written == {
-        *("report.html", "leaderboard.csv", "leaderboard.json", "inverse.json"),
+        *("report.html", "characterization.json", "inverse.json"),
+        *("leaderboard.csv", "leaderboard.json"),
         *("models/pi.json", "models/gpi.json"),
     }
     assert load(folder / "inverse.json").inverse() == load(folder / "models" / "gpi.json")

@@ -61,7 +61,7 @@ class CreepPIEstimator(SeparableEstimator):
         The largest threshold, relative to half the range of the logarithm.
     """
 
-    effort: ClassVar[float] = 2.0
+    effort: ClassVar[float] = 1.0
 
     n_operators: Operators = 10
     map_size: Annotated[int, Interval(ge=1, le=12)] = 6

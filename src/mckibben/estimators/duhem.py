@@ -30,7 +30,7 @@ class DuhemEstimator(SeparableEstimator):
         Of the slope right after a reversal.
     """
 
-    effort: ClassVar[float] = 1.2
+    effort: ClassVar[float] = 1.1
 
     nonnegative: bool = False
     degree: Annotated[int, Interval(ge=1, le=9)] = 4

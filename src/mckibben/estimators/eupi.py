@@ -39,7 +39,7 @@ class EUPIEstimator(SeparableEstimator):
         How thresholds spread over half the input range.
     """
 
-    effort: ClassVar[float] = 0.4
+    effort: ClassVar[float] = 0.3
 
     n_operators: Operators = 10
     spacing: Literal["even", "dense"] = "even"

@@ -32,7 +32,7 @@ class GeneralizedBoucWenEstimator(LoopEstimator):
         n. Default: the better of both on the training data.
     """
 
-    effort: ClassVar[float] = 1.8
+    effort: ClassVar[float] = 1.3
 
     exponent: Literal[1, 2] | None = None
 

@@ -50,7 +50,7 @@ class GPIEstimator(SeparableEstimator):
         How thresholds spread under the first rule.
     """
 
-    effort: ClassVar[float] = 0.8
+    effort: ClassVar[float] = 0.7
 
     n_operators: Annotated[int, Interval(ge=0, le=1000)] = 10
     envelope: Literal["tanh", "piecewise-linear", "exponential"] = "tanh"

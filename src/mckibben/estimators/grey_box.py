@@ -62,7 +62,7 @@ class GreyBoxEstimator(SeparableEstimator):
         Of the muscle at rest [mm]; scales load and stiffness, and nothing else.
     """
 
-    effort: ClassVar[float] = 3.0
+    effort: ClassVar[float] = 1.2
 
     n_operators: Operators = 6
     n_creep: Annotated[int, Interval(ge=0, le=5)] = 2

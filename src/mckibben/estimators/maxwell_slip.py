@@ -33,7 +33,7 @@ class MaxwellSlipEstimator(LoopEstimator):
         How the deflections at which they slip spread over half the input range.
     """
 
-    effort: ClassVar[float] = 0.03
+    effort: ClassVar[float] = 0.02
 
     n_operators: Operators = 8
     spacing: Literal["even", "dense"] = "even"
@@ -98,7 +98,7 @@ class MaxwellSlipEstimator(LoopEstimator):
 class ModifiedMaxwellSlipEstimator(MaxwellSlipEstimator):
     """Modified Maxwell-slip model: the two ratios of its directions are searched."""
 
-    effort: ClassVar[float] = 1.0
+    effort: ClassVar[float] = 0.5
 
     def bounds(self, data: TrainingData) -> tuple[Array, Array]:
         """Return bounds of the logarithms of both ratios."""

@@ -48,7 +48,7 @@ class MPIEstimator(SeparableEstimator):
         Straight lines of the map, or degree of the polynomial.
     """
 
-    effort: ClassVar[float] = 0.25
+    effort: ClassVar[float] = 0.2
 
     n_operators: Operators = 10
     spacing: Literal["even", "dense"] = "even"

@@ -39,7 +39,7 @@ class RDPIEstimator(MPIEstimator):
         Default: the best on the training data of none, 5 and 25 samples.
     """
 
-    effort: ClassVar[float] = 1.0
+    effort: ClassVar[float] = 0.9
 
     rate_time_constant: Annotated[float, Ge(0)] | None = None
 

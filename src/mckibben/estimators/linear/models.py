@@ -169,7 +169,7 @@ class ARMAXEstimator(ARXEstimator):
         Order of C.
     """
 
-    effort: ClassVar[float] = 1.2
+    effort: ClassVar[float] = 1.0
 
     n_noise: Order = 2
 
@@ -189,7 +189,7 @@ class OutputErrorEstimator(PredictionErrorEstimator):
         Order of F.
     """
 
-    effort: ClassVar[float] = 1.0
+    effort: ClassVar[float] = 0.8
 
     n_poles: Order = 2
 
@@ -211,7 +211,7 @@ class BoxJenkinsEstimator(OutputErrorEstimator):
         Orders of C and D.
     """
 
-    effort: ClassVar[float] = 1.5
+    effort: ClassVar[float] = 1.0
 
     n_noise: Order = 2
     n_noise_poles: Order = 2

@@ -34,6 +34,8 @@ class ProcessModelEstimator(SeparableEstimator):
         What the input does between samples.
     """
 
+    effort: ClassVar[float] = 0.3
+
     fit_delay: bool = False
     hold: Literal["first", "zero"] = "first"
     nonnegative: bool = False

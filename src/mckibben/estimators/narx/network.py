@@ -41,7 +41,7 @@ class NarxNetworkEstimator(NarxEstimator):
         Random first layers tried.
     """
 
-    effort: ClassVar[float] = 6.0
+    effort: ClassVar[float] = 2.0
 
     n_units: Annotated[int, Interval(ge=1, le=100)] = 5
     activation: Literal["tanh", "wavelet"] = "tanh"

@@ -36,7 +36,7 @@ class NarxPolynomialEstimator(NarxEstimator):
         Most terms; half and a quarter of them are tried too, and the best free run kept.
     """
 
-    effort: ClassVar[float] = 4.0
+    effort: ClassVar[float] = 0.6
 
     degree: Annotated[int, Interval(ge=1, le=6)] = 3
     n_terms: Annotated[int, Interval(ge=1, le=200)] = 16
@@ -76,7 +76,7 @@ class NarxPolynomialEstimator(NarxEstimator):
 class NarxPlayEstimator(NarxPolynomialEstimator):
     """Polynomial NARX model with play operators among its regressors, so that it keeps its branch."""
 
-    effort: ClassVar[float] = 1.8
+    effort: ClassVar[float] = 0.2
 
     output_lags: Annotated[int, Interval(ge=1, le=20)] = 1
     input_lags: Annotated[int, Interval(ge=1, le=20)] = 1

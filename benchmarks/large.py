@@ -108,7 +108,7 @@ def on_a_cluster(n: int, words: tuple[str | Path, ...]) -> None:
     except ImportError:
         print("  Dask is not installed")
         return
-    with cluster_of(n_workers=n, threads_per_worker=1, dashboard_address=None) as cluster:
+    with cluster_of(n_workers=n, threads_per_worker=1, dashboard_address=":0") as cluster:
         where = cluster.scheduler_address
         measured(f"--dask, {n} worker(s); memory of the client", *words, "--dask", where)
 

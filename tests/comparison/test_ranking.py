@@ -335,7 +335,7 @@ def test_dask_backend_gives_the_same_table(train: Recording, test_set: Recording
     serial = compare(train, test_set, models=["pi", "mpi"], n_folds=0, jobs=1)
     with (
         distributed.LocalCluster(
-            n_workers=1, threads_per_worker=2, processes=False, dashboard_address=None
+            n_workers=1, threads_per_worker=2, processes=False, dashboard_address=":0"
         ) as cluster,
         distributed.Client(cluster),
         joblib.parallel_config(backend="dask"),

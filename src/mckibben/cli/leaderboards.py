@@ -35,5 +35,7 @@ def print_leaderboard(board: Leaderboard) -> None:
     for row in board.rows:
         if row.reason is not None:
             print(f"{row.model}: failed, {row.reason}")
+    for note in board.notes:
+        print(f"Note: {note}")
     if board.left_out:
         print(f"Left out, made for other channels: {', '.join(board.left_out)}.")

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 
 from mckibben import registry
-from mckibben.comparison.free_run import run_free
-from mckibben.comparison.splits import folds
-from mckibben.errors import MckibbenError, ModelError
+from mckibben.comparison.splits import folds, given_split
+from mckibben.comparison.trying import Data, Part, Tried, effort_of, outcomes, processes_for
+from mckibben.errors import ModelError
 from mckibben.estimators.base import Estimator
 from mckibben.recording import Recording
 
@@ -58,6 +58,7 @@ def identify(
     orders: Mapping[str, Sequence[Any]] | None = None,
     *,
     n_folds: int = 4,
+    jobs: int | None = None,
     **settings: Any,
 ) -> Choice:
     """Identify a family of models, its orders chosen by cross-validated free-run error.
@@ -72,6 +73,8 @@ def identify(
         Setting -> values to try; every combination is. Default: what is usual for the family.
     n_folds : int
         Parts of the cross-validation, at least 2.
+    jobs : int, optional
+        Processes; default as many as there are cores, or none for little work.
     **settings
         Further settings of the estimator.
 
@@ -95,24 +98,22 @@ def identify(
     listed = [recordings] if isinstance(recordings, Recording) else list(recordings)
     named: Estimator = estimator_class(**settings)
     parts = tuple(folds(listed, named.input, max(n_folds, 2)))
-    tried: list[tuple[Mapping[str, Any], float, str]] = []
-    for values in product(*grid.values()):
-        combination = dict(zip(grid, values, strict=True))
-        squares, count, reason = 0.0, 0, ""
-        try:
-            for fold in parts:
-                estimator = estimator_class(**settings, **combination)
-                block = estimator.fit(fold.train, rows=fold.train_rows).model_
-                for recording, rows in zip(fold.test, fold.test_rows, strict=True):
-                    modelled = run_free(block, recording, named.output)
-                    errors = (modelled - recording[named.output])[rows]
-                    squares, count = squares + float(errors @ errors), count + errors.size
-        except MckibbenError as error:
-            reason = str(error)
-        rmse = float(np.sqrt(squares / count)) if count and not reason else float("inf")
-        tried.append((combination, rmse, reason))
+    data = Data(given_split(listed, ()), parts, named.input, named.output)
+    combinations = [dict(zip(grid, values, strict=True)) for values in product(*grid.values())]
+    every = tuple(range(len(parts)))
+    work = [Part(family, settings | chosen, every, whole=False) for chosen in combinations]
+    n = jobs or processes_for(effort_of(family, data) * len(parts) * len(work))
+    found = {outcome.index: outcome.result() for outcome in outcomes(data, work, n)}
+    tried = [(chosen, *_error(found[place])) for place, chosen in enumerate(combinations)]
     chosen, lowest, reason = min(tried, key=lambda item: item[1])
     if not np.isfinite(lowest):
         raise ModelError(f"every order of {family!r} failed: {reason}")
     fitted: Estimator = estimator_class(**settings, **chosen).fit(listed)
     return Choice(fitted, chosen, tuple(tried))
+
+
+def _error(tried: Tried) -> tuple[float, str]:
+    """Return the RMSE over all folds, infinite where one failed, and why."""
+    reason = tried.invalid or (tried.row and tried.row.reason) or ""
+    rmse = float(np.sqrt(tried.squares / tried.count)) if tried.count and not reason else np.inf
+    return rmse, reason

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -13,25 +13,23 @@ from numpy.typing import NDArray
 
 from mckibben import registry
 from mckibben.comparison.bootstrap import BlockBootstrap, interval
-from mckibben.comparison.cluster import in_backend, outer_backend
 from mckibben.comparison.kept import Kept
 from mckibben.comparison.results import Leaderboard, Row, Standing
 from mckibben.comparison.splits import folds, given_split, held_out_tail
 from mckibben.comparison.trying import (
     Data,
-    Part,
     Tried,
+    effort_of,
     errors_on_test,
     joined,
+    outcomes,
     outputs_of,
     parts_of,
-    try_part,
+    processes_for,
 )
 from mckibben.errors import ModelError
 from mckibben.recording import Recording
 from mckibben.signals import made_manageable
-from mckibben.threads import cores, one_blas_thread
-from mckibben.workers import Outcome, Workers, in_turn
 
 Array = NDArray[np.float64]
 Settings = Mapping[str, Mapping[str, Any]]
@@ -48,9 +46,6 @@ MOST_SAMPLES = 100_000
 
 QUICK = ("bouc-wen", "cpi", "gpi", "kp", "maxwell-slip", "mpi", "p2uz", "pi")
 """Models that are good or well known, and fitted in seconds."""
-
-WORTH_A_PROCESS = 4.0
-"""Seconds of work below which starting processes takes longer than it saves."""
 
 
 def compare(
@@ -287,8 +282,8 @@ def ranked(
             outputs = () if row.block is None else outputs_of(row.block, data)
             finished[model] = Tried(row, outputs)
     remaining = {m: s for m, s in plan.settings.items() if m not in finished}
-    efforts = {m: _effort(m, data) for m in remaining}
-    workers = jobs or (cores() if sum(efforts.values()) > WORTH_A_PROCESS else 1)
+    efforts = {m: effort_of(m, data) * (1 + len(data.folds)) for m in remaining}
+    workers = jobs or processes_for(sum(efforts.values()))
     large = sum(efforts.values()) / (4 * workers)
     parts = [
         part
@@ -319,7 +314,7 @@ def ranked(
     if finished:
         yield current()
     pieces: dict[str, list[Tried]] = {model: [] for model in remaining}
-    for outcome in _outcomes(data, parts, workers, told):
+    for outcome in outcomes(data, parts, workers, told):
         model = parts[outcome.index].model
         if outcome.error is None:
             pieces[model].append(outcome.value)
@@ -331,26 +326,6 @@ def ranked(
                 kept.put(model, finished[model].row, remaining[model])
             tell()
             yield current()
-
-
-def _outcomes(
-    data: Data, parts: Sequence[Part], n: int, told: Callable[..., None]
-) -> Iterator[Outcome]:
-    if outer_backend():
-        yield from in_backend(try_part, data, parts)
-    elif n == 1:
-        with one_blas_thread():
-            yield from in_turn(try_part, data, parts, told)
-    else:
-        with Workers(min(n, len(parts)), data) as workers:
-            yield from workers.results(try_part, parts, told)
-
-
-def _effort(model: str, data: Data) -> float:
-    """Return about how many seconds it takes to try a model."""
-    samples = sum(len(recording) for recording in data.split.train)
-    fits = 1 + len(data.folds)
-    return float(registry.load("estimators", model).effort * fits * max(samples, 2000) / 10_000)
 
 
 def _ranking(plan: Plan, finished: Mapping[str, Tried], bootstrap: BlockBootstrap) -> Ranking:

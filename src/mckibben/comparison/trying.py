@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from mckibben import registry
 from mckibben.blocks.base import Block
+from mckibben.comparison.cluster import in_backend, outer_backend
 from mckibben.comparison.free_run import run_free
 from mckibben.comparison.memory_test import memory_test
 from mckibben.comparison.results import Row
@@ -20,10 +21,15 @@ from mckibben.errors import MckibbenError
 from mckibben.estimators.search import Progress
 from mckibben.metrics import score
 from mckibben.recording import Recording
+from mckibben.threads import cores, one_blas_thread
+from mckibben.workers import Outcome, Workers, in_turn
 
 Array = NDArray[np.float64]
 
 TIMED_SAMPLES = 20_000
+
+WORTH_A_PROCESS = 4.0
+"""Seconds of work below which starting processes takes longer than it saves."""
 
 
 @dataclass(frozen=True)
@@ -108,6 +114,31 @@ def try_part(data: Data, part: Part, tell: Callable[..., None]) -> Tried:
         return Tried(Row(part.model, reason=str(error)))
     except Exception as error:  # one model must not take the comparison down, whatever it does
         return Tried(Row(part.model, reason=f"{type(error).__name__}: {error}"))
+
+
+def effort_of(model: str, data: Data) -> float:
+    """Return about how many seconds a fit of a model takes."""
+    samples = sum(len(recording) for recording in data.split.train)
+    return float(registry.load("estimators", model).effort * max(samples, 2000) / 10_000)
+
+
+def processes_for(seconds: float) -> int:
+    """Return how many processes should share so much work."""
+    return cores() if seconds > WORTH_A_PROCESS else 1
+
+
+def outcomes(
+    data: Data, parts: Sequence[Part], n: int, told: Callable[..., None] | None = None
+) -> Iterator[Outcome]:
+    """Yield what comes of every part, as it comes, from so many processes; see `Workers.results`."""
+    if outer_backend():
+        yield from in_backend(try_part, data, parts)
+    elif n == 1:
+        with one_blas_thread():
+            yield from in_turn(try_part, data, parts, told)
+    else:
+        with Workers(min(n, len(parts)), data) as workers:
+            yield from workers.results(try_part, parts, told)
 
 
 def joined(parts: Sequence[Tried]) -> Tried:

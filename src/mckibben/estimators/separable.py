@@ -19,7 +19,13 @@ from mckibben.blocks.base import Block
 from mckibben.errors import ModelError
 from mckibben.estimators.base import simulate_all
 from mckibben.estimators.data import Run, TrainingData
-from mckibben.estimators.search import Tracker, multi_start, particle_swarm, solve_linear
+from mckibben.estimators.search import (
+    Choice,
+    Tracker,
+    multi_start,
+    particle_swarm,
+    solve_linear,
+)
 from mckibben.estimators.searching import SearchingEstimator
 
 Array = NDArray[np.float64]
@@ -119,6 +125,11 @@ class SeparableEstimator(SearchingEstimator):
         directions = np.linalg.qr(taken)[0]
         return np.asarray(moves - directions @ (directions.T @ moves))
 
+    def choices(self, data: TrainingData) -> list[Choice]:
+        """Return what groups of the non-linear parameters may be exchanged for; none as a rule."""
+        del data
+        return []
+
     def identify(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
         """Return the block found, and the data with the memories at the start that belong to it."""
         if self.method == "pso":
@@ -161,6 +172,7 @@ class SeparableEstimator(SearchingEstimator):
                 n_refined=self.n_refined,
                 max_evaluations=self.search_evaluations,
                 jacobian=lambda point: self.jacobian(point, thin),
+                choices=self.choices(data),
             )
         return theta if tracker.interrupted else self._polish(theta, data, tracker)
 

@@ -120,10 +120,13 @@ class SeparableEstimator(SearchingEstimator):
             return np.zeros((len(matrix), theta.size))
         linear, _ = self._solve_for(matrix, data)
         moves = self.moves(theta, linear, data)
-        free = linear > 1.01 * self.least(matrix, data) if self.solves_nonnegative else linear != 0
-        taken = np.column_stack([np.ones(len(matrix)), matrix[:, free]])
-        directions = np.linalg.qr(taken)[0]
+        directions = np.linalg.qr(self.free(matrix, linear, data))[0]
         return np.asarray(moves - directions @ (directions.T @ moves))
+
+    def free(self, matrix: Array, linear: Array, data: TrainingData) -> Array:
+        """Return the columns whose linear parameters are solved for and at no bound, offset first."""
+        free = linear > 1.01 * self.least(matrix, data) if self.solves_nonnegative else linear != 0
+        return np.column_stack([np.ones(len(matrix)), matrix[:, free]])
 
     def choices(self, data: TrainingData) -> list[Choice]:
         """Return what groups of the non-linear parameters may be exchanged for; none as a rule."""

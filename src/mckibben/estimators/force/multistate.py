@@ -292,7 +292,7 @@ class MultistateEstimator(SeparableEstimator):
             return np.asarray(columns - directions @ (directions.T @ columns))
 
         scale = np.maximum(np.linalg.norm(friction, axis=0), 1e-300)
-        floor = LEAST_SHARE * np.ptp(target) / np.maximum(np.abs(friction).max(axis=0), 1e-300)
+        floor = self.least(friction, data)
         both = np.column_stack([beside(friction) / scale, beside(target)])
         reduced: Array = np.linalg.qr(both, mode="r")  # type: ignore[assignment]
         rest = reduced[:, n] - reduced[:, :n] @ (floor * scale)
@@ -302,6 +302,19 @@ class MultistateEstimator(SeparableEstimator):
         left = directions.T @ (target - friction @ stiffnesses)
         found = (right[known].T @ (left / singular[known])) / size
         return np.concatenate([stiffnesses, found[1:]]), float(found[0])
+
+    def least(self, matrix: Array, data: TrainingData) -> Array:
+        """Return the least stiffnesses, with which every element gives some force."""
+        largest = np.abs(matrix[:, : self.n_stiffnesses]).max(axis=0)
+        return np.asarray(LEAST_SHARE * np.ptp(data.target) / np.maximum(largest, 1e-300))
+
+    def free(self, matrix: Array, linear: Array, data: TrainingData) -> Array:
+        """Return the elements above their least force, and the static law, which has the offset."""
+        n = self.n_stiffnesses
+        elements = matrix[:, :n][:, linear[:n] > 1.01 * self.least(matrix, data)]
+        if self.static == "none":
+            return elements
+        return np.column_stack([np.ones(len(matrix)), matrix[:, n:], elements])
 
     def build(self, theta: Array, linear: Array, offset: float, data: TrainingData) -> Block:
         """Return the friction, with the static law beside it if there is one."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 import os
-import shutil
 import subprocess
 import sys
 import time
@@ -17,9 +16,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from tests.tools import needs, where
+
 playwright = pytest.importorskip("playwright.sync_api")
 
-BROWSER = shutil.which("chromium")
+BROWSER = where("chromium")
 SLOW = 180_000
 """Milliseconds to wait for fits on a busy machine."""
 
@@ -34,7 +35,7 @@ OPTIONS = [
     "--disable-sync",
 ]
 
-pytestmark = pytest.mark.skipif(BROWSER is None, reason="there is no chromium")
+pytestmark = needs("chromium")
 
 
 @pytest.fixture
@@ -138,7 +139,7 @@ def test_from_the_example_to_a_c_folder(page: Any, tmp_path: Path) -> None:
         names = archive.namelist()
         archive.extractall(tmp_path)
     assert any(name.endswith("CMakeLists.txt") for name in names)
-    if shutil.which("cc"):
+    if where("cc"):
         from mckibben.export.c.building import self_test
 
         folder = tmp_path / names[0].split("/")[0]

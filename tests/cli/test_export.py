@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-import shutil
 import subprocess
 from pathlib import Path
 from typing import Any
@@ -13,10 +12,9 @@ import pytest
 
 from mckibben.registry import load
 from tests.cli.conftest import Cli
+from tests.tools import needs
 
-needs_compiler = pytest.mark.skipif(
-    not (shutil.which("cc") or shutil.which("gcc")), reason="there is no C compiler"
-)
+needs_compiler = needs("cc")
 
 HOSTILE = [
     "*/ int evil(void) { return 1; } /*",
@@ -138,10 +136,9 @@ def test_a_folder_of_ones_own_with_the_same_names_is_not_replaced(cli: Cli, tmp_
 
 
 @needs_compiler
+@needs("cmake")
 @pytest.mark.parametrize("name", ["test", "all", "help", "clean", "install", "m", "package"])
 def test_names_that_builders_know_do_not_confuse_them(name: str, cli: Cli, tmp_path: Path) -> None:
-    if shutil.which("cmake") is None:
-        pytest.skip("there is no cmake")
     folder = tmp_path / "out"
     done(cli, "export", "c", saved("pi", tmp_path), "-o", folder, "--name", name)
     for command in (["-S", folder, "-B", tmp_path / "b"], ["--build", tmp_path / "b"]):

@@ -10,6 +10,7 @@ from mckibben.blocks.creep import Creep
 from mckibben.blocks.pi import PI
 from mckibben.estimators.data import training_data
 from mckibben.estimators.search import (
+    Choice,
     Swarm,
     Tracker,
     multi_start,
@@ -179,3 +180,29 @@ def test_swarm_survives_costs_that_are_not_numbers() -> None:
 
     best = particle_swarm(costs, np.zeros(2), np.ones(2), Swarm(10, 20), Tracker(), seed=0)
     assert best[0] <= 0.5
+
+
+def rugged(point: np.ndarray) -> np.ndarray:
+    """Residuals with many local minima, and 0 at (3, -2) alone."""
+    away = point - [3.0, -2.0]
+    return np.concatenate([0.3 * away, 2 * np.sin(np.pi * away)])
+
+
+def test_exchange_leads_out_of_local_minima_that_refinement_ends_in() -> None:
+    grid = np.linspace(-4.8, 4.2, 10)[:, None]
+    choices = [Choice(np.array([place]), grid) for place in (0, 1)]
+    found = [
+        multi_start(
+            rugged,
+            [np.array([-3.1, 2.9])],
+            np.full(2, -5.0),
+            np.full(2, 5.0),
+            Tracker(),
+            n_refined=1,
+            max_evaluations=50,
+            choices=tried,
+        )
+        for tried in ([], choices)
+    ]
+    assert np.abs(found[0] - [3.0, -2.0]).max() > 4.0
+    np.testing.assert_allclose(found[1], [3.0, -2.0], atol=1e-6)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ctypes
-import shutil
 import subprocess
 import warnings
 from dataclasses import replace
@@ -25,12 +24,11 @@ from mckibben.export import export_c
 from mckibben.export.c.building import CompiledModel, self_test
 from mckibben.registry import load, names
 from mckibben.stream import Step
+from tests.tools import needs
 
 Array = NDArray[np.float64]
 
-pytestmark = pytest.mark.skipif(
-    not (shutil.which("cc") or shutil.which("gcc")), reason="there is no C compiler"
-)
+pytestmark = needs("cc")
 
 SAMPLE_TIME = 0.01
 DOUBLE, SINGLE = 1e-12, 1e-4

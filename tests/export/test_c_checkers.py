@@ -15,13 +15,10 @@ from mckibben.export import export_c
 from mckibben.export.c.parts import PRIMITIVES
 from mckibben.registry import names
 from tests.export.test_c import MODELS, SAMPLE_TIME, difference, path_for, simulated
+from tests.tools import needs
 
 DOCS = Path(__file__).parents[2] / "docs" / "deploy"
 SHOWN = ("SDIHC", "MPI-NARMAX", "preisach-inverse", "multistate-friction", "feedforward-feedback")
-
-
-def needs(program: str) -> pytest.MarkDecorator:
-    return pytest.mark.skipif(shutil.which(program) is None, reason=f"there is no {program}")
 
 
 def run(command: Sequence[str | Path], cwd: Path) -> str:
@@ -115,6 +112,7 @@ def test_only_mathematics_is_asked_of_the_library(tmp_path: Path) -> None:
 
 
 @needs("mkoctfile")
+@needs("octave-cli")
 def test_octave_gives_pythons_numbers(tmp_path: Path) -> None:
     block = MODELS["SDIHC"]
     folder = export_c(block, tmp_path / "c", name="muscle", sample_time=SAMPLE_TIME)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -10,13 +11,16 @@ import pytest
 
 from mckibben import Block, ModelError
 from mckibben.export.c import emulation
-from mckibben.export.c.emulation import emulate, missing_tools
+from mckibben.export.c.emulation import emulate
 from mckibben.registry import names
 from tests.export.test_c import MODELS, SAMPLE_TIME, SINGLE
+from tests.tools import needs
 
-emulated = pytest.mark.skipif(
-    bool(missing_tools()), reason=f"not on this machine: {', '.join(missing_tools())}"
-)
+
+def emulated(test: Callable[..., None]) -> Callable[..., None]:
+    for tool in (emulation.COMPILER, emulation.SIZE, emulation.EMULATOR):
+        test = needs(tool)(test)
+    return test
 
 
 @emulated

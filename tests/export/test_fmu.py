@@ -6,6 +6,7 @@ import shutil
 import subprocess
 import sys
 import zipfile
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -19,13 +20,15 @@ from mckibben.export import export_fmu
 from mckibben.export.fmu.toolchains import own_platform
 from mckibben.registry import load, names
 from tests.export.test_c import MODELS, SAMPLE_TIME, difference, path_for, simulated
+from tests.tools import needs
 
 Array = NDArray[np.float64]
 
-needs_compiler = pytest.mark.skipif(
-    own_platform() is None or not (shutil.which("cc") or shutil.which("gcc")),
-    reason="there is no C compiler",
-)
+
+def needs_compiler(test: Callable[..., None]) -> Callable[..., None]:
+    platform = pytest.mark.skipif(own_platform() is None, reason="FMI knows no such platform")
+    return needs("cc")(platform(test))
+
 
 VERSIONS = ("2.0", "3.0")
 SHOWN = ("gpi-inverse", "SDIHC", "MPI-NARMAX", "process-model", "feedforward-feedback")
@@ -95,11 +98,10 @@ def test_every_block_makes_a_valid_description(kind: str, version: str, tmp_path
 
 
 @needs_compiler
+@needs("cmake")
 @pytest.mark.parametrize("version", VERSIONS)
 def test_it_rebuilds_from_its_own_sources(version: str, tmp_path: Path) -> None:
     pytest.importorskip("fmpy")
-    if shutil.which("cmake") is None:
-        pytest.skip("there is no cmake")
     block, inputs = MODELS["SDIHC"], path_for(MODELS["SDIHC"], 1, 50)
     path = exported(block, tmp_path, version, platforms=[])
     with zipfile.ZipFile(path) as archive:
@@ -110,6 +112,7 @@ def test_it_rebuilds_from_its_own_sources(version: str, tmp_path: Path) -> None:
 
 
 @needs_compiler
+@needs("libtbb.so.12")
 @pytest.mark.parametrize("version", VERSIONS)
 def test_a_second_importer_gives_pythons_numbers(version: str, tmp_path: Path) -> None:
     """Inputs are held at one value after another: each step takes what was set before it."""
@@ -256,9 +259,7 @@ def test_units_are_in_si(version: str, tmp_path: Path) -> None:
     assert float(displacement.get("factor", "1")) == 1e-3
 
 
-@pytest.mark.skipif(
-    shutil.which("x86_64-w64-mingw32-gcc") is None, reason="there is no compiler for Windows"
-)
+@needs("x86_64-w64-mingw32-gcc")
 @pytest.mark.parametrize(("version", "function"), [("2.0", "fmi2DoStep"), ("3.0", "fmi3DoStep")])
 def test_the_windows_library_exports_the_interface(
     version: str, function: str, tmp_path: Path

@@ -82,6 +82,42 @@ def solve_linear(
     return x, mean - float(means @ x)
 
 
+EXCHANGES = 3
+"""How often groups of parameters are exchanged and what was found refined, at most."""
+
+
+@dataclass(frozen=True)
+class Choice:
+    """Values that some of the parameters may be exchanged for, together.
+
+    Parameters
+    ----------
+    places : array of int, shape (k,)
+        Which parameters.
+    values : array, shape (n, k)
+        What to try for them.
+    """
+
+    places: NDArray[np.intp]
+    values: Array
+
+
+def exchange(cost: Callable[[Array], float], start: Array, choices: Sequence[Choice]) -> Array:
+    """Return the best point found by exchanging group after group, or the start where none is better.
+
+    It leaves local minima from which no small step leads on.
+    """
+    best, least = start, cost(start)
+    for choice in choices:
+        held = best
+        for values in choice.values:
+            tried = held.copy()
+            tried[choice.places] = values
+            if (found := cost(tried)) < least:
+                best, least = tried, found
+    return best
+
+
 def multi_start(
     residuals: Callable[[Array], Array],
     starts: Sequence[Array],
@@ -92,11 +128,13 @@ def multi_start(
     n_refined: int,
     max_evaluations: int,
     jacobian: Callable[[Array], Array] | None = None,
+    choices: Sequence[Choice] = (),
 ) -> Array:
     """Return the best point found by refining the most promising of many starts within bounds.
 
     Every start is evaluated once; the best ``n_refined`` are refined by a bounded trust-region
-    method, with the derivatives of the residuals where given, else with finite differences.
+    method, with the derivatives of the residuals where given, else with finite differences. Where
+    there are choices, the best is then improved by exchange, and refined again.
     """
     from scipy.optimize import least_squares
 
@@ -117,21 +155,34 @@ def multi_start(
         except KeyboardInterrupt:
             raise Interrupted from None
 
+    def cost(point: Array) -> float:
+        return float(np.mean(evaluate(point) ** 2))
+
+    def refine(start: Array) -> None:
+        margin = 1e-9 * (upper - lower)
+        least_squares(
+            evaluate,
+            np.clip(start, lower + margin, upper - margin),
+            jac="2-point" if jacobian is None else slopes,
+            bounds=(lower, upper),
+            x_scale=np.maximum(upper - lower, 1e-12),
+            max_nfev=max_evaluations,
+            ftol=1e-7,
+            xtol=1e-7,
+        )
+
     inside = [np.clip(start, lower, upper) for start in starts]
     try:
-        costs = [float(np.mean(evaluate(start) ** 2)) for start in inside]
+        costs = [cost(start) for start in inside]
         for index in np.argsort(costs, kind="stable")[:n_refined]:
-            margin = 1e-9 * (upper - lower)
-            least_squares(
-                evaluate,
-                np.clip(inside[index], lower + margin, upper - margin),
-                jac="2-point" if jacobian is None else slopes,
-                bounds=(lower, upper),
-                x_scale=np.maximum(upper - lower, 1e-12),
-                max_nfev=max_evaluations,
-                ftol=1e-7,
-                xtol=1e-7,
-            )
+            refine(inside[index])
+        for _ in range(EXCHANGES if choices else 0):
+            assert tracker.best is not None
+            best = tracker.best
+            better = exchange(cost, best, choices)
+            if better is best:
+                break
+            refine(better)
     except Interrupted:
         tracker.interrupted = True
     assert tracker.best is not None

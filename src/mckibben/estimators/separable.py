@@ -19,7 +19,13 @@ from mckibben.blocks.base import Block
 from mckibben.errors import ModelError
 from mckibben.estimators.base import simulate_all
 from mckibben.estimators.data import Run, TrainingData
-from mckibben.estimators.search import Tracker, multi_start, particle_swarm, solve_linear
+from mckibben.estimators.search import (
+    Choice,
+    Tracker,
+    multi_start,
+    particle_swarm,
+    solve_linear,
+)
 from mckibben.estimators.searching import SearchingEstimator
 
 Array = NDArray[np.float64]
@@ -114,10 +120,18 @@ class SeparableEstimator(SearchingEstimator):
             return np.zeros((len(matrix), theta.size))
         linear, _ = self._solve_for(matrix, data)
         moves = self.moves(theta, linear, data)
-        free = linear > 1.01 * self.least(matrix, data) if self.solves_nonnegative else linear != 0
-        taken = np.column_stack([np.ones(len(matrix)), matrix[:, free]])
-        directions = np.linalg.qr(taken)[0]
+        directions = np.linalg.qr(self.free(matrix, linear, data))[0]
         return np.asarray(moves - directions @ (directions.T @ moves))
+
+    def free(self, matrix: Array, linear: Array, data: TrainingData) -> Array:
+        """Return the columns whose linear parameters are solved for and at no bound, offset first."""
+        free = linear > 1.01 * self.least(matrix, data) if self.solves_nonnegative else linear != 0
+        return np.column_stack([np.ones(len(matrix)), matrix[:, free]])
+
+    def choices(self, data: TrainingData) -> list[Choice]:
+        """Return what groups of the non-linear parameters may be exchanged for; none as a rule."""
+        del data
+        return []
 
     def identify(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
         """Return the block found, and the data with the memories at the start that belong to it."""
@@ -161,6 +175,7 @@ class SeparableEstimator(SearchingEstimator):
                 n_refined=self.n_refined,
                 max_evaluations=self.search_evaluations,
                 jacobian=lambda point: self.jacobian(point, thin),
+                choices=self.choices(data),
             )
         return theta if tracker.interrupted else self._polish(theta, data, tracker)
 

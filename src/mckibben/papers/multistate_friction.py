@@ -7,7 +7,7 @@ Response of Pneumatic Artificial Muscles".
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import get_args
+from typing import Any, get_args
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from mckibben.blocks.force.multistate_friction import MultistateFriction
 from mckibben.blocks.published.multistate import multistate_friction as printed_friction
 from mckibben.blocks.published.multistate import static_force as printed_law
 from mckibben.comparison.free_run import run_free
+from mckibben.comparison.kept import Kept
 from mckibben.estimators.force.multistate import (
     MultistateEstimator,
     Structure,
@@ -61,10 +62,10 @@ HYSTERESIS = "force_hysteresis"
 
 
 def multistate_friction(
-    *, quick: bool, seed: int, jobs: int | None, tell: Progress
+    *, quick: bool, seed: int, jobs: int | None, tell: Progress, kept: Kept
 ) -> Reproduction:
     """Run the isometric and isobaric protocol, and identify force laws and friction."""
-    del jobs
+    del jobs, kept  # it takes seconds: there is nothing to go on from
     runs = protocol("multistate").runs
     recordings: dict[str, Recording] = {}
     for done, (run, recording) in enumerate(record("multistate", seed=seed), start=1):
@@ -84,9 +85,15 @@ def multistate_friction(
     tell(0.7, "friction")
     (from_rest,) = extract_hysteresis(whole, law)
     found, totals = {}, {}
+    search: dict[str, Any] = {"n_refined": 4} if quick else {}
     for name in get_args(Structure):
         estimator = MultistateEstimator(
-            output=HYSTERESIS, static="none", elements=name, initial="first_sample", seed=seed
+            output=HYSTERESIS,
+            static="none",
+            elements=name,
+            initial="first_sample",
+            seed=seed,
+            **search,
         )
         found[name] = estimator.fit(loop)
         alone = replace(estimator, initial="virgin").fit(from_rest).model_

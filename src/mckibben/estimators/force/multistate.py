@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import product
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
@@ -25,7 +26,7 @@ from mckibben.blocks.force.multistate_friction import (
 from mckibben.errors import DataError
 from mckibben.estimators.data import Run, TrainingData
 from mckibben.estimators.force.static import force_columns, force_law
-from mckibben.estimators.search import Tracker
+from mckibben.estimators.search import Choice, Tracker
 from mckibben.estimators.separable import SeparableEstimator
 from mckibben.recording import Recording
 
@@ -35,6 +36,10 @@ Structure = Literal["eleven", "each-way", "eighteen"]
 STRUCTURES = {"eleven": ELEVEN, "each-way": EACH_WAY, "eighteen": EIGHTEEN}
 LEAST_SHARE = 1e-5
 """Least force of an element, relative to the range of the output."""
+
+LENGTHS = np.geomspace(0.02, 1.0, 8)
+TIMES = (0.1, 10.0)
+"""Break-away lengths that elements are tried with, relative to the range, and times, in samples."""
 
 ORDERS = {"bilinear": (1, 2), "petrovic": (2, 2), "minh": (3, 3), "schindele": (3, 4)}
 
@@ -76,7 +81,7 @@ def extract_hysteresis(
 
 @dataclass(kw_only=True, repr=False, eq=False)
 class MultistateEstimator(SeparableEstimator):
-    """Multistate friction by bounded least squares from many starts.
+    """Multistate friction by bounded least squares from many starts, and exchange of elements.
 
     Break-away lengths and relaxation times are searched; stiffnesses, and a static law, are solved
     for. With ``static="none"`` the output is taken to be the hysteresis alone, as the paper does
@@ -170,6 +175,25 @@ class MultistateEstimator(SeparableEstimator):
                     theta += [length, time] * pairs
                 guesses.append(np.array([*theta, *[0.1] * self.fit_pressure_gain]))
         return guesses
+
+    def choices(self, data: TrainingData) -> list[Choice]:
+        """Return lengths and times to try for every element, the others held.
+
+        The cost has many local minima, in which one element does another's work: which of them the
+        best of many starts ends in is left to rounding.
+        """
+        low, high = data.input_range
+        lengths = np.log((high - low) * LENGTHS)
+        times = np.log((data.sample_time or 1.0) * np.array(TIMES))
+        found, first = [], 0
+        for pairs in self._pairs():
+            values = [
+                np.ravel([(length, time) for length in tried])
+                for time, tried in product(times, product(lengths, repeat=pairs))
+            ]
+            found.append(Choice(np.arange(first, first + 2 * pairs), np.array(values)))
+            first += 2 * pairs
+        return found
 
     def _unit(self, place: int, theta: Array) -> MultistateFriction:
         """Return one element with stiffnesses of 1."""
@@ -268,7 +292,7 @@ class MultistateEstimator(SeparableEstimator):
             return np.asarray(columns - directions @ (directions.T @ columns))
 
         scale = np.maximum(np.linalg.norm(friction, axis=0), 1e-300)
-        floor = LEAST_SHARE * np.ptp(target) / np.maximum(np.abs(friction).max(axis=0), 1e-300)
+        floor = self.least(friction, data)
         both = np.column_stack([beside(friction) / scale, beside(target)])
         reduced: Array = np.linalg.qr(both, mode="r")  # type: ignore[assignment]
         rest = reduced[:, n] - reduced[:, :n] @ (floor * scale)
@@ -278,6 +302,19 @@ class MultistateEstimator(SeparableEstimator):
         left = directions.T @ (target - friction @ stiffnesses)
         found = (right[known].T @ (left / singular[known])) / size
         return np.concatenate([stiffnesses, found[1:]]), float(found[0])
+
+    def least(self, matrix: Array, data: TrainingData) -> Array:
+        """Return the least stiffnesses, with which every element gives some force."""
+        largest = np.abs(matrix[:, : self.n_stiffnesses]).max(axis=0)
+        return np.asarray(LEAST_SHARE * np.ptp(data.target) / np.maximum(largest, 1e-300))
+
+    def free(self, matrix: Array, linear: Array, data: TrainingData) -> Array:
+        """Return the elements above their least force, and the static law, which has the offset."""
+        n = self.n_stiffnesses
+        elements = matrix[:, :n][:, linear[:n] > 1.01 * self.least(matrix, data)]
+        if self.static == "none":
+            return elements
+        return np.column_stack([np.ones(len(matrix)), matrix[:, n:], elements])
 
     def build(self, theta: Array, linear: Array, offset: float, data: TrainingData) -> Block:
         """Return the friction, with the static law beside it if there is one."""

@@ -1,0 +1,65 @@
+"""Programs and libraries that some tests need and the README's test line does not install.
+
+A test says so by `needs`: it is skipped where the tool is not, and selected by ``-m
+"tool(name='clang')"``. ``python -m tests.tools lacking`` prints such an expression for all that this
+machine lacks, ``python -m tests.tools packages`` what installs them.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import shutil
+import sys
+
+import pytest
+
+PACKAGES = {
+    "arm-none-eabi-gcc": "gcc-arm-none-eabi libnewlib-arm-none-eabi",
+    "arm-none-eabi-size": "binutils-arm-none-eabi",
+    "cc": "g++",
+    "chromium": "chromium",
+    "clang": "clang libclang-rt-14-dev",
+    "cmake": "cmake make",
+    "cppcheck": "cppcheck",
+    "g++": "g++",
+    "gcc": "g++",
+    "libtbb.so.12": "libtbb12",
+    "mkoctfile": "octave octave-dev",
+    "octave-cli": "octave",
+    "qemu-system-arm": "qemu-system-arm",
+    "x86_64-w64-mingw32-gcc": "gcc-mingw-w64-x86-64-win32",
+}
+"""Packages of Debian that bring each of them."""
+
+
+def needs(tool: str) -> pytest.MarkDecorator:
+    """Mark a test that needs a tool, which must be one of those that can be installed."""
+    assert tool in PACKAGES, f"{tool}: say in PACKAGES what brings it"
+    return pytest.mark.tool(name=tool)
+
+
+def where(tool: str) -> str | None:
+    """Return where a program is, or the name of a library that loads; None where it is not."""
+    if ".so" not in tool:
+        return shutil.which(tool)
+    try:
+        ctypes.CDLL(tool)
+    except OSError:
+        return None
+    return tool
+
+
+def skip_without_tools(item: pytest.Item) -> None:
+    """Skip a test whose tools are not here, and say which."""
+    wanted = [mark.kwargs["name"] for mark in item.iter_markers("tool")]
+    if lacking := sorted(tool for tool in wanted if where(tool) is None):
+        pytest.skip(f"there is no {', '.join(lacking)}")
+
+
+if __name__ == "__main__":
+    if sys.argv[1:] == ["packages"]:
+        print(" ".join(sorted({*" ".join(PACKAGES.values()).split()})))
+    elif sys.argv[1:] == ["lacking"]:
+        print(" or ".join(f"tool(name={tool!r})" for tool in PACKAGES if where(tool) is None))
+    else:
+        sys.exit("say packages or lacking")

@@ -6,6 +6,8 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
+import numpy as np
+
 from mckibben.blocks.base import Block
 from mckibben.comparison.kept import Kept
 from mckibben.files import read, write
@@ -23,8 +25,8 @@ class Fitted:
     ----------
     block : Block
         The model.
-    rmse : float or tuple of float
-        Its free-running error on the data fitted, of every output.
+    rmse : float
+        Its free-running error on the data fitted; of several outputs the largest.
     seconds : float
         That the fit took.
     """
@@ -32,7 +34,7 @@ class Fitted:
     __pydantic_config__: ClassVar[dict[str, bool]] = {"arbitrary_types_allowed": True}
 
     block: Block
-    rmse: float | tuple[float, ...]
+    rmse: float
     seconds: float
 
 
@@ -44,7 +46,7 @@ def fitted(
     def fit() -> Fitted:
         estimator.fit(recordings, **how)
         said = estimator.diagnostics_
-        return Fitted(estimator.model_, said.rmse, said.seconds)
+        return Fitted(estimator.model_, float(np.max(said.rmse)), said.seconds)
 
     settings = (type(estimator).__name__, estimator.get_params())
     return kept.once(name, Fitted, fit, settings, recordings, how)

@@ -6,6 +6,7 @@ Response of Pneumatic Artificial Muscles".
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any, get_args
 
@@ -25,6 +26,8 @@ from mckibben.estimators.force.multistate import (
     Structure,
     extract_hysteresis,
 )
+from mckibben.metrics import score
+from mckibben.papers.keeping import Fitted, fitted, recorded
 from mckibben.papers.reproduction import (
     Cell,
     Figure,
@@ -35,7 +38,6 @@ from mckibben.papers.reproduction import (
     thinned,
 )
 from mckibben.recording import Recording
-from mckibben.rigs import record
 from mckibben.signals.protocols import protocol
 
 LAWS = {
@@ -65,20 +67,23 @@ def multistate_friction(
     *, quick: bool, seed: int, jobs: int | None, tell: Progress, kept: Kept
 ) -> Reproduction:
     """Run the isometric and isobaric protocol, and identify force laws and friction."""
-    del jobs, kept  # it takes seconds: there is nothing to go on from
-    runs = protocol("multistate").runs
-    recordings: dict[str, Recording] = {}
-    for done, (run, recording) in enumerate(record("multistate", seed=seed), start=1):
-        recordings[run.name] = recording
-        tell(0.6 * done / len(runs), f"recorded {run.name}")
+    del jobs
+    runs = [run.name for run in protocol("multistate").runs]
+    recordings = {
+        run.name: recording
+        for run, recording in recorded(
+            kept, "multistate", runs, seed, lambda share, text: tell(0.6 * share, text)
+        )
+    }
     isometric = [r for name, r in recordings.items() if name.startswith("isometric")]
     isobaric = {name: r for name, r in recordings.items() if name.startswith("isobaric")}
     tell(0.62, "static laws")
     laws = {
-        name: registry.load("estimators", name)(seed=seed).fit(isometric)
+        name: fitted(kept, name, registry.load("estimators", name)(seed=seed), isometric)
         for name in (("force-bilinear",) if quick else LAWS)
     }
-    law: ForceLaw = laws["force-bilinear"].model_
+    law = laws["force-bilinear"].block
+    assert isinstance(law, ForceLaw)
     # the largest closed loop, as the paper's: from the first turn on
     whole = isobaric[IDENTIFIED]
     (loop,) = extract_hysteresis(whole.slice(len(whole) // 3, len(whole)), law)
@@ -95,15 +100,17 @@ def multistate_friction(
             seed=seed,
             **search,
         )
-        found[name] = estimator.fit(loop)
-        alone = replace(estimator, initial="virgin").fit(from_rest).model_
+        found[name] = fitted(kept, name, estimator, loop)
+        at_rest = replace(estimator, initial="virgin")
+        alone = fitted(kept, f"{name} from rest", at_rest, from_rest).block
         totals[NAMES[name]] = _total(law, alone)
     tell(0.85, "other models of hysteresis")
     others = {}
     for name in () if quick else BASELINES:
         estimator_class = registry.load("estimators", name)
-        others[name] = estimator_class(input="length", output=HYSTERESIS, seed=seed).fit(loop)
-    scores = {name: (fit.diagnostics_.rmse, fit.score(loop)) for name, fit in found.items()}
+        estimator = estimator_class(input="length", output=HYSTERESIS, seed=seed)
+        others[name] = fitted(kept, name, estimator, loop)
+    scores = {name: (fit.rmse, _r2(fit, [loop], HYSTERESIS)) for name, fit in found.items()}
     loops = _loops(isobaric, law, totals)
     unused = [row for row in loops.rows if row[0] != IDENTIFIED]
     worst = max(float(row[3] or 0) / float(row[1] or 1) for row in unused)
@@ -122,7 +129,7 @@ def multistate_friction(
             _static(laws, isometric),
             _friction(scores, others, loop),
             loops,
-            _values(law, found["eleven"].model_),
+            _values(law, found["eleven"].block),
         ),
         figures=_figures(isometric, isobaric, loop, law, found, totals),
         notes=(
@@ -134,20 +141,25 @@ def multistate_friction(
     )
 
 
+def _r2(fit: Fitted, recordings: Sequence[Recording], output: str) -> float:
+    """Return R² of the free-running output over recordings."""
+    measured = np.concatenate([recording[output] for recording in recordings])
+    modelled = np.concatenate([fit.block.simulate(r)[output] for r in recordings])
+    return score(measured, modelled).r2
+
+
 def _total(law: ForceLaw, friction: Block) -> Parallel:
     assert isinstance(friction, MultistateFriction)
     same = replace(friction, output=law.outputs[0], initial="virgin")
     return Parallel((law, same))
 
 
-def _static(laws: dict[str, object], isometric: list[Recording]) -> Table:
+def _static(laws: Mapping[str, Fitted], isometric: list[Recording]) -> Table:
     rows: list[tuple[Cell, ...]] = []
     for name, fit in laws.items():
         printed = PRINTED_STATIC if name == "force-bilinear" else (None, None)
-        r2 = fit.score(isometric)  # type: ignore[attr-defined]
-        n = fit.model_.n_parameters  # type: ignore[attr-defined]
-        here = fit.diagnostics_.rmse  # type: ignore[attr-defined]
-        rows.append((LAWS[name], printed[0], here, printed[1], r2, n))
+        r2 = _r2(fit, isometric, "force")
+        rows.append((LAWS[name], printed[0], fit.rmse, printed[1], r2, fit.block.n_parameters))
     return Table(
         "Static force from isometric runs (its Section 2)",
         ("law", "RMSE [N], printed", "RMSE [N], here", "r², printed", "r², here", "parameters"),
@@ -156,7 +168,7 @@ def _static(laws: dict[str, object], isometric: list[Recording]) -> Table:
 
 
 def _friction(
-    scores: dict[str, tuple[float, float]], others: dict[str, object], loop: Recording
+    scores: Mapping[str, tuple[float, float]], others: Mapping[str, Fitted], loop: Recording
 ) -> Table:
     counts = {"eleven": 11, "each-way": 11, "eighteen": 18}
     rows: list[tuple[Cell, ...]] = []
@@ -164,9 +176,8 @@ def _friction(
         printed = PRINTED_FRICTION if name == "eleven" else (None, None)
         rows.append((NAMES[name], printed[0], rmse, printed[1], r2, counts[name]))
     for name, fit in others.items():
-        rmse, r2 = fit.diagnostics_.rmse, fit.score(loop)  # type: ignore[attr-defined]
-        n = fit.model_.n_parameters  # type: ignore[attr-defined]
-        rows.append((name, None, rmse, None, r2, n))
+        r2 = _r2(fit, [loop], HYSTERESIS)
+        rows.append((name, None, fit.rmse, None, r2, fit.block.n_parameters))
     return Table(
         "Extracted hysteresis at 4 bar (its Section 4)",
         ("model", "RMSE [N], printed", "RMSE [N], here", "r², printed", "r², here", "parameters"),
@@ -229,7 +240,7 @@ def _figures(
     isobaric: dict[str, Recording],
     loop: Recording,
     law: ForceLaw,
-    found: dict[str, MultistateEstimator],
+    found: Mapping[str, Fitted],
     totals: dict[str, Parallel],
 ) -> tuple[Figure, ...]:
     def curve(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -261,7 +272,7 @@ def _figures(
             {
                 "extracted": curve(loop["length"], loop[HYSTERESIS]),
                 **{
-                    name: curve(loop["length"], found[name].predict(loop)[0])
+                    name: curve(loop["length"], found[name].block.simulate(loop)[HYSTERESIS])
                     for name in ("eleven", "each-way")
                 },
             },

@@ -19,7 +19,8 @@ def coarsened(recording: Recording, factor: int, channel: str) -> Recording:
     """Return a recording with one sample for every ``factor``, turning points kept.
 
     Of every bin the sample at which the channel turns is taken, else the first: levels at turning
-    points, on which memory depends, stay as they are, while times are off by less than a bin.
+    points, on which memory depends, stay as they are, while times are off by less than a bin. Of
+    several turns within one bin the outermost is taken; the first sample stays the first.
 
     Parameters
     ----------
@@ -39,7 +40,7 @@ def coarsened(recording: Recording, factor: int, channel: str) -> Recording:
     --------
     >>> run = Recording({"pressure": [0.0, 1.0, 2.0, 3.0, 2.0, 1.0, 0.0, 1.0]}, 0.1)
     >>> coarsened(run, 2, "pressure")["pressure"].tolist()
-    [0.0, 3.0, 2.0, 1.0]
+    [0.0, 3.0, 2.0, 0.0]
     """
     if factor == 1:
         return recording
@@ -50,10 +51,11 @@ def coarsened(recording: Recording, factor: int, channel: str) -> Recording:
             file=recording.source,
             remedy="allow more samples",
         )
-    turns = reversals(recording[channel])[1:-1]
+    u = recording[channel]
+    turns = reversals(u)[1:-1]
+    turns = turns[np.argsort(np.abs(u[turns] - 0.5 * (u.max() + u.min())), kind="stable")]
     taken = starts.copy()
-    taken[turns // factor] = turns
-    taken[0] = 0  # what the start depends on
+    taken[np.maximum(turns // factor, 1)] = turns  # of several the last one stays, the outermost
     step = recording.sample_time
     return replace(
         recording,

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import json
 import re
+from dataclasses import replace
 from html.parser import HTMLParser
 from importlib.resources import files
 from pathlib import Path
@@ -207,3 +208,13 @@ def test_a_failure_leaves_what_was_there(
         write_report(whole, path)
     assert path.read_text() == "before"
     assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_page_is_whole_before_any_model_is_fitted(whole: Study) -> None:
+    board = replace(whole.leaderboard, rows=(), pending=("pi", "gpi"))
+    early = replace(whole, leaderboard=board, predictions={}, inverse=None)
+    parsed = Parsed(page(early))
+    assert set(SECTIONS) <= set(parsed.ids)
+    assert {"time", "loop"} <= set(parsed.figures)
+    assert "pi and gpi to come" in parsed.words
+    assert "No model worked" not in parsed.words

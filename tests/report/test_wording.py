@@ -118,3 +118,16 @@ def test_versions_are_those_installed() -> None:
     from importlib.metadata import version
 
     assert versions()["numpy"] == version("numpy")
+
+
+def test_an_unfinished_study_says_so_and_promises_nothing() -> None:
+    whole = study()
+    board = replace(whole.leaderboard, pending=("cpi", "kp"))
+    unfinished = replace(whole, leaderboard=board, inverse=None)
+    assert "so far" in verdict(unfinished)[0]
+    assert "None of the models" not in " ".join(verdict(unfinished))
+    (step,) = next_steps(unfinished)
+    assert "cpi and kp to come" in step
+    assert "cpi" in commands(unfinished)[0][1]
+    empty = replace(unfinished, leaderboard=replace(board, rows=()), predictions={})
+    assert verdict(empty) == ["No model is fitted yet."]

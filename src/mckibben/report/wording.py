@@ -68,6 +68,8 @@ def verdict(study: Study) -> list[str]:
         low, high = best.rmse_interval
         between = f" (95 % interval {number(low)} to {number(high)} {board.unit})"
     lead = f"The best of {n_ok} models is" if n_ok > 1 else "The only model that worked is"
+    if board.pending:
+        lead = f"The best of {n_ok} models so far is" if n_ok > 1 else "The first model fitted is"
     share = percent(best.test.rmse / output_range(study))
     sentences = [
         f"{lead} {best.model}: free-running on data that it was not fitted "
@@ -106,8 +108,8 @@ def next_steps(study: Study) -> list[str]:
     if pending:
         done, left = len(study.leaderboard.rows), len(pending)
         return [
-            f"{done} of {done + left} models are fitted, and {_listed(pending)} to come: load this "
-            "page again while they are; if they were stopped, the same command goes on."
+            f"Load this page again while models are fitted: {done} of {done + left} are done, "
+            f"{_listed(pending)} to come. If the work was stopped, the same command goes on."
         ]
     if best is None or best.test is None or best.train is None:
         return [

@@ -182,5 +182,5 @@ class Coupling(Primitive):
     def example(cls) -> Self:
         """Return the paper's Table 3."""
         drives = tuple(Channel(f"displacement_{k}", "mm") for k in (1, 2, 3))
-        gains = ((1.0, 0.1521, 0.5368), (0.1124, 1.0, 0.6321), (0.0356, 0.2153, 1.0))
+        gains = ((1.0, 0.1124, 0.0356), (0.1521, 1.0, 0.2153), (0.5368, 0.6321, 1.0))
         return cls(gains, drives, drives)

@@ -261,7 +261,7 @@ def _references(cycles: int) -> dict[str, Recording]:
         found[f"muscle {muscle}"] = Recording(
             channels | {EXTENSOR: np.full(time.size, p0)}, CONTROL_TIME
         )
-    task = np.abs(40.0 * wave) + 5.0
+    task = np.abs(40.0 * wave + 5.0)
     found["task"] = Recording(
         dict.fromkeys(OUTPUTS, task) | {EXTENSOR: np.full(time.size, 0.6)}, CONTROL_TIME
     )
@@ -441,12 +441,12 @@ def _gains(model: Block) -> Table:
     assert isinstance(coupling, Coupling)
     printed, here = printed_coupling().matrix, coupling.matrix
     pairs = [(i, j) for i in range(3) for j in range(3) if i != j]
-    rows = tuple((f"G{j + 1}{i + 1}", float(printed[i, j]), float(here[i, j])) for i, j in pairs)
+    rows = tuple((f"G{i + 1}{j + 1}", float(printed[i, j]), float(here[i, j])) for i, j in pairs)
     return Table(
         "Coupling gains (its Table 3)",
         ("gain", "printed", "here"),
         rows,
-        f"G21: what muscle 1 gives muscle 2. Spectral radius of Jacobi's iteration: printed "
+        f"G21: what muscle 2 gives muscle 1. Spectral radius of Jacobi's iteration: printed "
         f"{printed_coupling().radius:.3f}, here {coupling.radius:.3f}.",
     )
 
@@ -508,10 +508,10 @@ def _task_table(found: Mapping[tuple[str, str], Tracked], controllers: list[str]
         errors = np.array([(recording[y] - recording[f"reference_{y}"])[kept] for y in OUTPUTS])
         rows.append((name, max(tracked.rmse.values()), float(errors.min()), float(errors.max())))
     return Table(
-        "All three follow |40 sin(0.04 pi t)| + 5 mm (its Figure 13)",
+        "All three follow |40 sin(0.04 pi t) + 5| mm (its Figure 13)",
         ("controller", "worst RMSE [mm]", "lowest error [mm]", "highest error [mm]"),
         tuple(rows),
-        "After the first cycle; at the corners of the reference its speed jumps by 10 mm/s.",
+        "After the first cycle; at the corners of the reference, at 0 mm, its speed jumps by 10 mm/s.",
     )
 
 

@@ -18,12 +18,12 @@ import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from multiprocessing import connection, forkserver, resource_tracker
+from multiprocessing import connection, forkserver, resource_tracker, util
 from types import ModuleType
-from typing import Any, Self
+from typing import Any, NoReturn, Self
 
 from mckibben import threads
-from mckibben.errors import MckibbenError
+from mckibben.errors import DataError, MckibbenError
 
 PRELOADED = ("mckibben.comparison.ranking", "mckibben.control", "numba", "scipy.optimize")
 """What the server loads, so that no process has to."""
@@ -62,7 +62,7 @@ class Outcome:
 
     index: int
     value: Any = None
-    error: BaseException | None = None
+    error: Exception | None = None
 
     def result(self) -> Any:
         """Return the value, or raise the error."""
@@ -187,16 +187,53 @@ class Workers:
         )
 
 
+def checked(jobs: int | None) -> int | None:
+    """Return a number of processes that was asked for.
+
+    Raises
+    ------
+    DataError
+        If it is below 1.
+    """
+    if jobs is not None and jobs < 1:
+        raise DataError(f"jobs is {jobs}", remedy="give a number of at least 1, or leave it out")
+    return jobs
+
+
+def outcomes(
+    work: Work,
+    common: Any,
+    items: Sequence[Any],
+    n: int,
+    told: Callable[..., None] | None = None,
+) -> Iterator[Outcome]:
+    """Yield what comes of every item, as it comes, from so many processes, or this one if it is one.
+
+    See `Workers.results`.
+    """
+    if min(n, len(items)) <= 1:
+        with threads.one_blas_thread():
+            yield from in_turn(work, common, items, told)
+    else:
+        with Workers(min(n, len(items)), common) as workers:
+            yield from workers.results(work, items, told)
+
+
 def all_of(work: Work, items: Sequence[Any], jobs: int | None = None) -> list[Any]:
-    """Return what comes of every item, in their order, worked on by as many processes as cores."""
-    found: dict[int, Any] = {}
-    n = min(jobs or threads.cores(), len(items))
-    if n <= 1:
-        return [outcome.result() for outcome in in_turn(work, None, items)]
-    with Workers(n) as workers:
-        for outcome in workers.results(work, items):
-            found[outcome.index] = outcome.result()
+    """Return what comes of every item, in their order; ``jobs`` processes, default as many as cores."""
+    n = checked(jobs) or threads.cores()
+    found = {outcome.index: outcome.result() for outcome in outcomes(work, None, items, n)}
     return [found[index] for index in range(len(items))]
+
+
+def leave(code: int) -> NoReturn:
+    """End this process at once, whatever it is at; those that work for it end by themselves.
+
+    Temporary folders go, which `os._exit` alone would leave behind.
+    """
+    with suppress(Exception):
+        util._run_finalizers()
+    os._exit(code)
 
 
 def prepare() -> None:
@@ -258,11 +295,20 @@ def _serve(link: connection.Connection, common: Any, cores: int) -> None:
                 work, item = pickle.loads(given)
                 done = ("done", work(common, item, lambda *what: send("told", what)))
             except Exception as error:
-                done = ("raised", error)
+                done = ("raised", _sendable(error))
             try:
                 send(*done)
             except (pickle.PicklingError, TypeError, AttributeError) as error:
-                send("raised", RuntimeError(f"{done[1]!r} cannot be sent: {error}"))
+                send("raised", WorkerError(f"{done[1]!r:.200} cannot be sent: {error}"))
+
+
+def _sendable(error: Exception) -> Exception:
+    """Return an error that arrives: as it is where it can be made again, else in words."""
+    try:
+        pickle.loads(pickle.dumps(error))
+    except Exception:
+        return WorkerError(f"{type(error).__name__}: {error}")
+    return error
 
 
 @contextmanager

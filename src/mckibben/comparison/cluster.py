@@ -74,13 +74,21 @@ def outer_backend() -> bool:
     return not isinstance(get_active_backend()[0], LokyBackend)
 
 
+def processes_outside() -> int:
+    """Return how many processes the joblib backend that was chosen outside has."""
+    from joblib.parallel import get_active_backend
+
+    backend, wanted = get_active_backend()
+    return int(backend.effective_n_jobs(wanted or -1))
+
+
 def in_backend(work: Work, common: Any, items: Sequence[Any]) -> Iterator[Outcome]:
     """Yield what comes of every item on the joblib backend that was chosen outside."""
     from joblib import Parallel, delayed
     from joblib.parallel import get_active_backend
 
-    backend, wanted = get_active_backend()
-    workers = int(backend.effective_n_jobs(wanted or -1))
+    backend = get_active_backend()[0]
+    workers = processes_outside()
     way = "generator_unordered" if backend.supports_return_generator else "list"
     pool = Parallel(n_jobs=min(workers, len(items)), return_as=way, max_nbytes=None)
     # what is common is one argument, and the same object: Dask sends it to each worker once

@@ -12,6 +12,8 @@ import shutil
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, fields, is_dataclass, replace
 from functools import cache
+from importlib.metadata import version
+from inspect import getsourcefile
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -126,9 +128,20 @@ def digest(*what: object) -> str:
 
 @cache
 def program() -> str:
-    """Return a digest of the package's own source: another version may find other models."""
+    """Return a digest of the package's own files, and of what it computes with.
+
+    Another version may find other models.
+    """
     home = Path(mckibben.__file__).parent
-    return digest({str(p.relative_to(home)): p.read_bytes() for p in sorted(home.rglob("*.py"))})
+    files = [p for p in sorted(home.rglob("*")) if p.is_file() and "__pycache__" not in p.parts]
+    libraries = {name: version(name) for name in ("numpy", "scipy", "numba")}
+    return digest({str(p.relative_to(home)): p.read_bytes() for p in files}, libraries)
+
+
+def source(plugin: type) -> str:
+    """Return a digest of the file that defines a class, such as an estimator of another package."""
+    path = getsourcefile(plugin)
+    return "" if path is None else digest(Path(path).read_bytes())
 
 
 def _to_json(value: Any) -> Any:
@@ -153,5 +166,5 @@ def _from_json(kind: type[Result], content: Any) -> Result:
         for name, value in content.items()
         if isinstance(value, Mapping) and "format" in value
     }
-    plain: Any = TypeAdapter(kind).validate_python(content | dict.fromkeys(blocks))
-    return replace(plain, **blocks)
+    found: Any = TypeAdapter(kind).validate_python(content | blocks)
+    return found

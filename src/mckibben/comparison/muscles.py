@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar
@@ -15,9 +15,10 @@ from mckibben.blocks.base import Block
 from mckibben.comparison.kept import Kept
 from mckibben.comparison.results import Standing
 from mckibben.errors import DataError, MckibbenError
+from mckibben.estimators.search import whole_searches
 from mckibben.recording import Recording
 from mckibben.threads import cores
-from mckibben.workers import Outcome, Tell, Workers, all_of, in_turn
+from mckibben.workers import Tell, all_of, checked, outcomes
 
 Array = NDArray[np.float64]
 Runs = tuple[Recording, ...]
@@ -161,7 +162,7 @@ def compare_muscles(
         if progress is not None:
             progress(Standing(len(rows), len(items), fitting, best))
 
-    for outcome in _outcomes(data, remaining, min(jobs or cores(), len(remaining)), told):
+    for outcome in outcomes(_try, data, remaining, checked(jobs) or cores(), told):
         name, own = remaining[outcome.index]
         rows[name] = outcome.value or MuscleRow(name, reason=str(outcome.error))
         if outcome.error is None:
@@ -170,16 +171,6 @@ def compare_muscles(
         if found is not None:
             found(ranked())
     return ranked()
-
-
-def _outcomes(
-    data: Data, items: Sequence[Item], n: int, told: Callable[..., None]
-) -> Iterator[Outcome]:
-    if n <= 1:
-        yield from in_turn(_try, data, items, told)
-        return
-    with Workers(n, data) as workers:
-        yield from workers.results(_try, items, told)
 
 
 def _try(data: Data, item: Item, tell: Tell) -> MuscleRow:
@@ -279,7 +270,8 @@ def _try_single(common: None, item: Any, tell: Tell) -> MuscleRow:
     name, model, how, run, test = item
     output = how["output"]
     try:
-        estimator = registry.load("estimators", model)(**how).fit(run)
+        with whole_searches():
+            estimator = registry.load("estimators", model)(**how).fit(run)
     except MckibbenError as error:
         return MuscleRow(name, reason=str(error))
     block: Block = estimator.model_

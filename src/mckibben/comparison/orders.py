@@ -11,10 +11,11 @@ import numpy as np
 
 from mckibben import registry
 from mckibben.comparison.splits import folds, given_split
-from mckibben.comparison.trying import Data, Part, Tried, effort_of, outcomes, processes_for
+from mckibben.comparison.trying import Data, Part, Tried, effort_of, outcomes, processes_for, rms_of
 from mckibben.errors import ModelError
 from mckibben.estimators.base import Estimator
 from mckibben.recording import Recording
+from mckibben.workers import checked
 
 GRIDS: Mapping[str, Mapping[str, tuple[Any, ...]]] = {
     "arx": {"n_poles": (1, 2, 3, 4), "n_zeros": (1, 2, 3)},
@@ -102,7 +103,7 @@ def identify(
     combinations = [dict(zip(grid, values, strict=True)) for values in product(*grid.values())]
     every = tuple(range(len(parts)))
     work = [Part(family, settings | chosen, every, whole=False) for chosen in combinations]
-    n = jobs or processes_for(effort_of(family, data) * len(parts) * len(work))
+    n = checked(jobs) or processes_for(effort_of(family, data) * len(parts) * len(work))
     found = {outcome.index: outcome.result() for outcome in outcomes(data, work, n)}
     tried = [(chosen, *_error(found[place])) for place, chosen in enumerate(combinations)]
     chosen, lowest, reason = min(tried, key=lambda item: item[1])
@@ -115,5 +116,5 @@ def identify(
 def _error(tried: Tried) -> tuple[float, str]:
     """Return the RMSE over all folds, infinite where one failed, and why."""
     reason = tried.invalid or (tried.row and tried.row.reason) or ""
-    rmse = float(np.sqrt(tried.squares / tried.count)) if tried.count and not reason else np.inf
-    return rmse, reason
+    rmse = rms_of([tried])
+    return (np.inf if reason or rmse is None else rmse), reason

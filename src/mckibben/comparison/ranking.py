@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +15,7 @@ from numpy.typing import NDArray
 
 from mckibben import registry
 from mckibben.comparison.bootstrap import BlockBootstrap, interval
-from mckibben.comparison.kept import Kept
+from mckibben.comparison.kept import Kept, source
 from mckibben.comparison.results import Leaderboard, Row, Standing
 from mckibben.comparison.splits import folds, given_split, held_out_tail
 from mckibben.comparison.trying import (
@@ -30,6 +32,7 @@ from mckibben.comparison.trying import (
 from mckibben.errors import ModelError
 from mckibben.recording import Recording
 from mckibben.signals import made_manageable
+from mckibben.workers import checked
 
 Array = NDArray[np.float64]
 Settings = Mapping[str, Mapping[str, Any]]
@@ -141,8 +144,8 @@ def compare(
     except KeyboardInterrupt:
         if not board.rows:
             raise
-    if not board.pending:
-        kept.clear()
+        return replace(board, stopped=True)
+    kept.clear()
     return board
 
 
@@ -175,6 +178,11 @@ class Plan:
     seed: int
     left_out: Mapping[str, str]
     notes: tuple[str, ...]
+
+    @cached_property
+    def sources(self) -> dict[str, str]:
+        """Digests of the files that define the estimators."""
+        return {model: source(registry.load("estimators", model)) for model in self.settings}
 
     def kept(self, folder: str | Path | None) -> Kept:
         """Return where finished models are kept."""
@@ -272,12 +280,11 @@ def ranked(
     watch: Watch | None = None,
 ) -> Generator[Ranking]:
     """Yield the ranking whenever a model is finished, cheap models first; the last one is whole."""
-    if jobs is not None and jobs < 1:
-        raise ModelError(f"jobs is {jobs}. Remedy: give a number of at least 1, or leave it out.")
+    checked(jobs)
     data = plan.data
     finished: dict[str, Tried] = {}
     for model, settings in plan.settings.items():
-        row = kept.get(model, Row, settings)
+        row = kept.get(model, Row, settings, plan.sources[model])
         if row is not None:
             outputs = () if row.block is None else outputs_of(row.block, data)
             finished[model] = Tried(row, outputs)
@@ -314,16 +321,17 @@ def ranked(
     if finished:
         yield current()
     pieces: dict[str, list[Tried]] = {model: [] for model in remaining}
+    wanted = Counter(part.model for part in parts)
     for outcome in outcomes(data, parts, workers, told):
         model = parts[outcome.index].model
         if outcome.error is None:
             pieces[model].append(outcome.value)
         else:
             pieces[model].append(Tried(Row(model, reason=str(outcome.error))))
-        if len(pieces[model]) == sum(part.model == model for part in parts):
+        if len(pieces[model]) == wanted[model]:
             finished[model] = joined(pieces[model])
             if outcome.error is None:
-                kept.put(model, finished[model].row, remaining[model])
+                kept.put(model, finished[model].row, remaining[model], plan.sources[model])
             tell()
             yield current()
 

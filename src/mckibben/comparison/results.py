@@ -138,6 +138,8 @@ class Leaderboard:
         Models that were not finished when this was made.
     notes : tuple of str
         What was done to the recordings before.
+    stopped : bool
+        Whether the work was interrupted, be it after the last model.
     """
 
     input: str
@@ -151,6 +153,7 @@ class Leaderboard:
     left_out: Mapping[str, str] = field(default_factory=dict)
     pending: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
+    stopped: bool = False
 
     @property
     def best(self) -> Row | None:
@@ -205,7 +208,7 @@ class Standing:
         >>> str(Standing(12, 28, ("gpi",), "cpi 0.27 mm"))
         '12 of 28, fitting gpi; best so far cpi 0.27 mm'
         """
-        fitting = f", fitting {', '.join(self.fitting)}" if self.fitting else ""
+        fitting = f", fitting {self.fitting[-1]}" if self.fitting else ""
         best = f"; best so far {self.best}" if self.best else ""
         return f"{self.done} of {self.total}{fitting}{best}"
 

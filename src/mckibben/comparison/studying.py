@@ -99,7 +99,7 @@ def study(
     except KeyboardInterrupt:
         if not so_far.leaderboard.rows:
             raise
-        return so_far
+        return replace(so_far, leaderboard=replace(so_far.leaderboard, stopped=True))
     so_far = replace(so_far, inverse=invert_best(so_far.leaderboard, recordings[0]))
     if found is not None:
         found(so_far)

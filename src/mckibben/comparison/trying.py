@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
@@ -10,19 +11,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mckibben import registry
+from mckibben import registry, workers
 from mckibben.blocks.base import Block
-from mckibben.comparison.cluster import in_backend, outer_backend
+from mckibben.comparison.cluster import in_backend, outer_backend, processes_outside
 from mckibben.comparison.free_run import run_free
 from mckibben.comparison.memory_test import memory_test
 from mckibben.comparison.results import Row
 from mckibben.comparison.splits import Fold, Mask, Split
 from mckibben.errors import MckibbenError
-from mckibben.estimators.search import Progress
+from mckibben.estimators.search import Progress, whole_searches
 from mckibben.metrics import score
 from mckibben.recording import Recording
-from mckibben.threads import cores, one_blas_thread
-from mckibben.workers import Outcome, Workers, in_turn
+from mckibben.threads import cores
+from mckibben.workers import Outcome
 
 Array = NDArray[np.float64]
 
@@ -85,15 +86,17 @@ class Tried:
         Of the leaderboard; None in parts that do not fit the whole.
     outputs : tuple of array
         Free-running output on every training recording, then every test recording.
-    squares, count : float, int
-        Sum and number of squared errors of the cross-validation.
+    squares : tuple of float
+        Sums of squared errors of the cross-validation, one a recording tested on.
+    count : int
+        Samples in them.
     invalid : str or None
         Why a fold could not be fitted.
     """
 
     row: Row | None = None
     outputs: tuple[Array, ...] = ()
-    squares: float = 0.0
+    squares: tuple[float, ...] = ()
     count: int = 0
     invalid: str | None = None
 
@@ -123,7 +126,9 @@ def effort_of(model: str, data: Data) -> float:
 
 
 def processes_for(seconds: float) -> int:
-    """Return how many processes should share so much work."""
+    """Return how many processes should share so much work, here or on the backend chosen outside."""
+    if outer_backend():
+        return processes_outside()
     return cores() if seconds > WORTH_A_PROCESS else 1
 
 
@@ -133,28 +138,30 @@ def outcomes(
     """Yield what comes of every part, as it comes, from so many processes; see `Workers.results`."""
     if outer_backend():
         yield from in_backend(try_part, data, parts)
-    elif n == 1:
-        with one_blas_thread():
-            yield from in_turn(try_part, data, parts, told)
     else:
-        with Workers(min(n, len(parts)), data) as workers:
-            yield from workers.results(try_part, parts, told)
+        yield from workers.outcomes(try_part, data, parts, n, told)
 
 
 def joined(parts: Sequence[Tried]) -> Tried:
-    """Return what came of all parts of a model, as one."""
+    """Return what came of all parts of a model, as one; the same whatever their order is."""
     failed = [tried for tried in parts if tried.row is not None and tried.row.reason is not None]
     if failed:
         return failed[0]
     (whole,) = (tried for tried in parts if tried.row is not None)
     assert whole.row is not None
     invalid = next((tried.invalid for tried in parts if tried.invalid is not None), None)
-    squares, count = (sum(getattr(tried, name) for tried in parts) for name in ("squares", "count"))
     if invalid is not None:
         noted = dict(whole.row.diagnostics) | {"validation_failed": invalid}
         return replace(whole, row=replace(whole.row, diagnostics=noted))
-    validation = float(np.sqrt(squares / count)) if count else None
+    validation = rms_of(parts)
     return replace(whole, row=replace(whole.row, validation_rmse=validation))
+
+
+def rms_of(parts: Sequence[Tried]) -> float | None:
+    """Return the root mean square of the cross-validation, or None where there was none."""
+    count = sum(tried.count for tried in parts)
+    total = math.fsum(square for tried in parts for square in tried.squares)  # in any order
+    return math.sqrt(total / count) if count else None
 
 
 def outputs_of(block: Block, data: Data) -> tuple[Array, ...]:
@@ -188,22 +195,22 @@ def _try(data: Data, part: Part, tell: Callable[..., None]) -> Tried:
     def fitted(
         recordings: Sequence[Recording], rows: Sequence[Mask] | None, progress: Progress | None
     ) -> Any:
-        estimator = estimator_class(**settings).fit(recordings, rows=rows, progress=progress)
-        if estimator.diagnostics_.interrupted:
-            raise KeyboardInterrupt  # a search cut short is no model to be ranked
-        return estimator
+        with whole_searches():
+            return estimator_class(**settings).fit(recordings, rows=rows, progress=progress)
 
-    squares, count, invalid = 0.0, 0, None
+    squares: list[float] = []
+    count, invalid = 0, None
     try:
         for fold in (data.folds[place] for place in part.folds):
             block = fitted(fold.train, fold.train_rows, None).model_
             for recording, rows in zip(fold.test, fold.test_rows, strict=True):
                 errors = (run_free(block, recording, data.output) - recording[data.output])[rows]
-                squares, count = squares + float(errors @ errors), count + errors.size
+                squares.append(float(errors @ errors))
+                count += errors.size
     except MckibbenError as error:  # a part of the data may be too little where all of it is enough
         invalid = str(error)
     if not part.whole:
-        return Tried(squares=squares, count=count, invalid=invalid)
+        return Tried(squares=tuple(squares), count=count, invalid=invalid)
     split = data.split
     started = time.perf_counter()
     estimator = fitted(split.train, None, tell)
@@ -228,7 +235,7 @@ def _try(data: Data, part: Part, tell: Callable[..., None]) -> Tried:
         block=block,
         diagnostics=diagnostics,
     )
-    return Tried(row, outputs, squares, count, invalid)
+    return Tried(row, outputs, tuple(squares), count, invalid)
 
 
 def _step_cost(block: Block, recording: Recording) -> float:

@@ -171,8 +171,10 @@ class Estimator(Parametrised, ABC):
             data = data.with_peaks([run.peak for run in used.runs])
         else:
             block, data = self.identify(data, tracker)
+        tracker.end()
         self.model_ = block
         self.diagnostics_ = self._diagnose(block, data, tracker, started)
+        tracker.end()
         if progress is not None:
             progress(1.0, self.diagnostics_.rmse)
         return self

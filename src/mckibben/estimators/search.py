@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,6 +17,22 @@ Progress = Callable[[float, float], None]
 
 class Interrupted(Exception):  # noqa: N818  # it is no error: the best so far is kept
     """Raised inside a search when the user interrupts it, once there is something to keep."""
+
+
+_whole: ContextVar[bool] = ContextVar("_whole", default=False)
+
+
+@contextmanager
+def whole_searches() -> Iterator[None]:
+    """Let an interrupt end a fit within this context, instead of leaving the best found until then.
+
+    A search cut short is no model to be ranked, or kept as finished.
+    """
+    before = _whole.set(True)
+    try:
+        yield
+    finally:
+        _whole.reset(before)
 
 
 @dataclass
@@ -35,6 +53,17 @@ class Tracker:
     best_cost: float = np.inf
     best: Array | None = None
     interrupted: bool = False
+
+    def end(self) -> None:
+        """Pass an interrupt on where only whole searches are wanted.
+
+        Raises
+        ------
+        KeyboardInterrupt
+            If the search was interrupted.
+        """
+        if self.interrupted and _whole.get():
+            raise KeyboardInterrupt
 
     def saw(self, point: Array, cost: float) -> None:
         """Take note of one evaluation."""

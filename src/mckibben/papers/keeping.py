@@ -10,6 +10,7 @@ import numpy as np
 
 from mckibben.blocks.base import Block
 from mckibben.comparison.kept import Kept
+from mckibben.estimators.search import whole_searches
 from mckibben.files import read, write
 from mckibben.recording import Recording
 from mckibben.rigs import record
@@ -26,9 +27,9 @@ class Fitted:
     block : Block
         The model.
     rmse : float
-        Its free-running error on the data fitted; of several outputs the largest.
+        Its free-running error on the data fitted, in the unit of the output; of several the largest.
     seconds : float
-        That the fit took.
+        That the fit took [s].
     """
 
     __pydantic_config__: ClassVar[dict[str, bool]] = {"arbitrary_types_allowed": True}
@@ -41,10 +42,30 @@ class Fitted:
 def fitted(
     kept: Kept, name: str, estimator: Any, recordings: Recording | Sequence[Recording], **how: Any
 ) -> Fitted:
-    """Return what an estimator finds on recordings, or found before the work was stopped."""
+    """Return what an estimator finds on recordings, or found before the work was stopped.
+
+    Parameters
+    ----------
+    kept : Kept
+        Where fits are kept.
+    name : str
+        Of the model.
+    estimator : Estimator
+        With its settings.
+    recordings : Recording or sequence of Recording
+        To fit.
+    **how
+        What else its ``fit`` takes.
+
+    Raises
+    ------
+    MckibbenError
+        As its ``fit`` does.
+    """
 
     def fit() -> Fitted:
-        estimator.fit(recordings, **how)
+        with whole_searches():
+            estimator.fit(recordings, **how)
         said = estimator.diagnostics_
         return Fitted(estimator.model_, float(np.max(said.rmse)), said.seconds)
 

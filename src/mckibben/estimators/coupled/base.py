@@ -17,6 +17,7 @@ from mckibben.blocks.base import Block
 from mckibben.errors import ModelWarning
 from mckibben.estimators.coupled.data import CoupledData, coupled_data
 from mckibben.estimators.parameters import Parametrised
+from mckibben.estimators.search import whole_searches
 from mckibben.estimators.settings import check_settings
 from mckibben.recording import Recording
 from mckibben.threads import one_blas_thread
@@ -108,7 +109,7 @@ class CoupledEstimator(Parametrised, ABC):
             On settings out of range.
         """
         del y
-        with one_blas_thread():
+        with one_blas_thread(), whole_searches():  # the parts of a model are searched whole
             return self._fit(recordings, validation, progress)
 
     def _fit(

@@ -20,7 +20,7 @@ import pytest
 from mckibben import GPI, Recording, write
 from mckibben.signals import irregular_triangle, triangle
 
-STOPS = int(os.environ.get("MCKIBBEN_STOPS", "3"))
+STOPS = int(os.environ.get("MCKIBBEN_STOPS", "2"))
 
 PROMPT = 2.0
 """Within which a command stops [s]."""
@@ -28,13 +28,13 @@ PROMPT = 2.0
 SLACK = 1.5
 """For a machine that has more to do than this [s]."""
 
-MODELS = "pi,maxwell-slip,kp,mpi,p1,bouc-wen,gpi"
+MODELS = "pi,maxwell-slip,mpi,p1,bouc-wen"
 
 
 @pytest.fixture(scope="module")
 def recordings(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
     folder = tmp_path_factory.mktemp("recordings")
-    time_ = np.arange(0, 60, 0.02)
+    time_ = np.arange(0, 60, 0.05)
     paths = []
     for name, u in (
         ("train", triangle(time_, 4.0, [5.0, 4.2, 3.4, 2.6, 1.8, 1.0])),
@@ -42,7 +42,7 @@ def recordings(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
     ):
         y = GPI.example().simulate(u) + 0.02 * np.random.default_rng(0).standard_normal(u.size)
         paths.append(folder / f"{name}.csv")
-        write(Recording({"pressure": u, "displacement": y}, 0.02), paths[-1])
+        write(Recording({"pressure": u, "displacement": y}, 0.05), paths[-1])
     return paths[0], paths[1]
 
 

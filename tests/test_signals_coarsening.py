@@ -50,6 +50,23 @@ def test_extremes_survive_bins_of_many_turns(
     if inner.size:
         middle = 0.5 * (u.max() + u.min())
         assert np.abs(thin - middle).max() >= np.abs(inner - middle).max() - 1e-12
+    if u[-1] in (u.max(), u.min()):
+        assert np.abs(thin - u[-1]).min() == 0
+
+
+@given(st.integers(900, 1100))
+def test_a_test_that_goes_on_from_training_still_does(cut: int) -> None:
+    whole = run_through([0, 5, 1, 4, 2, 5, 0], 300)
+    train, test = whole.slice(0, cut), whole.slice(cut, len(whole))
+    assert test.continues(train)
+    (a,), (b,), _ = made_manageable([train], [test], "pressure", 150)
+    assert b.continues(a)
+
+
+def test_turns_that_are_lost_are_counted() -> None:
+    fast = run_through([0, 5] * 50, 5)
+    _, _, notes = made_manageable([fast], [], "pressure", 50)
+    assert "turning points lie too close" in notes[-1]
 
 
 def test_memory_is_that_of_all_samples() -> None:
@@ -60,6 +77,7 @@ def test_memory_is_that_of_all_samples() -> None:
     taken = np.arange(0, len(recording), 37)
     turns = reversals(recording["pressure"])[1:-1]
     taken[turns // 37] = turns
+    taken[-1] = len(recording) - 1  # the lowest
     np.testing.assert_allclose(model.simulate(thin["pressure"]), whole[taken], atol=1e-12)
     plain = model.simulate(recording["pressure"][::37])  # control: without the turning points
     assert np.abs(plain - whole[::37]).max() > 1e-3
@@ -69,11 +87,12 @@ def test_recordings_are_thinned_alike_and_short_ones_left_out_with_a_word() -> N
     long, short = run_through([0, 5, 0], 2000), run_through([0, 5, 0], 20).with_meta(name="short")
     train, test, notes = made_manageable([long, short], [long], "pressure", 100)
     assert [len(r) for r in train] == [98]
+    assert "0.41 s apart" in notes[0]
     assert train[0].sample_time == test[0].sample_time
-    assert "one is used" in notes[0]
+    assert "one in 41 is used" in notes[0]
     assert "short" in notes[1]
     assert made_manageable([short], [short], "pressure", 100)[2] == ()
-    with pytest.raises(DataError, match="leaves none"):
+    with pytest.raises(DataError, match="is too few"):
         made_manageable([long], [short], "pressure", 100)
     with pytest.raises(DataError, match="too few to fit"):
         made_manageable([long], [], "pressure", 5)

@@ -15,7 +15,7 @@ from typing import Any
 import pytest
 
 from mckibben.errors import DataError
-from mckibben.workers import WorkerError, Workers, all_of, in_turn
+from mckibben.workers import WorkerError, Workers, all_of, in_turn, prepare
 
 
 def square(common: int, item: int, tell: Any) -> int:
@@ -27,6 +27,17 @@ def square(common: int, item: int, tell: Any) -> int:
     if item > 100:
         time.sleep(60)
     return common + item**2
+
+
+class OddError(Exception):
+    """It can be pickled, but not made again."""
+
+    def __init__(self, a: int, *, b: int) -> None:
+        super().__init__(f"{a} {b}")
+
+
+def raise_odd(common: int, item: int, tell: Any) -> None:
+    raise OddError(item, b=2)
 
 
 def test_everything_comes_back_and_is_told() -> None:
@@ -55,6 +66,10 @@ def test_errors_arrive_whole() -> None:
         (outcome,) = workers.results(square, [-1])
     with pytest.raises(DataError, match=r"channel 'pressure': too small\. Remedy: give more"):
         outcome.result()
+    with Workers(1, 0) as workers:
+        (odd,) = workers.results(raise_odd, [1])
+    with pytest.raises(WorkerError, match="OddError: 1 2"):
+        odd.result()
     error = DataError("odd", remedy="even", file="a.csv", row=3)
     assert str(pickle.loads(pickle.dumps(error))) == str(error)
 
@@ -92,6 +107,30 @@ def test_a_script_without_a_guard_is_not_run_again(tmp_path: Path) -> None:
         env=os.environ | {"PYTHONPATH": str(home)},
     )
     assert done.stdout.split("\n") == ["run", "[1, 4, 9]", ""]
+
+
+@pytest.mark.parametrize("method", ["fork", "spawn"])
+def test_a_daemon_does_the_work_itself(method: Any) -> None:
+    prepare()  # a forked process must not take this one's server for its own
+    context = multiprocessing.get_context(method)
+    ours, theirs = context.Pipe()
+    for daemon in (True, False):
+        process = context.Process(target=in_a_child, args=(theirs,), daemon=daemon)
+        process.start()
+        assert ours.poll(60)
+        assert ours.recv() == [0, 1, 4]
+        process.join()
+    ours.close()
+    theirs.close()
+
+
+def in_a_child(link: Any) -> None:
+    link.send(all_of(square_of, [0, 1, 2], 2))
+
+
+def test_numbers_of_processes_are_checked() -> None:
+    with pytest.raises(DataError, match="jobs is 0"):
+        all_of(square_of, [1], 0)
 
 
 def test_they_end_with_the_process_they_work_for() -> None:

@@ -35,6 +35,8 @@ ONE_THREAD = (
     "VECLIB_MAXIMUM_THREADS",
 )
 
+_starting = threading.Lock()
+
 Tell = Callable[..., None]
 """Called by the work with whatever the caller is to be told."""
 
@@ -152,7 +154,7 @@ class Workers:
                 index = busy[link]
                 try:
                     kind, what = pickle.loads(link.recv_bytes())
-                except (EOFError, ConnectionError):
+                except (EOFError, OSError):
                     kind, what = "raised", self._bury(link)
                     del busy[link]
                     link = self._start() if waiting else link
@@ -211,7 +213,7 @@ def outcomes(
 
     See `Workers.results`.
     """
-    if min(n, len(items)) <= 1:
+    if min(n, len(items)) <= 1 or multiprocessing.current_process().daemon:  # has no children
         with threads.one_blas_thread():
             yield from in_turn(work, common, items, told)
     else:
@@ -232,7 +234,7 @@ def leave(code: int) -> NoReturn:
     Temporary folders go, which `os._exit` alone would leave behind.
     """
     with suppress(Exception):
-        util._run_finalizers()
+        util._run_finalizers()  # type: ignore[attr-defined]  # typeshed lacks it
     os._exit(code)
 
 
@@ -240,6 +242,11 @@ def prepare() -> None:
     """Start loading what processes will need, in the background; call it as early as can be."""
     if context().get_start_method() != "forkserver":
         return
+    with _starting:
+        _prepare()
+
+
+def _prepare() -> None:
     resource_tracker.ensure_running()  # which else unblocks signals
     before = {name: os.environ.get(name) for name in ONE_THREAD}
     os.environ.update(dict.fromkeys(ONE_THREAD, "1"))
@@ -253,6 +260,15 @@ def prepare() -> None:
             os.environ.pop(name, None)
             if value is not None:
                 os.environ[name] = value
+
+
+def _forget_the_server() -> None:
+    """Let a process forked from this one start a server of its own: this one's is not its child."""
+    forkserver._forkserver._forkserver_pid = None  # type: ignore[attr-defined]  # no public way
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_forget_the_server)
 
 
 def context() -> Any:
@@ -314,9 +330,10 @@ def _sendable(error: Exception) -> Exception:
 @contextmanager
 def _without_the_script() -> Iterator[None]:
     """Hide the user's script from processes being started, which else run it again."""
-    script = sys.modules["__main__"]
-    sys.modules["__main__"] = ModuleType("__main__")
-    try:
-        yield
-    finally:
-        sys.modules["__main__"] = script
+    with _starting:
+        script = sys.modules["__main__"]
+        sys.modules["__main__"] = ModuleType("__main__")
+        try:
+            yield
+        finally:
+            sys.modules["__main__"] = script

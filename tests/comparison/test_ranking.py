@@ -3,14 +3,26 @@ from __future__ import annotations
 import json
 import sys
 import types
+import warnings
 from dataclasses import replace
+from itertools import permutations
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from mckibben import GPI, PI, DataError, ModelError, PIEstimator, Recording, compare, registry
+from mckibben import (
+    GPI,
+    PI,
+    DataError,
+    DataWarning,
+    ModelError,
+    PIEstimator,
+    Recording,
+    compare,
+    registry,
+)
 from mckibben.comparison.results import Leaderboard, Standing
 from mckibben.comparison.splits import folds, given_split, held_out_tail
 from mckibben.comparison.trying import Data, errors_on_test, joined, parts_of, try_part
@@ -166,7 +178,24 @@ def test_interrupt_keeps_what_is_finished(train: Recording, test_set: Recording)
     board = compare(train, test_set, models=["mpi", "pi"], n_folds=0, jobs=1, found=impatient)
     assert [row.model for row in board.rows] == ["pi"]
     assert board.pending == ("mpi",)
+    assert board.stopped
     assert board.to_dict()["pending"] == ["mpi"]
+
+
+def test_interrupt_after_the_last_model_loses_nothing(
+    train: Recording, test_set: Recording, tmp_path: Path
+) -> None:
+    def impatient(board: Leaderboard) -> None:
+        if not board.pending:
+            raise KeyboardInterrupt
+
+    how: dict[str, Any] = {"models": "mpi,pi", "n_folds": 0, "jobs": 1, "folder": tmp_path}
+    board = compare(train, test_set, found=impatient, **how)
+    assert board.stopped
+    assert len(board.rows) == 2
+    assert len(list((tmp_path / "unfinished").iterdir())) == 2
+    assert not compare(train, test_set, **how).stopped
+    assert not list(tmp_path.iterdir())
 
 
 def test_interrupt_within_a_fit_leaves_no_half_searched_model(
@@ -226,6 +255,40 @@ def test_going_on_recomputes_nothing_that_was_finished(
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.parametrize(
+    "damaged",
+    [
+        *("", "[]", "3", "null", '"x"', '{"model": "pi"}', "[" * 100_000),
+        '{"model": "mpi", "block": null}',
+    ],
+)
+def test_damaged_files_are_computed_again(
+    train: Recording, test_set: Recording, tmp_path: Path, damaged: str
+) -> None:
+    def impatient(board: Leaderboard) -> None:
+        raise KeyboardInterrupt
+
+    how: dict[str, Any] = {"models": "pi,maxwell-slip", "n_folds": 0, "jobs": 1}
+    compare(train, test_set, folder=tmp_path, found=impatient, **how)
+    (kept,) = (tmp_path / "unfinished").iterdir()
+    kept.write_text(damaged)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DataWarning)
+        board = compare(train, test_set, folder=tmp_path, **how)
+    assert without_times(board) == without_times(compare(train, test_set, **how))
+
+
+def test_what_failed_is_not_kept(train: Recording, test_set: Recording, tmp_path: Path) -> None:
+    def impatient(board: Leaderboard) -> None:
+        raise KeyboardInterrupt
+
+    timeless = replace(train, sample_time=None)
+    how: dict[str, Any] = {"models": "rdpi,pi", "n_folds": 0, "jobs": 1, "folder": tmp_path}
+    board = compare(timeless, replace(test_set, sample_time=None), found=impatient, **how)
+    assert board.rows[0].model == "pi"
+    assert [path.name.split("-")[0] for path in (tmp_path / "unfinished").iterdir()] == ["pi"]
+
+
 def test_what_was_kept_of_other_data_or_settings_is_not_used(
     train: Recording, test_set: Recording, tmp_path: Path
 ) -> None:
@@ -234,16 +297,11 @@ def test_what_was_kept_of_other_data_or_settings_is_not_used(
 
     how: dict[str, Any] = {"models": ["pi", "mpi"], "n_folds": 0, "jobs": 1}
     compare(train, test_set, folder=tmp_path, found=impatient, **how)
-    (kept,) = (tmp_path / "unfinished").iterdir()
     other = {"pi": {"thresholds": (0.0, 0.5)}}
     changed = compare(train, test_set, folder=tmp_path, settings=other, **how)
     assert changed.to_dict() != compare(train, test_set, **how).to_dict()
     assert without_times(changed) == without_times(compare(train, test_set, settings=other, **how))
     compare(train, test_set, folder=tmp_path, found=impatient, **how)
-    kept.write_text(kept.read_text()[:100])
-    assert without_times(compare(train, test_set, folder=tmp_path, **how)) == without_times(
-        compare(train, test_set, **how)
-    )
 
 
 def test_long_recordings_are_thinned_and_that_is_said(
@@ -251,7 +309,7 @@ def test_long_recordings_are_thinned_and_that_is_said(
 ) -> None:
     board = compare(train, test_set, models=["gpi"], n_folds=0, jobs=1, most_samples=400)
     assert board.n_train == 400
-    assert "every 3 one is used" in board.notes[0]
+    assert "one in 3 is used, 0.06 s apart" in board.notes[0]
     whole = compare(train, test_set, models=["gpi"], n_folds=0, jobs=1)
     assert not whole.notes
     thinned, all_samples = board.rows[0].test, whole.rows[0].test
@@ -317,7 +375,13 @@ def test_parts_of_a_model_make_the_same_row(
     )
     parts = parts_of("pi", {"seed": 0}, 3, split)
     assert len(parts) == (3 if split else 1)
-    tried = joined([try_part(data, part, lambda *_: None) for part in parts])
+    pieces = [try_part(data, part, lambda *_: None) for part in parts]
+    tried = joined(pieces)
+    for order in permutations(pieces):  # whichever process was first
+        again = joined(order)
+        assert again.row is not None
+        assert tried.row is not None
+        assert again.row.validation_rmse == tried.row.validation_rmse
     row = tried.row
     assert row is not None
     assert row.test is not None

@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from mckibben.cli.leaderboards import told
 from mckibben.cli.options import (
     MOST_SAMPLES,
     Columns,
@@ -92,9 +93,11 @@ def compare(
                 jobs=jobs,
                 most_samples=samples,
                 folder=folder,
-                progress=lambda standing: tell(standing.done / standing.total, str(standing)),
+                progress=told(tell),
                 found=None if folder is None else lambda board: write_leaderboard(board, folder),
             )
+        if folder is not None:
+            write_leaderboard(board, folder)
         if as_json:
             print_json(board.to_dict())
         else:

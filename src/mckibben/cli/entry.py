@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import os
 import signal
+from contextlib import suppress
 from types import FrameType
 
 
 def run() -> None:
     """Load the commands and run the one that was typed."""
-    before = signal.signal(signal.SIGINT, _leave)
+    before = signal.getsignal(signal.SIGINT)
+    if before is not signal.SIG_IGN:
+        signal.signal(signal.SIGINT, _leave)
     from mckibben.cli.main import run as command
 
     signal.signal(signal.SIGINT, before)
@@ -17,7 +20,8 @@ def run() -> None:
 
 
 def _leave(signum: int, frame: FrameType | None) -> None:
-    os.write(2, b"\nInterrupted before anything was begun.\n")
+    with suppress(OSError):
+        os.write(2, b"\nInterrupted before anything was begun.\n")
     os._exit(130)
 
 

@@ -12,9 +12,6 @@ from typing import Any
 from mckibben.atomic import to_json
 from mckibben.errors import MckibbenError
 
-BAR = 12
-"""Characters of a progress bar: the words beside it fit a terminal of 80 columns."""
-
 
 class InterruptionError(MckibbenError):
     """Work that the user stopped; the text says what was kept."""
@@ -33,7 +30,7 @@ def print_table(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
 
     table = Table(box=None, pad_edge=False, header_style="bold")
     for index, heading in enumerate(headings):
-        table.add_column(heading, justify="left" if index == 0 else "right", overflow="fold")
+        table.add_column(Text(heading), justify="left" if index == 0 else "right", overflow="fold")
     for row in rows:
         table.add_row(*(Text(cell) for cell in row))
     console = Console()
@@ -62,27 +59,28 @@ def progress_bar(what: str, *, plainly: bool = False) -> Iterator[Callable[[floa
     plainly : bool
         Whether to print a line for every step where standard error is no terminal; else nothing.
     """
-    if not sys.stderr.isatty():
+    if sys.stderr is None or not sys.stderr.isatty():
         last = -1.0
 
         def line(share: float, text: str) -> None:
             nonlocal last
-            if plainly and share > last:
+            if plainly and share > last and sys.stderr is not None:
                 print(text, file=sys.stderr, flush=True)
                 last = share
 
         yield line
         return
     from rich.console import Console
-    from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn
+    from rich.progress import Progress, SpinnerColumn, TextColumn
 
-    # no estimate of the time left: what is left takes longest, and the estimate would jump
-    columns = (SpinnerColumn(), BarColumn(BAR), TextColumn("{task.description}", markup=False))
+    # words only: what is left takes longest, so that any estimate of the time left would jump
+    columns = (SpinnerColumn(), TextColumn("{task.description}", markup=False))
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task(what, total=1.0)
+        task = bar.add_task(f"{what} ...", total=None)
 
         def tell(share: float, text: str) -> None:
-            bar.update(task, completed=share, description=f"{what} {text}")
+            del share
+            bar.update(task, description=f"{what} {text}")
 
         yield tell
 

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import os
+import select
 import signal
 import sys
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING
 
 from mckibben.cli.output import InterruptionError
+from mckibben.workers import leave
 
 if TYPE_CHECKING:
     from mckibben.comparison.results import Leaderboard
@@ -20,7 +22,7 @@ if TYPE_CHECKING:
 INTERRUPTED = 130
 """Exit code."""
 
-PATIENCE = 1.9
+PATIENCE = 1.3
 """How long the work may take to stop before the program ends without it [s]."""
 
 
@@ -38,41 +40,67 @@ def stoppable(folder: Path | None) -> Iterator[None]:
     InterruptionError
         When it was stopped; the text says how to go on.
     """
-    if folder is None:
-        kept = "nothing is kept without -o DIR"
-    else:
-        kept = f"what is finished is kept in {folder}; the same command goes on from there"
+    ours = threading.current_thread() is threading.main_thread()
+    if not ours or signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+        yield
+        return
+    what = "nothing is kept without -o DIR" if folder is None else "what is finished is kept"
     stopped = False
 
     def stop(signum: int, frame: FrameType | None) -> None:
         nonlocal stopped
-        if stopped:
-            os._exit(INTERRUPTED)
-        stopped = True
-        os.write(2, f"\nStopping: {kept}.\n".encode())  # safe wherever the signal finds us
-        ending = threading.Timer(PATIENCE, os._exit, (INTERRUPTED,))
-        ending.daemon = True
-        ending.start()
-        raise KeyboardInterrupt
+        first, stopped = not stopped, True
+        if first:
+            raise KeyboardInterrupt
 
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
     before = signal.signal(signal.SIGINT, stop)
+    with _watched(f"\nStopping: {what}.\n"):
+        try:
+            yield
+        except (KeyboardInterrupt, InterruptionError) as error:
+            said = str(error) or _kept(folder)
+            if stopped:  # without the interpreter's farewell, long where much is loaded
+                with suppress(OSError, AttributeError):
+                    print(said, file=sys.stderr)
+                    sys.stdout.flush()
+                    sys.stderr.flush()
+                leave(INTERRUPTED)
+            raise InterruptionError(said) from None
+        finally:
+            signal.signal(signal.SIGINT, before)
+
+
+@contextmanager
+def _watched(message: str) -> Iterator[None]:
+    """Hear of signals in a thread too: the main one hears nothing while it is in compiled code."""
+    heard, told = os.pipe()
+    os.set_blocking(told, False)
+
+    def watch() -> None:
+        if not os.read(heard, 1):
+            return  # all is done
+        with suppress(OSError):
+            os.write(2, message.encode())
+        select.select([heard], [], [], PATIENCE)
+        if os.read(heard, 1) if select.select([heard], [], [], 0)[0] else True:
+            leave(INTERRUPTED)  # a second signal, or it takes too long
+
+    threading.Thread(target=watch, daemon=True).start()
+    before = signal.set_wakeup_fd(told, warn_on_full_buffer=False)
     try:
         yield
-    except (KeyboardInterrupt, InterruptionError) as error:
-        said = str(error) or f"Stopped: {kept}."
-        if (
-            stopped
-        ):  # leave without the interpreter's farewell, which takes long where much is loaded
-            print(said, file=sys.stderr)
-            sys.stdout.flush()
-            sys.stderr.flush()
-            os._exit(INTERRUPTED)
-        raise InterruptionError(said) from None
     finally:
-        signal.signal(signal.SIGINT, before)
+        signal.set_wakeup_fd(before)
+        os.close(told)
+
+
+def _kept(folder: Path | None) -> str:
+    """Return what was kept of work that was stopped, and how to go on."""
+    if folder is None:
+        return "Stopped."
+    if not any((folder / "unfinished").rglob("*.*")):
+        return "Stopped before anything was finished."
+    return f"Stopped; the same command goes on from what is in {folder / 'unfinished'}."
 
 
 def stop_short(board: Leaderboard) -> None:
@@ -83,9 +111,9 @@ def stop_short(board: Leaderboard) -> None:
     InterruptionError
         Saying how far it was.
     """
-    if board.pending:
+    if board.stopped:
         done = len(board.rows)
         raise InterruptionError(
-            f"Stopped after {done} of {done + len(board.pending)} models; pending: "
-            f"{', '.join(board.pending)}."
+            f"Stopped after {done} of {done + len(board.pending)} models; the same command goes on "
+            "from there, where -o names a folder."
         )

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from mckibben.cli.leaderboards import told
 from mckibben.cli.options import (
     MOST_SAMPLES,
     Columns,
@@ -133,11 +134,11 @@ def study(
                 jobs=jobs,
                 most_samples=samples,
                 folder=folder,
-                progress=lambda standing: tell(standing.done / standing.total, str(standing)),
+                progress=told(tell, "inverting and drawing"),
                 found=found,
                 notes=notes,
             )
-        if done.leaderboard.pending:
+        if done.leaderboard.stopped:
             results.take(done, last=True)
         if as_json:
             print_json(_described(done, folder))
@@ -165,7 +166,7 @@ def _conclude(study: Study, folder: Path) -> None:
             f"{figure(high, 4)} {study.leaderboard.unit} on the model itself, largest error "
             f"{study.inverse.error:.1e} of that range."
         )
-    elif not study.leaderboard.pending:
+    elif not study.leaderboard.stopped:
         print("No model here has an inverse.")
     print(
         f"Written: {folder / 'report.html'}, leaderboard.csv, leaderboard.json, models"

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mckibben.atomic import write_json
+from mckibben.cli.leaderboards import told
 from mckibben.cli.options import parse_settings
 from mckibben.cli.output import figure, print_json, print_table, progress_bar
 from mckibben.errors import DataError
@@ -81,7 +82,7 @@ def study_muscles(
             seed=seed,
             jobs=jobs,
             folder=folder,
-            progress=lambda standing: tell(0.8 * standing.done / standing.total, str(standing)),
+            progress=told(lambda share, text: tell(0.8 * share, text)),
             found=results.so_far,
         )
         if load is not None and rows[0].block is not None:
@@ -107,7 +108,10 @@ def study_muscles(
     print()
     for sentence in _summary(rows, best, loops, plant):
         print(sentence)
-    print(f"Written: {folder / 'report.html'}, leaderboard.csv, leaderboard.json, models")
+    print(
+        f"Written: {folder / 'report.html'}, leaderboard.csv, leaderboard.json, models"
+        + ("" if best is None or best.inverse is None else ", inverse.json")
+    )
 
 
 class _Results:

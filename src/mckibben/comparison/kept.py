@@ -9,6 +9,7 @@ from __future__ import annotations
 import hashlib
 import json
 import shutil
+import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, fields, is_dataclass, replace
 from functools import cache
@@ -22,8 +23,9 @@ import numpy as np
 import mckibben
 from mckibben.atomic import write_text
 from mckibben.blocks.base import Block
-from mckibben.blocks.saving import from_dict, to_dict
-from mckibben.errors import MckibbenError
+from mckibben.blocks.saving import LARGEST_FILE, from_dict, to_dict
+from mckibben.errors import DataWarning, MckibbenError
+from mckibben.recording import PROVENANCE, Recording
 
 Result = TypeVar("Result")
 
@@ -58,17 +60,25 @@ class Kept:
         depends : object
             What this part depends on beside what everything does.
         """
+        path = self._path(name, depends)
+        if path is None or not path.is_file() or path.stat().st_size > LARGEST_FILE:
+            return None
         try:
-            content = json.loads(self._path(name, depends).read_text(encoding="utf-8"))
-            return _from_json(kind, content)
-        except (OSError, ValueError, TypeError, KeyError, MckibbenError):
-            return None  # absent or damaged: it is computed again
+            return _from_json(kind, json.loads(path.read_text(encoding="utf-8")))
+        except Exception as error:  # whatever is wrong with it, it can be computed again
+            _warn(path, error)
+            return None
 
     def put(self, name: str, result: object, *depends: object) -> None:
-        """Keep a part."""
-        if self._folder is not None:
-            self._folder.mkdir(parents=True, exist_ok=True)
-            write_text(self._path(name, depends), json.dumps(_to_json(result)) + "\n")
+        """Keep a part; where that fails, the work goes on without."""
+        path = self._path(name, depends)
+        if path is not None:
+            text = json.dumps(_to_json(result)) + "\n"
+            try:
+                path.parent.mkdir(parents=True, exist_ok=True)
+                write_text(path, text)
+            except (OSError, MckibbenError) as error:
+                _warn(path, error)
 
     def once(
         self, name: str, kind: type[Result], compute: Callable[[], Result], *depends: object
@@ -86,21 +96,25 @@ class Kept:
 
     def file(self, name: str, ending: str, *depends: object) -> Path | None:
         """Return where a part is to be kept that is no JSON, or None to keep nothing."""
-        if self._folder is None:
-            return None
-        self._folder.mkdir(parents=True, exist_ok=True)
-        return self._path(name, depends, ending)
+        path = self._path(name, depends, ending)
+        if path is not None:
+            path.parent.mkdir(parents=True, exist_ok=True)
+        return path
 
     def clear(self) -> None:
         """Forget everything: all is done."""
         if self._folder is not None:
             shutil.rmtree(self._folder, ignore_errors=True)
 
-    def _path(self, name: str, depends: object, ending: str = ".json") -> Path:
+    def _path(self, name: str, depends: object, ending: str = ".json") -> Path | None:
         if self._folder is None:
-            return Path()
+            return None
         plain = "".join(c if c.isalnum() or c in "-." else "-" for c in name)
         return self._folder / f"{plain}-{digest(self._digest, depends)[:16]}{ending}"
+
+
+def _warn(path: Path, error: Exception) -> None:
+    warnings.warn(f"{path} is not used: {error}", DataWarning, stacklevel=4)
 
 
 def digest(*what: object) -> str:
@@ -111,7 +125,11 @@ def digest(*what: object) -> str:
         if isinstance(value, np.ndarray):
             hashed.update(f"{value.dtype}{value.shape}".encode())
             hashed.update(np.ascontiguousarray(value).tobytes())
+        elif isinstance(value, Recording):  # wherever it was read from
+            known = {key: what for key, what in value.meta.items() if key not in PROVENANCE}
+            take((dict(value.channels), value.sample_time, value.start_time, value.units, known))
         elif is_dataclass(value) and not isinstance(value, type):
+            hashed.update(type(value).__qualname__.encode())
             take({f.name: getattr(value, f.name) for f in fields(value) if f.compare})
         elif isinstance(value, Mapping):
             take([(str(key), value[key]) for key in sorted(value, key=str)])

@@ -145,7 +145,12 @@ def compare_muscles(
     ]
     data = (tuple(train), tuple(test), tuple(validation))
     kept = Kept(folder, data)
-    rows = {name: row for name, s in items if (row := kept.get(name, MuscleRow, s)) is not None}
+    found_before = {name: kept.get(name, MuscleRow, own) for name, own in items}
+    rows = {
+        name: row
+        for name, row in found_before.items()
+        if row is not None and row.model == name and row.block is not None
+    }
     remaining = [item for item in items if item[0] not in rows]
     begun: list[str] = []
 
@@ -162,10 +167,12 @@ def compare_muscles(
         if progress is not None:
             progress(Standing(len(rows), len(items), fitting, best))
 
+    if rows:
+        tell()
     for outcome in outcomes(_try, data, remaining, checked(jobs) or cores(), told):
         name, own = remaining[outcome.index]
         rows[name] = outcome.value or MuscleRow(name, reason=str(outcome.error))
-        if outcome.error is None:
+        if rows[name].block is not None:
             kept.put(name, rows[name], own)
         tell()
         if found is not None:

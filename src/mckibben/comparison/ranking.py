@@ -84,9 +84,9 @@ def compare(
         training recordings, which is then left out of training.
     input, output : str
         Channels.
-    models : "all", "quick" or sequence of str
-        Short names; "all" leaves out models that are made for other channels, "quick" is a choice that
-        takes seconds.
+    models : "all", "quick", str or sequence of str
+        Short names, in a text with commas between; "all" leaves out models that are made for other
+        channels, "quick" is a choice that takes seconds.
     settings : mapping of str to mapping, optional
         Model name to settings of its estimator.
     n_folds : int
@@ -285,9 +285,9 @@ def ranked(
     finished: dict[str, Tried] = {}
     for model, settings in plan.settings.items():
         row = kept.get(model, Row, settings, plan.sources[model])
-        if row is not None:
-            outputs = () if row.block is None else outputs_of(row.block, data)
-            finished[model] = Tried(row, outputs)
+        if row is not None and row.model == model and row.sound:
+            assert row.block is not None
+            finished[model] = Tried(row, outputs_of(row.block, data))
     remaining = {m: s for m, s in plan.settings.items() if m not in finished}
     efforts = {m: effort_of(m, data) * (1 + len(data.folds)) for m in remaining}
     workers = jobs or processes_for(sum(efforts.values()))
@@ -319,6 +319,7 @@ def ranked(
             watch(model, *what)
 
     if finished:
+        tell()
         yield current()
     pieces: dict[str, list[Tried]] = {model: [] for model in remaining}
     wanted = Counter(part.model for part in parts)
@@ -330,8 +331,9 @@ def ranked(
             pieces[model].append(Tried(Row(model, reason=str(outcome.error))))
         if len(pieces[model]) == wanted[model]:
             finished[model] = joined(pieces[model])
-            if outcome.error is None:
-                kept.put(model, finished[model].row, remaining[model], plan.sources[model])
+            row = finished[model].row
+            if row is not None and row.sound:  # a failure may be the machine's, not the model's
+                kept.put(model, row, remaining[model], plan.sources[model])
             tell()
             yield current()
 
@@ -370,7 +372,8 @@ def _chosen(
 ) -> tuple[tuple[str, ...], dict[str, str]]:
     """Return the models to try, and why others of "all" have no place on these recordings."""
     if models not in ("all", "quick"):
-        return tuple(dict.fromkeys(models)), {}
+        named = models.split(",") if isinstance(models, str) else models
+        return tuple(dict.fromkeys(name.strip() for name in named)), {}
     names = registry.names("estimators") if models == "all" else QUICK
     objections = {
         name: registry.load("estimators", name).objection(recordings, input, output)

@@ -88,8 +88,19 @@ class Row:
     rmse_interval: tuple[float, float] | None = None
     difference_interval: tuple[float, float] | None = None
     memory: Memory | None = None
-    block: Block | None = None
-    diagnostics: Mapping[str, Any] = field(default_factory=dict)
+    block: Block | None = field(default=None, repr=False)
+    diagnostics: Mapping[str, Any] = field(default_factory=dict, repr=False)
+
+    @property
+    def sound(self) -> bool:
+        """Whether there is a model with finite scores."""
+        return (
+            self.reason is None
+            and self.block is not None
+            and self.train is not None
+            and self.test is not None
+            and bool(np.isfinite([self.train.rmse, self.test.rmse]).all())
+        )
 
     def to_dict(self) -> dict[str, Any]:
         """Return the row as the leaderboard files hold it."""
@@ -267,7 +278,7 @@ class Study:
     test: tuple[Recording, ...]
     characterization: Characterization
     leaderboard: Leaderboard
-    predictions: Mapping[str, tuple[Array, ...]]
+    predictions: Mapping[str, tuple[Array, ...]] = field(repr=False)
     inverse: InverseCheck | None
     notes: tuple[str, ...] = ()
 

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
 
 from mckibben.blocks.base import Block
 from mckibben.comparison.kept import Kept
+from mckibben.errors import MckibbenError
 from mckibben.estimators.search import whole_searches
 from mckibben.files import read, write
 from mckibben.recording import Recording
@@ -83,15 +85,22 @@ def recorded(
     """Yield runs of a protocol on its rig, in their order, those recorded before read from disk."""
     plan = protocol(name)
     files = {run: kept.file(run, ".parquet", name, seed) for run in runs}
-    missing = [run for run, file in files.items() if file is None or not file.exists()]
-    fresh = record(plan, runs=missing, seed=seed)
+    there = {run: _read(file) for run, file in files.items()}
+    fresh = record(plan, runs=[run for run in runs if there[run] is None], seed=seed)
     for done, run in enumerate(runs, start=1):
-        file = files[run]
-        if file is None:
+        recording, file = there[run], files[run]
+        if recording is None:
             _, recording = next(fresh)
-        else:
-            if run in missing:
-                write(next(fresh)[1], file)
-            (recording,) = read(file, informative=False)  # the same whether it was there or not
+            if file is not None:
+                write(recording, file)
         tell(done / len(runs), f"recorded {run}")
         yield plan[run], recording
+
+
+def _read(file: Path | None) -> Recording | None:
+    """Return the recording in a file, or None if it is absent or damaged."""
+    try:
+        (recording,) = read(file, informative=False) if file is not None else (None,)
+    except MckibbenError:
+        return None
+    return recording

@@ -6,6 +6,7 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from mckibben import registry
 from mckibben.atomic import write_json, write_text
 from mckibben.report.page import write_report
 
@@ -35,7 +36,9 @@ class StudyFolder:
         self._folder = folder
         self._saved: set[str] = set()
         self._next_page = 0.0
-        (folder / "inverse.json").unlink(missing_ok=True)  # of an earlier study
+        for name in registry.names("estimators"):  # of an earlier study
+            (folder / "models" / f"{name}.json").unlink(missing_ok=True)
+        (folder / "inverse.json").unlink(missing_ok=True)
 
     def take(self, study: Study, *, last: bool = False) -> None:
         """Write what is new; the page only when it is due, or the last."""

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mckibben.errors import DataError
 from mckibben.recording import Recording
@@ -20,7 +21,8 @@ def coarsened(recording: Recording, factor: int, channel: str) -> Recording:
 
     Of every bin the sample at which the channel turns is taken, else the first: levels at turning
     points, on which memory depends, stay as they are, while times are off by less than a bin. Of
-    several turns within one bin the outermost is taken; the first sample stays the first.
+    several turns within one bin the outermost is taken; the first sample stays the first, and the last
+    one is taken if it is the highest or lowest.
 
     Parameters
     ----------
@@ -53,6 +55,7 @@ def coarsened(recording: Recording, factor: int, channel: str) -> Recording:
         )
     u = recording[channel]
     turns = reversals(u)[1:-1]
+    turns = np.append(turns, u.size - 1) if _beyond(u) else turns
     turns = turns[np.argsort(np.abs(u[turns] - 0.5 * (u.max() + u.min())), kind="stable")]
     taken = starts.copy()
     taken[np.maximum(turns // factor, 1)] = turns  # of several the last one stays, the outermost
@@ -62,6 +65,11 @@ def coarsened(recording: Recording, factor: int, channel: str) -> Recording:
         channels={name: recording[name][taken] for name in recording.channels},
         sample_time=None if step is None else step * factor,
     )
+
+
+def _beyond(u: NDArray[np.float64]) -> bool:
+    """Tell whether the last sample is the highest or the lowest."""
+    return bool(u[-1] >= u.max() or u[-1] <= u.min())
 
 
 def made_manageable(
@@ -95,21 +103,40 @@ def made_manageable(
     factor = -(-total // most)
     if factor == 1:
         return list(train), list(test), ()
-    notes = [
-        f"{total} samples are many: of every {factor} one is used, the turning points of {channel} "
-        f"among them, which is {most} at most."
-    ]
-    parts = []
-    for recordings in (train, test):
+    step = train[0].sample_time
+    grid = "" if step is None else f", {step * factor:g} s apart: models hold for that sample time"
+    notes = [f"{total} samples are many: one in {factor} is used{grid}, turning points first."]
+    aligned = [_continuing(recording, train, factor) for recording in test]
+    parts, lost = [], 0
+    for recordings in (list(train), aligned):
         long = [r for r in recordings if len(r) >= FEWEST * factor]
         parts.append([coarsened(recording, factor, channel) for recording in long])
+        lost += sum(_lost(recording[channel], factor) for recording in long)
         left_out = [r.name for r in recordings if len(r) < FEWEST * factor]
         if left_out:
             notes.append(f"Too short beside the others, so left out: {', '.join(left_out)}.")
         if recordings and not long:
             raise DataError(
-                f"one sample in {factor} leaves none of these recordings",
+                f"these recordings have {max(map(len, recordings))} samples at most, of which one in "
+                f"{factor} is too few",
                 file=recordings[0].source,
-                remedy="allow more samples, or leave out the long recordings",
+                remedy="allow more samples with --samples, or give fewer recordings",
             )
+    if lost:
+        notes.append(
+            f"{lost} turning points lie too close to others and are lost: allow more samples."
+        )
     return parts[0], parts[1], tuple(notes)
+
+
+def _continuing(recording: Recording, others: Sequence[Recording], factor: int) -> Recording:
+    """Return a recording that continues another one without what their common bin has of it."""
+    before = next((other for other in others if recording.continues(other)), None)
+    skipped = 0 if before is None else -len(before) % factor
+    return recording.slice(skipped, len(recording)) if skipped + 2 <= len(recording) else recording
+
+
+def _lost(u: NDArray[np.float64], factor: int) -> int:
+    """Return how many turning points share a bin with another one."""
+    turns = reversals(u)[1:-1]
+    return int(turns.size - np.unique(np.maximum(turns // factor, 1)).size)

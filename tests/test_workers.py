@@ -82,12 +82,13 @@ def test_a_process_that_dies_takes_its_own_work_only() -> None:
 
 
 def test_leaving_ends_them_at_once() -> None:
+    before = set(multiprocessing.active_children())  # joblib's, of other tests
     with Workers(2, 0) as workers:
         results = workers.results(square, [2, 200, 300])
         assert next(results).value == 4
         started = time.monotonic()
     assert time.monotonic() - started < 2
-    assert not multiprocessing.active_children()
+    assert set(multiprocessing.active_children()) <= before
 
 
 def test_a_script_without_a_guard_is_not_run_again(tmp_path: Path) -> None:

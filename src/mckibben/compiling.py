@@ -38,7 +38,13 @@ class Deferred:
 
             with _lock:  # one of them, however many threads ask
                 if self._dispatcher is None:
-                    self._dispatcher = numba.njit(**self.targetoptions)(self.py_func)
+                    try:
+                        self._dispatcher = numba.njit(**self.targetoptions)(self.py_func)
+                    except (
+                        RuntimeError
+                    ):  # nowhere to keep what is compiled: it is compiled each time
+                        uncached = self.targetoptions | {"cache": False}
+                        self._dispatcher = numba.njit(**uncached)(self.py_func)
         return self._dispatcher
 
     @property

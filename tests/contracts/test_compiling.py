@@ -10,6 +10,7 @@ from pathlib import Path
 from threading import Barrier
 
 import cloudpickle
+import numba
 import numpy as np
 import pytest
 
@@ -122,3 +123,17 @@ def test_kernels_travel_to_other_processes() -> None:
     for _ in range(2):  # before it is compiled, and after
         assert cloudpickle.loads(cloudpickle.dumps(kernel))(3.0) == 6.0
         np.testing.assert_equal(kernel(3.0), 6.0)
+
+
+def test_without_a_place_for_caches_kernels_are_compiled_all_the_same(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    from numba.core import caching
+
+    def plain(x: float) -> float:
+        return 2.0 * x
+
+    monkeypatch.setattr(caching.CompileResultCacheImpl, "_locator_classes", [])
+    with pytest.raises(RuntimeError, match="no locator"):
+        numba.njit(cache=True)(plain)
+    assert deferred(plain)(3.0) == 6.0

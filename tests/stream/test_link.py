@@ -17,6 +17,9 @@ from mckibben import DataError
 from mckibben.stream import UDPLink
 from mckibben.stream.link import packed, unpacked
 
+LATE = 5000.0
+"""Lateness of a step that has no part in the law [us]."""
+
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
 
@@ -104,10 +107,11 @@ def test_bad_settings_name_a_remedy() -> None:
 
 
 def test_a_controller_follows_a_robot_in_another_process() -> None:
-    """Deadlines cannot be kept while other work has all cores: there are three tries."""
     command = [sys.executable, str(EXAMPLES / "robot_loop.py"), "--duration", "4"]
-    errors: list[float] = []
-    while not errors or (errors[-1] >= 1.0 and len(errors) < 3):
+    for _ in range(3):  # again only where other work kept it from its deadlines
         said = subprocess.run(command, capture_output=True, text=True, check=True).stdout
-        errors.append(float(said.split("within ")[1].split(" mm")[0]))
-    assert errors[-1] < 1.0
+        missed = int(said.split(" deadlines missed")[0].split()[-1])
+        latest = float(said.split("at most ")[1].split(" us")[0])
+        if missed == 0 and latest < LATE:
+            break
+    assert float(said.split("within ")[1].split(" mm")[0]) < 1.0

@@ -67,6 +67,7 @@ def study_muscles(
         folder, f"fitted to {len(train)} runs, tested on {len(tests)}: {split}", tests
     )
     results.command = f"mckibben study FILES{'' if load is None else f' --load {load}'} -o {folder}"
+    results.so_far([])
     plant = rig or _rig_of(recordings)
     loops: dict[str, Tracked] = {}
     with progress_bar("studying", plainly=True) as tell:
@@ -139,13 +140,14 @@ class _Results:
         from mckibben.papers.reproduction import Reproduction
         from mckibben.report import write_reproduction
 
-        _write(rows, self._folder)
-        summary = _summary(rows, best, loops, plant) if whole else ["More models are being fitted."]
+        if rows:
+            _write(rows, self._folder)
+        summary = _summary(rows, best, loops, plant) if whole else ["Models are being fitted."]
         found = Reproduction(
             name="study",
             title="Several muscles: models, inverses and loops",
             summary=tuple(summary),
-            tables=_tables(rows, loops),
+            tables=_tables(rows, loops) if rows else (),
             figures=_figures(rows, self._tests, loops),
             notes=(
                 f"{self._split[0].upper()}{self._split[1:]}.",
@@ -324,12 +326,10 @@ def _figures(
     from mckibben.papers.reproduction import Figure, thinned
 
     shown = [row for row in rows if row.block is not None][:3]
-    if not shown:
-        return ()
     run = tests[0]
     modelled = {row.model: row.block.simulate(run) for row in shown if row.block is not None}
     figures = []
-    for name in shown[0].test:
+    for name in shown[0].test if shown else _displacements(run):
         curves = {"measured": (thinned(run.time), thinned(run[name]))}
         curves |= {k: (thinned(run.time), thinned(v[name])) for k, v in modelled.items()}
         figures.append(Figure(f"{run.name}: {name}", "time [s]", "displacement [mm]", curves))
@@ -343,6 +343,10 @@ def _figures(
                 curves[controller] = (thinned(found.recording.time), thinned(y))
             figures.append(Figure(f"Loop: {name}", "time [s]", "displacement [mm]", curves))
     return tuple(figures)
+
+
+def _displacements(run: Recording) -> list[str]:
+    return [name for name in run.channels if name.startswith("displacement")]
 
 
 def is_of_muscles(recordings: Sequence[Recording]) -> bool:

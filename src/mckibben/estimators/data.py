@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +14,7 @@ from mckibben.recording import Recording
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
+Made = TypeVar("Made")
 
 FEWEST_SAMPLES = 10
 """Fewer samples than this identify nothing."""
@@ -81,12 +83,24 @@ class TrainingData:
     scheduling: tuple[str, ...] = ()
     scheduling_units: tuple[str, ...] = ()
     _memo: dict[Hashable, Array] = field(default_factory=dict, init=False, repr=False)
+    _latest: dict[Hashable, tuple[Array, Any]] = field(default_factory=dict, init=False, repr=False)
 
     def once(self, key: Hashable, compute: Callable[[], Array]) -> Array:
         """Return what ``compute`` gives, computed at the first call with this key only."""
         if key not in self._memo:
             self._memo[key] = compute()
         return self._memo[key]
+
+    def latest(self, key: Hashable, theta: Array, compute: Callable[[], Made]) -> Made:
+        """Return what ``compute`` gives, anew only where ``theta`` is not that of the last call.
+
+        For what all runs share at a point of a search.
+        """
+        known = self._latest.get(key)
+        if known is None or not np.array_equal(known[0], theta):
+            known = self._latest[key] = (theta.copy(), compute())
+        found: Made = known[1]
+        return found
 
     @property
     def input_range(self) -> tuple[float, float]:

@@ -75,9 +75,13 @@ class GPIEstimator(SeparableEstimator):
 
     def envelopes(self, theta: Array, data: TrainingData) -> tuple[Envelope, Envelope]:
         """Return both envelopes, in order over the whole input range."""
-        rising, falling = self.shape.envelopes(theta[:-1], data.input_range)
-        gap, _ = smallest_gap(rising, falling, data.input_range)
-        return rising, falling.shifted(float(theta[-1]) - gap + 1e-9)
+
+        def made() -> tuple[Envelope, Envelope]:
+            rising, falling = self.shape.envelopes(theta[:-1], data.input_range)
+            gap, _ = smallest_gap(rising, falling, data.input_range)
+            return rising, falling.shifted(float(theta[-1]) - gap + 1e-9)
+
+        return data.latest("envelopes", theta, made)
 
     def radii(self, rising: Envelope, falling: Envelope, data: TrainingData) -> Array:
         """Return the thresholds, shape (N + 1,)."""

@@ -12,6 +12,7 @@ corner of the delayed input by matrix exponentials.
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Annotated, ClassVar, Literal, Self
 
 import numpy as np
@@ -189,6 +190,10 @@ class ProcessModel(SingleChannel, NamedParameters, Primitive):
         ModelError
             Without a sample time, or where the delay is more than 254 samples.
         """
+        return _discretised(self, sample_time).copy()
+
+    def discretised(self, sample_time: float | None) -> Array:
+        """Return the same, computed; see `coefficients`."""
         step = needs_sample_time(self.kind, sample_time)
         samples = self.delay / step
         m = int(np.floor(samples + 1e-9))
@@ -240,6 +245,11 @@ class ProcessModel(SingleChannel, NamedParameters, Primitive):
     def example(cls) -> Self:
         """Return the P2UZ model that the paper prints."""
         return cls(6.7987, (5.7018,), 9.1096, 156.3105, 0.0, 1.0)
+
+
+@lru_cache(maxsize=8)
+def _discretised(model: ProcessModel, sample_time: float | None) -> Array:
+    return model.discretised(sample_time)  # once for many runs of one model
 
 
 def held(a: Array, b: Array, step: float) -> tuple[Array, Array, Array]:

@@ -100,13 +100,18 @@ class ProcessModelEstimator(SeparableEstimator):
             **self.channels(data),
         )
 
+    def _units(self, theta: Array, data: TrainingData) -> tuple[ProcessModel, ProcessModel]:
+        """Return the model without zero, and with one."""
+        unit = self.unit(theta, data)
+        return unit, replace(unit, zero_time=1.0)
+
     def basis(self, theta: Array, run: Run, data: TrainingData) -> Array:
         """Return the response to the input, and, with a zero, to its derivative."""
-        unit = self.unit(theta, data)
+        unit, with_zero = data.latest("units", theta, lambda: self._units(theta, data))
         step = run.sample_time
         columns = [unit.simulate(run.history, sample_time=step)]
         if "Z" in self.structure:
-            whole = replace(unit, zero_time=1.0).simulate(run.history, sample_time=step)
+            whole = with_zero.simulate(run.history, sample_time=step)
             columns.append(whole - columns[0])
         return np.column_stack(columns)
 

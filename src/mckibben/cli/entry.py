@@ -16,7 +16,10 @@ def run() -> None:
     from mckibben.cli.main import run as command
 
     signal.signal(signal.SIGINT, before)
-    command()
+    try:
+        command()
+    finally:  # all is done: there is nothing left to interrupt
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 def _leave(signum: int, frame: FrameType | None) -> None:

@@ -63,10 +63,12 @@ def reproduce(
             found: Reproduction = outcome.result()
         if folder is not None:
             from mckibben.atomic import write_json
+            from mckibben.comparison.kept import Kept
             from mckibben.report import write_reproduction
 
             write_reproduction(found, folder / "report.html")
             write_json(folder / "tables.json", found.to_dict())
+            Kept(folder).clear()
         if as_json:
             print_json(found.to_dict())
             return
@@ -79,7 +81,7 @@ def _again(common: None, given: dict[str, Any], tell: Callable[..., None]) -> Re
     """Run a paper again in a worker's process."""
     from mckibben.papers import reproduce as run
 
-    return run(**given, progress=tell)
+    return run(**given, clear=False, progress=tell)
 
 
 def _once_a_word(tell: Callable[[float, str], None]) -> Callable[..., None]:

@@ -118,6 +118,7 @@ def reproduce(
     seed: int = 0,
     jobs: int | None = None,
     folder: str | Path | None = None,
+    clear: bool = True,
     progress: Progress | None = None,
     **own: Any,
 ) -> Reproduction:
@@ -136,6 +137,9 @@ def reproduce(
     folder : path, optional
         Where recordings and models are kept until all is done, so that a re-run that was stopped and
         is called again goes on from there.
+    clear : bool
+        Whether to forget what was kept when all is done; else the caller does, once it has written
+        what is returned, by ``Kept(folder).clear()``.
     progress : callable, optional
         Told the share of the work done, and what is next.
     **own
@@ -157,7 +161,8 @@ def reproduce(
             kept=kept,
             **own,
         )
-    kept.clear()
+    if clear:
+        kept.clear()
     return found
 
 

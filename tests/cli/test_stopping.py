@@ -107,8 +107,8 @@ def test_a_stopped_comparison_keeps_what_is_finished_and_goes_on(
             check_stopped(code, said, took)
             assert not list(folder.rglob("*.part"))
             announced = on_board(folder)
-            names = {path.name.split("-")[0] for path in kept(folder)}
-            assert {model.split("-")[0] for model in announced} <= names
+            names = {path.name.rsplit("-", 1)[0] for path in kept(folder)}
+            assert set(announced) <= names
             process = begin(*words, "-o", folder)
             process.communicate()
             assert process.returncode == 0

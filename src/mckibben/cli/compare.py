@@ -33,7 +33,7 @@ from mckibben.cli.options import (
     settings_of_all,
 )
 from mckibben.cli.output import make_folder, print_json, progress_bar
-from mckibben.cli.stopping import stop_short, stoppable
+from mckibben.cli.stopping import forget_kept, stop_short, stoppable
 
 
 def compare(
@@ -93,6 +93,7 @@ def compare(
                 jobs=jobs,
                 most_samples=samples,
                 folder=folder,
+                clear=False,
                 progress=told(tell),
                 found=None if folder is None else lambda board: write_leaderboard(board, folder),
             )
@@ -105,3 +106,4 @@ def compare(
             if folder is not None:
                 print(f"Written: {folder / 'leaderboard.json'}, {folder / 'leaderboard.csv'}")
         stop_short(board)
+        forget_kept(folder)

@@ -10,7 +10,7 @@ import typer
 
 from mckibben.cli.options import Gaps, Jobs, Json, Reading, Seed
 from mckibben.cli.output import figure, make_folder, print_json, print_table, progress_bar
-from mckibben.cli.stopping import stoppable
+from mckibben.cli.stopping import forget_kept, stoppable
 from mckibben.errors import DataError
 
 if TYPE_CHECKING:
@@ -63,18 +63,17 @@ def reproduce(
             found: Reproduction = outcome.result()
         if folder is not None:
             from mckibben.atomic import write_json
-            from mckibben.comparison.kept import Kept
             from mckibben.report import write_reproduction
 
             write_reproduction(found, folder / "report.html")
             write_json(folder / "tables.json", found.to_dict())
-            Kept(folder).clear()
         if as_json:
             print_json(found.to_dict())
-            return
-        _print(found)
-        if folder is not None:
-            print(f"Written: {folder / 'report.html'}, {folder / 'tables.json'}")
+        else:
+            _print(found)
+            if folder is not None:
+                print(f"Written: {folder / 'report.html'}, {folder / 'tables.json'}")
+        forget_kept(folder)
 
 
 def _again(common: None, given: dict[str, Any], tell: Callable[..., None]) -> Reproduction:

@@ -103,6 +103,15 @@ def _kept(folder: Path | None) -> str:
     return f"Stopped; the same command goes on from what is in {folder / 'unfinished'}."
 
 
+def forget_kept(folder: Path | None) -> None:
+    """Forget what was kept, now that everything is written; nothing interrupts that any more."""
+    from mckibben.comparison.kept import Kept
+
+    if threading.current_thread() is threading.main_thread():
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+    Kept(folder).clear()
+
+
 def stop_short(board: Leaderboard) -> None:
     """Leave if a comparison was stopped before it was done.
 

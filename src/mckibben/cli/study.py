@@ -34,7 +34,7 @@ from mckibben.cli.options import (
     settings_of_all,
 )
 from mckibben.cli.output import figure, make_folder, print_json, progress_bar
-from mckibben.cli.stopping import stop_short, stoppable
+from mckibben.cli.stopping import forget_kept, stop_short, stoppable
 from mckibben.errors import DataError, DataWarning
 
 if TYPE_CHECKING:
@@ -134,6 +134,7 @@ def study(
                 jobs=jobs,
                 most_samples=samples,
                 folder=folder,
+                clear=False,
                 progress=told(tell, "inverting and drawing"),
                 found=found,
                 notes=notes,
@@ -145,6 +146,7 @@ def study(
         else:
             _conclude(done, folder)
         stop_short(done.leaderboard)
+        forget_kept(folder)
 
 
 def _say(study: Study, folder: Path) -> None:

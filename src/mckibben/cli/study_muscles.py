@@ -14,6 +14,7 @@ from mckibben.atomic import write_json
 from mckibben.cli.leaderboards import told
 from mckibben.cli.options import parse_settings
 from mckibben.cli.output import figure, print_json, print_table, progress_bar
+from mckibben.cli.stopping import forget_kept
 from mckibben.errors import DataError
 
 if TYPE_CHECKING:
@@ -44,7 +45,6 @@ def study_muscles(
 ) -> None:
     """Rank models of several muscles, invert the best that can be, track on the rig, and report."""
     from mckibben import registry
-    from mckibben.comparison.kept import Kept
     from mckibben.comparison.muscles import QUICK, compare_muscles, held_out_levels, per_load
 
     train, split = list(recordings), "as given"
@@ -98,9 +98,9 @@ def study_muscles(
     result = results.take(rows, best, loops, plant)
     if best is not None and best.inverse is not None:
         best.inverse.save(folder / "inverse.json")
-    Kept(folder).clear()
     if as_json:
         print_json(result)
+        forget_kept(folder)
         return
     for table in _tables(rows, loops):
         print(f"\n{table.title}")
@@ -113,6 +113,7 @@ def study_muscles(
         f"Written: {folder / 'report.html'}, leaderboard.csv, leaderboard.json, models"
         + ("" if best is None or best.inverse is None else ", inverse.json")
     )
+    forget_kept(folder)
 
 
 class _Results:

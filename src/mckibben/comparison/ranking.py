@@ -64,6 +64,7 @@ def compare(
     jobs: int | None = None,
     most_samples: int = MOST_SAMPLES,
     folder: str | Path | None = None,
+    clear: bool = True,
     progress: Callable[[Standing], None] | None = None,
     found: Callable[[Leaderboard], None] | None = None,
     watch: Watch | None = None,
@@ -102,6 +103,9 @@ def compare(
     folder : path, optional
         Where finished models are kept until all are, so that a comparison that was stopped and is
         called again goes on from there.
+    clear : bool
+        Whether to forget what was kept when all is done; else the caller does, once it has written
+        what is returned, by ``Kept(folder).clear()``.
     progress : callable, optional
         Told how far it is whenever that changes.
     found : callable, optional
@@ -145,7 +149,8 @@ def compare(
         if not board.rows:
             raise
         return replace(board, stopped=True)
-    kept.clear()
+    if clear:
+        kept.clear()
     return board
 
 

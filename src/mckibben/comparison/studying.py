@@ -38,6 +38,7 @@ def study(
     jobs: int | None = None,
     most_samples: int = MOST_SAMPLES,
     folder: str | Path | None = None,
+    clear: bool = True,
     progress: Callable[[Standing], None] | None = None,
     found: Callable[[Study], None] | None = None,
     notes: Sequence[str] = (),
@@ -48,7 +49,7 @@ def study(
 
     Parameters
     ----------
-    train, test, input, output, models, settings, seed, jobs, most_samples, folder, progress
+    train, test, input, output, models, settings, seed, jobs, most_samples, folder, clear, progress
         As for `compare`.
     found : callable, optional
         Told the study as far as it is: when it is known what the muscle does, before any model is
@@ -103,7 +104,8 @@ def study(
     so_far = replace(so_far, inverse=invert_best(so_far.leaderboard, recordings[0]))
     if found is not None:
         found(so_far)
-    kept.clear()
+    if clear:
+        kept.clear()
     return so_far
 
 

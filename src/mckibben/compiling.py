@@ -40,9 +40,8 @@ class Deferred:
                 if self._dispatcher is None:
                     try:
                         self._dispatcher = numba.njit(**self.targetoptions)(self.py_func)
-                    except (
-                        RuntimeError
-                    ):  # nowhere to keep what is compiled: it is compiled each time
+                    except RuntimeError:
+                        # there is nowhere to keep what is compiled: it is compiled each time
                         uncached = self.targetoptions | {"cache": False}
                         self._dispatcher = numba.njit(**uncached)(self.py_func)
         return self._dispatcher

@@ -81,8 +81,8 @@ def _watched(message: str) -> Iterator[None]:
             return  # all is done
         with suppress(OSError):
             os.write(2, message.encode())
-        select.select([heard], [], [], PATIENCE)
-        if os.read(heard, 1) if select.select([heard], [], [], 0)[0] else True:
+        ready, _, _ = select.select([heard], [], [], PATIENCE)
+        if not ready or os.read(heard, 1):
             leave(INTERRUPTED)  # a second signal, or it takes too long
 
     threading.Thread(target=watch, daemon=True).start()

@@ -306,14 +306,22 @@ def ranked(
     ]
     bootstrap = BlockBootstrap(plan.n_scored, plan.seed)
     begun: list[str] = []
+    samples: dict[str, Array] = {}
+
+    def resampled(model: str, tried: Tried) -> Array:
+        if model not in samples:  # once a model, however often the ranking is made
+            samples[model] = bootstrap.rmse(errors_on_test(tried.outputs, data))
+        return samples[model]
 
     def current() -> Ranking:
-        return _ranking(plan, finished, bootstrap)
+        return _ranking(plan, finished, resampled)
 
     def tell() -> None:
         if progress is not None:
             working = tuple(model for model in begun if model not in finished)
-            progress(Standing(len(finished), len(plan.settings), working, _best(current().board)))
+            progress(
+                Standing(len(finished), len(plan.settings), working, _best(finished, plan.unit))
+            )
 
     def told(index: int, *what: float) -> None:
         model = parts[index].model
@@ -343,10 +351,12 @@ def ranked(
             yield current()
 
 
-def _ranking(plan: Plan, finished: Mapping[str, Tried], bootstrap: BlockBootstrap) -> Ranking:
+def _ranking(
+    plan: Plan, finished: Mapping[str, Tried], resampled: Callable[[str, Tried], Array]
+) -> Ranking:
     done = [
-        (tried.row, bootstrap.rmse(errors_on_test(tried.outputs, plan.data)))
-        for tried in finished.values()
+        (tried.row, resampled(model, tried))
+        for model, tried in finished.items()
         if tried.row is not None and tried.row.test is not None
     ]
     done.sort(key=lambda item: (_rmse(item[0]), item[0].model))
@@ -364,9 +374,10 @@ def _ranking(plan: Plan, finished: Mapping[str, Tried], bootstrap: BlockBootstra
     return Ranking(plan.board([*rows, *failed]), outputs)
 
 
-def _best(board: Leaderboard) -> str:
-    best = board.best
-    return "" if best is None else f"{best.model} {_rmse(best):.3g} {board.unit}".strip()
+def _best(finished: Mapping[str, Tried], unit: str) -> str:
+    rows = [t.row for t in finished.values() if t.row is not None and t.row.test is not None]
+    best = min(rows, key=_rmse, default=None)
+    return "" if best is None else f"{best.model} {_rmse(best):.3g} {unit}".strip()
 
 
 def _chosen(

@@ -334,16 +334,16 @@ def ranked(
     if finished:
         tell()
         yield current()
-    pieces: dict[str, list[Tried]] = {model: [] for model in remaining}
+    pieces: dict[str, dict[int, Tried]] = {model: {} for model in remaining}
     wanted = Counter(part.model for part in parts)
     for outcome in outcomes(data, parts, workers, told):
         model = parts[outcome.index].model
         if outcome.error is None:
-            pieces[model].append(outcome.value)
+            pieces[model][outcome.index] = outcome.value
         else:
-            pieces[model].append(Tried(Row(model, reason=str(outcome.error))))
+            pieces[model][outcome.index] = Tried(Row(model, reason=str(outcome.error)))
         if len(pieces[model]) == wanted[model]:
-            finished[model] = joined(pieces[model])
+            finished[model] = joined([piece for _, piece in sorted(pieces[model].items())])
             row = finished[model].row
             if row is not None and row.sound:  # a failure may be the machine's, not the model's
                 kept.put(model, row, remaining[model], plan.sources[model])

@@ -143,7 +143,7 @@ def outcomes(
 
 
 def joined(parts: Sequence[Tried]) -> Tried:
-    """Return what came of all parts of a model, as one; the same whatever their order is."""
+    """Return what came of all parts of a model, given in their order, as one."""
     failed = [tried for tried in parts if tried.row is not None and tried.row.reason is not None]
     if failed:
         return failed[0]

@@ -21,6 +21,7 @@ Array = NDArray[np.float64]
 
 STEP = 0.01
 TIME = np.arange(10_001) * STEP
+RAMP: Array = np.arange(50, dtype=float)
 
 
 def run(u: Array, y: Array, step: float | None = STEP) -> Recording:
@@ -302,14 +303,14 @@ def test_it_can_be_saved_and_shown() -> None:
     ("recordings", "words"),
     [
         ([], "no recording"),
-        (run(np.zeros(50), np.arange(50.0)), "'pressure'.*constant"),
-        (run(np.arange(50.0), np.ones(50)), "'displacement'.*constant"),
-        (run(np.arange(5.0), np.arange(5.0)), "'pressure'.*too few"),
-        (Recording({"pressure": np.arange(50.0)}), "no channel 'displacement'"),
+        (run(np.zeros(50), RAMP), "'pressure'.*constant"),
+        (run(RAMP, np.ones(50)), "'displacement'.*constant"),
+        (run(np.arange(5, dtype=float), np.arange(5, dtype=float)), "'pressure'.*too few"),
+        (Recording({"pressure": RAMP}), "no channel 'displacement'"),
         (
             [
-                Recording({"pressure": np.arange(50.0), "displacement": np.arange(50.0)}),
-                Recording({"pressure": np.arange(50.0), "force": np.arange(50.0)}),
+                Recording({"pressure": RAMP, "displacement": RAMP}),
+                Recording({"pressure": RAMP, "force": RAMP}),
             ],
             "no channel 'displacement'",
         ),
@@ -323,8 +324,7 @@ def test_what_cannot_be_characterized_is_refused(
 
 
 def test_units_must_agree() -> None:
-    ramp = np.arange(50.0)
-    runs = [Recording({"a": ramp, "b": ramp}, 1.0, {"a": unit}) for unit in ("rad", "deg")]
+    runs = [Recording({"a": RAMP, "b": RAMP}, 1.0, {"a": unit}) for unit in ("rad", "deg")]
     with pytest.raises(DataError, match="different units"):
         characterize(runs, "a", "b")
 

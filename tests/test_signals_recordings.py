@@ -61,7 +61,7 @@ def test_what_would_alias_is_taken_out(ratio: float, above: float) -> None:
 def test_resampling_agrees_with_scipy() -> None:
     rng = np.random.default_rng(0)
     slow = np.cumsum(rng.standard_normal(10_001)) / 100
-    run = Recording({"pressure": np.convolve(slow, np.ones(100) / 100, "same")}, 1e-3)
+    run = Recording({"pressure": np.convolve(slow, np.full(100, 0.01), "same")}, 1e-3)
     reference = decimate(run["pressure"], 10, ftype="fir")
     found = resample(run, 0.01)["pressure"]
     assert found.shape == reference.shape

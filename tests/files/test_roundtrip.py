@@ -91,7 +91,7 @@ def test_csv_is_plain_to_other_programs(recording: Recording, tmp_path: Path) ->
 
 
 def test_without_time_there_is_no_column_of_it(tmp_path: Path) -> None:
-    mckibben.write(Recording({"pressure": np.arange(20.0)}), tmp_path / "a.csv")
+    mckibben.write(Recording({"pressure": np.arange(20, dtype=float)}), tmp_path / "a.csv")
     assert (tmp_path / "a.csv").read_text().startswith("pressure\n0.0\n")
     assert mckibben.read(tmp_path / "a.csv")[0].sample_time is None
 
@@ -139,7 +139,7 @@ def test_parquet_changed_by_another_program_is_read_as_foreign(
 
 def test_own_files_follow_columns_units_rate_and_channels(tmp_path: Path) -> None:
     path = tmp_path / "sim.csv"
-    k = np.arange(20.0)
+    k = np.arange(20, dtype=float)
     mckibben.write(
         Recording({"pressure": k, "pressure_model": 2 * k, "y": k}, units={"y": "cm"}), path
     )
@@ -176,11 +176,11 @@ def test_missing_folder_is_an_error(recording: Recording, tmp_path: Path, ending
 @pytest.mark.parametrize(
     "bad",
     [
-        Recording({"time": np.arange(10.0)}),
-        Recording({"a\nb": np.arange(10.0)}),
-        Recording({" ": np.arange(10.0)}),
-        Recording({"x": np.arange(10.0)}, meta={"a": {1, 2}}),
-        Recording({"x": np.arange(10.0)}, meta={"a": float("nan")}),
+        Recording({"time": np.arange(10, dtype=float)}),
+        Recording({"a\nb": np.arange(10, dtype=float)}),
+        Recording({" ": np.arange(10, dtype=float)}),
+        Recording({"x": np.arange(10, dtype=float)}, meta={"a": {1, 2}}),
+        Recording({"x": np.arange(10, dtype=float)}, meta={"a": float("nan")}),
     ],
 )
 def test_what_cannot_be_read_back_is_not_written_and_nothing_is_lost(

@@ -1,9 +1,8 @@
 """Identification of the activation-pressure model, as its paper does it.
 
 Source: "Inverse Modeling of Nonlinear Artificial Muscle Using Polynomial Parameterization and
-Particle Swarm Optimization", Sections 4.2 to 4.4: local extremes of every loop; a cubic at every
-force through them; its four characteristic points; their regression on the force in two enrichment
-steps, first the extremes, then inflection and tangent; and gamma and phi by particle swarm.
+Particle Swarm Optimization", Sections 4.2 to 4.4: `characteristic_points`, regressed on the force in
+two enrichment steps; and gamma and phi by particle swarm.
 """
 
 from __future__ import annotations
@@ -21,16 +20,15 @@ from mckibben.blocks.force.activation_pressure import ActivationPressure
 from mckibben.errors import DataError
 from mckibben.estimators.base import simulate_all
 from mckibben.estimators.data import Run, TrainingData
+from mckibben.estimators.force.characteristic_points import characteristic_points
 from mckibben.estimators.search import Tracker, particle_swarm
 from mckibben.estimators.searching import SearchingEstimator
 
 Array = NDArray[np.float64]
 
-FORCE_STEP = 5.0
-"""Runs whose mean forces differ by less belong to one force [N]."""
-
-MARGIN = 1e-3
-"""Least distance between neighbouring characteristic points, relative to the contraction's range."""
+STATIC_SHARE = 0.1
+"""A run below this share of the fastest run's frequency is static: it bounds low and high pressure,
+and tells nothing of the rate."""
 
 
 @dataclass(kw_only=True, repr=False, eq=False)
@@ -45,7 +43,7 @@ class ActivationPressureEstimator(SearchingEstimator):
         Of the filter of the rate [s]; default three samples.
     frequency : float, optional
         Of the excitation in every run [Hz]; default the strongest in each run's spectrum. The model
-        found is set to that of the first run.
+        found is set to that of the first run that is not static.
     """
 
     input: str = "contraction"
@@ -69,22 +67,26 @@ class ActivationPressureEstimator(SearchingEstimator):
         return (self.force,)
 
     def identify(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
-        """Return the model found, set to the first run's frequency, and the data."""
+        """Return the model found, set to the first moving run's frequency, and the data."""
         if data.sample_time is None:
             raise DataError(
                 "the recordings have no time, and this model depends on rate",
                 remedy="read them with a time column or --rate",
             )
-        groups = by_force(data.runs)
-        forces = np.array(list(groups))
-        points = np.array([characteristic_points(runs) for runs in groups.values()])
-        # first enrichment: the extremes; second: inflection and tangent, kept apart from them
-        contractions = [regress(forces, points[:, j, 0]) for j in range(4)]
-        pressures = [regress(forces, points[:, j, 1]) for j in range(4)]
+        frequencies = np.array(
+            [
+                dominant_frequency(run) if self.frequency is None else self.frequency
+                for run in data.runs
+            ]
+        )
+        moving = frequencies >= STATIC_SHARE * frequencies.max()
+        loops = replace(data, runs=tuple(data.runs[i] for i in np.flatnonzero(moving)))
+        at = frequencies[moving]
+        contractions, pressures = characteristic_points(data.runs, moving)
         tau = self.rate_time_constant
         model = ActivationPressure(
-            vector(np.concatenate(contractions)),
-            vector(np.concatenate(pressures)),
+            vector(contractions.ravel()),
+            vector(pressures.ravel()),
             (0.0, 0.0, 0.0, 1.0),
             (0.0, 1.0),
             1.0,
@@ -92,12 +94,7 @@ class ActivationPressureEstimator(SearchingEstimator):
             self.starting_rule,
             **self.channels(data),
         )
-        thin = data.thinned(20_000)
-        at = [
-            dominant_frequency(run) if self.frequency is None else self.frequency
-            for run in thin.runs
-        ]
-        phi, gamma = self._rates(model, thin, np.array(at), tracker)
+        phi, gamma = self._rates(model, loops.thinned(20_000), at, tracker)
         return replace(model, phi=vector(phi), gamma=gamma, frequency=float(at[0])), data
 
     def _rates(
@@ -151,61 +148,6 @@ class ActivationPressureEstimator(SearchingEstimator):
         """Return contraction, force and pressure."""
         force = Channel(data.scheduling[0], data.scheduling_units[0])
         return super().channels(data) | {"force": force}
-
-
-def by_force(runs: tuple[Run, ...]) -> dict[float, list[Run]]:
-    """Return the runs grouped by their mean force, weakest first."""
-    groups: dict[float, list[Run]] = {}
-    for run in sorted(runs, key=lambda run: float(run.scheduled.mean())):
-        mean = float(run.scheduled.mean())
-        near = next((force for force in groups if abs(force - mean) < FORCE_STEP), mean)
-        groups.setdefault(near, []).append(run)
-    return groups
-
-
-def characteristic_points(runs: list[Run]) -> Array:
-    """Return contraction and pressure at the lowest point, highest, inflection and tangent, (4, 2).
-
-    The cubic is fitted to the middle of all loops at one force, with the local extremes counted as
-    often as everything else together. The tangent is where the line through the first point touches
-    the cubic again, or, where it does not within the range, its highest point moved off the second.
-    """
-    from mckibben.signals import reversals
-
-    e = np.concatenate([run.u[run.counts] for run in runs])
-    p = np.concatenate([run.y[run.counts] for run in runs])
-    turns = np.concatenate([_turns(run, reversals(run.u)) for run in runs])
-    span = float(np.ptp(e))
-    columns = np.vander(np.concatenate([e, turns[:, 0]]), 4)
-    target = np.concatenate([p, turns[:, 1]])
-    weight = np.concatenate([np.ones(e.size), np.full(len(turns), e.size / max(len(turns), 1))])
-    root = np.sqrt(weight)
-    cubic = np.linalg.lstsq(columns * root[:, np.newaxis], target * root, rcond=1e-12)[0]
-    low, high = float(e.min()), float(e.max())
-    inflection = -cubic[1] / (3 * cubic[0]) if cubic[0] != 0 else 0.5 * (low + high)
-    # a line from the lowest point touches the cubic half-way past its inflection
-    tangent = -(cubic[1] / cubic[0] + low) / 2 if cubic[0] != 0 else low + 0.75 * span
-    middles = [
-        place if low + 0.05 * span < place < high - 0.05 * span else low + share * span
-        for place, share in ((inflection, 1 / 3), (tangent, 2 / 3))
-    ]
-    if abs(middles[0] - middles[1]) < 0.05 * span:
-        middles = [low + span / 3, low + 2 * span / 3]
-    at = np.array([low, high, *middles])
-    return np.column_stack([at, np.polyval(cubic, at)])
-
-
-def _turns(run: Run, places: NDArray[np.int64]) -> Array:
-    counting = [place for place in places if run.counts[place]]
-    return np.column_stack([run.u[counting], run.y[counting]])
-
-
-def regress(forces: Array, values: Array) -> Array:
-    """Return a cubic of the force through values, of lower order where there are few forces."""
-    order = min(3, forces.size - 1)
-    scale = max(float(np.abs(forces).max()), 1.0)
-    found = np.polyfit(forces / scale, values, order) / scale ** np.arange(order, -1, -1)
-    return np.concatenate([np.zeros(3 - order), found])
 
 
 def dominant_frequency(run: Run) -> float:

@@ -9,10 +9,19 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
 
 from mckibben.rigs import load_rig
 from mckibben.rigs.parameters import Muscle
-from mckibben.rigs.physics.air import AIR, LAMINAR_RATIO, flow, valve_flow, valve_target
+from mckibben.rigs.physics.air import (
+    AIR,
+    LAMINAR_RATIO,
+    flow,
+    line_flow,
+    through,
+    valve_flow,
+    valve_target,
+)
 from mckibben.rigs.physics.bladder import bladder_energy, bladder_force
 from mckibben.rigs.physics.braid import NEUTRAL_ANGLE, braid_area, braid_constants, braid_volume
 from mckibben.rigs.physics.compiled import ATMOSPHERE, NEWTON_PER_BAR_MM2
@@ -225,6 +234,36 @@ def test_an_opening_fills_or_vents() -> None:
     assert valve_flow(air, 1.0, 8.0) < 0.0
     assert valve_flow(air, -1.0, 0.0) == 0.0
     assert valve_flow(air, -1.0, -0.2) > 0.0
+
+
+@pytest.mark.parametrize("opening", [1.0, 0.3, 0.01, 0.0, -0.01, -0.3, -1.0])
+@pytest.mark.parametrize("pressure", [0.0, 0.3, 2.0, 5.9, 6.5])
+def test_what_goes_through_the_valve_goes_through_the_line(opening: float, pressure: float) -> None:
+    air = regulator(line=0.9)
+
+    def excess(outlet: float) -> float:
+        near, far = outlet + ATMOSPHERE, pressure + ATMOSPHERE
+        root = math.sqrt(abs(near**2 - far**2)) / 0.9
+        return valve_flow(air, opening, outlet) - math.copysign(root, near - far)
+
+    found, outlet = through(air, opening, pressure)
+    expected = brentq(excess, 0.0, 8.0) if opening else pressure
+    assert found == pytest.approx(valve_flow(air, opening, outlet), abs=2e-6)
+    # Nearly equal pressures: the flow is laminar there, and takes less pressure.
+    if abs(math.log((outlet + ATMOSPHERE) / (pressure + ATMOSPHERE))) > 0.03:
+        assert outlet == pytest.approx(expected, abs=1e-4)
+    assert through(regulator(), opening, pressure) == (
+        valve_flow(air, opening, pressure),
+        pressure,
+    )
+
+
+def test_a_line_takes_pressure_with_the_square_of_the_flow() -> None:
+    air = regulator(line=0.5)
+    squares = [(outlet + ATMOSPHERE) ** 2 - (2.0 + ATMOSPHERE) ** 2 for outlet in (2.2, 3.0, 5.0)]
+    flows = [line_flow(air, outlet, 2.0) for outlet in (2.2, 3.0, 5.0)]
+    assert np.square(flows) * 0.5**2 == pytest.approx(squares)
+    assert line_flow(air, 2.0, 5.0) == pytest.approx(-flows[-1])
 
 
 def test_a_regulator_has_a_dead_band_and_limits() -> None:

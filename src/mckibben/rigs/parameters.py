@@ -170,16 +170,23 @@ class Air(Section):
     valve_time: float = parameter("time in which the valve follows", "s", ge=0.001, le=1)
     gain: float = parameter("opening per bar of pressure error", "1/bar", gt=0, le=100)
     dead_band: float = parameter("pressure error that moves nothing", "bar", ge=0, le=1)
+    line: float = parameter(
+        "resistance of the line to the muscle, the inverse of its sonic conductance; pressure is "
+        "measured at the regulator",
+        "s bar/l",
+        ge=0,
+        le=10,
+        default=0.0,
+    )
     dead_volume: float = parameter("air in line and fittings", "ml", ge=0, le=10000)
     polytropic: float = parameter("exponent of the change of state", ge=1, le=1.4, default=1.1)
 
     def record(self) -> Records:
         """Return the regulator as the compiled physics reads it, shape (1,)."""
         made = np.zeros(1, AIR)
-        for name in ("supply", "fill", "vent", "critical_ratio", "valve_time", "gain", "dead_band"):
+        for name in type(self).model_fields.keys() - {"dead_volume"}:
             made[name] = getattr(self, name)
         made["dead_room"] = self.dead_volume * 1e3
-        made["polytropic"] = self.polytropic
         return made
 
 

@@ -4,6 +4,10 @@ The flow through an opening is that of ISO 6358: choked below the critical press
 above, and a straight line where pressures are nearly equal. Filling and venting openings differ. The
 valve follows its controller with a lag and not within a dead band; the chamber is the muscle, whose
 room changes as it moves, and dead volume. Changes of state are polytropic.
+
+Between regulator and muscle there may be a line. The flow through it is turbulent, so the pressure that
+it takes grows with the square of the flow; what the regulator and its sensor feel is the pressure at
+their own end.
 """
 
 from __future__ import annotations
@@ -23,6 +27,11 @@ SUBSTEPS = 4
 
 MM3_PER_LITRE = 1e6
 
+FLOW_TOLERANCE = 1e-6
+"""Between what goes through the valve and through the line [bar l/s]."""
+
+MOST_ATTEMPTS = 60
+
 
 AIR = np.dtype(
     [
@@ -33,6 +42,7 @@ AIR = np.dtype(
         ("valve_time", "f8"),  # s
         ("gain", "f8"),  # 1/bar
         ("dead_band", "f8"),  # bar
+        ("line", "f8"),  # resistance [s bar/l]; 0 is no line
         ("dead_room", "f8"),  # mm³
         ("polytropic", "f8"),
     ],
@@ -74,6 +84,46 @@ def valve_flow(air: Any, opening: float, pressure: float) -> float:
     if outside > inside:
         return flow(conductance, outside, inside, air.critical_ratio)
     return -flow(conductance, inside, outside, air.critical_ratio)
+
+
+@compiled
+def line_flow(air: Any, outlet: float, pressure: float) -> float:
+    """Return the flow into the muscle [bar l/s] from the pressure at the regulator's outlet [bar].
+
+    It goes with the root of the difference of the squares of the absolute pressures, as a long
+    pipe's does: an opening that never chokes.
+    """
+    near, far = outlet + ATMOSPHERE, pressure + ATMOSPHERE
+    if near > far:
+        return flow(1.0 / air.line, near, far, 0.0)
+    return -flow(1.0 / air.line, far, near, 0.0)
+
+
+@compiled
+def through(air: Any, opening: float, pressure: float) -> tuple[float, float]:
+    """Return the flow into the muscle [bar l/s], and the pressure at the regulator's outlet [bar].
+
+    The valve's flow falls as that pressure rises and the line's grows: by false position.
+    """
+    if air.line == 0.0:
+        return valve_flow(air, opening, pressure), pressure
+    near, far = pressure, air.supply if opening > 0.0 else 0.0
+    at_near = valve_flow(air, opening, near)
+    at_far = valve_flow(air, opening, far) - line_flow(air, far, pressure)
+    outlet = near
+    for _ in range(MOST_ATTEMPTS):
+        if abs(at_near) <= FLOW_TOLERANCE or at_near * at_far >= 0.0:
+            break
+        outlet = near - at_near * (far - near) / (at_far - at_near)
+        excess = valve_flow(air, opening, outlet) - line_flow(air, outlet, pressure)
+        if abs(excess) <= FLOW_TOLERANCE:
+            break
+        if excess * at_far < 0.0:
+            near, at_near = far, at_far
+        else:
+            at_near *= 0.5
+        far, at_far = outlet, excess
+    return line_flow(air, outlet, pressure), outlet
 
 
 @compiled

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mckibben.rigs.physics.air import MM3_PER_LITRE, SUBSTEPS, valve_flow, valve_target
+from mckibben.rigs.physics.air import MM3_PER_LITRE, SUBSTEPS, through, valve_target
 from mckibben.rigs.physics.compiled import ATMOSPHERE, compiled
 from mckibben.rigs.physics.friction import slip
 from mckibben.rigs.physics.muscle import (
@@ -265,7 +265,7 @@ def breathe(
     pressure = state.pressure
     for i in range(SUBSTEPS):
         command = before + (after - before) * (i + 0.5) / SUBSTEPS
-        target = valve_target(air, command, pressure)
+        target = valve_target(air, command, state.outlet)
         opening = target + (state.valve - target) * half
         state.valve = target + (opening - target) * half
         x = state.x + state.speed * dt * (i + 0.5)
@@ -274,10 +274,11 @@ def breathe(
             room, area, give = chamber(muscle, x, middle)
             room += air.dead_room - squeezed
             absolute = middle + ATMOSPHERE
-            rate = valve_flow(air, opening, middle) * MM3_PER_LITRE
+            rate = through(air, opening, middle)[0] * MM3_PER_LITRE
             rate -= absolute * (area * state.speed - squeezing)
             middle = pressure + 0.5 * stage * dt * rate / (room / air.polytropic + absolute * give)
         pressure = middle
+        state.outlet = through(air, state.valve, pressure)[1]
     state.pressure = pressure
 
 
@@ -340,7 +341,7 @@ def note(muscles: Any, mechanism: Any, states: Any, motion: Any, row: Array) -> 
         row[g] = motion.place[g]
         row[n + g] = motion.acceleration[g]
     for j in range(m):
-        row[2 * n + j] = states[j].pressure
+        row[2 * n + j] = states[j].outlet
         row[2 * n + m + j] = states[j].tension
         room, _, _ = chamber(muscles[j], states[j].x, states[j].pressure)
         row[2 * n + 2 * m + j] = room
@@ -366,8 +367,8 @@ def march(
 
     Commands have shape (n, muscles) [bar], loads (n, coordinates) [N or N mm], targets (n,) [mm].
     Between two samples they go on in straight lines, or are held at the first. Each row of
-    ``traces`` takes place and acceleration of every coordinate, then pressure, tension, room [mm³]
-    and warmth [K] of every muscle.
+    ``traces`` takes place and acceleration of every coordinate, then pressure at the regulator, tension,
+    room [mm³] and warmth [K] of every muscle.
     """
     note(muscles, mechanism[0], states, motion[0], traces[0])
     for i in range(commands.shape[0] - 1):

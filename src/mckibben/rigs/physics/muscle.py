@@ -76,6 +76,7 @@ MUSCLE_STATE = np.dtype(
         ("x", "f8"),  # own shortening [mm]
         ("speed", "f8"),
         ("pressure", "f8"),
+        ("outlet", "f8"),  # pressure at the regulator's end of the line [bar]
         ("valve", "f8"),
         ("warmth", "f8"),  # K above the room
         ("tension", "f8"),

@@ -260,7 +260,7 @@ def mckibben() -> Iterator[Row]:
         f"{np.sqrt(np.mean(np.square(off))):.2f} bar RMSE over {len(off)} points",
         "reached ones of points 1, 2, 4 at 0 to 300 N; 0.3 to 3.9 bar",
     )
-    for force in (50.0, 150.0, 300.0):
+    for force in (0.0, 50.0, 150.0, 300.0):
         widths, printed = [], []
         for frequency in activation.FREQUENCIES:
             cycle = last_cycle(runs[f"sine-{force:.0f}N-{frequency:.1f}Hz"], 1 / frequency)

@@ -131,6 +131,42 @@ def test_activation_pressure_finds_the_published_profile_again() -> None:
     assert fit.model_.gamma[0] / fit.model_.gamma[1] == pytest.approx(0.267 / 0.667, rel=0.3)
 
 
+def test_characteristic_points_of_loops_and_slow_cycles_bracket_the_pressure() -> None:
+    printed = replace(activation_pressure(), gamma=(0.0, 0.0))
+    time = np.arange(4000) * 0.005
+    runs = []
+    for force in (0.0, 100.0, 200.0, 300.0):
+        e = [np.polyval(printed.contractions[4 * j : 4 * j + 4], force) for j in range(4)]
+        for low, high, frequency in ((e[2], e[3], 0.05), (e[0], e[1], 1.0)):
+            contraction = low + (high - low) * 0.5 * (1 - np.cos(2 * np.pi * frequency * time))
+            given = Recording({"contraction": contraction, "force": np.full(4000, force)}, 0.005)
+            runs.append(given.with_channels(pressure=printed.simulate(given)["pressure"]))
+    fit: Any = ActivationPressureEstimator(method="ls", rate_time_constant=0.0).fit(runs)
+    for force, slow, loop in zip((0.0, 100.0, 200.0, 300.0), runs[::2], runs[1::2], strict=True):
+        e_1, e_2, e_3, e_4 = (
+            np.polyval(fit.model_.contractions[4 * j : 4 * j + 4], force) for j in range(4)
+        )
+        assert (e_1, e_2) == pytest.approx(
+            (loop["contraction"].min(), loop["contraction"].max()), abs=1e-4
+        )
+        assert e_3 < e_1 < e_2 < e_4
+        error = replace(fit.model_, gamma=(0.0, 0.0)).simulate(slow)["pressure"] - slow["pressure"]
+        assert np.abs(error).max() < 0.1
+    boundaries = np.reshape(fit.model_.pressures[8:], (2, 4))
+    assert not boundaries[:, :3].any()
+    lowest = min(run["pressure"].min() for run in runs[::2])
+    highest = max(run["pressure"].max() for run in runs[::2])
+    assert lowest < boundaries[0, 3] < min(run["pressure"].min() for run in runs[1::2])
+    assert max(run["pressure"].max() for run in runs[1::2]) < boundaries[1, 3] < highest
+
+
+def test_a_muscle_that_never_moves_has_no_characteristic_points() -> None:
+    still = sines(1.0, 100.0)
+    still = still.with_channels(contraction=np.full(len(still), 0.1))
+    with pytest.raises(DataError, match="does not move under 100 N"):
+        ActivationPressureEstimator(frequency=1.0).fit([sines(1.0, 0.0), still])
+
+
 def test_frequency_is_read_off_the_input() -> None:
     from mckibben.estimators.data import training_data
 

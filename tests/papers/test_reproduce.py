@@ -38,18 +38,6 @@ def test_friction_beats_the_static_law_on_loops_not_used() -> None:
     )
 
 
-def test_activation_pressure_needs_no_frequency(cli: Cli, tmp_path: Path) -> None:
-    result = cli("reproduce", "activation-pressure", "--quick", "-o", tmp_path / "run", "--json")
-    assert result.code == 0, result.err
-    found = json.loads(result.out)
-    assert number(found, r"frequency: at most ([\d.]+) %") < 5.0
-    assert json.loads((tmp_path / "run" / "tables.json").read_text()) == found
-    page = (tmp_path / "run" / "report.html").read_text()
-    assert not re.search(r"""<(?:script|link|img)[^>]+(?:src|href)=["']?http""", page)
-    for table in found["tables"]:
-        assert table["title"].partition("(")[0].strip() in page
-
-
 def test_own_recordings_take_the_place_of_the_rig(
     cli: Cli,
     files: tuple[Path, Path],  # noqa: F811

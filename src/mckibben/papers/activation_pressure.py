@@ -116,7 +116,8 @@ def activation_pressure(
             "printed. Here the boundaries are at the printed shares of the range of pressure, and the "
             "contractions there by least squares, the cubic being held to the extremes of the loops.",
             "Both models are fitted to slow cycles and sines; random waves are only tested on.",
-            "The printed profile belongs to another muscle, after which the rig was made.",
+            "The rig was made after the printed profile, rates included: gamma and phi near the printed "
+            "ones speak for the identification, not for the muscle.",
         ),
     )
 

@@ -88,6 +88,8 @@ def fit(
         )
     estimator.model_.save(out)
     found = estimator.diagnostics_
+    names = estimator.model_.parameter_names
+    undetermined = [names[place] for place in estimator.undetermined()]
     if as_json:
         print_json(
             {
@@ -103,6 +105,7 @@ def fit(
                 "parameters": estimator.model_.pack().tolist(),
                 "standard_errors": list(found.standard_errors),
                 "at_bounds": list(found.at_bounds),
+                "undetermined": undetermined,
             }
         )
         return
@@ -111,6 +114,8 @@ def fit(
         f"{model}: free-running RMSE {figure(found.rmse, 4)} {unit_name} on {found.n_samples} samples, "
         f"{estimator.model_.n_parameters} parameters, {found.seconds:.2f} s{stopped}"
     )
+    if undetermined:
+        print(f"Not determined by these recordings: {'; '.join(undetermined)}.")
     print(f"Written: {out}")
 
 

@@ -100,6 +100,22 @@ def test_commands_follow_a_force_on_the_test_stand(cli: Cli, tmp_path: Path) -> 
     assert "length" in result.err
 
 
+def test_runs_that_hold_the_length_are_fitted_together(cli: Cli, tmp_path: Path) -> None:
+    files = []
+    pressure = np.linspace(0.0, 4.0, 50)
+    for length in (190.0, 194.0, 198.0):
+        run = Recording({"length": np.full(50, length), "pressure": pressure}, 0.1)
+        files.append(tmp_path / f"{length:.0f}.csv")
+        write(run.with_channels(force=LAW.simulate(run)["force"]), files[-1])
+    channels = ["--input", "length", "--output", "force"]
+    result = cli("fit", "force-bilinear", *files, *channels, "-o", tmp_path / "law.json", "--json")
+    assert result.code == 0, result.err
+    assert json.loads(result.out)["rmse"] < 1e-6
+    alone = cli("fit", "force-bilinear", files[0], *channels, "-o", tmp_path / "law.json")
+    assert alone.code == 2
+    assert "constant" in alone.err
+
+
 @pytest.mark.parametrize("elements", [EACH_WAY, ("shared", "both", "shortening")])
 def test_every_value_of_friction_has_a_name(elements: Any) -> None:
     n = {"shared": 5, "both": 6, "lengthening": 3, "shortening": 3}

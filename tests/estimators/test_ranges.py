@@ -33,8 +33,7 @@ def test_ranges_of_a_linear_model_are_those_of_least_squares() -> None:
 
 
 def test_ranges_are_of_positive_parameters() -> None:
-    ones = np.ones(9)
-    given = Recording({"length": 1.0 * np.arange(9), "pressure": ones, "force": ones}, 0.1)
+    given = Recording(dict.fromkeys(("length", "pressure", "force"), np.linspace(1, 2, 9)), 0.1)
     with pytest.raises(ModelError, match="positive"):
         parameter_ranges(PolynomialForce((1.0,), (-1.0,)), given)
 

@@ -75,7 +75,10 @@ def fit(
         )
     estimator_class = registry.load("estimators", model)
     given = parse_settings(settings, model)
-    recordings = Reading(column, unit, rate, gaps, resample).read(files, [input, output])
+    # of several, each may hold the input, as isometric runs hold the length
+    recordings = Reading(column, unit, rate, gaps, resample).read(
+        files, [input, output], informative=len(files) == 1
+    )
     given = {"input": input, "output": output, "seed": seed} | given
     if method is not None:
         given["method"] = method

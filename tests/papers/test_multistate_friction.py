@@ -91,7 +91,7 @@ def baselines_have_the_sizes_that_the_paper_gives(found: Reproduction) -> None:
     }
     assert all(closed[name]["parameters, here"] == size for name, size in given.items())
     # signs of the weights are what keeps play operators from levelling off, not their number
-    signed = closed["PI, weights of either sign"]["RMSE [N], here"]
+    signed = closed["PI with weights of either sign"]["RMSE [N], here"]
     assert signed < 0.2 * closed["modified PI"]["RMSE [N], here"]
 
 

@@ -32,7 +32,11 @@ DIFFERENCE = 1e-5
 
 
 def parameter_ranges(
-    block: Block, recordings: Recording | Sequence[Recording], *, share: float = 0.01
+    block: Block,
+    recordings: Recording | Sequence[Recording],
+    *,
+    others: Sequence[Block] = (),
+    share: float = 0.01,
 ) -> Array:
     """Return the lowest and highest value of every parameter at which the error stays almost as it is.
 
@@ -42,6 +46,9 @@ def parameter_ranges(
         A model whose parameters are all positive, fitted to the recordings; of one driven input.
     recordings : Recording or sequence of Recording
         What it was fitted to.
+    others : sequence of Block
+        Models of the same structure from other searches: where they end in other minima that are as
+        good, ranges cover those too.
     share : float
         By how much the free-running RMSE may rise, all other parameters fitted again; 0.01 is 1 %.
 
@@ -57,8 +64,8 @@ def parameter_ranges(
     DataError
         On recordings that cannot be learned from.
     """
-    values = block.pack()
-    if not (values > 0).all() or not share > 0:
+    starts = [one.pack() for one in (block, *others)]
+    if not all((values > 0).all() for values in starts) or not share > 0:
         raise ModelError(
             "ranges are of positive parameters, for a positive share. Remedy: give the friction alone."
         )
@@ -69,18 +76,18 @@ def parameter_ranges(
         return simulate_all([block.unpack(np.exp(point)) for point in points], data) - data.target
 
     with one_blas_thread():
-        places = np.arange(values.size)
-        best, cost = _refined(residuals, np.log(values), places, 30)
-        most = cost * (1 + share) ** 2
-        ranges = np.empty((values.size, 2))
-        for place in places:
-            for side, end in enumerate((-1.0, 1.0)):
-                gone = _walk(residuals, best, int(place), end, most)
-                ranges[place, side] = (
-                    np.exp(best[place] + end * gone) if gone < FARTHEST else np.inf
-                )
-        ranges[:, 0] = np.where(np.isinf(ranges[:, 0]), 0.0, ranges[:, 0])
-    return ranges
+        places = np.arange(block.n_parameters)
+        minima = [_refined(residuals, np.log(values), places, 30) for values in starts]
+        most = min(cost for _, cost in minima) * (1 + share) ** 2
+        low, high = np.full(places.size, np.inf), np.zeros(places.size)
+        for best in (best for best, cost in minima if cost <= most):
+            down, up = (
+                np.array([_walk(residuals, best, place, way, most) for place in places.tolist()])
+                for way in (-1.0, 1.0)
+            )
+            low = np.minimum(low, np.where(down < FARTHEST, np.exp(best - down), 0.0))
+            high = np.maximum(high, np.where(up < FARTHEST, np.exp(best + up), np.inf))
+    return np.column_stack([low, high])
 
 
 def _walk(

@@ -86,9 +86,9 @@ def test_extracted_hysteresis_is_what_was_put_in() -> None:
 
 def test_friction_is_recovered_to_the_noise() -> None:
     (left,) = extract_hysteresis(isobaric(), static_force())
-    fit: Any = MultistateEstimator(
-        output="force_hysteresis", static="none", elements="each-way"
-    ).fit(left)
+    fit: Any = MultistateEstimator(output="force_hysteresis", static=None, elements="each-way").fit(
+        left
+    )
     assert fit.diagnostics_.rmse < 0.6
     table, truth = fit.model_.table(), TRUTH.table()
     # what lengthening feels from the bottom on, and shortening from the top on, is determined
@@ -107,7 +107,7 @@ def test_growth_with_pressure_is_found() -> None:
     for pressure in (2.0, 4.0, 6.0):
         bare = isobaric(pressure).select(["length", "pressure"])
         runs.append(bare.with_channels(force=growing.simulate(bare)["force"]))
-    fit: Any = MultistateEstimator(static="none", elements="each-way", fit_pressure_gain=True).fit(
+    fit: Any = MultistateEstimator(static=None, elements="each-way", fit_pressure_gain=True).fit(
         runs
     )
     assert fit.model_.pressure_gain == pytest.approx(0.2, abs=0.02)

@@ -7,7 +7,6 @@ import re
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 
 from mckibben import registry
@@ -22,20 +21,6 @@ def number(found: dict[str, Any], pattern: str) -> float:
     match = re.search(pattern, text)
     assert match, text
     return float(match.group(1))
-
-
-def test_friction_beats_the_static_law_on_loops_not_used() -> None:
-    shares: list[float] = []
-    found = reproduce("multistate-friction", quick=True, progress=lambda s, _: shares.append(s))
-    assert number(found.to_dict(), r"r² (0\.\d+) on the extracted") >= 0.995
-    assert number(found.to_dict(), r"at most ([\d.]+) times") <= 0.5
-    assert shares == sorted(shares)
-    assert all(
-        np.isfinite(curve).all()
-        for figure in found.figures
-        for pair in figure.curves.values()
-        for curve in pair
-    )
 
 
 def test_own_recordings_take_the_place_of_the_rig(

@@ -106,6 +106,11 @@ class Block(metaclass=Checked):
     def n_parameters(self) -> int:
         """Length of the parameter vector, `pack`."""
 
+    @property
+    def parameter_names(self) -> tuple[str, ...]:
+        """What each number of `pack` is, for people."""
+        return tuple(f"{self.kind} {place}" for place in range(1, self.n_parameters + 1))
+
     @abstractmethod
     def pack(self) -> Array:
         """Return the parameters as a vector, shape (n_parameters,); structure stays outside."""

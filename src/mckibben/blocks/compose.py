@@ -52,6 +52,11 @@ class Composition(Block):
         """The parameters of all parts."""
         return sum(part.n_parameters for part in self.parts)
 
+    @property
+    def parameter_names(self) -> tuple[str, ...]:
+        """Those of all parts, one after another."""
+        return tuple(name for part in self.parts for name in part.parameter_names)
+
     def pack(self) -> Array:
         """Return the parameters of all parts, one after another."""
         return np.concatenate([part.pack() for part in self.parts])

@@ -75,7 +75,10 @@ def fit(
         )
     estimator_class = registry.load("estimators", model)
     given = parse_settings(settings, model)
-    recordings = Reading(column, unit, rate, gaps, resample).read(files, [input, output])
+    # of several, each may hold the input, as isometric runs hold the length
+    recordings = Reading(column, unit, rate, gaps, resample).read(
+        files, [input, output], informative=len(files) == 1
+    )
     given = {"input": input, "output": output, "seed": seed} | given
     if method is not None:
         given["method"] = method
@@ -88,6 +91,8 @@ def fit(
         )
     estimator.model_.save(out)
     found = estimator.diagnostics_
+    names = estimator.model_.parameter_names
+    undetermined = [names[place] for place in estimator.undetermined()]
     if as_json:
         print_json(
             {
@@ -103,6 +108,7 @@ def fit(
                 "parameters": estimator.model_.pack().tolist(),
                 "standard_errors": list(found.standard_errors),
                 "at_bounds": list(found.at_bounds),
+                "undetermined": undetermined,
             }
         )
         return
@@ -111,6 +117,8 @@ def fit(
         f"{model}: free-running RMSE {figure(found.rmse, 4)} {unit_name} on {found.n_samples} samples, "
         f"{estimator.model_.n_parameters} parameters, {found.seconds:.2f} s{stopped}"
     )
+    if undetermined:
+        print(f"Not determined by these recordings: {'; '.join(undetermined)}.")
     print(f"Written: {out}")
 
 

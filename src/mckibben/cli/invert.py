@@ -16,12 +16,25 @@ def invert(
     out: Annotated[Path, typer.Option("-o", "--out", help="Inverse to write (JSON).")],
     as_json: Json = False,
 ) -> None:
-    """Write the inverse of a saved model: wished-for output in, input out."""
+    """Write the inverse of a saved model: wished-for output in, input out.
+
+    Of a model of force, what is written gives the pressure by wished-for force and length.
+    """
     import numpy as np
 
+    from mckibben.blocks.force.feedforward import ForceFeedforward
     from mckibben.blocks.saving import load
 
     block = load(model)
+    feedforward = ForceFeedforward.of(block)
+    if feedforward is not None:
+        feedforward.save(out)
+        if as_json:
+            print_json({"file": str(out), "reachable": {}})
+            return
+        print("Pressure by force and length, in closed form; track it where length is imposed.")
+        print(f"Written: {out}")
+        return
     inverse = block.inverse()
     inverse.save(out)
     low, high = block.reachable()

@@ -32,7 +32,8 @@ def track(
     compensator: Annotated[Path, typer.Argument(help="Inverse, from mckibben invert (JSON).")],
     rig: Annotated[str, typer.Option("--rig", help="Rig, by name or file; see rig list.")],
     reference: Annotated[
-        Path, typer.Option("--reference", metavar="FILE", help="Displacements to follow.")
+        Path,
+        typer.Option("--reference", metavar="FILE", help="Displacements, or force, to follow."),
     ],
     controller: Annotated[
         Kind, typer.Option("--controller", help="Which controller; pid does without the inverse.")
@@ -46,7 +47,7 @@ def track(
     ] = None,
     approach: Annotated[float, typer.Option(help="Time to reach the first reference [s].")] = 20.0,
     settle: Annotated[float, typer.Option(help="Time after that not scored [s].")] = 0.0,
-    noise: Annotated[float, typer.Option(help="Added to measured displacements [mm].")] = 0.0,
+    noise: Annotated[float, typer.Option(help="Added to what is followed [mm or N].")] = 0.0,
     delay: Annotated[int, typer.Option(help="Steps by which measurements come late.")] = 0,
     slew: Annotated[float | None, typer.Option(help="Fastest pressure change [bar/s].")] = None,
     pressure_loop: Annotated[
@@ -108,11 +109,12 @@ def track(
     rows = [
         [name, figure(found.rmse[name], 3), figure(found.largest[name], 3)] for name in found.rmse
     ]
-    print_table(["displacement", "RMSE [mm]", "largest [mm]"], rows)
+    measure = wanted.units[next(iter(found.rmse))]
+    print_table(["followed", f"RMSE [{measure}]", f"largest [{measure}]"], rows)
     if found.clipped:
         print(
             f"Pressures were at a limit in {found.clipped} steps; RMSE there is "
-            f"{figure(found.clipping_cost, 3)} mm above that of the other steps."
+            f"{figure(found.clipping_cost, 3)} {measure} above that of the other steps."
         )
     print(
         f"Controller: {1e6 * found.step_time[0]:.0f} µs a step (median), "

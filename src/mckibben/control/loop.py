@@ -53,13 +53,13 @@ class Tracked:
     Parameters
     ----------
     recording : Recording
-        References (``reference_...``), measured displacements and pressures, commands.
+        References (``reference_...``), all that was measured, and commands.
     rmse, largest : mapping of str to float
-        Of every displacement after the approach [mm].
+        Of everything followed, after the approach [mm or N].
     clipped : int
         Steps in which pressure or its rate was at a limit.
     clipping_cost : float
-        RMSE over those steps less RMSE over the others [mm]; 0 where there are none.
+        RMSE over those steps less RMSE over the others [mm or N]; 0 where there are none.
     step_time : (float, float)
         Median and 99.9th percentile of the controller's own time a step [s].
     """
@@ -86,7 +86,7 @@ def track(
     seed: int = 0,
     progress: Callable[[float], None] | None = None,
 ) -> Tracked:
-    """Let a controller make a plant's displacements follow references.
+    """Let a controller make a plant's displacements, or its force, follow references.
 
     Parameters
     ----------
@@ -94,8 +94,9 @@ def track(
     plant : Plant
         A rig; it is run at the reference's sample time, which is the control rate.
     reference : Recording
-        Channels of displacement to follow [mm], and of what schedules the controller and is held on the
-        plant, such as ``pressure_extensor``, as they should be.
+        Channels of displacement to follow [mm], or without any the force [N], and of what schedules the
+        controller and is held on the plant, such as ``pressure_extensor`` or the length in a test stand,
+        as they should be.
     approach : float
         Time to go from rest to the first reference [s], not scored.
     settle : float
@@ -103,7 +104,7 @@ def track(
     pressure_loop : bool
         Whether measured pressures are fed back inside, as regulators with a sensor do.
     noise : float
-        Standard deviation added to measured displacements [mm].
+        Standard deviation added to what is followed, as measured [mm or N].
     delay : int
         Control steps by which measurements come late.
     slew : float, optional
@@ -134,10 +135,12 @@ def track(
             "approach, settle, noise and delay must not be negative, and slew must be positive. "
             "Remedy: correct the setting."
         )
-    followed = [name for name in plant.outputs if name in reference and name.startswith("displ")]
+    measured_too = [name for name in plant.outputs if name in reference]
+    followed = [name for name in measured_too if name.startswith("displ")]
+    followed = followed or [name for name in measured_too if name == "force"]
     if not followed:
         raise DataError(
-            f"it has no displacement that {plant.name!r} measures",
+            f"it has no displacement or force that {plant.name!r} measures",
             file=reference.source,
             remedy=f"give channels among {', '.join(plant.outputs)}",
         )
@@ -253,7 +256,7 @@ def _recorded(
     channels |= {f"command_{name}": commands[:, k] for k, name in enumerate(driven)}
     for k, name in enumerate(held):
         channels.setdefault(name, scheduled[:, k])
-    units = {f"reference_{name}": "mm" for name in followed}
+    units = {f"reference_{name}": reference.units[name] for name in followed}
     units |= {f"command_{name}": "bar" for name in driven}
     step = reference.sample_time or 1.0
     return Recording(channels, step, units, start_time=-lead * step, meta={"plant": plant.name})

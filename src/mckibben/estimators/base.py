@@ -261,6 +261,15 @@ class Estimator(Parametrised, ABC):
             peaks=tuple(run.peak for run in data.runs),
         )
 
+    def undetermined(self) -> tuple[int, ...]:
+        """Return the places in ``model_.pack()`` of what the recordings do not determine.
+
+        By default, the parameters at no bound whose standard errors are not known.
+        """
+        found = self.diagnostics_
+        unknown = np.flatnonzero(np.isnan(found.standard_errors)).tolist()
+        return tuple(place for place in unknown if place not in found.at_bounds)
+
     def at_bounds(self, block: Block) -> tuple[int, ...]:
         """Return the places of parameters that ended at a bound: by default those that are zero."""
         return tuple(np.flatnonzero(block.pack() == 0).tolist())

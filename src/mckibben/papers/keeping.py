@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -32,6 +32,8 @@ class Fitted:
         Its free-running error on the data fitted, in the unit of the output; of several the largest.
     seconds : float
         That the fit took [s].
+    standard_errors : tuple of float
+        Of ``block.pack()``, NaN where not known; of several outputs none.
     """
 
     __pydantic_config__: ClassVar[dict[str, bool]] = {"arbitrary_types_allowed": True}
@@ -39,6 +41,7 @@ class Fitted:
     block: Block
     rmse: float
     seconds: float
+    standard_errors: tuple[float, ...] = field(default=(), compare=False)
 
 
 def fitted(
@@ -69,7 +72,8 @@ def fitted(
         with whole_searches():
             estimator.fit(recordings, **how)
         said = estimator.diagnostics_
-        return Fitted(estimator.model_, float(np.max(said.rmse)), said.seconds)
+        errors = tuple(getattr(said, "standard_errors", ()))
+        return Fitted(estimator.model_, float(np.max(said.rmse)), said.seconds, errors)
 
     settings = (type(estimator).__name__, estimator.get_params())
     return kept.once(name, Fitted, fit, settings, recordings, how)

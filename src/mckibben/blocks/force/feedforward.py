@@ -16,6 +16,7 @@ from pydantic import BeforeValidator, InstanceOf
 from pydantic.dataclasses import dataclass
 
 from mckibben.blocks.base import Block, Run
+from mckibben.blocks.compose import Parallel
 from mckibben.blocks.fields import STRICT, Channel, Initial
 from mckibben.blocks.force.law import ForceLaw
 from mckibben.blocks.force.multistate_friction import MultistateFriction
@@ -54,6 +55,27 @@ class ForceFeedforward(Block):
                 "law and friction differ in their channels. Remedy: give both the same length and "
                 "pressure."
             )
+
+    @classmethod
+    def of(cls, model: Block) -> Self | None:
+        """Return the feedforward of a model of force, or None if the model is another.
+
+        Parameters
+        ----------
+        model : Block
+            A `ForceLaw` that is linear in pressure, alone or with friction in `Parallel`.
+
+        Raises
+        ------
+        ModelError
+            If the law is not linear in pressure.
+        """
+        match model:
+            case ForceLaw():
+                return cls(model)
+            case Parallel(parts=(ForceLaw() as law, MultistateFriction() as friction)):
+                return cls(law, friction)
+        return None
 
     @property
     def rate_dependent(self) -> bool:  # type: ignore[override]

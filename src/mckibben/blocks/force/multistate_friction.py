@@ -53,6 +53,8 @@ SIZES: dict[str, int] = {"shared": 5, "both": 6, "lengthening": 3, "shortening":
 ELEVEN: tuple[Direction, ...] = ("shared", "shortening", "shortening")
 EACH_WAY: tuple[Direction, ...] = ("shared", "lengthening", "shortening")
 EIGHTEEN: tuple[Direction, ...] = ("both", "both", "both")
+QUANTITIES = ("k [N/mm]", "sigma [N s/mm]", "F_c [N]")
+"""Numbers of an element in one direction."""
 
 
 @kernel
@@ -163,6 +165,20 @@ class MultistateFriction(NamedParameters, Primitive):
     def parameters(self) -> tuple[str, ...]:  # type: ignore[override]
         """The values, and the pressure gain where there is one."""
         return ("values", "pressure_gain") if self.pressure_gain != 0 else ("values",)
+
+    @property
+    def parameter_names(self) -> tuple[str, ...]:
+        """Element, direction and quantity, with its unit, of every value."""
+        names: list[str] = []
+        for place, element in enumerate(self.elements, start=1):
+            both = element in ("shared", "both")
+            for way in ("lengthening", "shortening") if both else (element,):
+                names += [f"element {place}, {way}: {quantity}" for quantity in QUANTITIES]
+            if element == "shared":
+                names[-6:] = [f"element {place}: {QUANTITIES[0]}", *names[-5:-3], *names[-2:]]
+        if self.pressure_gain != 0:
+            names.append("pressure gain [1/bar]")
+        return tuple(names)
 
     @property
     def inputs(self) -> tuple[Channel, ...]:

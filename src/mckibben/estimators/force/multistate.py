@@ -84,15 +84,15 @@ class MultistateEstimator(SeparableEstimator):
     """Multistate friction by bounded least squares from many starts, and exchange of elements.
 
     Break-away lengths and relaxation times are searched; stiffnesses, and a static law, are solved
-    for. With ``static="none"`` the output is taken to be the hysteresis alone, as the paper does
+    for. With ``static=None`` the output is taken to be the hysteresis alone, as the paper does
     after `extract_hysteresis`.
 
     Parameters
     ----------
     pressure : str
         Channel of the pressure.
-    static : {"none", "bilinear", "petrovic", "minh", "schindele"}
-        Law identified with the friction.
+    static : {"bilinear", "petrovic", "minh", "schindele"}, optional
+        Law identified with the friction, or None.
     elements : {"eleven", "each-way", "eighteen"} or sequence of directions
         The paper's two structures; ours, of eleven parameters too, with one element shared, one for
         lengthening and one for shortening; or one direction an element ("shared", "both",
@@ -105,7 +105,7 @@ class MultistateEstimator(SeparableEstimator):
     output: str = "force"
     initial: Literal["first_sample", "virgin", "fitted"] = "virgin"
     pressure: str = "pressure"
-    static: Literal["none", "bilinear", "petrovic", "minh", "schindele"] = "bilinear"
+    static: Literal["bilinear", "petrovic", "minh", "schindele"] | None = "bilinear"
     elements: Structure | tuple[Direction, ...] = "eleven"
     fit_pressure_gain: bool = False
     nonnegative: bool = False
@@ -262,7 +262,7 @@ class MultistateEstimator(SeparableEstimator):
     def basis(self, theta: Array, run: Run, data: TrainingData) -> Array:
         """Return the forces of the elements, then what the static law's coefficients multiply."""
         friction = self._forces(theta, run, data)
-        if self.static == "none":
+        if self.static is None:
             return friction
         length, pressure = run.inputs.T
         columns = force_columns(length, pressure, ORDERS[self.static], data.input_range)
@@ -274,7 +274,7 @@ class MultistateEstimator(SeparableEstimator):
 
         n = self.n_stiffnesses
         friction, target = matrix[:, :n], data.target
-        if self.static == "none":
+        if self.static is None:
             law = np.empty((len(matrix), 0))
         else:
             law = np.column_stack([np.ones(len(matrix)), matrix[:, n:]])
@@ -297,7 +297,7 @@ class MultistateEstimator(SeparableEstimator):
         reduced: Array = np.linalg.qr(both, mode="r")  # type: ignore[assignment]
         rest = reduced[:, n] - reduced[:, :n] @ (floor * scale)
         stiffnesses = floor + nnls(reduced[:, :n], rest, maxiter=100 * n)[0] / scale
-        if self.static == "none":
+        if self.static is None:
             return stiffnesses, 0.0
         left = directions.T @ (target - friction @ stiffnesses)
         found = (right[known].T @ (left / singular[known])) / size
@@ -312,7 +312,7 @@ class MultistateEstimator(SeparableEstimator):
         """Return the elements above their least force, and the static law, which has the offset."""
         n = self.n_stiffnesses
         elements = matrix[:, :n][:, linear[:n] > 1.01 * self.least(matrix, data)]
-        if self.static == "none":
+        if self.static is None:
             return elements
         return np.column_stack([np.ones(len(matrix)), matrix[:, n:], elements])
 
@@ -320,11 +320,24 @@ class MultistateEstimator(SeparableEstimator):
         """Return the friction, with the static law beside it if there is one."""
         n = self.n_stiffnesses
         friction = self.friction(theta, linear[:n], data)
-        if self.static == "none":
+        if self.static is None:
             return friction
         orders = ORDERS[self.static]
         law = force_law(linear[n:], offset, orders, data.input_range, self.channels(data))
         return Parallel((law, friction))
+
+    def undetermined(self) -> tuple[int, ...]:
+        """Return the places of values that are not known, or are not told from nothing.
+
+        Values of friction are positive: one within two standard errors of 0 may be any smaller one. As
+        residuals are not independent, more may be undetermined; `parameter_ranges` tells.
+        """
+        block = self.fitted
+        values = block.pack()
+        errors = np.array(self.diagnostics_.standard_errors)
+        first = values.size - sum(SIZES[e] for e in self.directions) - self.fit_pressure_gain
+        vague = first + np.flatnonzero(~(2 * errors[first:] < np.abs(values[first:])))
+        return tuple(sorted({*super().undetermined(), *vague.tolist()}))
 
     def parameter_bounds(self, data: TrainingData) -> tuple[Block, Array, Array]:
         """Return the block of the first guess, and bounds about it that keep it valid."""

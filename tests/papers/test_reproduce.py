@@ -13,7 +13,7 @@ import pytest
 from mckibben import registry
 from mckibben.errors import ModelError
 from mckibben.papers import reproduce
-from tests.cli.conftest import Cli, files  # noqa: F401  # a fixture
+from tests.cli.conftest import Cli
 from tests.cli.conftest import cli as cli  # a fixture
 
 
@@ -48,18 +48,6 @@ def test_activation_pressure_needs_no_frequency(cli: Cli, tmp_path: Path) -> Non
     assert not re.search(r"""<(?:script|link|img)[^>]+(?:src|href)=["']?http""", page)
     for table in found["tables"]:
         assert table["title"].partition("(")[0].strip() in page
-
-
-def test_own_recordings_take_the_place_of_the_rig(
-    cli: Cli,
-    files: tuple[Path, Path],  # noqa: F811
-) -> None:
-    train, test = files
-    given = ["--train", train, "--test", test]
-    result = cli("reproduce", "field-models", "--quick", *given, "--json")
-    assert result.code == 0, result.err
-    models = {row["model"] for table in json.loads(result.out)["tables"] for row in table["rows"]}
-    assert {"cpi", "pi"} <= models
 
 
 def test_list_names_every_paper(cli: Cli) -> None:

@@ -61,7 +61,7 @@ class Integrator:
 
 @pytest.mark.parametrize("reference", ["random-wave", "irregular-triangle", "sine"])
 def test_feedback_solves_the_task_and_chance_does_not(reference: str) -> None:
-    env = gymnasium.make("mckibben/mas20-hanging-v1", duration=8.0, reference=reference)
+    env = gymnasium.make("mckibben/mas20-hanging-v2", duration=8.0, reference=reference)
     rng = np.random.default_rng(0)
     chance = episode(env, lambda *_: rng.uniform(-1, 1, 1).astype(np.float32))
     control = episode(env, Integrator(0.015, 0.01))

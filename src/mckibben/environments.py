@@ -6,7 +6,7 @@ Environments").
 
 >>> import gymnasium
 >>> import mckibben.environments
->>> env = gymnasium.make("mckibben/mas20-hanging-v1")
+>>> env = gymnasium.make("mckibben/mas20-hanging-v2")
 >>> observation, info = env.reset(seed=1)
 >>> observation, reward, terminated, truncated, info = env.step(env.action_space.sample())
 """

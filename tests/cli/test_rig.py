@@ -43,7 +43,7 @@ def test_run_writes_a_recording(cli: Cli, tmp_path: Path) -> None:
     (recording,) = read(out)
     assert len(recording) == 601
     assert recording["pressure"].max() == pytest.approx(6.0, abs=0.3)
-    assert recording.meta["rig"] == "mas20-hanging v1 (virtual)"
+    assert recording.meta["rig"] == "mas20-hanging v2 (virtual)"
     first = out.read_bytes()
     cli(*arguments, "-o", out)
     assert out.read_bytes() == first

@@ -6,7 +6,7 @@ import warnings
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import pytest
@@ -196,16 +196,35 @@ def test_pi_recovers_its_own_weights_with_intervals() -> None:
     assert 0.88 < np.mean(inside) <= 1.0
 
 
-def test_slope_rule_recovers_the_weights_of_a_clean_loop() -> None:
-    truth = PI((0.0, 0.5, 1.0, 1.5), (3.0, 1.5, 1.0, 0.5), 2.0, (0.0, 5.0))
+@pytest.mark.parametrize(
+    ("initial", "start", "stop"),
+    [("virgin", 0, 402), ("first_sample", 400, 803), ("virgin", 801, 1203)],
+)
+def test_slope_rule_recovers_the_weights_of_every_kind_of_branch(
+    initial: Literal["virgin", "first_sample"], start: int, stop: int
+) -> None:
+    """Operators begin after r on the rise from rest, after 2 r on the fall and the rise that follow."""
+    truth = PI((0.0, 0.5, 1.0, 1.5), (3.0, 1.5, 1.0, 0.5), 2.0, (0.0, 5.0), initial)
     t = np.concatenate([np.linspace(0, 5, 401), np.linspace(5, 0, 401), np.linspace(0, 5, 401)])
     loop = Recording({"pressure": t, "displacement": truth.simulate(t)}, 0.01)
-    second_rise = np.zeros(t.size, dtype=bool)
-    second_rise[802:] = True
-    fit = PIEstimator(thresholds=truth.thresholds, method="slopes").fit(loop, rows=[second_rise])
+    one_branch = np.zeros(t.size, dtype=bool)
+    one_branch[start:stop] = True
+    estimator = PIEstimator(thresholds=truth.thresholds, method="slopes", initial=initial)
+    fit = estimator.fit(loop, rows=[one_branch])
     assert isinstance(fit.model_, PI)
     np.testing.assert_allclose(fit.model_.pack()[:-1], truth.pack()[:-1], rtol=1e-6)
     assert fit.model_.offset == pytest.approx(truth.offset, rel=1e-6)
+
+
+def test_slope_rule_pools_slopes_that_fall_and_refuses_short_branches() -> None:
+    t = np.concatenate([np.linspace(0, 5, 401), np.linspace(5, 0, 401), np.linspace(0, 5, 401)])
+    flattening = Recording({"pressure": t, "displacement": np.sqrt(1 + 10 * t)}, 0.01)
+    rising = np.arange(t.size) >= 802
+    estimator = PIEstimator(thresholds=(0.0, 0.5, 1.0, 1.5), method="slopes")
+    weights = estimator.fit(flattening, rows=[rising]).fitted.pack()[:-1]
+    assert weights == pytest.approx(((np.sqrt(51) - 1) / 5, 0, 0, 0))
+    with pytest.raises(ModelError, match=r"the longest goes 5 .* twice a threshold"):
+        estimator.set_params(thresholds=(0.0, 2.5)).fit(flattening)
 
 
 @pytest.mark.parametrize("name", INVERTIBLE)

@@ -54,6 +54,7 @@ def recorded(
         Orders(b=3, a=2, c=2, delay=1),
         Orders(b=2, f=3),
         Orders(b=2, f=2, c=2, d=2, delay=2),
+        Orders(b=2, f=2, c=2, d=2, lags=(0, 2)),
     ],
 )
 def test_derivatives_of_prediction_errors(orders: Orders) -> None:

@@ -12,7 +12,7 @@ import pytest
 from mckibben import registry
 from mckibben.errors import ModelError
 from mckibben.papers import reproduce
-from tests.cli.conftest import Cli, files  # noqa: F401  # a fixture
+from tests.cli.conftest import Cli
 from tests.cli.conftest import cli as cli  # a fixture
 
 
@@ -21,18 +21,6 @@ def number(found: dict[str, Any], pattern: str) -> float:
     match = re.search(pattern, text)
     assert match, text
     return float(match.group(1))
-
-
-def test_own_recordings_take_the_place_of_the_rig(
-    cli: Cli,
-    files: tuple[Path, Path],  # noqa: F811
-) -> None:
-    train, test = files
-    given = ["--train", train, "--test", test]
-    result = cli("reproduce", "field-models", "--quick", *given, "--json")
-    assert result.code == 0, result.err
-    models = {row["model"] for table in json.loads(result.out)["tables"] for row in table["rows"]}
-    assert {"cpi", "pi"} <= models
 
 
 def test_list_names_every_paper(cli: Cli) -> None:

@@ -15,8 +15,8 @@ from mckibben.blocks.fields import vector
 from mckibben.blocks.memory import named_state
 from mckibben.blocks.pi import PI
 from mckibben.blocks.play import play_matrix
-from mckibben.errors import DataError, ModelError
-from mckibben.estimators.base import Operators
+from mckibben.errors import ModelError
+from mckibben.estimators.base import Operators, simulate_all
 from mckibben.estimators.data import Run, TrainingData
 from mckibben.estimators.search import Tracker
 from mckibben.estimators.separable import SeparableEstimator
@@ -31,8 +31,9 @@ class PIEstimator(SeparableEstimator):
 
     Everything is linear once thresholds are set, so the fit is a single exact solution. With
     ``method="slopes"`` the weights follow the rule of "Analysis and modeling of a pneumatic artificial
-    muscle system", Eqs. (14), (15): the slope of every segment of a rising branch is the sum of the
-    weights of the operators that move in it.
+    muscle system", Eqs. (14), (15): the slope of every segment of a loop is the sum of the weights of
+    the operators that move in it. The paper does not say on which branch; here it is over the longest
+    rise and the longest fall on which operators begin to move in turn.
 
     Parameters
     ----------
@@ -102,22 +103,23 @@ class PIEstimator(SeparableEstimator):
         return template, lower, np.array([*([slope] * radii.size), high])
 
     def _by_slopes(self, data: TrainingData) -> PI:
-        """Cut the longest rising branch where its operators start to move, and difference slopes."""
+        """Cut the widest loop where its operators begin to move, and difference slopes.
+
+        A segment lasts from one operator's beginning to the next one's: the printed Delta r on a rise
+        from rest, twice that after a reversal, where a play closes over 2 r. Printed weights are
+        positive, and a loop that flattens would want others: its slopes are pooled until none is
+        below the one before, which is their least-squares fit (isotonic regression).
+        """
+        from scipy.optimize import isotonic_regression
+
         radii = self.radii(data)
-        run, start, stop = _longest_rise(data)
-        u, y = run.u[start:stop], run.y[start:stop]
-        order = np.argsort(u, kind="stable")
-        edges = np.append(u.min() + 2 * radii, u.max())
-        if edges[-1] <= edges[-2]:
-            raise ModelError(
-                f"the longest rising branch covers {np.ptp(u):.3g} {data.input_unit}, too short for a "
-                f"threshold of {radii[-1]:.3g}. Remedy: use fewer operators or smaller thresholds."
-            )
-        heights = np.interp(edges, u[order], y[order])
-        slopes = np.diff(heights) / np.diff(edges)
+        lengths, rises = _segments(data, radii, self.starting_rule)
+        slopes = rises / lengths
+        if self.nonnegative:
+            slopes = np.maximum(isotonic_regression(slopes, weights=lengths).x, 0.0)
         weights = np.diff(slopes, prepend=0.0)
         model = self.build(np.empty(0), weights, 0.0, data)
-        outputs = np.concatenate([model.simulate(r.u)[r.counts] for r in data.runs])
+        outputs = simulate_all([model], data)[0]
         return self.build(np.empty(0), weights, float(np.mean(data.target - outputs)), data)
 
 
@@ -128,28 +130,35 @@ def play_operators(u: Array, radii: Array, rule: str) -> Array:
     return operators
 
 
-def _longest_rise(data: TrainingData) -> tuple[Run, int, int]:
-    """Return the run and the samples of the branch that rises furthest, all of it counting.
+def _segments(data: TrainingData, radii: Array, rule: str) -> tuple[Array, Array]:
+    """Return how far input and output go in each segment of the widest loop, each of shape (N,).
 
-    A rise after a fall goes before one at the start of a run, where operators may all have risen
-    already and there are no slopes to tell them apart by.
+    Of the longest rise and the longest fall together, among those on which operators begin to move one
+    after the other, each from where it stood.
     """
     from mckibben.signals import branches
 
-    best: tuple[tuple[bool, float], Run, int, int] | None = None
+    longest = {1: 0.0, -1: 0.0}
+    cut = {1: np.zeros((2, radii.size)), -1: np.zeros((2, radii.size))}
     for run in data.runs:
-        for start, stop, direction in branches(run.u):
-            height = (start > 0, float(np.ptp(run.u[start:stop])))
-            if (
-                direction > 0
-                and run.counts[start:stop].all()
-                and (best is None or height > best[0])
-            ):
-                best = (height, run, start, stop)
-    if best is None:
-        raise DataError(
-            "the input never rises, so there is no branch to take slopes from",
-            channel=data.input,
-            remedy="use method=ls, or a recording with a rising branch",
+        states = run.trim(play_operators(run.history, radii, rule))
+        for start, stop, way in branches(run.u):
+            if way == 0 or not run.counts[start:stop].all():
+                continue
+            travel = way * (run.u[start:stop] - run.u[start])
+            begins = way * (states[start] - run.u[start]) + radii
+            if travel.max() > longest[way] and np.all(np.diff(begins) > 0):
+                longest[way] = float(travel.max())
+                order = np.argsort(travel, kind="stable")
+                edges = np.minimum([*begins, longest[way]], longest[way])
+                rise = np.interp(edges, travel[order], way * run.y[start:stop][order])
+                cut[way] = np.diff([edges, rise])
+    lengths, rises = cut[1] + cut[-1]
+    if not np.all(lengths > 0):
+        raise ModelError(
+            f"on no branch do operators with thresholds up to {radii[-1]:.3g} {data.input_unit} begin "
+            f"to move in turn: the longest goes {max(longest.values()):.3g} {data.input_unit}, and "
+            "after a reversal it takes twice a threshold. Remedy: use fewer operators, smaller "
+            "thresholds, or method=ls."
         )
-    return best[1:]
+    return lengths, rises

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from abc import abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Annotated, ClassVar
 
 import numpy as np
-from annotated_types import Interval
+from annotated_types import Interval, Len
 from numpy.typing import NDArray
 
 from mckibben.blocks.base import Block
@@ -28,6 +29,7 @@ from mckibben.estimators.search import Tracker
 Array = NDArray[np.float64]
 
 Order = Annotated[int, Interval(ge=0, le=20)]
+Lag = Annotated[int, Interval(ge=0, le=120)]
 
 
 @dataclass(frozen=True)
@@ -121,8 +123,10 @@ class PredictionErrorEstimator(Estimator):
         deviation = evaluate(theta, orders, runs)[2]
         self.noise_ = Noise((1.0, *vector(p.c)), (1.0, *vector(p.d)), deviation)
         constant = p.constant / (1.0 + float(p.poles.sum())) if orders.a else p.constant
+        numerator = np.zeros(1 + max(orders.input_lags))
+        numerator[[*orders.input_lags]] = p.b
         block = TransferFunction(
-            (*(0.0,) * orders.delay, *vector(p.b)),
+            vector(numerator),
             vector(p.poles),
             step,
             centre,
@@ -201,24 +205,35 @@ class OutputErrorEstimator(PredictionErrorEstimator):
 
 @dataclass(kw_only=True, repr=False, eq=False)
 class BoxJenkinsEstimator(OutputErrorEstimator):
-    """Box-Jenkins model, y = B / F u + C / D e; second order each, as in the paper, by default.
+    """Box-Jenkins model, y = B / F u + C / D e; second order each by default.
 
-    Source: "Analysis and modeling of a pneumatic artificial muscle system", Eq. (5).
+    Source: "Analysis and modeling of a pneumatic artificial muscle system", Eq. (5). Its printed B has
+    terms in q^0 and q^-2 only, Eq. (6): ``lags=(0, 2)``.
 
     Parameters
     ----------
+    lags : sequence of int, optional
+        Samples by which the input of each coefficient of B lies back, instead of n_zeros from the delay
+        on.
     n_noise, n_noise_poles : int
         Orders of C and D.
     """
 
     effort: ClassVar[float] = 1.0
 
+    lags: Annotated[Sequence[Lag], Len(1)] | None = None
     n_noise: Order = 2
     n_noise_poles: Order = 2
 
     @property
     def orders(self) -> Orders:
         """B, F, C and D."""
+        lags = None if self.lags is None else tuple(sorted(set(self.lags)))
         return Orders(
-            b=self.n_zeros, f=self.n_poles, c=self.n_noise, d=self.n_noise_poles, delay=self.delay
+            b=len(lags) if lags else self.n_zeros,
+            f=self.n_poles,
+            c=self.n_noise,
+            d=self.n_noise_poles,
+            delay=self.delay,
+            lags=lags,
         )

@@ -32,6 +32,8 @@ class Orders:
         Orders of the others.
     delay : int
         Samples before B's first coefficient.
+    lags : tuple of int, optional
+        Of B's coefficients, in samples, instead of the next ones after the delay.
     """
 
     b: int
@@ -40,6 +42,12 @@ class Orders:
     c: int = 0
     d: int = 0
     delay: int = 0
+    lags: tuple[int, ...] | None = None
+
+    @property
+    def input_lags(self) -> tuple[int, ...]:
+        """By how many samples the input of each coefficient of B lies back."""
+        return self.lags or tuple(range(self.delay, self.delay + self.b))
 
     @property
     def poles(self) -> int:
@@ -109,7 +117,8 @@ def errors(theta: Array, orders: Orders, run: Run) -> tuple[Array, Array]:
         return np.asarray(lfilter([1.0], denominator, x))
 
     # a filter at rest answers what comes later as much later, so each is run only once
-    driven = sum((b * later(u, orders.delay + i) for i, b in enumerate(p.b)), np.zeros(n))
+    lags = orders.input_lags
+    driven = sum((b * later(u, lag) for lag, b in zip(lags, p.b, strict=True)), np.zeros(n))
     impulse = np.eye(1, n)[0]
     by_constant = -by_noise(np.ones(n))
     if orders.a:
@@ -123,7 +132,7 @@ def errors(theta: Array, orders: Orders, run: Run) -> tuple[Array, Array]:
         by_input, by_start = -by_noise(alone(poles, u)), -by_noise(alone(poles, impulse))
         behind = by_noise(alone(poles, free))
     e = by_noise(gap)
-    by_b = [later(by_input, orders.delay + i) for i in range(orders.b)]
+    by_b = [later(by_input, lag) for lag in lags]
     by_poles = [later(behind, i + 1) for i in range(orders.poles)]
     starts = [later(by_start, k) for k in range(orders.poles)]
     whitened_e, whitened_gap = alone(c, e), alone(c, gap)

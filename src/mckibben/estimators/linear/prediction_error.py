@@ -9,6 +9,7 @@ iteration, slow and fast lags, and random stable poles; the best of all is kept.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -153,7 +154,7 @@ def _steiglitz_mcbride(runs: Sequence[Run], orders: Orders, rounds: int) -> Arra
     """Return poles by ARX, iterated on data filtered by the poles found before."""
     from scipy.signal import lfilter
 
-    simple = Orders(b=orders.b, a=orders.poles, delay=orders.delay)
+    simple = replace(orders, a=orders.poles, f=0, c=0, d=0)
     poles = np.zeros(orders.poles)
     for _ in range(rounds + 1):
         filtered = [

@@ -92,7 +92,7 @@ def test_an_episode_is_repeatable_for_its_seed() -> None:
 
 def test_vectors_of_environments_run() -> None:
     vector = gymnasium.make_vec(
-        "mckibben/rail-v1", num_envs=2, vectorization_mode="sync", duration=1.0
+        "mckibben/rail-v2", num_envs=2, vectorization_mode="sync", duration=1.0
     )
     seen, _ = vector.reset(seed=1)
     assert seen.shape == (2, 4)

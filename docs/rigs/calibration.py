@@ -16,9 +16,10 @@ from numpy.typing import NDArray
 
 from mckibben.blocks.published.field_models import prandtl_ishlinskii
 from mckibben.blocks.published.mpi_narmax import modified_prandtl_ishlinskii
+from mckibben.estimators.rdpi import RDPIEstimator
 from mckibben.recording import Recording
 from mckibben.rigs import load_rig, record
-from mckibben.signals import sine, triangle
+from mckibben.signals import resample, sine, triangle
 from mckibben.signals.protocols import activation_pressure as activation
 from mckibben.signals.protocols import protocol
 from mckibben.signals.protocols.mpi_narmax import HIGH, LOW
@@ -242,6 +243,16 @@ def test_stand() -> Iterator[Row]:
         )
 
 
+def model_error(known: Recording, other: Recording) -> float:
+    """Return the MAE on another run of the MPI that is identified on a known one [mm]."""
+    known, other = (
+        resample(run.select(["voltage", "displacement"]), 0.02) for run in (known, other)
+    )
+    model = RDPIEstimator(input="voltage", rate_time_constant=0.1).fit(known).model_
+    missed = model.simulate(other)["displacement"] - other["displacement"]
+    return float(np.mean(np.abs(missed)))
+
+
 def rail() -> Iterator[Row]:
     """Give the rows of the muscle on a rail."""
     runs = recorded("mpi-narmax")
@@ -279,6 +290,13 @@ def rail() -> Iterator[Row]:
             f"{np.ptp(moved):.1f} mm, highest point {moved.max():.1f} mm",
             "",
         )
+    for known, other, printed in ((1, 2, "6.86"), (1, 3, "10.06"), (2, 3, "3.23")):
+        yield (
+            f"MPI identified on status {known}, on status {other}: MAE",
+            f"{printed} mm (Table 2)",
+            f"{model_error(runs[f'status-{known}'], runs[f'status-{other}']):.2f} mm",
+            "load sensitivity",
+        )
     pulled, left = runs["hand-0.1Hz"]["displacement"], runs["free-0.1Hz"]["displacement"]
     yield (
         "distortion by three pulls of 100 N",
@@ -288,7 +306,7 @@ def rail() -> Iterator[Row]:
     )
     held = runs["held-6V"]
     n = 20_000
-    force, moved = held["force"][-2 * n : -n], held["displacement"][-2 * n : -n]
+    force, moved = held["force"][-n:], held["displacement"][-n:]
     yield (
         "force-displacement loop at 6 V, 0 to 150 N",
         "a loop (Figure 3)",

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from mckibben import ModelError
+from mckibben.blocks.published.mpi_narmax import POLYNOMIAL, TURNING_POINT
 from mckibben.registry import load
 
 R_FIELD = [0, 0.3392, 0.6654, 0.9917, 1.3179, 1.6442, 1.9704]
@@ -55,6 +56,13 @@ def test_modified_prandtl_ishlinskii(frequency: float) -> None:
     assert 1.2 < last_cycle.min() < 1.8
     assert 47.5 < last_cycle.max() < 49.0
     assert abs(outputs[0]) < 0.1
+
+
+def test_the_printed_map_turns_where_it_is_said_to() -> None:
+    slope = np.polyder(POLYNOMIAL)
+    turns = [root.real for root in np.roots(slope) if abs(root.imag) < 1e-9 and root.real > 0]
+    assert min(turns) == pytest.approx(TURNING_POINT, abs=1e-4)
+    assert np.polyval(POLYNOMIAL, TURNING_POINT) == pytest.approx(48.77, abs=0.01)
 
 
 def test_modified_prandtl_ishlinskii_needs_time_and_has_no_inverse() -> None:

@@ -13,13 +13,14 @@ from mckibben.rigs import record
 from mckibben.signals import resample
 
 NAMES = ("status-1", "status-2", "status-3", "training-pulls-100N", "status-4")
+FREE = ("free-0.05Hz", "free-0.1Hz", "free-0.2Hz")
 
 
 @pytest.fixture(scope="module")
 def runs() -> dict[str, Recording]:
     return {
         run.name: resample(recording, 0.05)
-        for run, recording in record("mpi-narmax", runs=list(NAMES))
+        for run, recording in record("mpi-narmax", runs=[*NAMES, *FREE])
     }
 
 
@@ -50,6 +51,26 @@ def test_mpi_narmax_runs_free_under_a_load(
     assert first.diagnostics_.rmse[0] < 3.0
     output = first.model_.simulate(runs["status-4"])["displacement"]
     assert np.abs(output).max() < 70.0
+
+
+def test_hysteresis_is_identified_on_all_runs_without_load(runs: dict[str, Recording]) -> None:
+    free, pulled = [runs[name] for name in FREE], runs["training-pulls-100N"]
+    settings = {"memory": "rdpi", "method": "ls", "n_sets": 2, "constants": False}
+    estimator_class = registry.load("coupled", "mpi-narmax")
+    model = estimator_class(**settings, learns_from="loaded").fit([*free, pulled]).model_
+    alone = registry.load("estimators", "rdpi")(input="voltage", rate_time_constant=0.25).fit(free)
+    hysteresis, network = model.parts
+    given = pulled.select(["voltage"])
+    assert hysteresis.simulate(given)["displacement_free"] == pytest.approx(
+        alone.model_.simulate(given)["displacement"]
+    )
+    # the printed fourth layer has no constants
+    terms = np.reshape(network.consequents, (-1, network.n_regressors + 1))
+    assert not terms[:, -1].any()
+    assert terms[:, :-1].all()
+    everything = estimator_class(**settings).fit([*free, pulled]).model_
+    assert everything.parts[0] == hysteresis
+    assert everything.parts[1] != network
 
 
 def test_force_is_estimated_from_pressure_and_displacement(

@@ -49,10 +49,3 @@ def test_bad_calls_leave_with_a_remedy(cli: Cli, arguments: list[str], said: str
 def test_unknown_papers_are_refused() -> None:
     with pytest.raises(ModelError, match="multistate-friction"):
         reproduce("nobody")
-
-
-def test_models_under_load_are_ranked_as_in_the_paper() -> None:
-    found = reproduce("mpi-narmax", quick=True).to_dict()
-    assert number(found, r"force balance [\d.]+ mm \(([\d.]+) times") <= 0.5
-    assert number(found, r"ours [\d.]+ mm \(([\d.]+) times\)") >= 3.0
-    assert number(found, r"test: ([\d.]+) % of its range") < 8.0

@@ -8,6 +8,10 @@ with one rule for every combination of sets, normalised firing and linear conseq
 the last n_a outputs, the driven input now and n_b samples back, and every scheduling input now and n_c
 samples back; the output is fed back, so the network always runs free.
 
+The paper's fourth layer multiplies the firing by sum_i p_ki x_i alone; here a consequent has a constant
+too, 0 where it is to be the paper's. The paper's "3N" rules are read as 3^N, one for every combination
+of sets, and its N as the number of x that its NARMAX equation lists.
+
 Source: "High-Precision Displacement and Force Hybrid Modeling of Pneumatic Artificial Muscle Using 3D
 PI-NARMAX Model", Section 3.
 """

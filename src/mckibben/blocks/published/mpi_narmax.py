@@ -6,6 +6,11 @@ voltage and v its rate, then the displacement as a polynomial of b.
 
 The table counts the polynomial's coefficients downwards, from b^9 to b^0: so the paper's excitation
 gives loops of 1.6 to 48 mm. Read upwards from b^1, as Eq. (5) is written, it gives 10^5 mm.
+
+The map folds: it turns at |b| = 4.134, at 48.8 mm, and falls beyond. At 0.05 and 0.1 Hz the paper's
+excitation stays below; at 0.2 Hz the weights by rate lift b to 4.148, and the displacement falls while
+the voltage still rises. So the model has no inverse, and is not one to be driven faster than it was
+identified. It is printed for 0.1 Hz; at other rates it extrapolates.
 """
 
 from __future__ import annotations
@@ -37,6 +42,9 @@ WEIGHTS = (-0.3435, 0.643, -0.1711, 0.1878, -0.0425, 0.0359, 0.0461, 0.0461, -0.
 
 POLYNOMIAL = (-8.97e-4, 0.0, 0.0411, 0.0, -0.6712, 0.0, 4.4945, 0.0, 2.3917, 0.0)
 """a_i [mm], in descending powers, b^9 to b^0."""
+
+TURNING_POINT = 4.1343
+"""The least positive b at which that polynomial turns."""
 
 INPUT_RANGE = (0.0, 10.0)
 """Range of the pressure regulator valve [V], Section 2.2."""

@@ -1,7 +1,7 @@
 """Identification of MPI-NARMAX: rate-dependent hysteresis, then a recurrent network with the load.
 
-Two steps: the hysteresis on the run under the least load; then the network, which takes in the
-hysteresis, the measured force, and its own past output, running free.
+Two steps: the hysteresis on the runs without load; then the network, which takes in the hysteresis, the
+measured force, and its own past output, running free.
 
 Source: "High-Precision Displacement and Force Hybrid Modeling of Pneumatic Artificial Muscle Using 3D
 PI-NARMAX Model", Sections 3 and 4.
@@ -50,6 +50,9 @@ FAR = 100.0
 SEARCH_SAMPLES = 6000
 """Samples of all runs on which the swarm compares free runs, from the start of each."""
 
+UNLOADED = 0.05
+"""A run is without load where its largest stays below this share of the largest of all runs."""
+
 FREE = "displacement_free"
 """Name of what the hysteresis gives to the network."""
 
@@ -78,8 +81,13 @@ class MPINarmaxEstimator(CoupledEstimator):
     output_lags, input_lags, scheduling_lags : int
         n_a, n_b and n_c.
     memory : {"mpi", "rdpi"}
-        Hysteresis in front: without rate, or with weights by rate as in the paper, which leads astray
-        where the runs under load are faster than the one without.
+        Hysteresis in front: without rate, or with weights by rate as in the paper. It is identified on
+        all runs without load, or on the one under the least: weights by rate need runs of several
+        rates, since along one sine the rate follows from place and direction.
+    learns_from : {"all", "loaded"}
+        Runs that the network learns from: all, or as in the paper those under a load only.
+    constants : bool
+        Whether a consequent has a constant; the paper's fourth layer has none.
     method : {"pso", "ls", "trust-region"}
         Antecedents and feedbacks by the paper's particle swarm; even and none; or refined from those on
         the free-running error, over ever longer parts of the runs. Consequents by least squares always.
@@ -94,6 +102,8 @@ class MPINarmaxEstimator(CoupledEstimator):
     input_lags: Annotated[int, Interval(ge=0, le=3)] = 0
     scheduling_lags: Annotated[int, Interval(ge=0, le=3)] = 0
     memory: Literal["mpi", "rdpi"] = "mpi"
+    learns_from: Literal["all", "loaded"] = "all"
+    constants: bool = True
     method: Literal["pso", "ls", "trust-region"] = "pso"
     ridge: Annotated[float, Gt(0)] = 1e-4
 
@@ -108,8 +118,10 @@ class MPINarmaxEstimator(CoupledEstimator):
         if len({run.sample_time for run in data.runs}) > 1 or data.runs[0].sample_time is None:
             raise DataError("the runs differ in sample time", remedy="resample them to one")
         tell(0.0, "hysteresis")
-        hysteresis = self.hysteresis(data)
-        problem = _Problem.of(self, data, hysteresis)
+        free, loaded = _parted(data)
+        hysteresis = self.hysteresis(free)
+        known = loaded if self.learns_from == "loaded" and loaded.runs else data
+        problem = _Problem.of(self, known, hysteresis)
         low, high = problem.ranges
         even = Sets.even(low, high, self.n_sets)
         still = np.zeros_like(even.centres)
@@ -123,19 +135,34 @@ class MPINarmaxEstimator(CoupledEstimator):
         return Series((hysteresis, network))
 
     def hysteresis(self, data: CoupledData) -> Block:
-        """Return the hysteresis, from the run under the least load."""
-        run = min(data.runs, key=lambda run: float(np.abs(run.scheduled).max()))
+        """Return the hysteresis from runs without load."""
         u, y = data.pressures[0], data.displacements[0]
-        recording = Recording(
-            {u.name: run.pressures[:, 0], FREE: run.displacements[:, 0]},
-            run.sample_time,
-            {u.name: u.unit, FREE: y.unit},
-        )
+        recordings = [
+            Recording(
+                {u.name: run.pressures[:, 0], FREE: run.displacements[:, 0]},
+                run.sample_time,
+                {u.name: u.unit, FREE: y.unit},
+            )
+            for run in data.runs
+        ]
         settings = {"input": u.name, "output": FREE, "seed": self.seed}
         if self.memory == "rdpi":
-            settings["rate_time_constant"] = 5.0 * (run.sample_time or 0.0)
-        block: Block = registry.load("estimators", self.memory)(**settings).fit(recording).model_
+            settings["rate_time_constant"] = 5.0 * (data.runs[0].sample_time or 0.0)
+        block: Block = registry.load("estimators", self.memory)(**settings).fit(recordings).model_
         return block
+
+
+def _parted(data: CoupledData) -> tuple[CoupledData, CoupledData]:
+    """Return the runs without load, at least the one under the least, and all others."""
+    largest = np.array([np.abs(run.scheduled).max(axis=0) for run in data.runs])
+    shares = (largest / np.maximum(largest.max(axis=0), 1e-300)).max(axis=1)
+    free = shares <= max(UNLOADED, float(shares.min()))
+
+    def those(wanted: NDArray[np.bool_]) -> CoupledData:
+        runs = tuple(run for run, is_one in zip(data.runs, wanted, strict=True) if is_one)
+        return replace(data, runs=runs)
+
+    return those(free), those(~free)
 
 
 @dataclass(frozen=True)
@@ -184,7 +211,8 @@ class _Problem:
         self, sets: Sets, feedbacks: Array, pasts: tuple[Array, ...]
     ) -> RecurrentFuzzyNetwork:
         """Return the network whose consequents are solved for with given past outputs."""
-        solver = Consequents(constants=True, ridge=self.estimator.ridge)
+        constants = self.estimator.constants
+        solver = Consequents(constants=constants, ridge=self.estimator.ridge)
         gram: Array | float = 0.0
         right: Array | float = 0.0
         n_terms = 0
@@ -194,11 +222,13 @@ class _Problem:
             remembered(x, sets.centres, sets.widths, feedbacks, phi)
             fired = firing(phi)
             fired = fired / np.maximum(fired.sum(axis=1, keepdims=True), 1e-290)
-            columns = regressors(x, fired, constants=True)
+            columns = regressors(x, fired, constants=constants)
             gram = gram + columns.T @ columns
             right = right + columns.T @ y[:, np.newaxis]
-            n_terms = x.shape[1] + 1
+            n_terms = x.shape[1] + constants
         consequents = solver.solve(np.asarray(gram), np.asarray(right), n_terms)
+        if not constants:
+            consequents = np.pad(consequents.reshape(-1, n_terms), ((0, 0), (0, 1)))
         e = self.estimator
         return RecurrentFuzzyNetwork(
             rows(sets.centres),

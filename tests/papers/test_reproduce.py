@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
-from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -14,13 +11,6 @@ from mckibben.errors import ModelError
 from mckibben.papers import reproduce
 from tests.cli.conftest import Cli
 from tests.cli.conftest import cli as cli  # a fixture
-
-
-def number(found: dict[str, Any], pattern: str) -> float:
-    text = " ".join(found["summary"])
-    match = re.search(pattern, text)
-    assert match, text
-    return float(match.group(1))
 
 
 def test_list_names_every_paper(cli: Cli) -> None:

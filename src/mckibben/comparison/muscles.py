@@ -37,6 +37,9 @@ QUICK = ("coupled-memory", "coupled-pi", "force-balance")
 HELD_OUT = 3
 """Every so many-th level of what schedules, or run, is held out where no test runs are given."""
 
+ENOUGH = 12
+"""Fewest training runs of which a third can be spared: of a few, each shows what no other does."""
+
 TAIL = 0.25
 """Share of every run that is held out to choose on, where there are too few runs to leave any out."""
 
@@ -338,14 +341,14 @@ def validation_of(train: Sequence[Recording], given: Sequence[Recording] = ()) -
 
     Runs given for it are not fitted to, so that a model is scored as it is. Else it is fitted three
     times more, each time without every third run, and scored on those; not on runs whose pressures or
-    loads go beyond what is left, where no model is asked to know anything. Of fewer runs than three,
+    loads go beyond what is left, where no model is asked to know anything. Of fewer runs than twelve,
     the last quarter of each is left out of one more fit.
     """
     if given:
         scored = tuple((run, 0) for run in given)
         return Validation(((None, scored),), f"{len(scored)} validation runs")
     parts = []
-    if len(train) >= HELD_OUT:
+    if len(train) >= ENOUGH:
         for first in range(HELD_OUT):
             kept = tuple(run for place, run in enumerate(train) if place % HELD_OUT != first)
             left = tuple((run, 0) for run in train[first::HELD_OUT] if _within(run, kept))

@@ -264,7 +264,9 @@ def plan_of(
     recordings, tests, notes = made_manageable(recordings, tests, input, most_samples)
     split = given_split(recordings, tests) if tests else held_out_tail(recordings, input, HELD_OUT)
     parts, chosen_by = validation_folds(split.train, input, n_folds)
-    validated = f", cross-validated in {len(parts)} parts" if len(parts) > 1 else ""
+    validated = ""
+    if chosen_by == "cross-validation":
+        validated = f", cross-validated on {len(parts)} part(s) within the range of the rest"
     chosen, left_out = _chosen(models, [*recordings, *tests], input, output)
     if not chosen:
         raise ModelError(

@@ -202,7 +202,7 @@ def _leaderboard(desk: Desk) -> None:
     def shown() -> None:
         rows = [_row(result) for result in desk.workspace.results()]
         if not rows:
-            ui.label("Fit models to see them ranked here.").classes("opacity-70")
+            ui.label("Fit models to see them compared here.").classes("opacity-70")
             return
         table = named(
             ui.table(

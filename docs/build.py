@@ -15,9 +15,8 @@ import re
 import runpy
 import shutil
 import sys
-import tomllib
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +24,7 @@ import numpy as np
 
 import mckibben
 from mckibben import registry
+from mckibben.comparison.limits import limits
 from mckibben.errors import MckibbenError
 
 DOCS = Path(__file__).parent
@@ -163,17 +163,13 @@ def inverse_of(block: Any) -> str:
 
 def write_models() -> None:
     """Write a page for every model of one muscle, with a picture of it fitted to a virtual rig."""
-    limits = tomllib.loads((DOCS / "models" / "limits.toml").read_text(encoding="utf-8"))
     names = registry.names("estimators")
-    missing = set(names) ^ set(limits)
-    if missing:
-        sys.exit(f"docs/models/limits.toml and the registry differ: {sorted(missing)}")
     data, cost = recordings(), costs()
     listed = []
     for name in names:
-        write_model(name, limits[name], data, cost)
+        write_model(name, limits()[name], data, cost)
         summary = inspect.getdoc(registry.load("estimators", name)).splitlines()[0]
-        listed.append(f"| [{name}]({name}.md) | {summary} | {limits[name]['can']} |")
+        listed.append(f"| [{name}]({name}.md) | {summary} | {limits()[name]['can']} |")
     head = "# Models\n\nOne page each; those of several muscles are in "
     head += "[the API reference](../api/estimators.md).\n\n"
     head += "| model | what it is | what for |\n|---|---|---|\n"
@@ -183,7 +179,7 @@ def write_models() -> None:
 
 def write_model(
     name: str,
-    limits: dict[str, str],
+    known: Mapping[str, str],
     data: dict[tuple[str, str], list[Any]],
     cost: dict[str, list[str]],
 ) -> None:
@@ -209,11 +205,13 @@ def write_model(
         "",
         summary,
         "",
-        f"**Can**: {limits['can']}",
+        f"**Can**: {known['can']}",
         "",
-        f"**Cannot**: {limits['cannot']}",
+        f"**Cannot**: {known['cannot']}",
         "",
     ]
+    if "caution" in known:
+        lines += [f"**Good only near the motions it was trained on**: {known['caution']}.", ""]
     lines += [f"![{name} fitted to a virtual rig]({name}.png)", ""]
     lines += [
         "*Fitted to a short recording of a virtual rig, running free.*",

@@ -49,7 +49,7 @@ def test_an_empty_workspace_says_what_to_do_first(tmp_path: Path) -> None:
         await user.should_see(marker="example")
         for tab, text in (
             ("tab-look", "Add recordings with an input and an output first"),
-            ("tab-models", "Fit models to see them ranked here."),
+            ("tab-models", "Fit models to see them compared here."),
             ("tab-compensate", "Fit a model that can be inverted first"),
             ("tab-take", "Fit a model first"),
         ):

@@ -126,10 +126,11 @@ def test_a_place_that_cannot_be_a_workspace_is_named(tmp_path: Path) -> None:
         Workspace(tmp_path / "file")
 
 
-def test_results_are_ranked(tmp_path: Path) -> None:
+def test_results_are_in_the_order_of_the_choice(tmp_path: Path) -> None:
     workspace = Workspace(tmp_path)
-    for name, rmse in (("a", 2.0), ("b", 1.0)):
-        workspace.write_json("results", name, {"status": "ok", "test": {"rmse": rmse}})
+    for name, tested, validated in (("a", 2.0, 0.2), ("b", 1.0, 0.3), ("d", 0.1, None)):
+        content = {"status": "ok", "test": {"rmse": tested}, "validation_rmse": validated}
+        workspace.write_json("results", name, content)
     workspace.write_json("results", "c", {"status": "failed"})
-    assert [row["name"] for row in workspace.results()] == ["b", "a"]
+    assert [row["name"] for row in workspace.results()] == ["a", "b", "d"]
     assert json.loads((tmp_path / "results" / "a.json").read_text())["test"]["rmse"] == 2.0

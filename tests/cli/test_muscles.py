@@ -61,7 +61,11 @@ def test_study_of_a_folder_closes_the_loop(cli: Cli, arm: Path, tmp_path: Path) 
     result = cli("study", arm, "-o", out, "--models", "force-balance,coupled-pi", "--json")
     assert result.code == 0, result.err
     found = json.loads(result.out)
-    assert found["inverse"] == "force-balance"
+    assert found["inverse"] == found["chosen"] == "force-balance"
+    first, second = found["rows"]
+    assert np.mean(list(first["validation"].values())) < np.mean(
+        list(second["validation"].values())
+    )
     assert "1.2 bar held out" in found["split"]
     errors = {name: max(rmse.values()) for name, rmse in found["tracking"].items()}
     assert errors["force-balance inverse + PID"] < errors["force-balance inverse"]

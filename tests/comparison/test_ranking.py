@@ -23,8 +23,8 @@ from mckibben import (
     compare,
     registry,
 )
-from mckibben.comparison.results import Leaderboard, Standing
-from mckibben.comparison.splits import folds, given_split, held_out_tail
+from mckibben.comparison.results import CHOICES, Leaderboard, Standing
+from mckibben.comparison.splits import folds, given_split, held_out_tail, validation_folds
 from mckibben.comparison.trying import Data, errors_on_test, joined, parts_of, try_part
 from mckibben.estimators.base import Estimator
 from mckibben.signals import irregular_triangle, triangle
@@ -54,7 +54,7 @@ def without_times(board: Any) -> list[dict[str, Any]]:
 
 
 def test_leaderboard_has_the_promised_form(train: Recording, test_set: Recording) -> None:
-    board = compare(train, test_set, models=["pi", "gpi"], n_folds=2, jobs=1)
+    board = compare(train, test_set, models=["pi", "gpi"], jobs=1)
     content = json.loads(json.dumps(board.to_dict(), allow_nan=False))
     assert content["input"] == "pressure"
     assert content["output"] == "displacement"
@@ -68,8 +68,78 @@ def test_leaderboard_has_the_promised_form(train: Recording, test_set: Recording
         assert low <= row["test"]["rmse"] <= high
     best, other = content["rows"]
     assert best["test"]["rmse"] < 0.1 < other["test"]["rmse"]
-    assert best["test"]["difference_to_best_interval"] == [0.0, 0.0]
-    assert other["test"]["difference_to_best_interval"][0] > 0
+    assert best["test"]["difference_to_chosen_interval"] == [0.0, 0.0]
+    assert other["test"]["difference_to_chosen_interval"][0] > 0
+    assert [row["test"]["rank"] for row in content["rows"]] == [1, 2]
+    assert (content["chosen_by"], content["chosen"]) == ("cross-validation", "gpi")
+    assert content["lowest_on_test"] == "gpi"
+
+
+def test_the_choice_is_the_same_whatever_the_test(train: Recording, test_set: Recording) -> None:
+    backwards = test_set.with_channels(displacement=test_set["displacement"][::-1])
+    boards = [
+        compare(train, test, models=["pi", "mpi", "maxwell-slip"], jobs=1)
+        for test in (test_set, backwards, recorded(test_set["pressure"][::-1].copy(), 7))
+    ]
+    assert len({tuple(row.model for row in board.rows) for board in boards}) == 1
+    assert len({tuple(row.validation_rmse for row in board.rows) for board in boards}) == 1
+    assert len({tuple(row.test_rank for row in board.rows) for board in boards}) > 1
+
+
+@pytest.mark.parametrize(
+    ("n_folds", "chosen_by"), [(4, "cross-validation"), (1, "validation"), (0, "fit")]
+)
+def test_the_choice_has_the_least_error_of_what_it_is_by(
+    train: Recording, test_set: Recording, n_folds: int, chosen_by: str
+) -> None:
+    board = compare(train, test_set, models=["pi", "mpi"], n_folds=n_folds, jobs=1)
+    assert board.chosen_by == chosen_by
+    assert board.chosen.startswith(f"Chosen by {CHOICES[chosen_by][1]}: {board.rows[0].model}")
+    for row in board.rows:
+        assert (row.validation_rmse is None) == (chosen_by == "fit")
+    assert board.rows[0].order < board.rows[1].order
+
+
+def test_too_few_cycles_are_held_out_at_the_end_and_too_few_samples_not_at_all() -> None:
+    rising = np.linspace(0, 5, 200)
+    parts, chosen_by = validation_folds([recorded(rising)], "pressure", 4)
+    assert (len(parts), chosen_by) == (1, "validation")
+    (scored,) = parts[0].test_rows
+    assert scored[-50:].all()
+    assert len(parts[0].train[0]) == 200 - int(scored.sum())
+    assert validation_folds([recorded(rising[::20])], "pressure", 4) == ((), "fit")
+
+
+def test_a_part_that_goes_beyond_the_rest_does_not_decide(train: Recording) -> None:
+    parts, _ = validation_folds([train], "pressure", 4)
+    assert len(parts) == 3
+    for part in parts:
+        assert train["pressure"][part.test_rows[0]].max() < train["pressure"].max()
+    assert len(validation_folds([recorded(triangle(TIME, 4.0, 5.0))], "pressure", 4)[0]) == 4
+
+
+def test_a_model_whose_cross_validation_failed_is_chosen_only_where_all_did(
+    train: Recording, test_set: Recording
+) -> None:
+    board = compare(train, test_set, models=["pi", "mpi"], n_folds=2, jobs=1)
+    rows = [replace(row, validation_rmse=None) for row in board.rows]
+    assert min(rows[0], board.rows[1], key=lambda row: row.order) is board.rows[1]
+    neither = replace(board, rows=tuple(sorted(rows, key=lambda row: row.order)))
+    assert neither.best is not None
+    assert "for want of a validation that did not fail" in neither.chosen
+
+
+def test_a_test_that_was_fitted_is_pointed_out(train: Recording, test_set: Recording) -> None:
+    board = compare(train, [test_set, train], models=["pi"], n_folds=0, jobs=1)
+    assert [note for note in board.notes if "says nothing of new data" in note] == list(board.notes)
+    assert len(board.notes) == 1
+
+
+def test_what_is_good_only_near_its_training_says_so(train: Recording, test_set: Recording) -> None:
+    board = compare(train, test_set, models=["pi", "narx"], n_folds=0, jobs=1)
+    cautions = {row["model"]: row.get("caution") for row in board.to_dict()["rows"]}
+    assert cautions["pi"] is None
+    assert "leaves all bounds" in cautions["narx"]
 
 
 def test_same_seed_same_table_whatever_the_number_of_processes(
@@ -219,7 +289,7 @@ def test_progress_reads_as_a_person_would_say_it(train: Recording, test_set: Rec
         (1, ("gpi",)),
         (2, ()),
     ]
-    assert str(told[2]).startswith("1 of 2, fitting gpi; best so far pi ")
+    assert str(told[2]).startswith("1 of 2, fitting gpi; best so far pi, fit RMSE ")
     assert str(told[2]).endswith(" mm")
 
 
@@ -369,7 +439,7 @@ def test_parts_of_a_model_make_the_same_row(
 ) -> None:
     data = Data(
         given_split([train], [test_set]),
-        tuple(folds([train], "pressure", 3)),
+        validation_folds([train], "pressure", 4)[0],
         "pressure",
         "displacement",
     )
@@ -388,7 +458,7 @@ def test_parts_of_a_model_make_the_same_row(
     assert isinstance(row.block, PI)
     errors = errors_on_test(tried.outputs, data)
     assert row.test.rmse == pytest.approx(float(np.sqrt(np.mean(errors**2))))
-    alone = compare(train, test_set, models=["pi"], n_folds=3, jobs=1).rows[0]
+    alone = compare(train, test_set, models=["pi"], jobs=1).rows[0]
     assert row.validation_rmse == alone.validation_rmse
     assert row.block == alone.block
 

@@ -11,6 +11,7 @@ import pytest
 
 import mckibben
 from mckibben import registry
+from mckibben.comparison.limits import limits
 
 EXPORTED = [
     name
@@ -74,13 +75,17 @@ def test_every_plugin_documents_its_arguments(group: str, name: str) -> None:
     check(registry.load(group, name), f"{group} {name}")
 
 
-@pytest.mark.parametrize("name", registry.names("estimators"))
-def test_every_model_says_what_it_can_and_cannot(name: str) -> None:
-    import tomllib
-    from pathlib import Path
+MODELS = (*registry.names("estimators"), *registry.names("coupled"))
 
-    path = Path(__file__).parents[2] / "docs" / "models" / "limits.toml"
-    limits = tomllib.loads(path.read_text(encoding="utf-8"))
-    assert set(limits) == set(registry.names("estimators"))
-    assert limits[name]["can"].endswith(".")
-    assert limits[name]["cannot"].endswith(".")
+
+def test_every_model_has_its_limits_and_nothing_else_has() -> None:
+    assert sorted(limits()) == sorted(MODELS)
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_every_model_says_what_it_can_and_cannot(name: str) -> None:
+    known = limits()[name]
+    assert set(known) <= {"can", "cannot", "caution"}
+    assert known["can"].endswith(".")
+    assert known["cannot"].endswith(".")
+    assert not known.get("caution", "").endswith(".")

@@ -62,7 +62,7 @@ def test_an_interrupted_fit_is_not_kept(
 
 
 def test_rows_of_several_muscles_are_read_back(tmp_path: Path) -> None:
-    row = MuscleRow("a", 3, 0.1, {"y": 0.1}, {"y": 1 / 3}, float("inf"), GPI.example())
+    row = MuscleRow("a", 3, 0.1, {"y": 0.1}, {"y": 0.2}, {"y": 1 / 3}, block=GPI.example())
     Kept(tmp_path).put("a", row)
     assert Kept(tmp_path).get("a", MuscleRow) == row
 

@@ -40,7 +40,8 @@ def test_the_verdict_names_the_model_its_error_with_unit_and_range_and_the_inver
     assert best is not None
     assert best.test is not None
     words = " ".join(verdict(found))
-    assert "best of 4 models is gpi" in words
+    assert "Chosen by cross-validation on the training side: gpi" in words
+    assert "neither fitted to nor chosen by, gpi is off by" in words
     assert f"{number(best.test.rmse)} mm" in words
     assert "% of the measured range" in words
     assert "It can be inverted" in words
@@ -50,9 +51,18 @@ def test_another_model_may_be_the_one_to_invert() -> None:
     found = study()
     assert found.inverse is not None
     other = replace(found, inverse=replace(found.inverse, model="pi"))
-    assert "the best model that can is pi" in " ".join(verdict(other))
+    assert "the next of the leaderboard that can is pi" in " ".join(verdict(other))
     none = replace(found, inverse=None)
     assert "None of the models that worked can be inverted" in " ".join(verdict(none))
+
+
+def test_another_model_with_the_lowest_test_error_is_named_beside_the_choice() -> None:
+    found = study()
+    first, second, *others = found.leaderboard.rows
+    swapped = replace(found, leaderboard=replace(found.leaderboard, rows=(second, first, *others)))
+    words = verdict(swapped)[0]
+    assert f": {second.model}, CV RMSE" in words
+    assert f"Lowest test RMSE: {first.model}" in words
 
 
 def test_models_that_tie_with_the_best_are_named() -> None:

@@ -20,7 +20,7 @@ def fit_call(
     settings: Mapping[str, Any],
     seed: int,
 ) -> str:
-    """Return the call that fits and ranks a model on the recordings in use."""
+    """Return the call that fits and tests a model on the recordings in use."""
     given = f", settings={ {model: dict(settings)}!r}" if settings else ""
     return (
         f"mckibben.compare(train, test, input={channels[0]!r}, output={channels[1]!r}, "
@@ -29,7 +29,7 @@ def fit_call(
 
 
 def script(workspace: Workspace, models: Sequence[str], channels: tuple[str, str]) -> str:
-    """Return a Python script that does again what was done: read, fit, rank, invert, save."""
+    """Return a Python script that does again what was done: read, fit, choose, invert, save."""
     lines = ['"""What was done in the workbench, as a script."""', "", "import mckibben", ""]
     for role in ("train", "test"):
         paths = _files(workspace, role)
@@ -47,7 +47,8 @@ def script(workspace: Workspace, models: Sequence[str], channels: tuple[str, str
     kinds = [str((workspace.read_json("results", m) or {}).get("model", m)) for m in models]
     lines.append(f"    models={kinds!r}, settings={settings!r})")
     lines += [
-        'print(board.to_frame()[["model", "test.rmse"]])',
+        'print(board.to_frame()[["model", "validation_rmse", "test.rmse"]])',
+        "print(board.chosen)",
         "",
         "for row in board.rows:",
         "    if row.block is not None:",

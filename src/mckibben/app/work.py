@@ -49,11 +49,9 @@ def fit(workspace: Workspace, given: dict[str, Any], tell: Tell) -> str:
         "call": given.get("call", ""),
     }
     workspace.write_json("results", name, result)
-    return (
-        f"test RMSE {board.best.test.rmse:.4g} {board.unit}"
-        if board.best and board.best.test
-        else ""
-    )
+    validated = "none" if row.validation_rmse is None else f"{row.validation_rmse:.4g} {board.unit}"
+    tested = "none" if row.test is None else f"{row.test.rmse:.4g} {board.unit}"
+    return f"CV RMSE {validated}, test RMSE {tested}"
 
 
 def loop(workspace: Workspace, given: dict[str, Any], tell: Tell) -> str:

@@ -314,12 +314,18 @@ class Workspace:
         return load(self.path("models", f"{name}.json"))
 
     def results(self) -> list[dict[str, Any]]:
-        """Return what is known of every model fitted, the best first."""
+        """Return what is known of every model fitted, in the order of the choice: not by the test."""
         found = []
         for name in self.names("results"):
             content = self.read_json("results", name)
             if content is not None and content.get("status") == "ok":
                 found.append(content | {"name": name})
-        return sorted(
-            found, key=lambda row: row["test"]["rmse"] if row.get("test") else float("inf")
-        )
+        return sorted(found, key=_order)
+
+
+def _order(result: dict[str, Any]) -> tuple[bool, float]:
+    """Return what results are sorted by, as the rows of a leaderboard are."""
+    validated, train = result.get("validation_rmse"), result.get("train") or {}
+    if validated is not None:
+        return False, float(validated)
+    return True, float(train.get("rmse", float("inf")))

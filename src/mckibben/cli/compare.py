@@ -1,4 +1,4 @@
-"""mckibben compare: models ranked on recordings."""
+"""mckibben compare: models chosen and tested on recordings."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def compare(
     samples: Samples = MOST_SAMPLES,
     as_json: Json = False,
 ) -> None:
-    """Fit and rank models: cross-validated, tested on data not used to fit, free-running.
+    """Fit models, choose by cross-validation, test on data used for neither; all free-running.
 
     A folder stands for all recordings in it. Ctrl-C stops at once; with -o what is finished is kept, and
     the same command goes on from there.

@@ -37,10 +37,13 @@ def told(tell: Callable[[float, str], None], last: str = "") -> Callable[[Standi
 
 
 def print_leaderboard(board: Leaderboard) -> None:
-    """Print a leaderboard as a table, then the models that failed, each with its reason.
+    """Print a leaderboard as a table, what is chosen, and what is to be said of models that failed.
 
-    Five columns, for a terminal of 80; the files have the rest.
+    Few columns, for a terminal of 80; the files have the rest.
     """
+    from mckibben.comparison.results import CHOICES
+
+    validated = board.chosen_by != "fit"
     rows = []
     for row in board.rows:
         if row.test is None:
@@ -49,18 +52,30 @@ def print_leaderboard(board: Leaderboard) -> None:
         memory = None if row.memory is None else row.memory.gap_ratio
         rows.append(
             [
-                row.model,
+                row.model + ("*" if row.caution else ""),
+                figure(row.validation_rmse if validated else row.order[1]),
                 figure(row.test.rmse),
                 f"{figure(interval[0])} to {figure(interval[1])}",
-                figure(row.validation_rmse),
+                str(row.test_rank),
                 figure(memory, 2),
             ]
         )
     unit = f" [{board.unit}]" if board.unit else ""
     print(f"Split: {board.split}.")
-    headings = [f"test RMSE{unit}", "95 % interval", f"CV RMSE{unit}", "branch gap kept"]
+    heading, _ = CHOICES[board.chosen_by]
+    headings = [f"{heading}{unit}", f"test RMSE{unit}", "95 % interval", "rank", "gap kept"]
     print_table(["model", *headings], rows)
-    print("All run free. CV: cross-validated on the training side. Gap: 1 is right, 0 forgets.")
+    print("All run free. Rank: by test RMSE. Gap between branches kept: 1 is right, 0 forgets.")
+    if board.chosen:
+        print(board.chosen)
+    careful = [row.model for row in board.rows if row.reason is None and row.caution]
+    if careful:
+        print(
+            f"* Good only near the motions fitted, however small the errors: {', '.join(careful)}."
+        )
+    for row in board.rows:
+        if row.reason is None and row.invalid:
+            print(f"{row.model}: not chosen, its {heading.split()[0]} failed: {row.invalid}")
     for row in board.rows:
         if row.reason is not None:
             print(f"{row.model}: failed, {row.reason}")

@@ -33,7 +33,7 @@ INTERRUPTED = 130
 
 app = typer.Typer(
     name="mckibben",
-    help="Hysteresis of pneumatic artificial muscles: from a recording to a ranked, saved and "
+    help="Hysteresis of pneumatic artificial muscles: from a recording to a chosen, saved and "
     "inverted model. Start with: mckibben study FILE",
     no_args_is_help=True,
     add_completion=False,

@@ -72,7 +72,7 @@ def study(
     samples: Samples = MOST_SAMPLES,
     as_json: Json = False,
 ) -> None:
-    """Say what the muscle does, rank every model, invert the best, and write a report.
+    """Say what the muscle does, choose a model by cross-validation, test, invert, and write a report.
 
     Results are written as they come. Ctrl-C stops at once, and the same command goes on from there.
 

@@ -1,10 +1,11 @@
-"""mckibben study, where there are several muscles: models ranked, the best inverted, a loop closed."""
+"""mckibben study, where there are several muscles: a model chosen, tested, inverted, a loop closed."""
 
 from __future__ import annotations
 
 import csv
 import io
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -43,9 +44,17 @@ def study_muscles(
     jobs: int | None,
     as_json: bool,
 ) -> None:
-    """Rank models of several muscles, invert the best that can be, track on the rig, and report."""
+    """Choose a model of several muscles, test it, invert the first that can be, track, and report."""
     from mckibben import registry
-    from mckibben.comparison.muscles import QUICK, compare_muscles, held_out_levels, per_load
+    from mckibben.comparison.muscles import (
+        QUICK,
+        compare_muscles,
+        held_out_levels,
+        in_order,
+        per_load,
+        validation_of,
+    )
+    from mckibben.comparison.splits import repeated
 
     train, split = list(recordings), "as given"
     if not tests:
@@ -63,8 +72,13 @@ def study_muscles(
     if isinstance(models, str):
         models = QUICK if models == "quick" else registry.names("coupled")
     given = {name: parse_settings(settings, name, group="coupled") for name in models}
+    shared = [name for name in tests[0].channels if all(name in run for run in (*train, *tests))]
     results = _Results(
-        folder, f"fitted to {len(train)} runs, tested on {len(tests)}: {split}", tests
+        folder,
+        f"fitted to {len(train)} runs, tested on {len(tests)}: {split}",
+        validation_of(train, validation).described,
+        tests,
+        repeated(train, tests, shared),
     )
     results.command = f"mckibben study FILES{'' if load is None else f' --load {load}'} -o {folder}"
     results.so_far([])
@@ -89,12 +103,20 @@ def study_muscles(
         if load is not None and rows[0].block is not None:
             tell(0.8, "one model for every load")
             driven = rows[0].block.inputs[0].name
-            single = per_load(train, tests, load=load, input=driven, seed=seed, jobs=jobs)
-            rows = tuple(sorted((*rows, *single), key=lambda row: row.mean))
+            single = per_load(
+                train,
+                tests,
+                validation=validation,
+                load=load,
+                input=driven,
+                seed=seed,
+                jobs=jobs,
+            )
+            rows = in_order((*rows, *single))
         best = next((row for row in rows if row.inverse is not None), None)
         if best is not None and plant is not None:
             tell(0.85, "closing loops")
-            best, loops = _loops(best, rows, plant, tests, seed)
+            loops = _loops(best, rows, plant, tests, seed)
     result = results.take(rows, best, loops, plant)
     if best is not None and best.inverse is not None:
         best.inverse.save(folder / "inverse.json")
@@ -106,8 +128,10 @@ def study_muscles(
         print(f"\n{table.title}")
         cells = [[_cell(cell) for cell in row] for row in table.rows]
         print_table(list(table.columns), cells)
+        if table.note:
+            print(table.note)
     print()
-    for sentence in _summary(rows, best, loops, plant):
+    for sentence in (*_summary(rows, best, loops, plant, results.chosen_on), *results.repeated):
         print(sentence)
     print(
         f"Written: {folder / 'report.html'}, leaderboard.csv, leaderboard.json, models"
@@ -121,8 +145,16 @@ class _Results:
 
     command = ""
 
-    def __init__(self, folder: Path, split: str, tests: Sequence[Recording]) -> None:
+    def __init__(
+        self,
+        folder: Path,
+        split: str,
+        chosen_on: str,
+        tests: Sequence[Recording],
+        repeated: Sequence[str],
+    ) -> None:
         self._folder, self._split, self._tests = folder, split, tests
+        self.chosen_on, self.repeated = chosen_on, repeated
         (folder / "inverse.json").unlink(missing_ok=True)  # of an earlier study
 
     def so_far(self, rows: Sequence[MuscleRow]) -> None:
@@ -143,7 +175,9 @@ class _Results:
 
         if rows:
             _write(rows, self._folder)
-        summary = _summary(rows, best, loops, plant) if whole else ["Models are being fitted."]
+        summary = ["Models are being fitted."]
+        if whole:
+            summary = _summary(rows, best, loops, plant, self.chosen_on)
         found = Reproduction(
             name="study",
             title="Several muscles: models, inverses and loops",
@@ -152,9 +186,15 @@ class _Results:
             figures=_figures(rows, self._tests, loops),
             notes=(
                 f"{self._split[0].upper()}{self._split[1:]}.",
+                f"Chosen on {self.chosen_on}: that orders the table. Nothing is chosen by the test.",
                 "Every figure is free-running, on runs not used to fit.",
+                *(
+                    f"{name}: good only near the motions fitted, {why}."
+                    for name, why in _careful(rows)
+                ),
+                *self.repeated,
             ),
-            lead="Models of muscles that move one another, ranked on runs they have not seen.",
+            lead="Models of muscles that move one another, chosen on the training side, then tested.",
             notes_title="How it was done",
             command=self.command,
         )
@@ -162,6 +202,8 @@ class _Results:
         result = {
             "folder": str(self._folder),
             "split": self._split,
+            "chosen_on": self.chosen_on,
+            "chosen": rows[0].model if rows and rows[0].block is not None else None,
             "rows": [row.to_dict() for row in rows],
             "inverse": None if best is None else best.model,
             "tracking": {name: dict(tracked.rmse) for name, tracked in loops.items()},
@@ -190,11 +232,10 @@ def _rig_of(recordings: Sequence[Recording]) -> str | None:
 
 def _loops(
     best: MuscleRow, rows: Sequence[MuscleRow], plant: str, tests: Sequence[Recording], seed: int
-) -> tuple[MuscleRow, dict[str, Tracked]]:
-    """Return what came of following a measured motion with every inverse, PID, and both.
+) -> dict[str, Tracked]:
+    """Return what came of following a measured motion with every inverse, with PID, and with both.
 
-    And the model whose inverse did best by itself: to be inverted, a model must hold where no run has
-    been, which its error in prediction does not tell.
+    Nothing is chosen by it: the model that is to predict is the one that is inverted.
     """
     from mckibben.control import Controller, Feedforward, FeedforwardPID, track, tune_pid
     from mckibben.errors import MckibbenError
@@ -222,23 +263,19 @@ def _loops(
     pid = tune_pid(rig, sample_time=step, scheduled=scheduled, seed=seed)
     found: dict[str, Tracked] = {}
 
-    def follow(name: str, controller: Controller) -> float:
-        try:
+    def follow(name: str, controller: Controller) -> None:
+        with suppress(
+            MckibbenError
+        ):  # an inverse that fails is left out; its model is in the table
             found[name] = track(controller, rig, reference, approach=5.0, seed=seed)
-        except MckibbenError:  # an inverse that fails is left out; its model is in the table
-            return float("inf")
-        return max(found[name].rmse.values())
 
-    errors = [
-        (follow(f"{row.model} inverse", Feedforward(row.inverse)), place)
-        for place, row in enumerate(rows)
-        if row.inverse is not None
-    ]
-    best = rows[min(errors)[1]]
+    for row in rows:
+        if row.inverse is not None:
+            follow(f"{row.model} inverse", Feedforward(row.inverse))
     follow("PID", pid)
     if best.inverse is not None:
         follow(f"{best.model} inverse + PID", FeedforwardPID(best.inverse, pid))
-    return best, found
+    return found
 
 
 def _write(rows: Sequence[MuscleRow], folder: Path) -> None:
@@ -248,12 +285,12 @@ def _write(rows: Sequence[MuscleRow], folder: Path) -> None:
     outputs = list(rows[0].test)
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(
-        ["model", *(f"test_rmse_{name}" for name in outputs), "worst", "n_parameters", "reason"]
-    )
+    kinds = [f"{kind}_rmse_{name}" for kind in ("validation", "test") for name in outputs]
+    writer.writerow(["model", *kinds, "test_rank", "worst", "n_parameters", "reason"])
     for row in rows:
-        errors = [row.test.get(name, "") for name in outputs]
-        writer.writerow([row.model, *errors, row.worst, row.n_parameters, row.reason or ""])
+        errors = [kind.get(name, "") for kind in (row.validation, row.test) for name in outputs]
+        reason = row.reason or row.invalid or ""
+        writer.writerow([row.model, *errors, row.test_rank, row.worst, row.n_parameters, reason])
         if row.block is not None:
             named = "".join(c if c.isalnum() or c in "-." else "-" for c in row.model)
             row.block.save(folder / "models" / f"{named}.json")
@@ -265,19 +302,31 @@ def _summary(
     best: MuscleRow | None,
     loops: Mapping[str, Tracked],
     plant: str | None,
+    chosen_on: str,
 ) -> list[str]:
-    first = rows[0]
+    first, lowest = rows[0], min(rows, key=lambda row: row.mean)
     if first.block is None:
         return [f"No model could be fitted: {first.reason}"]
+    by = f"on {chosen_on}: {first.model}, {first.mean_validation:.3g} mm RMSE"
+    if not first.validation:
+        by = f"by its fit, since no model could be validated: {first.model}"
+    other = (
+        "the lowest" if lowest is first else f"lowest there: {lowest.model}, {lowest.mean:.3g} mm"
+    )
     said = [
-        f"Best on unseen runs: {first.model}, {first.mean:.3g} mm RMSE on average over "
-        f"{len(first.test)} displacements."
+        f"Chosen {by}; on the test runs {first.mean:.3g} mm, {other}. "
+        f"All are averages over {len(first.test)} displacement(s)."
     ]
+    if first.caution is not None:
+        said.append(f"{first.model} is good only near the motions fitted: {first.caution}.")
     if best is None:
         said.append("No model here has an inverse.")
+    elif best is first:
+        said.append(f"inverse.json is the inverse of {best.model}.")
     else:
-        chosen = ", which tracked best by itself" if loops else ""
-        said.append(f"inverse.json is the inverse of {best.model}{chosen}.")
+        said.append(
+            f"{first.model} has no inverse: inverse.json is that of {best.model}, the next that has."
+        )
     if loops:
         errors = {name: max(tracked.rmse.values()) for name, tracked in loops.items()}
         listed = ", ".join(f"{name} {value:.2g} mm" for name, value in errors.items())
@@ -287,27 +336,39 @@ def _summary(
     return said
 
 
+def _careful(rows: Sequence[MuscleRow]) -> list[tuple[str, str]]:
+    return [(row.model, row.caution) for row in rows if row.block is not None and row.caution]
+
+
 def _tables(rows: Sequence[MuscleRow], loops: Mapping[str, Tracked]) -> tuple[Any, ...]:
     from mckibben.papers.reproduction import Table
 
     outputs = list(rows[0].test)
     ranked: tuple[tuple[Cell, ...], ...] = tuple(
         (
-            row.model,
+            row.model + ("*" if row.caution else ""),
+            row.mean_validation if row.validation else None,
+            row.mean if row.block is not None else None,
+            row.test_rank,
             *(row.test.get(name) for name in outputs),
             row.worst if row.block is not None else None,
             row.n_parameters,
             row.seconds,
             "yes" if row.inverse is not None else "no",
-            row.reason or "",
+            row.reason or (f"not validated: {row.invalid}" if row.invalid else ""),
         )
         for row in rows
     )
-    columns = ("model", *(f"{name} RMSE [mm]" for name in outputs))
+    careful = ", ".join(name for name, _ in _careful(rows))
     board = Table(
-        "Models on unseen runs",
-        (*columns, "largest error [mm]", "parameters", "fit [s]", "inverse", "failed because"),
+        "Models in the order of the choice, and on the test runs",
+        (
+            *("model", "validation RMSE [mm]", "test RMSE [mm]", "rank by test"),
+            *(f"{name} [mm]" for name in outputs),
+            *("largest error [mm]", "parameters", "fit [s]", "inverse", "failed because"),
+        ),
         ranked,
+        careful and f"* Good only near the motions fitted, however small the errors: {careful}.",
     )
     if not loops:
         return (board,)

@@ -1,1 +1,1 @@
-"""Models ranked on recordings: splits, scores, intervals, the memory test, the whole study."""
+"""Models chosen and tested on recordings: splits, scores, intervals, memory test, the whole study."""

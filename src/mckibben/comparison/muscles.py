@@ -1,9 +1,9 @@
-"""Models of several muscles, ranked on runs that they were not fitted to."""
+"""Models of several muscles: chosen on the training side, tested on runs used for nothing else."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -13,7 +13,9 @@ from numpy.typing import NDArray
 from mckibben import registry
 from mckibben.blocks.base import Block
 from mckibben.comparison.kept import Kept
+from mckibben.comparison.limits import caution
 from mckibben.comparison.results import Standing
+from mckibben.comparison.splits import within
 from mckibben.errors import DataError, MckibbenError
 from mckibben.estimators.search import whole_searches
 from mckibben.recording import Recording
@@ -22,8 +24,9 @@ from mckibben.workers import Tell, all_of, checked, outcomes
 
 Array = NDArray[np.float64]
 Runs = tuple[Recording, ...]
-Data = tuple[Runs, Runs, Runs]
-"""To fit, to test on, and to validate with."""
+
+Scored = tuple[Recording, int]
+"""A run, and its first sample that is scored."""
 
 Item = tuple[str, Mapping[str, Any]]
 """A model's short name, and its settings."""
@@ -33,6 +36,47 @@ QUICK = ("coupled-memory", "coupled-pi", "force-balance")
 
 HELD_OUT = 3
 """Every so many-th level of what schedules, or run, is held out where no test runs are given."""
+
+ENOUGH = 12
+"""Fewest training runs of which a third can be spared: of a few, each shows what no other does."""
+
+TAIL = 0.25
+"""Share of every run that is held out to choose on, where there are too few runs to leave any out."""
+
+
+@dataclass(frozen=True)
+class Validation:
+    """What models are chosen on, within the training side.
+
+    Parameters
+    ----------
+    parts : tuple of (tuple of Recording or None, tuple of (Recording, int))
+        What is fitted for it, None where the model that is to be tested has not seen the runs; and the
+        runs, each with its first sample that is scored.
+    described : str
+        In words.
+    """
+
+    parts: tuple[tuple[Runs | None, tuple[Scored, ...]], ...]
+    described: str
+
+
+@dataclass(frozen=True)
+class Data:
+    """What all models are given.
+
+    Parameters
+    ----------
+    train, test, early : tuple of Recording
+        To fit, to test on, and to stop searches early.
+    validation : Validation
+        To choose on.
+    """
+
+    train: Runs
+    test: Runs
+    early: Runs
+    validation: Validation
 
 
 @dataclass(frozen=True)
@@ -46,8 +90,8 @@ class MuscleRow:
     n_parameters : int
     seconds : float
         Of the fit.
-    train, test : mapping of str to float
-        Free-running RMSE of every displacement [mm].
+    train, validation, test : mapping of str to float
+        Free-running RMSE of every displacement [mm]; validation is what models are chosen by.
     worst : float
         Largest error on the test runs [mm].
     block : Block or None
@@ -55,6 +99,10 @@ class MuscleRow:
         Where it has one.
     reason : str or None
         Why it failed.
+    invalid : str or None
+        Why it could not be validated, and so is not chosen unless nothing else can be.
+    test_rank : int or None
+        Place by mean test RMSE, from 1; nothing is chosen by it.
     """
 
     __pydantic_config__: ClassVar[dict[str, bool]] = {"arbitrary_types_allowed": True}
@@ -63,16 +111,34 @@ class MuscleRow:
     n_parameters: int = 0
     seconds: float = 0.0
     train: Mapping[str, float] = field(default_factory=dict)
+    validation: Mapping[str, float] = field(default_factory=dict)
     test: Mapping[str, float] = field(default_factory=dict)
     worst: float = float("inf")
     block: Block | None = None
     inverse: Block | None = None
     reason: str | None = None
+    invalid: str | None = None
+    test_rank: int | None = None
 
     @property
     def mean(self) -> float:
         """Mean test RMSE over all displacements [mm]."""
-        return float(np.mean(list(self.test.values()))) if self.test else float("inf")
+        return _mean(self.test)
+
+    @property
+    def mean_validation(self) -> float:
+        """Mean validation RMSE over all displacements [mm], infinite where there is none."""
+        return _mean(self.validation)
+
+    @property
+    def order(self) -> tuple[bool, float, float]:
+        """What rows are sorted by: those that failed last, else by validation; not by the test."""
+        return self.block is None, self.mean_validation, _mean(self.train)
+
+    @property
+    def caution(self) -> str | None:
+        """Why the model is good only near what it was trained on, or None."""
+        return caution(self.model)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the row as ``leaderboard.json`` holds it."""
@@ -81,10 +147,14 @@ class MuscleRow:
             "n_parameters": self.n_parameters,
             "fit_seconds": self.seconds,
             "train": dict(self.train),
+            "validation": dict(self.validation),
             "test": dict(self.test),
+            "test_rank": self.test_rank,
             "worst": self.worst if np.isfinite(self.worst) else None,
             "invertible": self.inverse is not None,
             "reason": self.reason,
+            "invalid": self.invalid,
+            "caution": self.caution,
         }
 
 
@@ -101,14 +171,14 @@ def compare_muscles(
     progress: Callable[[Standing], None] | None = None,
     found: Callable[[tuple[MuscleRow, ...]], None] | None = None,
 ) -> tuple[MuscleRow, ...]:
-    """Fit models of several muscles and rank them on other runs, free-running.
+    """Fit models of several muscles, choose one within the training side, and test all, free-running.
 
     Parameters
     ----------
     train, test : sequence of Recording
         Channels ``pressure_1`` ..., ``displacement_1`` ... and what schedules.
     validation : sequence of Recording
-        To stop searches early.
+        To stop searches early, and to choose on; without any, see `validation_of`.
     models : "all", "quick" or sequence of str
         Short names.
     settings : mapping of str to mapping, optional
@@ -128,7 +198,8 @@ def compare_muscles(
     Returns
     -------
     tuple of MuscleRow
-        Best first; models that failed last, with their reasons.
+        By validation error, so that the first is the choice; models that failed last, with their
+        reasons.
 
     Raises
     ------
@@ -143,7 +214,7 @@ def compare_muscles(
         (name, {"seed": seed} | dict((settings or {}).get(name, {})))
         for name in sorted(names, key=efforts.__getitem__)
     ]
-    data = (tuple(train), tuple(test), tuple(validation))
+    data = Data(tuple(train), tuple(test), tuple(validation), validation_of(train, validation))
     kept = Kept(folder, data)
     found_before = {name: kept.get(name, MuscleRow, own) for name, own in items}
     rows = {
@@ -155,14 +226,16 @@ def compare_muscles(
     begun: list[str] = []
 
     def ranked() -> tuple[MuscleRow, ...]:
-        return tuple(sorted(rows.values(), key=lambda row: row.mean))
+        return in_order(rows.values())
 
     def told(index: int, *_: Any) -> None:
         begun.append(remaining[index][0])
         tell()
 
     def tell() -> None:
-        best = next((f"{row.model} {row.mean:.3g} mm" for row in ranked() if row.block), "")
+        best = next(
+            (f"{row.model}, validation RMSE {row.mean_validation:.3g} mm" for row in ranked()), ""
+        )
         fitting = tuple(name for name in begun if name not in rows)
         if progress is not None:
             progress(Standing(len(rows), len(items), fitting, best))
@@ -182,10 +255,11 @@ def compare_muscles(
 
 def _try(data: Data, item: Item, tell: Tell) -> MuscleRow:
     del tell
-    (train, test, validation), (name, settings) = data, item
+    name, settings = item
     try:
         estimator = registry.load("coupled", name)(**settings)
-        return _row(name, estimator.fit(list(train), validation=list(validation)), test)
+        row = _row(name, estimator.fit(list(data.train), validation=list(data.early)), data.test)
+        return _validated(row, settings, data.validation)
     except MckibbenError as error:
         return MuscleRow(name, reason=str(error))
     except Exception as error:  # one model must not take the comparison down, whatever it does
@@ -195,13 +269,7 @@ def _try(data: Data, item: Item, tell: Tell) -> MuscleRow:
 def _row(name: str, estimator: Any, test: Sequence[Recording]) -> MuscleRow:
     block: Block = estimator.model_
     names = [channel.name for channel in block.outputs]
-    outputs = [block.simulate(recording) for recording in test]
-    errors = {
-        channel: np.concatenate(
-            [out[channel] - run[channel] for out, run in zip(outputs, test, strict=True)]
-        )
-        for channel in names
-    }
+    errors = _errors(block, [(run, 0) for run in test])
     try:
         inverse: Block | None = block.inverse()
     except MckibbenError:
@@ -211,10 +279,100 @@ def _row(name: str, estimator: Any, test: Sequence[Recording]) -> MuscleRow:
         block.n_parameters,
         estimator.diagnostics_.seconds,
         dict(zip(names, estimator.diagnostics_.rmse, strict=True)),
-        {channel: float(np.sqrt(np.mean(error**2))) for channel, error in errors.items()},
-        float(max(np.abs(error).max() for error in errors.values())),
-        block,
-        inverse,
+        test={name: _rms(error) for name, error in errors.items()},
+        worst=float(max(np.abs(error).max() for error in errors.values())),
+        block=block,
+        inverse=inverse,
+    )
+
+
+def _validated(row: MuscleRow, settings: Mapping[str, Any], on: Validation) -> MuscleRow:
+    """Return a row with its validation error, or why there is none."""
+    errors: list[dict[str, Array]] = []
+    try:
+        for fitted, runs in on.parts:
+            block = row.block
+            if fitted is not None:
+                block = registry.load("coupled", row.model)(**settings).fit(list(fitted)).model_
+            assert block is not None
+            errors.append(_errors(block, runs))
+    except MckibbenError as error:  # a part of the runs may be too little where all are enough
+        return replace(row, invalid=str(error))
+    names = row.test
+    return replace(
+        row, validation={name: _rms(np.concatenate([e[name] for e in errors])) for name in names}
+    )
+
+
+def _errors(block: Block, runs: Sequence[Scored]) -> dict[str, Array]:
+    """Return the errors of every output on runs, free-running, from their first sample that counts."""
+    outputs = [block.simulate(run) for run, _ in runs]
+    return {
+        name: np.concatenate(
+            [
+                (out[name] - run[name])[start:]
+                for out, (run, start) in zip(outputs, runs, strict=True)
+            ]
+        )
+        for name in (channel.name for channel in block.outputs)
+    }
+
+
+def _rms(errors: Array) -> float:
+    return float(np.sqrt(np.mean(errors**2)))
+
+
+def _mean(errors: Mapping[str, float]) -> float:
+    return float(np.mean(list(errors.values()))) if errors else float("inf")
+
+
+def in_order(rows: Iterable[MuscleRow]) -> tuple[MuscleRow, ...]:
+    """Return rows in the order of the choice, each with its rank by test."""
+    listed = sorted(rows, key=lambda row: row.order)
+    by_test = sorted(row.mean for row in listed)
+    return tuple(
+        replace(row, test_rank=None if row.block is None else 1 + by_test.index(row.mean))
+        for row in listed
+    )
+
+
+def validation_of(train: Sequence[Recording], given: Sequence[Recording] = ()) -> Validation:
+    """Return what models are chosen on: given runs, the training runs in turn, or the end of each.
+
+    Runs given for it are not fitted to, so that a model is scored as it is. Else it is fitted three
+    times more, each time without every third run, and scored on those; not on runs whose pressures or
+    loads go beyond what is left, where no model is asked to know anything. Of fewer runs than twelve,
+    the last quarter of each is left out of one more fit.
+    """
+    if given:
+        scored = tuple((run, 0) for run in given)
+        return Validation(((None, scored),), f"{len(scored)} validation runs")
+    parts = []
+    if len(train) >= ENOUGH:
+        for first in range(HELD_OUT):
+            kept = tuple(run for place, run in enumerate(train) if place % HELD_OUT != first)
+            left = tuple((run, 0) for run in train[first::HELD_OUT] if _within(run, kept))
+            if left:
+                parts.append((kept, left))
+    if parts:
+        n = sum(len(left) for _, left in parts)
+        return Validation(
+            tuple(parts), f"{n} of {len(train)} training runs, left in turn out of fits for it"
+        )
+    starts = [len(run) - round(TAIL * len(run)) for run in train]
+    fitted = tuple(run.slice(0, start) for run, start in zip(train, starts, strict=True))
+    return Validation(
+        ((fitted, tuple(zip(train, starts, strict=True))),),
+        "the last quarter of every training run, left out of a fit for it",
+    )
+
+
+def _within(run: Recording, others: Sequence[Recording]) -> bool:
+    """Tell whether the inputs of a run stay within the range of those of others, nearly."""
+    return all(
+        within(run[name], np.concatenate([other[name] for other in others]))
+        for name in run.channels
+        if not name.startswith("displacement") and all(name in other for other in others)
     )
 
 
@@ -244,6 +402,7 @@ def per_load(
     train: Sequence[Recording],
     test: Sequence[Recording],
     *,
+    validation: Sequence[Recording] = (),
     load: str = "force",
     input: str = "voltage",  # noqa: A002
     output: str = "displacement",
@@ -257,6 +416,8 @@ def per_load(
     ----------
     train, test : sequence of Recording
         Each training run is taken to be at its mean load.
+    validation : sequence of Recording
+        As for `compare_muscles`; the run that a model is fitted to is left out.
     load, input, output : str
         Channels.
     model : str
@@ -268,27 +429,33 @@ def per_load(
     """
     names = [f"{model} at {run[load].mean():.0f} {run.units[load]} ({run.name})" for run in train]
     how = {"input": input, "output": output, "seed": seed}
-    items = [(name, model, how, run, tuple(test)) for name, run in zip(names, train, strict=True)]
+    checks = [scored for _, left in validation_of(train, validation).parts for scored in left]
+    items = [
+        (name, model, how, run, tuple((r, s) for r, s in checks if r is not run), tuple(test))
+        for name, run in zip(names, train, strict=True)
+    ]
     return tuple(all_of(_try_single, items, jobs))
 
 
 def _try_single(common: None, item: Any, tell: Tell) -> MuscleRow:
     del common, tell
-    name, model, how, run, test = item
+    name, model, how, run, checks, test = item
     output = how["output"]
     try:
         with whole_searches():
             estimator = registry.load("estimators", model)(**how).fit(run)
+        block: Block = estimator.model_
+        errors = _errors(block, [(r, 0) for r in test])[output]
+        validation = {output: _rms(_errors(block, checks)[output])} if checks else {}
     except MckibbenError as error:
         return MuscleRow(name, reason=str(error))
-    block: Block = estimator.model_
-    errors = np.concatenate([block.simulate(r)[output] - r[output] for r in test])
     return MuscleRow(
         name,
         block.n_parameters,
         estimator.diagnostics_.seconds,
         {output: estimator.diagnostics_.rmse},
-        {output: float(np.sqrt(np.mean(errors**2)))},
+        validation,
+        {output: _rms(errors)},
         float(np.abs(errors).max()),
         block,
     )

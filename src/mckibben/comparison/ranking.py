@@ -1,4 +1,4 @@
-"""Models × recordings, ranked by free-running error on data not used to fit."""
+"""Models × recordings: chosen on the training side, tested once on data used for nothing else."""
 
 from __future__ import annotations
 
@@ -16,8 +16,14 @@ from numpy.typing import NDArray
 from mckibben import registry
 from mckibben.comparison.bootstrap import BlockBootstrap, interval
 from mckibben.comparison.kept import Kept, source
-from mckibben.comparison.results import Leaderboard, Row, Standing
-from mckibben.comparison.splits import folds, given_split, held_out_tail
+from mckibben.comparison.results import CHOICES, Leaderboard, Row, Standing
+from mckibben.comparison.splits import (
+    HELD_OUT,
+    given_split,
+    held_out_tail,
+    repeated,
+    validation_folds,
+)
 from mckibben.comparison.trying import (
     Data,
     Tried,
@@ -37,9 +43,6 @@ from mckibben.workers import checked
 Array = NDArray[np.float64]
 Settings = Mapping[str, Mapping[str, Any]]
 Watch = Callable[[str, float, float], None]
-
-HELD_OUT = 0.25
-"""Share of the input's travel that is held out where no test recording is given."""
 
 N_FOLDS = 4
 """Parts of the cross-validation."""
@@ -69,19 +72,20 @@ def compare(
     found: Callable[[Leaderboard], None] | None = None,
     watch: Watch | None = None,
 ) -> Leaderboard:
-    """Fit and rank models on the same data with the same seeds.
+    """Fit models on the same data with the same seeds, choose one, and test all.
 
-    Every figure is free-running. Models are fitted on the training recordings, cross-validated within
-    them (over recordings, or over blocks of cycles of a single one), and ranked on the test recordings,
-    which nothing else looks at. A model that fails is a row with its reason. An interrupt ends the work
-    at once; the leaderboard then holds what was finished, and names what is pending.
+    Every figure is free-running. Models are fitted on the training recordings, and chosen by
+    cross-validation within them (over recordings, or over blocks of cycles of a single one): that sorts
+    the leaderboard. Their errors on the test recordings, which nothing is chosen by, stand beside, with
+    their rank. A model that fails is a row with its reason. An interrupt ends the work at once; the
+    leaderboard then holds what was finished, and names what is pending.
 
     Parameters
     ----------
     train : Recording or sequence of Recording
         To fit and to choose.
     test : Recording or sequence of Recording, optional
-        To rank. Default: the last quarter of the input's travel over the
+        To test on. Default: the last quarter of the input's travel over the
         training recordings, which is then left out of training.
     input, output : str
         Channels.
@@ -91,7 +95,9 @@ def compare(
     settings : mapping of str to mapping, optional
         Model name to settings of its estimator.
     n_folds : int
-        Parts of the cross-validation; below 2 for none.
+        Parts of the cross-validation; those whose input goes beyond that of the rest are not tried.
+        1, or too few cycles: a single fit without the last quarter of the training data, tried on that.
+        0: none, and the choice is by the error on the data fitted.
     seed : int
         Of everything random.
     jobs : int, optional
@@ -170,6 +176,8 @@ class Plan:
         How the data were split, in words.
     seed : int
         Of everything random.
+    chosen_by : {"cross-validation", "validation", "fit"}
+        What the choice is by.
     left_out : mapping of str to str
         Models without a place on these channels, and why.
     notes : tuple of str
@@ -181,6 +189,7 @@ class Plan:
     unit: str
     described: str
     seed: int
+    chosen_by: str
     left_out: Mapping[str, str]
     notes: tuple[str, ...]
 
@@ -210,6 +219,7 @@ class Plan:
             seed=self.seed,
             n_train=sum(len(recording) for recording in self.data.split.train),
             n_test=sum(self.n_scored),
+            chosen_by=self.chosen_by,
             left_out=self.left_out,
             pending=tuple(model for model in self.settings if model not in done),
             notes=self.notes,
@@ -253,7 +263,10 @@ def plan_of(
         training_data([recordings[0], *tests], input, output)
     recordings, tests, notes = made_manageable(recordings, tests, input, most_samples)
     split = given_split(recordings, tests) if tests else held_out_tail(recordings, input, HELD_OUT)
-    parts = tuple(folds(split.train, input, n_folds)) if n_folds >= 2 else ()
+    parts, chosen_by = validation_folds(split.train, input, n_folds)
+    validated = ""
+    if chosen_by == "cross-validation":
+        validated = f", cross-validated on {len(parts)} part(s) within the range of the rest"
     chosen, left_out = _chosen(models, [*recordings, *tests], input, output)
     if not chosen:
         raise ModelError(
@@ -269,10 +282,11 @@ def plan_of(
             for model in sorted(chosen, key=efforts.__getitem__)
         },
         unit=recordings[0].units[output],
-        described=split.described + (f", {len(parts)}-fold cross-validation" if parts else ""),
+        described=split.described + validated,
         seed=seed,
+        chosen_by=chosen_by,
         left_out=left_out,
-        notes=notes,
+        notes=(*notes, *repeated(recordings, tests, (input, output))),
     )
 
 
@@ -319,9 +333,7 @@ def ranked(
     def tell() -> None:
         if progress is not None:
             working = tuple(model for model in begun if model not in finished)
-            progress(
-                Standing(len(finished), len(plan.settings), working, _best(finished, plan.unit))
-            )
+            progress(Standing(len(finished), len(plan.settings), working, _best(plan, finished)))
 
     def told(index: int, *what: float) -> None:
         model = parts[index].model
@@ -359,10 +371,12 @@ def _ranking(
         for model, tried in finished.items()
         if tried.row is not None and tried.row.test is not None
     ]
-    done.sort(key=lambda item: (_rmse(item[0]), item[0].model))
+    done.sort(key=lambda item: item[0].order)
+    by_test = sorted(_rmse(row) for row, _ in done)
     rows = [
         replace(
             row,
+            test_rank=1 + by_test.index(_rmse(row)),
             rmse_interval=interval(samples),
             difference_interval=interval(samples - done[0][1]),
         )
@@ -374,10 +388,15 @@ def _ranking(
     return Ranking(plan.board([*rows, *failed]), outputs)
 
 
-def _best(finished: Mapping[str, Tried], unit: str) -> str:
+def _best(plan: Plan, finished: Mapping[str, Tried]) -> str:
+    """Return in words which of the models finished would be chosen, and by what figure."""
     rows = [t.row for t in finished.values() if t.row is not None and t.row.test is not None]
-    best = min(rows, key=_rmse, default=None)
-    return "" if best is None else f"{best.model} {_rmse(best):.3g} {unit}".strip()
+    best = min(rows, key=lambda row: row.order, default=None)
+    if best is None:
+        return ""
+    unvalidated, figure, _ = best.order
+    heading, _ = CHOICES["fit" if unvalidated else plan.chosen_by]
+    return f"{best.model}, {heading} {figure:.3g} {plan.unit}".strip()
 
 
 def _chosen(

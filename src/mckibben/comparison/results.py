@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mckibben.blocks.base import Block
+from mckibben.comparison.limits import caution
 from mckibben.metrics import Scores
 from mckibben.recording import Recording
 
@@ -19,6 +20,16 @@ if TYPE_CHECKING:
     from mckibben.characterization import Characterization
 
 Array = NDArray[np.float64]
+
+CHOICES = {
+    "cross-validation": ("CV RMSE", "cross-validation on the training side"),
+    "validation": (
+        "validation RMSE",
+        "the last part of the training data, left out of a fit for it",
+    ),
+    "fit": ("fit RMSE", "the error on the data fitted, for want of a validation"),
+}
+"""What a model may be chosen by: the heading of its figure, and in words. The test is not among them."""
 
 
 @dataclass(frozen=True)
@@ -62,11 +73,14 @@ class Row:
     train, test : Scores or None
         Free-running scores, in the unit of the output; test is on data not used to fit or choose.
     validation_rmse : float or None
-        Cross-validated RMSE within the training set, by which models may be chosen.
+        Cross-validated RMSE within the training set, by which models are chosen; None where that
+        failed or was not asked for.
+    test_rank : int or None
+        Place by test RMSE, from 1; nothing is chosen by it.
     rmse_interval : (float, float) or None
         95 % moving-block bootstrap interval of the test RMSE.
     difference_interval : (float, float) or None
-        The same of its difference to the best model's test RMSE, paired on the same blocks.
+        The same of its difference to the chosen model's test RMSE, paired on the same blocks.
     memory : Memory or None
         The memory test, on the test set.
     block : Block or None
@@ -85,6 +99,7 @@ class Row:
     train: Scores | None = None
     test: Scores | None = None
     validation_rmse: float | None = None
+    test_rank: int | None = None
     rmse_interval: tuple[float, float] | None = None
     difference_interval: tuple[float, float] | None = None
     memory: Memory | None = None
@@ -102,6 +117,24 @@ class Row:
             and bool(np.isfinite([self.train.rmse, self.test.rmse]).all())
         )
 
+    @property
+    def order(self) -> tuple[bool, float, str]:
+        """What rows are sorted by: the validated ones first, by that; nothing of the test is in it."""
+        if self.validation_rmse is not None:
+            return False, self.validation_rmse, self.model
+        return True, float("inf") if self.train is None else self.train.rmse, self.model
+
+    @property
+    def invalid(self) -> str | None:
+        """Why a part of the cross-validation failed, or None."""
+        found: str | None = self.diagnostics.get("validation_failed")
+        return found
+
+    @property
+    def caution(self) -> str | None:
+        """Why the model is good only near what it was trained on, or None."""
+        return caution(self.model)
+
     def to_dict(self) -> dict[str, Any]:
         """Return the row as the leaderboard files hold it."""
         if self.reason is not None:
@@ -109,8 +142,9 @@ class Row:
         train = None if self.train is None else asdict(self.train)
         test = None if self.test is None else asdict(self.test)
         if test is not None:
+            test["rank"] = self.test_rank
             test["rmse_interval"] = _listed(self.rmse_interval)
-            test["difference_to_best_interval"] = _listed(self.difference_interval)
+            test["difference_to_chosen_interval"] = _listed(self.difference_interval)
         return {
             "model": self.model,
             "status": "ok",
@@ -122,12 +156,13 @@ class Row:
             "validation_rmse": self.validation_rmse,
             "memory": None if self.memory is None else asdict(self.memory),
             "rate_dependent": self.block is not None and bool(self.block.rate_dependent),
+            "caution": self.caution,
         }
 
 
 @dataclass(frozen=True)
 class Leaderboard:
-    """Models ranked on data not used to fit them.
+    """Models chosen on the training side, and their errors on data not used to fit or to choose.
 
     Parameters
     ----------
@@ -136,13 +171,15 @@ class Leaderboard:
     unit : str
         Unit of the output and of every RMSE.
     rows : tuple of Row
-        Sorted by test RMSE; models that failed last.
+        Sorted by what they are chosen by; those for which it failed behind, models that failed last.
     split : str
         In words: what was used to fit, to choose, and to test, and how memory was started.
     seed : int
         The seed of everything random.
     n_train, n_test : int
         Samples.
+    chosen_by : {"cross-validation", "validation", "fit"}
+        What the model is chosen by, see `CHOICES`: never the test.
     left_out : mapping of str to str
         Models that were not asked for by name and have no place on these channels, and why.
     pending : tuple of str
@@ -161,6 +198,7 @@ class Leaderboard:
     seed: int
     n_train: int
     n_test: int
+    chosen_by: str = "cross-validation"
     left_out: Mapping[str, str] = field(default_factory=dict)
     pending: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
@@ -168,11 +206,47 @@ class Leaderboard:
 
     @property
     def best(self) -> Row | None:
-        """The first row that did not fail, or None."""
+        """The model chosen: of the first row that did not fail, or None.
+
+        It has the least cross-validated error on the training side. One whose cross-validation failed
+        is chosen only if every other's did. The test has no say, except that a model that cannot be
+        run on it at all has failed.
+        """
         return next((row for row in self.rows if row.reason is None), None)
+
+    @property
+    def lowest(self) -> Row | None:
+        """The row with the least test error, which is nothing to choose by, or None."""
+        tested = [row for row in self.rows if row.test is not None]
+        return min(tested, key=lambda row: row.test.rmse if row.test else 0.0, default=None)
+
+    @property
+    def chosen(self) -> str:
+        """Which model is chosen and by what, and its test error, in words; empty where there is none.
+
+        The test error of another model is told where it is lower.
+        """
+        best, lowest = self.best, self.lowest
+        if best is None or best.test is None or best.train is None or lowest is None:
+            return ""
+        heading, by = CHOICES[self.chosen_by]
+        value = best.validation_rmse
+        if value is None and self.chosen_by != "fit":
+            heading, by = CHOICES["fit"]
+            by += " that did not fail"
+        least = "" if lowest.test is None else f"{lowest.test.rmse:.3g} {self.unit}".strip()
+        own = f"{best.test.rmse:.3g} {self.unit}".strip()
+        said = (
+            f"Chosen by {by}: {best.model}, {heading} "
+            f"{best.train.rmse if value is None else value:.3g} {self.unit}".strip()
+        )
+        if lowest.model == best.model:
+            return f"{said}; its test RMSE: {own}, the lowest."
+        return f"{said}; its test RMSE: {own}. Lowest test RMSE: {lowest.model}, {least}."
 
     def to_dict(self) -> dict[str, Any]:
         """Return the leaderboard as ``leaderboard.json`` holds it."""
+        best, lowest = self.best, self.lowest
         return {
             "input": self.input,
             "output": self.output,
@@ -181,6 +255,9 @@ class Leaderboard:
             "seed": self.seed,
             "n_train": self.n_train,
             "n_test": self.n_test,
+            "chosen_by": self.chosen_by,
+            "chosen": None if best is None else best.model,
+            "lowest_on_test": None if lowest is None else lowest.model,
             "left_out": dict(self.left_out),
             "pending": list(self.pending),
             "notes": list(self.notes),
@@ -205,7 +282,7 @@ class Standing:
     fitting : tuple of str
         Models in work, the latest last.
     best : str
-        The best model so far, with its error, in words; empty before there is one.
+        The model that would be chosen so far, and by what figure; empty before there is one.
     """
 
     done: int
@@ -216,8 +293,8 @@ class Standing:
     def __str__(self) -> str:
         """Return it as a person would say it.
 
-        >>> str(Standing(12, 28, ("gpi",), "cpi 0.27 mm"))
-        '12 of 28, fitting gpi; best so far cpi 0.27 mm'
+        >>> str(Standing(12, 28, ("gpi",), "cpi, CV RMSE 0.27 mm"))
+        '12 of 28, fitting gpi; best so far cpi, CV RMSE 0.27 mm'
         """
         fitting = f", fitting {self.fitting[-1]}" if self.fitting else ""
         best = f"; best so far {self.best}" if self.best else ""
@@ -265,11 +342,11 @@ class Study:
     characterization : Characterization
         What the muscle does.
     leaderboard : Leaderboard
-        Models ranked.
+        Models in the order of the choice.
     predictions : mapping of str to tuple of array
         Model name to its free-running output on every training recording, then every test recording.
     inverse : InverseCheck or None
-        The best invertible model's, or None where no model is.
+        Of the first model of the leaderboard that has one, or None where no model has.
     notes : tuple of str
         What was assumed or mended on the way.
     """

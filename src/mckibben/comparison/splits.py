@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,6 +19,12 @@ Mask = NDArray[np.bool_]
 
 FEWEST = 10
 """Samples in either part of a split."""
+
+HELD_OUT = 0.25
+"""Share of the input's travel that is held out where nothing else says what."""
+
+BEYOND = 0.05
+"""Share of the range of an input that a part may go beyond and still be within it: noise does."""
 
 
 @dataclass(frozen=True)
@@ -156,9 +163,76 @@ def folds(train: Sequence[Recording], channel: str, n: int) -> Iterator[Fold]:
         yield Fold((recording,), (~mask,), (recording,), (mask,))
 
 
+def validation_folds(
+    train: Sequence[Recording], channel: str, n: int
+) -> tuple[tuple[Fold, ...], str]:
+    """Return the parts on which models are chosen within the training data, and what that is called.
+
+    A cross-validation in ``n`` parts; where there are too few cycles for one, or for ``n`` of 1, the
+    last part of the training data is held out; where that is too little, or for 0, there is nothing.
+    A part whose input goes beyond that of the rest is left out of the cross-validation, unless all do:
+    the largest of decaying cycles would otherwise decide, by how models extrapolate to it, though the
+    model that is delivered has seen it.
+
+    Parameters
+    ----------
+    channel : str
+        The input.
+    n : int
+        Largest number of parts.
+
+    Returns
+    -------
+    parts : tuple of Fold
+    chosen_by : {"cross-validation", "validation", "fit"}
+    """
+    if n >= 2:
+        with suppress(DataError):  # of an input that never turns
+            parts = tuple(folds(train, channel, n))
+            if all(_count(rows) >= FEWEST for p in parts for rows in (p.train_rows, p.test_rows)):
+                inside = tuple(part for part in parts if _interpolates(part, channel))
+                return inside or parts, "cross-validation"
+    if n >= 1:
+        with suppress(DataError):
+            tail = held_out_tail(train, channel, HELD_OUT)
+            fold = Fold(tail.train, _all_rows(tail.train), tail.test, tail.test_rows)
+            return (fold,), "validation"
+    return (), "fit"
+
+
+def within(values: Array, others: Array) -> bool:
+    """Tell whether values stay within the range of others, nearly."""
+    low, high = others.min(), others.max()
+    slack = BEYOND * (high - low)
+    return bool(values.min() >= low - slack and values.max() <= high + slack)
+
+
+def _interpolates(part: Fold, channel: str) -> bool:
+    tested, fitted = (
+        np.concatenate([r[channel][mask] for r, mask in zip(runs, rows, strict=True)])
+        for runs, rows in ((part.test, part.test_rows), (part.train, part.train_rows))
+    )
+    return within(tested, fitted)
+
+
+def repeated(
+    train: Sequence[Recording], test: Sequence[Recording], channels: Sequence[str]
+) -> tuple[str, ...]:
+    """Return a warning for every test recording that is a training recording once more."""
+    return tuple(
+        f"{one.name} is fitted to and tested on: its test error says nothing of new data."
+        for one in test
+        if any(all(np.array_equal(one[name], other[name]) for name in channels) for other in train)
+    )
+
+
 def predecessor(recording: Recording, others: Sequence[Recording]) -> Recording | None:
     """Return the recording among others that this one continues, or None."""
     return next((other for other in others if recording.continues(other)), None)
+
+
+def _count(rows: Sequence[Mask]) -> int:
+    return sum(int(mask.sum()) for mask in rows)
 
 
 def _all_rows(recordings: Sequence[Recording]) -> tuple[Mask, ...]:

@@ -1,4 +1,4 @@
-"""The main job: what the muscle does, which model is best, and its inverse."""
+"""The main job: what the muscle does, which model to use, and its inverse."""
 
 from __future__ import annotations
 
@@ -43,7 +43,9 @@ def study(
     found: Callable[[Study], None] | None = None,
     notes: Sequence[str] = (),
 ) -> Study:
-    """Characterize recordings, rank models on them, and invert the best that can be inverted.
+    """Characterize recordings, choose a model by cross-validation, test it, and invert it if it can be.
+
+    Where it cannot, the next in the order of the choice is inverted that can.
 
     An interrupt ends the work at once; the study then holds what was finished.
 

@@ -153,8 +153,7 @@ def joined(parts: Sequence[Tried]) -> Tried:
     if invalid is not None:
         noted = dict(whole.row.diagnostics) | {"validation_failed": invalid}
         return replace(whole, row=replace(whole.row, diagnostics=noted))
-    validation = rms_of(parts)
-    return replace(whole, row=replace(whole.row, validation_rmse=validation))
+    return replace(whole, row=replace(whole.row, validation_rmse=rms_of(parts)))
 
 
 def rms_of(parts: Sequence[Tried]) -> float | None:

@@ -35,26 +35,28 @@ def leaderboard(study: Study) -> Drawing:
 
 
 def fit(study: Study) -> Drawing:
-    """Measured and modelled output over time, of the best model."""
+    """Measured and modelled output over time, of the model chosen."""
     return _one_each(
         shown(study),
-        lambda one: subjects.fit_over_time(one.recording, study.output, _best(one), one.test_from),
+        lambda one: subjects.fit_over_time(
+            one.recording, study.output, _chosen(one), one.test_from
+        ),
     )
 
 
 def loops(study: Study) -> Drawing:
-    """Measured and modelled loop, of the best model."""
+    """Measured and modelled loop, of the model chosen."""
     return _one_each(
         shown(study),
-        lambda one: subjects.fit_loops(one.recording, study.input, study.output, _best(one)),
+        lambda one: subjects.fit_loops(one.recording, study.input, study.output, _chosen(one)),
     )
 
 
 def residuals(study: Study) -> Drawing:
-    """Residuals of the best model against input and time, on the recording tested on."""
+    """Residuals of the model chosen against input and time, on the recording tested on."""
     first = shown(study)[0]
     return subjects.residuals(
-        first.recording, study.input, study.output, _best(first), first.test_from
+        first.recording, study.input, study.output, _chosen(first), first.test_from
     )
 
 
@@ -208,7 +210,7 @@ def _recordings(study: Study) -> list[Recording]:
     return [one.recording for one in shown(study)]
 
 
-def _best(one: Shown) -> dict[str, subjects.Array]:
+def _chosen(one: Shown) -> dict[str, subjects.Array]:
     if not one.outputs:
         raise ModelError(
             "no model of this study worked. Remedy: read the reasons in its leaderboard."

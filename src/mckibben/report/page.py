@@ -48,6 +48,8 @@ def page(study: Study) -> str:
     """Return the report of a study as HTML."""
     from plotly.offline import get_plotlyjs
 
+    from mckibben.comparison.results import CHOICES
+
     every = shown(study)
     pictured = drawn(every)
     figures, left_out = _figures(study, pictured)
@@ -60,6 +62,7 @@ def page(study: Study) -> str:
         left_out=left_out,
         models=_models(study.leaderboard),
         bars=_bars(study.leaderboard),
+        choices=CHOICES,
         wording=wording,
         plotly=get_plotlyjs(),
     )
@@ -103,7 +106,7 @@ def _figures(study: Study, pictured: tuple[Shown, ...]) -> tuple[Plots, str]:
 
 
 def _models(board: Leaderboard) -> list[dict[str, str]]:
-    """Return the models that figures show, best first, each with its colour."""
+    """Return the models that figures show, the chosen one first, each with its colour."""
     ranked = [row.model for row in board.rows if row.reason is None][:N_COLOURS]
     return [{"name": name, "colour": series_colour(place)} for place, name in enumerate(ranked)]
 

@@ -29,7 +29,7 @@ class Shown:
     recording : Recording
         Measured.
     outputs : mapping of str to array, shape (n,)
-        Model name to its output, best first.
+        Model name to its output, the chosen model first.
     role : str
         What the recording was used for, in words.
     test_from : int or None

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from mckibben.comparison.results import Row, Study
+    from mckibben.comparison.results import Leaderboard, Row, Study
     from mckibben.recording import Recording
 
 WORSE_ON_TEST = 1.5
@@ -18,7 +18,7 @@ FORGETFUL = 0.7
 """Share of the measured branch gap below which a model is said to forget."""
 
 MISLEADING = 0.05
-"""RMSE over range from which the best model is said to miss something."""
+"""RMSE over range from which the chosen model is said to miss something."""
 
 
 def number(value: float | None, digits: int = 3) -> str:
@@ -56,7 +56,7 @@ def output_range(study: Study) -> float:
 
 
 def verdict(study: Study) -> list[str]:
-    """Return which model is best, how good it is, and whether it can be inverted."""
+    """Return which model is chosen and by what, its test error, and whether it can be inverted."""
     board, best = study.leaderboard, study.leaderboard.best
     if best is None or best.test is None:
         if board.pending:
@@ -67,35 +67,48 @@ def verdict(study: Study) -> list[str]:
     if best.rmse_interval is not None:
         low, high = best.rmse_interval
         between = f" (95 % interval {number(low)} to {number(high)} {board.unit})"
-    lead = f"The best of {n_ok} models is" if n_ok > 1 else "The only model that worked is"
-    if board.pending:
-        lead = f"The best of {n_ok} models so far is" if n_ok > 1 else "The first model fitted is"
+    so_far = " so far" if board.pending else ""
     share = percent(best.test.rmse / output_range(study))
     sentences = [
-        f"{lead} {best.model}: free-running on data that it was not fitted "
-        f"to, its RMSE is {number(best.test.rmse)} {board.unit}{between}, {share} of the measured "
-        f"range; at worst it is off by {number(best.test.max_error)} {board.unit}."
+        f"Models that worked{so_far}: {n_ok}. {board.chosen}",
+        f"Free-running on the test data, which it was neither fitted to nor chosen by, {best.model} is "
+        f"off by {number(best.test.rmse)} {board.unit} RMSE{between}, {share} of the measured range; "
+        f"at worst by {number(best.test.max_error)} {board.unit}.",
     ]
     tied = [row.model for row in board.rows if row is not best and _ties(row)]
     if tied:
         sentences.append(
-            f"On these data {_listed(tied)} cannot be told apart from it: their interval of the "
+            f"On the test data {_listed(tied)} cannot be told apart from it: their interval of the "
             "difference contains 0."
         )
+    if best.caution is not None:
+        sentences.append(
+            f"{best.model} is good only near the motions it was fitted to: {best.caution}."
+        )
     return [*sentences, _invertibility(study, best)]
+
+
+def cautions(board: Leaderboard) -> dict[str, str]:
+    """Return the models of a leaderboard that are good only near what they were fitted to, and why."""
+    return {row.model: row.caution for row in board.rows if row.reason is None and row.caution}
+
+
+def not_validated(board: Leaderboard) -> dict[str, str]:
+    """Return the models that cannot be chosen since their cross-validation failed, and why it did."""
+    return {row.model: row.invalid for row in board.rows if row.reason is None and row.invalid}
 
 
 def _invertibility(study: Study, best: Row) -> str:
     check = study.inverse
     if check is None and study.leaderboard.pending:
-        return "The best one that can be inverted is inverted when all are fitted."
+        return "The first of the leaderboard that can be inverted is inverted when all are fitted."
     if check is None:
         return "None of the models that worked can be inverted."
     low, high = check.reachable
     if check.model == best.model:
         which = "It can be inverted"
     else:
-        which = f"It cannot be inverted here; the best model that can is {check.model}"
+        which = f"It cannot be inverted here; the next of the leaderboard that can is {check.model}"
     return (
         f"{which}: any {study.output} from {number(low)} to {number(high)} "
         f"{study.leaderboard.unit} can be asked for, whatever happened before."
@@ -125,7 +138,7 @@ def next_steps(study: Study) -> list[str]:
         )
     if best.test.rmse / output_range(study) > MISLEADING:
         steps.append(
-            "The best model still misses something: the residuals below show whether it depends on "
+            "The chosen model still misses something: the residuals below show whether it depends on "
             "the input (a wrong shape) or on time (creep, rate)."
         )
     if best.train.rmse > 0 and best.test.rmse > WORSE_ON_TEST * best.train.rmse:

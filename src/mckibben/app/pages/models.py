@@ -1,4 +1,4 @@
-"""Models: choose, fit in the background, rank, and see why."""
+"""Models: fit in the background, choose by cross-validation, and see why."""
 
 from __future__ import annotations
 
@@ -184,10 +184,10 @@ def _best_so_far(desk: Desk, fits: list[Job]) -> None:
 
 COLUMNS = (
     ("name", "Model"),
+    ("cv", "CV RMSE"),
     ("rmse", "Test RMSE"),
     ("interval", "95 % interval"),
     ("r2", "R² [%]"),
-    ("cv", "CV RMSE"),
     ("train", "Train RMSE"),
     ("memory", "Memory"),
     ("parameters", "Parameters"),
@@ -196,13 +196,13 @@ COLUMNS = (
 
 
 def _leaderboard(desk: Desk) -> None:
-    ui.label("Leaderboard: free-running, on data not used to fit").classes("text-lg")
+    ui.label("Leaderboard: free-running, in the order of the choice").classes("text-lg")
 
     @ui.refreshable
     def shown() -> None:
         rows = [_row(result) for result in desk.workspace.results()]
         if not rows:
-            ui.label("Fit models to see them ranked here.").classes("opacity-70")
+            ui.label("Fit models to see them compared here.").classes("opacity-70")
             return
         table = named(
             ui.table(
@@ -220,6 +220,8 @@ def _leaderboard(desk: Desk) -> None:
             "leaderboard",
         )
         ui.label(
+            "The first is to be chosen: least error in cross-validation on the training side; nothing "
+            "is chosen by the test. "
             "Memory: 1 where the model keeps rising and falling branches as far apart as the data do, "
             "0 where it forgot. Select one or two models to look closer."
         ).classes("text-xs opacity-70")

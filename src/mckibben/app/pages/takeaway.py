@@ -162,7 +162,9 @@ def _figures(desk: Desk, model: Any) -> None:
 def _report(desk: Desk) -> None:
     with ui.card().classes("min-w-72"):
         ui.label("Report").classes("text-lg")
-        ui.label("What the muscle does, models ranked, the inverse: one page that opens anywhere.")
+        ui.label(
+            "What the muscle does, the model chosen, its test and inverse: one page, opens anywhere."
+        )
 
         def start() -> None:
             models, settings = [], {}

@@ -51,7 +51,7 @@ def test_sdchm_has_joint_random_runs_that_no_other_role_repeats() -> None:
     plan = protocol("sdchm")
     waves = []
     for role in ("train", "validation", "test"):
-        runs = plan.select(role, stage="joint")  # type: ignore[arg-type]
+        runs = plan.select(role, stage="joint")
         assert {run.labels["extensor"] for run in runs} == {"constant", "moving"}
         for run in runs:
             inputs = run.inputs

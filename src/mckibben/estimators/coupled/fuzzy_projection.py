@@ -42,6 +42,8 @@ def project(
     """
     scale = np.maximum(high - low, 1e-9)
     start = Sets.even(low, low + scale, n_sets)
+    if n_sets == 1:  # it fires alone, wherever it is
+        return start
     lower, upper = _limits(start, low, scale)
     unit = np.concatenate([np.repeat(scale, start.centres.shape[1])] * 2)
     theta, damping = start.vector, 1e-2

@@ -60,7 +60,7 @@ HIGHEST = 2.5
 
 
 def sdchm() -> Protocol:
-    """Return all runs: identification, network data, prediction check, coupling patterns, joint random."""
+    """Return all runs: identification, network, prediction, coupling patterns, joint random."""
     runs = [
         _run(f"gpi-{k}", "train", (k,), 0.0, IDENTIFICATION_PEAKS, 50.0, stage="hysteresis")
         for k in (1, 2, 3)
@@ -93,8 +93,8 @@ def sdchm() -> Protocol:
         source="Modeling and Compensation of Stiffness-Dependent Hysteresis Coupling Behavior for "
         "Parallel Pneumatic Artificial Muscle-Driven Soft Manipulator, Sections 2.2 and 5.1",
         runs=tuple(runs),
-        notes=f"Sines start at their minimum; network runs have cycles of {TRAINING_PEAKS} bar. Runs with "
-        "all pressures random are ours.",
+        notes=f"Sines start at their minimum; network runs have cycles of {TRAINING_PEAKS} bar. "
+        "Runs with all pressures random are ours.",
     )
 
 

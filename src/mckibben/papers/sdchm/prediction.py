@@ -102,7 +102,7 @@ class Predictions:
                 )
             )
         note = (
-            f"{len(test)} test runs, which no choice has seen; displacements cover "
+            f"Test runs: {len(test)}, which no choice has seen; displacements cover "
             f"{', '.join(f'{span:.0f}' for span in spans)} mm. Trained on the paper's patterns alone, "
             f"unless the name says more. {more}"
         )

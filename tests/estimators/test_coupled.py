@@ -13,8 +13,13 @@ from mckibben.blocks.compose import PerChannel, Series
 from mckibben.blocks.coupling import Coupling
 from mckibben.blocks.fields import Channel
 from mckibben.blocks.force_balance import ForceBalance
+from mckibben.blocks.gpi import gpi_matrix
+from mckibben.blocks.memory import named_state
 from mckibben.estimators.coupled.data import coupled_data
-from mckibben.estimators.coupled.fuzzy import Consequents, Sets, _Problem, _sensitivities
+from mckibben.estimators.coupled.fuzzy import Consequents, Fitted, Problem, Sets
+from mckibben.estimators.coupled.fuzzy_fit import solve_in_parts
+from mckibben.estimators.coupled.fuzzy_projection import sensitivities
+from mckibben.estimators.coupled.fuzzy_swarm import Swarm
 from mckibben.estimators.coupled.sdchm import coupled, softest
 
 STEP = 0.05
@@ -143,8 +148,8 @@ def test_projected_derivatives_agree_with_differences() -> None:
     y = np.column_stack([np.sin(3 * x[:, 0]) * x[:, 1], x[:, 0] ** 2])
     y += 0.2 * rng.standard_normal(y.shape)
     sets = Sets.even(np.zeros(2), np.ones(2), 2)
-    problem = _Problem(x, y, Consequents(True, 1e-10))
-    jacobian, residual = _sensitivities(problem, sets)
+    problem = Problem(x, y, Consequents(True, 1e-10))
+    jacobian, residual = sensitivities(problem, sets)
     gradient = jacobian.T @ residual
     for k in range(sets.vector.size):
         moved = sets.vector
@@ -154,3 +159,34 @@ def test_projected_derivatives_agree_with_differences() -> None:
         down = problem.cost(sets.replaced(moved)) ** 2
         slope = (up - down) / 2e-5 * residual.size / 2
         assert gradient[k] == pytest.approx(slope, rel=0.02, abs=1e-3 * np.abs(gradient).max())
+
+
+def test_the_printed_start_of_a_gpi_model_is_stationary() -> None:
+    rng = np.random.default_rng(0)
+    u = np.concatenate([[0.0], rng.uniform(0, 2.5, 50)])
+    r = np.arange(11) / 10 * 2.5
+    flat = np.zeros_like(u)  # tanh(0 u + 0) + 0
+    operators = np.empty((u.size, r.size))
+    gpi_matrix(u, flat, flat, r, named_state("virgin", r, 0.0, 0.0), operators)
+    assert not operators.any()  # nor then do weights of 0 see a slope, nor envelopes of theirs
+
+
+def test_swarms_start_is_the_printed_one() -> None:
+    rng = np.random.default_rng(3)
+    x = rng.uniform(0, 40, (200, 2))
+    problem = Problem(x, x**2, Consequents(False, 1e-9))
+    found = Swarm(particles=1, iterations=0).best(problem, 3, 5, lambda share: None)
+    start = np.random.default_rng(5).standard_normal(12)
+    np.testing.assert_array_equal(found.centres.ravel(), start[:6])
+    np.testing.assert_array_equal(found.widths.ravel(), np.abs(start[6:]))
+
+
+def test_a_problems_cost_orders_as_the_printed_loss() -> None:
+    rng = np.random.default_rng(4)
+    x = rng.uniform(0, 1, (300, 1))
+    y = np.column_stack([np.sin(9 * x[:, 0]), 100 * x[:, 0] ** 3])  # of very different sizes
+    solver = Consequents(True, 1e-12)
+    problem = Problem(x, y, solver)
+    sets = Sets.even(np.zeros(1), np.ones(1), 3)
+    errors = Fitted(sets, solve_in_parts(x, y, sets, solver)).predict(x, True) - y
+    assert problem.cost(sets) ** 2 * y.shape[1] == pytest.approx(np.mean((errors**2).sum(axis=1)))

@@ -251,6 +251,18 @@ def test_outputs_that_fall_are_fitted_like_those_that_rise(name: str, loop: Reco
     )
 
 
+def test_virgin_gpi_models_are_recovered_and_deliver_what_was_optimised() -> None:
+    example = GPI.example()
+    up, down = example.rising.shifted(0.8), example.falling.shifted(0.8)
+    # where virgin operators start depends on how high the envelopes are
+    truth = replace(example, initial="virgin", rising=up, falling=down)
+    loop = recorded(truth)
+    model = quick("gpi", n_operators=10, initial="virgin").fit(loop).model_
+    error = np.abs(model.simulate(PRESSURE) - loop["displacement"]).max()
+    assert error <= 0.01 * np.ptp(loop["displacement"])
+    assert model.initial == "virgin"
+
+
 def test_gpi_counts_seventeen_parameters_for_ten_operators(loop: Recording) -> None:
     assert quick("gpi", n_operators=10).fit(loop).model_.n_parameters == 17
 

@@ -47,6 +47,24 @@ def test_sdchm_has_the_printed_numbers_of_samples() -> None:
     assert not first["pressure_2"].any()
 
 
+def test_sdchm_has_joint_random_runs_that_no_other_role_repeats() -> None:
+    plan = protocol("sdchm")
+    waves = []
+    for role in ("train", "validation", "test"):
+        runs = plan.select(role, stage="joint")
+        assert {run.labels["extensor"] for run in runs} == {"constant", "moving"}
+        for run in runs:
+            inputs = run.inputs
+            waves += [inputs[f"pressure_{k}"] for k in (1, 2, 3)]
+            assert all(wave[0] == 0.0 and np.ptp(wave) > 1.5 for wave in waves[-3:])
+            travels = np.ptp(inputs["pressure_extensor"])
+            assert travels == 0.0 if run.labels["extensor"] == "constant" else travels > 1.5
+            assert run.settings["start.pressure_extensor"] == inputs["pressure_extensor"][0]
+    # no two waves are alike, so no run is in another role, and none drives two muscles alike
+    likeness = np.corrcoef(waves) - np.eye(len(waves))
+    assert np.abs(likeness).max() < 0.95
+
+
 def test_field_models_starts_at_one_bar_and_falls_each_cycle() -> None:
     falling = protocol("field-models")["decaying-triangle"].inputs["pressure"]
     tops = [falling[i : i + 501].max() for i in range(0, 4500, 500)]

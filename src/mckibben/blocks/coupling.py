@@ -1,7 +1,7 @@
 """Linear coupling of muscles: what each gives is felt by all, h = G^T v.
 
 Source: "Modeling and Compensation of Stiffness-Dependent Hysteresis Coupling Behavior for Parallel
-Pneumatic Artificial Muscle-Driven Soft Manipulator", Eqs. (11) to (18).
+Pneumatic Artificial Muscle-Driven Soft Manipulator", Eqs. (8) and (14).
 """
 
 from __future__ import annotations
@@ -141,7 +141,7 @@ class Coupling(Primitive):
     def jacobi(
         self, coupled: ArrayLike, *, tolerance: float = 0.01, max_iterations: int = 1000
     ) -> Array:
-        """Return v for h = G^T v by the paper's Jacobi iteration, Eq. (18).
+        """Return v for h = G^T v by the paper's Jacobi iteration, Eqs. (28), (29).
 
         Parameters
         ----------

@@ -6,7 +6,7 @@ for every combination, the normalised firing of a rule is the product of members
 by input, which is how it is computed: in the log domain, where nothing underflows far from all centres.
 
 Source: "Modeling and Compensation of Stiffness-Dependent Hysteresis Coupling Behavior for Parallel
-Pneumatic Artificial Muscle-Driven Soft Manipulator", Eqs. (19) to (24).
+Pneumatic Artificial Muscle-Driven Soft Manipulator", Eqs. (9) to (13).
 """
 
 from __future__ import annotations

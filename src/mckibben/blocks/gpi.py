@@ -9,8 +9,12 @@ u = gamma_R^{-1}(z) while the reference rises and gamma_L^{-1}(z) while it falls
 continuous while u jumps across the dead zone between the envelopes, where every operator holds, so
 the inverse stays exact through minor loops.
 
+The paper starts operators from f_r(u_0, 0), Eq. (1), without saying which branch a first sample takes.
+Both together leave one meaning: 0, moved no further than into [gamma_R(u_0) - r, gamma_L(u_0) + r],
+which is the rule ``virgin``. ``first_sample`` takes gamma_R(u_0) - r, as if the input had only risen.
+
 Source: "Modeling and Compensation of Stiffness-Dependent Hysteresis Coupling Behavior for Parallel
-Pneumatic Artificial Muscle-Driven Soft Manipulator", Eqs. (1) to (7).
+Pneumatic Artificial Muscle-Driven Soft Manipulator", Eqs. (1) to (7), the inverse Eqs. (16) to (20).
 """
 
 from __future__ import annotations

@@ -34,6 +34,10 @@ class GPIEstimator(SeparableEstimator):
     and the gap between them are searched. Both envelopes increase and the falling one never runs below
     the rising one, whatever the search tries, so that the model always has its exact inverse.
 
+    The paper's start of the operators, f_r(p(0), 0), is ``initial="virgin"``. Its Algorithm 1 starts the
+    search from weights and envelopes of 0, where every operator stays at 0 and no derivative tells a
+    way out; the search here starts from increasing envelopes.
+
     Parameters
     ----------
     n_operators : int
@@ -64,22 +68,52 @@ class GPIEstimator(SeparableEstimator):
         return SHAPES[self.envelope](self.n_knots)
 
     def bounds(self, data: TrainingData) -> tuple[Array, Array]:
-        """Return bounds of the envelopes' shapes and of the gap between them."""
+        """Return bounds of the envelopes' shapes, the gap between them, and a virgin one's height."""
         lower, upper = self.shape.bounds(data.input_range)
-        return np.append(lower, 0.0), np.append(upper, 1.0)
+        highest = [] if self.solves_offset else [2.0 * self.highest(data)]
+        return (
+            np.concatenate([lower, [0.0], -np.array(highest)]),
+            np.concatenate([upper, [1.0], highest]),
+        )
 
     def guesses(self, data: TrainingData) -> list[Array]:
         """Return near-equal envelopes of a few curvatures."""
         shapes = self.shape.guesses(data.input_range)
-        return [np.append(shape, gap) for shape in shapes for gap in (0.0, 0.1)]
+        heights: list[list[float]] = [[]]
+        if not self.solves_offset:
+            heights = [[share * self.highest(data)] for share in (-0.5, 0.0, 0.5)]
+        return [
+            np.concatenate([shape, [gap], height])
+            for height in heights
+            for shape in shapes
+            for gap in (0.0, 0.1)
+        ]
+
+    @property
+    def solves_offset(self) -> bool:
+        """Whether the envelopes' common height is solved for: it is where the start moves with it.
+
+        Virgin operators are nearest to 0, wherever the envelopes are, so their height is searched.
+        """
+        return self.starting_rule != "virgin"
+
+    def highest(self, data: TrainingData) -> float:
+        """Return how far the middle of the envelopes may be from 0, in heights of theirs."""
+        low, high = data.output_range
+        return 1.0 + 2.0 * max(abs(low), abs(high)) / max(high - low, 1e-12)
 
     def envelopes(self, theta: Array, data: TrainingData) -> tuple[Envelope, Envelope]:
         """Return both envelopes, in order over the whole input range."""
 
         def made() -> tuple[Envelope, Envelope]:
-            rising, falling = self.shape.envelopes(theta[:-1], data.input_range)
+            n = theta.size - 1 if self.solves_offset else theta.size - 2
+            rising, falling = self.shape.envelopes(theta[:n], data.input_range)
             gap, _ = smallest_gap(rising, falling, data.input_range)
-            return rising, falling.shifted(float(theta[-1]) - gap + 1e-9)
+            height = 0.0 if self.solves_offset else float(theta[-1])
+            return (
+                rising.shifted(height),
+                falling.shifted(height + float(theta[n]) - gap + 1e-9),
+            )
 
         return data.latest("envelopes", theta, made)
 

@@ -75,7 +75,12 @@ class Tracker:
 
 
 def solve_linear(
-    basis: Array, target: Array, *, nonnegative: bool, least: Array | None = None
+    basis: Array,
+    target: Array,
+    *,
+    nonnegative: bool,
+    least: Array | None = None,
+    with_offset: bool = True,
 ) -> tuple[Array, float]:
     """Solve ``basis @ x + offset = target`` in least squares.
 
@@ -90,6 +95,8 @@ def solve_linear(
         Whether every x must be at least 0.
     least : array, shape (m,), optional
         Then the least that every x may be, instead.
+    with_offset : bool
+        Whether the offset is free, or 0.
 
     Returns
     -------
@@ -98,8 +105,10 @@ def solve_linear(
     """
     from scipy.optimize import nnls
 
-    means, mean = basis.mean(axis=0), float(target.mean())
     m = basis.shape[1]
+    means, mean = np.zeros(m), 0.0
+    if with_offset:
+        means, mean = basis.mean(axis=0), float(target.mean())
     triangle: Array = np.linalg.qr(np.column_stack([basis - means, target - mean]), mode="r")  # type: ignore[assignment]
     scale = np.maximum(np.sqrt((triangle[:, :m] ** 2).sum(axis=0)), 1e-300)
     scaled, right = triangle[:, :m] / scale, triangle[:, m]

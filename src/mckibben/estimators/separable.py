@@ -124,9 +124,10 @@ class SeparableEstimator(SearchingEstimator):
         return np.asarray(moves - directions @ (directions.T @ moves))
 
     def free(self, matrix: Array, linear: Array, data: TrainingData) -> Array:
-        """Return the columns whose linear parameters are solved for and at no bound, offset first."""
+        """Return the columns of what is solved for and at no bound, the offset's first if it is."""
         free = linear > 1.01 * self.least(matrix, data) if self.solves_nonnegative else linear != 0
-        return np.column_stack([np.ones(len(matrix)), matrix[:, free]])
+        offset = [np.ones(len(matrix))] if self.solves_offset else []
+        return np.column_stack([*offset, matrix[:, free]])
 
     def choices(self, data: TrainingData) -> list[Choice]:
         """Return what groups of the non-linear parameters may be exchanged for; none as a rule."""
@@ -240,7 +241,18 @@ class SeparableEstimator(SearchingEstimator):
     def _solve_for(self, matrix: Array, data: TrainingData) -> tuple[Array, float]:
         least = self.least(matrix, data)
         nonnegative = self.solves_nonnegative
-        return solve_linear(matrix, data.target, nonnegative=nonnegative, least=least)
+        return solve_linear(
+            matrix,
+            data.target,
+            nonnegative=nonnegative,
+            least=least,
+            with_offset=self.solves_offset,
+        )
+
+    @property
+    def solves_offset(self) -> bool:
+        """Whether an offset is solved for; else it is 0."""
+        return True
 
     @property
     def solves_nonnegative(self) -> bool:

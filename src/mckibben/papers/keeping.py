@@ -17,7 +17,7 @@ from mckibben.files import read, write
 from mckibben.recording import Recording
 from mckibben.rigs import record
 from mckibben.signals.protocols import protocol
-from mckibben.signals.protocols.protocol import Run
+from mckibben.signals.protocols.protocol import Protocol, Run
 
 
 @dataclass(frozen=True)
@@ -81,14 +81,14 @@ def fitted(
 
 def recorded(
     kept: Kept,
-    name: str,
+    what: Protocol | str,
     runs: Sequence[str],
     seed: int,
     tell: Callable[[float, str], None],
 ) -> Iterator[tuple[Run, Recording]]:
     """Yield runs of a protocol on its rig, in their order, those recorded before read from disk."""
-    plan = protocol(name)
-    files = {run: kept.file(run, ".parquet", name, seed) for run in runs}
+    plan = protocol(what) if isinstance(what, str) else what
+    files = {run: kept.file(run, ".parquet", plan.name, plan[run], seed) for run in runs}
     there = {run: _read(file) for run, file in files.items()}
     fresh = record(plan, runs=[run for run in runs if there[run] is None], seed=seed)
     for done, run in enumerate(runs, start=1):

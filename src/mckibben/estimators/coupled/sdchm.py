@@ -27,7 +27,9 @@ from mckibben.blocks.pi import PI
 from mckibben.errors import DataError, ModelWarning
 from mckibben.estimators.coupled.base import CoupledEstimator, Tell
 from mckibben.estimators.coupled.data import CoupledData, CoupledRun
-from mckibben.estimators.coupled.fuzzy import Fitted, Method, fit_network
+from mckibben.estimators.coupled.fuzzy import Consequents, Fitted
+from mckibben.estimators.coupled.fuzzy_fit import Method, Search, fit_network
+from mckibben.estimators.coupled.fuzzy_swarm import Swarm
 from mckibben.estimators.pi import play_operators
 from mckibben.recording import Recording
 
@@ -57,14 +59,27 @@ class NetworkEstimator(CoupledEstimator):
         Antecedents by variable projection, or by the paper's particle swarm.
     ridge : float
         Damping of what is a rule's own, relative to the size of what it multiplies. With next to none
-        (1e-7) the network predicts best along what was recorded; but it is then undetermined where no
-        run has been, and cannot be inverted there.
+        (1e-7) the network follows what was recorded most closely; but it is then undetermined where no
+        run has been: it neither predicts there nor can be inverted.
+    particles, iterations : int
+        Of the swarm.
+    search_samples : int
+        Samples on which antecedents are searched; consequents are solved for on all.
     """
 
     n_sets: Annotated[int, Interval(ge=1, le=6)] = 3
     constants: bool = False
     method: Method = "ls"
     ridge: Annotated[float, Ge(0)] = 1e-3
+    particles: Annotated[int, Ge(1)] = 20
+    iterations: Annotated[int, Ge(1)] = 50
+    search_samples: Annotated[int, Ge(100)] = 6000
+
+    @property
+    def search(self) -> Search:
+        """How antecedents are searched."""
+        swarm = Swarm(self.particles, self.iterations)
+        return Search(self.method, self.search_samples, swarm, self.seed)
 
     def network(
         self,
@@ -80,10 +95,8 @@ class NetworkEstimator(CoupledEstimator):
             x,
             y,
             self.n_sets,
-            constants=self.constants,
-            method=self.method,
-            ridge=self.ridge,
-            seed=self.seed,
+            Consequents(self.constants, self.ridge),
+            self.search,
             validation=validation,
             tell=lambda share: tell(share, "network"),
         )
@@ -159,6 +172,9 @@ class SDCHMEstimator(NetworkEstimator):
     """
 
     effort: ClassVar[float] = 20.0
+
+    memory_defaults: ClassVar[dict[str, dict[str, Any]]] = {}
+    """Settings of memories that differ from their own defaults, by memory."""
 
     constants: bool = True
     memory: Literal["gpi", "pi", "mpi", "eupi", "cpi"] = "cpi"
@@ -257,7 +273,7 @@ class SDCHMEstimator(NetworkEstimator):
         )
         settings = {"input": given.name, "output": wanted.name, "seed": self.seed}
         estimator = registry.load("estimators", self.memory)(
-            **settings | (self.memory_settings or {})
+            **settings | self.memory_defaults.get(self.memory, {}) | (self.memory_settings or {})
         )
         block: Block = estimator.fit(recording).model_
         return block
@@ -312,7 +328,14 @@ def coupled(memories: list[Block], runs: list[CoupledRun], data: CoupledData) ->
 
 @dataclass(kw_only=True, repr=False, eq=False)
 class PublishedSDCHMEstimator(SDCHMEstimator):
-    """The model as its paper identifies it: GPI, coupling, and a network trained by particle swarm."""
+    """The model as its paper identifies it: GPI, coupling, and a network trained by particle swarm.
+
+    Algorithm 1, with thresholds by Eq. (7), operators started by Eq. (1) and the loss of Eq. (26). What
+    differs: the GPI models' search does not start from weights and envelopes of 0 (see `GPIEstimator`);
+    gains and consequents are solved for, so that their printed starts are of no effect; and rules are
+    normalised input by input in the log domain, since printed centres near 0 are so far from most
+    displacements that every rule's product underflows.
+    """
 
     effort: ClassVar[float] = 25.0
 
@@ -320,6 +343,9 @@ class PublishedSDCHMEstimator(SDCHMEstimator):
     method: Method = "pso"
     ridge: Annotated[float, Ge(0)] = 1e-9
     memory: Literal["gpi", "pi", "mpi", "eupi", "cpi"] = "gpi"
+    memory_defaults: ClassVar[dict[str, dict[str, Any]]] = {
+        "gpi": {"threshold_rule": "paper", "initial": "virgin"}
+    }
     n_friction: Annotated[int, Interval(ge=0, le=20)] = 0
 
 

@@ -3,8 +3,12 @@
 Source: Modeling and Compensation of Stiffness-Dependent Hysteresis Coupling Behavior for Parallel
 Pneumatic Artificial Muscle-Driven Soft Manipulator, Sections 2.2 and 5.
 
-All signals are sines of 0.02 Hz. The paper's equation starts them in the middle of their range, with a
-jump at every change of amplitude; here each cycle starts at its minimum.
+The paper's signals are sines of 0.02 Hz, on one muscle at a time or on all three alike. Its equation
+starts them in the middle of their range, with a jump at every change of amplitude; here each cycle
+starts at its minimum.
+
+Runs in which all pressures are random at once are ours: the paper's patterns visit but a few lines among
+all combinations of pressures, and a model can be close along them and anything at all beside.
 """
 
 from __future__ import annotations
@@ -14,6 +18,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from mckibben.recording import Recording
+from mckibben.signals.broadband import random_wave
 from mckibben.signals.excitations import sine
 from mckibben.signals.protocols.protocol import Protocol, Role, Run
 
@@ -35,11 +40,27 @@ TEST = (0.3, 0.9, 1.3, 1.9, 2.1, 2.4)
 """Pressures of the extensor [bar] whose runs train, validate and test, Section 5.1."""
 
 PREDICTION = (0.1, 1.5, 1.7)
-"""Pressures of the extensor in the check of predictions [bar]."""
+"""Pressures of the extensor in the check of predictions [bar]; all belong to the validation set."""
+
+JOINT: dict[Role, tuple[float | None, ...]] = {
+    "train": (0.4, 1.2, 2.0, None, None),
+    "validation": (0.5, 1.7, None, None),
+    "test": (0.3, 1.1, 1.9, None, None),
+}
+"""Pressures of the extensor in runs with all pressures random [bar]; None where it moves too."""
+
+JOINT_TIME, JOINT_FREQUENCY, EXTENSOR_FREQUENCY = 150.0, 0.05, 0.02
+"""Of those runs [s], and highest frequencies of the muscles' pressures and the extensor's [Hz]."""
+
+JOINT_START = 20.0
+"""Time in which the muscles' random pressures set in from rest [s], where the patterns start too."""
+
+HIGHEST = 2.5
+"""Pressure that all muscles withstand [bar], Table 1."""
 
 
 def sdchm() -> Protocol:
-    """Return all runs: identification, coupling patterns, network data, prediction check."""
+    """Return all runs: identification, network, prediction, coupling patterns, joint random."""
     runs = [
         _run(f"gpi-{k}", "train", (k,), 0.0, IDENTIFICATION_PEAKS, 50.0, stage="hysteresis")
         for k in (1, 2, 3)
@@ -64,13 +85,16 @@ def sdchm() -> Protocol:
     for p0 in (0.0, 0.5, 1.0, 1.5, 2.0, 2.5):
         name = f"stiffness-p0-{p0:.1f}"
         runs.append(_run(name, "test", (1,), p0, (0.7, 0.7), 20.0, stage="stiffness"))
+    for role in JOINT:
+        runs += _joint(role)
     return Protocol(
         name="sdchm",
         rig="soft-arm",
         source="Modeling and Compensation of Stiffness-Dependent Hysteresis Coupling Behavior for "
         "Parallel Pneumatic Artificial Muscle-Driven Soft Manipulator, Sections 2.2 and 5.1",
         runs=tuple(runs),
-        notes=f"Sines start at their minimum; network runs have cycles of {TRAINING_PEAKS} bar.",
+        notes=f"Sines start at their minimum; network runs have cycles of {TRAINING_PEAKS} bar. "
+        "Runs with all pressures random are ours.",
     )
 
 
@@ -95,3 +119,35 @@ def _run(
         settings={"start.pressure_extensor": p0},
         labels={"stage": stage, "p0": p0, "driven": "".join(map(str, driven))},
     )
+
+
+def _joint(role: Role) -> list[Run]:
+    """Return the runs of a role with all pressures random at once."""
+    first = 1000 * list(JOINT).index(role)
+    time = np.arange(round(JOINT_TIME * 20.0)) / 20.0
+    runs = []
+    for number, p0 in enumerate(JOINT[role]):
+        seed = first + 10 * number
+        channels = {
+            f"pressure_{k}": np.minimum(time / JOINT_START, 1.0)
+            * random_wave(time, JOINT_FREQUENCY, HIGHEST, seed=seed + k)
+            for k in (1, 2, 3)
+        }
+        channels["pressure_extensor"] = (
+            random_wave(time, EXTENSOR_FREQUENCY, HIGHEST, seed=seed)
+            if p0 is None
+            else np.full(time.size, p0)
+        )
+        start = float(channels["pressure_extensor"][0])
+        extensor = "moving" if p0 is None else "constant"
+        name = f"moving-{number}" if p0 is None else f"p0-{p0:.1f}"
+        runs.append(
+            Run(
+                name=f"joint-{role}-{name}",
+                role=role,
+                inputs=Recording(channels, 1 / 20.0),
+                settings={"start.pressure_extensor": start},
+                labels={"stage": "joint", "p0": start, "driven": "123", "extensor": extensor},
+            )
+        )
+    return runs

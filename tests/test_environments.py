@@ -77,7 +77,7 @@ def test_feedback_solves_the_task_and_chance_does_not(reference: str) -> None:
 
 
 def test_an_episode_is_repeatable_for_its_seed() -> None:
-    env = gymnasium.make("mckibben/soft-arm-v1", duration=1.0, preview=3, spread=0.1)
+    env = gymnasium.make("mckibben/soft-arm-v2", duration=1.0, preview=3, spread=0.1)
 
     def act(seen: np.ndarray, info: dict[str, Any]) -> np.ndarray:
         return np.full(4, 0.2, np.float32)

@@ -16,7 +16,10 @@ from numpy.typing import NDArray
 
 from mckibben.blocks.published.field_models import prandtl_ishlinskii
 from mckibben.blocks.published.mpi_narmax import modified_prandtl_ishlinskii
+from mckibben.estimators.gpi import GPIEstimator
 from mckibben.estimators.rdpi import RDPIEstimator
+from mckibben.metrics import err
+from mckibben.papers.sdchm.printed import ORDERS, PREDICTION
 from mckibben.recording import Recording
 from mckibben.rigs import load_rig, record
 from mckibben.signals import resample, sine, triangle
@@ -24,6 +27,7 @@ from mckibben.signals.protocols import activation_pressure as activation
 from mckibben.signals.protocols import protocol
 from mckibben.signals.protocols.mpi_narmax import HIGH, LOW
 from mckibben.signals.protocols.multistate import SHORTEST
+from mckibben.signals.protocols.sdchm import PATTERNS
 
 Array = NDArray[np.float64]
 Row = tuple[str, str, str, str]
@@ -70,7 +74,8 @@ def span(values: list[float], digits: int = 1) -> str:
 
 def soft_arm() -> Iterator[Row]:
     """Give the rows of the soft arm."""
-    runs = recorded("sdchm", lambda name: name.startswith(("coupling", "stiffness", "gpi")))
+    wanted = ("coupling", "stiffness", "gpi", "prediction-p0-0.1")
+    runs = recorded("sdchm", lambda name: name.startswith(wanted))
     widths, driven = [], []
     for name, recording in runs.items():
         if name.startswith("coupling"):
@@ -119,6 +124,60 @@ def soft_arm() -> Iterator[Row]:
     order = np.argsort(rise["pressure_1"], kind="stable")
     there = np.interp(1.4, rise["pressure_1"][order], rise["displacement_1"][order])
     yield "shortening of I on its way up at 1.4 bar, p0 = 0", "about 45 mm", f"{there:.0f} mm", ""
+    yield from arm_hysteresis(runs["gpi-1"])
+    yield from arm_motion(
+        {pattern: runs[f"prediction-p0-0.1-drive-{pattern}"] for pattern in PATTERNS}
+    )
+
+
+def arm_hysteresis(identification: Recording) -> Iterator[Row]:
+    """Give the errors of the paper's hysteresis model on one muscle (its Table 2)."""
+    for n, printed in ORDERS.items():
+        model = GPIEstimator(
+            input="pressure_1",
+            output="displacement_1",
+            n_operators=n,
+            threshold_rule="paper",
+            initial="virgin",
+        )
+        block = model.fit(identification).model_
+        modelled = block.simulate(identification["pressure_1"])
+        found = err(identification["displacement_1"], modelled)
+        yield f"Err of GPI 1 with N = {n}", f"{printed:.2f} %", f"{found:.2f} %", "tanh envelopes"
+
+
+def arm_motion(runs: Mapping[str, Recording]) -> Iterator[Row]:
+    """Give the mean deviation of each muscle's motion from its mean (what Table 4 divides by).
+
+    A mean absolute error is at most the root mean square, so that RMSE / Err bounds it from above.
+    """
+    printed = np.array(list(PREDICTION.values())).reshape(len(runs), 3, 4)
+    bounds = 100 * printed[..., 1::2] / printed[..., ::2]
+    for (pattern, recording), bound in zip(runs.items(), bounds, strict=True):
+        sdchm, raw = bound.T
+        moved = [recording[f"displacement_{k}"] for k in (1, 2, 3)]
+        here = np.array([np.abs(y - y.mean()).mean() for y in moved])
+        yield (
+            f"mean deviation of I, II, III, driven {pattern}, p0 = 0.1 bar",
+            f"RMSE/Err: {listed(sdchm)} (raw network {listed(raw)}) mm",
+            f"{listed(here)} mm",
+            "printed: upper bounds",
+        )
+        if len(pattern) == 1:
+            driven = int(pattern) - 1
+            passive = [k for k in range(3) if k != driven]
+            own, other, ours = (x[passive] / x[driven] for x in (sdchm, raw, here))
+            yield (
+                f"passive over driven, driven {pattern}",
+                f"{listed(own, 2)} (raw network {listed(other, 2)})",
+                listed(ours, 2),
+                "of the row above",
+            )
+
+
+def listed(values: Array, digits: int = 0) -> str:
+    """Return numbers in words, in their order."""
+    return ", ".join(f"{value:.{digits}f}" for value in values)
 
 
 def branch_heights(u: Array, y: Array) -> tuple[float, float]:

@@ -140,6 +140,19 @@ def test_an_arm_bends_towards_the_muscle_that_is_driven() -> None:
     assert pushed["displacement_1"][-1] < -1.0
 
 
+def test_the_arm_turns_with_a_dead_zone_and_takes_the_others_along() -> None:
+    time = np.arange(500) * 0.1
+    commands = {"pressure_1": sine(time, 50.0, 1.4), "pressure_extensor": np.full(time.size, 0.1)}
+    rig = load_rig("soft-arm").changed({"start.pressure_extensor": 0.1})
+    run = rig.run(Recording(commands, 0.1), ideal=True)
+    driven, pressure = run["displacement_1"], run["pressure_1"]
+    top = int(pressure.argmax())
+    later = np.interp(-1.1, -pressure[top:], driven[top:])
+    assert 0.0 < driven.max() - later < 0.03 * driven.max()
+    for k in (2, 3):
+        assert 0.2 < np.ptp(run[f"displacement_{k}"]) / np.ptp(driven) < 0.65
+
+
 def stroke(rig: Rig, **changes: object) -> float:
     time = np.arange(0, 20.0, 0.02)
     given = Recording({"pressure": triangle(time, 10.0, 5.0)}, 0.02)

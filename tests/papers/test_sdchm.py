@@ -38,9 +38,9 @@ class Off:
 
     by: float | None = None
 
-    def simulate(self, recording: Recording) -> dict[str, Any]:
+    def simulate(self, recording: Recording) -> Recording:
         by = recording[EXTENSOR] if self.by is None else self.by
-        return {name: recording[name] + by for name in OUTPUTS}
+        return Recording({name: recording[name] + by for name in OUTPUTS}, recording.sample_time)
 
 
 @pytest.fixture(scope="module")

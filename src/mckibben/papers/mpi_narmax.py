@@ -33,6 +33,7 @@ from mckibben.control import (
 )
 from mckibben.errors import ModelWarning
 from mckibben.estimators.coupled.force_estimate import ForceEstimate, fit_force_estimate
+from mckibben.papers.free_runs import FreeRuns
 from mckibben.papers.keeping import fitted, recorded
 from mckibben.papers.reproduction import Cell, Figure, Progress, Reproduction, Table, rms, thinned
 from mckibben.recording import Recording
@@ -127,7 +128,11 @@ def mpi_narmax(
         )
     }
     models, facts = _models(recordings, quick, seed, tell, kept)
-    displacements, said = _displacements(models, recordings)
+    free = FreeRuns(models)
+    displacements = {
+        name: {run: free(name, recording)["displacement"] for run, recording in recordings.items()}
+        for name in models
+    }
     tell(0.75, "force")
     estimate = fit_force_estimate([recordings[name] for name in MORE])
     tell(0.8, "closed loops")
@@ -141,7 +146,7 @@ def mpi_narmax(
         estimate,
         loops,
         _bounded(models, step, quick, seed),
-        said,
+        free.warned,
         quick,
     )
     return _reported(found)
@@ -172,21 +177,6 @@ def _models(
         models[name] = found.block
         facts.append((name, told.learned, found.seconds, found.block.n_parameters))
     return models, facts
-
-
-def _displacements(
-    models: Mapping[str, Block], recordings: Mapping[str, Recording]
-) -> tuple[dict[str, dict[str, Array]], list[str]]:
-    """Return the free-running displacements by model and run, and what models warned of."""
-    found: dict[str, dict[str, Array]] = {name: {} for name in models}
-    said = []
-    for name, model in models.items():
-        for run, recording in recordings.items():
-            with warnings.catch_warnings(record=True) as caught:
-                warnings.simplefilter("always", ModelWarning)
-                found[name][run] = model.simulate(recording)["displacement"]
-            said += [f"{name} on {run}: {warning.message}." for warning in caught]
-    return found, said
 
 
 def _loops(
@@ -245,7 +235,7 @@ class _Found:
     estimate: ForceEstimate
     loops: Mapping[str, Tracked]
     drift: Mapping[str, float]
-    said: list[str]
+    warned: list[str]
     quick: bool
 
     def counted(self, run: str, values: Array) -> Array:
@@ -337,7 +327,7 @@ def _reported(found: _Found) -> Reproduction:
             f"{PLAIN!r} has two sets for each input, even ones without feedback.",
             "The maps of the models fitted here increase; the printed map folds (its table above).",
             "How the hand pulls, the random runs, and the voltages held are ours.",
-            *found.said,
+            *found.warned,
         ),
     )
 

@@ -51,8 +51,9 @@ def sdchm(*, quick: bool, seed: int, jobs: int | None, tell: Progress, kept: Kep
     predictions = Predictions(models, runs)
     tell(0.7, "closed loops")
     loops, beyond = run_loops(models, runs.patterns, quick, seed, jobs, kept)
+    predicted = tuple(predictions.tables())
     tables = [
-        *predictions.tables(),
+        *predicted,
         by_order,
         gains(models[PUBLISHED]),
         *loops.tables(),
@@ -66,7 +67,7 @@ def sdchm(*, quick: bool, seed: int, jobs: int | None, tell: Progress, kept: Kep
         summary=(*predictions.summary(), *loops.summary()),
         tables=tuple(tables),
         figures=(*predictions.figures(), *loops.figures()),
-        notes=(*NOTES, QUICK_NOTE) if quick else NOTES,
+        notes=(*NOTES, *([QUICK_NOTE] if quick else []), *predictions.found.warned),
     )
 
 

@@ -90,15 +90,6 @@ def fit_models(runs: Recordings, quick: bool, seed: int, tell: Progress, kept: K
     return Models(blocks, seconds)
 
 
-def errors(model: Block, recordings: list[Recording]) -> Array:
-    """Return modelled less measured displacements over all recordings, shape (n, 3) [mm]."""
-    parts = []
-    for recording in recordings:
-        found = model.simulate(recording)
-        parts.append(np.column_stack([found[name] - recording[name] for name in OUTPUTS]))
-    return np.concatenate(parts)
-
-
 def measured(recordings: list[Recording]) -> Array:
     """Return measured displacements over all recordings, shape (n, 3) [mm]."""
     return np.concatenate([recording.matrix(OUTPUTS) for recording in recordings])

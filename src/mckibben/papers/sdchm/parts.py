@@ -7,9 +7,9 @@ from mckibben.blocks.base import Block
 from mckibben.blocks.compose import Series
 from mckibben.blocks.coupling import Coupling
 from mckibben.blocks.published.coupling import coupling as printed_coupling
+from mckibben.metrics import err
 from mckibben.papers.reproduction import Cell, Table
 from mckibben.papers.sdchm import printed
-from mckibben.papers.sdchm.prediction import err
 from mckibben.recording import Recording
 
 

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from mckibben.metrics import err
+from mckibben.papers.free_runs import FreeRuns
 from mckibben.papers.reproduction import Cell, Figure, Table, rms, thinned
 from mckibben.papers.sdchm import printed
 from mckibben.papers.sdchm.models import (
@@ -20,7 +23,6 @@ from mckibben.papers.sdchm.models import (
     PUBLISHED,
     RAW,
     Models,
-    errors,
     measured,
 )
 from mckibben.papers.sdchm.recordings import EXTENSOR, OUTPUTS, Recordings
@@ -38,10 +40,20 @@ GROUPS = (PUBLISHED, RAW, OURS, BALANCE)
 
 @dataclass(frozen=True)
 class Predictions:
-    """Models and what they were recorded against."""
+    """Models and what they are compared with."""
 
     models: Models
     runs: Recordings
+
+    @cached_property
+    def found(self) -> FreeRuns:
+        """What the models give over the recordings."""
+        return FreeRuns(self.models.blocks)
+
+    def errors(self, name: str, recordings: list[Recording]) -> Array:
+        """Return modelled less measured displacements over all recordings, shape (n, 3) [mm]."""
+        parts = [self.found(name, r).matrix(OUTPUTS) - r.matrix(OUTPUTS) for r in recordings]
+        return np.concatenate(parts)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -55,7 +67,7 @@ class Predictions:
 
     def off(self, name: str, recordings: list[Recording]) -> float:
         """Return a model's RMSE over all outputs [mm]."""
-        return rms(errors(self.models[name], recordings))
+        return rms(self.errors(name, recordings))
 
     @property
     def headline(self) -> str:
@@ -90,7 +102,7 @@ class Predictions:
         spans = np.ptp(measured(test), axis=0)
         rows: list[tuple[Cell, ...]] = []
         for name in self.names:
-            off = errors(self.models[name], test)
+            off = self.errors(name, test)
             each = np.sqrt(np.mean(off**2, axis=0))
             rows.append(
                 (
@@ -122,12 +134,13 @@ class Predictions:
     def _test_table(self) -> Table:
         test = self.runs.select("test", stage="network")
         y = measured(test)
+        mean = y.mean(axis=0)
         levels = sorted({round(float(recording[EXTENSOR].mean()), 1) for recording in test})
         rows: list[tuple[Cell, ...]] = []
         for name in self.names:
-            off = errors(self.models[name], test)
+            off = self.errors(name, test)
             each = np.sqrt(np.mean(off**2, axis=0)).tolist()
-            rows.append((name, *each, err(y, y + off)))
+            rows.append((name, *each, err((y - mean).ravel(), (y - mean + off).ravel())))
         return Table(
             "The paper's test set: its patterns at stiffnesses not trained on",
             ("model", *(f"RMSE {k} [mm]" for k in (1, 2, 3)), "Err [%]"),
@@ -148,7 +161,7 @@ class Predictions:
         letters = iter(printed.PREDICTION)
         found = {}
         for recording in self._prediction(p0).values():
-            off = errors(self.models[name], [recording])
+            off = self.errors(name, [recording])
             for k, output in enumerate(OUTPUTS):
                 y = recording[output]
                 found[next(letters)] = (err(y, y + off[:, k]), rms(off[:, k]))
@@ -188,7 +201,7 @@ class Predictions:
         test = self.runs.select("test", stage="network")
         best, limit = self.headline, self.off(LINEAR, joint)
         spans = np.ptp(measured(joint), axis=0)
-        each = np.sqrt(np.mean(errors(self.models[best], joint) ** 2, axis=0))
+        each = np.sqrt(np.mean(self.errors(best, joint) ** 2, axis=0))
         yield (
             f"All pressures random at once, test runs: {best}, chosen on validation runs, is off by "
             f"{self.off(best, joint):.2f} mm (at worst {100 * np.max(each / spans):.1f} % of a range) "
@@ -230,7 +243,7 @@ class Predictions:
         """Return joint test runs over time, and Figure 10."""
         for extensor in ("constant", "moving"):
             run = self.joint("test", extensor)[0]
-            shown = {name: self.models[name].simulate(run) for name in (LINEAR, OURS, BALANCE)}
+            shown = {name: self.found(name, run) for name in (LINEAR, OURS, BALANCE)}
             curves = {"measured": (thinned(run.time), thinned(run[OUTPUTS[0]]))}
             for name, found in shown.items():
                 curves[name] = (thinned(run.time), thinned(found[OUTPUTS[0]]))
@@ -238,15 +251,10 @@ class Predictions:
             yield Figure(title, "time [s]", "displacement [mm]", curves)
         for pattern, run in self._prediction(TABLE_4).items():
             driven = f"pressure_{pattern[0]}"
-            found_by = {name: self.models[name].simulate(run) for name in (PUBLISHED, RAW, OURS)}
+            found_by = {name: self.found(name, run) for name in (PUBLISHED, RAW, OURS)}
             for output in OUTPUTS:
                 curves = {"measured": (thinned(run[driven]), thinned(run[output]))}
                 for name, found in found_by.items():
                     curves[name] = (thinned(run[driven]), thinned(found[output]))
                 said = f"Driven: {', '.join(pattern)}; {output.replace('_', ' ')} (its Figure 10)"
                 yield Figure(said, "pressure [bar]", "displacement [mm]", curves)
-
-
-def err(y: Array, modelled: Array) -> float:
-    """Return the paper's Err [%], over all outputs together."""
-    return float(100 * np.abs(y - modelled).sum() / np.abs(y - y.mean(axis=0)).sum())

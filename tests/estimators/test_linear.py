@@ -14,8 +14,11 @@ from scipy.signal import lfilter
 from mckibben import DataError, ModelError, Recording, identify
 from mckibben.blocks.dynamic.process_model import ProcessModel
 from mckibben.blocks.dynamic.transfer_function import TransferFunction
+from mckibben.blocks.saving import from_dict
+from mckibben.comparison.free_run import run_free
 from mckibben.estimators.affine_match import affine_match
 from mckibben.estimators.data import training_data
+from mckibben.estimators.gpi import GPIEstimator
 from mckibben.estimators.linear.models import (
     ARMAXEstimator,
     ARXEstimator,
@@ -23,6 +26,7 @@ from mckibben.estimators.linear.models import (
     OutputErrorEstimator,
 )
 from mckibben.estimators.linear.polynomials import Orders, errors
+from mckibben.estimators.linear.prediction_error import evaluate
 from mckibben.estimators.linear.process import P2UZEstimator
 
 Array = NDArray[np.float64]
@@ -77,7 +81,8 @@ def test_prediction_errors_are_those_of_a_naive_loop() -> None:
     b, f, c, d, constant = (0.5, 0.3), (-1.2, 0.4), 0.3, -0.6, 1.5
     w, v, e = [0.0] * 60, [0.0] * 60, [0.0] * 60
     for t in range(60):
-        past = [(w[t - k] if t >= k else 0.0, run.u[t - k] if t >= k else 0.0) for k in (1, 2)]
+        # the input has been at its first value before
+        past = [(w[t - k] if t >= k else 0.0, run.u[max(t - k, 0)]) for k in (1, 2)]
         w[t] = b[0] * run.u[t] + b[1] * past[0][1] - f[0] * past[0][0] - f[1] * past[1][0]
         v[t] = run.y[t] - w[t] - constant
         before_v, before_e = (v[t - 1], e[t - 1]) if t else (0.0, 0.0)
@@ -184,3 +189,76 @@ def test_affine_match_by_both_rules() -> None:
         matched = affine_match(model, twisted, rule)
         errors_left = matched.simulate(twisted)["displacement"] - twisted["displacement"]
         assert np.abs(errors_left).max() < 1e-9
+
+
+def test_slopes_hold_with_the_starts_solved_for() -> None:
+    """How the start's response moves counts too: without it searches stop where nothing is least."""
+    orders = Orders(b=2, f=2, c=1, d=1)
+    run = training_data(recorded(11, 200), "pressure", "displacement").runs[0]
+    theta = np.array([0.5, 0.3, -1.8, 0.81, 0.3, -0.9, 3.0])
+    e, jacobian, _ = evaluate(theta, orders, [run])
+
+    def cost(point: Array) -> float:
+        return 0.5 * float(np.sum(evaluate(point, orders, [run])[0] ** 2))
+
+    np.testing.assert_allclose(
+        jacobian.T @ e, approx_fprime(theta, cost, 1e-7), rtol=1e-3, atol=1e-2
+    )
+
+
+WARM = ProcessModel(6.8, (5.7,), 9.1, 156.0, 0.0, 0.0, 2.0)
+
+
+def warm(seed: int, n: int = 1000) -> Recording:
+    rng = np.random.default_rng(seed)
+    u = np.repeat(rng.uniform(0, 5, (n + 500) // 50), 50)
+    y = WARM.simulate(u, sample_time=0.5) + 0.1 * rng.standard_normal(u.size)
+    return Recording({"pressure": u[500:], "displacement": y[500:]}, 0.5)
+
+
+def test_a_run_that_starts_warm_gives_the_truth_within_its_errors() -> None:
+    fit = P2UZEstimator().fit(warm(0))
+    off = np.abs(fit.model_.pack() - WARM.pack())[:4]
+    assert np.all(off < 3 * np.array(fit.diagnostics_.standard_errors)[:4])
+
+
+@pytest.mark.parametrize("initial", ["fitted", "first_sample"])
+def test_what_is_delivered_is_what_was_optimised(initial: Any) -> None:
+    recording = warm(1)
+    fits: list[Any] = [P2UZEstimator(initial=initial), OutputErrorEstimator(initial=initial)]
+    for fit in fits:
+        model = fit.fit(recording).model_
+        for modelled in (
+            model.simulate(recording)["displacement"],
+            *([run_free(model, recording, "displacement", (recording,))] * (initial == "fitted")),
+        ):
+            delivered = np.sqrt(np.mean((modelled - recording["displacement"]) ** 2))
+            assert delivered == pytest.approx(fit.diagnostics_.rmse, rel=1e-9)
+    assert fits[1].diagnostics_.rmse <= fits[1].noise_.deviation * (1 + 1e-9)
+
+
+def test_prediction_goes_from_one_step_errors_to_the_free_run() -> None:
+    recording = recorded(12, 1000, c=C, d=D)
+    fit = BoxJenkinsEstimator().fit(recording)
+    model = from_dict(fit.model_.to_dict())
+    assert isinstance(model, TransferFunction)
+    assert model == fit.model_
+    measured = recording["displacement"]
+    rms = [
+        float(np.std(model.predict(recording, k)["displacement"] - measured)) for k in (1, 5, 50)
+    ]
+    assert rms[0] == pytest.approx(fit.noise_.deviation, rel=1e-3)
+    assert rms[0] < rms[1] < rms[2] * 1.001
+    with pytest.raises(ModelError, match="horizon is 0"):
+        model.predict(recording, 0)
+
+
+def test_a_model_that_overflows_has_no_covariance_and_no_crash() -> None:
+    unstable = TransferFunction((1.0,), (-9.0,), STEP)
+    data = training_data(recorded(13, 1000), "pressure", "displacement")
+    fit = GPIEstimator()
+    with np.errstate(all="ignore"):
+        residual = data.target - fit.free_runs([unstable], data)[0]
+    condition, covariance = fit.uncertainty(unstable, data, residual, ())
+    assert np.isinf(condition)
+    assert np.isnan(covariance).all()

@@ -174,6 +174,11 @@ class Block(metaclass=Checked):
         del first, output
         return None
 
+    def start_on(self, recording: Recording, initial: Initial | None = None) -> Initial | None:
+        """Return the start to use on a recording, which some rules look at; by default as given."""
+        del recording
+        return initial
+
     def passes(self, low: Array, high: Array) -> tuple[Array, Array]:
         """Return the outputs that can be reached where the inputs between two ends can be.
 
@@ -229,7 +234,7 @@ class Block(metaclass=Checked):
         """
         if isinstance(data, Recording):
             inputs = self._inputs_from(data)
-            outputs = self._run(inputs, data.sample_time, initial)
+            outputs = self._run(inputs, data.sample_time, self.start_on(data, initial))
             if not np.isfinite(outputs).all():
                 raise ModelError(
                     f"the output of {self.kind!r} is not finite on {data.name}. "
@@ -292,7 +297,7 @@ class Block(metaclass=Checked):
     def final_state(self, data: Recording, *, initial: Initial | None = None) -> Array:
         """Return the state after a recording, shape (n_states,): its memory, to start another with."""
         inputs = self._inputs_from(data)
-        state = self.initial_state(inputs[0], initial)
+        state = self.initial_state(inputs[0], self.start_on(data, initial))
         self.bind(data.sample_time, state, inputs, np.empty((len(inputs), len(self.outputs))))()
         return state
 

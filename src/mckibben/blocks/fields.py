@@ -43,6 +43,10 @@ StoredInitial = Literal["first_sample", "virgin"] | Vector
 """`Initial` as a field of a block."""
 
 
+FittedInitial = Literal["first_sample", "virgin", "fitted"] | Vector
+"""`StoredInitial` of linear models, whose start can be fitted to outputs too; see `LinearStart`."""
+
+
 def vector(values: ArrayLike) -> tuple[float, ...]:
     """Return numbers as a field of a block holds them."""
     return tuple(np.asarray(values, dtype=np.float64).tolist())

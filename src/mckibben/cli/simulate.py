@@ -23,6 +23,10 @@ def simulate(
             "(the one excursion that explains the first measured output)."
         ),
     ] = "model",
+    horizon: Annotated[
+        int | None,
+        typer.Option(help="Predict so many samples ahead from measured outputs, instead of free."),
+    ] = None,
     column: Columns = None,
     unit: Units = None,
     rate: Rate = None,
@@ -30,7 +34,11 @@ def simulate(
     resample: Resample = None,
     as_json: Json = False,
 ) -> None:
-    """Run a saved model free over a recording; adds channels named OUTPUT_model."""
+    """Run a saved model free over a recording; adds channels named OUTPUT_model.
+
+    A linear model whose start is fitted starts from the state that explains the measured output best,
+    where the file has it; with --initial first_sample from inputs alone.
+    """
     from dataclasses import asdict
 
     from mckibben.blocks.saving import load
@@ -47,7 +55,10 @@ def simulate(
             remedy="simulate with --gaps interpolate, or cut the file first",
         )
     (recording,) = recordings
-    modelled = block.simulate(recording, initial=_initial(initial, block, recording))
+    if horizon is None:
+        modelled = block.simulate(recording, initial=_initial(initial, block, recording))
+    else:
+        modelled = _predicted(block, recording, horizon)
     result = recording.select(wanted)
     metrics: dict[str, dict[str, float]] = {}
     for channel in block.outputs:
@@ -61,14 +72,28 @@ def simulate(
             metrics[channel.name] = asdict(score(measured, modelled[channel.name]))
     write(result.with_meta(model=str(model)), out)
     if as_json:
-        print_json({"file": str(out), "n_samples": len(result), "metrics": metrics})
+        head = {"file": str(out), "n_samples": len(result), "horizon": horizon}
+        print_json(head | {"metrics": metrics})
         return
     for name, figures in metrics.items():
         print(
-            f"{name}: RMSE {figure(figures['rmse'], 4)}, MAE {figure(figures['mae'], 4)}, worst "
+            f"{name}{'' if horizon is None else f', {horizon} samples ahead'}: "
+            f"RMSE {figure(figures['rmse'], 4)}, MAE {figure(figures['mae'], 4)}, worst "
             f"{figure(figures['max_error'], 4)} {recording.units[name]}, R² {figure(figures['r2'], 5)}"
         )
     print(f"Written: {out}")
+
+
+def _predicted(block: Any, recording: Any, horizon: int) -> Any:
+    from mckibben.blocks.dynamic.transfer_function import TransferFunction
+    from mckibben.errors import ModelError
+
+    if not isinstance(block, TransferFunction):
+        raise ModelError(
+            f"{block.kind!r} has no noise model, so it cannot predict from measured outputs. "
+            "Remedy: leave --horizon out, or fit arx, armax, oe or bj."
+        )
+    return block.predict(recording, horizon)
 
 
 def _initial(rule: str, block: Any, recording: Any) -> Any:

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from mckibben.blocks.base import Block
 from mckibben.blocks.compose import Series
-from mckibben.comparison.splits import predecessor
+from mckibben.blocks.dynamic.linear_start import LinearStart
+from mckibben.comparison.splits import Mask, predecessor
 from mckibben.recording import Recording
 
 Array = NDArray[np.float64]
@@ -19,13 +20,26 @@ SETTLING = 256
 
 
 def run_free(
-    block: Block, recording: Recording, output: str, known: Sequence[Recording] = ()
+    block: Block,
+    recording: Recording,
+    output: str,
+    known: Sequence[Recording] = (),
+    known_rows: Sequence[Mask] | None = None,
 ) -> Array:
     """Return the modelled output over a recording, shape (n,).
 
     Memory starts from the end of the known recording that this one continues; else from the one
     excursion before the first sample that best explains the first measured output (`measured_start`).
-    After that nothing measured but the inputs is used.
+    A linear model whose start is fitted starts from what explains best those of its samples that are
+    known: the recording is one of the known ones, or begins as one of them does. After that nothing
+    measured but the inputs is used.
+
+    Parameters
+    ----------
+    known : sequence of Recording
+        What the model was identified from.
+    known_rows : sequence of bool arrays, optional
+        For every one of them, the samples whose outputs are known; default all.
 
     Raises
     ------
@@ -33,11 +47,40 @@ def run_free(
         If the output is not finite.
     """
     before = predecessor(recording, known)
+    rows = [np.ones(len(r), dtype=bool) for r in known] if known_rows is None else known_rows
     if before is not None:
-        start = block.final_state(before, initial=measured_start(block, before, output).tolist())
+        start = block.final_state(before, initial=known_start(block, before, output).tolist())
     else:
-        start = measured_start(block, recording, output)
+        begun = ((r, mask) for r, mask in zip(known, rows, strict=True) if _begins(recording, r))
+        own, mask = next(begun, (None, None))
+        start = (
+            measured_start(block, recording, output)
+            if own is None
+            else known_start(block, own, output, mask)
+        )
     return block.simulate(recording, initial=start.tolist())[output]
+
+
+def known_start(block: Block, recording: Recording, output: str, rows: Mask | None = None) -> Array:
+    """Return the state before the first sample of a recording whose outputs are known.
+
+    That of the least squared error where the block's start is fitted; else `measured_start`.
+    """
+    if isinstance(block, LinearStart) and block.initial == "fitted":
+        inputs = recording.matrix(channel.name for channel in block.inputs)
+        return block.fitted_state(inputs, recording[output], recording.sample_time, rows)
+    return measured_start(block, recording, output)
+
+
+def _begins(recording: Recording, known: Recording) -> bool:
+    """Tell whether a known recording is this one, or its beginning."""
+    n = len(known)
+    return known is recording or (
+        known.start_time == recording.start_time
+        and n <= len(recording)
+        and list(known.channels) == list(recording.channels)
+        and all(np.array_equal(recording[name][:n], known[name]) for name in known.channels)
+    )
 
 
 def measured_start(block: Block, recording: Recording, output: str) -> Array:

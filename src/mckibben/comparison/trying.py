@@ -166,7 +166,7 @@ def rms_of(parts: Sequence[Tried]) -> float | None:
 def outputs_of(block: Block, data: Data) -> tuple[Array, ...]:
     """Return a model's free-running output on every training recording, then every test recording."""
     split = data.split
-    on_train = [run_free(block, recording, data.output) for recording in split.train]
+    on_train = [run_free(block, recording, data.output, (recording,)) for recording in split.train]
     on_test = [run_free(block, recording, data.output, split.train) for recording in split.test]
     return (*on_train, *on_test)
 
@@ -202,8 +202,13 @@ def _try(data: Data, part: Part, tell: Callable[..., None]) -> Tried:
     try:
         for fold in (data.folds[place] for place in part.folds):
             block = fitted(fold.train, fold.train_rows, None).model_
+            # a single recording is fitted and tested on samples of its own
+            fitted_to = list(zip(fold.train, fold.train_rows, strict=True))
             for recording, rows in zip(fold.test, fold.test_rows, strict=True):
-                errors = (run_free(block, recording, data.output) - recording[data.output])[rows]
+                known = [pair for pair in fitted_to if pair[0] is recording]
+                own, own_rows = [r for r, _ in known], [kept for _, kept in known]
+                modelled = run_free(block, recording, data.output, own, own_rows)
+                errors = (modelled - recording[data.output])[rows]
                 squares.append(float(errors @ errors))
                 count += errors.size
     except MckibbenError as error:  # a part of the data may be too little where all of it is enough

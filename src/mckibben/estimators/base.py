@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Annotated, ClassVar, Literal, Self
 
@@ -25,6 +25,12 @@ from mckibben.recording import Recording
 from mckibben.threads import one_blas_thread
 
 Array = NDArray[np.float64]
+
+LARGEST = 1e150
+"""Sensitivity that still is one: its square is a number."""
+
+DIFFERENCE = 1e-6
+"""Step of finite differences, relative to the size of a parameter."""
 
 Operators = Annotated[int, Interval(ge=1, le=1000)]
 """Number of operators."""
@@ -82,8 +88,8 @@ class Estimator(Parametrised, ABC):
         Channels to learn from.
     initial : {"first_sample", "virgin", "fitted"}
         Memory before the first sample of every recording: as if the input had only risen; as if
-        nothing had ever happened; or one number a recording fitted with the rest, the input from
-        which it came down.
+        nothing had ever happened; or fitted with the rest, of which a model with hysteresis has one
+        number a recording, the input from which it came down, and a linear one its whole state.
     seed : int
         Of everything random.
     """
@@ -241,15 +247,15 @@ class Estimator(Parametrised, ABC):
         self, block: Block, data: TrainingData, tracker: Tracker, started: float
     ) -> Diagnostics:
         at_bounds = self.at_bounds(block)
-        residual = data.target - simulate_all([block], data)[0]
+        residual = data.target - self.free_runs([block], data)[0]
         try:
-            condition, covariance = _sensitivity(block, data, residual, at_bounds)
+            condition, covariance = self.uncertainty(block, data, residual, at_bounds)
         except KeyboardInterrupt:  # the model is found; only what is known about it is cut short
             tracker.interrupted = True
             condition = np.nan
             covariance = np.full((block.n_parameters, block.n_parameters), np.nan)
         return Diagnostics(
-            rmse=float(np.sqrt(np.mean(residual**2))),
+            rmse=_rms(residual),
             n_samples=residual.size,
             n_evaluations=tracker.evaluations,
             seconds=time.perf_counter() - started,
@@ -270,6 +276,19 @@ class Estimator(Parametrised, ABC):
         unknown = np.flatnonzero(np.isnan(found.standard_errors)).tolist()
         return tuple(place for place in unknown if place not in found.at_bounds)
 
+    def free_runs(self, blocks: Sequence[Block], data: TrainingData) -> Array:
+        """Return the free-running outputs of blocks where samples count, each run started as fitted.
+
+        Shape (blocks, samples).
+        """
+        return simulate_all(blocks, data)
+
+    def uncertainty(
+        self, block: Block, data: TrainingData, residual: Array, at_bounds: Sequence[int]
+    ) -> tuple[float, Array]:
+        """Return the condition of the free parameters, and the covariance of all; see `Diagnostics`."""
+        return _sensitivity(block, data, residual, at_bounds)
+
     def at_bounds(self, block: Block) -> tuple[int, ...]:
         """Return the places of parameters that ended at a bound: by default those that are zero."""
         return tuple(np.flatnonzero(block.pack() == 0).tolist())
@@ -285,37 +304,79 @@ def simulate_all(blocks: Sequence[Block], data: TrainingData) -> Array:
     return np.concatenate(outputs, axis=1)
 
 
+def _rms(residual: Array) -> float:
+    with np.errstate(over="ignore", invalid="ignore"):  # a model that overflows has no finite error
+        return float(np.sqrt(np.mean(residual**2)))
+
+
 def _sensitivity(
     block: Block, data: TrainingData, residual: Array, fixed: Sequence[int]
 ) -> tuple[float, Array]:
     """Return the condition of the parameters that are free, and the covariance of all.
 
     From finite differences of the free-running output on a share of the samples. Parameters that
-    are fixed, or that the data do not determine, have NaN.
+    are fixed, or that the data do not determine, have NaN; so have those at which the output
+    overflows, and all of a model whose own output does.
     """
     parameters = block.pack()
     covariance = np.full((parameters.size, parameters.size), np.nan)
     free = [index for index in range(parameters.size) if index not in fixed]
     if not free:
         return np.inf, covariance
-    sizes = np.maximum(np.abs(parameters), 1e-3 * np.abs(parameters).max(initial=1e-3))[free]
-    moves = 1e-6 * np.diag(sizes)
     thin = data.thinned(max(2000, 4 * parameters.size))
-    perturbed = []
-    for move in moves:
+    sizes = relative_sizes(parameters)
+    with np.errstate(over="ignore", invalid="ignore"):
+        slopes = sensitivities(block, free, sizes[free], lambda blocks: simulate_all(blocks, thin))
+        power = float(residual @ residual)
+    finite = np.isfinite(slopes).all(axis=0) & (np.abs(slopes).max(axis=0, initial=0.0) < LARGEST)
+    if not finite.any() or not np.isfinite(power):
+        return np.inf, covariance
+    condition, own = inverted(slopes[:, finite])
+    places = np.array(free)[finite]
+    variance = power / max(residual.size - len(free), 1) * len(slopes) / residual.size
+    covariance[np.ix_(places, places)] = variance * own * np.outer(sizes[places], sizes[places])
+    return condition if finite.all() else np.inf, covariance
+
+
+def relative_sizes(parameters: Array) -> Array:
+    """Return the sizes by which parameters are scaled; none is counted as very small."""
+    return np.maximum(np.abs(parameters), 1e-3 * np.abs(parameters).max(initial=1e-3))
+
+
+def sensitivities(
+    block: Block, places: Sequence[int], sizes: Array, run: Callable[[list[Block]], Array]
+) -> Array:
+    """Return how outputs move with some parameters, each in units of its size, shape (n, k).
+
+    Parameters
+    ----------
+    places : sequence of int, length k
+        Of the parameters.
+    sizes : array, shape (k,)
+        Their sizes.
+    run : callable
+        Gives the outputs of blocks, shape (blocks, n).
+    """
+    parameters = block.pack()
+    perturbed: list[Block] = [block]
+    for place, size in zip(places, sizes, strict=True):
         moved = parameters.copy()
-        moved[free] += move
+        moved[place] += DIFFERENCE * size
         perturbed.append(block.unpack(moved))
-    base, *others = simulate_all([block, *perturbed], thin)
-    scaled = np.column_stack([other - base for other in others]) / 1e-6
-    singular, right = np.linalg.svd(scaled, full_matrices=False)[1:]
+    base, *others = run(perturbed)
+    return np.column_stack([other - base for other in others]) / DIFFERENCE
+
+
+def inverted(slopes: Array) -> tuple[float, Array]:
+    """Return the condition of scaled slopes, shape (n, k), and the inverse of their products, (k, k).
+
+    Rows and columns of what the slopes do not determine are NaN.
+    """
+    singular, right = np.linalg.svd(slopes, full_matrices=False)[1:]
     condition = float(singular[0] / singular[-1]) if singular[-1] > 0 else np.inf
     kept = singular > 1e-6 * singular[0]
     inverse = (right[kept].T / singular[kept] ** 2) @ right[kept]
     determined = 1 - (right[~kept] ** 2).sum(axis=0) > 0.99
-    variance = float(residual @ residual) / max(residual.size - len(free), 1)
-    own = variance * inverse * np.outer(sizes, sizes) * base.size / residual.size
-    own[~determined] = np.nan
-    own[:, ~determined] = np.nan
-    covariance[np.ix_(free, free)] = own
-    return condition, covariance
+    inverse[~determined] = np.nan
+    inverse[:, ~determined] = np.nan
+    return condition, inverse

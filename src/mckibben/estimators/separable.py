@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 
 from mckibben.blocks.base import Block
 from mckibben.errors import ModelError
-from mckibben.estimators.base import simulate_all
 from mckibben.estimators.data import Run, TrainingData
 from mckibben.estimators.search import (
     Choice,
@@ -70,6 +69,9 @@ class SeparableEstimator(SearchingEstimator):
 
     searches_condensed: ClassVar[bool] = True
     """Whether the search may skip what lies between turning points of the input."""
+
+    fits_peaks: ClassVar[bool] = True
+    """Whether a fitted start is the input from which every run came down."""
 
     @abstractmethod
     def bounds(self, data: TrainingData) -> tuple[Array, Array]:
@@ -137,14 +139,14 @@ class SeparableEstimator(SearchingEstimator):
     def identify(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
         """Return the block found, and the data with the memories at the start that belong to it."""
         if self.method == "pso":
-            if self.initial == "fitted":
+            if self.initial == "fitted" and self.fits_peaks:
                 raise ModelError(
                     "a swarm over all parameters cannot fit the initial memory too. "
                     "Remedy: use --set method=ls, or initial=first_sample."
                 )
             return self._swarm_over_all(data, tracker), data
         theta = self._search(data, tracker)
-        if self.initial == "fitted":
+        if self.initial == "fitted" and self.fits_peaks:
             for _ in range(2):
                 data = self._fit_peaks(theta, data)
                 theta = self._polish(theta, data, tracker)
@@ -283,7 +285,7 @@ class SeparableEstimator(SearchingEstimator):
         tracker.budget = self.pso_particles * (self.pso_iterations + 1)
 
         def costs(points: Array) -> Array:
-            outputs = simulate_all([template.unpack(point) for point in points], data)
+            outputs = self.free_runs([template.unpack(point) for point in points], data)
             return np.sqrt(np.mean((outputs - data.target) ** 2, axis=1))
 
         return template.unpack(particle_swarm(costs, lower, upper, self.swarm, tracker, self.seed))

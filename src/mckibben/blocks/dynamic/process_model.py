@@ -22,13 +22,14 @@ from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.blocks.base import Block, Kernel, Primitive
+from mckibben.blocks.dynamic.linear_start import LinearStart
 from mckibben.blocks.fields import (
     DISPLACEMENT,
     PRESSURE,
     STRICT,
     ChannelField,
+    FittedInitial,
     Initial,
-    StoredInitial,
     Vector,
 )
 from mckibben.blocks.kernels import kernel
@@ -73,7 +74,7 @@ def process_model_kernel(coefficients: Array, state: Array, inputs: Array, outpu
 
 
 @dataclass(frozen=True, config=STRICT)
-class ProcessModel(SingleChannel, NamedParameters, Primitive):
+class ProcessModel(LinearStart, SingleChannel, NamedParameters, Primitive):
     """A gain, one to three lags, perhaps a zero and a delay, about an operating point.
 
     Parameters
@@ -92,9 +93,10 @@ class ProcessModel(SingleChannel, NamedParameters, Primitive):
         The operating point.
     hold : {"first", "zero"}
         What the input does between samples: go on in a straight line, or stay.
-    initial : {"first_sample", "virgin"} or sequence of float
+    initial : {"first_sample", "virgin", "fitted"} or sequence of float
         Default memory before the first sample: at rest at the first input, or at the operating
-        point.
+        point, or, on recordings that have the output, what explains it best (else at rest at the
+        first input).
     input, output : Channel
         Channel driven and channel given.
     """
@@ -111,7 +113,7 @@ class ProcessModel(SingleChannel, NamedParameters, Primitive):
     input_offset: FiniteFloat = 0.0
     output_offset: FiniteFloat = 0.0
     hold: Literal["first", "zero"] = "first"
-    initial: StoredInitial = "first_sample"
+    initial: FittedInitial = "first_sample"
     input: ChannelField = PRESSURE
     output: ChannelField = DISPLACEMENT
 
@@ -144,6 +146,11 @@ class ProcessModel(SingleChannel, NamedParameters, Primitive):
         """MATLAB's name of the structure, P1 to P3 with U and Z; a delay adds D."""
         under = "U" if self.damping is not None else ""
         return f"P{self.order}{'D' * (self.delay > 0)}{under}{'Z' * (self.zero_time is not None)}"
+
+    @property
+    def n_free(self) -> int:
+        """As many states as there are lags."""
+        return self.order
 
     @property
     def n_states(self) -> int:
@@ -229,7 +236,7 @@ class ProcessModel(SingleChannel, NamedParameters, Primitive):
         if not isinstance(start, str):
             return explicit_state(self, start)
         state = np.zeros(self.n_states)
-        if start == "first_sample":
+        if start in ("first_sample", "fitted"):
             state[0] = state[self.order : self.n_states - self.order] = first[0] - self.input_offset
         return state
 

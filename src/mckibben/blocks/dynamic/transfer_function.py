@@ -2,9 +2,9 @@
 
 y_t - y_0 = B(q) / F(q) (u_t - u_0),  B = b_0 + b_1 q^-1 + ...,  F = 1 + f_1 q^-1 + ...
 
-Of the models named, B / F is what a free run needs; their noise models only matter to one-step
-predictions. The inverse is F / B. It exists where the output answers at once (b_0 is not zero) and
-all zeros of B lie within the unit circle.
+Of the models named, B / F is what a free run needs; the noise model beside it, C / D, says what past
+errors tell of coming ones, and only `predict` looks at it. The inverse is F / B. It exists where the
+output answers at once (b_0 is not zero) and all zeros of B lie within the unit circle.
 """
 
 from __future__ import annotations
@@ -12,19 +12,20 @@ from __future__ import annotations
 from typing import Annotated, ClassVar, Self
 
 import numpy as np
-from annotated_types import Gt
+from annotated_types import Ge, Gt
 from numpy.typing import NDArray
 from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.blocks.base import Kernel, Primitive
+from mckibben.blocks.dynamic.linear_start import LinearStart
 from mckibben.blocks.fields import (
     DISPLACEMENT,
     PRESSURE,
     STRICT,
     ChannelField,
+    FittedInitial,
     Initial,
-    StoredInitial,
     Vector,
 )
 from mckibben.blocks.kernels import kernel
@@ -32,6 +33,7 @@ from mckibben.blocks.named import NamedParameters
 from mckibben.blocks.refusals import explicit_state, own_sample_time
 from mckibben.blocks.single import SingleChannel
 from mckibben.errors import ModelError
+from mckibben.recording import Recording
 
 Array = NDArray[np.float64]
 
@@ -56,7 +58,7 @@ def transfer_function_kernel(
 
 
 @dataclass(frozen=True, config=STRICT)
-class TransferFunction(SingleChannel, NamedParameters, Primitive):
+class TransferFunction(LinearStart, SingleChannel, NamedParameters, Primitive):
     """Discrete transfer function about an operating point.
 
     Parameters
@@ -69,10 +71,15 @@ class TransferFunction(SingleChannel, NamedParameters, Primitive):
         Time between samples that it holds for [s]; positive.
     input_offset, output_offset : float
         u_0 and y_0, the operating point.
-    initial : {"first_sample", "virgin"} or sequence of float
-        Default memory before the first sample: at rest at the first input, or at u_0.
+    initial : {"first_sample", "virgin", "fitted"} or sequence of float
+        Default memory before the first sample: at rest at the first input, or at u_0, or, on recordings
+        that have the output, what explains it best (else at rest at the first input).
     input, output : Channel
         Channel driven and channel given.
+    noise_numerator, noise_denominator : sequence of float
+        c_1, c_2, ... and d_1, d_2, ... of the noise model C / D, its leading ones left out.
+    noise_deviation : float or None
+        Standard deviation of the white noise that drives it; None where it is not known.
     """
 
     kind: ClassVar[str] = "transfer-function"
@@ -90,9 +97,12 @@ class TransferFunction(SingleChannel, NamedParameters, Primitive):
     sample_time: Annotated[FiniteFloat, Gt(0)]
     input_offset: FiniteFloat = 0.0
     output_offset: FiniteFloat = 0.0
-    initial: StoredInitial = "first_sample"
+    initial: FittedInitial = "first_sample"
     input: ChannelField = PRESSURE
     output: ChannelField = DISPLACEMENT
+    noise_numerator: Vector = ()
+    noise_denominator: Vector = ()
+    noise_deviation: Annotated[FiniteFloat, Ge(0)] | None = None
 
     def __post_init__(self) -> None:
         if not self.numerator:
@@ -104,6 +114,11 @@ class TransferFunction(SingleChannel, NamedParameters, Primitive):
     def n_states(self) -> int:
         """The order."""
         return max(len(self.numerator) - 1, len(self.denominator))
+
+    @property
+    def n_free(self) -> int:
+        """As many states as there are poles."""
+        return len(self.denominator)
 
     @property
     def poles(self) -> NDArray[np.complex128]:
@@ -124,13 +139,13 @@ class TransferFunction(SingleChannel, NamedParameters, Primitive):
     def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
         """Return the filter at rest: at the first input, or, virgin, at the operating point."""
         start = self.initial if initial is None else initial
-        if start == "first_sample":
+        if start in ("first_sample", "fitted"):
             u = float(first[0]) - self.input_offset
             y = self.gain * u if np.isfinite(self.gain) else 0.0
             b, f = self._padded()
             tails = [np.cumsum((b * u - f * y)[::-1])[::-1][1:]]
             return np.concatenate(tails)
-        if start == "virgin":
+        if isinstance(start, str):
             return np.zeros(self.n_states)
         return explicit_state(self, start)
 
@@ -150,6 +165,50 @@ class TransferFunction(SingleChannel, NamedParameters, Primitive):
         """
         own_sample_time(self.kind, self.sample_time, sample_time)
         return np.concatenate([[self.input_offset, self.output_offset], *self._padded()])
+
+    def predict(self, recording: Recording, horizon: int = 1) -> Recording:
+        """Predict the output some samples ahead from outputs measured until then; no free run.
+
+        Parameters
+        ----------
+        recording : Recording
+            With the input, which is known until the sample predicted, and the measured output.
+        horizon : int
+            Samples ahead, at least 1.
+
+        Returns
+        -------
+        Recording
+            The input, and the output predicted. Where the block's `initial` is "fitted", the state
+            before the first sample is that with the least one-step errors on this recording. The noise
+            before the first sample is taken to be zero.
+
+        Raises
+        ------
+        DataError
+            If the recording lacks a channel.
+        ModelError
+            If the horizon is not positive.
+        """
+        from scipy.signal import lfilter
+
+        if horizon < 1:
+            raise ModelError(f"the horizon is {horizon}. Remedy: predict 1 sample ahead or more.")
+        c, d = [1.0, *self.noise_numerator], [1.0, *self.noise_denominator]
+        name = self.output.name
+        inputs, measured = self._inputs_from(recording), recording[name]
+        fitted = self.initial == "fitted"
+        rest = self.simulate(
+            inputs, initial="first_sample" if fitted else None, sample_time=recording.sample_time
+        )[:, 0]
+        errors = np.asarray(lfilter(d, c, measured - rest))
+        if fitted and self.n_free:
+            free = lfilter(d, c, self.free_responses(len(inputs), recording.sample_time), axis=0)
+            errors = errors - free @ np.linalg.lstsq(free, errors, rcond=1e-12)[0]
+        ahead = lfilter(c, d, np.eye(1, horizon)[0])  # what an error does to the samples after it
+        predicted = measured - np.asarray(lfilter(ahead, [1.0], errors))
+        kept = recording.select([self.input.name])
+        return kept.with_channels({name: self.output.unit}, **{name: predicted})
 
     def inverse(self) -> TransferFunction:
         """Return the filter that undoes this one.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Annotated, ClassVar
 
 import numpy as np
@@ -15,7 +15,7 @@ from mckibben.blocks.base import Block
 from mckibben.blocks.dynamic.transfer_function import TransferFunction
 from mckibben.blocks.fields import vector
 from mckibben.errors import DataError, ModelError
-from mckibben.estimators.base import Estimator
+from mckibben.estimators.base import inverted
 from mckibben.estimators.data import Run, TrainingData
 from mckibben.estimators.linear.polynomials import Orders, Polynomials
 from mckibben.estimators.linear.prediction_error import (
@@ -24,6 +24,7 @@ from mckibben.estimators.linear.prediction_error import (
     minimise,
     starting_points,
 )
+from mckibben.estimators.linear.starts import LinearEstimator, meat
 from mckibben.estimators.search import Tracker
 
 Array = NDArray[np.float64]
@@ -39,6 +40,13 @@ class Noise:
     numerator: tuple[float, ...]
     denominator: tuple[float, ...]
     deviation: float
+    covariance: Array = field(repr=False)
+    """Of all coefficients: B, A or F, C, D, leading ones left out; constants not."""
+
+    @property
+    def standard_errors(self) -> tuple[float, ...]:
+        """Of the same."""
+        return vector(np.sqrt(np.diag(self.covariance)))
 
 
 def stretches(run: Run, shortest: int) -> list[Run]:
@@ -61,10 +69,12 @@ def stretches(run: Run, shortest: int) -> list[Run]:
 
 
 @dataclass(kw_only=True, repr=False, eq=False)
-class PredictionErrorEstimator(Estimator):
+class PredictionErrorEstimator(LinearEstimator):
     """An estimator of a linear model by one-step prediction errors, run free ever after.
 
-    After `fit`, ``noise_`` holds the noise model.
+    After `fit`, ``noise_`` holds the noise model, the one-step error, and the covariance of all
+    coefficients. Covariances are those of Ljung, chapter 9, and take the noise to be what the model says
+    it is; output-error models say nothing of it, and theirs hold under coloured noise too.
 
     Parameters
     ----------
@@ -95,11 +105,6 @@ class PredictionErrorEstimator(Estimator):
                 "the recordings have no time, and this model depends on rate",
                 remedy="read them with a time column or --rate, or use gpi",
             )
-        if self.initial == "fitted":
-            raise ModelError(
-                "prediction errors always estimate the state before the first sample. "
-                "Remedy: leave initial out."
-            )
         orders = self.orders
         if data.target.size <= orders.size + orders.poles * len(data.runs):
             raise DataError(
@@ -108,20 +113,34 @@ class PredictionErrorEstimator(Estimator):
             )
         centre = float(np.mean(np.concatenate([run.u for run in data.runs])))
         middle = float(np.mean(data.target))
-        runs = [
-            replace(piece, u=piece.u - centre, y=piece.y - middle)
-            for run in data.runs
-            for piece in stretches(run, orders.size)
-        ]
+        # a free run needs no outputs, so it goes on where they do not count
+        pieces = (
+            data.runs
+            if not (orders.a or orders.c or orders.d)
+            else tuple(piece for run in data.runs for piece in stretches(run, orders.size))
+        )
+        runs = [replace(piece, u=piece.u - centre, y=piece.y - middle) for piece in pieces]
         if orders.c == orders.d == orders.f == 0:
             theta = arx(runs, orders)
-            tracker.saw(theta, evaluate(theta, orders, runs)[2])
+            tracker.saw(theta, evaluate(theta, orders, runs, self.initial)[2])
         else:
             starts = starting_points(runs, orders, self.n_starts, self.seed)
-            theta = minimise(runs, orders, starts, tracker)
+            theta = minimise(runs, orders, starts, tracker, self.initial)
         p = Polynomials.of(theta, orders)
-        deviation = evaluate(theta, orders, runs)[2]
-        self.noise_ = Noise((1.0, *vector(p.c)), (1.0, *vector(p.d)), deviation)
+        self._constant = p.constant
+        e, slopes, deviation = evaluate(theta, orders, runs, self.initial)
+        size = np.maximum(np.linalg.norm(slopes, axis=0), 1e-300)
+        self._condition, inverse = inverted(slopes / size)
+        freedom = max(e.size - orders.size - orders.poles * len(runs), 1)
+        self._covariance = float(e @ e) / freedom * inverse / np.outer(size, size)
+        if orders.f and not orders.c + orders.d:
+            self._covariance = self._robust(runs, slopes / size, e, freedom, inverse, size)
+        self.noise_ = Noise(
+            (1.0, *vector(p.c)),
+            (1.0, *vector(p.poles if orders.a else p.d)),
+            deviation,
+            self._covariance[:-1, :-1],
+        )
         constant = p.constant / (1.0 + float(p.poles.sum())) if orders.a else p.constant
         numerator = np.zeros(1 + max(orders.input_lags))
         numerator[[*orders.input_lags]] = p.b
@@ -131,7 +150,10 @@ class PredictionErrorEstimator(Estimator):
             step,
             centre,
             middle + constant,
-            self.starting_rule,
+            self.initial,
+            noise_numerator=vector(p.c),
+            noise_denominator=vector(p.poles if orders.a else p.d),
+            noise_deviation=deviation,
             **self.channels(data),
         )
         if not block.is_stable:
@@ -141,6 +163,51 @@ class PredictionErrorEstimator(Estimator):
                 "Remedy: use other orders, or output-error (oe), which is kept stable."
             )
         return block, data
+
+    def _robust(
+        self,
+        runs: Sequence[Run],
+        slopes: Array,
+        e: Array,
+        freedom: int,
+        inverse: Array,
+        size: Array,
+    ) -> Array:
+        """Return the covariance under coloured residuals."""
+        moves, residuals, place = [], [], 0
+        for run in runs:
+            n = int(run.counts.sum())
+            wide, left = np.zeros((run.u.size, slopes.shape[1])), np.zeros(run.u.size)
+            wide[run.counts], left[run.counts] = slopes[place : place + n], e[place : place + n]
+            moves.append(wide)
+            residuals.append(left)
+            place += n
+        own = np.nan_to_num(inverse)
+        own = own @ meat(moves, residuals, freedom) @ own / np.outer(size, size)
+        own[np.isnan(inverse)] = np.nan
+        return np.asarray(own)
+
+    def uncertainty(
+        self, block: Block, data: TrainingData, residual: Array, at_bounds: Sequence[int]
+    ) -> tuple[float, Array]:
+        """Return the condition and covariance from the prediction errors; the input's offset is set."""
+        del data, residual, at_bounds
+        orders = self.orders
+        n, poles = block.n_parameters, orders.poles
+        turned = np.zeros((n, orders.size))
+        turned[[*orders.input_lags], : orders.b] = np.eye(orders.b)
+        first = 1 + max(orders.input_lags)
+        turned[first : first + poles, orders.b : orders.b + poles] = np.eye(poles)
+        turned[-1, -1] = 1.0
+        if orders.a:  # the offset of the output is the constant over the sum of A
+            assert isinstance(block, TransferFunction)
+            whole = 1.0 + sum(block.denominator)
+            turned[-1, -1] = 1.0 / whole
+            turned[-1, orders.b : orders.b + poles] = -self._constant / whole**2
+        used = np.any(turned != 0, axis=1)
+        covariance = np.full((n, n), np.nan)
+        covariance[np.ix_(used, used)] = (turned @ self._covariance @ turned.T)[np.ix_(used, used)]
+        return self._condition, covariance
 
 
 @dataclass(kw_only=True, repr=False, eq=False)

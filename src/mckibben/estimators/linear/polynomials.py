@@ -1,9 +1,10 @@
 """Prediction errors of linear models, and their derivatives.
 
 A(q) y = B(q) / F(q) u + C(q) / D(q) e. Residuals are one-step prediction errors
-e = D / C (A y - B / F u - start), where start is the free response from the state before the first
-sample, one to each run, estimated with the rest. ARX has A and B, ARMAX A, B and C, output-error B
-and F, Box-Jenkins B, F, C and D.
+e = D / C (A y - B / F u - start), where the start is what the state before the first sample adds:
+nothing, a rest at the first input, or, as a rule, a free response estimated with the rest, one to each
+run. The input is taken to have been at its first value before. The noise starts from nothing. ARX has A
+and B, ARMAX A, B and C, output-error B and F, Box-Jenkins B, F, C and D.
 
 Source: Ljung, "System Identification", 1999, chapters 4 and 7.
 """
@@ -11,6 +12,7 @@ Source: Ljung, "System Identification", 1999, chapters 4 and 7.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +20,13 @@ from numpy.typing import NDArray
 from mckibben.estimators.data import Run
 
 Array = NDArray[np.float64]
+
+Start = Literal["fitted", "first_sample", "virgin"]
+"""State before the first sample: estimated; at rest at the first input; at rest at an input of zero.
+
+Equation errors (of models with A) need no state: outputs before are measured, and the first few
+samples, which have none before them, are left out of account by a start that is always estimated.
+"""
 
 
 @dataclass(frozen=True)
@@ -78,32 +87,40 @@ class Polynomials:
         return cls(b, poles, c, d, float(rest[0]))
 
 
-def spectral_radius(tail: Array) -> float:
-    """Return the largest size of the roots of a polynomial with a leading 1."""
-    if tail.size == 0 or not np.isfinite(tail).all():
-        return 0.0 if tail.size == 0 else np.inf
-    if tail.size > 2:
-        return float(np.abs(np.roots([1.0, *tail])).max())
-    a, b = float(tail[0]), float(tail[1]) if tail.size == 2 else 0.0
-    inside = a * a - 4.0 * b
-    return 0.5 * (abs(a) + inside**0.5) if inside >= 0 else b**0.5
+def errors(
+    theta: Array,
+    orders: Orders,
+    run: Run,
+    start: Start = "fitted",
+    state: Array | None = None,
+    *,
+    only_starts: bool = False,
+) -> tuple[Array, Array]:
+    """Return the prediction errors of a run, and their derivatives by theta and by its start.
 
-
-def errors(theta: Array, orders: Orders, run: Run) -> tuple[Array, Array]:
-    """Return the prediction errors of a run without its start, and their derivatives by theta.
+    Parameters
+    ----------
+    state : array, shape (poles,), optional
+        The start, where it is estimated: what the recursion from input to output is given, beside the
+        input, at the first samples. Default is nothing.
+    only_starts : bool
+        Leave out the derivatives by theta.
 
     Returns
     -------
     errors : array, shape (n,)
     jacobian : array, shape (n, size + poles)
-        By theta, then by the start of this run, in which the errors are linear.
+        By theta, then by the start of this run, in which the errors are linear; without the latter
+        where the start is not estimated.
     """
     from scipy.signal import lfilter
 
     p = Polynomials.of(theta, orders)
     poles, c, d = np.array([1.0, *p.poles]), np.array([1.0, *p.c]), np.array([1.0, *p.d])
     n = run.u.size
-    u = run.u
+    estimated = start == "fitted" or orders.a > 0
+    rest = 0.0 if start == "virgin" else float(run.u[0])
+    u = run.u - rest
 
     def later(x: Array, samples: int) -> Array:
         moved = np.zeros_like(x)
@@ -119,22 +136,36 @@ def errors(theta: Array, orders: Orders, run: Run) -> tuple[Array, Array]:
     # a filter at rest answers what comes later as much later, so each is run only once
     lags = orders.input_lags
     driven = sum((b * later(u, lag) for lag, b in zip(lags, p.b, strict=True)), np.zeros(n))
-    impulse = np.eye(1, n)[0]
-    by_constant = -by_noise(np.ones(n))
+    impulse, ones = np.eye(1, n)[0], np.ones(n)
+    by_constant = -by_noise(ones)
+    held = float(p.b.sum()) * rest
+    if state is not None:
+        driven[: state.size] += state[:n]
     if orders.a:
         # equation error: the recursion is taken on measured outputs
-        gap = np.asarray(lfilter(poles, [1.0], run.y)) - driven - p.constant
-        by_input, by_start = -by_noise(u), -by_noise(impulse)
+        gap = np.asarray(lfilter(poles, [1.0], run.y)) - driven - held - p.constant
+        by_input, by_start, by_rest = -by_noise(u), -by_noise(impulse), by_constant
         behind = by_noise(run.y)
-    else:
-        free = alone(poles, driven)
+    elif estimated:
+        free = alone(poles, driven + held)
         gap = run.y - free - p.constant
         by_input, by_start = -by_noise(alone(poles, u)), -by_noise(alone(poles, impulse))
+        by_rest = -by_noise(alone(poles, ones))
         behind = by_noise(alone(poles, free))
+    else:
+        moved, whole = alone(poles, driven), float(poles.sum())
+        gap = run.y - moved - held / whole - p.constant
+        by_input, by_start = -by_noise(alone(poles, u)), impulse
+        by_rest = by_constant / whole
+        behind = by_noise(alone(poles, moved))
     e = by_noise(gap)
-    by_b = [later(by_input, lag) for lag in lags]
+    starts = [later(by_start, k) for k in range(orders.poles if estimated else 0)]
+    if only_starts:
+        return e, np.column_stack([np.empty((n, 0)), *starts])
+    by_b = [later(by_input, lag) + rest * by_rest for lag in lags]
     by_poles = [later(behind, i + 1) for i in range(orders.poles)]
-    starts = [later(by_start, k) for k in range(orders.poles)]
+    if not estimated:
+        by_poles = [column - held / whole * by_rest for column in by_poles]
     whitened_e, whitened_gap = alone(c, e), alone(c, gap)
     by_c = [-later(whitened_e, i + 1) for i in range(orders.c)]
     by_d = [later(whitened_gap, i + 1) for i in range(orders.d)]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Annotated, ClassVar, Literal
 
@@ -14,6 +15,7 @@ from mckibben.blocks.base import Block
 from mckibben.blocks.dynamic.process_model import LONGEST_DELAY, ProcessModel
 from mckibben.errors import DataError
 from mckibben.estimators.data import Run, TrainingData
+from mckibben.estimators.linear.starts import LinearEstimator
 from mckibben.estimators.search import Tracker
 from mckibben.estimators.separable import SeparableEstimator
 
@@ -23,7 +25,7 @@ Structure = Literal["P1", "P1Z", "P2", "P2Z", "P2U", "P2UZ", "P3"]
 
 
 @dataclass(kw_only=True, repr=False, eq=False)
-class ProcessModelEstimator(SeparableEstimator):
+class ProcessModelEstimator(LinearEstimator, SeparableEstimator):
     """Process model by variable projection: gain and zero are solved for, the poles searched.
 
     Parameters
@@ -44,6 +46,7 @@ class ProcessModelEstimator(SeparableEstimator):
 
     rises: ClassVar[bool] = False
     searches_condensed: ClassVar[bool] = False
+    fits_peaks: ClassVar[bool] = False
 
     @property
     @abstractmethod
@@ -58,6 +61,13 @@ class ProcessModelEstimator(SeparableEstimator):
                 remedy="read them with a time column or --rate, or use gpi",
             )
         return super().identify(data, tracker)
+
+    def uncertainty(
+        self, block: Block, data: TrainingData, residual: Array, at_bounds: Sequence[int]
+    ) -> tuple[float, Array]:
+        """Return the condition and covariance from free-run errors; the input's offset is set."""
+        del residual
+        return self.free_run_covariance(block, data, [*at_bounds, block.n_parameters - 2])
 
     @property
     def n_times(self) -> int:
@@ -96,7 +106,7 @@ class ProcessModelEstimator(SeparableEstimator):
             data.input_range[0],
             0.0,
             self.hold,
-            self.starting_rule,
+            self.initial,
             **self.channels(data),
         )
 
@@ -114,6 +124,17 @@ class ProcessModelEstimator(SeparableEstimator):
             whole = with_zero.simulate(run.history, sample_time=step)
             columns.append(whole - columns[0])
         return np.column_stack(columns)
+
+    def matrix(self, theta: Array, data: TrainingData) -> Array:
+        """Return the basis and, where starts are fitted, what the lags of every run start with."""
+        from scipy.linalg import block_diag
+
+        columns = super().matrix(theta, data)
+        if self.initial != "fitted":
+            return columns
+        unit = self._units(theta, data)[0]
+        starts = [unit.free_responses(run.u.size, run.sample_time)[run.counts] for run in data.runs]
+        return np.column_stack([columns, block_diag(*starts)])
 
     def build(self, theta: Array, linear: Array, offset: float, data: TrainingData) -> ProcessModel:
         """Return the model."""

@@ -27,8 +27,12 @@ Array = NDArray[np.float64]
 
 PRIMITIVES = Path(__file__).parent / "primitives"
 
-RULES = {"first_sample": "MCK_FIRST_SAMPLE", "virgin": "MCK_VIRGIN"}
-"""Starting memories, by what C calls them."""
+RULES = {
+    "first_sample": "MCK_FIRST_SAMPLE",
+    "virgin": "MCK_VIRGIN",
+    "fitted": "MCK_FIRST_SAMPLE",
+}
+"""Starting memories, by what C calls them; no outputs are known there to fit one to."""
 
 ENVELOPES = {"tanh": 0, "exponential": 1, "piecewise-linear": 2}
 """Kinds of envelopes, by their number in gpi.c."""

@@ -1,0 +1,135 @@
+"""What linear estimators share: runs started as fitted, and covariances that stand coloured noise."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mckibben.blocks.base import Block
+from mckibben.blocks.dynamic.linear_start import LinearStart
+from mckibben.estimators.base import (
+    Estimator,
+    inverted,
+    relative_sizes,
+    sensitivities,
+    simulate_all,
+)
+from mckibben.estimators.data import Run, TrainingData
+
+Array = NDArray[np.float64]
+
+LONGEST = 30
+"""Order of the autoregression that describes coloured residuals, at most."""
+
+
+@dataclass(kw_only=True, repr=False, eq=False)
+class LinearEstimator(Estimator):
+    """An estimator of a linear dynamic model.
+
+    Parameters
+    ----------
+    initial : {"fitted", "first_sample", "virgin"}
+        State before the first sample of every recording, in the search, in what the fit says of itself
+        and, as the rule of the block, after it: with the least squared error; at rest at the first
+        input; at rest at the operating point.
+    """
+
+    initial: Literal["first_sample", "virgin", "fitted"] = "fitted"
+
+    def free_runs(self, blocks: Sequence[Block], data: TrainingData) -> Array:
+        """Return the free-running outputs of blocks where samples count, started by their rule."""
+        if self.initial != "fitted":
+            return simulate_all(blocks, data)
+        return np.array(
+            [
+                np.concatenate([started(block, run)[run.counts] for run in data.runs])
+                for block in blocks
+            ]
+        )
+
+    def free_run_covariance(
+        self, block: Block, data: TrainingData, fixed: Sequence[int]
+    ) -> tuple[float, Array]:
+        """Return the condition and covariance of what was found by free-run errors; NaN where fixed.
+
+        The derivatives are those with every start solved for. Residuals may be coloured, and are taken
+        not to depend on the input: (J'J)^-1 J' S J (J'J)^-1, where S is that of an autoregression.
+        """
+        values = block.pack()
+        covariance = np.full((values.size, values.size), np.nan)
+        free = [place for place in range(values.size) if place not in fixed]
+        sizes = relative_sizes(values)
+        moves, residuals = [], []
+        for run in data.runs:
+            one = TrainingData((run,), data.input, data.output, data.input_unit, data.output_unit)
+            slopes = np.zeros((run.u.size, len(free)))
+            slopes[run.counts] = sensitivities(
+                block, free, sizes[free], partial(self.free_runs, data=one)
+            )
+            left = np.where(run.counts, run.y, 0.0)
+            left[run.counts] -= self.free_runs([block], one)[0]
+            moves.append(slopes)
+            residuals.append(left)
+        if not np.isfinite(np.concatenate(moves)).all():
+            return np.inf, covariance
+        condition, inverse = inverted(np.concatenate(moves))
+        coloured = meat(moves, residuals, data.target.size - len(free))
+        own = np.nan_to_num(inverse)
+        own = own @ coloured @ own
+        own[np.isnan(inverse)] = np.nan
+        covariance[np.ix_(free, free)] = own * np.outer(sizes[free], sizes[free])
+        return condition, covariance
+
+
+def started(block: Block, run: Run) -> Array:
+    """Return the free-running output over a run from the state that explains it best, shape (n,)."""
+    assert isinstance(block, LinearStart)
+    inputs, outputs = run.inputs, np.empty((run.u.size, 1))
+    state = block.fitted_state(inputs, run.y, run.sample_time, run.counts)
+    block.bind(run.sample_time, state, inputs, outputs)()
+    return outputs[:, 0]
+
+
+def meat(moves: Sequence[Array], residuals: Sequence[Array], freedom: int) -> Array:
+    """Return J' S J for residuals of an autoregression whose order Schwarz's criterion chooses.
+
+    Parameters
+    ----------
+    moves : sequence of array, shape (n, k)
+        Derivatives over every run, zero where samples do not count.
+    residuals : sequence of array, shape (n,)
+        Likewise.
+    freedom : int
+        Samples less parameters.
+    """
+    from scipy.linalg import solve_toeplitz
+    from scipy.signal import lfilter
+
+    n = sum(e.size for e in residuals)
+    counted = freedom + moves[0].shape[1]
+    power = sum(float(e @ e) for e in residuals)
+    k = moves[0].shape[1]
+    if power <= 0.0:
+        return np.zeros((k, k))
+    longest = min(LONGEST, n // 20)
+    r = np.array(
+        [sum(float(e[: e.size - lag] @ e[lag:]) for e in residuals) for lag in range(longest + 1)]
+    )
+    best, chosen, variance = counted * np.log(r[0]), np.empty(0), r[0]
+    for order in range(1, longest + 1):
+        a = solve_toeplitz(r[:order], r[1 : order + 1])
+        left = float(r[0] - a @ r[1 : order + 1])
+        if left <= 0.0:
+            break
+        cost = counted * np.log(left) + order * np.log(counted)
+        if cost < best:
+            best, chosen, variance = cost, a, left
+    # J' S J is the power of J filtered backwards by what makes the residuals of white noise
+    filtered = [lfilter([1.0], [1.0, *-chosen], x[::-1], axis=0) for x in moves]
+    whole = sum((x.T @ x for x in filtered), np.zeros((k, k)))
+    return np.asarray(whole * variance / max(freedom, 1))

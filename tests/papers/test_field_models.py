@@ -23,6 +23,8 @@ from mckibben.papers import Reproduction, field_models, reproduce
 from mckibben.papers.field_models import LEAST_SQUARES, PRINTED
 from tests.cli.conftest import files  # noqa: F401  # a fixture
 
+pytestmark = pytest.mark.xdist_group("field-models")  # one quick run serves all its tests
+
 EXAMPLES = Path(__file__).parents[2] / "examples"
 ROLES, RUNS = ("train", "test"), ("decaying-triangle", "irregular-triangle")
 PAPERS = tuple(PRINTED)
@@ -62,6 +64,10 @@ def test_methods_as_published_are_as_good_as_their_kind(found: Found) -> None:
     assert plain["NARX"] < 1.2
     assert plain["P2UZ"] < 2.0
     assert plain["Box-Jenkins"] < 4.0  # it minimises errors of one step, which bounds this loosely
+    for row in rows(found, "The same by seed"):
+        if row["model"] in ("Box-Jenkins", "P2UZ") and row["match"] == "none":
+            calibrations = [row[f"RMSE calibration [mm], {way}"] for way in ("lowest", "highest")]
+            assert calibrations[1] == pytest.approx(calibrations[0], rel=0.01)  # one minimum
     assert calibration["P2UZ"] <= calibration["Box-Jenkins"]  # one of them minimises this error
     assert calibration[LEAST_SQUARES] <= calibration["PI by slopes"] < 2.5
     table = {row["model"]: row for row in rows(found, "The paper's methods")}
@@ -83,6 +89,8 @@ def test_the_headline_is_that_of_the_tables_and_says_how_it_was_chosen(found: Fo
     assert float(said[1]) == pytest.approx(best, abs=5e-4)
     assert float(said[2]) == pytest.approx(best / lowest, abs=5e-3)
     assert "cross-validation" not in summary  # which the quick run does not do
+    table = [row["RMSE test [mm]"] for row in rows(found, "The whole field")]
+    assert table == sorted(table)
     assert "MATLAB" not in json.dumps(found)
 
 
@@ -123,7 +131,7 @@ def test_a_method_that_breaks_is_a_row_with_its_reason(small: Callable[..., Repr
     assert table["NARX"]["failed because"].startswith("3 of 3 seeds: on no branch")
     assert table["P2UZ"]["failed because"] == ""
     assert "NARX failed in 3 of 3 seeds" in found.summary[-1]
-    assert " times that" in found.summary[1]
+    assert any(" times that" in sentence for sentence in found.summary)
     for name, place in (("Calibration", 3), ("Test", 4)):
         (figure,) = (f for f in found.figures if f.title.startswith(f"{name}: the paper's methods"))
         assert f"Figure {place}" in figure.title
@@ -133,7 +141,7 @@ def test_a_method_that_breaks_is_a_row_with_its_reason(small: Callable[..., Repr
 def test_no_headline_is_made_of_methods_that_all_break(small: Callable[..., Reproduction]) -> None:
     found = small(*PAPERS)
     assert not any("times" in sentence for sentence in found.summary)
-    assert "Lowest test error in the field" in found.summary[0]
+    assert any("Lowest test error in the field" in sentence for sentence in found.summary)
 
 
 def test_box_jenkins_finds_a_numerator_of_the_printed_structure() -> None:

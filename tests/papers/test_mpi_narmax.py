@@ -17,6 +17,8 @@ from mckibben.papers.mpi_narmax import (
     UNLOADED,
 )
 
+pytestmark = pytest.mark.xdist_group("mpi-narmax")  # one quick run serves all its tests
+
 Rows = dict[str, dict[str, Any]]
 
 VOLTS = (2, 4, 6, 8, 10)

@@ -29,6 +29,9 @@ from mckibben.errors import DataError, ModelError
 if TYPE_CHECKING:
     from mckibben.recording import Recording
 
+STARTS_MATTER = 0.05
+"""Relative difference of the errors from rest and from fitted starts that is told."""
+
 
 def fit(
     model: Annotated[str, typer.Argument(help="Short name; see info --models.")],
@@ -100,6 +103,7 @@ def fit(
                 "file": str(out),
                 "n_parameters": estimator.model_.n_parameters,
                 "rmse": found.rmse,
+                "rmse_from_rest": found.rmse_from_rest,
                 "n_samples": found.n_samples,
                 "n_evaluations": found.n_evaluations,
                 "seconds": found.seconds,
@@ -117,6 +121,11 @@ def fit(
         f"{model}: free-running RMSE {figure(found.rmse, 4)} {unit_name} on {found.n_samples} samples, "
         f"{estimator.model_.n_parameters} parameters, {found.seconds:.2f} s{stopped}"
     )
+    if abs(found.rmse_from_rest - found.rmse) > STARTS_MATTER * found.rmse:
+        print(
+            "That starts every recording from its fitted state; from rest, as streams and generated "
+            f"code start, the RMSE is {figure(found.rmse_from_rest, 4)} {unit_name}."
+        )
     if undetermined:
         print(f"Not determined by these recordings: {'; '.join(undetermined)}.")
     print(f"Written: {out}")

@@ -43,7 +43,9 @@ class Diagnostics:
     Parameters
     ----------
     rmse : float
-        Free-running RMSE on the samples fitted, in the unit of the output.
+        Free-running RMSE on the samples fitted, in the unit of the output, each run started as fitted.
+    rmse_from_rest : float
+        The same, each run started as a stream or generated code starts: without knowing an output.
     n_samples : int
         Samples fitted.
     n_evaluations : int
@@ -67,6 +69,7 @@ class Diagnostics:
     """
 
     rmse: float
+    rmse_from_rest: float
     n_samples: int
     n_evaluations: int
     seconds: float
@@ -256,6 +259,7 @@ class Estimator(Parametrised, ABC):
             covariance = np.full((block.n_parameters, block.n_parameters), np.nan)
         return Diagnostics(
             rmse=_rms(residual),
+            rmse_from_rest=_rms(data.target - simulate_all([block], data.unstarted())[0]),
             n_samples=residual.size,
             n_evaluations=tracker.evaluations,
             seconds=time.perf_counter() - started,

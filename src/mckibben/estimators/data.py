@@ -144,6 +144,10 @@ class TrainingData:
         runs = tuple(replace(run, peak=peak) for run, peak in zip(self.runs, peaks, strict=True))
         return replace(self, runs=runs)
 
+    def unstarted(self) -> TrainingData:
+        """Return the same data with no memory fitted to any start."""
+        return self.with_peaks([None] * len(self.runs))
+
     def condensed(self) -> TrainingData:
         """Return the same data with every run condensed; see `Run.condensed`."""
         return replace(self, runs=tuple(run.condensed() for run in self.runs))

@@ -16,7 +16,7 @@ from mckibben.blocks.pi import PI
 from mckibben.blocks.published.field_models import THRESHOLDS, prandtl_ishlinskii
 from mckibben.comparison.kept import Kept
 from mckibben.comparison.ranking import compare
-from mckibben.comparison.results import Leaderboard, Row
+from mckibben.comparison.results import CHOICES, Leaderboard, Row
 from mckibben.errors import MckibbenError, ModelError
 from mckibben.estimators.affine_match import affine_match
 from mckibben.estimators.base import Estimator
@@ -58,15 +58,16 @@ def published(seed: int) -> dict[str, Estimator]:
 
     Of the NARX model the paper prints neither regressors nor mapping: this one is a sigmoid network on
     two past outputs and inputs, one sample late, fitted to one-step errors, the best of five starts.
-    Box-Jenkins has the printed orders, Eqs. (6) to (9): B has terms in q^0 and q^-2. PI has the printed
-    thresholds, and weights by the slopes of segments, Eqs. (14) and (15).
+    Box-Jenkins has the printed orders, Eqs. (6) to (9): B has terms in q^0 and q^-2. Like P2UZ it starts
+    at rest, as the muscle does. PI has the printed thresholds, and weights by the slopes of segments,
+    Eqs. (14) and (15).
     """
     return {
         "NARX": NarxNetworkEstimator(
             n_units=10, delay=1, refine=False, allow_unstable=True, n_starts=5, seed=seed
         ),
-        "Box-Jenkins": BoxJenkinsEstimator(lags=(0, 2), seed=seed),
-        "P2UZ": P2UZEstimator(seed=seed),
+        "Box-Jenkins": BoxJenkinsEstimator(lags=(0, 2), initial="first_sample", seed=seed),
+        "P2UZ": P2UZEstimator(initial="first_sample", seed=seed),
         "PI by slopes": PIEstimator(thresholds=THRESHOLDS, method="slopes", seed=seed),
         LEAST_SQUARES: PIEstimator(thresholds=THRESHOLDS, seed=seed),
     }
@@ -225,17 +226,12 @@ def _errors(model: Block, train: Recording, test: Recording) -> Errors:
 
 
 def _shown(board: Leaderboard) -> dict[str, Row]:
-    """Return the models of the field that the summary names, and how they were chosen."""
-    sound = [row for row in board.rows if row.sound]
-    validated = [row for row in sound if row.validation_rmse is not None]
-    chosen = {}
-    if validated:
-        best = min(validated, key=lambda row: row.validation_rmse or 0.0)
-        chosen["Chosen from the field by cross-validation on the calibration run"] = best
-    if sound:
-        lowest = min(sound, key=lambda row: row.test.rmse if row.test else np.inf)
-        chosen["Lowest test error in the field, known only from the test itself"] = lowest
-    return chosen
+    """Return the models of the field that the summary names, by how they were chosen."""
+    named = {
+        f"Chosen from the field by {CHOICES[board.chosen_by][1]}": board.best,
+        "Lowest test error in the field, known only from the test itself": board.lowest,
+    }
+    return {how: row for how, row in named.items() if row is not None and row.sound}
 
 
 def _summary(tried: Mapping[str, Tried], board: Leaderboard, n_seeds: int) -> tuple[str, ...]:
@@ -329,7 +325,7 @@ def _weights(tried: Mapping[str, Tried]) -> Table:
 
 def _leaderboard(board: Leaderboard) -> Table:
     rows: list[tuple[Cell, ...]] = []
-    for row in board.rows:
+    for row in sorted(board.rows, key=lambda row: row.test.rmse if row.test else np.inf):
         if row.test is None or row.train is None:
             rows.append((row.model, *(None,) * 7, row.reason))
             continue

@@ -190,7 +190,7 @@ class TransferFunction(LinearStart, SingleChannel, NamedParameters, Primitive):
         ModelError
             If the horizon is not positive.
         """
-        from scipy.signal import lfilter
+        from scipy.signal import convolve, lfilter
 
         if horizon < 1:
             raise ModelError(f"the horizon is {horizon}. Remedy: predict 1 sample ahead or more.")
@@ -205,8 +205,9 @@ class TransferFunction(LinearStart, SingleChannel, NamedParameters, Primitive):
         if fitted and self.n_free:
             free = lfilter(d, c, self.free_responses(len(inputs), recording.sample_time), axis=0)
             errors = errors - free @ np.linalg.lstsq(free, errors, rcond=1e-12)[0]
-        ahead = lfilter(c, d, np.eye(1, horizon)[0])  # what an error does to the samples after it
-        predicted = measured - np.asarray(lfilter(ahead, [1.0], errors))
+        # what an error does to the samples after it, of which there are no more than in the recording
+        ahead = lfilter(c, d, np.eye(1, min(horizon, len(errors)))[0])
+        predicted = measured - np.asarray(convolve(errors, ahead))[: len(errors)]
         kept = recording.select([self.input.name])
         return kept.with_channels({name: self.output.unit}, **{name: predicted})
 

@@ -57,7 +57,8 @@ def published(seed: int) -> dict[str, Estimator]:
     """Return the paper's four methods as published, and its PI model by least squares.
 
     Of the NARX model the paper prints neither regressors nor mapping: this one is a sigmoid network on
-    two past outputs and inputs, one sample late, fitted to one-step errors, the best of five starts.
+    two past outputs and inputs, one sample late, fitted to one-step errors, of five starts the one with
+    the least free-running error.
     Box-Jenkins has the printed orders, Eqs. (6) to (9): B has terms in q^0 and q^-2. Like P2UZ it starts
     at rest, as the muscle does. PI has the printed thresholds, and weights by the slopes of segments,
     Eqs. (14) and (15).
@@ -171,7 +172,8 @@ def field_models(
             "The rig's physics is not the paper's muscle: levels differ, the order of methods may.",
             "The paper does not print its signals: peaks and turning points are ours.",
             "Of the NARX model the paper prints no regressors, lags or mapping, only the toolbox that "
-            "made it: ours is a network of ten sigmoids on two past outputs and two past inputs.",
+            "made it: ours is a network of ten sigmoids on two past outputs and two past inputs, fitted "
+            "to one-step errors; of five starts, the one that runs free best over the calibration.",
             "Matched as in the paper: gain by ranges, offset by first samples of the calibration. Its "
             "Eq. (2) prints the offset as z(0) - x(0); with the gain in it, first samples do agree.",
             "PI by slopes: the paper does not say which branches its segments are of; here it is the "

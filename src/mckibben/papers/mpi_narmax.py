@@ -373,7 +373,8 @@ def _by_status(found: _Found) -> Iterator[Table]:
         for name in found.models:
             known: tuple[Cell, ...] = printed.get(name, (None,) * 4)
             rows.append((name, *known, *(found.errors(name, run)[place] for run in STATUSES)))
-        yield Table(f"{what} by status [mm]", ("model", *headings), tuple(rows), _NOTE)
+        title = f"{what} by status [mm] (its Table {2 + place})"
+        yield Table(title, ("model", *headings), tuple(rows), _NOTE)
 
 
 _NOTE = (

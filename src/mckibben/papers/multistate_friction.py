@@ -64,7 +64,7 @@ PRINTED_SIZES = {
     "modified PI": 40,
     "generalised Bouc-Wen": 9,
 }
-"""Numbers of parameters that the paper gives its models, and those of others, in Section 4."""
+"""Numbers of parameters that the paper gives its models, and those of others, in Sections 1 and 4."""
 
 
 @dataclass(frozen=True)
@@ -354,7 +354,8 @@ def _printed_third() -> str:
     k, _, limit = printed_friction().table()[2, 3:]
     return (
         f"The paper's third element never slips: with F_c / k = {limit / k / 1000:.1f} m it is a spring "
-        f"of {1000 * k:.1f} N/m, 1 or 2 mN over the stroke, and its ten other parameters make the loop."
+        f"of {1000 * k:.1f} N/m, 1 or 2 mN over the stroke, and the eight parameters of the others make "
+        "the loop."
     )
 
 

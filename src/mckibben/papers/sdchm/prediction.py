@@ -214,8 +214,16 @@ class Predictions:
             verb = "is" if len(failing) == 1 else "are"
             yield (
                 f"Only near the patterns trained on: {told} {verb} worse than that linear function "
-                "there."
+                "with the extensor constant."
             )
+        limit = self.off(LINEAR, moving)
+        told = ", ".join(
+            f"{name} ({self.off(name, moving):.1f} mm)"
+            for name in self.names
+            if name not in failing and self.off(name, moving) > limit
+        )
+        if told:
+            yield f"Worse than it once the extensor moves: {told}."
         along = ", ".join(
             f"{name} {self.off(name, test):.2f} mm"
             for name in (RAW, DAMPED, PUBLISHED, OURS, BALANCE)

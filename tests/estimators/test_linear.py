@@ -209,6 +209,19 @@ def test_slopes_hold_with_the_starts_solved_for() -> None:
 WARM = ProcessModel(6.8, (5.7,), 9.1, 156.0, 0.0, 0.0, 2.0)
 
 
+def test_a_start_of_which_the_known_outputs_tell_nothing_is_rest() -> None:
+    """A lag's start dies away before them, so that it would be made up of their noise."""
+    lag = TransferFunction((0.2, 0.1), (-0.6,), STEP, initial="fitted")
+    rng = np.random.default_rng(0)
+    u = rng.uniform(0, 4, (400, 1))
+    at_rest = lag.initial_state(u[0], "first_sample")
+    y = lag.simulate(u, sample_time=STEP, initial=(at_rest + 2.0).tolist())[:, 0]
+    y += 0.1 * rng.standard_normal(y.size)
+    late = np.arange(y.size) >= 200
+    np.testing.assert_allclose(lag.fitted_state(u, y, STEP, late), at_rest, atol=1e-12)
+    np.testing.assert_allclose(lag.fitted_state(u, y, STEP), at_rest + 2.0, atol=0.4)
+
+
 def warm(seed: int, n: int = 1000) -> Recording:
     rng = np.random.default_rng(seed)
     u = np.repeat(rng.uniform(0, 5, (n + 500) // 50), 50)

@@ -41,6 +41,21 @@ def test_one_model_for_all_loads_beats_one_for_each(
     assert "98 N" in single[1].model
 
 
+def test_a_model_of_one_load_is_run_without_a_look_at_the_test() -> None:
+    rng = np.random.default_rng(0)
+    u = np.repeat(rng.uniform(0, 5, 20), 20)
+    slow = np.convolve(u, 0.02 * 0.98 ** np.arange(u.size))[: u.size]
+    train, test = (
+        Recording({"voltage": u, "displacement": slow + more, "force": np.full(u.size, 9.0)}, 0.05)
+        for more in (0.0, np.exp(-np.arange(u.size) / 40.0))
+    )
+    (row,) = per_load([train], [test], model="p1", jobs=1)
+    assert row.block is not None
+    inputs_alone = row.block.simulate(test.select(["voltage"]))["displacement"]
+    error = np.sqrt(np.mean((inputs_alone - test["displacement"]) ** 2))
+    assert row.mean == pytest.approx(error, rel=1e-9)
+
+
 @pytest.mark.parametrize("memory", ["mpi", "rdpi"])
 def test_mpi_narmax_runs_free_under_a_load(
     memory: str, runs: dict[str, Recording], train: list[Recording]

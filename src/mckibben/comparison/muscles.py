@@ -305,8 +305,12 @@ def _validated(row: MuscleRow, settings: Mapping[str, Any], on: Validation) -> M
 
 
 def _errors(block: Block, runs: Sequence[Scored]) -> dict[str, Array]:
-    """Return the errors of every output on runs, free-running, from their first sample that counts."""
-    outputs = [block.simulate(run) for run, _ in runs]
+    """Return the errors of every output on runs, free-running, from their first sample that counts.
+
+    Blocks are shown the inputs alone: no start may be fitted to outputs that are tested on.
+    """
+    names = [channel.name for channel in block.inputs]
+    outputs = [block.simulate(run.select(names)) for run, _ in runs]
     return {
         name: np.concatenate(
             [

@@ -21,6 +21,9 @@ from mckibben.recording import Recording
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
+KNOWN = 0.5
+"""Least norm, where outputs are known, of a start's response whose norm is 1, to solve for it."""
+
 
 class LinearStart(Block):
     """A block, linear about an operating point, whose first states can be solved for."""
@@ -51,6 +54,9 @@ class LinearStart(Block):
     ) -> Array:
         """Return the state before the first sample with the least squared error, shape (n_states,).
 
+        Rest, in what the known outputs do not tell of it: where the first ones are not known, a start
+        that has died away before the others would be made up of their noise.
+
         Parameters
         ----------
         inputs : array, shape (n, 1)
@@ -63,11 +69,16 @@ class LinearStart(Block):
         state = self.initial_state(inputs[0], "first_sample")
         at_rest = np.empty((len(inputs), 1))
         self.bind(sample_time, state.copy(), inputs, at_rest)()
-        free = self.free_responses(len(inputs), sample_time)[counts]
+        free = self.free_responses(len(inputs), sample_time)
         left = outputs[counts] - at_rest[counts, 0]
         if free.shape[1] and np.isfinite(left).all():
             size = np.maximum(np.linalg.norm(free, axis=0), 1e-300)
-            state[: self.n_free] += np.linalg.lstsq(free / size, left, rcond=1e-12)[0] / size
+            responses, spread, turned = np.linalg.svd(free / size, full_matrices=False)
+            moved = spread > 1e-12 * spread[0]
+            u, known, v = np.linalg.svd(responses[np.ix_(counts, moved)], full_matrices=False)
+            told = known > KNOWN
+            found = v[told].T @ ((u.T @ left)[told] / known[told])
+            state[: self.n_free] += turned[moved].T @ (found / spread[moved]) / size
         return state
 
     def free_responses(self, n: int, sample_time: float | None) -> Array:

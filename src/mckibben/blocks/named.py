@@ -25,6 +25,15 @@ class NamedParameters(Block):
         """All numbers in the fields that are parameters."""
         return sum(np.size(getattr(self, name)) for name in self.parameters)
 
+    @property
+    def parameter_names(self) -> tuple[str, ...]:
+        """Names of the fields, those of vectors numbered."""
+        names: list[str] = []
+        for name in self.parameters:
+            value, said = getattr(self, name), name.replace("_", " ")
+            names += [f"{said} {k + 1}" for k in range(len(value))] if np.ndim(value) else [said]
+        return tuple(names)
+
     def pack(self) -> Array:
         """Return the fields one after another."""
         return np.concatenate([np.atleast_1d(getattr(self, name)) for name in self.parameters])

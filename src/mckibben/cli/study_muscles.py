@@ -389,7 +389,11 @@ def _figures(
 
     shown = [row for row in rows if row.block is not None][:3]
     run = tests[0]
-    modelled = {row.model: row.block.simulate(run) for row in shown if row.block is not None}
+    modelled = {
+        row.model: row.block.simulate(run.select([channel.name for channel in row.block.inputs]))
+        for row in shown
+        if row.block is not None
+    }
     figures = []
     for name in shown[0].test if shown else _displacements(run):
         curves = {"measured": (thinned(run.time), thinned(run[name]))}

@@ -29,7 +29,7 @@ def affine_match(
     Parameters
     ----------
     model : Block
-        One output, run free from its own start.
+        One output, run free from its inputs alone, as it will be behind the match.
     recordings : Recording or sequence of Recording
         With the model's inputs and the measured output; the range rule looks at the first.
     rule : {"range", "least-squares"}
@@ -44,7 +44,8 @@ def affine_match(
     """
     listed = [recordings] if isinstance(recordings, Recording) else list(recordings)
     name = model.outputs[0].name
-    modelled = [model.simulate(recording)[name] for recording in listed]
+    inputs = [channel.name for channel in model.inputs]
+    modelled = [model.simulate(recording.select(inputs))[name] for recording in listed]
     x = modelled[0] if rule == "range" else np.concatenate(modelled)
     if np.ptp(x) == 0:
         raise DataError(

@@ -206,12 +206,17 @@ class Estimator(Parametrised, ABC):
         check_settings(self)
 
     def predict(self, recordings: Recording | Sequence[Recording]) -> list[Array]:
-        """Return the model's free-running output on every recording."""
+        """Return the model's free-running output on every recording, from its inputs alone.
+
+        Every run starts as a stream would: no measured output is looked at.
+        """
         listed = [recordings] if isinstance(recordings, Recording) else list(recordings)
-        return [self.fitted.simulate(recording)[self.output] for recording in listed]
+        block = self.fitted
+        names = [channel.name for channel in block.inputs]
+        return [block.simulate(r.select(names))[self.output] for r in listed]
 
     def score(self, recordings: Recording | Sequence[Recording], y: None = None) -> float:
-        """Return R² of the free-running output over all recordings."""
+        """Return R² over all recordings of what `predict` gives."""
         del y
         listed = [recordings] if isinstance(recordings, Recording) else list(recordings)
         measured = np.concatenate([recording[self.output] for recording in listed])

@@ -123,6 +123,10 @@ class PIEstimator(SeparableEstimator):
         return self.build(np.empty(0), weights, float(np.mean(data.target - outputs)), data)
 
 
+SHORTEST = 0.02
+"""Segment whose slope is more than noise, relative to the longest branch."""
+
+
 def play_operators(u: Array, radii: Array, rule: str) -> Array:
     """Return play operators side by side over an input, shape (n, N)."""
     operators = np.empty((u.size, radii.size))
@@ -154,7 +158,7 @@ def _segments(data: TrainingData, radii: Array, rule: str) -> tuple[Array, Array
                 rise = np.interp(edges, travel[order], way * run.y[start:stop][order])
                 cut[way] = np.diff([edges, rise])
     lengths, rises = cut[1] + cut[-1]
-    if not np.all(lengths > 0):
+    if not np.all(lengths > SHORTEST * max(longest.values())):
         raise ModelError(
             f"on no branch do operators with thresholds up to {radii[-1]:.3g} {data.input_unit} begin "
             f"to move in turn: the longest goes {max(longest.values()):.3g} {data.input_unit}, and "

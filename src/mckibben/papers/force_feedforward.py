@@ -109,8 +109,10 @@ def feedforward_on_the_stand(
         tuple(rows),
         "Pressure = the closed-form solution of f_st(l, p) + f_h(l) = force at the commanded length, "
         f"which goes through irregular loops of {STROKE:.0f} mm; the force is not fed back. Friction is "
-        "that of 4 bar, whatever the pressure. The same by hand: mckibben fit, invert, and track "
-        f"--rig {RIG} with a reference of force and length.",
+        "that of 4 bar, whatever the pressure. By hand: mckibben rig record multistate "
+        "--out runs; mckibben fit multistate runs/isometric-*.csv runs/isobaric-4bar.csv --input length "
+        "--output force -o law.json; mckibben invert law.json -o ahead.json; mckibben track ahead.json "
+        f"--rig {RIG} --reference wished.csv, which holds force and length.",
     )
     figure = Figure(
         "Force on the test stand, by feedforward alone", "length [mm]", "force [N]", curves

@@ -69,6 +69,20 @@ class ProcessModelEstimator(LinearEstimator, SeparableEstimator):
         del residual
         return self.free_run_covariance(block, data, [*at_bounds, block.n_parameters - 2])
 
+    def undetermined(self) -> tuple[int, ...]:
+        """Return also a gain, a time constant or a zero within two standard errors of 0.
+
+        A zero that all but cancels a pole leaves them so, and what depends on them uncertain too.
+        """
+        values, errors = self.fitted.pack(), self.diagnostics_.standard_errors
+        names = self.fitted.parameter_names
+        vague = {
+            place
+            for place, (value, error) in enumerate(zip(values, errors, strict=True))
+            if abs(value) < 2 * error and "offset" not in names[place]
+        }
+        return tuple(sorted({*super().undetermined(), *vague}))
+
     @property
     def n_times(self) -> int:
         """Time constants searched."""

@@ -52,6 +52,11 @@ class LinearEstimator(Estimator):
             ]
         )
 
+    def undetermined(self) -> tuple[int, ...]:
+        """Return the places of what the recordings do not determine; the input's offset is chosen."""
+        names = self.fitted.parameter_names
+        return tuple(place for place in super().undetermined() if names[place] != "input offset")
+
     def free_run_covariance(
         self, block: Block, data: TrainingData, fixed: Sequence[int]
     ) -> tuple[float, Array]:

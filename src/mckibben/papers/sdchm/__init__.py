@@ -21,6 +21,8 @@ NOTES = (
     "Every sine starts at its minimum; Eq. (21) starts in the middle and jumps with the amplitude. "
     "The network's runs have a cycle of 1.5 and one of 2.5 bar; of the paper's two the peaks are not "
     "told (the first two of Eq. (22) are of 1.0 and 1.5).",
+    "The operators' start, f_r(0) in Eq. (1), is taken as the play of the first pressure on an output "
+    "of 0: as published they start from rest. Ours start as if pressure had risen from its least.",
     "As published: the swarm's inertia is not printed (0.7), nor any bounds (none). Gains and "
     "consequents are solved for, whatever their printed start. The search for the GPI models does not "
     "start from weights and envelopes of 0, where nothing moves. Firing is normalised in the log "

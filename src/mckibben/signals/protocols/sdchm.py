@@ -32,7 +32,7 @@ IDENTIFICATION_PEAKS = (1.0, 1.5, 2.0, 2.5)
 """Peak of each cycle when the hysteresis of a muscle is identified [bar], Eq. (22)."""
 
 TRAINING_PEAKS = (1.5, 2.5)
-"""Peaks of the two cycles that train the network [bar]; the paper does not print them."""
+"""Peaks of the two cycles that train the network [bar]; the paper does not say which of Eq. (22)'s."""
 
 TRAINING = (0.0, 0.2, 0.4, 0.6, 0.8, 1.0, 1.2, 1.4, 1.6, 1.8, 2.0, 2.2, 2.5)
 VALIDATION = (0.1, 0.5, 0.7, 1.1, 1.5, 1.7, 2.3)

@@ -74,8 +74,8 @@ def test_force_moves_every_load_model_while_the_voltage_is_held(found: dict[str,
 def test_what_is_no_better_off_its_patterns_is_named(found: dict[str, Any]) -> None:
     off = rows(found, "does not repeat")
     (said,) = (sentence for sentence in found["summary"] if sentence.startswith("Only good near"))
-    free, _, held = said.partition("random voltage and force ")[2].partition(
-        "; with the voltage held "
+    free, _, held = said.partition("random voltage and force: ")[2].partition(
+        ". With the voltage held: "
     )
     for where, named in (("random", free), ("voltage held", held.rstrip("."))):
         blind = min(off[name][f"{where}, MAE"] for name in UNLOADED)

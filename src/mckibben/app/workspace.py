@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from mckibben.atomic import replacing, write_text
+from mckibben.comparison.limits import caution
 from mckibben.errors import DataError, MckibbenError
 
 if TYPE_CHECKING:  # loaded when they are first used, so that the page is there at once
@@ -323,9 +324,10 @@ class Workspace:
         return sorted(found, key=_order)
 
 
-def _order(result: dict[str, Any]) -> tuple[bool, float]:
+def _order(result: dict[str, Any]) -> tuple[bool, bool, float]:
     """Return what results are sorted by, as the rows of a leaderboard are."""
     validated, train = result.get("validation_rmse"), result.get("train") or {}
+    cautioned = caution(str(result.get("model"))) is not None
     if validated is not None:
-        return False, float(validated)
-    return True, float(train.get("rmse", float("inf")))
+        return False, cautioned, float(validated)
+    return True, cautioned, float(train.get("rmse", float("inf")))

@@ -12,9 +12,7 @@ from mckibben.cli.options import (
     Files,
     GapPolicy,
     Gaps,
-    Input,
     Json,
-    Output,
     Rate,
     Reading,
     Resample,
@@ -37,8 +35,12 @@ def fit(
     model: Annotated[str, typer.Argument(help="Short name; see info --models.")],
     files: Files,
     out: Annotated[Path, typer.Option("-o", "--out", help="Model file to write (JSON).")],
-    input: Input = "pressure",  # noqa: A002
-    output: Output = "displacement",
+    input: Annotated[  # noqa: A002
+        str | None, typer.Option("--input", metavar="CHANNEL", help="Input; default the model's.")
+    ] = None,
+    output: Annotated[
+        str | None, typer.Option("--output", metavar="CHANNEL", help="Output; default the model's.")
+    ] = None,
     method: Annotated[
         str | None, typer.Option("--method", help="How to search: ls, pso-ls, pso.")
     ] = None,
@@ -78,15 +80,14 @@ def fit(
         )
     estimator_class = registry.load("estimators", model)
     given = parse_settings(settings, model)
+    named = {"input": input, "output": output, "method": method}
+    given = {key: value for key, value in named.items() if value is not None} | given
+    estimator = estimator_class(**{"seed": seed} | given)
     # of several, each may hold the input, as isometric runs hold the length
     recordings = Reading(column, unit, rate, gaps, resample).read(
-        files, [input, output], informative=len(files) == 1
+        files, [estimator.input, estimator.output], informative=len(files) == 1
     )
-    given = {"input": input, "output": output, "seed": seed} | given
-    if method is not None:
-        given["method"] = method
-    estimator = estimator_class(**given)
-    unit_name = recordings[0].units[output]
+    unit_name = recordings[0].units[estimator.output]
     with progress_bar(f"fitting {model}") as tell:
         estimator.fit(
             recordings,

@@ -53,7 +53,7 @@ def print_leaderboard(board: Leaderboard) -> None:
         rows.append(
             [
                 row.model + ("*" if row.caution else ""),
-                figure(row.validation_rmse if validated else row.order[1]),
+                figure(row.validation_rmse if validated else row.chosen_by),
                 figure(row.test.rmse),
                 f"{figure(interval[0])} to {figure(interval[1])}",
                 str(row.test_rank),
@@ -71,7 +71,8 @@ def print_leaderboard(board: Leaderboard) -> None:
     careful = [row.model for row in board.rows if row.reason is None and row.caution]
     if careful:
         print(
-            f"* Good only near the motions fitted, however small the errors: {', '.join(careful)}."
+            "* Good only near the motions fitted, however small the errors, so not chosen while another "
+            f"works: {', '.join(careful)}."
         )
     for row in board.rows:
         if row.reason is None and row.invalid:

@@ -368,7 +368,9 @@ def _tables(rows: Sequence[MuscleRow], loops: Mapping[str, Tracked]) -> tuple[An
             *("largest error [mm]", "parameters", "fit [s]", "inverse", "failed because"),
         ),
         ranked,
-        careful and f"* Good only near the motions fitted, however small the errors: {careful}.",
+        careful
+        and "* Good only near the motions fitted, however small the errors, so not chosen while another "
+        f"works: {careful}.",
     )
     if not loops:
         return (board,)

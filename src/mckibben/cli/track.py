@@ -111,7 +111,9 @@ def track(
     ]
     measure = wanted.units[next(iter(found.rmse))]
     print_table(["followed", f"RMSE [{measure}]", f"largest [{measure}]"], rows)
-    if found.clipped:
+    if found.clipped >= len(found.recording):
+        print("Pressures were at a limit throughout: the reference is out of reach.")
+    elif found.clipped:
         print(
             f"Pressures were at a limit in {found.clipped} steps; RMSE there is "
             f"{figure(found.clipping_cost, 3)} {measure} above that of the other steps."

@@ -131,9 +131,14 @@ class MuscleRow:
         return _mean(self.validation)
 
     @property
-    def order(self) -> tuple[bool, float, float]:
-        """What rows are sorted by: those that failed last, else by validation; not by the test."""
-        return self.block is None, self.mean_validation, _mean(self.train)
+    def order(self) -> tuple[bool, bool, bool, float, float]:
+        """What rows are sorted by: those that failed last, else by validation; not by the test.
+
+        Those that are good only near what they were trained on come after the others.
+        """
+        cautioned = self.caution is not None
+        by = self.mean_validation, _mean(self.train)
+        return self.block is None, not self.validation, cautioned, *by
 
     @property
     def caution(self) -> str | None:

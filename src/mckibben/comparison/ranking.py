@@ -394,9 +394,8 @@ def _best(plan: Plan, finished: Mapping[str, Tried]) -> str:
     best = min(rows, key=lambda row: row.order, default=None)
     if best is None:
         return ""
-    unvalidated, figure, _ = best.order
-    heading, _ = CHOICES["fit" if unvalidated else plan.chosen_by]
-    return f"{best.model}, {heading} {figure:.3g} {plan.unit}".strip()
+    heading, _ = CHOICES["fit" if best.validation_rmse is None else plan.chosen_by]
+    return f"{best.model}, {heading} {best.chosen_by:.3g} {plan.unit}".strip()
 
 
 def _chosen(

@@ -118,11 +118,21 @@ class Row:
         )
 
     @property
-    def order(self) -> tuple[bool, float, str]:
-        """What rows are sorted by: the validated ones first, by that; nothing of the test is in it."""
+    def chosen_by(self) -> float:
+        """The error that the model is chosen by: the validated one, else that of the fit."""
         if self.validation_rmse is not None:
-            return False, self.validation_rmse, self.model
-        return True, float("inf") if self.train is None else self.train.rmse, self.model
+            return self.validation_rmse
+        return float("inf") if self.train is None else self.train.rmse
+
+    @property
+    def order(self) -> tuple[bool, bool, float, str]:
+        """What rows are sorted by: the validated ones first, by that; nothing of the test is in it.
+
+        Those that are good only near what they were trained on come after the others, since parts of the
+        same motion cannot tell.
+        """
+        cautioned = self.caution is not None
+        return self.validation_rmse is None, cautioned, self.chosen_by, self.model
 
     @property
     def invalid(self) -> str | None:

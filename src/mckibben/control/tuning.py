@@ -49,7 +49,7 @@ def tune_pid(
     Raises
     ------
     ModelError
-        If a muscle does not move with its own pressure.
+        If a muscle does not move with its own pressure, or the rig imposes its length.
     """
     scheduled = scheduled or {}
     driven = actuated(plant, scheduled)
@@ -63,9 +63,13 @@ def tune_pid(
     gains = []
     for name, limit in zip(driven, limits, strict=True):
         rig.reset(seed)
-        place = rig.outputs.index(
-            name.replace("pressure", "displacement").replace("voltage", "displacement")
-        )
+        followed = name.replace("pressure", "displacement").replace("voltage", "displacement")
+        if followed not in rig.outputs:
+            raise ModelError(
+                f"PID follows a displacement, and {plant.name} gives {', '.join(rig.outputs)}. "
+                "Remedy: use the compensator alone, or another rig."
+            )
+        place = rig.outputs.index(followed)
         for _ in range(n):
             before = rig.step({**middle, **scheduled})[place]
         size = STEP * (limit.high - limit.low)

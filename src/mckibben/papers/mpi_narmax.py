@@ -459,9 +459,9 @@ def _summary(found: _Found) -> tuple[str, ...]:
         f"Random voltage and force, MAE / RMSE: {both(RANDOM)}.",
         f"Voltage held while the force is cycled, MAE / RMSE: {both(*HELD_RUNS)}. Swing over the "
         f"measured one: {'; '.join(swings)}; every MPI 0.",
-        "Only good near the patterns of their training, that is told the force and yet no better in MAE "
-        f"than the best MPI, which is not: on random voltage and force {no_better(RANDOM)}; with the "
-        f"voltage held {no_better(*HELD_RUNS)}.",
+        "Only good near the patterns of their training: models that are told the force, and are yet no "
+        "better in MAE than the best MPI, which is not told it. On random voltage and force: "
+        f"{no_better(RANDOM)}. With the voltage held: {no_better(*HELD_RUNS)}.",
         f"Force estimated on the test: {100 * rms(estimated - force) / float(np.ptp(force)):.1f} % of "
         "its range RMSE.",
         "Largest displacement under random load, free-running"

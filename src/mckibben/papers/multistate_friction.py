@@ -319,7 +319,7 @@ def _eighteen(
     unused = [name for name in isobaric if name != IDENTIFIED]
     lost = [n for n in unused if rms(many.errors(isobaric[n])) > rms(few.errors(isobaric[n]))]
     holds = many.closed.rmse > 0.95 * few.closed.rmse
-    exceptions = f"; it is worse on {', '.join(lost)}" if lost else ""
+    exceptions = f"; they are worse on {', '.join(lost)}" if lost else ""
     return (
         ("As the paper finds" if holds else "Against the paper's finding (its Figure 7)")
         + f", eighteen parameters leave {many.closed.rmse:.2f} N of the fitted loop, its eleven "

@@ -188,12 +188,14 @@ class TransferFunction(LinearStart, SingleChannel, NamedParameters, Primitive):
         DataError
             If the recording lacks a channel.
         ModelError
-            If the horizon is not positive.
+            If the horizon is not a positive whole number.
         """
         from scipy.signal import convolve, lfilter
 
-        if horizon < 1:
-            raise ModelError(f"the horizon is {horizon}. Remedy: predict 1 sample ahead or more.")
+        if not isinstance(horizon, int) or horizon < 1:
+            raise ModelError(
+                f"the horizon is {horizon!r}. Remedy: predict a whole number of samples, 1 or more."
+            )
         c, d = [1.0, *self.noise_numerator], [1.0, *self.noise_denominator]
         name = self.output.name
         inputs, measured = self._inputs_from(recording), recording[name]

@@ -38,9 +38,9 @@ NOTES = (
 )
 
 QUICK_NOTE = (
-    "Quick: three stiffnesses to learn from and parts of every run; no validation patterns; a swarm of "
-    "8 particles and 6 iterations where the paper has 20 and 50, on 1000 samples; fewer starts of every "
-    "search; one muscle moved in Table 5."
+    "Quick: three stiffnesses to learn from and parts of every run; no validation patterns, so that no "
+    "search stops by them; a swarm of 8 particles and 6 iterations where the paper has 20 and 50, on "
+    "1000 samples; fewer starts of every search; one muscle moved in Table 5."
 )
 
 

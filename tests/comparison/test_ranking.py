@@ -140,6 +140,11 @@ def test_what_is_good_only_near_its_training_says_so(train: Recording, test_set:
     cautions = {row["model"]: row.get("caution") for row in board.to_dict()["rows"]}
     assert cautions["pi"] is None
     assert "leaves all bounds" in cautions["narx"]
+    row = board.rows[0]
+    careful = replace(row, model="narx", validation_rmse=0.1)
+    plain = replace(row, model="pi", validation_rmse=0.2)
+    failed = replace(row, model="gpi", validation_rmse=None)
+    assert sorted([failed, careful, plain], key=lambda row: row.order) == [plain, careful, failed]
 
 
 def test_same_seed_same_table_whatever_the_number_of_processes(

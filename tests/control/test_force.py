@@ -93,6 +93,8 @@ def test_commands_follow_a_force_on_the_test_stand(cli: Cli, tmp_path: Path) -> 
         assert result.code == 0, result.err
         reached[name] = json.loads(result.out)["rmse"]["force"]
     assert reached["friction"] < 0.7 * reached["static"]
+    result = cli("track", ahead, *options, "--controller", "pid")
+    assert (result.code, "PID follows a displacement" in result.err) == (2, True)
     without = tmp_path / "without.csv"
     write(reference().select(["force"]), without)
     result = cli("track", ahead, "--rig", "mas10-test-stand", "--reference", without)

@@ -264,6 +264,21 @@ def test_prediction_goes_from_one_step_errors_to_the_free_run() -> None:
     assert rms[0] < rms[1] < rms[2] * 1.001
     with pytest.raises(ModelError, match="horizon is 0"):
         model.predict(recording, 0)
+    with pytest.raises(ModelError, match="whole number"):
+        model.predict(recording, 1.5)  # type: ignore[arg-type]
+    beyond, whole = (model.predict(recording, n) for n in (10**9, len(recording)))
+    np.testing.assert_array_equal(beyond["displacement"], whole["displacement"])
+
+
+def test_scores_look_at_no_measured_output_to_start_from() -> None:
+    recording = warm(1)
+    fit = OutputErrorEstimator().fit(recording)
+    moved = recording.with_channels(
+        {"displacement": "mm"}, displacement=recording["displacement"] + 7.0
+    )
+    first, second = fit.predict([recording, moved])
+    np.testing.assert_array_equal(first, second)
+    assert fit.diagnostics_.rmse_from_rest > fit.diagnostics_.rmse
 
 
 def test_a_model_that_overflows_has_no_covariance_and_no_crash() -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Literal
+from typing import Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +19,9 @@ from mckibben.estimators.base import (
     sensitivities,
     simulate_all,
 )
-from mckibben.estimators.data import Run, TrainingData
+from mckibben.estimators.data import Mask, Run, TrainingData, training_data
+from mckibben.estimators.search import Progress
+from mckibben.recording import Recording
 
 Array = NDArray[np.float64]
 
@@ -36,10 +38,33 @@ class LinearEstimator(Estimator):
     initial : {"fitted", "first_sample", "virgin"}
         State before the first sample of every recording, in the search, in what the fit says of itself
         and, as the rule of the block, after it: with the least squared error; at rest at the first
-        input; at rest at the operating point.
+        input; at rest at the operating point. A model with a fitted start that from rest is further off
+        than the output ever moves has let its starts explain the data, and could not run on any other:
+        it is then identified from rest, and its block says so.
     """
 
     initial: Literal["first_sample", "virgin", "fitted"] = "fitted"
+
+    def _fit(
+        self,
+        recordings: Recording | Sequence[Recording],
+        rows: Sequence[Mask] | None,
+        progress: Progress | None,
+    ) -> Self:
+        super()._fit(recordings, rows, progress)
+        found = self.diagnostics_
+        if self.initial != "fitted" or found.interrupted:
+            return self
+        target = training_data(recordings, self.input, self.output, rows, self.scheduling).target
+        if found.rmse_from_rest <= np.ptp(target):
+            return self
+        settings = self.get_params()
+        at_rest = type(self)(**settings | {"initial": "first_sample"})
+        at_rest._fit(recordings, rows, progress)
+        for name, value in vars(at_rest).items():
+            if name not in settings:
+                setattr(self, name, value)
+        return self
 
     def free_runs(self, blocks: Sequence[Block], data: TrainingData) -> Array:
         """Return the free-running outputs of blocks where samples count, started by their rule."""

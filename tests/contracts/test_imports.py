@@ -13,7 +13,7 @@ import mckibben
 SOURCE = Path(mckibben.__file__).parent
 
 LAYERS = (
-    {"errors", "registry", "atomic", "threads", "workers", "compiling"},
+    {"errors", "registry", "atomic", "ordinary", "threads", "workers", "compiling"},
     {"recording", "signals", "metrics", "characterization"},
     {"files"},
     {"rigs"},
@@ -30,12 +30,12 @@ LAYERS = (
 """Lowest first."""
 
 STANDS_ON = {
-    "files": {"files", "recording", "errors", "registry", "atomic"},
+    "files": {"files", "recording", "errors", "registry", "atomic", "ordinary"},
     "rigs": {
-        *("rigs", "recording", "signals", "errors", "registry", "atomic"),
+        *("rigs", "recording", "signals", "errors", "registry", "atomic", "ordinary"),
         *("compiling", "threads"),
     },
-    "export": {"export", "blocks", "errors", "registry", "atomic"},
+    "export": {"export", "blocks", "errors", "registry", "atomic", "ordinary"},
     "stream": {"stream", "blocks", "errors"},
     "control": {"control", "blocks", "recording", "errors", "registry"},
     "environments": {"environments", "rigs", "recording", "signals", "errors"},

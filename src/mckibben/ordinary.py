@@ -51,7 +51,7 @@ def opened(path: str | Path, *, most: int) -> Iterator[BinaryIO]:
             file=path,
             remedy="check the path and its rights",
         ) from None
-    with os.fdopen(number, "rb") as file:
+    try:
         found = os.fstat(number)
         if stat.S_ISDIR(found.st_mode):
             raise _folder(path)
@@ -63,7 +63,10 @@ def opened(path: str | Path, *, most: int) -> Iterator[BinaryIO]:
                 file=path,
                 remedy="cut it into smaller files",
             )
-        yield file
+        with os.fdopen(number, "rb", closefd=False) as file:
+            yield file
+    finally:
+        os.close(number)
 
 
 def read_bytes(path: str | Path, *, most: int) -> bytes:

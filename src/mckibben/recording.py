@@ -268,3 +268,9 @@ def notes_by_file(recordings: Iterable[Recording]) -> dict[str, list[str]]:
         known = found.setdefault(recording.source or recording.name, [])
         known += [note for note in recording.notes if note not in known]
     return {file: notes for file, notes in found.items() if notes}
+
+
+def reading_notes(recordings: Iterable[Recording]) -> tuple[str, ...]:
+    """Return the notes of `notes_by_file` as sentences that begin with the file."""
+    found = notes_by_file(recordings)
+    return tuple(f"{file}: {note}" for file, notes in found.items() for note in notes)

@@ -21,9 +21,7 @@ _NUMBER = {
 _SPACED = re.compile(r"[+-]?\d{1,3}(?: \d{3})+(?:[.,]\d*)?", re.ASCII)
 """A number like 1 000, which is refused later, but is one cell where there is a better separator."""
 _BLANKS = re.compile(r"[ \t]+")
-_WIDE_SPACED = re.compile(r"[+-]?\d{1,3}(?: \d{3})+(?:[.,]\d*)?", re.ASCII)
-"""A number like 1 000, which is refused later, but is one cell where there is a better separator."""
-_BLANKS = re.compile(r"\s{2,}|\t")
+_WIDE_BLANKS = re.compile(r"\s{2,}|\t")
 _BRACKET = re.compile(r"[\[\]()]")
 
 

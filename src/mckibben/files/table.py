@@ -107,10 +107,10 @@ def column(header: str, values: NDArray[Any], unit: str | None = None) -> Column
 
 
 def printable(table: Table) -> Table:
-    """Return a foreign table whose words hold nothing that steers a terminal or turns text round.
+    r"""Return a foreign table whose words hold nothing that steers a terminal or turns text round.
 
     Blanks of any kind become plain ones, other signs that cannot be printed are written as
-    ``\\x1b``. What this package wrote stands as it is: its names were looked at before.
+    ``\x1b``. What this package wrote stands as it is: its names were looked at before.
     """
     if table.own:
         return table
@@ -128,10 +128,10 @@ def printable(table: Table) -> Table:
 
 
 def plain(text: str) -> str:
-    """Return text with what cannot be printed written out.
+    r"""Return text with what cannot be printed written out.
 
-    >>> plain("\x1b[31mpressure\xa0(bar)")
-    '\\\\x1b[31mpressure (bar)'
+    >>> print(plain("\x1b[31mpressure\xa0(bar)"))
+    \x1b[31mpressure (bar)
     """
     if text.isprintable():
         return text

@@ -35,7 +35,7 @@ from mckibben.cli.options import (
 )
 from mckibben.cli.output import figure, make_folder, print_json, progress_bar
 from mckibben.cli.stopping import forget_kept, stop_short, stoppable
-from mckibben.errors import DataError, DataWarning
+from mckibben.errors import DataError
 
 if TYPE_CHECKING:
     from mckibben.comparison.results import Study
@@ -103,13 +103,11 @@ def study(
         if rig is not None:
             raise DataError("--rig is for recordings of several muscles", remedy="leave it out")
         given = settings_of_all(settings, chosen)
-        with warnings.catch_warnings(record=True) as caught:
-            warnings.simplefilter("always", DataWarning)
-            recordings = reading.read([*train, *validation], [input, output])
-            held_out = reading.read(tests, [input, output])
-        notes = [str(warning.message) for warning in caught]
-        for note in notes:
-            typer.echo(f"Note: {note}", err=True)
+        from mckibben.recording import notes_by_file
+
+        recordings = reading.read([*train, *validation], [input, output])
+        held_out = reading.read(tests, [input, output])
+        notes = notes_by_file([*recordings, *held_out])
 
         from mckibben.comparison.cluster import on_cluster
         from mckibben.comparison.studying import study as find
@@ -137,12 +135,11 @@ def study(
                 clear=False,
                 progress=told(tell, "inverting and drawing"),
                 found=found,
-                notes=notes,
             )
         if done.leaderboard.stopped:
             results.take(done, last=True)
         if as_json:
-            print_json(_described(done, folder))
+            print_json(_described(done, folder) | {"notes": notes})
         else:
             _conclude(done, folder)
         stop_short(done.leaderboard)

@@ -55,6 +55,7 @@ def study_muscles(
         validation_of,
     )
     from mckibben.comparison.splits import repeated
+    from mckibben.recording import reading_notes
 
     train, split = list(recordings), "as given"
     if not tests:
@@ -78,7 +79,10 @@ def study_muscles(
         f"fitted to {len(train)} runs, tested on {len(tests)}: {split}",
         validation_of(train, validation).described,
         tests,
-        repeated(train, tests, shared),
+        (
+            *repeated(train, tests, shared),
+            *reading_notes([*recordings, *validation, *tests]),
+        ),
     )
     results.command = f"mckibben study FILES{'' if load is None else f' --load {load}'} -o {folder}"
     results.so_far([])
@@ -131,7 +135,7 @@ def study_muscles(
         if table.note:
             print(table.note)
     print()
-    for sentence in (*_summary(rows, best, loops, plant, results.chosen_on), *results.repeated):
+    for sentence in (*_summary(rows, best, loops, plant, results.chosen_on), *results.said):
         print(sentence)
     print(
         f"Written: {folder / 'report.html'}, leaderboard.csv, leaderboard.json, models"
@@ -151,10 +155,10 @@ class _Results:
         split: str,
         chosen_on: str,
         tests: Sequence[Recording],
-        repeated: Sequence[str],
+        said: Sequence[str],
     ) -> None:
         self._folder, self._split, self._tests = folder, split, tests
-        self.chosen_on, self.repeated = chosen_on, repeated
+        self.chosen_on, self.said = chosen_on, said
         (folder / "inverse.json").unlink(missing_ok=True)  # of an earlier study
 
     def so_far(self, rows: Sequence[MuscleRow]) -> None:
@@ -192,7 +196,7 @@ class _Results:
                     f"{name}: good only near the motions fitted, {why}."
                     for name, why in _careful(rows)
                 ),
-                *self.repeated,
+                *self.said,
             ),
             lead="Models of muscles that move one another, chosen on the training side, then tested.",
             notes_title="How it was done",
@@ -203,6 +207,7 @@ class _Results:
             "folder": str(self._folder),
             "split": self._split,
             "chosen_on": self.chosen_on,
+            "notes": list(self.said),
             "chosen": rows[0].model if rows and rows[0].block is not None else None,
             "rows": [row.to_dict() for row in rows],
             "inverse": None if best is None else best.model,

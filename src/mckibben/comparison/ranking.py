@@ -36,7 +36,7 @@ from mckibben.comparison.trying import (
     processes_for,
 )
 from mckibben.errors import ModelError
-from mckibben.recording import Recording
+from mckibben.recording import Recording, reading_notes
 from mckibben.signals import made_manageable
 from mckibben.workers import checked
 
@@ -286,7 +286,11 @@ def plan_of(
         seed=seed,
         chosen_by=chosen_by,
         left_out=left_out,
-        notes=(*notes, *repeated(recordings, tests, (input, output))),
+        notes=(
+            *notes,
+            *repeated(recordings, tests, (input, output)),
+            *reading_notes([*recordings, *tests]),
+        ),
     )
 
 

@@ -281,13 +281,28 @@ def context() -> Any:
 
 
 def end_with_parent() -> None:
-    """End this process when the one that started it ends, however it does."""
+    """End this process when the one that started it ends, however it does.
+
+    Where the system can, it does so itself: a thread would wait as long as compiled code keeps all
+    others from running.
+    """
     parent = multiprocessing.parent_process()
+    if parent is None:
+        return
+    if sys.platform == "linux":
+        import fcntl
+
+        # the parent holds the other end of this pipe, and writes nothing more to it
+        fcntl.fcntl(parent.sentinel, fcntl.F_SETOWN, os.getpid())
+        fcntl.fcntl(parent.sentinel, fcntl.F_SETSIG, signal.SIGKILL)
+        flags = fcntl.fcntl(parent.sentinel, fcntl.F_GETFL)
+        fcntl.fcntl(parent.sentinel, fcntl.F_SETFL, flags | os.O_ASYNC)
+    if not parent.is_alive():
+        os._exit(1)
 
     def wait() -> None:
-        if parent is not None:
-            parent.join()
-            os._exit(1)
+        parent.join()
+        os._exit(1)
 
     threading.Thread(target=wait, daemon=True).start()
 

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from mckibben.recording import Recording
 from mckibben.report import interactive
 from mckibben.report.drawing import Drawing, over_time
+from mckibben.report.interactive import text
 
 Array = NDArray[np.float64]
 Json = dict[str, Any]
@@ -23,8 +24,16 @@ POINTS = 4000
 
 CONFIG: Json = {
     "displaylogo": False,
-    "modeBarButtonsToRemove": ["lasso2d", "sendDataToCloud"],
+    "modeBarButtons": [
+        ["toImage"],
+        ["zoom2d", "pan2d", "select2d", "zoomIn2d", "zoomOut2d", "autoScale2d", "resetScale2d"],
+    ],
+    "showSendToCloud": False,
+    "showEditInChartStudio": False,
+    "showLink": False,
+    "plotlyServerURL": "",
 }
+"""The buttons are named one by one: none that another plotly.js brings sends a plot anywhere."""
 
 
 @cache
@@ -123,7 +132,13 @@ def lines(
         t, v = over_time(np.asarray(at, float), np.asarray(values, float), POINTS)
         line = {"color": palette[colour], "width": 1.6}
         data.append(
-            {"type": "scatter", "mode": "lines", "name": name, "x": _listed(t), "y": _listed(v)}
+            {
+                "type": "scatter",
+                "mode": "lines",
+                "name": text(name),
+                "x": _listed(t),
+                "y": _listed(v),
+            }
             | {"line": line}
         )
     shapes = [
@@ -142,8 +157,8 @@ def lines(
     plot = {
         "data": data,
         "layout": {
-            "xaxis": {"title": {"text": x}},
-            "yaxis": {"title": {"text": y}},
+            "xaxis": {"title": {"text": text(x)}},
+            "yaxis": {"title": {"text": text(y)}},
             "shapes": shapes,
             "showlegend": len(curves) > 1,
         },

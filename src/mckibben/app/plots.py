@@ -21,10 +21,10 @@ Json = dict[str, Any]
 POINTS = 4000
 """Most points of a curve sent to the page."""
 
-CONFIG: Json = {
-    "displaylogo": False,
-    "modeBarButtonsToRemove": ["lasso2d", "sendDataToCloud"],
+CONFIG: Json = interactive.BAR | {
+    "modeBarButtons": [["select2d"], *interactive.BAR["modeBarButtons"]]
 }
+"""A part of a recording is chosen with one button more."""
 
 
 @cache

@@ -22,18 +22,10 @@ Json = dict[str, Any]
 POINTS = 4000
 """Most points of a curve sent to the page."""
 
-CONFIG: Json = {
-    "displaylogo": False,
-    "modeBarButtons": [
-        ["toImage"],
-        ["zoom2d", "pan2d", "select2d", "zoomIn2d", "zoomOut2d", "autoScale2d", "resetScale2d"],
-    ],
-    "showSendToCloud": False,
-    "showEditInChartStudio": False,
-    "showLink": False,
-    "plotlyServerURL": "",
+CONFIG: Json = interactive.BAR | {
+    "modeBarButtons": [["select2d"], *interactive.BAR["modeBarButtons"]]
 }
-"""The buttons are named one by one: none that another plotly.js brings sends a plot anywhere."""
+"""A part of a recording is chosen with one button more."""
 
 
 @cache

@@ -9,7 +9,7 @@ import typer
 
 from mckibben.cli.leaderboards import told
 from mckibben.cli.options import (
-    MOST_SAMPLES,
+    AllowShared,
     Columns,
     Dask,
     Files,
@@ -55,7 +55,8 @@ def compare(
     rate: Rate = None,
     gaps: GapPolicy = Gaps.ERROR,
     resample: Resample = None,
-    samples: Samples = MOST_SAMPLES,
+    samples: Samples = None,
+    allow_shared: AllowShared = False,
     as_json: Json = False,
 ) -> None:
     """Fit models, choose by cross-validation, test on data used for neither; all free-running.
@@ -92,6 +93,7 @@ def compare(
                 seed=seed,
                 jobs=jobs,
                 most_samples=samples,
+                allow_shared=allow_shared,
                 folder=folder,
                 clear=False,
                 progress=told(tell),

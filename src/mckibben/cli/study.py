@@ -10,7 +10,7 @@ import typer
 
 from mckibben.cli.leaderboards import told
 from mckibben.cli.options import (
-    MOST_SAMPLES,
+    AllowShared,
     Columns,
     Dask,
     Files,
@@ -69,7 +69,8 @@ def study(
     rate: Rate = None,
     gaps: GapPolicy = Gaps.ERROR,
     resample: Resample = None,
-    samples: Samples = MOST_SAMPLES,
+    samples: Samples = None,
+    allow_shared: AllowShared = False,
     as_json: Json = False,
 ) -> None:
     """Say what the muscle does, choose a model by cross-validation, test, invert, and write a report.
@@ -97,7 +98,8 @@ def study(
                 reading.read(some, None, informative=False) for some in (train, validation, tests)
             )
             study_muscles(
-                runs, checks, held_back, folder, chosen, settings, rig, load, seed, jobs, as_json
+                *(runs, checks, held_back, folder, chosen, settings, rig, load, seed, jobs),
+                *(as_json, allow_shared),
             )
             return
         if rig is not None:
@@ -131,6 +133,7 @@ def study(
                 seed=seed,
                 jobs=jobs,
                 most_samples=samples,
+                allow_shared=allow_shared,
                 folder=folder,
                 clear=False,
                 progress=told(tell, "inverting and drawing"),
@@ -165,6 +168,8 @@ def _conclude(study: Study, folder: Path) -> None:
             f"{figure(high, 4)} {study.leaderboard.unit} on the model itself, largest error "
             f"{study.inverse.error:.1e} of that range."
         )
+    elif study.leaderboard.not_recommended:
+        print("No inverse is written, since no model is recommended.")
     elif not study.leaderboard.stopped:
         print("No model here has an inverse.")
     print(

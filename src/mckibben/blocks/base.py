@@ -10,6 +10,7 @@ from __future__ import annotations
 from abc import ABCMeta, abstractmethod
 from collections.abc import Callable
 from dataclasses import fields
+from functools import partial
 from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar, overload
 
 import numpy as np
@@ -371,4 +372,4 @@ class Primitive(Block):
     def bind(self, sample_time: float | None, state: Array, inputs: Array, outputs: Array) -> Run:
         """Return a function that runs the kernel in place."""
         run, coefficients = resolved(type(self).kernel), self.coefficients(sample_time)
-        return lambda: run(coefficients, state, inputs, outputs)
+        return partial(run, coefficients, state, inputs, outputs)

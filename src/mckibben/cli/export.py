@@ -88,9 +88,13 @@ def export_c(
     """Write C99 that compiles as it is: on a PC, a microcontroller, Arduino, MATLAB."""
     from mckibben.export import export_c as write_c
     from mckibben.export.c.building import self_test
+    from mckibben.export.folders import refuse_folder
     from mckibben.export.naming import name_from
+    from mckibben.outputs import refuse_inputs
 
     chosen = name or name_from(model)
+    refuse_inputs(out, [model])
+    refuse_folder(out, overwrite=overwrite)
     block = _loaded(model, inverse)
     write_c(
         block,
@@ -137,8 +141,12 @@ def export_fmu(
     import zipfile
 
     from mckibben.export import export_fmu as write_fmu
+    from mckibben.export.fmu.unit import refuse_file
     from mckibben.export.naming import name_from
+    from mckibben.outputs import refuse_inputs
 
+    refuse_inputs(out, [model])
+    refuse_file(out, overwrite=overwrite)
     named = [word.strip() for word in platforms.split(",")]
     write_fmu(
         _loaded(model, inverse),

@@ -10,6 +10,7 @@ import typer
 from mckibben.cli.options import (
     Columns,
     Files,
+    Force,
     GapPolicy,
     Gaps,
     Json,
@@ -57,6 +58,7 @@ def fit(
     rate: Rate = None,
     gaps: GapPolicy = Gaps.ERROR,
     resample: Resample = None,
+    force: Force = False,
     as_json: Json = False,
 ) -> None:
     """Identify one model from recordings and save it as JSON.
@@ -65,7 +67,9 @@ def fit(
     channels by name: pressure_1 ..., displacement_1 ..., and pressure_extensor where there is one.
     """
     from mckibben import registry
+    from mckibben.outputs import claim_model
 
+    claim_model(out, inputs=[*files, *(validation or [])], force=force)
     if model in registry.names("coupled"):
         reading = Reading(column, unit, rate, gaps, resample)
         held_back = reading.read(validation or [], None)

@@ -7,13 +7,14 @@ from typing import Annotated
 
 import typer
 
-from mckibben.cli.options import Json
+from mckibben.cli.options import Force, Json
 from mckibben.cli.output import figure, print_json
 
 
 def invert(
     model: Annotated[Path, typer.Argument(help="Model file (JSON).")],
     out: Annotated[Path, typer.Option("-o", "--out", help="Inverse to write (JSON).")],
+    force: Force = False,
     as_json: Json = False,
 ) -> None:
     """Write the inverse of a saved model: wished-for output in, input out.
@@ -24,7 +25,9 @@ def invert(
 
     from mckibben.blocks.force.feedforward import ForceFeedforward
     from mckibben.blocks.saving import load
+    from mckibben.outputs import claim_model
 
+    claim_model(out, inputs=[model], force=force)
     block = load(model)
     feedforward = ForceFeedforward.of(block)
     if feedforward is not None:

@@ -71,6 +71,12 @@ Samples = Annotated[
 ]
 MOST_SAMPLES = 100_000
 """As `mckibben.comparison.ranking` has it, which takes long to import."""
+Force = Annotated[
+    bool,
+    typer.Option(
+        "--force", help="Replace files that this program did not write; never what is read."
+    ),
+]
 Settings = Annotated[
     list[str] | None,
     typer.Option(

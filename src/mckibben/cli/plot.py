@@ -10,6 +10,7 @@ import typer
 from mckibben.cli.options import (
     Columns,
     Files,
+    Force,
     GapPolicy,
     Gaps,
     Input,
@@ -40,8 +41,12 @@ def plot(
     rate: Rate = None,
     gaps: GapPolicy = Gaps.ERROR,
     resample: Resample = None,
+    force: Force = False,
 ) -> None:
     """Draw recordings, or a saved model against them."""
+    from mckibben.outputs import claim_figure
+
+    claim_figure(out, inputs=[*files, *([] if model is None else [model])], force=force)
     recordings = Reading(column, unit, rate, gaps, resample).read(files, [input, output])
     from mckibben.report.figures import plot_model, plot_recording
 

@@ -14,6 +14,7 @@ from mckibben.cli.options import (
     Columns,
     Dask,
     Files,
+    Force,
     GapPolicy,
     Gaps,
     Input,
@@ -70,6 +71,7 @@ def study(
     gaps: GapPolicy = Gaps.ERROR,
     resample: Resample = None,
     samples: Samples = MOST_SAMPLES,
+    force: Force = False,
     as_json: Json = False,
 ) -> None:
     """Say what the muscle does, choose a model by cross-validation, test, invert, and write a report.
@@ -80,8 +82,10 @@ def study(
     displacement_1 ...) get models that couple them, and a closed loop on a virtual rig. With --load
     force, models that are told the load are ranked against one model for every load.
     """
-    from mckibben import workers
+    from mckibben import registry, workers
     from mckibben.files.folders import expanded
+    from mckibben.outputs import Results
+    from mckibben.report.results_folder import study_files
 
     folder = make_folder(out)
     with stoppable(folder):
@@ -90,6 +94,9 @@ def study(
         chosen = chosen_models(models, quick)
         reading = Reading(column, unit, rate, gaps, resample)
         train, validation, tests = expanded(files, test or [])
+        kept = Results(folder, inputs=[*train, *validation, *tests], force=force)
+        names = registry.names("estimators") if isinstance(chosen, str) else chosen
+        kept.claim(study_files(names))
         if load is not None or _of_muscles(reading, train):
             from mckibben.cli.study_muscles import study_muscles
 
@@ -97,7 +104,7 @@ def study(
                 reading.read(some, None, informative=False) for some in (train, validation, tests)
             )
             study_muscles(
-                runs, checks, held_back, folder, chosen, settings, rig, load, seed, jobs, as_json
+                runs, checks, held_back, kept, chosen, settings, rig, load, seed, jobs, as_json
             )
             return
         if rig is not None:
@@ -115,7 +122,7 @@ def study(
         from mckibben.comparison.studying import study as find
         from mckibben.report import StudyFolder
 
-        results = StudyFolder(folder)
+        results = StudyFolder(kept)
 
         def found(so_far: Study) -> None:
             results.take(so_far)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from mckibben.cli.options import Columns, Gaps, Json, Rate, Reading, Seed, Units
+from mckibben.cli.options import Columns, Force, Gaps, Json, Rate, Reading, Seed, Units
 from mckibben.cli.output import figure, print_json, print_table, progress_bar
 from mckibben.errors import DataError
 
@@ -57,14 +57,22 @@ def track(
     column: Columns = None,
     unit: Units = None,
     rate: Rate = None,
+    force: Force = False,
     as_json: Json = False,
 ) -> None:
     """Let a compensator, or a controller with it, follow a reference on a virtual rig."""
     from mckibben.blocks.saving import load
     from mckibben.control import track as close
     from mckibben.files import write
+    from mckibben.outputs import claim_model, claim_recording
     from mckibben.rigs import load_rig
 
+    inputs = [compensator, reference, Path(rig)]
+    if out is not None:
+        claim_recording(out, inputs=inputs, force=force)
+        inputs.append(out)
+    if controller_out is not None:
+        claim_model(controller_out, inputs=inputs, force=force)
     block = load(compensator)
     plant = load_rig(rig)
     runs = Reading(column, unit, rate, Gaps.ERROR).read([reference], None, informative=False)

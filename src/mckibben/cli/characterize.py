@@ -15,7 +15,7 @@ from mckibben.cli.options import (
     Resample,
     Units,
 )
-from mckibben.cli.output import figure, print_json, print_table
+from mckibben.cli.output import figure, print_json, print_table, say
 
 
 def characterize(
@@ -38,8 +38,8 @@ def characterize(
         print_json(found.to_dict())
         return
     for sentence in found.sentences:
-        print(sentence)
-    print()
+        say(sentence)
+    say()
     print_table(
         ["quantity", "value", "unit"],
         [[str(name), _shown(value), str(units)] for name, value, units, _ in found.table()],

@@ -33,7 +33,7 @@ from mckibben.cli.options import (
     chosen_models,
     settings_of_all,
 )
-from mckibben.cli.output import make_folder, print_json, progress_bar
+from mckibben.cli.output import make_folder, print_json, progress_bar, say
 from mckibben.cli.stopping import forget_kept, stop_short, stoppable
 
 
@@ -113,6 +113,6 @@ def compare(
         else:
             print_leaderboard(board)
             if folder is not None:
-                print(f"Written: {folder / 'leaderboard.json'}, {folder / 'leaderboard.csv'}")
+                say(f"Written: {folder / 'leaderboard.json'}, {folder / 'leaderboard.csv'}")
         stop_short(board)
         forget_kept(folder)

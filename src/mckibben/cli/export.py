@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from mckibben.cli.options import Json
-from mckibben.cli.output import print_json
+from mckibben.cli.output import print_json, say
 
 if TYPE_CHECKING:
     from mckibben.blocks.base import Block
@@ -114,8 +114,8 @@ def export_c(
         )
         return
     for line in filter(None, (told, ran)):
-        print(line)
-    print(f"Written: {out} ({len(files)} files; start with {out / 'README.md'})")
+        say(line)
+    say(f"Written: {out} ({len(files)} files; start with {out / 'README.md'})")
 
 
 @app.command("fmu")
@@ -163,5 +163,5 @@ def export_fmu(
         print_json({"file": str(out), "fmi": fmi.value, "libraries": built})
         return
     for path in built:
-        print(f"Library: {path}")
-    print(f"Written: {out} (FMI {fmi.value})")
+        say(f"Library: {path}")
+    say(f"Written: {out} (FMI {fmi.value})")

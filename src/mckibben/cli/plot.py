@@ -20,6 +20,7 @@ from mckibben.cli.options import (
     Resample,
     Units,
 )
+from mckibben.cli.output import say
 
 
 def plot(
@@ -56,4 +57,4 @@ def plot(
         from mckibben.blocks.saving import load
 
         plot_model(load(model), recordings, kind or "fit", out)
-    typer.echo(f"Written: {out}")
+    say(f"Written: {out}")

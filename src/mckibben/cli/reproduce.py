@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from mckibben.cli.options import Force, Gaps, Jobs, Json, Reading, Seed
-from mckibben.cli.output import figure, make_folder, print_json, print_table, progress_bar
+from mckibben.cli.output import figure, make_folder, print_json, print_table, progress_bar, say
 from mckibben.cli.stopping import forget_kept, stoppable
 from mckibben.errors import DataError
 
@@ -80,7 +80,7 @@ def reproduce(
         else:
             _print(found)
             if folder is not None:
-                print(f"Written: {folder / 'report.html'}, {folder / 'tables.json'}")
+                say(f"Written: {folder / 'report.html'}, {folder / 'tables.json'}")
         forget_kept(folder)
 
 
@@ -145,13 +145,13 @@ def _cell(cell: str | float | None) -> str:
 
 def _print(found: Reproduction) -> None:
     for table in found.tables:
-        print(f"\n{table.title}")
+        say(f"\n{table.title}")
         rows = [[_cell(cell) for cell in row] for row in table.rows]
         print_table(table.columns, rows)
         if table.note:
-            print(table.note)
-    print()
+            say(table.note)
+    say()
     for sentence in found.summary:
-        print(sentence)
+        say(sentence)
     for note in found.notes:
-        print(f"Note: {note}")
+        say(f"Note: {note}")

@@ -9,7 +9,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from mckibben.cli.options import Force, Json, Seed
-from mckibben.cli.output import InterruptionError, figure, make_folder, print_json, progress_bar
+from mckibben.cli.output import (
+    InterruptionError,
+    figure,
+    make_folder,
+    print_json,
+    progress_bar,
+    say,
+)
 from mckibben.errors import DataError
 
 if TYPE_CHECKING:
@@ -67,16 +74,16 @@ def list_rigs(as_json: Json = False) -> None:
             }
         )
         return
-    print("Rigs:")
+    say("Rigs:")
     for name, rig in rigs.items():
-        print(f"  {name}: {rig.title}")
-        print(f"    driven by {', '.join(rig.inputs)}; measures {', '.join(rig.outputs)}")
-    print("\nProtocols:")
+        say(f"  {name}: {rig.title}")
+        say(f"    driven by {', '.join(rig.inputs)}; measures {', '.join(rig.outputs)}")
+    say("\nProtocols:")
     for name, plan in protocols.items():
-        print(f"  {name}: {len(plan.runs)} runs on {plan.rig}")
-    print("\nSignals (--signal NAME:SETTING=VALUE,...):")
+        say(f"  {name}: {len(plan.runs)} runs on {plan.rig}")
+    say("\nSignals (--signal NAME:SETTING=VALUE,...):")
     for name, settings in signals.items():
-        print(f"  {name}: {', '.join(_setting(key, *rest) for key, rest in settings.items())}")
+        say(f"  {name}: {', '.join(_setting(key, *rest) for key, rest in settings.items())}")
 
 
 def _setting(name: str, kind: str, default: Any) -> str:
@@ -98,7 +105,7 @@ def show(
     if as_json:
         print_json(rig.model_dump(mode="json"))
     else:
-        print(describe(rig), end="")
+        say(describe(rig), end="")
 
 
 @app.command()
@@ -161,8 +168,8 @@ def run(
         )
         return
     for channel, (low, high) in spans.items():
-        print(f"{channel}: {figure(low + 0.0, 4)} to {figure(high, 4)} {recording.units[channel]}")
-    print(f"Written: {out}")
+        say(f"{channel}: {figure(low + 0.0, 4)} to {figure(high, 4)} {recording.units[channel]}")
+    say(f"Written: {out}")
 
 
 @app.command()
@@ -225,7 +232,7 @@ def record(
         print_json({"folder": str(folder), "recorded": wanted, "kept": sorted(kept)})
         return
     note = f", {len(kept)} were there already" if kept else ""
-    print(f"Written: {len(wanted)} recordings to {folder}{note}; roles are in protocol.json")
+    say(f"Written: {len(wanted)} recordings to {folder}{note}; roles are in protocol.json")
 
 
 @app.command()
@@ -260,7 +267,7 @@ def new(
         loop_width=loop_width,
     )
     save_rig(rig, file)
-    print(
+    say(
         f"Written: {file}; run it with: mckibben rig run {file} --signal triangle:period=10 -o run.csv"
     )
 

@@ -18,7 +18,7 @@ from mckibben.cli.options import (
     Resample,
     Units,
 )
-from mckibben.cli.output import figure, print_json
+from mckibben.cli.output import figure, print_json, say
 from mckibben.errors import DataError
 
 
@@ -89,12 +89,12 @@ def simulate(
         print_json(head | {"metrics": metrics})
         return
     for name, figures in metrics.items():
-        print(
+        say(
             f"{name}{'' if horizon is None else f', {horizon} samples ahead'}: "
             f"RMSE {figure(figures['rmse'], 4)}, MAE {figure(figures['mae'], 4)}, worst "
             f"{figure(figures['max_error'], 4)} {recording.units[name]}, R² {figure(figures['r2'], 5)}"
         )
-    print(f"Written: {out}")
+    say(f"Written: {out}")
 
 
 def _predicted(block: Any, recording: Any, horizon: int) -> Any:

@@ -34,7 +34,7 @@ from mckibben.cli.options import (
     chosen_models,
     settings_of_all,
 )
-from mckibben.cli.output import figure, make_folder, print_json, progress_bar
+from mckibben.cli.output import figure, make_folder, print_json, progress_bar, say
 from mckibben.cli.stopping import forget_kept, stop_short, stoppable
 from mckibben.errors import DataError, DataWarning
 
@@ -116,7 +116,7 @@ def study(
             held_out = reading.read(tests, [input, output])
         notes = [str(warning.message) for warning in caught]
         for note in notes:
-            typer.echo(f"Note: {note}", err=True)
+            say(f"Note: {note}", error=True)
 
         from mckibben.comparison.cluster import on_cluster
         from mckibben.comparison.studying import study as find
@@ -159,25 +159,25 @@ def study(
 def _say(study: Study, folder: Path) -> None:
     """Print what the muscle does, before any model is fitted."""
     for sentence in study.characterization.sentences:
-        print(sentence)
-    print(f"Drawn: {folder / 'report.html'}, which grows with every model fitted.\n", flush=True)
+        say(sentence)
+    say(f"Drawn: {folder / 'report.html'}, which grows with every model fitted.\n", flush=True)
 
 
 def _conclude(study: Study, folder: Path) -> None:
     from mckibben.cli.leaderboards import print_leaderboard
 
     print_leaderboard(study.leaderboard)
-    print()
+    say()
     if study.inverse is not None:
         low, high = study.inverse.reachable
-        print(
+        say(
             f"Inverse of {study.inverse.model}: follows any reference from {figure(low, 4)} to "
             f"{figure(high, 4)} {study.leaderboard.unit} on the model itself, largest error "
             f"{study.inverse.error:.1e} of that range."
         )
     elif not study.leaderboard.stopped:
-        print("No model here has an inverse.")
-    print(
+        say("No model here has an inverse.")
+    say(
         f"Written: {folder / 'report.html'}, leaderboard.csv, leaderboard.json, models"
         + ("" if study.inverse is None else ", inverse.json")
     )

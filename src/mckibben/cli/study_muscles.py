@@ -14,7 +14,7 @@ from mckibben.atomic import to_json
 from mckibben.blocks.saving import to_text
 from mckibben.cli.leaderboards import told
 from mckibben.cli.options import parse_settings
-from mckibben.cli.output import figure, print_json, print_table, progress_bar
+from mckibben.cli.output import figure, print_json, print_table, progress_bar, say
 from mckibben.cli.stopping import forget_kept
 from mckibben.errors import DataError
 from mckibben.report.results_folder import model_file, study_files
@@ -129,15 +129,15 @@ def study_muscles(
         forget_kept(folder)
         return
     for table in _tables(rows, loops):
-        print(f"\n{table.title}")
+        say(f"\n{table.title}")
         cells = [[_cell(cell) for cell in row] for row in table.rows]
         print_table(list(table.columns), cells)
         if table.note:
-            print(table.note)
-    print()
+            say(table.note)
+    say()
     for sentence in (*_summary(rows, best, loops, plant, results.chosen_on), *results.repeated):
-        print(sentence)
-    print(
+        say(sentence)
+    say(
         f"Written: {folder / 'report.html'}, leaderboard.csv, leaderboard.json, models"
         + ("" if best is None or best.inverse is None else ", inverse.json")
     )

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from mckibben.cli.options import Columns, Force, Gaps, Json, Rate, Reading, Seed, Units
-from mckibben.cli.output import figure, print_json, print_table, progress_bar
+from mckibben.cli.output import figure, print_json, print_table, progress_bar, say
 from mckibben.errors import DataError
 
 if TYPE_CHECKING:
@@ -120,18 +120,18 @@ def track(
     measure = wanted.units[next(iter(found.rmse))]
     print_table(["followed", f"RMSE [{measure}]", f"largest [{measure}]"], rows)
     if found.clipped >= len(found.recording):
-        print("Pressures were at a limit throughout: the reference is out of reach.")
+        say("Pressures were at a limit throughout: the reference is out of reach.")
     elif found.clipped:
-        print(
+        say(
             f"Pressures were at a limit in {found.clipped} steps; RMSE there is "
             f"{figure(found.clipping_cost, 3)} {measure} above that of the other steps."
         )
-    print(
+    say(
         f"Controller: {1e6 * found.step_time[0]:.0f} µs a step (median), "
         f"{1e6 * found.step_time[1]:.0f} µs (99.9 %)."
     )
     if out is not None:
-        print(f"Written: {out}")
+        say(f"Written: {out}")
 
 
 def _fits(block: Block, plant: Rig, reference: Recording) -> None:

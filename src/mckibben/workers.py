@@ -35,6 +35,9 @@ ONE_THREAD = (
     "VECLIB_MAXIMUM_THREADS",
 )
 
+MOST_JOBS = 4096
+"""Processes that may be asked for."""
+
 _starting = threading.Lock()
 
 Tell = Callable[..., None]
@@ -195,10 +198,10 @@ def checked(jobs: int | None) -> int | None:
     Raises
     ------
     DataError
-        If it is below 1.
+        If it is below 1 or above `MOST_JOBS`.
     """
-    if jobs is not None and jobs < 1:
-        raise DataError(f"jobs is {jobs}", remedy="give a number of at least 1, or leave it out")
+    if jobs is not None and not 1 <= jobs <= MOST_JOBS:
+        raise DataError(f"jobs is {jobs}", remedy=f"give 1 to {MOST_JOBS}, or leave it out")
     return jobs
 
 

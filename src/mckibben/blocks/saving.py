@@ -84,9 +84,14 @@ def nested(content: Any) -> Any:
     return part_from_dict(content) if isinstance(content, Mapping) else content
 
 
+def to_text(block: Block) -> str:
+    """Return a block as the text of its file."""
+    return json.dumps(to_dict(block), indent=2, allow_nan=False) + "\n"
+
+
 def save(block: Block, path: str | Path) -> None:
-    """Write a block as JSON, by a temporary file that is then renamed."""
-    write_text(path, json.dumps(to_dict(block), indent=2, allow_nan=False) + "\n")
+    """Write a block as JSON, by a temporary file that is then renamed, over what had the name."""
+    write_text(path, to_text(block))
 
 
 def load(path: str | Path) -> Block:

@@ -15,7 +15,7 @@ from mckibben.cli.options import (
     Resample,
     Units,
 )
-from mckibben.cli.output import figure, print_json, print_table
+from mckibben.cli.output import figure, print_json, print_table, say
 
 
 def characterize(
@@ -39,14 +39,14 @@ def characterize(
         print_json(found.to_dict() | {"notes": notes_by_file(recordings)})
         return
     for sentence in found.sentences:
-        print(sentence)
-    print()
+        say(sentence)
+    say()
     print_table(
         ["quantity", "value", "unit"],
         [[str(name), _shown(value), str(units)] for name, value, units, _ in found.table()],
     )
     for note in reading_notes(recordings):
-        print(f"Note: {note}")
+        say(f"Note: {note}")
 
 
 def _shown(value: object) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -271,7 +272,7 @@ def _changed(name: str, changes: list[str] | None) -> Rig:
             )
         try:
             settings[key.replace("-", "_")] = json.loads(text)
-        except ValueError:
+        except (ValueError, RecursionError):
             settings[key.replace("-", "_")] = text
     return rig.changed(settings) if settings else rig
 
@@ -355,9 +356,10 @@ def _said(plan: Any, rig: Rig, seed: int, file_format: str) -> dict[str, Any]:
 def _kept(folder: Path, said: dict[str, Any]) -> set[str]:
     """Write what the folder is to hold, and return the runs that it holds already."""
     from mckibben.atomic import to_json, write_text
+    from mckibben.ordinary import DESCRIPTION, read_text
 
     text, place = to_json(said) + "\n", folder / "protocol.json"
-    if place.exists() and place.read_text(encoding="utf-8") != text:
+    if os.path.lexists(place) and read_text(place, most=DESCRIPTION) != text:
         raise DataError(
             "the folder holds another protocol, rig or seed",
             file=place,

@@ -25,6 +25,7 @@ from mckibben.atomic import write_text
 from mckibben.blocks.base import Block
 from mckibben.blocks.saving import LARGEST_FILE, from_dict, to_dict
 from mckibben.errors import DataWarning, MckibbenError
+from mckibben.ordinary import read_text
 from mckibben.recording import PROVENANCE, Recording
 
 Result = TypeVar("Result")
@@ -61,10 +62,10 @@ class Kept:
             What this part depends on beside what everything does.
         """
         path = self._path(name, depends)
-        if path is None or not path.is_file() or path.stat().st_size > LARGEST_FILE:
+        if path is None or not path.is_file():
             return None
         try:
-            return _from_json(kind, json.loads(path.read_text(encoding="utf-8")))
+            return _from_json(kind, json.loads(read_text(path, most=LARGEST_FILE)))
         except Exception as error:  # whatever is wrong with it, it can be computed again
             _warn(path, error)
             return None

@@ -10,11 +10,13 @@ import hashlib
 import io
 import os
 import shutil
+import sys
 import zipfile
 from collections.abc import Mapping
 from pathlib import Path
 
 from mckibben.errors import DataError
+from mckibben.ordinary import DESCRIPTION, opened, read_text
 
 MANIFEST = "manifest.sha256"
 
@@ -87,17 +89,22 @@ def _digest(content: bytes) -> str:
     return hashlib.sha256(content).hexdigest()
 
 
+def _digest_of(path: Path) -> str:
+    with opened(path, most=sys.maxsize) as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
 def _check_own(folder: Path) -> None:
     """Refuse to replace a folder that holds anything but what an export wrote."""
     try:
-        lines = (folder / MANIFEST).read_text(encoding="utf-8").splitlines()
-    except (OSError, UnicodeError):
+        lines = read_text(folder / MANIFEST, most=DESCRIPTION).splitlines()
+    except DataError:
         lines = []
     written = {line[66:]: line[:64] for line in lines}
     found = [path for path in folder.rglob("*") if path.is_file() or path.is_symlink()]
     for path in sorted(found):
         name = path.relative_to(folder).as_posix()
-        own = not path.is_symlink() and written.get(name) == _digest(path.read_bytes())
+        own = not path.is_symlink() and written.get(name) == _digest_of(path)
         if name != MANIFEST and not own:
             raise DataError(
                 f"{name} in it was not written by an export, or has been changed since",

@@ -8,7 +8,9 @@ from __future__ import annotations
 
 import csv
 import io
+import os
 import re
+from io import BufferedReader
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +24,7 @@ from mckibben.files.dialect import Dialect, detect
 from mckibben.files.notices import warn
 from mckibben.files.stored import Stored
 from mckibben.files.table import Column, Table
+from mckibben.ordinary import DESCRIPTION, read_bytes
 from mckibben.recording import Recording
 
 _CONTROL = re.compile(r"[\x00-\x08\x0e-\x1f\x7f]")
@@ -37,9 +40,9 @@ def sidecar(path: Path) -> Path:
     return path.with_name(f"{path.name}-metadata.json")
 
 
-def read(path: Path) -> list[Table]:
+def read(file: BufferedReader, path: Path) -> list[Table]:
     """Read the one table of a text file."""
-    data = path.read_bytes()
+    data = file.read()
     description = _described(path, data)
     return [_parse(_decode(data, path), path) if description is None else _own(data, description)]
 
@@ -66,12 +69,12 @@ def write(recording: Recording, path: Path) -> None:
 def _described(path: Path, data: bytes) -> Stored | None:
     """Return the sidecar's description, if there is one and it is of these bytes."""
     beside = sidecar(path)
-    try:
-        description = stored.parse(beside.read_bytes())
-    except FileNotFoundError:
+    if not os.path.lexists(beside):
         return None
-    except OSError as error:
-        description = error.strerror or "unreadable"
+    try:
+        description = stored.parse(read_bytes(beside, most=DESCRIPTION))
+    except DataError as error:
+        description = error.problem
     if isinstance(description, str):
         problem = f"is not a description by this package ({description})"
     elif description.sha256 != stored.digest(data):

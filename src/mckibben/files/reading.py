@@ -12,9 +12,8 @@ from typing import Literal
 import numpy as np
 
 from mckibben.errors import DataError
-from mckibben.files import timebase
+from mckibben.files import formats, timebase
 from mckibben.files.choosing import Choice, choose
-from mckibben.files.formats import tables
 from mckibben.files.holes import Channels, treat
 from mckibben.files.notices import warn
 from mckibben.files.request import Request
@@ -91,10 +90,14 @@ def read(
     path = Path(path)
     request = Request(dict(columns or {}), dict(units or {}), rate, gaps, channels, informative)
     request.check(path)
-    return [recording for table in tables(path) for recording in _recordings(table, request, path)]
+    with formats.opening(path) as file:
+        tables = formats.read(file, path)
+        file.seek(0)
+        digest = hashlib.file_digest(file, "sha256").hexdigest()
+    return [each for table in tables for each in _recordings(table, request, path, digest)]
 
 
-def _recordings(table: Table, request: Request, path: Path) -> list[Recording]:
+def _recordings(table: Table, request: Request, path: Path, digest: str) -> list[Recording]:
     choice = choose(table, request, path)
     n = next(iter(choice.channels.values())).size
     if n < request.fewest:
@@ -120,7 +123,7 @@ def _recordings(table: Table, request: Request, path: Path) -> list[Recording]:
     else:
         pieces = _on_grid(channels, measured, spans, choice, table, request, path)
     units = {name: choice.units[name] for name in channels}
-    meta = _meta(choice, table, path)
+    meta = _meta(choice, table, path, digest)
     found = [Recording(piece.samples, piece.step, units, piece.start, meta) for piece in pieces]
     if len(found) == 1:
         return found
@@ -252,8 +255,6 @@ def _seconds(value: float, choice: Choice) -> float:
     return float(convert(np.array([value]), choice.time_unit, "s")[0])
 
 
-def _meta(choice: Choice, table: Table, path: Path) -> dict[str, object]:
-    with path.open("rb") as file:
-        digest = hashlib.file_digest(file, "sha256").hexdigest()
+def _meta(choice: Choice, table: Table, path: Path, digest: str) -> dict[str, object]:
     name = {} if table.name is None else {"name": f"{path.stem}[{table.name}]"}
     return {**table.meta, **choice.meta, **name, "file": str(path), "sha256": digest}

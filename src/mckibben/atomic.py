@@ -29,6 +29,7 @@ def replacing(path: str | Path) -> Iterator[Path]:
         raise DataError("its folder does not exist", file=path, remedy="create the folder first")
     new = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
+        new.unlink(missing_ok=True)  # lest a link that someone left there be followed
         yield new
         new.replace(path)
     except OSError as error:

@@ -31,7 +31,7 @@ from mckibben.recording import Recording
 
 MOST_COLUMNS = 4096
 _CONTROL = bytes([*range(0x09), *range(0x0E, 0x20), 0x7F])
-_PART = 1_000_000  # cells that are read at once
+_PART = 200_000  # cells that are read at once
 _LISTED = 10
 
 

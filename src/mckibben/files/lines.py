@@ -20,7 +20,7 @@ LONGEST = 2**18
 MOST = 50_000_000
 """Lines of a text."""
 
-_BLOCK = 2**22  # bytes that are looked at at once
+_BLOCK = 2**20  # bytes that are looked at at once
 _SAMPLE = 200  # lines that the dialect is found from
 _BLANK = np.isin(np.arange(256), list(b" \t\v\f"))
 _BETWEEN_CELLS = np.isin(np.arange(256), list(b" \t\n"))

@@ -7,6 +7,7 @@ be put in its place in between.
 
 from __future__ import annotations
 
+import io
 import os
 import stat
 from collections.abc import Iterator
@@ -18,6 +19,18 @@ from mckibben.errors import DataError
 
 DESCRIPTION = 4 * 2**20
 """Bytes that a description (a sidecar, a protocol, a job, a rig) may have."""
+
+_SMALL = 2**16
+"""Bytes that are asked for without a look at how many there are."""
+
+
+class _Ordinary(io.BufferedReader):
+    """A file that makes no room for more than is left in it, whatever a format says there is."""
+
+    def read(self, size: int | None = -1, /) -> bytes:
+        if size is not None and size > _SMALL:
+            size = min(size, max(0, os.fstat(self.fileno()).st_size - self.tell()))
+        return super().read(size)
 
 
 @contextmanager
@@ -63,7 +76,7 @@ def opened(path: str | Path, *, most: int) -> Iterator[BufferedReader]:
                 file=path,
                 remedy="cut it into smaller files",
             )
-        with os.fdopen(number, "rb", closefd=False) as file:
+        with _Ordinary(io.FileIO(number, "rb", closefd=False)) as file:
             yield file
     finally:
         os.close(number)

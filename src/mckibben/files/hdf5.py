@@ -7,6 +7,7 @@ sends a file must not choose what else is read.
 from __future__ import annotations
 
 import math
+import zlib
 from collections.abc import Iterator
 from io import BufferedReader
 from pathlib import Path
@@ -17,6 +18,12 @@ import numpy as np
 from mckibben.errors import DataError
 from mckibben.files.limits import MOST_TEXT, Budget
 from mckibben.files.table import Column, Table, column, of_equal_length
+
+_HEAP = b"GCOL\1\0\0\0"
+_BLOCK = 2**22
+
+MOST_UNLOOKED = 2**18
+"""Bytes of a packed chunk that may stand for a thousand times as many, unseen."""
 
 _SIGNATURE = b"\x89HDF\r\n\x1a\n"
 
@@ -39,6 +46,7 @@ def read(file: BufferedReader, path: Path) -> list[Table]:
             remedy="pip install mckibben[hdf5]",
         ) from None
 
+    _refuse_endless(file)
     budget = Budget(file, path)
     found: dict[str, Column] = {}
     with h5py.File(file, "r") as tree:
@@ -48,6 +56,7 @@ def read(file: BufferedReader, path: Path) -> list[Table]:
             if vector and data.dtype.kind in "biuf" and not _is_text(data):
                 budget.samples(data.size)
                 budget.at_once(math.prod(data.chunks or ()))
+                _refuse_overfull(place, data, path)
                 unit = _text(data, "units") or _text(data, "unit")
                 found[place] = column(place.rpartition("/")[2], data[()].reshape(-1), unit)
         budget.parts(h5py.h5a.get_num_attrs(tree.id))
@@ -57,6 +66,35 @@ def read(file: BufferedReader, path: Path) -> list[Table]:
             found, path, meta={name: value for name, value in meta.items() if value is not None}
         )
     ]
+
+
+def _refuse_endless(file: BufferedReader) -> None:
+    """Refuse a heap of texts in which a piece has no length: HDF5 would look for its end for ever."""
+    at, last = 0, b""
+    while block := file.read(_BLOCK):
+        window = last + block
+        start = at - len(last)
+        found = window.find(_HEAP)
+        while found >= 0:
+            _walk_heap(file, start + found)
+            found = window.find(_HEAP, found + 1)
+        at += len(block)
+        file.seek(at)
+        last = window[1 - len(_HEAP) :]
+    file.seek(0)
+
+
+def _walk_heap(file: BufferedReader, at: int) -> None:
+    file.seek(at + len(_HEAP))
+    size = int.from_bytes(file.read(8), "little")
+    heap, inside = file.read(max(0, min(size, 2**32) - 16)), 0
+    while inside + 16 <= len(heap):
+        index = int.from_bytes(heap[inside : inside + 2], "little")
+        length = int.from_bytes(heap[inside + 8 : inside + 16], "little")
+        step = 16 + length + -length % 8 if index else length
+        if not 0 < step < 2**63:
+            raise ValueError("its texts have no end")
+        inside += step
 
 
 def _data_sets(tree: Any, budget: Budget) -> Iterator[tuple[str, Any]]:
@@ -95,6 +133,37 @@ def _refuse_elsewhere(place: str, data: Any, path: Path) -> None:
             f"data set {place!r} keeps its samples in another file",
             file=path,
             remedy="save all samples in this file",
+        )
+
+
+def _refuse_overfull(place: str, data: Any, path: Path) -> None:
+    """Refuse chunks that unpack to more than a chunk holds, which HDF5 would make room for."""
+    from h5py import h5z
+
+    if data.chunks is None:
+        return
+    pipeline = data.id.get_create_plist()
+    filters = [pipeline.get_filter(i)[0] for i in range(pipeline.get_nfilters())]
+    packing = [one for one in filters if one not in (h5z.FILTER_SHUFFLE, h5z.FILTER_FLETCHER32)]
+    room = math.prod(data.chunks) * data.dtype.itemsize
+    overfull = len(packing) > 1
+
+    def look(chunk: Any) -> None:
+        nonlocal overfull
+        overfull |= chunk.size > room + room // 8 + 1024
+        if chunk.size > MOST_UNLOOKED and not overfull and packing == [h5z.FILTER_DEFLATE]:
+            packed = data.id.read_direct_chunk(chunk.chunk_offset)[1]
+            unpacking = zlib.decompressobj()
+            unpacking.decompress(packed, room + 1024)
+            overfull |= bool(unpacking.unconsumed_tail)
+
+    if packing and not overfull:
+        data.id.chunk_iter(look)
+    if overfull:
+        raise DataError(
+            f"data set {place!r} is packed more than once, or more closely than it says",
+            file=path,
+            remedy="save it without compression",
         )
 
 

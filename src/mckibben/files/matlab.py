@@ -28,6 +28,8 @@ _NUMBERS |= {12: "i8", 13: "u8"}
 _TEXTS = {1: "latin-1", 2: "latin-1", 4: "utf-16", 16: "utf-8", 17: "utf-16", 18: "utf-32"}
 _CELL, _STRUCT, _OBJECT, _CHAR = 1, 2, 3, 4
 _NUMERIC = range(6, 16)
+_WITHOUT_SHAPE = (16, 17)
+"""Functions, and objects of newer kinds."""
 _COMPLEX = 0x800
 
 
@@ -121,7 +123,7 @@ class _Version5:
         elements = self._elements(content)
         flags = self._integers(next(elements)[1])[0]
         of = flags & 0xFF
-        if not (of in _NUMERIC or of in (_CELL, _STRUCT, _OBJECT, _CHAR)):
+        if of in _WITHOUT_SHAPE:
             return
         shape = self._integers(next(elements)[1])
         name = bytes(next(elements)[1]).decode("latin-1")
@@ -143,6 +145,8 @@ class _Version5:
             for start in range(0, len(names), length):
                 field = names[start : start + length].partition(b"\0")[0].decode("latin-1")
                 self._inside(f"{place}.{field}", elements, depth)
+        elif not 0 < of < 16:
+            raise ValueError(f"a matrix of class {of}")
 
     def _inside(self, place: str, elements: Iterator[tuple[int, memoryview]], depth: int) -> None:
         kind, content = next(elements)

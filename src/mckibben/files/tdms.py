@@ -20,7 +20,7 @@ from mckibben.files.limits import MOST_TEXT, Budget
 from mckibben.files.table import Column, Table, column, of_equal_length
 
 _LEAD = struct.Struct("<4sIIQQ")
-_META_DATA, _BIG_ENDIAN = 1 << 1, 1 << 6
+_META_DATA, _NEW_LIST, _BIG_ENDIAN = 1 << 1, 1 << 2, 1 << 6
 
 _Waveform = tuple[float | None, float]
 
@@ -68,7 +68,8 @@ def _count_segments(file: BufferedReader, budget: Budget) -> None:
         if contents & _META_DATA:
             count = file.read(4)
             order: Literal["big", "little"] = "big" if contents & _BIG_ENDIAN else "little"
-            objects = max(1, int.from_bytes(count, order))
+            kept = 1 if contents & _NEW_LIST else objects
+            objects = max(kept, int.from_bytes(count, order))
             if contents & _BIG_ENDIAN:
                 length = int.from_bytes(length.to_bytes(8, "little"), "big")
         budget.pieces(objects)

@@ -107,7 +107,7 @@ def _toml(value: Any) -> str:
 
 def _read(path: Path) -> dict[str, Any]:
     try:
-        fields = tomllib.loads(read_text(path, most=DESCRIPTION))
+        fields = _plain(tomllib.loads(read_text(path, most=DESCRIPTION)))
     except (ValueError, RecursionError) as error:
         raise DataError(
             f"this is not TOML: {str(error)[:200]}", file=path, remedy="mend the file"
@@ -137,17 +137,17 @@ def _from_fields(fields: dict[str, Any], path: Path) -> Rig:
         )
     model: type[Rig] = registry.load("setups", str(setup))
     try:
-        return model.model_validate(_floats(fields))
+        return model.model_validate(fields)
     except ValidationError as error:
         raise refused(error, model, path) from None
 
 
-def _floats(value: Any) -> Any:
+def _plain(value: Any) -> Any:
     """Return TOML's nan, inf and endless integers as words, which every number field refuses."""
     if isinstance(value, dict):
-        return {key: _floats(item) for key, item in value.items()}
+        return {key: _plain(item) for key, item in value.items()}
     if isinstance(value, list):
-        return [_floats(item) for item in value]
+        return [_plain(item) for item in value]
     if isinstance(value, int) and value.bit_length() > 63:
         return "an integer beyond 64 bits"
     return str(value) if isinstance(value, float) and not math.isfinite(value) else value

@@ -116,6 +116,8 @@ class Cache(Generic[Value]):
             raise DataError(
                 f"it cannot be read ({error.strerror})", file=path, remedy="add it again"
             ) from None
+        if not stat.S_ISREG(found.st_mode):
+            raise DataError("this is no ordinary file", file=path, remedy="remove it")
         stamp = found.st_mtime_ns, found.st_size, found.st_ino
         known = self._kept.get(path)
         if known is None or known[0] != stamp:

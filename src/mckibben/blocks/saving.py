@@ -49,7 +49,10 @@ def from_dict(content: Mapping[str, Any]) -> Block:
             "Remedy: save it again with a matching release of mckibben."
         )
     described = {key: value for key, value in content.items() if key not in ("format", "version")}
-    block: Block = part_from_dict(described)
+    try:
+        block: Block = part_from_dict(described)
+    except RecursionError:
+        raise ModelError("nested too deeply. Remedy: compose fewer blocks in each other.") from None
     return block
 
 
@@ -70,7 +73,7 @@ def part_from_dict(content: Any, group: str = "blocks") -> Any:
     kind = content["kind"]
     cls = load_plugin(group, kind)
     values = {key: _tuples(value) for key, value in content.items() if key != "kind"}
-    unknown = sorted(set(values) - {field.name for field in fields(cls)})
+    unknown = sorted(set(values) - {field.name for field in fields(cls)}, key=str)
     if unknown:
         raise ModelError(f"{kind!r} has no field {unknown[0]!r}. Remedy: save the model again.")
     return cls(**values)

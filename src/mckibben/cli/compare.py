@@ -9,7 +9,7 @@ import typer
 
 from mckibben.cli.leaderboards import told
 from mckibben.cli.options import (
-    MOST_SAMPLES,
+    AllowShared,
     Columns,
     Dask,
     Files,
@@ -56,7 +56,8 @@ def compare(
     rate: Rate = None,
     gaps: GapPolicy = Gaps.ERROR,
     resample: Resample = None,
-    samples: Samples = MOST_SAMPLES,
+    samples: Samples = None,
+    allow_shared: AllowShared = False,
     force: Force = False,
     as_json: Json = False,
 ) -> None:
@@ -101,6 +102,7 @@ def compare(
                 seed=seed,
                 jobs=jobs,
                 most_samples=samples,
+                allow_shared=allow_shared,
                 folder=folder,
                 clear=False,
                 progress=told(tell),

@@ -114,3 +114,5 @@ def _recordings(recordings: list[Any], as_json: bool) -> None:
             for name, s in recording.channels.items()
         ]
         print_table(["channel", "unit", "lowest", "highest"], rows)
+        for note in recording.notes:
+            say(f"Note: {note}")

@@ -45,7 +45,7 @@ def print_leaderboard(board: Leaderboard) -> None:
 
     validated = board.chosen_by != "fit"
     rows = []
-    for row in board.rows:
+    for row in board.ranking:
         if row.test is None:
             continue
         interval = row.rmse_interval or (float("nan"), float("nan"))
@@ -56,7 +56,7 @@ def print_leaderboard(board: Leaderboard) -> None:
                 figure(row.validation_rmse if validated else row.chosen_by),
                 figure(row.test.rmse),
                 f"{figure(interval[0])} to {figure(interval[1])}",
-                str(row.test_rank),
+                "-" if row.test_rank is None else str(row.test_rank),
                 figure(memory, 2),
             ]
         )
@@ -66,6 +66,8 @@ def print_leaderboard(board: Leaderboard) -> None:
     headings = [f"{heading}{unit}", f"test RMSE{unit}", "95 % interval", "rank", "gap kept"]
     print_table(["model", *headings], rows)
     say("All run free. Rank: by test RMSE. Gap between branches kept: 1 is right, 0 forgets.")
+    if board.constant is not None and board.rows:
+        say("constant: the mean of the training output, which every model has to beat.")
     if board.chosen:
         say(board.chosen)
     careful = [row.model for row in board.rows if row.reason is None and row.caution]

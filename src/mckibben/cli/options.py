@@ -64,7 +64,7 @@ Models = Annotated[
 ]
 Quick = Annotated[bool, typer.Option("--quick", help="Same as --models quick.")]
 Samples = Annotated[
-    int,
+    int | None,
     typer.Option(
         "--samples",
         metavar="N",
@@ -73,8 +73,10 @@ Samples = Annotated[
         help="Samples to fit to at most: longer recordings are thinned.",
     ),
 ]
-MOST_SAMPLES = 100_000
-"""As `mckibben.comparison.ranking` has it, which takes long to import."""
+AllowShared = Annotated[
+    bool,
+    typer.Option("--allow-shared", help="Test on data fitted to, and say so in every result."),
+]
 Force = Annotated[
     bool,
     typer.Option(

@@ -10,7 +10,7 @@ import typer
 
 from mckibben.cli.leaderboards import told
 from mckibben.cli.options import (
-    MOST_SAMPLES,
+    AllowShared,
     Columns,
     Dask,
     Files,
@@ -36,7 +36,7 @@ from mckibben.cli.options import (
 )
 from mckibben.cli.output import figure, make_folder, print_json, progress_bar, say
 from mckibben.cli.stopping import forget_kept, stop_short, stoppable
-from mckibben.errors import DataError, DataWarning
+from mckibben.errors import DataError
 
 if TYPE_CHECKING:
     from mckibben.comparison.results import Study
@@ -70,7 +70,8 @@ def study(
     rate: Rate = None,
     gaps: GapPolicy = Gaps.ERROR,
     resample: Resample = None,
-    samples: Samples = MOST_SAMPLES,
+    samples: Samples = None,
+    allow_shared: AllowShared = False,
     force: Force = False,
     as_json: Json = False,
 ) -> None:
@@ -104,19 +105,18 @@ def study(
                 reading.read(some, None, informative=False) for some in (train, validation, tests)
             )
             study_muscles(
-                runs, checks, held_back, kept, chosen, settings, rig, load, seed, jobs, as_json
+                *(runs, checks, held_back, kept, chosen, settings, rig, load, seed, jobs),
+                *(as_json, allow_shared),
             )
             return
         if rig is not None:
             raise DataError("--rig is for recordings of several muscles", remedy="leave it out")
         given = settings_of_all(settings, chosen)
-        with warnings.catch_warnings(record=True) as caught:
-            warnings.simplefilter("always", DataWarning)
-            recordings = reading.read([*train, *validation], [input, output])
-            held_out = reading.read(tests, [input, output])
-        notes = [str(warning.message) for warning in caught]
-        for note in notes:
-            say(f"Note: {note}", error=True)
+        from mckibben.recording import notes_by_file
+
+        recordings = reading.read([*train, *validation], [input, output])
+        held_out = reading.read(tests, [input, output])
+        notes = notes_by_file([*recordings, *held_out])
 
         from mckibben.comparison.cluster import on_cluster
         from mckibben.comparison.studying import study as find
@@ -140,16 +140,16 @@ def study(
                 seed=seed,
                 jobs=jobs,
                 most_samples=samples,
+                allow_shared=allow_shared,
                 folder=folder,
                 clear=False,
                 progress=told(tell, "inverting and drawing"),
                 found=found,
-                notes=notes,
             )
         if done.leaderboard.stopped:
             results.take(done, last=True)
         if as_json:
-            print_json(_described(done, folder))
+            print_json(_described(done, folder) | {"notes": notes})
         else:
             _conclude(done, folder)
         stop_short(done.leaderboard)
@@ -175,6 +175,8 @@ def _conclude(study: Study, folder: Path) -> None:
             f"{figure(high, 4)} {study.leaderboard.unit} on the model itself, largest error "
             f"{study.inverse.error:.1e} of that range."
         )
+    elif study.leaderboard.not_recommended:
+        say("No inverse is written, since no model is recommended.")
     elif not study.leaderboard.stopped:
         say("No model here has an inverse.")
     say(

@@ -7,7 +7,7 @@ from pathlib import Path
 from types import ModuleType
 
 from mckibben.errors import DataError, MckibbenError
-from mckibben.files.table import Table
+from mckibben.files.table import Table, printable
 
 READERS: dict[str, str] = {
     ".csv": "delimited",
@@ -48,7 +48,7 @@ def tables(path: Path) -> list[Table]:
     module = _module(path, tuple(READERS), "read")
     try:
         _refuse_impostor(path)
-        found: list[Table] = module.read(path)
+        found: list[Table] = [printable(table) for table in module.read(path)]
     except MckibbenError:
         raise
     except OSError as error:

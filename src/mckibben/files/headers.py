@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from functools import lru_cache
 
 from mckibben.files.units import find, find_listed
 from mckibben.recording import standard_unit
@@ -44,6 +45,10 @@ _ENDINGS = (
 )
 
 
+LONGEST = 256
+"""Characters of a header."""
+
+
 @dataclass(frozen=True)
 class Header:
     """What a header says: ``name`` without the unit, and the unit's text or None."""
@@ -52,6 +57,7 @@ class Header:
     unit: str | None
 
 
+@lru_cache(maxsize=8192)
 def parse(text: str) -> Header:
     """Split a header into name and unit.
 
@@ -60,7 +66,9 @@ def parse(text: str) -> Header:
     >>> parse("valve_voltage_V"), parse("pressure_in")
     (Header(name='valve_voltage', unit='V'), Header(name='pressure_in', unit=None))
     """
-    text = text.strip()
+    text = " ".join(text.split())
+    if len(text) > LONGEST:  # the forms below take time by the square of the length
+        return Header(text, None)
     bracketed = _BRACKETED.fullmatch(text)
     if bracketed and bracketed["name"] and not _EXTENSOR & set(_words(bracketed["unit"])):
         return Header(bracketed["name"], bracketed["unit"].strip())

@@ -2,7 +2,8 @@
 
 The output is fitted by functions of the input, and of its direction. Noise is fitted by them too, the
 better the slower it is, so that its spectrum is taken from what is left over, and what noise of that
-spectrum would give is compared: weighted sums of chi-square, by their mean and variance. The fit itself
+spectrum would give is compared: weighted sums of chi-square, by their mean and variance, over what is
+known from few frequencies, as in an F-test. The fit itself
 takes frequencies out of what is left over, all of them where the input repeats; a frequency's power is
 therefore the mean over its neighbours, divided by the share that the fit can leave of them.
 """
@@ -108,7 +109,7 @@ def _spectrum_left(base: Array, y: Array) -> Array:
 
 def _p_value(basis: Array, y: Array, spectrum: Array) -> float | None:
     """Return how likely noise of a spectrum is fitted as well as an output by a basis."""
-    from scipy.special import gammaincc
+    from scipy.special import fdtrc
 
     if basis.shape[1] == 0:
         return None
@@ -118,4 +119,4 @@ def _p_value(basis: Array, y: Array, spectrum: Array) -> float | None:
     mean, variance = float(np.trace(covariance)), 2 * float(np.sum(covariance**2))
     if mean <= 1e-20:
         return 0.0 if fitted > 1e-20 else 1.0
-    return float(gammaincc(mean**2 / variance, fitted * mean / variance))
+    return float(fdtrc(2 * mean**2 / variance, min(BAND, y.size // 2), fitted / mean))

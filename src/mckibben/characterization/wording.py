@@ -137,8 +137,8 @@ def table(found: Characterization) -> list[Row]:
 def _independent(found: Characterization) -> str:
     return (
         f"{found.output[0].upper()}{found.output[1:]} does not depend on {found.input} by more than "
-        f"noise would give ({_level(found.p_dependence)}), so there is no loop, gain or saturation to tell: "
-        "check the channels and the sensor."
+        f"noise would give ({_level(found.p_dependence)}), so there is no loop, gain or saturation to "
+        "tell: check the channels and the sensor."
     )
 
 

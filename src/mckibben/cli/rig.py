@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -286,7 +287,7 @@ def _changed(name: str, changes: list[str] | None) -> Rig:
             )
         try:
             settings[key.replace("-", "_")] = json.loads(text)
-        except ValueError:
+        except (ValueError, RecursionError):
             settings[key.replace("-", "_")] = text
     return rig.changed(settings) if settings else rig
 
@@ -374,7 +375,7 @@ def _kept(folder: Path, said: dict[str, Any]) -> set[str]:
     from mckibben.outputs import is_recording
 
     text, place = to_json(said) + "\n", folder / "protocol.json"
-    if place.exists() and ordinary.read_text(place, most=ordinary.DESCRIPTION) != text:
+    if os.path.lexists(place) and ordinary.read_text(place, most=ordinary.DESCRIPTION) != text:
         raise DataError(
             "the folder holds another protocol, rig or seed",
             file=place,

@@ -169,7 +169,7 @@ def _sentence(shared: Shared, listed: Sequence[tuple[str, Recording]]) -> str:
     where = (
         f"{shared.start:.6g} to {shared.stop:.6g} {unit} of {_called(other, one)} are those of "
         f"{_called(one, other)} from {shared.begins:.6g} {unit} on, "
-        f"{100 * shared.share:.2g} % of the shorter one's motion"
+        f"{100 * shared.share:.0f} % of the shorter one's motion"
     )
     if role == other_role:
         return f"the same samples would count twice to {role}: {where}"

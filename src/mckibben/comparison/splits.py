@@ -110,6 +110,8 @@ def held_out_tail(recordings: Sequence[Recording], channel: str, share: float) -
         whole.insert(0, train.pop())
     last, travel = train[-1], travels[-1]
     start = int(np.searchsorted(travel, travel[-1] - wanted))
+    if start < FEWEST and len(train) > 1:  # nearly all of it, as of recordings equally long
+        whole.insert(0, train.pop())
     if min(start, len(last) - start) >= FEWEST:
         tail = np.zeros(len(last), dtype=bool)
         tail[start:] = True

@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import csv
 import io
+import os
+from io import BufferedReader
 from pathlib import Path
 from typing import Any
 
@@ -18,11 +20,13 @@ from mckibben.errors import DataError
 from mckibben.files import stored
 from mckibben.files.cells import Cells
 from mckibben.files.dialect import Dialect, detect
+from mckibben.files.limits import Budget
 from mckibben.files.lines import Lines
 from mckibben.files.marks import Doubt, doubts
 from mckibben.files.notices import warn
 from mckibben.files.stored import Stored
-from mckibben.files.table import Column, Table, refuse_huge
+from mckibben.files.table import Column, Table
+from mckibben.ordinary import DESCRIPTION, read_bytes
 from mckibben.recording import Recording
 
 MOST_COLUMNS = 4096
@@ -40,11 +44,13 @@ def sidecar(path: Path) -> Path:
     return path.with_name(f"{path.name}-metadata.json")
 
 
-def read(path: Path) -> list[Table]:
+def read(file: BufferedReader, path: Path) -> list[Table]:
     """Read the one table of a text file."""
-    data = path.read_bytes()
+    data = file.read()
     description = _described(path, data)
-    return [_parse(_utf8(data, path), path) if description is None else _own(data, description)]
+    if description is not None:
+        return [_own(data, description)]
+    return [_parse(_utf8(data, path), Budget(file, path), path)]
 
 
 def write(recording: Recording, path: Path) -> None:
@@ -69,12 +75,12 @@ def write(recording: Recording, path: Path) -> None:
 def _described(path: Path, data: bytes) -> Stored | None:
     """Return the sidecar's description, if there is one and it is of these bytes."""
     beside = sidecar(path)
-    try:
-        description = stored.parse(beside.read_bytes())
-    except FileNotFoundError:
+    if not os.path.lexists(beside):
         return None
-    except OSError as error:
-        description = error.strerror or "unreadable"
+    try:
+        description = stored.parse(read_bytes(beside, most=DESCRIPTION))
+    except DataError as error:
+        description = error.problem
     if isinstance(description, str):
         problem = f"is not a description by this package ({description})"
     elif description.sha256 != stored.digest(data):
@@ -124,7 +130,7 @@ def _utf8(data: bytes, path: Path) -> bytes:
     return data
 
 
-def _parse(data: bytes, path: Path) -> Table:
+def _parse(data: bytes, budget: Budget, path: Path) -> Table:
     lines, comment = Lines.of(data, path)
     dialect = detect(lines.sample())
     headers, units, first = _head(lines.sample(), comment, dialect, path)
@@ -139,7 +145,7 @@ def _parse(data: bytes, path: Path) -> Table:
         raise DataError(
             "there is a header and no samples", file=path, remedy="give a file with samples"
         )
-    refuse_huge(len(headers) * len(lines), path)
+    budget.samples(len(headers) * len(lines))
     _refuse_ragged(lines, len(headers), dialect, path)
     return Table(_columns(lines, headers, units, dialect, path), lines=lines.numbers)
 

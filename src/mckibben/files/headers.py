@@ -130,10 +130,11 @@ def _standard(name: str) -> str | None:
             return "pressure_extensor"
     if name in _CHANNELS:
         return _CHANNELS[name]
-    numbered = re.fullmatch(r"(?P<alias>.*?)_?(?P<number>[0-9]+)", name)
-    if numbered and numbered["alias"] in _NUMBERED:
-        channel = _CHANNELS[numbered["alias"]]
-        return None if channel == "time" else f"{channel}_{numbered['number']}"
+    without = name.rstrip("0123456789")
+    alias, number = without.removesuffix("_"), name[len(without) :]
+    if number and alias in _NUMBERED:
+        channel = _CHANNELS[alias]
+        return None if channel == "time" else f"{channel}_{number}"
     return None
 
 

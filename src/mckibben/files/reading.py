@@ -12,9 +12,8 @@ from typing import Literal
 import numpy as np
 
 from mckibben.errors import DataError
-from mckibben.files import timebase
+from mckibben.files import formats, timebase
 from mckibben.files.choosing import Choice, choose
-from mckibben.files.formats import tables
 from mckibben.files.holes import Channels, treat
 from mckibben.files.notices import noted, warn
 from mckibben.files.request import Request
@@ -93,9 +92,11 @@ def read(
     request = Request(dict(columns or {}), dict(units or {}), rate, gaps, channels, informative)
     request.check(path)
     with noted() as notes:
-        found = [
-            recording for table in tables(path) for recording in _recordings(table, request, path)
-        ]
+        with formats.opening(path) as file:
+            tables = formats.read(file, path)
+            file.seek(0)
+            digest = hashlib.file_digest(file, "sha256").hexdigest()
+        found = [each for table in tables for each in _recordings(table, request, path, digest)]
     return [_with_notes(recording, notes) for recording in found]
 
 
@@ -106,7 +107,7 @@ def _with_notes(recording: Recording, notes: list[str]) -> Recording:
     return recording.with_meta(notes=known + new) if new else recording
 
 
-def _recordings(table: Table, request: Request, path: Path) -> list[Recording]:
+def _recordings(table: Table, request: Request, path: Path, digest: str) -> list[Recording]:
     choice = choose(table, request, path)
     n = next(iter(choice.channels.values())).size
     if n < request.fewest:
@@ -132,7 +133,7 @@ def _recordings(table: Table, request: Request, path: Path) -> list[Recording]:
     else:
         pieces = _on_grid(channels, measured, spans, choice, table, request, path)
     units = {name: choice.units[name] for name in channels}
-    meta = _meta(choice, table, path)
+    meta = _meta(choice, table, path, digest)
     found = [Recording(piece.samples, piece.step, units, piece.start, meta) for piece in pieces]
     if len(found) == 1:
         return found
@@ -264,8 +265,6 @@ def _seconds(value: float, choice: Choice) -> float:
     return float(convert(np.array([value]), choice.time_unit, "s")[0])
 
 
-def _meta(choice: Choice, table: Table, path: Path) -> dict[str, object]:
-    with path.open("rb") as file:
-        digest = hashlib.file_digest(file, "sha256").hexdigest()
+def _meta(choice: Choice, table: Table, path: Path, digest: str) -> dict[str, object]:
     name = {} if table.name is None else {"name": f"{path.stem}[{table.name}]"}
     return {**table.meta, **choice.meta, **name, "file": str(path), "sha256": digest}

@@ -105,7 +105,7 @@ def parse(text: str | bytes) -> Stored | str:
     except ValidationError as error:
         first = error.errors()[0]
         where = ".".join(str(step) for step in first["loc"])
-        return f"{where}: {first['msg']}" if where else str(first["msg"])
+        return f"{where[:60]}: {first['msg'][:200]}" if where else str(first["msg"])[:200]
 
 
 def digest(samples: bytes) -> str:

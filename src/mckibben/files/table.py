@@ -14,9 +14,6 @@ from numpy.typing import NDArray
 from mckibben.errors import DataError
 from mckibben.recording import Array
 
-MAX_SAMPLES = 250_000_000
-"""Samples of one file (2 GB of memory); one that declares more is refused before it is read."""
-
 
 @dataclass(frozen=True)
 class Flaw:
@@ -169,16 +166,6 @@ def of_equal_length(
     kept = tuple(column for column in columns.values() if _length(column) == common)
     listed = {"ignored_columns": left_out} if left_out else {}
     return Table(kept, meta={**meta, **listed}, name=name)
-
-
-def refuse_huge(samples: int, path: Path) -> None:
-    """Raise a `DataError` if a file declares more samples than are reasonable to hold."""
-    if samples > MAX_SAMPLES:
-        raise DataError(
-            f"it declares {samples} samples, more than the {MAX_SAMPLES} that are read at once",
-            file=path,
-            remedy="split the file, or check that it is not damaged",
-        )
 
 
 def _length(column: Column) -> int:

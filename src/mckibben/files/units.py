@@ -37,8 +37,10 @@ SPELLINGS: dict[str, dict[str, str]] = {
         "s": "s sec secs second seconds",
         "ms": "ms msec millisecond milliseconds",
         "us": "us usec microsecond microseconds",
+        "ns": "ns nsec nanosecond nanoseconds",
         "min": "min minute minutes",
         "hour": "h hr hour hours",
+        "day": "day days",
     },
     "rad": {
         "rad": "rad radian radians",

@@ -138,7 +138,7 @@ def test_a_cache_that_others_can_write_to_is_not_used(
 @pytest.mark.skipif(sys.platform != "linux", reason="rights are others there")
 def test_figures_are_drawn_without_a_home(package: Path) -> None:
     run = package / "work" / "run.csv"
-    samples = np.array([0.0, 1.0, 2.0])
+    samples = np.linspace(0.0, 2.0, 30)
     write(Recording({"pressure": samples, "displacement": samples}, 1.0), run)
     code = (
         "import sys; from mckibben.cli.main import run\n"

@@ -257,9 +257,8 @@ FULL = [
     ["simulate", MODEL, RUN, "-o", "out.parquet"],
     ["fit", "pi", RUN, "-o", "out.json"],
     ["invert", MODEL, "-o", "out.json"],
-    ["plot", RUN, "-o", "out.png"],
     ["plot", RUN, "-o", "out.pdf"],
-    ["rig", "run", RIG, "--inputs", RUN, "-o", "out.csv"],
+    ["rig", "run", RIG, "--signal", "constant:value=5", "--duration", "1", "-o", "out.csv"],
     ["export", "c", MODEL, "-o", "out"],
     ["export", "fmu", MODEL, "--platforms", "none", "-o", "out.fmu"],
     ["compare", RUN, "--models", "pi", "--jobs", "1", "-o", "out"],
@@ -296,7 +295,7 @@ def test_a_full_disk_is_told_with_the_file_that_was_not_written(folder: Path) ->
         assert "File too large" in said, (words, said)
     assert held(folder) == before
     assert not list(folder.rglob("*.part"))
-    assert not [path for path in (folder / "out").rglob("*") if path.is_file()]
+    assert {path.name for path in (folder / "out").rglob("*") if path.is_file()} <= {MANIFEST}
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="no device is always full here")

@@ -5,6 +5,7 @@ Neither pyplot nor any global state is touched, and the same drawing gives the s
 
 from __future__ import annotations
 
+import io
 from collections.abc import Mapping
 from pathlib import Path
 from types import MappingProxyType
@@ -108,8 +109,11 @@ def save(drawing: Drawing, path: str | Path) -> None:
 
     path, style = Path(path), dict(STYLE)
     kind = format_of(path)
-    with replacing(path) as new, rc_context(style):
-        drawn(drawing).savefig(new, format=kind, dpi=RESOLUTION, metadata=dict(METADATA[kind]))
+    figure = io.BytesIO()
+    with rc_context(style):
+        drawn(drawing).savefig(figure, format=kind, dpi=RESOLUTION, metadata=dict(METADATA[kind]))
+    with replacing(path) as new:
+        new.write_bytes(figure.getbuffer())
 
 
 def format_of(path: Path) -> str:

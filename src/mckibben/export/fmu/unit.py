@@ -230,7 +230,9 @@ def _libraries(
     files: Mapping[str, bytes], name: str, version: Version, platforms: Sequence[str]
 ) -> dict[str, bytes]:
     """Return the library for each platform, by path in the zip."""
-    built = {}
+    built: dict[str, bytes] = {}
+    if not platforms:
+        return built
     with tempfile.TemporaryDirectory() as place:
         folder = Path(place)
         for path, content in files.items():

@@ -183,11 +183,11 @@ def kinds(rng: Rng, content: Any) -> None:
 def nesting(rng: Rng, content: Any) -> None:
     """Put the whole into compositions, once or many times."""
     own = {k: content.pop(k) for k in list(content) if k not in ("format", "version")}
+    length = len(json.dumps(own))
     for _ in range(int(10 ** rng.uniform(0, 2.3))):
         kind = ["series", "parallel", "per-channel"][rng.integers(3)]
-        own = {"kind": kind, "parts": [own] * int(rng.choice([1, 1, 1, 2]))}
-        if len(json.dumps(own)) > 100_000:
-            break
+        times = 2 if length < 100_000 and rng.random() < 0.2 else 1
+        own, length = {"kind": kind, "parts": [own] * times}, times * length
     content.update(own)
 
 

@@ -60,22 +60,20 @@ def guarded(attempt: Attempt, seconds: float) -> tuple[int, dict[str, list[int]]
         )
         child.start()
         theirs.close()
-        wrong: str | None = None
-        try:
-            while wrong is None and time.monotonic() < until:
+        ended: str | None = None
+        while ended is None:
+            try:
                 if ours.poll(LONGEST):
-                    wrong = ours.recv()
+                    if wrong := ours.recv():
+                        findings.setdefault(wrong, []).append(number)
                     number += 1
-                    if wrong:
-                        findings.setdefault(wrong, []).append(number - 1)
-                        wrong = None
                 else:
-                    wrong = f"more than {LONGEST:g} s"
-        except EOFError:
-            child.join()
-            wrong = f"the end of the process ({child.exitcode})"
-        if wrong is not None and (child.exitcode != 0 or child.is_alive()):
-            findings.setdefault(wrong, []).append(number)
+                    ended = f"more than {LONGEST:g} s"
+            except EOFError:
+                child.join()
+                ended = f"the end of the process ({child.exitcode})" if child.exitcode else ""
+        if ended:
+            findings.setdefault(ended, []).append(number)
             number += 1
         child.kill()
         child.join()

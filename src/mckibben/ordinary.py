@@ -11,8 +11,8 @@ import os
 import stat
 from collections.abc import Iterator
 from contextlib import contextmanager
+from io import BufferedReader
 from pathlib import Path
-from typing import BinaryIO
 
 from mckibben.errors import DataError
 
@@ -21,7 +21,7 @@ DESCRIPTION = 4 * 2**20
 
 
 @contextmanager
-def opened(path: str | Path, *, most: int) -> Iterator[BinaryIO]:
+def opened(path: str | Path, *, most: int) -> Iterator[BufferedReader]:
     """Open an ordinary file for reading.
 
     Parameters

@@ -35,6 +35,9 @@ ONE_THREAD = (
     "VECLIB_MAXIMUM_THREADS",
 )
 
+MOST_JOBS = 4096
+"""Processes that may be asked for."""
+
 _starting = threading.Lock()
 
 Tell = Callable[..., None]
@@ -195,10 +198,10 @@ def checked(jobs: int | None) -> int | None:
     Raises
     ------
     DataError
-        If it is below 1.
+        If it is below 1 or above `MOST_JOBS`.
     """
-    if jobs is not None and jobs < 1:
-        raise DataError(f"jobs is {jobs}", remedy="give a number of at least 1, or leave it out")
+    if jobs is not None and not 1 <= jobs <= MOST_JOBS:
+        raise DataError(f"jobs is {jobs}", remedy=f"give 1 to {MOST_JOBS}, or leave it out")
     return jobs
 
 
@@ -285,13 +288,28 @@ def context() -> Any:
 
 
 def end_with_parent() -> None:
-    """End this process when the one that started it ends, however it does."""
+    """End this process when the one that started it ends, however it does.
+
+    Where the system can, it does so itself: a thread would wait as long as compiled code keeps all
+    others from running.
+    """
     parent = multiprocessing.parent_process()
+    if parent is None:
+        return
+    if sys.platform == "linux":
+        import fcntl
+
+        # the parent holds the other end of this pipe, and writes nothing more to it
+        fcntl.fcntl(parent.sentinel, fcntl.F_SETOWN, os.getpid())
+        fcntl.fcntl(parent.sentinel, fcntl.F_SETSIG, signal.SIGKILL)
+        flags = fcntl.fcntl(parent.sentinel, fcntl.F_GETFL)
+        fcntl.fcntl(parent.sentinel, fcntl.F_SETFL, flags | os.O_ASYNC)
+    if not parent.is_alive():
+        os._exit(1)
 
     def wait() -> None:
-        if parent is not None:
-            parent.join()
-            os._exit(1)
+        parent.join()
+        os._exit(1)
 
     threading.Thread(target=wait, daemon=True).start()
 

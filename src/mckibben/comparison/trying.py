@@ -16,6 +16,7 @@ from mckibben.blocks.base import Block
 from mckibben.comparison.cluster import outcomes_outside, outer_backend, processes_outside
 from mckibben.comparison.free_run import run_free
 from mckibben.comparison.memory_test import memory_test
+from mckibben.comparison.recommending import CONSTANT
 from mckibben.comparison.results import Row
 from mckibben.comparison.splits import Fold, Mask, Split
 from mckibben.errors import MckibbenError
@@ -28,6 +29,9 @@ from mckibben.workers import Outcome, WorkerError
 Array = NDArray[np.float64]
 
 TIMED_SAMPLES = 20_000
+
+PIECES = 8
+"""Blocks that the errors on a recording of the cross-validation are summed in, so that models pair."""
 
 WORTH_A_PROCESS = 4.0
 """Seconds of work below which starting processes takes longer than it saves."""
@@ -87,7 +91,7 @@ class Tried:
     outputs : tuple of array
         Free-running output on every training recording, then every test recording.
     squares : tuple of float
-        Sums of squared errors of the cross-validation, one a recording tested on.
+        Sums of squared errors of the cross-validation, `PIECES` a recording tested on.
     count : int
         Samples in them.
     invalid : str or None
@@ -187,7 +191,47 @@ def joined(parts: Sequence[Tried]) -> Tried:
     if invalid is not None:
         noted = dict(whole.row.diagnostics) | {"validation_failed": invalid}
         return replace(whole, row=replace(whole.row, diagnostics=noted))
-    return replace(whole, row=replace(whole.row, validation_rmse=rms_of(parts)))
+    squares = tuple(square for tried in parts for square in tried.squares)
+    return replace(whole, row=replace(whole.row, validation_rmse=rms_of(parts)), squares=squares)
+
+
+def squares_of(errors: Array) -> list[float]:
+    """Return the sums of squared errors of consecutive pieces."""
+    return [float(piece @ piece) for piece in np.array_split(errors, PIECES)]
+
+
+def constant_of(data: Data) -> Tried:
+    """Return what comes of predicting the mean of the output that is fitted to, whatever the input."""
+    squares: list[float] = []
+    count = 0
+    for fold in data.folds:
+        mean = _mean(fold.train, data.output, fold.train_rows)
+        for recording, rows in zip(fold.test, fold.test_rows, strict=True):
+            errors = mean - recording[data.output][rows]
+            squares += squares_of(errors)
+            count += errors.size
+    split = data.split
+    mean = _mean(split.train, data.output, [np.ones(len(r), dtype=bool) for r in split.train])
+    outputs = tuple(np.full(len(recording), mean) for recording in (*split.train, *split.test))
+    scored, measured = _tested(outputs, data)
+    trained = np.concatenate([recording[data.output] for recording in split.train])
+    found = Tried(None, outputs, tuple(squares), count)
+    row = Row(
+        model=CONSTANT,
+        n_parameters=1,
+        fit_seconds=0.0,
+        step_ns=0.0,
+        train=score(trained, np.full(trained.size, mean)),
+        test=score(measured, scored),
+        validation_rmse=rms_of([found]),
+    )
+    return replace(found, row=row)
+
+
+def _mean(recordings: Sequence[Recording], output: str, rows: Sequence[Mask]) -> float:
+    return float(
+        np.concatenate([r[output][kept] for r, kept in zip(recordings, rows, strict=True)]).mean()
+    )
 
 
 def rms_of(parts: Sequence[Tried]) -> float | None:
@@ -243,7 +287,7 @@ def _try(data: Data, part: Part, tell: Callable[..., None]) -> Tried:
                 own, own_rows = [r for r, _ in known], [kept for _, kept in known]
                 modelled = run_free(block, recording, data.output, own, own_rows)
                 errors = (modelled - recording[data.output])[rows]
-                squares.append(float(errors @ errors))
+                squares += squares_of(errors)
                 count += errors.size
     except MckibbenError as error:  # a part of the data may be too little where all of it is enough
         invalid = str(error)

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from mckibben.recording import notes_by_file, reading_notes
 from mckibben.report import interactive, model_subjects, subjects, templating, wording
 from mckibben.report.drawing import N_COLOURS, POINTS, Drawing, series_colour
 from mckibben.report.shown import Shown, drawn, shown
@@ -50,6 +51,7 @@ def page(study: Study) -> str:
     every = shown(study)
     pictured = drawn(every)
     figures, left_out = _figures(study, pictured)
+    measured = [one.recording for one in every]
     return templating.page(
         "report.html.j2",
         figures,
@@ -61,6 +63,8 @@ def page(study: Study) -> str:
         models=_models(study.leaderboard),
         bars=_bars(study.leaderboard),
         choices=CHOICES,
+        reading=notes_by_file(measured),
+        notes=[note for note in study.notes if note not in reading_notes(measured)],
         wording=wording,
     )
 

@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
+from urllib.parse import urlsplit
 
 import pytest
 
@@ -63,7 +64,7 @@ class Watched:
     left: list[str] = field(default_factory=list)
     errors: list[str] = field(default_factory=list)
 
-    def click_everything(self) -> int:
+    def click_everything(self, which: str = CLICKABLE) -> int:
         """Click whatever can be clicked, and what that opens; return how many clicks it took."""
         clicks = 0
         for _ in range(3):  # what the first clicks open is clicked next
@@ -80,7 +81,7 @@ class Watched:
                     }
                     return all.length;
                 }""",
-                CLICKABLE,
+                which,
             )
             clicks += int(found)
             if not found:
@@ -109,11 +110,13 @@ def watched(own: str) -> Iterator[Watched]:
     play_with = pytest.importorskip("playwright.sync_api").sync_playwright
     with play_with() as play:
         browser = play.chromium.launch(executable_path=BROWSER, args=OPTIONS)
+        parts = urlsplit(own)
+        ours = own if parts.scheme == "file" else f"{parts.scheme}://{parts.netloc}/"
         context = browser.new_context(viewport={"width": 1280, "height": 900})
         found = Watched(context.new_page())
 
         def asked(request: Any) -> None:
-            if not request.url.startswith((own, "data:", "blob:")):
+            if not request.url.startswith((ours, "data:", "blob:")):
                 found.left.append(request.url)
 
         page = found.page
@@ -123,7 +126,7 @@ def watched(own: str) -> Iterator[Watched]:
             "window.windowsOpened = [];"
             "window.open = (address) => { window.windowsOpened.push(`${address}`); return window; };"
         )
-        here = own.replace("http", "ws", 1)
+        here = ours.replace("http", "ws", 1)
         page.on(
             "websocket",
             lambda link: None if link.url.startswith(here) else found.left.append(link.url),

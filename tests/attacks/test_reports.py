@@ -15,6 +15,8 @@ from mckibben.blocks.gpi import GPI
 from mckibben.papers import Figure, Reproduction, Table
 from mckibben.report import page as report
 from mckibben.report.reproduction import reproduction_page
+from tests.app.test_journey import SLOW
+from tests.app.test_journey import address as address  # the fixture that starts the workbench
 from tests.attacks.browser import HOSTILE, watched
 from tests.report.studies_by_hand import measured, renamed, study
 from tests.tools import needs
@@ -75,6 +77,16 @@ def test_no_click_in_a_hostile_page_reaches_the_network_or_runs_a_name(
         n_plots = browser.page.locator(".plot").count()
         assert browser.click_everything() > 5 * n_plots  # the tool bars are among it
         assert browser.page.evaluate(HIDDEN) == []
+        browser.unharmed()
+
+
+@needs("chromium")
+def test_no_plot_of_the_workbench_uploads(address: str) -> None:
+    with watched(address) as browser:
+        browser.page.get_by_test_id("example").click()
+        button = browser.page.get_by_test_id("preview-plot").locator(".modebar-btn").first
+        button.wait_for(state="attached", timeout=SLOW)
+        assert browser.click_everything(".modebar-btn, [class*=dialog] *") > 5
         browser.unharmed()
 
 

@@ -22,10 +22,10 @@ Json = dict[str, Any]
 POINTS = 4000
 """Most points of a curve sent to the page."""
 
-CONFIG: Json = interactive.BAR | {
-    "modeBarButtons": [["select2d"], *interactive.BAR["modeBarButtons"]]
+CONFIG: Json = interactive.CLOSED | {
+    # not named as in pages: plotly.js puts objects into that list, and no plot is drawn in NiceGUI then
+    "modeBarButtonsToRemove": ["lasso2d", "sendChartToCloud", "sendDataToCloud"]
 }
-"""A part of a recording is chosen with one button more."""
 
 
 @cache

@@ -50,7 +50,10 @@ def from_dict(content: Mapping[str, Any]) -> Block:
             "Remedy: save it again with a matching release of mckibben."
         )
     described = {key: value for key, value in content.items() if key not in ("format", "version")}
-    block: Block = part_from_dict(described)
+    try:
+        block: Block = part_from_dict(described)
+    except RecursionError:
+        raise ModelError("nested too deeply. Remedy: compose fewer blocks in each other.") from None
     return block
 
 
@@ -71,7 +74,7 @@ def part_from_dict(content: Any, group: str = "blocks") -> Any:
     kind = content["kind"]
     cls = load_plugin(group, kind)
     values = {key: _tuples(value) for key, value in content.items() if key != "kind"}
-    unknown = sorted(set(values) - {field.name for field in fields(cls)})
+    unknown = sorted(set(values) - {field.name for field in fields(cls)}, key=str)
     if unknown:
         raise ModelError(f"{kind!r} has no field {unknown[0]!r}. Remedy: save the model again.")
     return cls(**values)
@@ -82,9 +85,14 @@ def nested(content: Any) -> Any:
     return part_from_dict(content) if isinstance(content, Mapping) else content
 
 
+def to_text(block: Block) -> str:
+    """Return a block as the text of its file."""
+    return json.dumps(to_dict(block), indent=2, allow_nan=False) + "\n"
+
+
 def save(block: Block, path: str | Path) -> None:
-    """Write a block as JSON, by a temporary file that is then renamed."""
-    write_text(path, json.dumps(to_dict(block), indent=2, allow_nan=False) + "\n")
+    """Write a block as JSON, by a temporary file that is then renamed, over what had the name."""
+    write_text(path, to_text(block))
 
 
 def load(path: str | Path) -> Block:

@@ -11,7 +11,7 @@ from types import ModuleType
 
 from mckibben.errors import DataError, MckibbenError
 from mckibben.files.limits import MOST_BYTES
-from mckibben.files.table import Table
+from mckibben.files.table import Table, printable
 from mckibben.ordinary import opened
 
 READERS: dict[str, str] = {
@@ -67,7 +67,7 @@ def read(file: BufferedReader, path: Path) -> list[Table]:
     module = _reader(path)
     try:
         _refuse_impostor(file, path)
-        found: list[Table] = module.read(file, path)
+        found: list[Table] = [printable(table) for table in module.read(file, path)]
     except MckibbenError:
         raise
     except OSError as error:

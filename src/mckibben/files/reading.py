@@ -15,7 +15,7 @@ from mckibben.errors import DataError
 from mckibben.files import formats, timebase
 from mckibben.files.choosing import Choice, choose
 from mckibben.files.holes import Channels, treat
-from mckibben.files.notices import warn
+from mckibben.files.notices import noted, warn
 from mckibben.files.request import Request
 from mckibben.files.table import Table
 from mckibben.files.timebase import Span
@@ -74,7 +74,8 @@ def read(
     list of Recording
         One; or one for each stretch with ``gaps="split"``, and for each group of a TDMS file.
         In the package's units: bar, mm, N, s, rad, V, mm/s, degC. A file that `write` made gives
-        a recording equal to the one written.
+        a recording equal to the one written. What was assumed or mended on the way is in
+        ``meta["notes"]``, a list of sentences, if there was anything.
 
     Raises
     ------
@@ -90,11 +91,20 @@ def read(
     path = Path(path)
     request = Request(dict(columns or {}), dict(units or {}), rate, gaps, channels, informative)
     request.check(path)
-    with formats.opening(path) as file:
-        tables = formats.read(file, path)
-        file.seek(0)
-        digest = hashlib.file_digest(file, "sha256").hexdigest()
-    return [each for table in tables for each in _recordings(table, request, path, digest)]
+    with noted() as notes:
+        with formats.opening(path) as file:
+            tables = formats.read(file, path)
+            file.seek(0)
+            digest = hashlib.file_digest(file, "sha256").hexdigest()
+        found = [each for table in tables for each in _recordings(table, request, path, digest)]
+    return [_with_notes(recording, notes) for recording in found]
+
+
+def _with_notes(recording: Recording, notes: list[str]) -> Recording:
+    """Return a recording that tells what was assumed or mended when it was read, now or before."""
+    known = list(recording.notes)
+    new = [note for note in notes if note not in known]
+    return recording.with_meta(notes=known + new) if new else recording
 
 
 def _recordings(table: Table, request: Request, path: Path, digest: str) -> list[Recording]:

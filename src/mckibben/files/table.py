@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +13,23 @@ from numpy.typing import NDArray
 
 from mckibben.errors import DataError
 from mckibben.recording import Array
+
+
+@dataclass(frozen=True)
+class Flaw:
+    """What keeps a column of numbers from being used.
+
+    Parameters
+    ----------
+    sample : int
+        The first that shows it, counted from 0.
+    problem, remedy : str
+        As in a `DataError`.
+    """
+
+    sample: int
+    problem: str
+    remedy: str
 
 
 @dataclass(frozen=True)
@@ -28,16 +45,16 @@ class Column:
     unit : str, optional
         The unit where the file states it apart from the header.
     texts : sequence of str, length n
-        The cells of a column of text.
-    flaw : (int, str), optional
-        Sample, from 0, and text of the first cell that should be a number and is not.
+        The cells of a column of text; of a text file the first ones only, if they are no times.
+    flaw : Flaw, optional
+        Why the samples cannot be used, if they cannot.
     """
 
     header: str
     values: Array | None
     unit: str | None = None
     texts: Sequence[str] = ()
-    flaw: tuple[int, str] | None = None
+    flaw: Flaw | None = None
 
 
 @dataclass(frozen=True)
@@ -84,6 +101,47 @@ def column(header: str, values: NDArray[Any], unit: str | None = None) -> Column
     if values.dtype.kind in "biuf":
         return Column(header, np.asarray(values, dtype=np.float64), unit)
     return Column(header, None, unit, texts=[str(value) for value in values])
+
+
+def printable(table: Table) -> Table:
+    r"""Return a foreign table whose words hold nothing that steers a terminal or turns text round.
+
+    Blanks of any kind become plain ones, other signs that cannot be printed are written as
+    ``\x1b``. What this package wrote stands as it is: its names were looked at before.
+    """
+    if table.own:
+        return table
+    columns = tuple(
+        replace(
+            column,
+            header=plain(column.header),
+            unit=None if column.unit is None else plain(column.unit),
+        )
+        for column in table.columns
+    )
+    name = None if table.name is None else plain(table.name)
+    meta = {plain(key): _plain_value(value) for key, value in table.meta.items()}
+    return replace(table, columns=columns, name=name, meta=meta)
+
+
+def plain(text: str) -> str:
+    r"""Return text with what cannot be printed written out.
+
+    >>> print(plain("\x1b[31mpressure\xa0(bar)"))
+    \x1b[31mpressure (bar)
+    """
+    if text.isprintable():
+        return text
+    return "".join(
+        sign if sign.isprintable() else " " if sign.isspace() else ascii(sign)[1:-1]
+        for sign in text
+    )
+
+
+def _plain_value(value: Any) -> Any:
+    if isinstance(value, str):
+        return plain(value)
+    return [_plain_value(item) for item in value] if isinstance(value, list) else value
 
 
 def of_equal_length(

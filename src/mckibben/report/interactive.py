@@ -18,6 +18,18 @@ from mckibben.report.drawing import Curve, Drawing, Panel
 Array = NDArray[np.float64]
 Json = dict[str, Any]
 
+BAR: Json = {
+    "displaylogo": False,
+    "modeBarButtons": [
+        ["toImage"],
+        ["zoom2d", "pan2d"],
+        ["zoomIn2d", "zoomOut2d", "resetScale2d"],
+    ],
+    "showSendToCloud": False,
+    "plotlyServerURL": "",
+}
+"""The tool bar of every plot: its buttons are named, for plotly.js has one that uploads the data."""
+
 _WIDTHS = {"line": 1.5, "fine": 0.8, "broad": 5.0, "beads": 1.0}
 """Of lines [px], by style."""
 

@@ -20,6 +20,9 @@ from mckibben.errors import DataError
 MANIFEST = "results.sha256"
 """Of a folder of results."""
 
+MAKER = "drawn by mckibben"
+"""In every figure."""
+
 BEGINNING = 256
 """Bytes in which models and rigs say what they are."""
 
@@ -44,8 +47,6 @@ def is_recording(path: Path) -> bool:
 
 def is_figure(path: Path) -> bool:
     """Tell whether a file is a figure that this program drew."""
-    from mckibben.report.printed import MAKER
-
     try:
         return MAKER.encode() in ordinary.read_bytes(path, most=LARGEST_FIGURE)
     except DataError:
@@ -127,10 +128,7 @@ def claim_model(path: Path, *, inputs: Iterable[Path], force: bool) -> None:
 
 
 def claim_figure(path: Path, *, inputs: Iterable[Path], force: bool) -> None:
-    """Refuse to draw over an input or a stranger's file, or in an unknown format, likewise."""
-    from mckibben.report.printed import format_of
-
-    format_of(path)
+    """Refuse to draw over an input or a stranger's file, likewise."""
     claim(path, is_figure, inputs=inputs, force=force)
 
 

@@ -308,7 +308,8 @@ def peak():
     return int(re.search(r"VmHWM:\\s+(\\d+)", Path("/proc/self/status").read_text())[1])
 before = peak()
 for path in sys.argv[1:]:
-    (table,) = delimited.read(Path(path))
+    with open(path, "rb") as file:
+        (table,) = delimited.read(file, Path(path))
 print(1024 * (peak() - before))
 """
 

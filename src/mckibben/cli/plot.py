@@ -46,7 +46,9 @@ def plot(
 ) -> None:
     """Draw recordings, or a saved model against them."""
     from mckibben.outputs import claim_figure
+    from mckibben.report.printed import format_of
 
+    format_of(out)  # another ending is refused now
     claim_figure(out, inputs=[*files, *([] if model is None else [model])], force=force)
     recordings = Reading(column, unit, rate, gaps, resample).read(files, [input, output])
     from mckibben.report.figures import plot_model, plot_recording

@@ -19,7 +19,7 @@ from mckibben.recording import Recording
 _KEY = b"mckibben"
 
 MOST_WORDS = 2**26
-"""Bytes of text that are read of a column: that of some million instants."""
+"""Bytes of text that are read: that of some million instants."""
 
 
 def read(file: BufferedReader, path: Path) -> list[Table]:
@@ -30,18 +30,17 @@ def read(file: BufferedReader, path: Path) -> list[Table]:
     parquet = pq.ParquetFile(file, thrift_container_size_limit=MOST_PARTS)
     about, schema = parquet.metadata, parquet.schema_arrow
     budget.parts(about.num_row_groups * about.num_columns)
-    texts = {field.name for field in schema if _is_text(field.type)}
-    rows, lengths = about.num_rows, dict.fromkeys(texts, 0)
     groups = [about.row_group(i) for i in range(about.num_row_groups)]
-    for group in groups:
-        for chunk in map(group.column, range(about.num_columns)):
-            if chunk.path_in_schema in texts:
-                lengths[chunk.path_in_schema] += chunk.total_uncompressed_size
-    for name in [name for name, length in lengths.items() if length > MOST_WORDS]:
-        warn(path, f"column {name[:60]!r} is not read: it holds more text than times do")
-        texts.remove(name)
-    wanted = [f.name for f in schema if f.name in texts or _is_number(f.type)]
-    budget.samples(max(rows, sum(group.num_rows for group in groups)) * len(wanted))
+    rows = max(about.num_rows, sum(group.num_rows for group in groups))
+    numbers = [field.name for field in schema if _is_number(field.type)]
+    texts = {field.name for field in schema if _is_text(field.type)}
+    # of groups, not of columns: PyArrow ends the process over some damaged descriptions of those
+    size = sum(group.total_byte_size for group in groups)
+    if texts and size - 9 * rows * len(numbers) > MOST_WORDS:
+        warn(path, f"columns of text are not read, as there is more than {MOST_WORDS} bytes of it")
+        texts = set()
+    wanted = [field.name for field in schema if field.name in {*numbers, *texts}]
+    budget.samples(rows * len(wanted))
     # words that are repeated stay one word each, however often they are
     parquet = pq.ParquetFile(file, metadata=about, read_dictionary=sorted(texts))
     frame = parquet.read(columns=None if len(wanted) == len(schema) else wanted)

@@ -15,6 +15,7 @@ import numpy as np
 
 from mckibben.atomic import replacing
 from mckibben.errors import DataError
+from mckibben.outputs import MAKER
 from mckibben.report.drawing import Curve, Drawing, Panel
 
 if TYPE_CHECKING:
@@ -76,9 +77,6 @@ _WIDTHS = {"line": 0.9, "fine": 0.4, "broad": 2.6, "beads": 0.5}
 
 _LEGEND = 45
 """Letters of three names that stand side by side above a panel at most."""
-
-MAKER = "drawn by mckibben"
-"""In every figure, by which a command knows what it may replace."""
 
 METADATA: Mapping[str, Mapping[str, str | None]] = MappingProxyType(
     {

@@ -79,7 +79,7 @@ def page(address: str) -> Iterator[Any]:
         errors: list[str] = []
 
         def asked(request: Any) -> None:
-            if not request.url.startswith((address, "data:", "blob:")):
+            if not request.url.startswith((address.partition("?")[0], "data:", "blob:")):
                 foreign.append(request.url)
 
         page.on("request", asked)

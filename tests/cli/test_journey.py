@@ -109,7 +109,7 @@ def test_study_writes_everything(cli: Cli, files: tuple[Path, Path], tmp_path: P
     written = {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
     assert written == {
         *("report.html", "characterization.json", "inverse.json"),
-        *("leaderboard.csv", "leaderboard.json"),
+        *("leaderboard.csv", "leaderboard.json", "results.sha256"),
         *("models/pi.json", "models/gpi.json"),
     }
     assert load(folder / "inverse.json").inverse() == load(folder / "models" / "gpi.json")

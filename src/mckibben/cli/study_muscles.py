@@ -6,21 +6,23 @@ import csv
 import io
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mckibben.atomic import write_json
+from mckibben.atomic import to_json
+from mckibben.blocks.saving import to_text
 from mckibben.cli.leaderboards import told
 from mckibben.cli.options import parse_settings
-from mckibben.cli.output import figure, print_json, print_table, progress_bar
+from mckibben.cli.output import figure, print_json, print_table, progress_bar, say
 from mckibben.cli.stopping import forget_kept
 from mckibben.errors import DataError
+from mckibben.report.results_folder import model_file, study_files
 
 if TYPE_CHECKING:
     from mckibben.comparison.muscles import MuscleRow
     from mckibben.control import Tracked
+    from mckibben.outputs import Results
     from mckibben.papers.reproduction import Cell
     from mckibben.recording import Recording
 
@@ -35,7 +37,7 @@ def study_muscles(
     recordings: Sequence[Recording],
     validation: Sequence[Recording],
     tests: Sequence[Recording],
-    folder: Path,
+    kept: Results,
     models: str | Sequence[str],
     settings: list[str] | None,
     rig: str | None,
@@ -58,6 +60,7 @@ def study_muscles(
         validation_of,
     )
     from mckibben.comparison.recommending import acceptable, recommended
+    from mckibben.recording import reading_notes
 
     train, split = list(recordings), "as given"
     if not tests:
@@ -77,12 +80,15 @@ def study_muscles(
     given = {name: parse_settings(settings, name, group="coupled") for name in models}
     if not tests:
         raise DataError("there is no run to test on", remedy="give --test, or more runs")
+    kept.claim(study_files(models))
+    folder = kept.folder
     results = _Results(
-        folder,
+        kept,
         f"fitted to {len(train)} runs, tested on {len(tests)}: {split}",
         validation_of(train, validation).described,
         tests,
         shared_runs(train, validation, tests, allow=allow_shared),
+        reading_notes([*recordings, *validation, *tests]),
         constant_row(train, tests, validation),
     )
     results.command = f"mckibben study FILES{'' if load is None else f' --load {load}'} -o {folder}"
@@ -128,21 +134,21 @@ def study_muscles(
             loops = _loops(best, rows, plant, tests, seed)
     result = results.take(rows, best, loops, plant)
     if best is not None and best.inverse is not None:
-        best.inverse.save(folder / "inverse.json")
+        kept.write_text("inverse.json", to_text(best.inverse))
     if as_json:
         print_json(result)
         forget_kept(folder)
         return
     for table in _tables(rows, results.constant, loops):
-        print(f"\n{table.title}")
+        say(f"\n{table.title}")
         cells = [[_cell(cell) for cell in row] for row in table.rows]
         print_table(list(table.columns), cells)
         if table.note:
-            print(table.note)
-    print()
-    for sentence in (*results.summary(rows, best, loops, plant), *results.shared):
-        print(sentence)
-    print(
+            say(table.note)
+    say()
+    for sentence in (*results.summary(rows, best, loops, plant), *results.shared, *results.notes):
+        say(sentence)
+    say(
         f"Written: {folder / 'report.html'}, leaderboard.csv, leaderboard.json, models"
         + ("" if best is None or best.inverse is None else ", inverse.json")
     )
@@ -156,16 +162,18 @@ class _Results:
 
     def __init__(
         self,
-        folder: Path,
+        kept: Results,
         split: str,
         chosen_on: str,
         tests: Sequence[Recording],
         shared: Sequence[str],
+        notes: Sequence[str],
         constant: MuscleRow,
     ) -> None:
-        self._folder, self._split, self._tests = folder, split, tests
+        self._kept, self._split, self._tests = kept, split, tests
         self.chosen_on, self.shared, self.constant = chosen_on, shared, constant
-        (folder / "inverse.json").unlink(missing_ok=True)  # of an earlier study
+        self.notes = notes
+        kept.clear()  # of an earlier study
 
     def so_far(self, rows: Sequence[MuscleRow]) -> None:
         """Write what is finished, while more models are fitted."""
@@ -192,10 +200,10 @@ class _Results:
         """Write models, leaderboard and report as far as they are; return the leaderboard."""
         from mckibben.comparison.recommending import recommended
         from mckibben.papers.reproduction import Reproduction
-        from mckibben.report import write_reproduction
+        from mckibben.report.reproduction import reproduction_page
 
         if rows:
-            _write(rows, self._folder)
+            _write(rows, self._kept)
         summary = ["Models are being fitted."]
         if whole:
             summary = [*self.summary(rows, best, loops, plant), *self.shared]
@@ -215,17 +223,19 @@ class _Results:
                     f"{name}: good only near the motions fitted, {why}."
                     for name, why in _careful(rows)
                 ),
+                *self.notes,
             ),
             lead="Models of muscles that move one another, chosen on the training side, then tested.",
             notes_title="How it was done",
             command=self.command,
         )
-        write_reproduction(found, self._folder / "report.html")
+        self._kept.write_text("report.html", reproduction_page(found))
         chosen, objection = recommended(rows, self.constant, "mm")
         result = {
-            "folder": str(self._folder),
+            "folder": str(self._kept.folder),
             "split": self._split,
             "chosen_on": self.chosen_on,
+            "notes": list(self.notes),
             "chosen": None if chosen is None else chosen.model,
             "not_recommended": objection or None,
             "shared": list(self.shared),
@@ -233,7 +243,7 @@ class _Results:
             "inverse": None if best is None else best.model,
             "tracking": {name: dict(tracked.rmse) for name, tracked in loops.items()},
         }
-        write_json(self._folder / "leaderboard.json", result)
+        self._kept.write_text("leaderboard.json", to_json(result) + "\n")
         return result
 
 
@@ -311,10 +321,7 @@ def _loops(
     return found
 
 
-def _write(rows: Sequence[MuscleRow], folder: Path) -> None:
-    from mckibben.atomic import write_text
-
-    (folder / "models").mkdir(exist_ok=True)
+def _write(rows: Sequence[MuscleRow], kept: Results) -> None:
     outputs = list(rows[0].test)
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
@@ -325,9 +332,8 @@ def _write(rows: Sequence[MuscleRow], folder: Path) -> None:
         reason = row.reason or row.invalid or ""
         writer.writerow([row.model, *errors, row.test_rank, row.worst, row.n_parameters, reason])
         if row.block is not None:
-            named = "".join(c if c.isalnum() or c in "-." else "-" for c in row.model)
-            row.block.save(folder / "models" / f"{named}.json")
-    write_text(folder / "leaderboard.csv", text.getvalue())
+            kept.write_text(model_file(row.model), to_text(row.block))
+    kept.write_text("leaderboard.csv", text.getvalue())
 
 
 def _summary(

@@ -7,6 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from mckibben.signals.checking import generator
+
 Array = NDArray[np.float64]
 
 RESAMPLES = 1000
@@ -24,7 +26,7 @@ class BlockBootstrap:
     """
 
     def __init__(self, lengths: Sequence[int], seed: int) -> None:
-        rng = np.random.default_rng(seed)
+        rng = generator(seed)
         self._parts: list[tuple[int, int, int, NDArray[np.intp]]] = []
         offset = 0
         for n in lengths:

@@ -39,7 +39,7 @@ from mckibben.comparison.trying import (
     processes_for,
 )
 from mckibben.errors import ModelError
-from mckibben.recording import Recording
+from mckibben.recording import Recording, reading_notes
 from mckibben.signals import made_manageable
 from mckibben.workers import checked
 
@@ -308,7 +308,7 @@ def plan_of(
         seed=seed,
         chosen_by=chosen_by,
         left_out=left_out,
-        notes=(*notes, *shared),
+        notes=(*notes, *shared, *reading_notes([*recordings, *tests])),
         shared=shared,
     )
 

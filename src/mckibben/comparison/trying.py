@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from mckibben import registry, workers
 from mckibben.blocks.base import Block
-from mckibben.comparison.cluster import in_backend, outer_backend, processes_outside
+from mckibben.comparison.cluster import outcomes_outside, outer_backend, processes_outside
 from mckibben.comparison.free_run import run_free
 from mckibben.comparison.memory_test import memory_test
 from mckibben.comparison.recommending import CONSTANT
@@ -24,7 +24,7 @@ from mckibben.estimators.search import Progress, whole_searches
 from mckibben.metrics import score
 from mckibben.recording import Recording
 from mckibben.threads import cores
-from mckibben.workers import Outcome
+from mckibben.workers import Outcome, WorkerError
 
 Array = NDArray[np.float64]
 
@@ -140,10 +140,42 @@ def outcomes(
     data: Data, parts: Sequence[Part], n: int, told: Callable[..., None] | None = None
 ) -> Iterator[Outcome]:
     """Yield what comes of every part, as it comes, from so many processes; see `Workers.results`."""
-    if outer_backend():
-        yield from in_backend(try_part, data, parts)
-    else:
-        yield from workers.outcomes(try_part, data, parts, n, told)
+    found = (
+        outcomes_outside(try_part, data, parts)
+        if outer_backend()
+        else workers.outcomes(try_part, data, parts, n, told)
+    )
+    for outcome in found:
+        part = parts[outcome.index]
+        if outcome.error is None and not _is_of(outcome.value, part, data):
+            words = f"its process gave something that is not what came of {part.model}"
+            outcome = Outcome(outcome.index, error=WorkerError(words))
+        yield outcome
+
+
+def _is_of(tried: Any, part: Part, data: Data) -> bool:
+    """Tell whether this is what came of a part: complete, of its model, and scored as it says."""
+    if not isinstance(tried, Tried):
+        return False
+    row = tried.row
+    if row is None:
+        return not part.whole and all(isinstance(square, float) for square in tried.squares)
+    if not isinstance(row, Row) or row.model != part.model:
+        return False
+    if row.reason is not None:
+        return isinstance(row.reason, str)
+    recordings = (*data.split.train, *data.split.test)
+    if (
+        not (part.whole and isinstance(row.block, Block) and row.sound)
+        or row.test is None
+        or not all(isinstance(output, np.ndarray) for output in tried.outputs)
+        or [output.shape for output in tried.outputs] != [(len(r),) for r in recordings]
+    ):
+        return False
+    errors = errors_on_test(tried.outputs, data)
+    rmse = math.sqrt(float(errors @ errors) / errors.size)
+    most = max(float(np.abs(recording[data.output]).max()) for recording in recordings)
+    return math.isclose(rmse, row.test.rmse, rel_tol=1e-6, abs_tol=1e-9 * most)
 
 
 def joined(parts: Sequence[Tried]) -> Tried:
@@ -154,6 +186,8 @@ def joined(parts: Sequence[Tried]) -> Tried:
     (whole,) = (tried for tried in parts if tried.row is not None)
     assert whole.row is not None
     invalid = next((tried.invalid for tried in parts if tried.invalid is not None), None)
+    if invalid is None and not math.isfinite(rms_of(parts) or 0.0):
+        invalid = "its outputs ran away on a part of the data that it was not fitted to"
     if invalid is not None:
         noted = dict(whole.row.diagnostics) | {"validation_failed": invalid}
         return replace(whole, row=replace(whole.row, diagnostics=noted))

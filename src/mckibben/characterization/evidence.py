@@ -21,10 +21,10 @@ from mckibben.characterization.tracks import Scale, Track
 Array = NDArray[np.float64]
 
 LEVEL = 0.01
-"""Of the tests: white noise passes for a dependence, or for a loop, in about one of a hundred recordings.
+"""Of the tests: white noise passes for a dependence, or a loop, in about one of a hundred recordings.
 
-Noise that wanders as slowly as the input moves passes more often, and drift over a single cycle cannot be
-told from a loop: record several.
+Noise that wanders as slowly as the input moves passes more often, and drift over a single cycle cannot
+be told from a loop: record several.
 """
 
 MOST = 4096

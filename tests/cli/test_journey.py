@@ -85,7 +85,7 @@ def test_compare_writes_the_promised_leaderboard(
     assert result.code == 0, result.err
     board = json.loads((tmp_path / "lb" / "leaderboard.json").read_text())
     assert (board["input"], board["output"]) == ("pressure", "displacement")
-    assert [row["model"] for row in board["rows"]] == ["gpi", "pi"]
+    assert [row["model"] for row in board["rows"]] == ["gpi", "pi", "constant"]
     assert board["rows"][0]["test"]["rmse"] < board["rows"][1]["test"]["rmse"]
     assert board["rows"][0]["n_parameters"] == 11
     table = columns_of_text(tmp_path / "lb" / "leaderboard.csv")

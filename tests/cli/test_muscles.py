@@ -62,7 +62,8 @@ def test_study_of_a_folder_closes_the_loop(cli: Cli, arm: Path, tmp_path: Path) 
     assert result.code == 0, result.err
     found = json.loads(result.out)
     assert found["inverse"] == found["chosen"] == "force-balance"
-    first, second = found["rows"]
+    first, second, constant = found["rows"]
+    assert constant["model"] == "constant"
     assert np.mean(list(first["validation"].values())) < np.mean(
         list(second["validation"].values())
     )

@@ -21,9 +21,13 @@ from mckibben.characterization.tracks import Scale, Track
 Array = NDArray[np.float64]
 
 LEVEL = 0.01
-"""Of the tests: noise alone passes for a dependence, or for a loop, in one of a hundred recordings."""
+"""Of the tests: white noise passes for a dependence, or a loop, in about one of a hundred recordings.
 
-MOST = 8192
+Noise that wanders as slowly as the input moves passes more often, and drift over a single cycle cannot
+be told from a loop: record several.
+"""
+
+MOST = 4096
 """Samples looked at; of more, means over as many as it takes."""
 
 FEWEST = 40
@@ -54,12 +58,12 @@ class Evidence:
 
 def evidence(tracks: Sequence[Track], scale: Scale) -> Evidence:
     """Test the output of recordings for dependence on the input, and for a loop."""
-    u, y, way = (np.concatenate(parts) for parts in zip(*map(_samples, tracks), strict=True))
-    every = -(-u.size // MOST)
-    n = u.size // every
+    every = -(-sum(track.u.size for track in tracks) // MOST)
+    parts = [_means(track, every) for track in tracks]
+    u, y, way = (np.concatenate(some) for some in zip(*parts, strict=True))
+    n = u.size
     if n < FEWEST:
         return Evidence(None, None)
-    u, y, way = (x[: n * every].reshape(n, every).mean(axis=1) for x in (u, y, way))
     x = 2 * (u - scale.u_low) / scale.u_span - 1
     y = (y - y.mean()) / scale.y_span
     turned = [way, way * x]
@@ -70,11 +74,14 @@ def evidence(tracks: Sequence[Track], scale: Scale) -> Evidence:
     return Evidence(_p_value(curve, y, spectrum), _p_value(loop, y, spectrum))
 
 
-def _samples(track: Track) -> tuple[Array, Array, Array]:
-    """Return input, output and direction of every sample."""
+def _means(track: Track, every: int) -> tuple[Array, Array, Array]:
+    """Return input and output, means over so many samples each, and the direction amid them."""
+    n = track.u.size // every
+    u, y = (x[: n * every].reshape(n, every).mean(axis=1) for x in (track.u, track.y))
+    amid = every * np.arange(n) + every // 2
+    branch = np.searchsorted(track.turns, amid, side="right") - 1
     ways = np.sign(np.diff(track.heights))
-    way = np.repeat(ways, np.diff(track.turns))
-    return track.u, track.y, np.append(way, way[-1:])
+    return u, y, ways[np.minimum(branch, ways.size - 1)]
 
 
 def _hats(x: Array) -> Array:

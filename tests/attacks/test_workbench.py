@@ -417,7 +417,7 @@ def test_a_pipe_in_the_folder_holds_nobody_up(tmp_path: Path) -> None:
     with pytest.raises(DataError):
         workspace.log("x")
     workspace.warm()
-    assert workspace.logged() == workspace.entries() == workspace.results() == []
+    assert (workspace.logged(), workspace.entries(), workspace.results()) == ([], [], [])
     assert Jobs(workspace).jobs == {}
 
 
@@ -447,14 +447,14 @@ def test_a_full_disk_is_told_and_jobs_end(tmp_path: Path, monkeypatch: pytest.Mo
     monkeypatch.setattr(Path, "write_text", full)
     monkeypatch.setattr(Path, "write_bytes", full)
     monkeypatch.setattr(os, "fdopen", full)
-    for write in (
+    for attempt in (
         lambda: workspace.write_json("results", "x", {}),
         lambda: workspace.log("x"),
         lambda: workspace.keep_upload("a.csv", b"1"),
         lambda: workspace.add(recording(), origin="", call="", name="run"),
     ):
         with pytest.raises(DataError, match=r"x\.json|log\.jsonl|a\.csv|run") as caught:
-            write()
+            attempt()
         assert "No space left" in str(caught.value)
     assert jobs.poll()
     assert jobs.jobs["fit"].state == "failed"

@@ -24,16 +24,20 @@ POINTS = 4000
 
 CONFIG: Json = {
     "displaylogo": False,
-    "modeBarButtons": [
-        ["toImage"],
-        ["zoom2d", "pan2d", "select2d", "zoomIn2d", "zoomOut2d", "autoScale2d", "resetScale2d"],
+    "modeBarButtonsToRemove": [
+        "lasso2d",
+        *("sendChartToCloud", "sendDataToCloud", "editInChartStudio"),
     ],
     "showSendToCloud": False,
     "showEditInChartStudio": False,
     "showLink": False,
     "plotlyServerURL": "",
 }
-"""The buttons are named one by one: none that another plotly.js brings sends a plot anywhere."""
+"""No button sends a plot anywhere, nor has anywhere to send it.
+
+Buttons cannot be named one by one here: plotly.js writes into such a list, takes it for a change, and
+draws for ever.
+"""
 
 
 @cache

@@ -9,6 +9,7 @@ the folder's manifest. Functions of the library that are given a path, such as `
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Callable, Iterable
 from functools import partial
 from pathlib import Path
@@ -19,6 +20,12 @@ from mckibben.errors import DataError
 
 MANIFEST = "results.sha256"
 """Of a folder of results."""
+
+RESULTS = re.compile(
+    r"(leaderboard|characterization|inverse|tables)\.json|leaderboard\.csv|report\.html"
+    r"|models/[\w.-]+\.json"
+)
+"""Names in such a folder that commands give, and that a later run may remove."""
 
 MAKER = "drawn by mckibben"
 """In every figure."""
@@ -188,7 +195,9 @@ class Results:
     def __init__(self, folder: Path, *, inputs: Iterable[Path] = (), force: bool = False) -> None:
         self.folder = folder
         self._inputs, self._force = list(inputs), force
-        self._digests = manifest.read(folder / MANIFEST)
+        listed = folder / MANIFEST
+        # a list of digests that the user made says nothing of who wrote the files
+        self._digests = manifest.read(listed) if manifest.is_manifest(listed) else {}
         self._claimed: set[str] = set()
 
     def claim(self, names: Iterable[str]) -> None:
@@ -204,6 +213,8 @@ class Results:
         DataError
             As `mckibben.outputs.claim` does.
         """
+        listed = self.folder / MANIFEST
+        claim(listed, manifest.is_manifest, inputs=self._inputs, force=self._force)
         for name in names:
             path = self._path(name)
             if path.parent.is_dir():
@@ -215,7 +226,7 @@ class Results:
         """Remove the results of an earlier run, but what was changed since; nothing else is touched."""
         for name in self._digests:
             path = self.folder / name
-            if self._inside(path) and self._own(path, name):
+            if RESULTS.fullmatch(name) and self._inside(path) and self._own(path, name):
                 refuse_inputs(path, self._inputs)
                 with written(path):
                     path.unlink()

@@ -205,6 +205,34 @@ def test_a_hostile_manifest_removes_nothing_elsewhere(tmp_path: Path) -> None:
         results.write_text("models/pi.json", "new")
 
 
+def test_digests_that_the_user_took_make_nothing_ours(folder: Path) -> None:
+    out = folder / "out"
+    out.mkdir()
+    for name in ("thesis.csv", "report.html", "leaderboard.csv"):
+        (out / name).write_text("mine")
+    theirs = "".join(f"{manifest.digest(b'mine')}  {path.name}\n" for path in out.iterdir())
+    (out / MANIFEST).write_text(theirs)
+    before = held(out)
+    words = ("compare", RUN, "--models", "pi", "--jobs", "1", "-o", "out")
+    refused = call(*words)
+    assert refused.code == 2
+    assert MANIFEST in refused.err
+    assert held(out) == before
+    Results(out, force=True).clear()
+    assert held(out) == before
+    # in a manifest of ours, names that no command gives are somebody else's
+    (out / MANIFEST).write_text(manifest.HEAD + theirs)
+    Results(out).clear()
+    assert sorted(path.name for path in out.iterdir()) == [MANIFEST, "thesis.csv"]
+
+
+@pytest.mark.skipif(not shutil.which("sha256sum"), reason="no sha256sum here")
+def test_manifests_are_read_by_sha256sum(tmp_path: Path) -> None:
+    Results(tmp_path).write_text("report.html", "new")
+    check = ["sha256sum", "--check", "--strict", MANIFEST]
+    assert subprocess.run(check, cwd=tmp_path, check=False, capture_output=True).returncode == 0
+
+
 def test_a_folder_named_like_ours_keeps_what_somebody_else_put_there(tmp_path: Path) -> None:
     (tmp_path / "unfinished").mkdir()
     (tmp_path / "unfinished" / "thesis.json").write_text("mine")

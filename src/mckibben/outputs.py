@@ -1,8 +1,8 @@
 """What the commands write takes the place of no input, and of no file that this program did not write.
 
 What it wrote is known by what is in it: a model and a rig by how they begin, a recording by its
-description and the digest there, a figure by its maker's name, and what is in a folder of results by
-the folder's manifest. Functions of the library that are given a path, such as `mckibben.write` and
+description and the digest there, a figure by the digest in its seal, and what is in a folder of results
+by the folder's manifest. Functions of the library that are given a path, such as `mckibben.write` and
 `Block.save`, write what their caller asks for; the command line asks here first, before any work.
 """
 
@@ -17,6 +17,7 @@ from pathlib import Path
 from mckibben import manifest, ordinary
 from mckibben.atomic import write_text, written
 from mckibben.errors import DataError
+from mckibben.seals import is_sealed
 
 MANIFEST = "results.sha256"
 """Of a folder of results."""
@@ -27,9 +28,6 @@ RESULTS = re.compile(
 )
 """Names in such a folder that commands give, and that a later run may remove."""
 
-MAKER = "drawn by mckibben"
-"""In every figure."""
-
 BEGINNING = 256
 """Bytes in which models and rigs say what they are."""
 
@@ -38,7 +36,10 @@ LARGEST_FIGURE = 256 * 2**20
 
 
 def is_model(path: Path) -> bool:
-    """Tell whether a file is a model, inverse or controller that this program saved."""
+    """Tell whether a file is a model, inverse or controller that this program saved.
+
+    One that was edited by hand since still counts as that.
+    """
     from mckibben.blocks.saving import FORMAT
 
     start = b"".join(_beginning(path).split())
@@ -53,9 +54,9 @@ def is_recording(path: Path) -> bool:
 
 
 def is_figure(path: Path) -> bool:
-    """Tell whether a file is a figure that this program drew."""
+    """Tell whether a file is a figure that this program drew, unchanged since."""
     try:
-        return MAKER.encode() in ordinary.read_bytes(path, most=LARGEST_FIGURE)
+        return is_sealed(ordinary.read_bytes(path, most=LARGEST_FIGURE))
     except DataError:
         return False
 
@@ -117,13 +118,14 @@ def claim(
         if force or not (link or (path.exists() and path.stat().st_size)):
             return
     if link or not ours(path):
-        raise _strange(path)
+        raise _strange(path, changed=ours is not is_model)
 
 
-def _strange(path: Path) -> DataError:
+def _strange(path: Path, *, changed: bool) -> DataError:
     what = "a link" if path.is_symlink() else "a file"
+    since = ", or that was changed since" if changed else ""  # an edited model is ours
     return DataError(
-        f"there is {what} of that name that this program did not write, or that was changed since",
+        f"there is {what} of that name that this program did not write{since}",
         file=path,
         remedy="give another name, or replace it with --force",
     )

@@ -12,12 +12,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from mckibben import GPI, Recording, manifest, write
 from mckibben.atomic import PART, replacing, write_text
 from mckibben.comparison.kept import Kept
 from mckibben.errors import DataError
-from mckibben.outputs import MANIFEST, Results
+from mckibben.outputs import MANIFEST, Results, is_figure
+from mckibben.report import printed
+from mckibben.report.drawing import Curve, Drawing, Panel
 from mckibben.rigs import describe, load_rig
 from mckibben.signals import triangle
 from tests.attacks.commands import call
@@ -133,6 +136,31 @@ def test_what_we_wrote_and_its_user_changed_is_a_strangers(
     (folder / "out.csv").write_text(changed)
     assert call(*words).code == 2
     assert (folder / "out.csv").read_text() == changed
+
+
+@pytest.mark.parametrize("kind", ["png", "svg", "pdf"])
+def test_a_figure_that_its_user_changed_is_a_strangers(tmp_path: Path, kind: str) -> None:
+    path = tmp_path / f"figure.{kind}"
+    x = np.linspace(0, 1, 20)
+    printed.save(Drawing((Panel("x", "y", (Curve(x, x, "a", "series-1"),), "a"),)), path)
+    drawn = path.read_bytes()
+    assert is_figure(path)
+    n = len(drawn)
+    for changed in (
+        drawn + b"\n",
+        drawn[:-1],
+        drawn[: n // 2] + b"!" + drawn[n // 2 + 1 :],
+        drawn[: n // 2] + b"more" + drawn[n // 2 :],
+        b"a thesis on what was drawn by mckibben",
+        drawn[:4],
+    ):
+        path.write_bytes(changed)
+        assert not is_figure(path)
+    if kind == "png":
+        path.write_bytes(drawn)
+        with Image.open(path) as image:
+            image.load()
+            assert "sha256" in image.info["Comment"]
 
 
 def test_a_description_beside_the_output_is_guarded_too(

@@ -15,8 +15,8 @@ import numpy as np
 
 from mckibben.atomic import replacing
 from mckibben.errors import DataError
-from mckibben.outputs import MAKER
 from mckibben.report.drawing import Curve, Drawing, Panel
+from mckibben.seals import MAKER, sealed
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -111,7 +111,7 @@ def save(drawing: Drawing, path: str | Path) -> None:
     with rc_context(style):
         drawn(drawing).savefig(figure, format=kind, dpi=RESOLUTION, metadata=dict(METADATA[kind]))
     with replacing(path) as new:
-        new.write_bytes(figure.getbuffer())
+        new.write_bytes(sealed(figure.getvalue()))
 
 
 def format_of(path: Path) -> str:

@@ -203,6 +203,28 @@ def test_nobody_else_may_read_or_write_a_workspace(tmp_path: Path) -> None:
 
 
 @posix
+@pytest.mark.skipif(os.name == "posix" and os.getuid() != 0, reason="only root gives away")
+@pytest.mark.parametrize("theirs", ["", "recordings"])
+def test_a_workspace_of_another_user_is_refused(tmp_path: Path, theirs: str) -> None:
+    Workspace(tmp_path / "ws")
+    os.chown(tmp_path / "ws" / theirs, 65534, 65534)
+    with pytest.raises(DataError, match=r"another user's.*Remedy"):
+        Workspace(tmp_path / "ws")
+
+
+@posix
+@pytest.mark.parametrize("open_one", ["", "uploads"])
+def test_a_workspace_that_stays_open_to_others_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, open_one: str
+) -> None:
+    workspace = Workspace(tmp_path / "ws")
+    (tmp_path / "ws" / open_one).chmod(0o755)
+    monkeypatch.setattr(Path, "chmod", lambda *_: None)  # as on a disk without rights
+    with pytest.raises(DataError, match=r"other users.*Remedy"):
+        workspace.claim()
+
+
+@posix
 def test_links_in_a_received_folder_lead_nowhere(tmp_path: Path) -> None:
     victim = tmp_path / "victim"
     victim.mkdir()

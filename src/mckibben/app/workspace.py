@@ -152,7 +152,8 @@ class Workspace:
     Raises
     ------
     DataError
-        If it cannot be made or written to, or a folder in it is a link to another place.
+        If it cannot be made or written to, or is another user's, or a folder in it is that or a link to
+        another place.
     """
 
     def __init__(self, folder: str | Path) -> None:
@@ -176,6 +177,13 @@ class Workspace:
                 file=self.folder,
                 remedy="give a folder that can be written to",
             ) from None
+        for path, found in self._rights():
+            if found.st_uid != os.getuid():
+                raise DataError(
+                    "this folder is another user's, who could read and change all that is done here",
+                    file=path,
+                    remedy="give a folder of your own",
+                )
         self._recordings: Cache[Recording] = Cache(MOST_CELLS)
         self._models: Cache[Block] = Cache(MOST_MODELS)
         self._inverses: Cache[bool] = Cache(MOST_MODELS)
@@ -189,7 +197,7 @@ class Workspace:
         Raises
         ------
         DataError
-            If the disk cannot lock files.
+            If the disk cannot lock files, or cannot keep others out.
         """
         self._owner = Lock(self.folder / ".owner")
         jobs = Lock(self.folder / ".working")
@@ -200,6 +208,13 @@ class Workspace:
         else:
             self._tidy()
         jobs.leave()
+        for path, found in self._rights():
+            if found.st_mode & 0o077:
+                raise DataError(
+                    "other users can get into this folder, and it cannot be closed to them",
+                    file=path,
+                    remedy="chmod it to 0700, or give a folder on a disk that knows rights of users",
+                )
         return not self.read_only
 
     def work(self) -> Lock:
@@ -231,6 +246,14 @@ class Workspace:
                     path.unlink()
                 elif found.st_mode & 0o077:
                     path.chmod(stat.S_IMODE(found.st_mode) & ~0o077)
+
+    def _rights(self) -> Iterator[tuple[Path, os.stat_result]]:
+        """Look up whose its folders are and who may enter; nothing where the system tells otherwise."""
+        if os.name == "posix":
+            for path in (self.folder, *(self.folder / name for name in FOLDERS)):
+                with written(path):
+                    found = path.lstat()
+                yield path, found
 
     def demand(self) -> None:
         """Refuse where nothing may be written.

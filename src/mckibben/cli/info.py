@@ -108,7 +108,7 @@ def _recordings(recordings: list[Any], as_json: bool) -> None:
         print_json(described)
         return
     for recording in recordings:
-        say(recording)
+        say(str(recording))
         rows = [
             [name, recording.units[name] or "-", f"{s.min():.6g}", f"{s.max():.6g}"]
             for name, s in recording.channels.items()

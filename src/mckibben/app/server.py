@@ -10,6 +10,8 @@ import webbrowser
 from collections.abc import Callable, Iterator
 from importlib import import_module
 from pathlib import Path
+from types import ModuleType
+from typing import Any
 
 from nicegui import Client, app, ui
 
@@ -36,6 +38,9 @@ PATIENCE = 600.0
 
 UNOPENED = 16
 """Pages that were asked for and have not been opened; older ones are let go."""
+
+ABSENCE = 30.0
+"""For which a page that has lost the server is kept as it was [s]; on a busy machine seconds pass."""
 
 OPENING = 0.5
 """After the server has started, when to open a browser [s]."""
@@ -89,8 +94,20 @@ def build(workspace: Workspace, jobs: Jobs) -> None:
         for name in PAGES:
             with ui.tab_panel(tab[name]).classes("p-2"):
                 holders[name] = ui.column().classes("w-full")
-    _fill(desk, "Data", holders, built)
-    panels.on_value_change(lambda event: _fill(desk, str(event.value), holders, built))
+    built.add("Data")
+    with holders["Data"]:
+        _module("Data").build(desk)
+
+    async def opened(event: Any) -> None:
+        """Build a page when it is first opened."""
+        name = str(event.value)
+        if name in PAGES and name not in built:
+            built.add(name)
+            module = await asyncio.to_thread(_module, name)
+            with holders[name]:
+                module.build(desk)
+
+    panels.on_value_change(opened)
     _log(desk)
     ends = {name: job.state for name, job in jobs.jobs.items()}
     told: dict[str, int] = {}
@@ -147,12 +164,8 @@ def _switch(desk: Desk, dark: ui.dark_mode) -> None:
     desk.changed("theme")
 
 
-def _fill(desk: Desk, name: str, holders: dict[str, ui.column], built: set[str]) -> None:
-    """Build a page when it is first opened."""
-    if name in PAGES and name not in built:
-        built.add(name)
-        with holders[name]:
-            import_module(f"mckibben.app.pages.{PAGES[name][1]}").build(desk)
+def _module(name: str) -> ModuleType:
+    return import_module(f"mckibben.app.pages.{PAGES[name][1]}")
 
 
 def _log(desk: Desk) -> None:
@@ -173,8 +186,8 @@ def _log(desk: Desk) -> None:
 
 def _load_the_rest() -> None:
     """Load what all pages need, in a thread, so that opening one does not wait for it."""
-    for _, module in PAGES.values():
-        import_module(f"mckibben.app.pages.{module}")
+    for name in PAGES:
+        _module(name)
     for module in (*PRELOADED, "mckibben.app.work"):
         import_module(module)
     for name in registry.names("estimators"):
@@ -252,6 +265,7 @@ def serve(
             show=False,
             reload=False,
             show_welcome_message=False,
+            reconnect_timeout=ABSENCE,
             favicon="🦾",
         )
 

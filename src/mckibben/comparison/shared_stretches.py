@@ -156,8 +156,9 @@ def told(
             raise DataError(
                 sentence,
                 file=listed[shared.second][1].source,
-                remedy="drop the copy, or cut the stretch out of one of them; to go on all the same, "
-                "give --allow-shared (allow_shared=True), and every result will say so",
+                remedy="drop the copy, or cut the stretch out of one of them; to go on all the same "
+                "(runs of a sensor with few levels may agree and be two), give --allow-shared "
+                "(allow_shared=True), and every result will say so",
             )
         said.append(f"{sentence}.")
     return tuple(said)

@@ -26,6 +26,7 @@ from mckibben.files.marks import Doubt, doubts
 from mckibben.files.notices import warn
 from mckibben.files.stored import Stored
 from mckibben.files.table import Column, Table
+from mckibben.manifest import digest
 from mckibben.ordinary import DESCRIPTION, read_bytes
 from mckibben.recording import Recording
 
@@ -83,7 +84,7 @@ def _described(path: Path, data: bytes) -> Stored | None:
         description = error.problem
     if isinstance(description, str):
         problem = f"is not a description by this package ({description})"
-    elif description.sha256 != stored.digest(data):
+    elif description.sha256 != digest(data):
         problem = "describes another version of the file"
     else:
         return description

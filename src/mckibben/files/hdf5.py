@@ -144,7 +144,9 @@ def _refuse_overfull(place: str, data: Any, path: Path) -> None:
         return
     pipeline = data.id.get_create_plist()
     filters = [pipeline.get_filter(i)[0] for i in range(pipeline.get_nfilters())]
-    packing = [one for one in filters if one not in (h5z.FILTER_SHUFFLE, h5z.FILTER_FLETCHER32)]
+    # what leaves as many bytes as a chunk has, or fewer, whatever it is given
+    harmless = (h5z.FILTER_SHUFFLE, h5z.FILTER_FLETCHER32, h5z.FILTER_SCALEOFFSET, h5z.FILTER_NBIT)
+    packing = [one for one in filters if one not in harmless]
     room = math.prod(data.chunks) * data.dtype.itemsize
     overfull = len(packing) > 1
 

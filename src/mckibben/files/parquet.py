@@ -14,6 +14,7 @@ from mckibben.files.limits import MOST_PARTS, Budget
 from mckibben.files.notices import warn
 from mckibben.files.stored import Stored
 from mckibben.files.table import Column, Table, column, of_equal_length
+from mckibben.manifest import digest
 from mckibben.recording import Recording
 
 _KEY = b"mckibben"
@@ -75,7 +76,7 @@ def _own(frame: Any, text: bytes, path: Path) -> Table | None:
         names = list(description.units)
         if set(names) <= set(frame.column_names):
             values = {name: _array(frame[name]) for name in names}
-            if stored.digest(_samples(values.values())) == description.sha256:
+            if digest(_samples(values.values())) == description.sha256:
                 return description.table(values)
         problem = "the description in it is of other samples"
     warn(path, f"{problem}; it is ignored, and units are taken from the names of the columns")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 from pathlib import Path
 from typing import Any, Literal
@@ -11,6 +10,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 
 from mckibben.errors import DataError
 from mckibben.files.table import Column, Table
+from mckibben.manifest import digest
 from mckibben.recording import Array, Recording
 
 
@@ -106,8 +106,3 @@ def parse(text: str | bytes) -> Stored | str:
         first = error.errors()[0]
         where = ".".join(str(step) for step in first["loc"])
         return f"{where[:60]}: {first['msg'][:200]}" if where else str(first["msg"])[:200]
-
-
-def digest(samples: bytes) -> str:
-    """Return the SHA-256 of bytes, in hexadecimal digits."""
-    return hashlib.sha256(samples).hexdigest()

@@ -79,7 +79,7 @@ def page(address: str) -> Iterator[Any]:
         errors: list[str] = []
 
         def asked(request: Any) -> None:
-            if not request.url.startswith((address, "data:", "blob:")):
+            if not request.url.startswith((address.partition("?")[0], "data:", "blob:")):
                 foreign.append(request.url)
 
         page.on("request", asked)
@@ -228,3 +228,18 @@ def test_a_part_is_kept_by_dragging_across_the_plot(page: Any) -> None:
     seen(page, "role-decaying-triangle").locator("[aria-pressed=true]").get_by_text(
         "unused"
     ).wait_for()
+
+
+def test_two_tabs_on_one_workbench(page: Any, address: str) -> None:
+    seen(page, "example").click()
+    run = "recording-irregular-triangle"
+    seen(page, run)
+    other = page.context.browser.new_page()
+    other.goto(address)
+    seen(other, run)
+    page.get_by_label("Remove irregular-triangle").click()
+    page.get_by_test_id(run).wait_for(state="detached", timeout=SLOW)
+    other.get_by_label("Remove irregular-triangle").click()
+    other.get_by_text("no such recording").first.wait_for(timeout=SLOW)
+    seen(other, "recording-decaying-triangle")
+    seen(page, "recording-decaying-triangle")

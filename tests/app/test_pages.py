@@ -18,7 +18,7 @@ from mckibben import DataError
 from mckibben.app import plots, scripts
 from mckibben.app.jobs import Jobs
 from mckibben.app.pages.compensate import _points
-from mckibben.app.server import build
+from mckibben.app.server import _load_the_rest, build
 from mckibben.app.work import reference_recording
 from mckibben.app.workspace import Workspace
 from mckibben.registry import load
@@ -28,6 +28,8 @@ from tests.app.test_jobs import filled
 
 def visit(workspace: Workspace, look: Callable[[User], Awaitable[None]]) -> None:
     """Open the workbench over a workspace, without a browser, and look at it."""
+
+    _load_the_rest()  # which a page that is opened would wait for
 
     async def run() -> None:
         def root() -> None:

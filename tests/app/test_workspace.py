@@ -47,6 +47,7 @@ def test_no_name_leaves_the_folder(name: str, tmp_path: Path) -> None:
         workspace.path("models", name)
     chosen = workspace.new_name("models", name)
     assert inside(workspace, workspace.path("models", f"{chosen}.json"))
+    workspace.give_back("models", chosen)
     kept = workspace.keep_upload(f"{name}.csv", b"a,b\n1,2\n")
     assert inside(workspace, kept)
     assert kept.parent.name == "uploads"

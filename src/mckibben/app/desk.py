@@ -5,13 +5,20 @@ from __future__ import annotations
 from collections.abc import Awaitable, Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from typing import Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from nicegui import ui
 
 from mckibben.app.jobs import Jobs
 from mckibben.app.workspace import Workspace
 from mckibben.errors import MckibbenError
+
+if TYPE_CHECKING:
+    from nicegui.elements.upload_files import FileUpload
+
+LONGEST = 2000
+"""Characters of a message."""
 
 Refresh = Callable[[], Any]
 
@@ -67,13 +74,29 @@ class Desk:
 
 def named(element: Any, name: str) -> Any:
     """Give an element a name that tests, and people who script the page, find it by."""
-    return element.mark(name).props(f'data-testid="{name}"')
+    return labelled(element.mark(name), "data-testid", name)
+
+
+def labelled(element: Any, attribute: str, text: str) -> Any:
+    """Set an attribute of an element to a text, whatever that holds: it is never read as more."""
+    element.props[attribute] = text
+    return element
+
+
+def code(text: str) -> Any:
+    """Show Python as it stands, with a button that copies it; nothing in it is read as markup."""
+    with ui.row().classes("w-full no-wrap items-start") as row:
+        shown = ui.label(text).classes("flex-1 whitespace-pre overflow-x-auto font-mono text-sm")
+        copy = f"() => navigator.clipboard.writeText(getHtmlElement({shown.id}).innerText)"
+        button = ui.button(icon="content_copy").props("flat dense").on("click", js_handler=copy)
+        labelled(button, "aria-label", "Copy")
+    return row
 
 
 def tell(error: Exception | str) -> None:
     """Show a problem with its remedy until it is closed."""
     ui.notify(
-        str(error),
+        str(error)[:LONGEST].encode("utf-8", "replace").decode(),
         type="negative",
         multi_line=True,
         close_button="Close",
@@ -109,5 +132,29 @@ def told() -> Iterator[None]:
         yield
     except MckibbenError as error:
         tell(error)
-    except (OSError, ValueError) as error:
-        tell(f"{error}. Remedy: check the file or the value.")
+    except Exception as error:
+        unexpected(error)
+
+
+def unexpected(error: Exception) -> None:
+    """Show what nobody has foreseen: a full disk, a value that cannot be, a file made to mislead."""
+    if isinstance(error, MckibbenError):
+        tell(error)
+    elif isinstance(error, OSError):
+        place = f"{error.filename}: " if error.filename else ""
+        tell(f"{place}{error.strerror or error}. Remedy: see to the disk's room and rights.")
+    else:
+        tell(f"{type(error).__name__}: {error}. Remedy: check the file or the value.")
+
+
+async def kept(desk: Desk, file: FileUpload) -> Path:
+    """Keep an uploaded file, without holding it in memory, and return where.
+
+    Raises
+    ------
+    DataError
+        If it cannot be kept.
+    """
+    with desk.workspace.receiving(file.name, file.size()) as (new, path):
+        await file.save(new)
+    return path

@@ -1,23 +1,68 @@
-"""Who may talk to the workbench: this machine alone, or whoever has the token.
+"""Who may talk to the workbench: whoever has its token, from its own page, and never without end.
 
-Requests must name the host that the page is served from, so that a page of someone else's, opened in
-the same browser, can neither read nor steer it; web sockets must come from the page itself.
+Other users of this machine reach its ports too, and so do the pages of others in the same browser: both
+are told nothing and steer nothing without the token. What goes out forbids all scripts but its own.
 """
 
 from __future__ import annotations
 
+import hmac
+import re
 import secrets
-from collections.abc import Awaitable, Callable, MutableMapping
-from http.cookies import SimpleCookie
+from collections.abc import Awaitable, Callable, Iterator, MutableMapping
 from typing import Any
 from urllib.parse import parse_qs, urlsplit
 
+from mckibben.errors import DataError
+
 Scope = MutableMapping[str, Any]
-Receive = Callable[[], Awaitable[MutableMapping[str, Any]]]
-Send = Callable[[MutableMapping[str, Any]], Awaitable[None]]
+Message = MutableMapping[str, Any]
+Receive = Callable[[], Awaitable[Message]]
+Send = Callable[[Message], Awaitable[None]]
+Headers = list[tuple[bytes, bytes]]
 
 LOCAL = ("127.0.0.1", "localhost", "::1")
-COOKIE = "mckibben-token"
+
+LARGEST_UPLOAD = 512 * 2**20
+"""Bytes of a file."""
+
+LARGEST_REQUEST = LARGEST_UPLOAD + 2**20
+"""Bytes of a request: of a file, and what is around it."""
+
+AT_ONCE = 2 * LARGEST_REQUEST
+"""Bytes of all requests that are being received."""
+
+TOKEN = re.compile(r"[A-Za-z0-9_.~-]{16,256}")
+"""What a token may be: not guessed, and whole in an address and a cookie."""
+
+POLICY = "; ".join(
+    (
+        "default-src 'none'",
+        # the page's frame compiles its templates in the browser, hence eval; no script stands in a page
+        # or an attribute, except with the word that each answer makes up anew
+        "script-src 'self' 'nonce-{nonce}' 'unsafe-eval'",
+        "script-src-attr 'none'",
+        "style-src 'self' 'unsafe-inline'",
+        "img-src 'self' data: blob:",
+        "font-src 'self' data:",
+        "connect-src 'self'",
+        "base-uri 'none'",
+        "form-action 'none'",
+        "frame-ancestors 'none'",
+        "object-src 'none'",
+    )
+)
+
+PRECAUTIONS: Headers = [
+    (b"x-content-type-options", b"nosniff"),
+    (b"x-frame-options", b"DENY"),
+    (b"referrer-policy", b"no-referrer"),
+    (b"cross-origin-opener-policy", b"same-origin"),
+    (b"cross-origin-resource-policy", b"same-origin"),
+]
+
+WELCOME = '<!doctype html><title>mckibben</title><meta http-equiv="refresh" content="0;url=/">'
+"""It asks for the page itself: then no browser holds back the cookie, wherever the address stood."""
 
 
 class Guard:
@@ -29,66 +74,190 @@ class Guard:
         What is behind it.
     host : str
         Address that the page is served on.
-    token : str or None
-        To be shown once as ``?token=``, then kept as a cookie; None where only this machine connects.
+    port : int
+        Port; cookies are kept apart by it, since browsers do not.
+    token : str
+        To be shown once as ``?token=``, then kept as a cookie.
     """
 
-    def __init__(self, app: Any, *, host: str, token: str | None) -> None:
-        self.app, self.token = app, token
+    def __init__(self, app: Any, *, host: str, port: int, token: str) -> None:
+        self.app, self.token = app, token.encode()
+        self.cookie = f"mckibben-token-{port}".encode()
         self.hosts = None if host in ("0.0.0.0", "::") else {host, *LOCAL}
+        self._receiving = 0
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Pass a request on, or answer it."""
         if scope["type"] not in ("http", "websocket"):
             await self.app(scope, receive, send)
             return
-        headers = {
-            key.decode("latin1").lower(): value.decode("latin1") for key, value in scope["headers"]
-        }
+        headers: Headers = [(key.lower(), value) for key, value in scope["headers"]]
         reason = self._objection(headers)
-        if reason is None and self.token is not None and not self._knows(headers):
-            given = parse_qs(scope.get("query_string", b"").decode("latin1")).get("token", [""])[0]
-            if scope["type"] == "http" and secrets.compare_digest(given, self.token):
-                await _answer(send, 303, "", self._welcome())
-                return
+        if reason is None and scope["type"] == "http" and self._is_given(scope):
+            kept = self.cookie + b"=" + self.token + b"; HttpOnly; SameSite=Strict; Path=/"
+            html = (b"content-type", b"text/html; charset=utf-8")
+            await _answer(send, 200, WELCOME, [html, (b"set-cookie", kept)])
+            return
+        if reason is None and not self._knows(headers):
             reason = (
                 "This workbench wants its token: open the address that it printed when it started."
             )
-        if reason is None:
-            await self.app(scope, receive, send)
+        if reason is None and _first(headers, b"sec-fetch-site") in (b"cross-site", b"same-site"):
+            reason = "Another page may not use the workbench."
+        if reason is not None:
+            await _refuse(scope, receive, send, 403, reason)
         elif scope["type"] == "websocket":
-            await receive()
-            await send({"type": "websocket.close", "code": 1008})
+            await self.app(scope, receive, send)
         else:
-            await _answer(send, 403, reason, [])
+            await self._bounded(scope, headers, receive, send)
 
-    def _objection(self, headers: dict[str, str]) -> str | None:
+    def _objection(self, headers: Headers) -> str | None:
+        given = _first(headers, b"host").decode("latin1")
         try:
-            host = urlsplit(f"//{headers.get('host', '')}").hostname
+            host = urlsplit(f"//{given}").hostname
         except ValueError:
             host = None
         if self.hosts is not None and host not in self.hosts:
             return "This address is not the workbench's."
-        origin = headers.get("origin")
-        if origin is not None and origin.partition("://")[2] != headers.get("host"):
-            return "Another page may not use the workbench."
+        for name, value in headers:
+            if name == b"origin" and value.decode("latin1").partition("://")[2] != given:
+                return "Another page may not use the workbench."
         return None
 
-    def _knows(self, headers: dict[str, str]) -> bool:
-        cookie = SimpleCookie(headers.get("cookie", "")).get(COOKIE)
-        return cookie is not None and secrets.compare_digest(cookie.value, self.token or "")
+    def _is_given(self, scope: Scope) -> bool:
+        given = parse_qs(scope.get("query_string", b"").decode("latin1")).get("token", [])
+        return any(hmac.compare_digest(token.encode(), self.token) for token in given)
 
-    def _welcome(self) -> list[tuple[bytes, bytes]]:
-        kept = f"{COOKIE}={self.token}; HttpOnly; SameSite=Strict; Path=/"
-        return [(b"set-cookie", kept.encode()), (b"location", b"/")]
+    def _knows(self, headers: Headers) -> bool:
+        """Tell whether any cookie of this port's name is right, whatever else there is beside it."""
+        return any(
+            name == self.cookie and hmac.compare_digest(value, self.token)
+            for name, value in _cookies(headers)
+        )
+
+    async def _bounded(self, scope: Scope, headers: Headers, receive: Receive, send: Send) -> None:
+        """Pass a request on as long as it has no more bytes than allowed, and guard its answer."""
+        told = _first(headers, b"content-length")
+        if told and (not told.isdigit() or len(told) > 15 or int(told) > LARGEST_REQUEST):
+            await _refuse(scope, receive, send, 413, TOO_LARGE)
+            return
+        received, over = 0, False
+
+        async def counted() -> Message:
+            nonlocal received, over
+            message = await receive()
+            if message["type"] == "http.request":
+                received += len(message.get("body", b""))
+                self._receiving += len(message.get("body", b""))
+                over = over or received > LARGEST_REQUEST or self._receiving > AT_ONCE
+            return {"type": "http.disconnect"} if over else message
+
+        answer = _Answer(send)
+
+        async def sent(message: Message) -> None:
+            if not over:
+                await answer(message)
+
+        if not scope.get("path", "").startswith("/_nicegui/"):  # of a page, that it can be amended
+            headers = [header for header in headers if header[0] != b"accept-encoding"]
+        try:
+            await self.app({**scope, "headers": headers}, counted, sent)
+        except Exception:
+            if not over:
+                raise
+        finally:
+            self._receiving -= received
+        if over and not answer.begun:
+            await _refuse(scope, receive, send, 413, TOO_LARGE)
 
 
-async def _answer(send: Send, status: int, text: str, headers: list[tuple[bytes, bytes]]) -> None:
-    plain = (b"content-type", b"text/plain; charset=utf-8")
-    await send({"type": "http.response.start", "status": status, "headers": [plain, *headers]})
+TOO_LARGE = (
+    f"This is more than {LARGEST_UPLOAD // 2**20} MiB, or too much is being sent at once: "
+    "put large files into a folder and use the command line."
+)
+
+
+class _Answer:
+    """What is sent, with precautions; scripts in a page get the word that lets them run."""
+
+    def __init__(self, send: Send) -> None:
+        self._send, self.begun = send, False
+        self._nonce = secrets.token_urlsafe(18)
+        self._page: tuple[Message, bytearray] | None = None
+
+    async def __call__(self, message: Message) -> None:
+        self.begun = True
+        if message["type"] == "http.response.start":
+            headers: Headers = list(message.get("headers", []))
+            policy = POLICY.format(nonce=self._nonce).encode()
+            message = {
+                **message,
+                "headers": [*headers, *PRECAUTIONS, (b"content-security-policy", policy)],
+            }
+            if _first(headers, b"content-type").startswith(b"text/html"):
+                self._page = message, bytearray()
+                return
+        elif self._page is not None:
+            start, page = self._page
+            page += message.get("body", b"")
+            if message.get("more_body"):
+                return
+            # whatever comes from files stands escaped in a page: these are its own scripts
+            body = re.sub(
+                rb"<script(?=[\s>])", b'<script nonce="%b"' % self._nonce.encode(), bytes(page)
+            )
+            kept = [item for item in start["headers"] if item[0].lower() != b"content-length"]
+            length = (b"content-length", str(len(body)).encode())
+            await self._send({**start, "headers": [*kept, length]})
+            message = {"type": "http.response.body", "body": body}
+        await self._send(message)
+
+
+def _first(headers: Headers, name: bytes) -> bytes:
+    return next((value for key, value in headers if key.lower() == name), b"")
+
+
+def _cookies(headers: Headers) -> Iterator[tuple[bytes, bytes]]:
+    for name, value in headers:
+        if name == b"cookie":
+            for part in value.split(b";"):
+                key, _, word = part.strip().partition(b"=")
+                yield key, word
+
+
+async def _refuse(scope: Scope, receive: Receive, send: Send, status: int, reason: str) -> None:
+    if scope["type"] == "websocket":
+        await receive()
+        await send({"type": "websocket.close", "code": 1008})
+    else:
+        plain = (b"content-type", b"text/plain; charset=utf-8")
+        await _answer(send, status, reason, [plain, (b"connection", b"close")])
+
+
+async def _answer(send: Send, status: int, text: str, headers: Headers) -> None:
+    policy = (b"content-security-policy", b"default-src 'none'; frame-ancestors 'none'")
+    length = (b"content-length", str(len(text.encode())).encode())
+    start = {"type": "http.response.start", "status": status}
+    await send(start | {"headers": [*headers, length, *PRECAUTIONS, policy]})
     await send({"type": "http.response.body", "body": text.encode()})
 
 
 def new_token() -> str:
     """Return a token that cannot be guessed."""
     return secrets.token_urlsafe(24)
+
+
+def checked_token(token: str) -> str:
+    """Return a token that was asked for.
+
+    Raises
+    ------
+    DataError
+        If it could be guessed, or would not be whole in an address.
+    """
+    if not TOKEN.fullmatch(token):
+        raise DataError(
+            "the token is empty, short, long or has other characters than an address takes",
+            remedy="leave --token out, and one is made; or give 16 to 256 of A-Z a-z 0-9 _ . ~ -",
+        )
+    return token

@@ -1,19 +1,26 @@
 """Jobs in the background, each a process of its own, so that any can be cancelled at any time.
 
 What a job is, and how it went, is a file in the workspace; results are written by the job itself,
-whole or not at all. Killing the workbench ends its jobs, and loses nothing that was finished.
+whole or not at all. Killing the workbench ends its jobs, and loses nothing that was finished. Where
+another workbench has the folder, its jobs are shown as they stand, and none is started.
 """
 
 from __future__ import annotations
 
 import os
+import sys
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from multiprocessing.process import BaseProcess
 from pathlib import Path
 from typing import Any
 
+from mckibben.app import kept
 from mckibben.app.workspace import Workspace
+from mckibben.errors import DataError
+from mckibben.ordinary import DESCRIPTION, read_bytes
 from mckibben.threads import cores
 from mckibben.workers import context, end_with_parent, prepare
 
@@ -23,6 +30,12 @@ ENDED = (DONE, FAILED, CANCELLED, INTERRUPTED)
 
 KINDNESS = 5
 """Niceness of jobs, so that the page stays quick."""
+
+PLACES = {"fit": "models", "loop": "runs"}
+"""Kinds of jobs whose results have a name, and where."""
+
+UNWRITTEN = 74
+"""What a job leaves with that could not write down how it went; by custom for input and output."""
 
 TELLING = 0.2
 """Least time between two lines of progress [s]."""
@@ -56,7 +69,8 @@ class Job:
     @property
     def title(self) -> str:
         """What it is, in a word or two."""
-        return str(self.given.get("title") or self.given.get("model") or self.kind)
+        given = self.given
+        return str(given.get("title") or given.get("name") or given.get("model") or self.kind)
 
 
 class Jobs:
@@ -73,51 +87,83 @@ class Jobs:
     def __init__(self, workspace: Workspace, at_once: int | None = None) -> None:
         self.workspace = workspace
         self.at_once = at_once or cores()
-        self.jobs: dict[str, Job] = {}
-        for name in workspace.names("jobs"):
-            content = workspace.read_json("jobs", name)
-            if content is None or not isinstance(content.get("given"), dict):
+        self.untold: list[str] = []
+        """What could not be written down, for the page to tell."""
+        self._seen = -1
+        self.jobs = self._kept()
+
+    def _kept(self) -> dict[str, Job]:
+        found = {}
+        for name in self.workspace.names("jobs"):
+            noted = kept.checked(kept.Noted, self.workspace.read_json("jobs", name))
+            if noted is None:
                 continue
-            job = Job(
-                name,
-                str(content.get("kind")),
-                content["given"],
-                str(content.get("state")),
-                str(content.get("message", "")),
-            )
-            if job.state not in ENDED:
+            given = noted.given.model_dump(exclude_unset=True)
+            job = Job(name, noted.kind, given, noted.state, noted.message)
+            if job.state not in ENDED and not self.workspace.read_only:
                 job.state = INTERRUPTED
                 job.message = "the workbench was closed before it was done"
-            self.jobs[name] = job
+            found[name] = job
+        return found
 
     def submit(self, kind: str, given: dict[str, Any]) -> Job:
-        """Queue a job."""
+        """Queue a job; where its result has a name, it gets one like that wished for, its own.
+
+        Raises
+        ------
+        DataError
+            If it cannot be written down.
+        """
         name = self.workspace.new_name("jobs", f"{kind}-{given.get('model', '')}")
+        place = PLACES.get(kind)
+        if place is not None:
+            given = given | {"name": self.workspace.new_name(place, str(given["name"]))}
         job = Job(name, kind, given)
+        try:
+            self._write(job)
+        except DataError:
+            self._give_back(job)
+            raise
         self.jobs[name] = job
-        self._note(job)
         self.poll()
         return job
 
     def poll(self) -> bool:
         """Start what can be started and see what has ended; tell whether anything changed."""
         changed = False
-        for job in self.jobs.values():
+        if self.workspace.read_only:
+            return self._look()
+        for job in list(self.jobs.values()):
             if job.state == RUNNING and job.process is not None and not job.process.is_alive():
                 self._finish(job)
                 changed = True
         running = sum(job.state == RUNNING for job in self.jobs.values())
-        for job in self.jobs.values():
+        for job in list(self.jobs.values()):
             if job.state == WAITING and running < self.at_once:
                 self._start(job)
                 running += 1
                 changed = True
         return changed
 
+    def _look(self) -> bool:
+        """See how the jobs of another workbench do."""
+        seen = (self.workspace.folder / "jobs").stat().st_mtime_ns
+        changed, self._seen = seen != self._seen, seen
+        if changed:
+            self.jobs = self._kept()
+        return changed
+
     def cancel(self, name: str) -> None:
-        """End a job; what it had finished before stays."""
-        job = self.jobs[name]
-        if job.state in ENDED:
+        """End a job; what it had finished before stays.
+
+        Raises
+        ------
+        DataError
+            If it is another workbench's.
+        """
+        self.workspace.demand()
+        job = self.jobs.get(name)
+        if job is None or job.state in ENDED:
             return
         if job.process is not None:
             job.process.terminate()
@@ -126,19 +172,21 @@ class Jobs:
                 job.process.kill()
         job.state, job.message, job.process = CANCELLED, "cancelled", None
         self._note(job)
+        self._give_back(job)
         self.poll()
 
     def forget(self, name: str) -> None:
         """Take an ended job off the list."""
-        if self.jobs[name].state in ENDED:
+        self.workspace.demand()
+        if name in self.jobs and self.jobs[name].state in ENDED:
             del self.jobs[name]
             self.workspace.path("jobs", f"{name}.json").unlink(missing_ok=True)
             self._progress(name).unlink(missing_ok=True)
 
     def close(self) -> None:
         """End all jobs."""
-        for name in list(self.jobs):
-            self.cancel(name)
+        for job in self.active() if not self.workspace.read_only else []:
+            self.cancel(job.name)
 
     def active(self) -> list[Job]:
         """Return the jobs that wait or run."""
@@ -147,15 +195,9 @@ class Jobs:
     def progress(self, name: str) -> list[tuple[float, float, float]]:
         """Return what a job told: seconds, share done, least cost so far."""
         try:
-            lines = self._progress(name).read_text(encoding="utf-8").splitlines()
-        except OSError:
+            return kept.progress(read_bytes(self._progress(name), most=DESCRIPTION))
+        except DataError:
             return []
-        told = []
-        for line in lines:
-            words = line.split()
-            if len(words) == 3:
-                told.append((float(words[0]), float(words[1]), float(words[2])))
-        return told
 
     def _progress(self, name: str) -> Path:
         return self.workspace.path("jobs", f"{name}.progress")
@@ -172,19 +214,43 @@ class Jobs:
         self._note(job)
 
     def _finish(self, job: Job) -> None:
-        content = self.workspace.read_json("jobs", job.name) or {}
+        noted = kept.checked(kept.Noted, self.workspace.read_json("jobs", job.name))
+        code = None if job.process is None else job.process.exitcode
         job.process = None
-        if content.get("state") in (DONE, FAILED):
-            job.state, job.message = content["state"], str(content.get("message", ""))
+        if noted is not None and noted.state in (DONE, FAILED):
+            job.state, job.message = noted.state, noted.message
         else:
             job.state, job.message = FAILED, "the process ended without a word; is memory short?"
+            if code == UNWRITTEN:
+                job.message = "how it went could not be written down; is the disk full?"
             self._note(job)
-        self.workspace.log(
-            f"{job.kind} {job.title}: {job.state}. {job.message}", job.given.get("call", "")
-        )
+        self._give_back(job)
+        with self._told():
+            self.workspace.log(
+                f"{job.kind} {job.title}: {job.state}. {job.message}",
+                str(job.given.get("call", "")),
+            )
+
+    def _give_back(self, job: Job) -> None:
+        """Free the names of a job that came to nothing."""
+        self.workspace.give_back("jobs", job.name)
+        if job.kind in PLACES:
+            self.workspace.give_back(PLACES[job.kind], str(job.given.get("name")))
 
     def _note(self, job: Job) -> None:
+        with self._told():
+            self._write(job)
+
+    def _write(self, job: Job) -> None:
         note(self.workspace, job.name, job.kind, job.given, job.state, job.message)
+
+    @contextmanager
+    def _told(self) -> Iterator[None]:
+        """Keep what could not be written for the page to tell: jobs go on and end without it."""
+        try:
+            yield
+        except DataError as error:
+            self.untold.append(str(error))
 
 
 def note(
@@ -200,31 +266,35 @@ def run(folder: str, name: str, kind: str, given: dict[str, Any]) -> None:
     from mckibben.app.work import WORK
     from mckibben.errors import MckibbenError
 
+    end_with_parent()
     if hasattr(os, "nice"):
         os.nice(KINDNESS)
-    end_with_parent()
     workspace = Workspace(folder)
+    held = workspace.work()
     path = workspace.path("jobs", f"{name}.progress")
     started, last = time.monotonic(), -TELLING
 
-    with path.open("w", encoding="utf-8") as file:
-
-        def tell(share: float, cost: float) -> None:
-            nonlocal last
-            now = time.monotonic()
-            if now - last >= TELLING or share >= 1.0:
-                last = now
+    def tell(share: float, cost: float) -> None:
+        nonlocal last
+        now = time.monotonic()
+        if now - last >= TELLING or share >= 1.0:
+            last = now
+            # how far it is can be done without, on a disk that is full
+            with suppress(OSError), path.open("a", encoding="utf-8") as file:
                 file.write(f"{now - started:.2f} {share:.4f} {cost:.6g}\n")
-                file.flush()
 
+    try:
         tell(0.0, float("nan"))
-        try:
-            message, state = WORK[kind](workspace, given, tell), DONE
-        except MckibbenError as error:
-            message, state = str(error), FAILED
-        except Exception as error:  # a job that fails must say so, whatever it did
-            message, state = f"{type(error).__name__}: {error}", FAILED
-    note(workspace, name, kind, given, state, message)
+        message, state = WORK[kind](workspace, given, tell), DONE
+    except MckibbenError as error:
+        message, state = str(error), FAILED
+    except Exception as error:  # a job that fails must say so, whatever it did
+        message, state = f"{type(error).__name__}: {error}", FAILED
+    try:
+        note(workspace, name, kind, given, state, message[: kept.LONGEST])
+    except DataError:
+        sys.exit(UNWRITTEN)
+    held.leave()
 
 
 def parse_settings(text: str) -> dict[str, Any]:

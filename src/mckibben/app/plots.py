@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from mckibben.recording import Recording
 from mckibben.report import interactive
 from mckibben.report.drawing import Drawing, over_time
+from mckibben.report.interactive import text
 
 Array = NDArray[np.float64]
 Json = dict[str, Any]
@@ -21,9 +22,9 @@ Json = dict[str, Any]
 POINTS = 4000
 """Most points of a curve sent to the page."""
 
-CONFIG: Json = {
-    "displaylogo": False,
-    "modeBarButtonsToRemove": ["lasso2d", "sendDataToCloud"],
+CONFIG: Json = interactive.CLOSED | {
+    # not named as in pages: plotly.js puts objects into that list, and no plot is drawn in NiceGUI then
+    "modeBarButtonsToRemove": ["lasso2d", "sendChartToCloud", "sendDataToCloud"]
 }
 
 
@@ -123,7 +124,13 @@ def lines(
         t, v = over_time(np.asarray(at, float), np.asarray(values, float), POINTS)
         line = {"color": palette[colour], "width": 1.6}
         data.append(
-            {"type": "scatter", "mode": "lines", "name": name, "x": _listed(t), "y": _listed(v)}
+            {
+                "type": "scatter",
+                "mode": "lines",
+                "name": text(name),
+                "x": _listed(t),
+                "y": _listed(v),
+            }
             | {"line": line}
         )
     shapes = [
@@ -142,8 +149,8 @@ def lines(
     plot = {
         "data": data,
         "layout": {
-            "xaxis": {"title": {"text": x}},
-            "yaxis": {"title": {"text": y}},
+            "xaxis": {"title": {"text": text(x)}},
+            "yaxis": {"title": {"text": text(y)}},
             "shapes": shapes,
             "showlegend": len(curves) > 1,
         },

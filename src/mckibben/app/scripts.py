@@ -39,12 +39,9 @@ def script(workspace: Workspace, models: Sequence[str], channels: tuple[str, str
         "",
         f"board = mckibben.compare(train, test, input={channels[0]!r}, output={channels[1]!r},",
     ]
-    settings = {}
-    for model in models:
-        result = workspace.read_json("results", model) or {}
-        if result.get("settings"):
-            settings[str(result.get("model", model))] = result["settings"]
-    kinds = [str((workspace.read_json("results", m) or {}).get("model", m)) for m in models]
+    chosen = [row for row in workspace.results() if row["name"] in models]
+    settings = {row["model"]: row["settings"] for row in chosen if row["settings"]}
+    kinds = [row["model"] for row in chosen]
     lines.append(f"    models={kinds!r}, settings={settings!r})")
     lines += [
         'print(board.to_frame()[["model", "validation_rmse", "test.rmse"]])',
@@ -54,9 +51,10 @@ def script(workspace: Workspace, models: Sequence[str], channels: tuple[str, str
         "    if row.block is not None:",
         '        row.block.save(f"{row.model}.json")',
         "",
-        "best = board.best.block",
+        "if board.best is None:",
+        "    raise SystemExit(board.not_recommended)",
         "try:",
-        "    inverse = best.inverse()",
+        "    inverse = board.best.block.inverse()",
         "except mckibben.ModelError as error:",
         "    print(error)",
         "else:",

@@ -2,21 +2,26 @@
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 import socket
 import threading
-from collections.abc import Callable
+import webbrowser
+from collections.abc import Callable, Iterator
 from importlib import import_module
 from pathlib import Path
+from types import ModuleType
+from typing import Any
 
-from nicegui import app, ui
+from nicegui import Client, app, ui
 
 from mckibben import registry
-from mckibben.app.desk import Desk, named
-from mckibben.app.guard import LOCAL, Guard, new_token
+from mckibben.app.desk import Desk, code, named, tell, unexpected
+from mckibben.app.guard import Guard, checked_token, new_token
 from mckibben.app.jobs import Job, Jobs
 from mckibben.app.workspace import Workspace
-from mckibben.errors import DataError
+from mckibben.atomic import write_text
+from mckibben.errors import DataError, MckibbenError
 from mckibben.workers import PRELOADED
 
 PAGES = {
@@ -27,6 +32,18 @@ PAGES = {
     "Take away": ("download", "takeaway"),
 }
 """Icon and module of each page; a module is loaded when its page is opened, or nothing else is to do."""
+
+PATIENCE = 600.0
+"""For what a page shows to be read, the first time [s]."""
+
+UNOPENED = 16
+"""Pages that were asked for and have not been opened; older ones are let go."""
+
+ABSENCE = 30.0
+"""For which a page that has lost the server is kept as it was [s]; on a busy machine seconds pass."""
+
+OPENING = 0.5
+"""After the server has started, when to open a browser [s]."""
 
 IDLE = 1.0
 """After the first page is there, when to load what the others need [s]."""
@@ -50,6 +67,7 @@ TOPICS = {"fit": "results", "loop": "runs", "record": "recordings", "report": "j
 
 def build(workspace: Workspace, jobs: Jobs) -> None:
     """Build one page for one browser."""
+    ui.on_exception(unexpected)
     desk = Desk(workspace, jobs)
     desk.settle_channels()
     dark = ui.dark_mode(None)
@@ -66,6 +84,9 @@ def build(workspace: Workspace, jobs: Jobs) -> None:
         ui.button(icon="contrast", on_click=lambda: _switch(desk, dark)).props(
             'flat dense color=white aria-label="Light or dark"'
         )
+    if workspace.read_only:
+        text = f"Nothing can be changed here: {workspace.read_only}."
+        named(ui.label(text).classes("w-full text-center bg-warning text-black"), "read-only")
     panels = ui.tab_panels(tabs, value=tab["Data"], animated=False)
     with panels.classes("w-full bg-transparent"):
         built: set[str] = set()
@@ -73,29 +94,47 @@ def build(workspace: Workspace, jobs: Jobs) -> None:
         for name in PAGES:
             with ui.tab_panel(tab[name]).classes("p-2"):
                 holders[name] = ui.column().classes("w-full")
-    _fill(desk, "Data", holders, built)
-    panels.on_value_change(lambda event: _fill(desk, str(event.value), holders, built))
+    built.add("Data")
+    with holders["Data"]:
+        _module("Data").build(desk)
+
+    async def opened(event: Any) -> None:
+        """Build a page when it is first opened."""
+        name = str(event.value)
+        if name in PAGES and name not in built:
+            built.add(name)
+            module = await asyncio.to_thread(_module, name)
+            with holders[name]:
+                module.build(desk)
+
+    panels.on_value_change(opened)
     _log(desk)
     ends = {name: job.state for name, job in jobs.jobs.items()}
     told: dict[str, int] = {}
 
-    def tick() -> None:
+    async def tick() -> None:
+        while jobs.untold:
+            tell(jobs.untold.pop(0))
         active = jobs.active()
         busy.set_text(f"{len(active)} job(s)" if active else "")
-        moved = False
+        moved, ended = False, []
         for name, job in list(jobs.jobs.items()):
             lines = len(jobs.progress(name)) if job.state == "running" else 0
             if ends.get(name) != job.state:
                 ends[name] = job.state
                 moved = True
                 if job.state in ("done", "failed", "cancelled"):
-                    _say(job)
-                    desk.changed(TOPICS.get(job.kind, "jobs"), "log")
-                    if job.kind == "record":
-                        desk.changed("channels")
+                    ended.append(job)
             elif lines != told.get(name):
                 moved = True
             told[name] = lines
+        if ended:
+            await asyncio.to_thread(workspace.warm)
+        for job in ended:
+            _say(job)
+            desk.changed(TOPICS.get(job.kind, "jobs"), "log")
+            if job.kind == "record":
+                desk.changed("channels")
         if moved:
             desk.changed("jobs")
 
@@ -112,7 +151,7 @@ def build(workspace: Workspace, jobs: Jobs) -> None:
 
 
 def _say(job: Job) -> None:
-    text = f"{job.title}: {job.state}. {job.message}"[:300]
+    text = f"{job.title:.80}: {job.state}. {job.message}"[:300]
     if job.state == "failed":
         ui.notify(text, type="negative", multi_line=True, timeout=10_000)
     else:
@@ -125,12 +164,8 @@ def _switch(desk: Desk, dark: ui.dark_mode) -> None:
     desk.changed("theme")
 
 
-def _fill(desk: Desk, name: str, holders: dict[str, ui.column], built: set[str]) -> None:
-    """Build a page when it is first opened."""
-    if name in PAGES and name not in built:
-        built.add(name)
-        with holders[name]:
-            import_module(f"mckibben.app.pages.{PAGES[name][1]}").build(desk)
+def _module(name: str) -> ModuleType:
+    return import_module(f"mckibben.app.pages.{PAGES[name][1]}")
 
 
 def _log(desk: Desk) -> None:
@@ -139,12 +174,11 @@ def _log(desk: Desk) -> None:
 
         @ui.refreshable
         def shown() -> None:
-            lines = [entry for entry in desk.workspace.logged() if entry.get("call")][-12:]
+            lines = [entry for entry in desk.workspace.logged() if entry["call"]][-12:]
             if not lines:
                 ui.label("Nothing yet.").classes("opacity-70")
-            text = "\n".join(f"# {entry['did']}\n{entry['call']}" for entry in reversed(lines))
-            if text:
-                ui.code(text, language="python").classes("w-full")
+            else:
+                code("\n".join(f"# {entry['did']}\n{entry['call']}" for entry in reversed(lines)))
 
         desk.when("log", shown.refresh)
         shown()
@@ -152,8 +186,8 @@ def _log(desk: Desk) -> None:
 
 def _load_the_rest() -> None:
     """Load what all pages need, in a thread, so that opening one does not wait for it."""
-    for _, module in PAGES.values():
-        import_module(f"mckibben.app.pages.{module}")
+    for name in PAGES:
+        _module(name)
     for module in (*PRELOADED, "mckibben.app.work"):
         import_module(module)
     for name in registry.names("estimators"):
@@ -178,55 +212,103 @@ def serve(
     Parameters
     ----------
     folder : str or Path
-        The workspace; made where it is missing.
+        The workspace; made where it is missing. Where another workbench has it, it is shown, and
+        nothing in it can be changed.
     host : str
-        Address to listen on; any but this machine's own demands a token.
+        Address to listen on.
     port : int
         To listen on; 0 for any free one.
     token : str, optional
-        To demand; default a new one where the host is not this machine alone, else none.
+        To demand of whoever connects, from this machine too; default a new one.
     show : bool
         Whether to open the page in a browser.
     announce : callable
-        Told the address when the server starts.
+        Told the address, with the token, when the server starts.
 
     Raises
     ------
     DataError
-        If the workspace cannot be made, or the port is taken.
+        If the workspace cannot be made, the port is taken, or the token could be guessed.
     """
+    token = new_token() if token is None else checked_token(token)
     workspace = Workspace(folder)
-    jobs = Jobs(workspace)
     port = _free(host, port)
-    if token is None and host not in LOCAL:
-        token = new_token()
-    address = f"http://{'127.0.0.1' if host == '0.0.0.0' else host}:{port}/"
-    address += f"?token={token}" if token else ""
-    app.add_middleware(Guard, host=host, token=token)
+    workspace.claim()
+    jobs = Jobs(workspace)
+    address = f"http://{_shown(host)}:{port}/?token={token}"
+    app.add_middleware(Guard, host=host, port=port, token=token)
     app.on_shutdown(jobs.close)
     app.timer(TICK, jobs.poll)  # whether or not a page is open
 
     idle = threading.Timer(IDLE, _load_the_rest)
     idle.daemon = True
 
-    @ui.page("/", title="mckibben")
-    def page() -> None:
+    @ui.page("/", title="mckibben", response_timeout=PATIENCE)
+    async def page() -> None:
+        _make_room()
+        await asyncio.to_thread(workspace.warm)
         build(workspace, jobs)
         if not idle.is_alive() and not idle.finished.is_set():
             idle.start()
 
     told = f"Workbench over {workspace.folder}: {address} (Ctrl-C ends it)"
+    if workspace.read_only:
+        told += f"\nNothing can be changed here: {workspace.read_only}."
     app.on_startup(lambda: announce(told))
-    with contextlib.suppress(KeyboardInterrupt):
+    with contextlib.suppress(KeyboardInterrupt), _door(workspace, port, address) as door:
+        if show and door is not None:
+            app.timer(OPENING, lambda: _open(door), once=True, immediate=False)
         ui.run(
             host=host,
             port=port,
             title="mckibben",
-            show=address if show else False,
+            show=False,
             reload=False,
             show_welcome_message=False,
+            reconnect_timeout=ABSENCE,
             favicon="🦾",
         )
+
+
+def _make_room() -> None:
+    """Let go of pages that were asked for and never opened, beyond some; each takes memory."""
+    own = ui.context.client
+    waiting = [
+        client
+        for client in Client.instances.values()
+        if client is not own and not client.has_socket_connection
+    ]
+    for client in sorted(waiting, key=lambda client: client.created)[:-UNOPENED]:
+        client.delete()
+
+
+def _shown(host: str) -> str:
+    """Return a host as an address names it."""
+    named = {"0.0.0.0": "127.0.0.1", "::": "::1"}.get(host, host)
+    return f"[{named}]" if ":" in named else named
+
+
+@contextlib.contextmanager
+def _door(workspace: Workspace, port: int, address: str) -> Iterator[Path | None]:
+    """Make a page in the workspace that leads to the workbench, as long as that is there.
+
+    The address must not stand in the command that starts a browser: every user of this machine may
+    read that.
+    """
+    path = workspace.folder / f".open-{port}.html"
+    try:
+        write_text(path, f'<meta http-equiv="refresh" content="0;url={address}">')
+    except MckibbenError:  # of a folder that may only be read
+        yield None
+        return
+    try:
+        yield path
+    finally:
+        path.unlink(missing_ok=True)
+
+
+def _open(door: Path) -> None:
+    threading.Thread(target=webbrowser.open, args=(door.as_uri(),), daemon=True).start()
 
 
 def _free(host: str, port: int) -> int:

@@ -17,7 +17,8 @@ from typing import Any
 
 from mckibben.atomic import write_text
 from mckibben.blocks.base import Block
-from mckibben.errors import ModelError
+from mckibben.errors import DataError, ModelError
+from mckibben.ordinary import read_text
 from mckibben.registry import load as load_plugin
 
 FORMAT = "mckibben-model"
@@ -95,9 +96,14 @@ def nested(content: Any) -> Any:
     return part_from_dict(content) if isinstance(content, Mapping) else content
 
 
+def to_text(block: Block) -> str:
+    """Return a block as the text of its file."""
+    return json.dumps(to_dict(block), indent=2, allow_nan=False) + "\n"
+
+
 def save(block: Block, path: str | Path) -> None:
-    """Write a block as JSON, by a temporary file that is then renamed."""
-    write_text(path, json.dumps(to_dict(block), indent=2, allow_nan=False) + "\n")
+    """Write a block as JSON, by a temporary file that is then renamed, over what had the name."""
+    write_text(path, to_text(block))
 
 
 def load(path: str | Path) -> Block:
@@ -115,16 +121,13 @@ def load(path: str | Path) -> Block:
     """
     path = Path(path)
     try:
-        if path.stat().st_size > LARGEST_FILE:
-            raise ModelError(f"larger than {LARGEST_FILE} bytes. Remedy: give a model file.")
-        text = path.read_text(encoding="utf-8")
+        text = read_text(path, most=LARGEST_FILE)
         return from_dict(json.loads(text, parse_constant=_refuse, object_pairs_hook=_unique))
-    except OSError as error:
-        reason = error.strerror or "unreadable"
-        raise ModelError(f"{path}: {reason}. Remedy: check the path of the model file.") from None
+    except DataError as error:
+        raise ModelError(str(error)) from None
     except (ValueError, RecursionError) as error:
         raise ModelError(
-            f"{path}: not readable as a model ({error}). Remedy: save the model again."
+            f"{path}: not readable as a model ({str(error)[:200]}). Remedy: save the model again."
         ) from None
     except ModelError as error:
         raise ModelError(f"{path}: {error}") from None

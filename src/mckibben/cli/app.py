@@ -16,11 +16,12 @@ def app(
     ] = Path("workbench"),
     host: Annotated[
         str,
-        typer.Option("--host", help="Address to listen on; others than this machine need a token."),
+        typer.Option("--host", help="Address to listen on."),
     ] = "127.0.0.1",
     port: Annotated[int, typer.Option("--port", help="Port; 0 for any free one.")] = 8750,
     token: Annotated[
-        str | None, typer.Option("--token", help="Token to demand; made up where one is needed.")
+        str | None,
+        typer.Option("--token", help="Token to demand, 16 letters or more; made up if not given."),
     ] = None,
     show: Annotated[bool, typer.Option("--show/--no-show", help="Open a browser.")] = True,
 ) -> None:

@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import asyncio
+from typing import Any
 
 import numpy as np
 from nicegui import ui
 from nicegui.events import MouseEventArguments, UploadEventArguments
 
 from mckibben.app import plots
-from mckibben.app.desk import Desk, guarded, named, on_event, tell
+from mckibben.app.desk import Desk, guarded, kept, named, on_event, tell
+from mckibben.app.guard import LARGEST_UPLOAD, TOO_LARGE
 from mckibben.app.work import compensated, reference_recording
 from mckibben.errors import DataError, MckibbenError
 from mckibben.files import read, write
 from mckibben.recording import Recording
+from mckibben.report import wording
 
 CONTROLLERS = {
     "feedforward": "compensator alone",
@@ -31,7 +34,7 @@ def build(desk: Desk) -> None:
     selects: list[ui.select] = []
 
     def found() -> list[str]:
-        return [name for name in desk.workspace.models() if _invertible(desk, name)]
+        return [name for name in desk.workspace.models() if desk.workspace.invertible(name)]
 
     @ui.refreshable
     def shown() -> None:
@@ -63,21 +66,17 @@ def build(desk: Desk) -> None:
     shown()
 
 
-def _invertible(desk: Desk, name: str) -> bool:
-    try:
-        block = desk.workspace.model(name)
-        block.inverse()
-    except MckibbenError:
-        return False
-    return len(block.inputs) == len(block.outputs) == 1 and not block.kind.endswith("-inverse")
-
-
 def _reach(desk: Desk, model: str) -> tuple[float, float]:
-    low, high = desk.workspace.model(model).reachable()
+    try:
+        low, high = desk.workspace.model(model).reachable()
+    except MckibbenError:
+        low = high = np.array([np.nan])
     if not (np.isfinite(low[0]) and np.isfinite(high[0])):
         seen = [r[desk.output] for r in desk.workspace.with_role("train")] or [np.array([0.0, 1.0])]
-        return min(float(y.min()) for y in seen), max(float(y.max()) for y in seen)
-    return float(low[0]), float(high[0])
+        least, most = min(float(y.min()) for y in seen), max(float(y.max()) for y in seen)
+    else:
+        least, most = float(low[0]), float(high[0])
+    return (least, most) if least < most else (least - 0.5, least + 0.5)
 
 
 class Editor:
@@ -124,6 +123,8 @@ class Editor:
         ui.upload(
             label="or a file with displacement over time",
             auto_upload=True,
+            max_file_size=LARGEST_UPLOAD,
+            on_rejected=lambda: tell(TOO_LARGE),
             on_upload=on_event(self._loaded),
         ).classes("w-full")
 
@@ -168,9 +169,11 @@ class Editor:
         )
 
     async def _loaded(self, event: UploadEventArguments) -> None:
-        path = self.desk.workspace.keep_upload(event.file.name, await event.file.read())
-        (recording,) = await asyncio.to_thread(lambda: read(path, informative=False))
-        self.file = recording
+        path = await kept(self.desk, event.file)
+        found = await asyncio.to_thread(lambda: read(path, informative=False))
+        if len(found) != 1:
+            raise DataError("it holds several recordings", file=path, remedy="give a file of one")
+        self.file = found[0]
         await self._show()
 
     def _wished(self) -> Recording:
@@ -183,8 +186,8 @@ class Editor:
     async def _show(self) -> None:
         desk, reference, name = self.desk, self._wished(), str(self.model.value)
         given, notes = await asyncio.to_thread(compensated, desk.workspace, name, reference)
-        file = f"{desk.workspace.new_name('runs', 'reference')}.csv"
-        write(reference, desk.workspace.path("runs", file))
+        file = f"{desk.workspace.new_name('runs', 'reference', '.csv')}.csv"
+        await asyncio.to_thread(write, reference, desk.workspace.new_path("runs", file))
         call = f"mckibben.load('models/{name}.json').inverse().simulate(reference)"
         desk.did(f"inverted {name}", call)
         self.results.clear()
@@ -255,6 +258,10 @@ def _pressures(
     ).props("outline")
 
 
+def _listed(values: dict[str, float | None]) -> str:
+    return ", ".join(wording.number(value, 3) for value in values.values())
+
+
 def _loops(desk: Desk, model: str, reference: str) -> None:
     from mckibben.rigs import load_rig, rig_names
 
@@ -277,39 +284,31 @@ def _loops(desk: Desk, model: str, reference: str) -> None:
             "controllers",
         )
 
-        def start() -> None:
+        async def start() -> None:
             if not rig.value or not kinds.value:
                 tell("Choose a rig and a controller.")
             for kind in kinds.value:
-                name = desk.workspace.new_name("runs", f"{model}-{kind}")
+                name = f"{model}-{kind}"
                 call = f"track({kind} of {model!r}, load_rig({rig.value!r}), reference)"
                 desk.jobs.submit(
                     "loop",
                     {"model": model, "controller": kind, "rig": rig.value, "reference": reference}
-                    | {"name": name, "call": call, "title": name},
+                    | {"name": name, "call": call},
                 )
                 desk.did(f"closed the loop: {name}", call)
             desk.changed("jobs")
 
-        named(ui.button("Run", on_click=start), "run-loop")
+        named(ui.button("Run", on_click=guarded(start)), "run-loop")
 
     @ui.refreshable
     def shown() -> None:
-        names = [
-            name
-            for name in desk.workspace.names("runs")
-            if (desk.workspace.read_json("runs", name) or {}).get("model") == model
+        runs = desk.workspace.runs(model)
+        rows: list[dict[str, Any]] = [
+            {"name": name, "controller": run.controller, "rig": run.rig}
+            | {"rmse": _listed(run.rmse), "largest": _listed(run.largest), "clipped": run.clipped}
+            | {"step": wording.number(run.step_us, 2)}
+            for name, run in runs.items()
         ]
-        rows = []
-        for name in names:
-            found = desk.workspace.read_json("runs", name) or {}
-            rms = ", ".join(f"{value:.3g}" for value in found.get("rmse", {}).values())
-            worst = ", ".join(f"{value:.3g}" for value in found.get("largest", {}).values())
-            rows.append(
-                {"name": name, "controller": found.get("controller"), "rig": found.get("rig")}
-                | {"rmse": rms, "largest": worst, "clipped": found.get("clipped")}
-                | {"step": f"{found.get('step_us', float('nan')):.0f}"}
-            )
         if not rows:
             return
         labels = ("Run", "Controller", "Rig", "RMSE [mm]", "Largest [mm]", "Clipped", "Step [µs]")
@@ -319,14 +318,15 @@ def _loops(desk: Desk, model: str, reference: str) -> None:
         ]
         named(ui.table(rows=rows, columns=columns, row_key="name").props("dense flat"), "runs")
         curves: list[tuple[str, plots.Array, plots.Array, str]] = []
-        for place, name in enumerate(names[-4:]):
+        for place, name in enumerate(list(runs)[-4:]):
             try:
                 (run_,) = read(desk.workspace.path("runs", f"{name}.csv"), informative=False)
-            except MckibbenError:
+                wished, followed = run_["reference_displacement"], run_["displacement"]
+            except (MckibbenError, ValueError, KeyError):
                 continue
             if not curves:
-                curves.append(("reference", run_.time, run_["reference_displacement"], "measured"))
-            curves.append((name, run_.time, run_["displacement"], f"series-{place + 1}"))
+                curves.append(("reference", run_.time, wished, "measured"))
+            curves.append((name, run_.time, followed, f"series-{place + 1}"))
         if curves:
             named(
                 ui.plotly(

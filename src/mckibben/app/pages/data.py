@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import warnings
 from typing import TYPE_CHECKING, Any
 
 from nicegui import ui
@@ -10,13 +11,16 @@ from nicegui.events import UploadEventArguments
 
 from mckibben import registry
 from mckibben.app import scripts
-from mckibben.app.desk import Desk, guarded, named, on_event, tell
-from mckibben.app.workspace import LARGEST_UPLOAD
-from mckibben.errors import DataError, MckibbenError
+from mckibben.app.desk import LONGEST, Desk, guarded, kept, labelled, named, on_event, tell
+from mckibben.app.guard import LARGEST_UPLOAD, TOO_LARGE
+from mckibben.errors import DataError, DataWarning, MckibbenError
 
 if TYPE_CHECKING:
     from mckibben.files.table import Column
     from mckibben.recording import Recording
+
+SHOWN = 6
+"""Notes of reading that are shown of a recording."""
 
 EXAMPLE = "field-models"
 """Protocol whose runs are the example."""
@@ -44,7 +48,7 @@ def _sources(desk: Desk) -> None:
             auto_upload=True,
             max_file_size=LARGEST_UPLOAD,
             on_upload=on_event(lambda event: _uploaded(desk, event)),
-            on_rejected=lambda: tell(f"A file has more than {LARGEST_UPLOAD // 2**20} MiB."),
+            on_rejected=lambda: tell(TOO_LARGE),
         ).classes("w-full"),
         "upload",
     )
@@ -108,45 +112,59 @@ def _rig(desk: Desk) -> None:
 
 
 async def _uploaded(desk: Desk, event: UploadEventArguments) -> None:
-    content = await event.file.read()
-    path = desk.workspace.keep_upload(event.file.name, content)
+    path = await kept(desk, event.file)
     await _take(desk, path.name, event.file.name, {})
 
 
-async def _take(desk: Desk, kept: str, shown: str, options: dict[str, Any]) -> bool:
+async def _take(desk: Desk, held: str, shown: str, options: dict[str, Any]) -> bool:
     """Read an uploaded file and add its recordings; where that fails, ask how it is to be read."""
     from mckibben.files import read
 
-    path = desk.workspace.path("uploads", kept)
-    try:
-        recordings = await asyncio.to_thread(lambda: read(path, informative=False, **options))
-    except MckibbenError as error:
-        await _ask(desk, kept, shown, options, error)
-        return False
+    path = desk.workspace.path("uploads", held)
     call = scripts.read_call(str(path), options)
-    for recording in recordings:
-        desk.workspace.add(recording, origin=f"file {shown}", call=call)
+
+    def taken() -> tuple[int, list[str]]:
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            recordings = read(path, informative=False, **options)
+        notes = [str(one.message) for one in caught if issubclass(one.category, DataWarning)]
+        added: list[str] = []
+        for recording in recordings:
+            entry = desk.workspace.add(recording, origin=f"file {shown}", call=call, notes=notes)
+            added += entry.notes
+        desk.workspace.warm()
+        return len(recordings), list(dict.fromkeys(added))
+
+    try:
+        number, notes = await asyncio.to_thread(taken)
+    except MckibbenError as error:
+        await _ask(desk, held, shown, options, error)
+        return False
     desk.settle_channels()
     desk.did(f"read {shown}", call)
     desk.changed("recordings")
-    ui.notify(f"{shown}: {len(recordings)} recording(s)")
+    ui.notify(f"{shown}: {number} recording(s)")
+    for note in notes:
+        ui.notify(note[:LONGEST], type="warning", multi_line=True, timeout=10_000)
     return True
 
 
 async def _ask(
-    desk: Desk, kept: str, shown: str, options: dict[str, Any], error: MckibbenError
+    desk: Desk, held: str, shown: str, options: dict[str, Any], error: MckibbenError
 ) -> None:
     """Show why a file could not be read, what is in it, and let columns and units be named."""
     from mckibben.files import formats
 
-    path = desk.workspace.path("uploads", kept)
+    path = desk.workspace.path("uploads", held)
     try:
         tables = await asyncio.to_thread(formats.tables, path)
         columns = [column.header for column in tables[0].columns]
         first = [
-            {column.header: _cell(column, row) for column in tables[0].columns} for row in range(5)
+            {f"{place}": _cell(column, row)[:80] for place, column in enumerate(tables[0].columns)}
+            for row in range(5)
         ]
     except (MckibbenError, IndexError):
+        path.unlink(missing_ok=True)  # nobody can be asked how it is to be read
         tell(f"{shown}: {error}")
         return
     with ui.dialog() as dialog, ui.card().classes("w-full max-w-4xl"):
@@ -154,7 +172,10 @@ async def _ask(
         named(ui.label(str(error)).classes("text-negative"), "problem")
         ui.table(
             rows=first,
-            columns=[{"name": c, "label": c, "field": c, "align": "right"} for c in columns],
+            columns=[
+                {"name": f"{place}", "label": column[:80], "field": f"{place}", "align": "right"}
+                for place, column in enumerate(columns)
+            ],
         ).classes("w-full").props("dense flat")
         picks: dict[str, tuple[Any, Any]] = {}
         with ui.grid(columns=3).classes("items-center"):
@@ -175,7 +196,7 @@ async def _ask(
             if rate.value:
                 chosen["rate"] = float(rate.value)
             dialog.close()
-            await _take(desk, kept, shown, chosen)
+            await _take(desk, held, shown, chosen)
 
         with ui.row():
             named(ui.button("Read it so", on_click=guarded(again)), "read-again")
@@ -237,6 +258,8 @@ def _row(desk: Desk, name: str) -> None:
             ui.label(name).classes("font-medium")
             listed = ", ".join(f"{c} [{recording.units[c] or '-'}]" for c in recording.channels)
             ui.label(f"{len(recording)} samples{duration}; {listed}").classes("text-xs opacity-70")
+            for note in entry.notes[:SHOWN]:
+                named(ui.label(note[:LONGEST]).classes("text-xs text-warning"), f"note-{name}")
         named(
             ui.toggle(
                 ["train", "test", "unused"],
@@ -245,12 +268,9 @@ def _row(desk: Desk, name: str) -> None:
             ).props("dense"),
             f"role-{name}",
         )
-        ui.button(icon="show_chart", on_click=lambda: _show(desk, name)).props(
-            f'flat dense aria-label="Show {name}"'
-        ).tooltip("Show")
-        ui.button(icon="delete", on_click=lambda: _remove(desk, name)).props(
-            f'flat dense aria-label="Remove {name}"'
-        ).tooltip("Remove")
+        for icon, word, action in (("show_chart", "Show", _show), ("delete", "Remove", _remove)):
+            button = ui.button(icon=icon, on_click=lambda action=action: action(desk, name))
+            labelled(button.props("flat dense").tooltip(word), "aria-label", f"{word} {name}")
 
 
 def _set_role(desk: Desk, name: str, role: Any) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import dataclasses
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -12,11 +13,15 @@ from nicegui import ui
 
 from mckibben import registry
 from mckibben.app import plots, scripts
-from mckibben.app.desk import Desk, guarded, named, on_event, tell
+from mckibben.app.desk import Desk, code, guarded, labelled, named, on_event, tell
 from mckibben.app.jobs import ENDED, RUNNING, Job, parse_settings
+from mckibben.atomic import to_json
 from mckibben.comparison.free_run import run_free
-from mckibben.errors import MckibbenError, ModelError
+from mckibben.errors import DataError, MckibbenError, ModelError
 from mckibben.report import subjects, wording
+
+LONGEST = 200_000
+"""Characters of a model's parameters that are shown."""
 
 SENSIBLE = ("pi", "gpi", "mpi", "cpi", "preisach")
 """Models to start with."""
@@ -48,7 +53,7 @@ def _names_only(chosen: ui.select) -> None:
     """Show the short names of what is chosen; the menu describes them."""
 
     def show() -> None:
-        chosen.props(f'display-value="{", ".join(chosen.value or []) or "none"}"')
+        labelled(chosen, "display-value", ", ".join(chosen.value or []) or "none")
 
     chosen.on_value_change(show)
     show()
@@ -95,15 +100,11 @@ def _fit(desk: Desk, models: list[str], settings: dict[str, str]) -> None:
                 f"{model} has no setting {unknown[0]!r}. Remedy: use one of {', '.join(sorted(known))}."
             )
             continue
-        name = desk.workspace.new_name("models", model)
-        busy = {job.given.get("name") for job in desk.jobs.active()}
-        while name in busy:
-            name += "x"
         call = scripts.fit_call(model, desk.channels, given, 0)
         desk.jobs.submit(
             "fit",
-            {"model": model, "name": name, "input": desk.input, "output": desk.output}
-            | {"settings": given, "seed": 0, "call": call, "title": name},
+            {"model": model, "name": model, "input": desk.input, "output": desk.output}
+            | {"settings": given, "seed": 0, "call": call},
         )
         desk.did(f"started fitting {model}", call)
     desk.changed("jobs")
@@ -225,6 +226,8 @@ def _leaderboard(desk: Desk) -> None:
             "Memory: 1 where the model keeps rising and falling branches as far apart as the data do, "
             "0 where it forgot. Select one or two models to look closer."
         ).classes("text-xs opacity-70")
+        for said in _judged(desk.workspace.results()):
+            ui.label(said).classes("text-sm")
         place = named(ui.column().classes("w-full"), "closer")
 
         async def closer() -> None:
@@ -242,27 +245,46 @@ def _leaderboard(desk: Desk) -> None:
     shown()
 
 
+def _judged(results: Sequence[dict[str, Any]]) -> list[str]:
+    """Return what every model has to beat, and what speaks against models or their tests."""
+    said = []
+    for result in results:
+        constant = result.get("constant") or {}
+        tested = wording.number((constant.get("test") or {}).get("rmse"))
+        validated = wording.number(constant.get("validation_rmse"))
+        if constant:
+            said.append(
+                f"constant, the mean of the training output: CV RMSE {validated}, test RMSE {tested}. "
+                "Every model has to beat it."
+            )
+        against = [result.get("not_recommended"), *result.get("shared", ())]
+        said += [f"{result['name']}: {one}" for one in against if one]
+    return list(dict.fromkeys(said))
+
+
 def _row(result: dict[str, Any]) -> dict[str, Any]:
-    test, train = result.get("test") or {}, result.get("train") or {}
+    test, train = result["test"] or {}, result["train"] or {}
     interval = test.get("rmse_interval")
-    memory = (result.get("memory") or {}).get("gap_ratio")
+    memory = (result["memory"] or {}).get("gap_ratio")
     number = wording.number
     return {
         "name": result["name"],
         "rmse": number(test.get("rmse")),
         "interval": f"{number(interval[0])} to {number(interval[1])}" if interval else "",
         "r2": number(100 * test["r2"], 4) if test.get("r2") is not None else "",
-        "cv": number(result.get("validation_rmse")),
+        "cv": number(result["validation_rmse"]),
         "train": number(train.get("rmse")),
         "memory": number(memory, 2),
-        "parameters": result.get("n_parameters"),
-        "seconds": number(result.get("fit_seconds"), 2),
+        "parameters": result["n_parameters"],
+        "seconds": number(result["fit_seconds"], 2),
     }
 
 
 async def _closer(desk: Desk, names: list[str], place: Any) -> None:
     """Show measured against modelled, residuals and parameters, of one model or two side by side."""
     recordings = desk.workspace.with_role("test") or desk.workspace.with_role("train")
+    if not recordings:
+        raise DataError("there is no recording to run it on", remedy="add one under Data")
     recording = recordings[0]
     blocks = {name: desk.workspace.model(name) for name in names}
     known = desk.workspace.with_role("train")
@@ -292,5 +314,5 @@ async def _closer(desk: Desk, names: list[str], place: Any) -> None:
         with ui.row().classes("w-full items-start"):
             for name, block in blocks.items():
                 content = {key: value for key, value in block.to_dict().items() if key != "format"}
-                with ui.expansion(f"Parameters of {name}").classes("flex-1"):
-                    ui.json_editor({"content": {"json": content}, "readOnly": True})
+                with ui.expansion(f"Parameters of {name}").classes("flex-1 min-w-0"):
+                    code(to_json(content)[:LONGEST]).classes("max-h-96 overflow-y-auto")

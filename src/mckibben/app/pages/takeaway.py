@@ -9,10 +9,14 @@ from typing import Any
 from nicegui import ui
 
 from mckibben.app import scripts
-from mckibben.app.desk import Desk, guarded, named
+from mckibben.app.desk import Desk, code, guarded, named
 from mckibben.atomic import replacing
 from mckibben.blocks.base import Block
 from mckibben.errors import DataError
+from mckibben.ordinary import read_bytes
+
+LARGEST = 256 * 2**20
+"""Bytes of a file that is handed over."""
 
 FIGURES = {
     "time": "recordings over time",
@@ -77,7 +81,7 @@ def _code(desk: Desk, model: Any, inverse: Any, step: Any) -> None:
             return {"sample_time": float(step.value)} if block.rate_dependent else {}
 
         async def as_json() -> None:
-            path = desk.workspace.path("takeaway", f"{_stem(model, inverse)}.json")
+            path = desk.workspace.new_path("takeaway", f"{_stem(model, inverse)}.json")
             _block(desk, model, inverse).save(path)
             _hand_over(desk, path, "Block.save(path)")
 
@@ -86,7 +90,7 @@ def _code(desk: Desk, model: Any, inverse: Any, step: Any) -> None:
             from mckibben.export.folders import zipped
 
             name = name_from(Path(f"{_stem(model, inverse)}.json"))
-            folder = desk.workspace.path("takeaway", f"{name}-c")
+            folder = desk.workspace.new_path("takeaway", f"{name}-c")
             await asyncio.to_thread(
                 lambda: export_c(
                     _block(desk, model, inverse),
@@ -97,9 +101,9 @@ def _code(desk: Desk, model: Any, inverse: Any, step: Any) -> None:
                     **options(),
                 )
             )
-            path = desk.workspace.path("takeaway", f"{name}-c.zip")
+            path = desk.workspace.new_path("takeaway", f"{name}-c.zip")
             with replacing(path) as new:
-                new.write_bytes(zipped(_contents(folder)))
+                new.write_bytes(await asyncio.to_thread(lambda: zipped(_contents(folder))))
             flag = " --float32" if single.value else ""
             _hand_over(desk, path, f"mckibben export c {model.value}.json -o {folder.name}{flag}")
 
@@ -107,7 +111,7 @@ def _code(desk: Desk, model: Any, inverse: Any, step: Any) -> None:
             from mckibben.export import export_fmu
 
             name = name_from(Path(f"{_stem(model, inverse)}.json"))
-            path = desk.workspace.path("takeaway", f"{name}.fmu")
+            path = desk.workspace.new_path("takeaway", f"{name}.fmu")
             await asyncio.to_thread(
                 lambda: export_fmu(
                     _block(desk, model, inverse),
@@ -144,7 +148,7 @@ def _figures(desk: Desk, model: Any) -> None:
             stem = (
                 f"{model.value}-{kind.value}" if kind.value not in ("time", "loop") else kind.value
             )
-            path = desk.workspace.path("takeaway", f"{stem}.{form.value}")
+            path = desk.workspace.new_path("takeaway", f"{stem}.{form.value}")
 
             def save() -> None:
                 if kind.value in ("time", "loop"):
@@ -166,12 +170,12 @@ def _report(desk: Desk) -> None:
             "What the muscle does, the model chosen, its test and inverse: one page, opens anywhere."
         )
 
-        def start() -> None:
+        async def start() -> None:
             models, settings = [], {}
             for row in desk.workspace.results():
                 if row["model"] not in models:
                     models.append(row["model"])
-                    settings[row["model"]] = row.get("settings") or {}
+                    settings[row["model"]] = row["settings"]
             call = f"write_report(mckibben.study(train, test, models={models!r}), 'report.html')"
             desk.jobs.submit(
                 "report",
@@ -181,7 +185,7 @@ def _report(desk: Desk) -> None:
             desk.did("started the report", call)
             desk.changed("jobs")
 
-        named(ui.button("Write it", on_click=start), "take-report")
+        named(ui.button("Write it", on_click=guarded(start)), "take-report")
 
         @ui.refreshable
         def ready() -> None:
@@ -190,10 +194,12 @@ def _report(desk: Desk) -> None:
                     ui.label("Being written.").classes("text-xs")
             path = desk.workspace.path("takeaway", "report.html")
             if path.is_file():
-                get = lambda: ui.download(path.read_bytes(), "report.html")  # noqa: E731
-                named(
-                    ui.button("Download report.html", on_click=get).props("outline"), "get-report"
-                )
+
+                async def get() -> None:
+                    ui.download(read_bytes(path, most=LARGEST), "report.html")
+
+                button = ui.button("Download report.html", on_click=guarded(get)).props("outline")
+                named(button, "get-report")
 
         desk.when("jobs", ready.refresh)
         ready()
@@ -209,7 +215,7 @@ def _script(desk: Desk) -> None:
 
         @ui.refreshable
         def shown() -> None:
-            named(ui.code(text(), language="python").classes("w-full"), "script")
+            named(code(text()), "script")
 
         for topic in ("results", "recordings", "channels"):
             desk.when(topic, shown.refresh)
@@ -224,11 +230,14 @@ def _script(desk: Desk) -> None:
 
 def _hand_over(desk: Desk, path: Path, call: str) -> None:
     desk.did(f"wrote {path.name}", call)
-    ui.download(path.read_bytes(), path.name)
+    ui.download(read_bytes(path, most=LARGEST), path.name)
     ui.notify(f"Also kept as {path}")
 
 
 def _contents(folder: Path) -> dict[str, bytes]:
     """Return the files of a folder by their path, the folder's own name first."""
-    files = (path for path in folder.rglob("*") if path.is_file())
-    return {path.relative_to(folder.parent).as_posix(): path.read_bytes() for path in files}
+    return {
+        path.relative_to(folder.parent).as_posix(): read_bytes(path, most=LARGEST)
+        for path in folder.rglob("*")
+        if path.is_file() and not path.is_symlink()
+    }

@@ -1,0 +1,164 @@
+"""What is read of a workspace: checked here, so that what is damaged costs its line and never a page."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from typing import Annotated, Any, Literal, TypeVar
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
+from pydantic_core import from_json
+
+LONGEST = 10_000
+"""Characters of a text."""
+
+
+def _finite(value: Any) -> float | None:
+    """Return a number, or None for what is none: NaN and Infinity stand in files of good fits too."""
+    if value is None or isinstance(value, bool) or not isinstance(value, int | float):
+        if value is None:
+            return None
+        raise ValueError("no number")
+    try:
+        return float(value) if math.isfinite(value) else None
+    except OverflowError:
+        return None
+
+
+Text = Annotated[str, Field(max_length=LONGEST)]
+Number = Annotated[float | None, BeforeValidator(_finite)]
+Count = Annotated[int, Field(ge=0, le=2**53)]
+
+
+class Kept(BaseModel):
+    """Anything kept; what is not known of it is passed over."""
+
+    model_config = ConfigDict(extra="ignore", strict=True)
+
+
+class Line(Kept):
+    """A line of the log."""
+
+    did: Text
+    call: Text = ""
+    time: Text = ""
+
+
+class Described(Kept):
+    """What is known of a recording."""
+
+    role: Literal["train", "test", "unused"]
+    origin: Text = ""
+    call: Text = ""
+    file: Text = ""
+    notes: list[Text] = []
+
+
+class Figures(Kept):
+    """How a model did on some recordings."""
+
+    rmse: Number = None
+    r2: Number = None
+    rmse_interval: list[Number] | None = Field(default=None, min_length=2, max_length=2)
+
+
+class Memory(Kept):
+    """Whether a model keeps its branches apart."""
+
+    gap_ratio: Number = None
+
+
+class Constant(Kept):
+    """How far off the mean of the training output is, which every model has to beat."""
+
+    validation_rmse: Number = None
+    test: Figures | None = None
+
+
+class Fitted(Kept):
+    """What came of a fit."""
+
+    status: Literal["ok"]
+    model: Text = ""
+    settings: dict[str, Any] = {}
+    validation_rmse: Number = None
+    test: Figures | None = None
+    train: Figures | None = None
+    memory: Memory | None = None
+    n_parameters: Count | None = None
+    fit_seconds: Number = None
+    constant: Constant | None = None
+    not_recommended: Text | None = None
+    shared: list[Text] = []
+
+
+class Followed(Kept):
+    """What came of a closed loop."""
+
+    model: Text
+    rig: Text = ""
+    controller: Text = ""
+    rmse: dict[str, Number] = {}
+    largest: dict[str, Number] = {}
+    clipped: Count | None = None
+    step_us: Number = None
+
+
+class Given(Kept):
+    """What a job is to do, as far as the page shows it; the rest is for the work to judge."""
+
+    model_config = ConfigDict(extra="allow", strict=True)
+    title: Text = ""
+    name: Text = ""
+    model: Text = ""
+    call: Text = ""
+    settings: dict[str, Any] = {}
+
+
+class Noted(Kept):
+    """What a job is and how it went."""
+
+    kind: Literal["fit", "loop", "record", "report"]
+    state: Text
+    message: Text = ""
+    given: Given
+
+
+Any_ = TypeVar("Any_", bound=Kept)
+
+
+def checked(kind: type[Any_], content: Any) -> Any_ | None:
+    """Return what was kept, or None where it is not what it should be."""
+    try:
+        return kind.model_validate(content)
+    except ValidationError:
+        return None
+
+
+def parsed(content: bytes) -> Any:
+    """Return what JSON holds, or None where it is damaged: not UTF-8, half there, endlessly deep."""
+    try:
+        return from_json(content)
+    except ValueError:
+        return None
+
+
+def lines(content: bytes) -> Iterable[Line]:
+    """Yield the lines of a log that are whole."""
+    for line in content.split(b"\n"):
+        found = checked(Line, parsed(line)) if line.strip() else None
+        if found is not None:
+            yield found
+
+
+def progress(content: bytes) -> list[tuple[float, float, float]]:
+    """Return what a job told, as far as it is whole: seconds, share done, least cost so far or NaN."""
+    told = []
+    for line in content.splitlines():
+        try:
+            seconds, share, cost = map(float, line.split())
+        except ValueError:
+            continue
+        if math.isfinite(seconds) and 0.0 <= share <= 1.0:
+            told.append((seconds, share, cost))
+    return told

@@ -36,6 +36,9 @@ from mckibben.registry import names
 
 SAMPLE_TIME = 0.01
 
+LONGEST_TEXT = 5_000_000
+"""Of a damaged model; longer ones are cut."""
+
 NUMBERS: tuple[Any, ...] = (
     *(0, 0.0, -0.0, 1, -1, 0.5, 2, 3, 1e308, -1e308, 1.7e308, 1e154, 1e-154, 5e-324, -5e-324),
     *(1e-300, 1e16, 1e9, 10**6, 10**9, 2**31, 2**63, -(2**63), 10**30, 10**308, 10**400, 1e999),
@@ -212,7 +215,7 @@ def damaged(rng: Rng) -> str:
         DAMAGES[rng.integers(len(DAMAGES))](rng, content)
         if not content:
             break
-    text = json.dumps(content)
+    text = json.dumps(content)[:LONGEST_TEXT]
     if rng.random() < 0.05:
         at = int(rng.integers(len(text)))
         text = (

@@ -35,11 +35,9 @@ Kernel = Callable[..., None]
 Made = TypeVar("Made")
 
 
-COMPUTING = {
-    *("__post_init__", "bind", "coefficients", "initial_state", "inverse", "pack", "passes"),
-    *("reachable", "unpack"),
-}
-"""Methods in which numbers may be too large or too small to compute with."""
+UNCOMPUTABLE = (ArithmeticError, np.linalg.LinAlgError)
+COMPUTING = {"coefficients", "initial_state", "inverse", "passes", "reachable"}
+"""Methods in which numbers may be too large or too small to compute with, as where one is made."""
 
 
 def _computing(method: Callable[..., Any]) -> Callable[..., Any]:
@@ -49,13 +47,17 @@ def _computing(method: Callable[..., Any]) -> Callable[..., Any]:
     def told(self: Any, *given: Any, **named: Any) -> Any:
         try:
             return method(self, *given, **named)
-        except (ArithmeticError, np.linalg.LinAlgError) as error:
-            raise ModelError(
-                f"the numbers of {self.kind!r} cannot be computed with ({error}). "
-                "Remedy: identify the model again; numbers so large or small mean nothing."
-            ) from error
+        except UNCOMPUTABLE as error:
+            raise _beyond_sense(type(self), error) from error
 
     return told
+
+
+def _beyond_sense(cls: type, error: Exception) -> ModelError:
+    return ModelError(
+        f"the numbers of {getattr(cls, 'kind', cls.__name__)!r} cannot be computed with ({error}). "
+        "Remedy: identify the model again; numbers so large or small mean nothing."
+    )
 
 
 class Checked(ABCMeta):
@@ -74,6 +76,8 @@ class Checked(ABCMeta):
         """Return an instance, its fields validated."""
         try:
             return super().__call__(*values, **named)  # type: ignore[misc]
+        except UNCOMPUTABLE as error:
+            raise _beyond_sense(cls, error) from error
         except ValidationError as error:
             first = error.errors()[0]
             names = [field.name for field in fields(cls)]  # type: ignore[arg-type]

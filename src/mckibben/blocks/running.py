@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from math import isfinite
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -60,7 +61,7 @@ class Stream:
     def reset(self) -> None:
         """Forget everything: the next step is a first one."""
         self._started = False
-        self._kept: float | Sequence[float] = 0.0
+        self._kept: float | list[float] = 0.0
         self.status = self.GOOD
 
     def step(self, inputs: float | ArrayLike) -> Array:
@@ -73,27 +74,31 @@ class Stream:
         DataError
             If the inputs are not as many numbers as the block has inputs.
         """
-        try:
-            self._input[...] = inputs
-        except (TypeError, ValueError, OverflowError) as error:
-            raise self._misfit(error) from None
-        given = self._given
-        total = given[0] if self._one_given else sum(given)  # finite only if all are; may overflow
-        if total - total != 0.0 and not all(map(isfinite, given)):
+        given, gives = self._given, self._gives
+        # a sum is finite only if all terms are; it may overflow, and infinity less itself is NaN
+        if self._one_given and type(inputs) is float:
+            total = given[0] = inputs
+        else:
+            try:
+                self._input[...] = inputs
+            except (TypeError, ValueError, OverflowError) as error:
+                raise self._misfit(error) from None
+            total = given[0] if self._one_given else sum(given)
+        if total - total and not all(map(isfinite, given)):
             return self._held(self.BAD_INPUT)
         if not self._started:
             self.state[:] = self.block.initial_state(self._input, self.initial)
             self._started = True
         self._run()
-        kept = self._gives[0] if self._one_gives else self._gives.tolist()
-        total = sum(kept) if isinstance(kept, list) else kept
-        if total - total == 0.0 or all(map(isfinite, self._gives)):
-            self._kept = kept
-            self.status = self.GOOD
-            return self._output
-        if not np.isfinite(self.state).all():
-            self._started = False
-        return self._held(self.BAD_OUTPUT)
+        kept: Any = gives[0] if self._one_gives else gives.tolist()
+        total = kept if self._one_gives else sum(kept)
+        if total - total and not all(map(isfinite, gives)):
+            if not np.isfinite(self.state).all():
+                self._started = False
+            return self._held(self.BAD_OUTPUT)
+        self._kept = kept
+        self.status = self.GOOD
+        return self._output
 
     def _held(self, status: int) -> Array:
         self.status = status

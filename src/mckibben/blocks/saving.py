@@ -8,8 +8,10 @@ are refused.
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextvars import ContextVar
 from dataclasses import fields, is_dataclass
+from itertools import count, repeat
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +25,10 @@ FORMAT = "mckibben-model"
 VERSION = 1
 LARGEST_FILE = 64 * 2**20
 """Bytes; a longer file is refused before it is parsed."""
+MOST_PARTS = 5000
+"""Blocks and what is in them that a model may describe, so that reading a large file ends soon."""
+
+_described: ContextVar[Iterator[int]] = ContextVar("described")
 
 
 def to_dict(block: Block) -> dict[str, Any]:
@@ -50,10 +56,13 @@ def from_dict(content: Mapping[str, Any]) -> Block:
             "Remedy: save it again with a matching release of mckibben."
         )
     described = {key: value for key, value in content.items() if key not in ("format", "version")}
+    counted = _described.set(count(1))
     try:
         block: Block = part_from_dict(described)
     except RecursionError:
         raise ModelError("nested too deeply. Remedy: compose fewer blocks in each other.") from None
+    finally:
+        _described.reset(counted)
     return block
 
 
@@ -71,6 +80,8 @@ def part_from_dict(content: Any, group: str = "blocks") -> Any:
     """Return the block (or other plug-in of ``group``) that `part_to_dict` described."""
     if not isinstance(content, Mapping) or not isinstance(content.get("kind"), str):
         raise ModelError('a block without a "kind". Remedy: save the model again.')
+    if next(_described.get(repeat(1))) > MOST_PARTS:
+        raise ModelError(f"more than {MOST_PARTS} parts. Remedy: compose fewer blocks.")
     kind = content["kind"]
     cls = load_plugin(group, kind)
     values = {key: _tuples(value) for key, value in content.items() if key != "kind"}

@@ -126,7 +126,7 @@ class Inverse(Backward):
 
 
 NARROWEST, NARROWEST_SHARE = 1e-30, 1e-9
-"""Width of an input range, in the unit of the input and as a share of its larger end, at least."""
+"""Least width of an input range: in the unit of the input, and as a share of the sizes of its ends."""
 
 
 def check_input_range(kind: str, input_range: tuple[float, float] | None) -> None:
@@ -134,8 +134,8 @@ def check_input_range(kind: str, input_range: tuple[float, float] | None) -> Non
     if input_range is None:
         return
     low, high = input_range
-    narrowest = max(NARROWEST, NARROWEST_SHARE * max(abs(low), abs(high)))
-    if not narrowest <= high - low < np.inf:
+    width = high - low
+    if not (NARROWEST <= width < np.inf and width >= NARROWEST_SHARE * (abs(low) + abs(high))):
         raise ModelError(
             f"the input range {input_range} of {kind!r} is empty, or too narrow or wide to compute "
             "with. Remedy: give (lowest, highest)."

@@ -26,6 +26,9 @@ TOLERANCES = {False: "1e-9", True: "1e-4"}
 
 SHARED = ("mck.h",)
 
+LONGEST_STEP = 1e6
+"""Time between steps of an exported model [s]."""
+
 
 def export_c(
     block: Block,
@@ -182,13 +185,14 @@ def checked_sample_time(block: Block, sample_time: float | None) -> float | None
     ModelError
         If it is missing, not positive, or not the block's own.
     """
-    if sample_time is not None and not 0 < sample_time < float("inf"):
+    step = own_time(block) if sample_time is None and block.rate_dependent else sample_time
+    if step is not None and not 0 < step <= LONGEST_STEP:
         raise ModelError(
-            f"the sample time is {sample_time}. Remedy: give a positive time in seconds."
+            f"the sample time is {step}. Remedy: give a positive time in seconds, at most "
+            f"{LONGEST_STEP:g}."
         )
     if not block.rate_dependent:
         return None
-    step = sample_time if sample_time is not None else own_time(block)
     if step is None:
         raise ModelError(
             f"{block.kind!r} depends on the rate. Remedy: give the time between steps, "

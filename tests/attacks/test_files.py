@@ -118,6 +118,49 @@ def overfull_chunk_hdf5(path: Path) -> None:
         data.id.write_direct_chunk((0,), packed_zeros(10**9))
 
 
+def damaged_chunk(content: bytes, mask: int = 0, **packing: Any) -> Callable[[Path], None]:
+    """Return a maker of files with one chunk of 160 bytes that is this instead."""
+
+    def make(path: Path) -> None:
+        import h5py
+
+        with h5py.File(path, "w") as file:
+            data = file.create_dataset("p", (20,), "f8", chunks=(20,), **packing)
+            data.id.write_direct_chunk((0,), content, filter_mask=mask)
+
+    return make
+
+
+def patched_scale_hdf5(path: Path) -> None:
+    """Tell the filter of another number of samples than there is room for."""
+    import h5py
+
+    with h5py.File(path, "w") as file:
+        data = file.create_dataset("p", data=np.full(20, 3), chunks=(20,), scaleoffset=0)
+        said = struct.pack("<5I", *data.id.get_create_plist().get_filter(0)[2][:5])
+    content = bytearray(path.read_bytes())
+    struct.pack_into("<I", content, content.index(said) + 8, 2**28)
+    path.write_bytes(content)
+
+
+def short_hdf5(path: Path) -> None:
+    """Say that there are more samples in one piece than were kept."""
+    import h5py
+
+    with h5py.File(path, "w") as file:
+        file["p"] = np.arange(777.0)
+    content = path.read_bytes()
+    path.write_bytes(content.replace(struct.pack("<Q", 777), struct.pack("<Q", 7777)))
+
+
+def wide_chunks_hdf5(path: Path) -> None:
+    """Spread few samples over chunks that each unpack to many more."""
+    import h5py
+
+    with h5py.File(path, "w") as file:
+        file.create_dataset("p", (2000, 1), "f8", chunks=(1, 5 * 10**4), maxshape=(None, None))
+
+
 def deep_hdf5(path: Path) -> None:
     import h5py
 
@@ -223,7 +266,20 @@ REFUSED: dict[str, tuple[Callable[[Path], None], str]] = {
     "zeros.h5": (zeros_hdf5, "none were measured"),
     "many_zeros.h5": (many_zeros_hdf5, "none were measured"),
     "large_chunk.h5": (large_chunk_hdf5, "declares 400000000 samples"),
-    "overfull_chunk.h5": (overfull_chunk_hdf5, "more closely than it says"),
+    "overfull_chunk.h5": (overfull_chunk_hdf5, "less closely than it says"),
+    "few.h5": (damaged_chunk(zlib.compress(bytes(16)), compression="gzip"), "less closely"),
+    "tail.h5": (
+        damaged_chunk(zlib.compress(bytes(160)) + b"x", compression="gzip"),
+        "less closely",
+    ),
+    "bare.h5": (damaged_chunk(bytes(16)), "less closely"),
+    "masked.h5": (damaged_chunk(bytes(16), 1, compression="gzip"), "less closely"),
+    "shuffled.h5": (damaged_chunk(bytes(16), shuffle=True), "less closely"),
+    "checked.h5": (damaged_chunk(bytes(160), fletcher32=True), "less closely"),
+    "lzf.h5": (damaged_chunk(b"\3abcd", compression="lzf"), "in a way that is not read"),
+    "scaled.h5": (patched_scale_hdf5, "in a way that is not read"),
+    "short.h5": (short_hdf5, "Remedy"),
+    "wide_chunks.h5": (wide_chunks_hdf5, "none were measured"),
     "deep.h5": (deep_hdf5, "nested more than"),
     "endless.h5": (endless_heap_hdf5, "have no end"),
     "many_links.h5": (many_links_hdf5, "more than 10000 parts"),
@@ -306,6 +362,23 @@ def test_closely_packed_samples_are_read_up_to_some_millions(tmp_path: Path) -> 
         file.create_dataset("a", data=rising, compression="gzip", shuffle=True)
     (recording,) = mckibben.read(tmp_path / "a.h5")
     assert np.array_equal(recording["a"], rising)
+
+
+@pytest.mark.parametrize("shuffle", [False, True])
+@pytest.mark.parametrize("fletcher32", [False, True])
+@pytest.mark.parametrize("compression", [None, "gzip"])
+@pytest.mark.parametrize("shape", [(50,), (50, 1)])
+def test_packed_samples_are_read(
+    shape: tuple[int, ...], compression: str | None, fletcher32: bool, shuffle: bool, tmp_path: Path
+) -> None:
+    import h5py
+
+    samples = np.sin(np.arange(50)).reshape(shape)
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        packing = {"compression": compression, "fletcher32": fletcher32, "shuffle": shuffle}
+        file.create_dataset("a", data=samples, chunks=(7, 1)[: len(shape)], **packing)
+    (recording,) = mckibben.read(tmp_path / "a.h5")
+    assert np.array_equal(recording["a"], samples.reshape(-1))
 
 
 def test_long_texts_about_a_recording_are_left_out(tmp_path: Path) -> None:

@@ -184,6 +184,18 @@ def endless_heap_hdf5(path: Path) -> None:
     path.write_bytes(content)
 
 
+def packed_heap_hdf5(path: Path) -> None:
+    """Say of the names in a group that they are packed."""
+    import h5py
+
+    with h5py.File(path, "w", libver="latest") as file:
+        for i in range(20):
+            file[f"a{i}"] = np.arange(20.0)
+    content = bytearray(path.read_bytes())
+    content[content.index(b"FRHP") + 7] = 30
+    path.write_bytes(content)
+
+
 def many_links_hdf5(path: Path) -> None:
     import h5py
 
@@ -225,6 +237,22 @@ def head(of: int, name: bytes, *shape: int) -> bytes:
 
 def zeros_mat(path: Path) -> None:
     path.write_bytes(MAT + element(15, packed_zeros(10**9)))
+
+
+def exact_mat(path: Path) -> None:
+    """Use up what may be unpacked to the last byte, and go on."""
+    size = 8 * limits.FREE_SAMPLES
+    first = struct.pack("<II", 14, size - 8) + element(6, struct.pack("<II", 16, 0))
+    packing = zlib.compressobj(1)
+    packed = packing.compress(first + bytes(size - len(first))) + packing.flush()
+    tag = struct.pack("<II", 15, len(packed))  # what is packed is not padded
+    path.write_bytes(MAT + tag + packed + element(15, packed_zeros(10**9)))
+
+
+def many_fields_mat(path: Path) -> None:
+    n = limits.MOST_PARTS + 1
+    about = head(2, b"s", 1, 1) + element(5, struct.pack("<i", 1)) + element(1, b"a" * n)
+    path.write_bytes(MAT + element(14, about + struct.pack("<II", 14, 0) * n))
 
 
 def bytes_for_doubles_mat(path: Path) -> None:
@@ -282,9 +310,12 @@ REFUSED: dict[str, tuple[Callable[[Path], None], str]] = {
     "wide_chunks.h5": (wide_chunks_hdf5, "none were measured"),
     "deep.h5": (deep_hdf5, "nested more than"),
     "endless.h5": (endless_heap_hdf5, "have no end"),
+    "packed_heap.h5": (packed_heap_hdf5, "are packed"),
     "many_links.h5": (many_links_hdf5, "more than 10000 parts"),
     "zeros.parquet": (zeros_parquet, "none were measured"),
     "zeros.mat": (zeros_mat, "none were measured"),
+    "exact.mat": (exact_mat, "none were measured"),
+    "many_fields.mat": (many_fields_mat, "more than 10000 parts"),
     "bytes.mat": (bytes_for_doubles_mat, "none were measured"),
     "deep.mat": (deep_mat, "nested more than"),
     "declared.tdms": (declared_tdms, "it cannot be read"),

@@ -20,7 +20,10 @@ from mckibben.files.limits import MOST_TEXT, Budget
 from mckibben.files.table import Column, Table, column, of_equal_length
 
 _HEAP = b"GCOL\1\0\0\0"
+_FRACTAL = b"FRHP\0"
 _BLOCK = 2**22
+_KEPT = 8
+"""Bytes before a block that are looked at with it: a heap's first nine, less one."""
 
 _SIGNATURE = b"\x89HDF\r\n\x1a\n"
 
@@ -69,7 +72,11 @@ def read(file: BufferedReader, path: Path) -> list[Table]:
 
 
 def _refuse_endless(file: BufferedReader) -> None:
-    """Refuse a heap of texts in which a piece has no length: HDF5 would look for its end for ever."""
+    """Refuse heaps that HDF5 would never come to the end of.
+
+    A piece of one may have no length, and one that is packed unpacks to as much as it likes; h5py
+    packs none.
+    """
     at, last = 0, b""
     while block := file.read(_BLOCK):
         window = last + block
@@ -78,10 +85,19 @@ def _refuse_endless(file: BufferedReader) -> None:
         while found >= 0:
             _walk_heap(file, start + found)
             found = window.find(_HEAP, found + 1)
+        _refuse_packed_heap(window)
         at += len(block)
         file.seek(at)
-        last = window[1 - len(_HEAP) :]
+        last = window[-_KEPT:]
     file.seek(0)
+
+
+def _refuse_packed_heap(window: bytes) -> None:
+    found = window.find(_FRACTAL)
+    while found >= 0:
+        if any(window[found + 7 : found + 9]):  # how long the description of its filters is
+            raise ValueError("its names or attributes are packed")
+        found = window.find(_FRACTAL, found + 1)
 
 
 def _walk_heap(file: BufferedReader, at: int) -> None:

@@ -215,6 +215,22 @@ def zeros_parquet(path: Path) -> None:
             writer.write_table(table)
 
 
+def wrong_pages_parquet(path: Path) -> None:
+    """Say of pages that they unpack to less than nothing."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    table = pa.table({name: np.zeros(2000) for name in "abc"})
+    pq.write_table(table, path, compression="zstd", use_dictionary=False)
+    content, group = bytearray(path.read_bytes()), pq.read_metadata(path).row_group(0)
+    for i in range(3):
+        size = group.column(i).data_page_offset + 3  # behind the type, and the mark of a size
+        assert content[size - 1] == 0x15
+        assert content[size + 3] == 0x15
+        content[size : size + 3] = b"\xff\xff\x7f"
+    path.write_bytes(content)
+
+
 def packed_zeros(n: int) -> bytes:
     """Return zeros as zlib packs them; those in the middle are copies of what stands before."""
     packing = zlib.compressobj(1)
@@ -313,6 +329,7 @@ REFUSED: dict[str, tuple[Callable[[Path], None], str]] = {
     "packed_heap.h5": (packed_heap_hdf5, "are packed"),
     "many_links.h5": (many_links_hdf5, "more than 10000 parts"),
     "zeros.parquet": (zeros_parquet, "none were measured"),
+    "wrong_pages.parquet": (wrong_pages_parquet, "a page is longer than its column"),
     "zeros.mat": (zeros_mat, "none were measured"),
     "exact.mat": (exact_mat, "none were measured"),
     "many_fields.mat": (many_fields_mat, "more than 10000 parts"),
@@ -547,6 +564,39 @@ def test_hostile_descriptions_are_refused(text: str, tmp_path: Path) -> None:
     with pytest.warns(mckibben.DataWarning, match="it is ignored") as warned:
         mckibben.read(run)
     assert all(len(str(one.message)) < 1000 for one in warned)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"units": {"pressure": "bar"}},
+        {"units": {"pressure": "bar", "displacement": "mm", "force": "N"}},
+        {"units": {"displacement": "mm", "pressure": "bar"}},
+        {"sample_time": None},
+        {"sample_time": 1e-320},
+        {"sample_time": 0.0},
+    ],
+)
+def test_descriptions_of_other_columns_are_ignored(change: dict[str, Any], tmp_path: Path) -> None:
+    run, n = tmp_path / "run.csv", np.arange(20.0)
+    units = {"pressure": "bar", "displacement": "mm"}
+    mckibben.write(mckibben.Recording({"pressure": n, "displacement": n}, 0.1, units=units), run)
+    about = json.loads(delimited.sidecar(run).read_text(encoding="utf-8"))
+    delimited.sidecar(run).write_text(json.dumps(about | change), encoding="utf-8")
+    with pytest.warns(mckibben.DataWarning, match="it is ignored"):
+        (recording,) = mckibben.read(run, units=units | {"time": "s"})
+    assert recording.sample_time == pytest.approx(0.1)
+    assert np.array_equal(recording["pressure"], n)
+
+
+@pytest.mark.parametrize("before", ["sep=;\n", "\ufeffsep=;\r\n", "\ufeff\ufeff"])
+def test_what_programs_put_before_a_table_is_passed_over(before: str, tmp_path: Path) -> None:
+    rows = [f"{k};{k / 8:.3f}".replace(".", ",") for k in range(20)]
+    text = before + "\n".join(["time_s;pressure_bar", *rows])
+    (tmp_path / "a.csv").write_text(text, encoding="utf-8")
+    (recording,) = mckibben.read(tmp_path / "a.csv")
+    assert list(recording.channels) == ["pressure"]
+    assert np.array_equal(recording["pressure"], np.arange(20) / 8)
 
 
 def test_long_descriptions_are_not_read(tmp_path: Path) -> None:

@@ -118,6 +118,49 @@ def overfull_chunk_hdf5(path: Path) -> None:
         data.id.write_direct_chunk((0,), packed_zeros(10**9))
 
 
+def damaged_chunk(content: bytes, mask: int = 0, **packing: Any) -> Callable[[Path], None]:
+    """Return a maker of files with one chunk of 160 bytes that is this instead."""
+
+    def make(path: Path) -> None:
+        import h5py
+
+        with h5py.File(path, "w") as file:
+            data = file.create_dataset("p", (20,), "f8", chunks=(20,), **packing)
+            data.id.write_direct_chunk((0,), content, filter_mask=mask)
+
+    return make
+
+
+def patched_scale_hdf5(path: Path) -> None:
+    """Tell the filter of another number of samples than there is room for."""
+    import h5py
+
+    with h5py.File(path, "w") as file:
+        data = file.create_dataset("p", data=np.full(20, 3), chunks=(20,), scaleoffset=0)
+        said = struct.pack("<5I", *data.id.get_create_plist().get_filter(0)[2][:5])
+    content = bytearray(path.read_bytes())
+    struct.pack_into("<I", content, content.index(said) + 8, 2**28)
+    path.write_bytes(content)
+
+
+def short_hdf5(path: Path) -> None:
+    """Say that there are more samples in one piece than were kept."""
+    import h5py
+
+    with h5py.File(path, "w") as file:
+        file["p"] = np.arange(777.0)
+    content = path.read_bytes()
+    path.write_bytes(content.replace(struct.pack("<Q", 777), struct.pack("<Q", 7777)))
+
+
+def wide_chunks_hdf5(path: Path) -> None:
+    """Spread few samples over chunks that each unpack to many more."""
+    import h5py
+
+    with h5py.File(path, "w") as file:
+        file.create_dataset("p", (2000, 1), "f8", chunks=(1, 5 * 10**4), maxshape=(None, None))
+
+
 def deep_hdf5(path: Path) -> None:
     import h5py
 
@@ -141,6 +184,18 @@ def endless_heap_hdf5(path: Path) -> None:
     path.write_bytes(content)
 
 
+def packed_heap_hdf5(path: Path) -> None:
+    """Say of the names in a group that they are packed."""
+    import h5py
+
+    with h5py.File(path, "w", libver="latest") as file:
+        for i in range(20):
+            file[f"a{i}"] = np.arange(20.0)
+    content = bytearray(path.read_bytes())
+    content[content.index(b"FRHP") + 7] = 30
+    path.write_bytes(content)
+
+
 def many_links_hdf5(path: Path) -> None:
     import h5py
 
@@ -158,6 +213,22 @@ def zeros_parquet(path: Path) -> None:
     with pq.ParquetWriter(path, table.schema, compression="zstd") as writer:
         for _ in range(10):
             writer.write_table(table)
+
+
+def wrong_pages_parquet(path: Path) -> None:
+    """Say of pages that they unpack to less than nothing."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    table = pa.table({name: np.zeros(2000) for name in "abc"})
+    pq.write_table(table, path, compression="zstd", use_dictionary=False)
+    content, group = bytearray(path.read_bytes()), pq.read_metadata(path).row_group(0)
+    for i in range(3):
+        size = group.column(i).data_page_offset + 3  # behind the type, and the mark of a size
+        assert content[size - 1] == 0x15
+        assert content[size + 3] == 0x15
+        content[size : size + 3] = b"\xff\xff\x7f"
+    path.write_bytes(content)
 
 
 def packed_zeros(n: int) -> bytes:
@@ -182,6 +253,22 @@ def head(of: int, name: bytes, *shape: int) -> bytes:
 
 def zeros_mat(path: Path) -> None:
     path.write_bytes(MAT + element(15, packed_zeros(10**9)))
+
+
+def exact_mat(path: Path) -> None:
+    """Use up what may be unpacked to the last byte, and go on."""
+    size = 8 * limits.FREE_SAMPLES
+    first = struct.pack("<II", 14, size - 8) + element(6, struct.pack("<II", 16, 0))
+    packing = zlib.compressobj(1)
+    packed = packing.compress(first + bytes(size - len(first))) + packing.flush()
+    tag = struct.pack("<II", 15, len(packed))  # what is packed is not padded
+    path.write_bytes(MAT + tag + packed + element(15, packed_zeros(10**9)))
+
+
+def many_fields_mat(path: Path) -> None:
+    n = limits.MOST_PARTS + 1
+    about = head(2, b"s", 1, 1) + element(5, struct.pack("<i", 1)) + element(1, b"a" * n)
+    path.write_bytes(MAT + element(14, about + struct.pack("<II", 14, 0) * n))
 
 
 def bytes_for_doubles_mat(path: Path) -> None:
@@ -223,12 +310,29 @@ REFUSED: dict[str, tuple[Callable[[Path], None], str]] = {
     "zeros.h5": (zeros_hdf5, "none were measured"),
     "many_zeros.h5": (many_zeros_hdf5, "none were measured"),
     "large_chunk.h5": (large_chunk_hdf5, "declares 400000000 samples"),
-    "overfull_chunk.h5": (overfull_chunk_hdf5, "more closely than it says"),
+    "overfull_chunk.h5": (overfull_chunk_hdf5, "less closely than it says"),
+    "few.h5": (damaged_chunk(zlib.compress(bytes(16)), compression="gzip"), "less closely"),
+    "tail.h5": (
+        damaged_chunk(zlib.compress(bytes(160)) + b"x", compression="gzip"),
+        "less closely",
+    ),
+    "bare.h5": (damaged_chunk(bytes(16)), "less closely"),
+    "masked.h5": (damaged_chunk(bytes(16), 1, compression="gzip"), "less closely"),
+    "shuffled.h5": (damaged_chunk(bytes(16), shuffle=True), "less closely"),
+    "checked.h5": (damaged_chunk(bytes(160), fletcher32=True), "less closely"),
+    "lzf.h5": (damaged_chunk(b"\3abcd", compression="lzf"), "in a way that is not read"),
+    "scaled.h5": (patched_scale_hdf5, "in a way that is not read"),
+    "short.h5": (short_hdf5, "Remedy"),
+    "wide_chunks.h5": (wide_chunks_hdf5, "none were measured"),
     "deep.h5": (deep_hdf5, "nested more than"),
     "endless.h5": (endless_heap_hdf5, "have no end"),
+    "packed_heap.h5": (packed_heap_hdf5, "are packed"),
     "many_links.h5": (many_links_hdf5, "more than 10000 parts"),
     "zeros.parquet": (zeros_parquet, "none were measured"),
+    "wrong_pages.parquet": (wrong_pages_parquet, "a page is longer than its column"),
     "zeros.mat": (zeros_mat, "none were measured"),
+    "exact.mat": (exact_mat, "none were measured"),
+    "many_fields.mat": (many_fields_mat, "more than 10000 parts"),
     "bytes.mat": (bytes_for_doubles_mat, "none were measured"),
     "deep.mat": (deep_mat, "nested more than"),
     "declared.tdms": (declared_tdms, "it cannot be read"),
@@ -306,6 +410,23 @@ def test_closely_packed_samples_are_read_up_to_some_millions(tmp_path: Path) -> 
         file.create_dataset("a", data=rising, compression="gzip", shuffle=True)
     (recording,) = mckibben.read(tmp_path / "a.h5")
     assert np.array_equal(recording["a"], rising)
+
+
+@pytest.mark.parametrize("shuffle", [False, True])
+@pytest.mark.parametrize("fletcher32", [False, True])
+@pytest.mark.parametrize("compression", [None, "gzip"])
+@pytest.mark.parametrize("shape", [(50,), (50, 1)])
+def test_packed_samples_are_read(
+    shape: tuple[int, ...], compression: str | None, fletcher32: bool, shuffle: bool, tmp_path: Path
+) -> None:
+    import h5py
+
+    samples = np.sin(np.arange(50)).reshape(shape)
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        packing = {"compression": compression, "fletcher32": fletcher32, "shuffle": shuffle}
+        file.create_dataset("a", data=samples, chunks=(7, 1)[: len(shape)], **packing)
+    (recording,) = mckibben.read(tmp_path / "a.h5")
+    assert np.array_equal(recording["a"], samples.reshape(-1))
 
 
 def test_long_texts_about_a_recording_are_left_out(tmp_path: Path) -> None:
@@ -443,6 +564,39 @@ def test_hostile_descriptions_are_refused(text: str, tmp_path: Path) -> None:
     with pytest.warns(mckibben.DataWarning, match="it is ignored") as warned:
         mckibben.read(run)
     assert all(len(str(one.message)) < 1000 for one in warned)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"units": {"pressure": "bar"}},
+        {"units": {"pressure": "bar", "displacement": "mm", "force": "N"}},
+        {"units": {"displacement": "mm", "pressure": "bar"}},
+        {"sample_time": None},
+        {"sample_time": 1e-320},
+        {"sample_time": 0.0},
+    ],
+)
+def test_descriptions_of_other_columns_are_ignored(change: dict[str, Any], tmp_path: Path) -> None:
+    run, n = tmp_path / "run.csv", np.arange(20.0)
+    units = {"pressure": "bar", "displacement": "mm"}
+    mckibben.write(mckibben.Recording({"pressure": n, "displacement": n}, 0.1, units=units), run)
+    about = json.loads(delimited.sidecar(run).read_text(encoding="utf-8"))
+    delimited.sidecar(run).write_text(json.dumps(about | change), encoding="utf-8")
+    with pytest.warns(mckibben.DataWarning, match="it is ignored"):
+        (recording,) = mckibben.read(run, units=units | {"time": "s"})
+    assert recording.sample_time == pytest.approx(0.1)
+    assert np.array_equal(recording["pressure"], n)
+
+
+@pytest.mark.parametrize("before", ["sep=;\n", "\ufeffsep=;\r\n", "\ufeff\ufeff"])
+def test_what_programs_put_before_a_table_is_passed_over(before: str, tmp_path: Path) -> None:
+    rows = [f"{k};{k / 8:.3f}".replace(".", ",") for k in range(20)]
+    text = before + "\n".join(["time_s;pressure_bar", *rows])
+    (tmp_path / "a.csv").write_text(text, encoding="utf-8")
+    (recording,) = mckibben.read(tmp_path / "a.csv")
+    assert list(recording.channels) == ["pressure"]
+    assert np.array_equal(recording["pressure"], np.arange(20) / 8)
 
 
 def test_long_descriptions_are_not_read(tmp_path: Path) -> None:

@@ -9,6 +9,8 @@ from __future__ import annotations
 import csv
 import io
 import os
+import re
+from collections.abc import Sequence
 from io import BufferedReader
 from pathlib import Path
 from typing import Any
@@ -19,7 +21,7 @@ from mckibben.atomic import replacing
 from mckibben.errors import DataError
 from mckibben.files import stored
 from mckibben.files.cells import Cells
-from mckibben.files.dialect import Dialect, detect
+from mckibben.files.dialect import SEPARATORS, Dialect, detect
 from mckibben.files.limits import Budget
 from mckibben.files.lines import Lines
 from mckibben.files.marks import Doubt, doubts
@@ -32,6 +34,10 @@ from mckibben.recording import Recording
 
 MOST_COLUMNS = 4096
 _CONTROL = bytes([*range(0x09), *range(0x0E, 0x20), 0x7F])
+_MARKS = re.compile(rb"\A(?:\xef\xbb\xbf)+")
+"""Of UTF-8; a program that puts one there may find another."""
+_SAID = re.compile(rb"\A\"?sep=([\t;|,])\"?[ \t;|,]*\n", re.IGNORECASE)
+"""A first line that tells Excel of the separator."""
 _PART = 200_000  # cells that are read at once
 _LISTED = 10
 
@@ -86,28 +92,43 @@ def _described(path: Path, data: bytes) -> Stored | None:
         problem = f"is not a description by this package ({description})"
     elif description.sha256 != digest(data):
         problem = "describes another version of the file"
+    elif all(
+        next(csv.reader([_header(data)], delimiter=mark), []) != _columns_of(description)
+        for mark in "\t,"
+    ):
+        problem = "names other columns than the file"
     else:
         return description
     warn(beside, f"it {problem}; it is ignored, and units are taken from the header")
     return None
 
 
+def _header(data: bytes) -> str:
+    return data.partition(b"\n")[0].decode("utf-8", "replace")
+
+
+def _separator(data: bytes) -> str:
+    return "\t" if "\t" in _header(data) else ","
+
+
+def _columns_of(description: Stored) -> list[str]:
+    return [*([] if description.sample_time is None else ["time"]), *description.units]
+
+
 def _own(data: bytes, description: Stored) -> Table:
     import pandas as pd
 
-    names = list(description.units)
-    with_time = [*([] if description.sample_time is None else ["time"]), *names]
-    separator = "\t" if b"\t" in data.partition(b"\n")[0] else ","
     frame = pd.read_csv(
         io.BytesIO(data),
-        sep=separator,
+        sep=_separator(data),
         skiprows=1,
         header=None,
-        names=with_time,
+        names=_columns_of(description),
+        index_col=False,
         dtype=np.float64,
         **_exact(pd.__version__),
     )
-    return description.table({name: frame[name].to_numpy() for name in names})
+    return description.table({name: frame[name].to_numpy() for name in description.units})
 
 
 def _utf8(data: bytes, path: Path) -> bytes:
@@ -119,7 +140,7 @@ def _utf8(data: bytes, path: Path) -> bytes:
             data.decode("utf-8")
     except UnicodeDecodeError:
         data = data.decode("latin-1").encode()
-    data = data.removeprefix(b"\xef\xbb\xbf").rstrip(b"\x1a")
+    data = _MARKS.sub(b"", data, count=1).rstrip(b"\x1a")
     if b"\r" in data:
         data = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
     if len(data.translate(None, _CONTROL)) < len(data):
@@ -132,8 +153,12 @@ def _utf8(data: bytes, path: Path) -> bytes:
 
 
 def _parse(data: bytes, budget: Budget, path: Path) -> Table:
+    separators: Sequence[str | None] = SEPARATORS
+    if said := _SAID.match(data):
+        separators = (said[1].decode(),)
+        data = b" " * (said.end() - 1) + data[said.end() - 1 :]  # the lines keep their numbers
     lines, comment = Lines.of(data, path)
-    dialect = detect(lines.sample())
+    dialect = detect(lines.sample(), separators)
     headers, units, first = _head(lines.sample(), comment, dialect, path)
     if len(headers) > MOST_COLUMNS:
         raise DataError(

@@ -56,7 +56,7 @@ class Dialect:
         return _NUMBER[self.decimal].fullmatch(cell) is not None
 
 
-def detect(lines: Sequence[str]) -> Dialect:
+def detect(lines: Sequence[str], separators: Sequence[str | None] = SEPARATORS) -> Dialect:
     """Return the dialect in which most cells are numbers and most lines equally long.
 
     >>> detect(["p;l", "0,5;10,25", "1;11"])
@@ -64,7 +64,7 @@ def detect(lines: Sequence[str]) -> Dialect:
     """
     candidates = [
         Dialect(separator, decimal)
-        for separator in SEPARATORS
+        for separator in separators
         for decimal in ".,"
         if separator != decimal
     ]

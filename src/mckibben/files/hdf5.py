@@ -11,7 +11,7 @@ import zlib
 from collections.abc import Iterator
 from io import BufferedReader
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 
@@ -20,10 +20,10 @@ from mckibben.files.limits import MOST_TEXT, Budget
 from mckibben.files.table import Column, Table, column, of_equal_length
 
 _HEAP = b"GCOL\1\0\0\0"
+_FRACTAL = b"FRHP\0"
 _BLOCK = 2**22
-
-MOST_UNLOOKED = 2**18
-"""Bytes of a packed chunk that may stand for a thousand times as many, unseen."""
+_KEPT = 8
+"""Bytes before a block that are looked at with it: a heap's first nine, less one."""
 
 _SIGNATURE = b"\x89HDF\r\n\x1a\n"
 
@@ -55,7 +55,10 @@ def read(file: BufferedReader, path: Path) -> list[Table]:
             vector = data.ndim == 1 or (data.ndim == 2 and 1 in data.shape)
             if vector and data.dtype.kind in "biuf" and not _is_text(data):
                 budget.samples(data.size)
-                budget.at_once(math.prod(data.chunks or ()))
+                if data.chunks is not None:
+                    steps = zip(data.shape, data.chunks, strict=True)
+                    padded = math.prod(-(-n // step) * step for n, step in steps)
+                    budget.at_once(max(math.prod(data.chunks), padded // 2))
                 _refuse_overfull(place, data, path)
                 unit = _text(data, "units") or _text(data, "unit")
                 found[place] = column(place.rpartition("/")[2], data[()].reshape(-1), unit)
@@ -69,7 +72,11 @@ def read(file: BufferedReader, path: Path) -> list[Table]:
 
 
 def _refuse_endless(file: BufferedReader) -> None:
-    """Refuse a heap of texts in which a piece has no length: HDF5 would look for its end for ever."""
+    """Refuse heaps that HDF5 would never come to the end of.
+
+    A piece of one may have no length, and one that is packed unpacks to as much as it likes; h5py
+    packs none.
+    """
     at, last = 0, b""
     while block := file.read(_BLOCK):
         window = last + block
@@ -78,10 +85,19 @@ def _refuse_endless(file: BufferedReader) -> None:
         while found >= 0:
             _walk_heap(file, start + found)
             found = window.find(_HEAP, found + 1)
+        _refuse_packed_heap(window)
         at += len(block)
         file.seek(at)
-        last = window[1 - len(_HEAP) :]
+        last = window[-_KEPT:]
     file.seek(0)
+
+
+def _refuse_packed_heap(window: bytes) -> None:
+    found = window.find(_FRACTAL)
+    while found >= 0:
+        if any(window[found + 7 : found + 9]):  # how long the description of its filters is
+            raise ValueError("its names or attributes are packed")
+        found = window.find(_FRACTAL, found + 1)
 
 
 def _walk_heap(file: BufferedReader, at: int) -> None:
@@ -137,36 +153,55 @@ def _refuse_elsewhere(place: str, data: Any, path: Path) -> None:
 
 
 def _refuse_overfull(place: str, data: Any, path: Path) -> None:
-    """Refuse chunks that unpack to more than a chunk holds, which HDF5 would make room for."""
+    """Refuse samples that take other room than their shape says: HDF5 reads on past their end.
+
+    What is in chunks is unpacked here as well, since HDF5 would make room for all that comes out.
+    """
+    from h5py import h5d, h5z
+
+    def refuse(problem: str) -> NoReturn:
+        raise DataError(
+            f"data set {place!r} {problem}",
+            file=path,
+            remedy="save it with gzip or without compression",
+        )
+
+    about, size = data.id.get_create_plist(), data.id.get_type().get_size()
+    if data.chunks is None:
+        kept = about.get_layout() == h5d.COMPACT or data.id.get_offset() is not None
+        if kept and data.id.get_storage_size() < data.size * size:
+            refuse("has fewer samples than it says")
+        return
+    filters = [about.get_filter(i)[0] for i in range(about.get_nfilters())]
+    known = {h5z.FILTER_DEFLATE, h5z.FILTER_SHUFFLE, h5z.FILTER_FLETCHER32}
+    if not set(filters) <= known or len(set(filters)) < len(filters):
+        refuse("is packed more than once, or in a way that is not read")
+    room = math.prod(data.chunks) * size
+    places = math.prod(-(-n // step) for n, step in zip(data.shape, data.chunks, strict=True))
+    if data.id.get_num_chunks() > places:
+        refuse("has more chunks than it says")
+    chunks: list[Any] = []
+    data.id.chunk_iter(chunks.append)
+    for chunk in chunks:
+        used = [one for i, one in enumerate(filters) if not chunk.filter_mask >> i & 1]
+        if chunk.size > room + room // 8 + 1024 or (
+            _unpacked(data, chunk, used, room) if h5z.FILTER_DEFLATE in used else chunk.size
+        ) != room + 4 * (h5z.FILTER_FLETCHER32 in used):
+            refuse("is packed more or less closely than it says")
+
+
+def _unpacked(data: Any, chunk: Any, filters: list[int], room: int) -> int:
+    """Return how many bytes a chunk unpacks to, with those of its checksum; -1 if it does not."""
     from h5py import h5z
 
-    if data.chunks is None:
-        return
-    pipeline = data.id.get_create_plist()
-    filters = [pipeline.get_filter(i)[0] for i in range(pipeline.get_nfilters())]
-    # what leaves as many bytes as a chunk has, or fewer, whatever it is given
-    harmless = (h5z.FILTER_SHUFFLE, h5z.FILTER_FLETCHER32, h5z.FILTER_SCALEOFFSET, h5z.FILTER_NBIT)
-    packing = [one for one in filters if one not in harmless]
-    room = math.prod(data.chunks) * data.dtype.itemsize
-    overfull = len(packing) > 1
-
-    def look(chunk: Any) -> None:
-        nonlocal overfull
-        overfull |= chunk.size > room + room // 8 + 1024
-        if chunk.size > MOST_UNLOOKED and not overfull and packing == [h5z.FILTER_DEFLATE]:
-            packed = data.id.read_direct_chunk(chunk.chunk_offset)[1]
-            unpacking = zlib.decompressobj()
-            unpacking.decompress(packed, room + 1024)
-            overfull |= bool(unpacking.unconsumed_tail)
-
-    if packing and not overfull:
-        data.id.chunk_iter(look)
-    if overfull:
-        raise DataError(
-            f"data set {place!r} is packed more than once, or more closely than it says",
-            file=path,
-            remedy="save it without compression",
-        )
+    packed = memoryview(data.id.read_direct_chunk(chunk.chunk_offset)[1])
+    after = h5z.FILTER_FLETCHER32 in filters[filters.index(h5z.FILTER_DEFLATE) :]
+    unpacking = zlib.decompressobj()
+    try:
+        size = len(unpacking.decompress(packed[:-4] if after else packed, room + 5))
+    except zlib.error:
+        return -1
+    return size + 4 * after if unpacking.eof and not unpacking.unused_data else -1
 
 
 def _is_text(data: Any) -> bool:

@@ -84,15 +84,16 @@ class _Version5:
                 kind, content = next(self._elements(self._unpacked(content)))
             if kind != _MATRIX:
                 raise ValueError(f"a variable of type {kind}")
+            self._budget.parts(1)
             self._collect("", content, 0)
         return self._found
 
     def _unpacked(self, packed: memoryview) -> memoryview:
-        most = 8 * self._budget.allowed - self._bytes
+        most = max(8 * self._budget.allowed - self._bytes, 0)
         unpacking = zlib.decompressobj()
-        content = unpacking.decompress(packed, most)
+        content = unpacking.decompress(packed, most + 1)  # a limit of 0 would be none
         self._bytes += len(content)
-        if unpacking.unconsumed_tail:
+        if len(content) > most:
             self._budget.at_once(self._bytes // 8 + 1)
         if not unpacking.eof:
             raise ValueError("a packed variable is cut off")
@@ -118,7 +119,6 @@ class _Version5:
         place : str
             Empty for a variable, which has a name of its own.
         """
-        self._budget.parts(1)
         self._budget.depth(depth)
         elements = self._elements(content)
         flags = self._integers(next(elements)[1])[0]
@@ -149,6 +149,7 @@ class _Version5:
             raise ValueError(f"a matrix of class {of}")
 
     def _inside(self, place: str, elements: Iterator[tuple[int, memoryview]], depth: int) -> None:
+        self._budget.parts(1)
         kind, content = next(elements)
         if kind == _MATRIX and content:
             self._collect(place, content, depth + 1)

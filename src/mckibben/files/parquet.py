@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from mckibben.atomic import replacing
-from mckibben.files import stored
+from mckibben.files import pages, stored
 from mckibben.files.limits import MOST_PARTS, Budget
 from mckibben.files.notices import warn
 from mckibben.files.stored import Stored
@@ -42,6 +42,7 @@ def read(file: BufferedReader, path: Path) -> list[Table]:
         texts = set()
     wanted = [field.name for field in schema if field.name in {*numbers, *texts}]
     budget.samples(rows * len(wanted))
+    pages.look(file, set(wanted), 8 * budget.allowed + MOST_WORDS, budget)
     # words that are repeated stay one word each, however often they are
     parquet = pq.ParquetFile(file, metadata=about, read_dictionary=sorted(texts))
     frame = parquet.read(columns=None if len(wanted) == len(schema) else wanted)

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from mckibben.errors import DataError
 from mckibben.files.table import Column, Table
@@ -32,7 +32,7 @@ class Stored(BaseModel):
     format: Literal["mckibben-recording"] = "mckibben-recording"
     version: Literal[1] = 1
     sha256: str
-    sample_time: float | None
+    sample_time: Annotated[float, Field(gt=1e-9, lt=1e11)] | None
     start_time: float
     units: dict[str, str]
     meta: dict[str, Any]

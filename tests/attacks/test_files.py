@@ -578,7 +578,7 @@ def test_hostile_descriptions_are_refused(text: str, tmp_path: Path) -> None:
     ],
 )
 def test_descriptions_of_other_columns_are_ignored(change: dict[str, Any], tmp_path: Path) -> None:
-    run, n = tmp_path / "run.csv", np.arange(20.0)
+    run, n = tmp_path / "run.csv", np.arange(20, dtype=np.float64)
     units = {"pressure": "bar", "displacement": "mm"}
     mckibben.write(mckibben.Recording({"pressure": n, "displacement": n}, 0.1, units=units), run)
     about = json.loads(delimited.sidecar(run).read_text(encoding="utf-8"))

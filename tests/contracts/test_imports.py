@@ -19,6 +19,7 @@ LAYERS = (
         "atomic",
         "ordinary",
         "manifest",
+        "seals",
         "caches",
         "threads",
         "workers",

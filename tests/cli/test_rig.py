@@ -109,7 +109,8 @@ def test_a_recorded_set_can_be_studied(cli: Cli, tmp_path: Path) -> None:
         *("--models", "pi,rdpi", "--json"),
     )
     assert result.code == 0, result.err
-    assert {row["model"] for row in json.loads(result.out)["rows"]} == {"pi", "rdpi"}
+    models = {row["model"] for row in json.loads(result.out)["rows"]}
+    assert models == {"pi", "rdpi", "constant"}
 
 
 def test_new_makes_a_rig_from_a_data_sheet(cli: Cli, tmp_path: Path) -> None:

@@ -1,7 +1,9 @@
 """Who may talk to the workbench: whoever has its token, from its own page, and never without end.
 
 Other users of this machine reach its ports too, and so do the pages of others in the same browser: both
-are told nothing and steer nothing without the token. What goes out forbids all scripts but its own.
+are told nothing and steer nothing without the token. It is the beginning of every path, and in no
+cookie: browsers send those to whatever listens on another port. What goes out forbids all scripts but
+its own.
 """
 
 from __future__ import annotations
@@ -9,9 +11,9 @@ from __future__ import annotations
 import hmac
 import re
 import secrets
-from collections.abc import Awaitable, Callable, Iterator, MutableMapping
+from collections.abc import Awaitable, Callable, MutableMapping
 from typing import Any
-from urllib.parse import parse_qs, urlsplit
+from urllib.parse import urlsplit
 
 from mckibben.errors import DataError
 
@@ -33,7 +35,7 @@ AT_ONCE = 2 * LARGEST_REQUEST
 """Bytes of all requests that are being received."""
 
 TOKEN = re.compile(r"[A-Za-z0-9_.~-]{16,256}")
-"""What a token may be: not guessed, and whole in an address and a cookie."""
+"""What a token may be: not guessed, and whole in an address."""
 
 POLICY = "; ".join(
     (
@@ -61,9 +63,6 @@ PRECAUTIONS: Headers = [
     (b"cross-origin-resource-policy", b"same-origin"),
 ]
 
-WELCOME = '<!doctype html><title>mckibben</title><meta http-equiv="refresh" content="0;url=/">'
-"""It asks for the page itself: then no browser holds back the cookie, wherever the address stood."""
-
 
 class Guard:
     """ASGI middleware that lets in or turns away.
@@ -74,15 +73,12 @@ class Guard:
         What is behind it.
     host : str
         Address that the page is served on.
-    port : int
-        Port; cookies are kept apart by it, since browsers do not.
     token : str
-        To be shown once as ``?token=``, then kept as a cookie.
+        Folder in which everything is served.
     """
 
-    def __init__(self, app: Any, *, host: str, port: int, token: str) -> None:
-        self.app, self.token = app, token.encode()
-        self.cookie = f"mckibben-token-{port}".encode()
+    def __init__(self, app: Any, *, host: str, token: str) -> None:
+        self.app, self.root = app, f"/{token}"
         self.hosts = None if host in ("0.0.0.0", "::") else {host, *LOCAL}
         self._receiving = 0
 
@@ -91,14 +87,14 @@ class Guard:
         if scope["type"] not in ("http", "websocket"):
             await self.app(scope, receive, send)
             return
-        headers: Headers = [(key.lower(), value) for key, value in scope["headers"]]
+        headers: Headers = [
+            (key.lower(), value)
+            for key, value in scope["headers"]
+            if key.lower() != b"x-forwarded-prefix"  # which would go before the folder
+        ]
+        scope = {**scope, "headers": headers, "root_path": self.root}
         reason = self._objection(headers)
-        if reason is None and scope["type"] == "http" and self._is_given(scope):
-            kept = self.cookie + b"=" + self.token + b"; HttpOnly; SameSite=Strict; Path=/"
-            html = (b"content-type", b"text/html; charset=utf-8")
-            await _answer(send, 200, WELCOME, [html, (b"set-cookie", kept)])
-            return
-        if reason is None and not self._knows(headers):
+        if reason is None and not self._knows(scope):
             reason = (
                 "This workbench wants its token: open the address that it printed when it started."
             )
@@ -124,16 +120,11 @@ class Guard:
                 return "Another page may not use the workbench."
         return None
 
-    def _is_given(self, scope: Scope) -> bool:
-        given = parse_qs(scope.get("query_string", b"").decode("latin1")).get("token", [])
-        return any(hmac.compare_digest(token.encode(), self.token) for token in given)
-
-    def _knows(self, headers: Headers) -> bool:
-        """Tell whether any cookie of this port's name is right, whatever else there is beside it."""
-        return any(
-            name == self.cookie and hmac.compare_digest(value, self.token)
-            for name, value in _cookies(headers)
-        )
+    def _knows(self, scope: Scope) -> bool:
+        """Tell whether what is asked for is in the folder that is named as the token."""
+        folder = f"{self.root}/".encode()
+        asked = str(scope.get("path", "")).encode("utf-8", "replace")[: len(folder)]
+        return hmac.compare_digest(asked, folder)
 
     async def _bounded(self, scope: Scope, headers: Headers, receive: Receive, send: Send) -> None:
         """Pass a request on as long as it has no more bytes than allowed, and guard its answer."""
@@ -158,7 +149,8 @@ class Guard:
             if not over:
                 await answer(message)
 
-        if not scope.get("path", "").startswith("/_nicegui/"):  # of a page, that it can be amended
+        if not str(scope["path"]).startswith(f"{self.root}/_nicegui/"):
+            # an answer with a page in it comes as it is, so that it can be amended
             headers = [header for header in headers if header[0] != b"accept-encoding"]
         try:
             await self.app({**scope, "headers": headers}, counted, sent)
@@ -215,14 +207,6 @@ class _Answer:
 
 def _first(headers: Headers, name: bytes) -> bytes:
     return next((value for key, value in headers if key.lower() == name), b"")
-
-
-def _cookies(headers: Headers) -> Iterator[tuple[bytes, bytes]]:
-    for name, value in headers:
-        if name == b"cookie":
-            for part in value.split(b";"):
-                key, _, word = part.strip().partition(b"=")
-                yield key, word
 
 
 async def _refuse(scope: Scope, receive: Receive, send: Send, status: int, reason: str) -> None:

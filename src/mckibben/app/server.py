@@ -235,8 +235,8 @@ def serve(
     port = _free(host, port)
     workspace.claim()
     jobs = Jobs(workspace)
-    address = f"http://{_shown(host)}:{port}/?token={token}"
-    app.add_middleware(Guard, host=host, port=port, token=token)
+    address = f"http://{_shown(host)}:{port}/{token}/"
+    app.add_middleware(Guard, host=host, token=token)
     app.on_shutdown(jobs.close)
     app.timer(TICK, jobs.poll)  # whether or not a page is open
 

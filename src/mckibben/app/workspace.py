@@ -318,8 +318,8 @@ class Workspace:
         return content if isinstance(content, dict) else None
 
     def names(self, kind: str) -> list[str]:
-        """Return the names of all JSON files of a kind."""
-        found = (path.name for path in (self.folder / kind).glob("*.json"))
+        """Return the names of all JSON files of a kind; those that are only taken are none yet."""
+        found = (path.name for path in (self.folder / kind).glob("*.json") if _written(path))
         return sorted(
             name.removesuffix(".json")
             for name in found
@@ -600,6 +600,13 @@ def _order(result: dict[str, Any]) -> tuple[bool, bool, float]:
         return False, cautioned, float(validated)
     rmse = train.get("rmse")
     return True, cautioned, float("inf") if rmse is None else float(rmse)
+
+
+def _written(path: Path) -> bool:
+    try:
+        return path.lstat().st_size > 0
+    except OSError:
+        return False
 
 
 def _short(text: str) -> str:

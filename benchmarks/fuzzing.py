@@ -1,4 +1,4 @@
-"""What fuzzers share: attempts by number in a child process, within limits, that can be repeated."""
+"""Attempts by number in a child process, within limits, that can be repeated."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from pathlib import Path
 Attempt = Callable[[int], None]
 """Tries what a number stands for; anything that it raises is a finding."""
 
-LONGEST = 20.0
-"""Seconds that an attempt may take."""
+LONGEST = 60.0
+"""Seconds that an attempt may take, on a machine that does other things too."""
 
 MEMORY = 3 * 2**30
 """Bytes of address space that attempts may take beside what is there before them."""

@@ -14,6 +14,7 @@ from mckibben import Block, Channel, ModelError, Parallel, Series
 from mckibben.blocks import saving
 from mckibben.blocks.compose import DEEPEST, MOST_BLOCKS, PerChannel
 from mckibben.blocks.fields import MOST_COEFFICIENTS, MOST_NUMBERS
+from mckibben.blocks.trial import input_limits, wander
 from mckibben.export.c.project import c_files
 from mckibben.registry import load
 
@@ -188,3 +189,12 @@ def test_a_start_hard_to_find_is_found() -> None:
     forward = saving.from_dict(content)
     target = float(forward.simulate([1.0])[0])
     assert np.isfinite(forward.inverse().simulate([target])).all()
+
+
+def test_inputs_to_try_a_model_on_are_those_of_a_range_that_is_one() -> None:
+    """The outputs of its forward block reach from end to end of all numbers."""
+    forward = {"polynomial": [12.0, 1.7e308, 3.0, -4.0], "centre": 5.0, "input_range": [0.0, 10.0]}
+    block = saving.from_dict(described("polynomial", scale=5.0, **forward)).inverse()
+    low, high = input_limits(block)
+    assert np.isfinite(high - low).all()
+    assert np.isfinite(wander(low, high, np.random.default_rng(0), 3)).all()

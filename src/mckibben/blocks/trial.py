@@ -103,7 +103,8 @@ def input_limits(block: Block) -> tuple[Array, Array]:
             low, high = block.inverse().reachable()
         except ModelError:
             return lowest, highest
-    known = np.isfinite(low) & np.isfinite(high)
+    with np.errstate(over="ignore", invalid="ignore"):
+        known = np.isfinite(high - low)
     lowest[driven] = np.where(known, low, lowest[driven])
     highest[driven] = np.where(known, high, highest[driven])
     return narrowed(lowest, highest)

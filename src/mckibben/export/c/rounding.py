@@ -15,7 +15,8 @@ from mckibben.errors import ModelWarning
 NOTICED = 5e-5
 """Relative to the range of the output."""
 
-SAMPLES = 100_000
+SAMPLES, MOST_PRODUCTS = 100_000, 30_000_000
+"""Fewer samples of filters with very many states."""
 
 
 def warn_of_rounding(block: Block, sample_time: float | None) -> None:
@@ -26,7 +27,8 @@ def warn_of_rounding(block: Block, sample_time: float | None) -> None:
     if not isinstance(block, TransferFunction | ProcessModel):
         return
     rng = np.random.default_rng(0)
-    inputs = wander(*input_limits(block), rng, 400, SAMPLES // 400)
+    samples = min(SAMPLES, MOST_PRODUCTS // max(block.n_states, 1))
+    inputs = wander(*input_limits(block), rng, 400, samples // 400)
     single = _run(block, inputs.astype(np.float32), sample_time)
     double = _run(block, inputs.astype(np.float32).astype(np.float64), sample_time)
     off = float(np.abs(single - double).max() / max(np.ptp(double), 1e-300))

@@ -32,7 +32,7 @@ class Stored(BaseModel):
     format: Literal["mckibben-recording"] = "mckibben-recording"
     version: Literal[1] = 1
     sha256: str
-    sample_time: Annotated[float, Field(gt=1e-9, lt=1e11)] | None
+    sample_time: Annotated[float, Field(ge=1e-12, lt=1e11)] | None
     start_time: float
     units: dict[str, str]
     meta: dict[str, Any]

@@ -141,7 +141,8 @@ def build(workspace: Workspace, jobs: Jobs) -> None:
     async def match() -> None:
         """Draw figures for the theme that the browser has chosen."""
         query = "window.matchMedia('(prefers-color-scheme: dark)').matches"
-        desk.dark = bool(await ui.run_javascript(query, timeout=5.0))
+        with contextlib.suppress(TimeoutError):  # of a browser that is busy: it stays light
+            desk.dark = bool(await ui.run_javascript(query, timeout=5.0))
         dark.set_value(desk.dark)
         if desk.dark:
             desk.changed("theme")

@@ -3,8 +3,9 @@
     .venv/bin/python examples/robot_loop.py
 
 The robot is a virtual rig that applies the newest pressure it was sent and answers with the
-displacement it measured. The controller follows a slow wave. On a real robot, the other end
-is a microcontroller that speaks the same packets (see mckibben.stream.link).
+displacement it measured. The controller follows a slow wave. Each is told the other's address before it
+starts, hears nobody else, and the robot obeys no pressure beyond its limits. On a real robot, the other
+end is a microcontroller that speaks the same packets (see mckibben.stream.link).
 """
 
 from __future__ import annotations
@@ -29,9 +30,11 @@ def robot(pipe: Connection, period: float, duration: float) -> None:
     rig = mckibben.load_rig(RIG).changed({"sample_time": period})
     readings = rig.reset(0)
     place = rig.outputs.index("displacement")
-    pressure = rig.limits("pressure").low
-    with UDPLink(size=1) as link:
+    limits = rig.limits("pressure")
+    pressure = limits.low
+    with UDPLink(size=1, limits=[(limits.low, limits.high)]) as link:
         pipe.send(link.address)
+        link.accept(pipe.recv())  # nobody else commands it
         for _ in FixedRate(period, duration):
             wanted = link.newest()
             if wanted is not None:
@@ -41,13 +44,13 @@ def robot(pipe: Connection, period: float, duration: float) -> None:
 
 
 def controller(
-    address: tuple[str, int], block: mckibben.Block, period: float, duration: float
+    pipe: Connection, block: mckibben.Block, period: float, duration: float
 ) -> tuple[float, str]:
     """Follow a wave, and return the root-mean-square error [mm] and how well time was kept."""
     step, rate, errors = Step(block, period), FixedRate(period, duration), []
     measured = 0.0
-    with UDPLink(address, size=1) as link:
-        link.send([0.0])
+    with UDPLink(pipe.recv(), size=1) as link:
+        pipe.send(link.address)
         for k in rate:
             newest = link.newest()
             if newest is not None:
@@ -76,7 +79,7 @@ def main() -> None:
     context = multiprocessing.get_context("spawn")
     process = context.Process(target=robot, args=(theirs, chosen.period, chosen.duration + 1.0))
     process.start()
-    error, kept = controller(ours.recv(), block, chosen.period, chosen.duration)
+    error, kept = controller(ours, block, chosen.period, chosen.duration)
     process.join()
     print(f"Followed within {error:.2f} mm RMS: {kept}")
 

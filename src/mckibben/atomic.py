@@ -5,41 +5,84 @@ from __future__ import annotations
 import json
 import math
 import os
+import secrets
+import stat
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
 from mckibben.errors import DataError
+
+PART = ".mckibben-"
+"""How temporary names begin."""
 
 
 @contextmanager
 def replacing(path: str | Path) -> Iterator[Path]:
     """Give a temporary path in the same folder, and rename it to ``path`` when all went well.
 
+    The temporary file is new, whatever is lying in wait there, and has the rights of the one that it
+    replaces, or those that the process gives to new files. A link of that name is replaced itself: what
+    it leads to stays as it is.
+
     Raises
     ------
     DataError
-        If the folder is missing or cannot be written to, or there is a folder of that name.
+        If the folder is missing or cannot be written to, or what has that name is no ordinary file.
     """
     path = Path(path)
-    if path.is_dir():
-        raise DataError("there is a folder of that name", file=path, remedy="name a file")
-    if not path.parent.is_dir():
-        raise DataError("its folder does not exist", file=path, remedy="create the folder first")
-    new = path.with_name(f".{path.name}.{os.getpid()}.part")
+    with written(path):
+        before = _replaceable(path)
+        new = path.with_name(f"{PART}{secrets.token_hex(8)}.part")
+        # created here and by nobody else: a file or link that was put there before is refused
+        os.close(os.open(new, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666))
+        try:
+            if before is not None and stat.S_ISREG(before.st_mode):
+                new.chmod(stat.S_IMODE(before.st_mode) & 0o777)
+            yield new
+            new.replace(path)
+        finally:
+            with suppress(OSError):
+                new.unlink(missing_ok=True)
+
+
+@contextmanager
+def written(path: str | Path) -> Iterator[None]:
+    """Say of what the operating system refuses which file is not written because of it.
+
+    Raises
+    ------
+    DataError
+        In place of an `OSError`.
+    """
     try:
-        new.unlink(missing_ok=True)  # lest a link that someone left there be followed
-        yield new
-        new.replace(path)
+        yield
     except OSError as error:
         raise DataError(
             f"it cannot be written ({error.strerror or error})",
             file=path,
-            remedy="give a path in a folder that can be written to",
+            remedy="give a path in a folder that can be written to, on a disk that is not full",
         ) from None
-    finally:
-        new.unlink(missing_ok=True)
+
+
+def _replaceable(path: Path) -> os.stat_result | None:
+    """Return what has that name, if anything; folders, pipes and devices are refused."""
+    try:
+        found = path.lstat()
+    except (FileNotFoundError, NotADirectoryError):
+        if not path.parent.is_dir():
+            raise DataError(
+                "its folder does not exist", file=path, remedy="create the folder first"
+            ) from None
+        return None
+    except ValueError as error:
+        raise DataError(f"no file has that name ({error})", file=path, remedy="mend it") from None
+    if path.is_dir():
+        raise DataError("there is a folder of that name", file=path, remedy="name a file")
+    if not (stat.S_ISREG(found.st_mode) or stat.S_ISLNK(found.st_mode)):
+        raise DataError("there is a device or a pipe of that name", file=path, remedy="name a file")
+    return found
 
 
 def write_text(path: str | Path, text: str) -> None:

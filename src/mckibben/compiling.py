@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
-from functools import update_wrapper
+from contextlib import suppress
+from functools import cache, update_wrapper
+from pickle import UnpicklingError
 from typing import Any, TypeVar, cast
+
+from mckibben.caches import place
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
-_OPTIONS = {"cache": True, "nogil": True, "error_model": "numpy"}
+_OPTIONS = {"nogil": True, "error_model": "numpy"}
 _lock = threading.Lock()
 
 
@@ -38,12 +42,9 @@ class Deferred:
 
             with _lock:  # one of them, however many threads ask
                 if self._dispatcher is None:
-                    try:
-                        self._dispatcher = numba.njit(**self.targetoptions)(self.py_func)
-                    except RuntimeError:
-                        # there is nowhere to keep what is compiled: it is compiled each time
-                        uncached = self.targetoptions | {"cache": False}
-                        self._dispatcher = numba.njit(**uncached)(self.py_func)
+                    compiled = numba.njit(**self.targetoptions)(self.py_func)
+                    _keep(compiled, self.py_func)
+                    self._dispatcher = compiled
         return self._dispatcher
 
     @property
@@ -64,9 +65,48 @@ def deferred(function: Function, **options: Any) -> Function:
     function : callable
         Of what numba compiles without Python objects.
     **options
-        Of `numba.njit`, beside caching, freedom of other threads, and division as NumPy does it.
+        Of `numba.njit`, beside freedom of other threads, and division as NumPy does it.
     """
     return cast("Function", Deferred(function, _OPTIONS | options))
+
+
+def _keep(compiled: Any, function: Callable[..., Any]) -> None:
+    """Let numba keep a function compiled in a folder of this user's alone, if there is one."""
+    import numba
+
+    config: Any = numba.config
+    if config.DISABLE_JIT:
+        return
+    folder = place()
+    if folder is None:
+        return
+    before, config.CACHE_DIR = config.CACHE_DIR, str(folder)
+    try:
+        # as its own ``enable_caching`` does
+        compiled._cache = _cache_class()(function)
+    except RuntimeError:  # it has no source that could be seen to change
+        pass
+    finally:
+        config.CACHE_DIR = before
+
+
+@cache
+def _cache_class() -> Any:
+    """Return numba's cache, done without where it fails, as on a full disk."""
+    from numba.core.caching import FunctionCache
+
+    base: Any = FunctionCache
+
+    class Cache(base):  # type: ignore[misc]  # numba has no types
+        def save_overload(self, *what: Any) -> None:
+            with suppress(OSError):
+                base.save_overload(self, *what)
+
+        def load_overload(self, *what: Any) -> Any:
+            with suppress(OSError, EOFError, UnpicklingError):
+                return base.load_overload(self, *what)
+
+    return Cache
 
 
 def resolved(function: Function) -> Function:

@@ -58,11 +58,17 @@ class DataError(MckibbenError):
     def __str__(self) -> str:
         where = [] if self.file is None else [str(self.file)]
         if self.channel is not None:
-            where.append(f"channel {self.channel!r}")
+            where.append(f"channel {_short(self.channel, 100)!r}")
         if self.row is not None:
             where.append(f"row {self.row}")
         place = f"{', '.join(where)}: " if where else ""
-        return f"{place}{self.problem}. Remedy: {self.remedy}."
+        return f"{place}{_short(self.problem)}. Remedy: {_short(self.remedy)}."
+
+
+def _short(text: str, most: int = 1000) -> str:
+    """Return a text without its middle where it is too long to be read, as one from a file can be."""
+    half = most // 2
+    return text if len(text) <= most else f"{text[:half]} ... {text[-half:]}"
 
 
 class ModelError(MckibbenError):

@@ -7,21 +7,34 @@ be put in its place in between.
 
 from __future__ import annotations
 
+import io
 import os
 import stat
 from collections.abc import Iterator
 from contextlib import contextmanager
+from io import BufferedReader
 from pathlib import Path
-from typing import BinaryIO
 
 from mckibben.errors import DataError
 
 DESCRIPTION = 4 * 2**20
 """Bytes that a description (a sidecar, a protocol, a job, a rig) may have."""
 
+_SMALL = 2**16
+"""Bytes that are asked for without a look at how many there are."""
+
+
+class _Ordinary(io.BufferedReader):
+    """A file that makes no room for more than is left in it, whatever a format says there is."""
+
+    def read(self, size: int | None = -1, /) -> bytes:
+        if size is not None and size > _SMALL:
+            size = min(size, max(0, os.fstat(self.fileno()).st_size - self.tell()))
+        return super().read(size)
+
 
 @contextmanager
-def opened(path: str | Path, *, most: int) -> Iterator[BinaryIO]:
+def opened(path: str | Path, *, most: int) -> Iterator[BufferedReader]:
     """Open an ordinary file for reading.
 
     Parameters
@@ -63,7 +76,7 @@ def opened(path: str | Path, *, most: int) -> Iterator[BinaryIO]:
                 file=path,
                 remedy="cut it into smaller files",
             )
-        with os.fdopen(number, "rb", closefd=False) as file:
+        with _Ordinary(io.FileIO(number, "rb", closefd=False)) as file:
             yield file
     finally:
         os.close(number)

@@ -189,6 +189,13 @@ class Recording:
             return str(given)
         return "recording" if self.source is None else Path(self.source).stem
 
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What was assumed or mended when it was read, as ``meta["notes"]`` has it."""
+        given = self.meta.get("notes")
+        several = given if isinstance(given, list | tuple) else () if given is None else (given,)
+        return tuple(map(str, several))
+
     def matrix(self, channels: Iterable[str]) -> Array:
         """Return several channels side by side, shape (n, number of channels)."""
         return np.column_stack([self[name] for name in channels])
@@ -252,3 +259,18 @@ def _frozen(name: str, samples: ArrayLike) -> Array:
         )
     values.flags.writeable = False
     return values
+
+
+def notes_by_file(recordings: Iterable[Recording]) -> dict[str, list[str]]:
+    """Return what was assumed or mended in every file that recordings come from, if anything was."""
+    found: dict[str, list[str]] = {}
+    for recording in recordings:
+        known = found.setdefault(recording.source or recording.name, [])
+        known += [note for note in recording.notes if note not in known]
+    return {file: notes for file, notes in found.items() if notes}
+
+
+def reading_notes(recordings: Iterable[Recording]) -> tuple[str, ...]:
+    """Return the notes of `notes_by_file` as sentences that begin with the file."""
+    found = notes_by_file(recordings)
+    return tuple(f"{file}: {note}" for file, notes in found.items() for note in notes)

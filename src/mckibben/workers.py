@@ -35,6 +35,9 @@ ONE_THREAD = (
     "VECLIB_MAXIMUM_THREADS",
 )
 
+MOST_JOBS = 4096
+"""Processes that may be asked for."""
+
 _starting = threading.Lock()
 
 Tell = Callable[..., None]
@@ -153,7 +156,7 @@ class Workers:
             for link in [link for link in busy if link in ready]:
                 index = busy[link]
                 try:
-                    kind, what = pickle.loads(link.recv_bytes())
+                    kind, what = understood(link.recv_bytes())
                 except (EOFError, OSError):
                     kind, what = "raised", self._bury(link)
                     del busy[link]
@@ -195,10 +198,10 @@ def checked(jobs: int | None) -> int | None:
     Raises
     ------
     DataError
-        If it is below 1.
+        If it is below 1 or above `MOST_JOBS`.
     """
-    if jobs is not None and jobs < 1:
-        raise DataError(f"jobs is {jobs}", remedy="give a number of at least 1, or leave it out")
+    if jobs is not None and not 1 <= jobs <= MOST_JOBS:
+        raise DataError(f"jobs is {jobs}", remedy=f"give 1 to {MOST_JOBS}, or leave it out")
     return jobs
 
 
@@ -272,8 +275,12 @@ if hasattr(os, "register_at_fork"):
 
 
 def context() -> Any:
-    """Return how processes start: from a server that has loaded the library, where there can be one."""
-    if "forkserver" not in multiprocessing.get_all_start_methods():
+    """Return how processes start: from a server that has loaded the library, where there can be one.
+
+    Where the caller set multiprocessing to spawn, or the system knows nothing else, they are spawned.
+    """
+    spawned = multiprocessing.get_start_method(allow_none=True) == "spawn"
+    if spawned or "forkserver" not in multiprocessing.get_all_start_methods():
         return multiprocessing.get_context("spawn")
     found = multiprocessing.get_context("forkserver")
     found.set_forkserver_preload(list(PRELOADED))
@@ -313,9 +320,6 @@ def _serve(link: connection.Connection, common: Any, cores: int) -> None:
     threads.use_cores(cores)
     warnings.simplefilter("ignore")
 
-    def send(kind: str, what: Any) -> None:
-        link.send_bytes(pickle.dumps((kind, what)))
-
     with threads.one_blas_thread():
         while True:
             try:
@@ -324,22 +328,64 @@ def _serve(link: connection.Connection, common: Any, cores: int) -> None:
                 return
             try:
                 work, item = pickle.loads(given)
-                done = ("done", work(common, item, lambda *what: send("told", what)))
             except Exception as error:
-                done = ("raised", _sendable(error))
-            try:
-                send(*done)
-            except (pickle.PicklingError, TypeError, AttributeError) as error:
-                send("raised", WorkerError(f"{done[1]!r:.200} cannot be sent: {error}"))
+                link.send_bytes(_packed("raised", _sendable(error)))
+                continue
+            link.send_bytes(
+                answered(work, common, item, lambda *what: link.send_bytes(_packed("told", what)))
+            )
+
+
+def answered(work: Work, common: Any, item: Any, tell: Tell) -> bytes:
+    """Do the work, and return what came of it as it is sent: something that arrives, whatever it is."""
+    try:
+        value = work(common, item, tell)
+    except Exception as error:
+        return _packed("raised", _sendable(error))
+    try:
+        return _packed("done", value)
+    except Exception as error:
+        words = f"what it made, a {type(value).__name__}, cannot be sent: {said(error)}"
+        return _packed("raised", WorkerError(words))
+
+
+def understood(given: object) -> tuple[str, Any]:
+    """Return whether something was told, done or raised, and what; what is no answer is an error."""
+    if isinstance(given, Exception):
+        return "raised", WorkerError(f"the task failed: {said(given)}")
+    try:
+        kind, what = pickle.loads(given)  # type: ignore[arg-type]  # if it is none, that is told
+        if kind == "done" or (kind, type(what)) == ("told", tuple):
+            return kind, what
+        if kind == "raised" and isinstance(what, Exception):
+            return kind, what
+        words = "its process gave no answer that is understood"
+    except Exception as error:
+        words = f"what its process gave cannot be read: {said(error)}"
+    return "raised", WorkerError(f"{words}. Remedy: use the same versions everywhere.")
+
+
+def _packed(kind: str, what: Any) -> bytes:
+    return pickle.dumps((kind, what))
+
+
+def said(error: Exception) -> str:
+    """Return an error in words, whatever its own words do."""
+    try:
+        return f"{type(error).__name__}: {error}"
+    except Exception:
+        return type(error).__name__
 
 
 def _sendable(error: Exception) -> Exception:
     """Return an error that arrives: as it is where it can be made again, else in words."""
     try:
-        pickle.loads(pickle.dumps(error))
+        if type(pickle.loads(pickle.dumps(error))) is type(error):
+            str(error)
+            return error
     except Exception:
-        return WorkerError(f"{type(error).__name__}: {error}")
-    return error
+        pass
+    return WorkerError(said(error))
 
 
 @contextmanager

@@ -27,6 +27,7 @@ from mckibben import DataError, Recording
 from mckibben.app import guard, kept, reading
 from mckibben.app.guard import Guard, checked_token
 from mckibben.app.jobs import Job, Jobs
+from mckibben.app.pages.models import _judged
 from mckibben.app.workspace import FOLDERS, Workspace
 from mckibben.files import write
 from mckibben.registry import load
@@ -434,7 +435,7 @@ def test_a_pipe_in_the_folder_holds_nobody_up(tmp_path: Path) -> None:
     with pytest.raises(DataError):
         workspace.log("x")
     workspace.warm()
-    assert (workspace.logged(), workspace.entries(), workspace.results()) == ([], [], [])
+    assert [*workspace.logged(), *workspace.entries(), *workspace.results()] == []
     assert Jobs(workspace).jobs == {}
 
 
@@ -573,3 +574,13 @@ def test_hundreds_of_foreign_requests_take_no_memory(served: tuple[int, str, int
     status = Path(f"/proc/{process}/status").read_text()
     resident = next(line for line in status.splitlines() if line.startswith("VmHWM"))
     assert int(resident.split()[1]) < 600 * 1024
+
+
+def test_what_speaks_against_a_model_reaches_the_page(tmp_path: Path) -> None:
+    workspace = Workspace(tmp_path)
+    against = {"not_recommended": "Nothing speaks for it.", "shared": ["It was fitted to."]}
+    result = {"status": "ok", "model": "pi", "constant": {"test": {"rmse": 3.0}}} | against
+    workspace.write_json("results", "pi", result)
+    constant, *said = _judged(workspace.results())
+    assert "test RMSE 3" in constant
+    assert said == ["pi: Nothing speaks for it.", "pi: It was fitted to."]

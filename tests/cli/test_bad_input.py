@@ -20,7 +20,7 @@ def test_malformed_files_leave_with_a_remedy_and_nothing_lost(
     path = case.write(tmp_path)
     out = tmp_path / "model.json"
     out.write_text("what was there before")
-    result = cli("fit", "pi", path, "-o", out, *case.arguments)
+    result = cli("fit", "pi", path, "-o", out, "--force", *case.arguments)
     assert result.code == 2
     assert result.out == ""
     assert "Traceback" not in result.err
@@ -50,7 +50,7 @@ def test_malformed_files_leave_with_a_remedy_and_nothing_lost(
         (["fit", "pi", "FILE", "-o", "x.json", "--unit", "pressure=mm"], "mm"),
         (["fit", "pi", "FILE", "-o", "x.json", "--rate", "-5"], "rate"),
         (["compare", "FILE", "--models", "pi,what"], "no estimator named 'what'"),
-        (["compare", "FILE", "--models", ""], "no models"),
+        (["compare", "FILE", "--models", ","], "no models"),
         (["study", "FILE", "-o", "FILE"], "a file of that name"),
         (["simulate", "FILE", "FILE", "-o", "x.csv"], "not readable as a model"),
         (["simulate", "nowhere.json", "FILE", "-o", "x.csv"], "nowhere.json"),

@@ -85,7 +85,7 @@ def test_compare_writes_the_promised_leaderboard(
     assert result.code == 0, result.err
     board = json.loads((tmp_path / "lb" / "leaderboard.json").read_text())
     assert (board["input"], board["output"]) == ("pressure", "displacement")
-    assert [row["model"] for row in board["rows"]] == ["gpi", "pi"]
+    assert [row["model"] for row in board["rows"]] == ["gpi", "pi", "constant"]
     assert board["rows"][0]["test"]["rmse"] < board["rows"][1]["test"]["rmse"]
     assert board["rows"][0]["n_parameters"] == 11
     table = columns_of_text(tmp_path / "lb" / "leaderboard.csv")
@@ -109,7 +109,7 @@ def test_study_writes_everything(cli: Cli, files: tuple[Path, Path], tmp_path: P
     written = {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
     assert written == {
         *("report.html", "characterization.json", "inverse.json"),
-        *("leaderboard.csv", "leaderboard.json"),
+        *("leaderboard.csv", "leaderboard.json", "results.sha256"),
         *("models/pi.json", "models/gpi.json"),
     }
     assert load(folder / "inverse.json").inverse() == load(folder / "models" / "gpi.json")

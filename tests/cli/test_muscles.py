@@ -25,7 +25,7 @@ def arm(tmp_path_factory: pytest.TempPathFactory) -> Path:
     ]
     roles = []
     for run, recording in record("sdchm", runs=names):
-        write(recording, folder / f"{run.name}.csv")
+        write(recording.with_meta(notes=["its clock was mended"]), folder / f"{run.name}.csv")
         roles.append({"name": run.name, "role": run.role})
     reference = {f"displacement_{k}": np.full(400, 30.0) for k in (1, 2, 3)}
     reference["displacement_1"] = 30.0 + 4.0 * np.sin(np.linspace(0, 4 * np.pi, 400))
@@ -62,11 +62,15 @@ def test_study_of_a_folder_closes_the_loop(cli: Cli, arm: Path, tmp_path: Path) 
     assert result.code == 0, result.err
     found = json.loads(result.out)
     assert found["inverse"] == found["chosen"] == "force-balance"
-    first, second = found["rows"]
+    first, second, constant = found["rows"]
+    assert constant["model"] == "constant"
     assert np.mean(list(first["validation"].values())) < np.mean(
         list(second["validation"].values())
     )
     assert "1.2 bar held out" in found["split"]
+    noted = [note for note in found["notes"] if note.endswith(".csv: its clock was mended")]
+    assert len(noted) == len(list(arm.glob("*.csv")))
+    assert noted[0] in (out / "report.html").read_text()
     errors = {name: max(rmse.values()) for name, rmse in found["tracking"].items()}
     assert errors["force-balance inverse + PID"] < errors["force-balance inverse"]
     for name in ("report.html", "leaderboard.csv", "leaderboard.json", "inverse.json"):

@@ -113,7 +113,8 @@ def test_a_scheduler_that_does_not_answer_is_named(
         pass
 
 
-def test_a_cluster_without_workers_is_named() -> None:
+def test_a_cluster_without_workers_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("mckibben.comparison.cluster.ABSENCE", 0.1)
     with (
         distributed.LocalCluster(n_workers=0, dashboard_address=None) as empty,
         pytest.raises(DataError, match="has no workers"),

@@ -58,19 +58,21 @@ def test_leaderboard_has_the_promised_form(train: Recording, test_set: Recording
     content = json.loads(json.dumps(board.to_dict(), allow_nan=False))
     assert content["input"] == "pressure"
     assert content["output"] == "displacement"
-    assert [row["model"] for row in content["rows"]] == ["gpi", "pi"]
+    assert [row["model"] for row in content["rows"]] == ["gpi", "pi", "constant"]
+    assert [row["status"] for row in content["rows"]] == ["ok", "ok", "baseline"]
     for row in content["rows"]:
-        assert row["status"] == "ok"
         assert {"n_parameters", "fit_seconds", "step_ns"} <= set(row)
         assert {"rmse", "mae", "r2", "max_error"} <= set(row["train"])
         assert {"rmse", "mae", "r2", "max_error", "rmse_interval"} <= set(row["test"])
         low, high = row["test"]["rmse_interval"]
         assert low <= row["test"]["rmse"] <= high
-    best, other = content["rows"]
+    best, other, constant = content["rows"]
+    assert constant["test"]["rank"] is None
+    assert other["test"]["rmse"] < constant["test"]["rmse"]
     assert best["test"]["rmse"] < 0.1 < other["test"]["rmse"]
     assert best["test"]["difference_to_chosen_interval"] == [0.0, 0.0]
     assert other["test"]["difference_to_chosen_interval"][0] > 0
-    assert [row["test"]["rank"] for row in content["rows"]] == [1, 2]
+    assert [row["test"]["rank"] for row in content["rows"]] == [1, 2, None]
     assert (content["chosen_by"], content["chosen"]) == ("cross-validation", "gpi")
     assert content["lowest_on_test"] == "gpi"
 
@@ -130,9 +132,13 @@ def test_a_model_whose_cross_validation_failed_is_chosen_only_where_all_did(
 
 
 def test_a_test_that_was_fitted_is_pointed_out(train: Recording, test_set: Recording) -> None:
-    board = compare(train, [test_set, train], models=["pi"], n_folds=0, jobs=1)
-    assert [note for note in board.notes if "says nothing of new data" in note] == list(board.notes)
+    with pytest.raises(DataError, match="tested on data it was fitted to"):
+        compare(train, [test_set, train], models=["pi"], n_folds=0, jobs=1)
+    board = compare(train, [test_set, train], models=["pi"], n_folds=0, jobs=1, allow_shared=True)
     assert len(board.notes) == 1
+    assert board.notes == board.shared
+    for said in (board.split, board.chosen.lower(), *board.to_dict()["shared"]):
+        assert "tested on data it was fitted to" in said
 
 
 def test_what_is_good_only_near_its_training_says_so(train: Recording, test_set: Recording) -> None:
@@ -214,7 +220,8 @@ def test_a_model_that_fails_is_a_row_with_its_reason(
     reasons = {row.model: row.reason for row in board.rows}
     assert reasons["failing"] == "ZeroDivisionError: of all things"
     assert "not finite" in str(reasons["overflowing"])
-    assert board.to_dict()["rows"][1] == {
+    assert [row["model"] for row in board.to_dict()["rows"]][1] == "constant"
+    assert board.to_dict()["rows"][2] == {
         "model": "failing",
         "status": "failed",
         "reason": "ZeroDivisionError: of all things",

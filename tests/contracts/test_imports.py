@@ -13,13 +13,23 @@ import mckibben
 SOURCE = Path(mckibben.__file__).parent
 
 LAYERS = (
-    {"errors", "registry", "atomic", "ordinary", "threads", "workers", "compiling"},
+    {
+        "errors",
+        "registry",
+        "atomic",
+        "ordinary",
+        "manifest",
+        "caches",
+        "threads",
+        "workers",
+        "compiling",
+    },
     {"recording", "signals", "metrics", "characterization"},
     {"files"},
     {"rigs"},
     {"environments"},
     {"blocks"},
-    {"estimators", "export", "stream"},
+    {"estimators", "export", "stream", "outputs"},
     {"compensators", "control"},
     {"comparison"},
     {"papers"},
@@ -30,14 +40,14 @@ LAYERS = (
 """Lowest first."""
 
 STANDS_ON = {
-    "files": {"files", "recording", "errors", "registry", "atomic", "ordinary"},
+    "files": {"files", "recording", "errors", "registry", "atomic", "ordinary", "manifest"},
     "rigs": {
         *("rigs", "recording", "signals", "errors", "registry", "atomic", "ordinary"),
         *("compiling", "threads"),
     },
-    "export": {"export", "blocks", "errors", "registry", "atomic", "ordinary"},
+    "export": {"export", "blocks", "errors", "registry", "atomic", "ordinary", "manifest"},
     "stream": {"stream", "blocks", "errors"},
-    "control": {"control", "blocks", "recording", "errors", "registry"},
+    "control": {"control", "blocks", "recording", "signals", "errors", "registry"},
     "environments": {"environments", "rigs", "recording", "signals", "errors"},
 }
 """What some members may import and no more: a rig's physics knows nothing of models."""

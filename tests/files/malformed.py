@@ -185,7 +185,7 @@ UNITS = {"units": {"pressure": "bar", "displacement": "mm"}}
 
 CASES: list[Case] = [
     # No file, or none that is known
-    Case("missing.csv", nothing, "No such file"),
+    Case("missing.csv", nothing, "no such file"),
     Case("folder.csv", Path.mkdir, "this is a folder"),
     Case("link.csv", loop, "it cannot be read"),
     Case("pipe.csv", os.mkfifo, "no ordinary file"),

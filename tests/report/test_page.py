@@ -145,7 +145,7 @@ def test_hostile_names_stay_words(name: str) -> None:
     blocks = {"gpi": renamed(GPI.example(), channels), "pi": renamed(PI.example(), channels)}
     html = page(study((recording,), (test,), blocks=blocks, notes=(name,), reason=name))
     parsed = Parsed(html)
-    assert len(parsed.scripts) == 3
+    assert len(parsed.scripts) == 4
     assert not any(attribute.startswith("on") for _, attribute, _ in parsed.attributes)
     assert "<script>alert" not in html
     assert parsed.words.count(name) >= 4

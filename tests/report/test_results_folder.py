@@ -6,6 +6,7 @@ import json
 from dataclasses import replace
 from pathlib import Path
 
+from mckibben.outputs import Results
 from mckibben.report import StudyFolder
 from tests.report.studies_by_hand import study
 
@@ -13,7 +14,7 @@ from tests.report.studies_by_hand import study
 def test_results_are_written_as_they_come(tmp_path: Path) -> None:
     whole = study()
     board = whole.leaderboard
-    (tmp_path / "inverse.json").write_text("of an earlier study")
+    Results(tmp_path).write_text("inverse.json", "of an earlier study")
     folder = StudyFolder(tmp_path)
     assert not (tmp_path / "inverse.json").exists()
     names = tuple(row.model for row in board.rows)

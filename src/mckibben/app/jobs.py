@@ -11,7 +11,7 @@ import os
 import sys
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from multiprocessing.process import BaseProcess
 from pathlib import Path
@@ -279,7 +279,8 @@ def run(folder: str, name: str, kind: str, given: dict[str, Any]) -> None:
         now = time.monotonic()
         if now - last >= TELLING or share >= 1.0:
             last = now
-            with path.open("a", encoding="utf-8") as file:
+            # how far it is can be done without, on a disk that is full
+            with suppress(OSError), path.open("a", encoding="utf-8") as file:
                 file.write(f"{now - started:.2f} {share:.4f} {cost:.6g}\n")
 
     try:

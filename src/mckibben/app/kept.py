@@ -68,6 +68,13 @@ class Memory(Kept):
     gap_ratio: Number = None
 
 
+class Constant(Kept):
+    """How far off the mean of the training output is, which every model has to beat."""
+
+    validation_rmse: Number = None
+    test: Figures | None = None
+
+
 class Fitted(Kept):
     """What came of a fit."""
 
@@ -80,6 +87,9 @@ class Fitted(Kept):
     memory: Memory | None = None
     n_parameters: Count | None = None
     fit_seconds: Number = None
+    constant: Constant | None = None
+    not_recommended: Text | None = None
+    shared: list[Text] = []
 
 
 class Followed(Kept):

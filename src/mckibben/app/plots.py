@@ -22,22 +22,10 @@ Json = dict[str, Any]
 POINTS = 4000
 """Most points of a curve sent to the page."""
 
-CONFIG: Json = {
-    "displaylogo": False,
-    "modeBarButtonsToRemove": [
-        "lasso2d",
-        *("sendChartToCloud", "sendDataToCloud", "editInChartStudio"),
-    ],
-    "showSendToCloud": False,
-    "showEditInChartStudio": False,
-    "showLink": False,
-    "plotlyServerURL": "",
+CONFIG: Json = interactive.CLOSED | {
+    # not named as in pages: plotly.js puts objects into that list, and no plot is drawn in NiceGUI then
+    "modeBarButtonsToRemove": ["lasso2d", "sendChartToCloud", "sendDataToCloud"]
 }
-"""No button sends a plot anywhere, nor has anywhere to send it.
-
-Buttons cannot be named one by one here: plotly.js writes into such a list, takes it for a change, and
-draws for ever.
-"""
 
 
 @cache

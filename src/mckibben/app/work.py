@@ -33,6 +33,7 @@ def fit(workspace: Workspace, given: dict[str, Any], tell: Tell) -> str:
         settings={model: given.get("settings", {})},
         seed=int(given.get("seed", 0)),
         jobs=1,
+        allow_shared=bool(given.get("allow_shared", False)),
         watch=lambda _, share, cost: tell(share, cost),
     )
     (row,) = board.rows
@@ -45,13 +46,17 @@ def fit(workspace: Workspace, given: dict[str, Any], tell: Tell) -> str:
         "output": board.output,
         "unit": board.unit,
         "split": board.split,
+        "constant": None if board.constant is None else board.constant.to_dict(),
+        "not_recommended": board.not_recommended,
+        "shared": list(board.shared),
         "settings": given.get("settings", {}),
         "call": given.get("call", ""),
     }
     workspace.write_json("results", name, result)
     validated = "none" if row.validation_rmse is None else f"{row.validation_rmse:.4g} {board.unit}"
     tested = "none" if row.test is None else f"{row.test.rmse:.4g} {board.unit}"
-    return f"CV RMSE {validated}, test RMSE {tested}"
+    told = [f"CV RMSE {validated}, test RMSE {tested}", board.not_recommended, *board.shared]
+    return ". ".join(sentence for sentence in told if sentence)
 
 
 def loop(workspace: Workspace, given: dict[str, Any], tell: Tell) -> str:
@@ -116,6 +121,7 @@ def report(workspace: Workspace, given: dict[str, Any], tell: Tell) -> str:
         settings=given.get("settings") or None,
         seed=int(given.get("seed", 0)),
         jobs=1,
+        allow_shared=bool(given.get("allow_shared", False)),
         progress=lambda standing: tell(standing.done / standing.total, float("nan")),
     )
     path = workspace.path("takeaway", "report.html")

@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING, Any, Generic, Literal, TypeVar
 from mckibben.app import kept
 from mckibben.app.claim import Lock
 from mckibben.app.guard import LARGEST_UPLOAD
-from mckibben.atomic import replacing, write_text
+from mckibben.atomic import replacing, write_text, written
 from mckibben.comparison.limits import caution
 from mckibben.errors import DataError, MckibbenError, ModelError
 from mckibben.ordinary import DESCRIPTION, opened, read_bytes
@@ -291,13 +291,9 @@ class Workspace:
             if name in taken:
                 continue
             path = folder / f"{name}{ending}"
-            try:
+            with written(path), suppress(FileExistsError):
                 os.close(os.open(path, os.O_CREAT | os.O_EXCL | os.O_WRONLY, mode=0o600))
-            except FileExistsError:
-                continue
-            except OSError as error:
-                raise _unwritten(path, error) from None
-            return name
+                return name
         raise AssertionError
 
     def give_back(self, kind: str, name: str, ending: str = ".json") -> None:
@@ -344,13 +340,9 @@ class Workspace:
         line = json.dumps({"time": now, "did": _short(what), "call": _short(call)})
         path = self.folder / "log.jsonl"
         flags = os.O_WRONLY | os.O_CREAT | os.O_APPEND | getattr(os, "O_NOFOLLOW", 0)
-        try:
-            with os.fdopen(
-                os.open(path, flags | getattr(os, "O_NONBLOCK", 0), 0o600), "ab"
-            ) as file:
-                file.write(line.encode() + b"\n")
-        except OSError as error:
-            raise _unwritten(path, error) from None
+        flags |= getattr(os, "O_NONBLOCK", 0)
+        with written(path), os.fdopen(os.open(path, flags, 0o600), "ab") as file:
+            file.write(line.encode() + b"\n")
 
     def logged(self) -> list[dict[str, str]]:
         """Return the end of the log, oldest first; damaged lines are passed over."""
@@ -621,11 +613,3 @@ def _demand_text(*names: str) -> None:
         "".join(names).encode()
     except UnicodeEncodeError:
         raise DataError("a channel's name is no text", remedy="add it again") from None
-
-
-def _unwritten(path: Path, error: OSError) -> DataError:
-    return DataError(
-        f"it cannot be written ({error.strerror or error})",
-        file=path,
-        remedy="make room on the disk, or see to its rights",
-    )

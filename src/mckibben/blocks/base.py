@@ -10,6 +10,8 @@ from __future__ import annotations
 from abc import ABCMeta, abstractmethod
 from collections.abc import Callable
 from dataclasses import fields
+from functools import partial, wraps
+from inspect import isfunction
 from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar, overload
 
 import numpy as np
@@ -33,8 +35,40 @@ Kernel = Callable[..., None]
 Made = TypeVar("Made")
 
 
+COMPUTING = {
+    *("__post_init__", "bind", "coefficients", "initial_state", "inverse", "pack", "passes"),
+    *("reachable", "unpack"),
+}
+"""Methods in which numbers may be too large or too small to compute with."""
+
+
+def _computing(method: Callable[..., Any]) -> Callable[..., Any]:
+    """Return a method whose arithmetic errors are told as those of the model's numbers."""
+
+    @wraps(method)
+    def told(self: Any, *given: Any, **named: Any) -> Any:
+        try:
+            return method(self, *given, **named)
+        except (ArithmeticError, np.linalg.LinAlgError) as error:
+            raise ModelError(
+                f"the numbers of {self.kind!r} cannot be computed with ({error}). "
+                "Remedy: identify the model again; numbers so large or small mean nothing."
+            ) from error
+
+    return told
+
+
 class Checked(ABCMeta):
-    """What makes classes whose constructors refuse bad fields with a `ModelError`."""
+    """What makes classes that refuse bad fields, and numbers beyond all sense, with a `ModelError`."""
+
+    def __new__(
+        mcs, name: str, bases: tuple[type, ...], namespace: dict[str, Any], **named: Any
+    ) -> Checked:
+        """Return the class, its arithmetic guarded."""
+        for method in COMPUTING & namespace.keys():
+            if isfunction(namespace[method]):
+                namespace[method] = _computing(namespace[method])
+        return super().__new__(mcs, name, bases, namespace, **named)
 
     def __call__(cls: type[Made], /, *values: Any, **named: Any) -> Made:
         """Return an instance, its fields validated."""
@@ -371,4 +405,4 @@ class Primitive(Block):
     def bind(self, sample_time: float | None, state: Array, inputs: Array, outputs: Array) -> Run:
         """Return a function that runs the kernel in place."""
         run, coefficients = resolved(type(self).kernel), self.coefficients(sample_time)
-        return lambda: run(coefficients, state, inputs, outputs)
+        return partial(run, coefficients, state, inputs, outputs)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import cached_property
 from itertools import pairwise
 from typing import Annotated, ClassVar, Self
 
@@ -25,6 +26,10 @@ from mckibben.errors import ModelError
 Array = NDArray[np.float64]
 
 
+DEEPEST, MOST_BLOCKS = 32, 1000
+"""Compositions in compositions, and blocks in all."""
+
+
 def _parts(value: object) -> object:
     return tuple(nested(part) for part in value) if isinstance(value, tuple | list) else value
 
@@ -36,6 +41,26 @@ class Composition(Block):
     """What all compositions share: states and parameters are those of the parts, one after another."""
 
     parts: tuple[Block, ...]
+
+    @property
+    def depth(self) -> int:
+        """How many compositions are in each other, this one included."""
+        return 1 + max(getattr(part, "depth", 0) for part in self.parts)
+
+    @property
+    def n_blocks(self) -> int:
+        """How many blocks it is made of, compositions included."""
+        return 1 + sum(getattr(part, "n_blocks", 1) for part in self.parts)
+
+    def check_parts(self) -> None:
+        """Refuse no parts at all, and more, or more deeply nested ones, than a model is made of."""
+        if not self.parts:
+            raise ModelError(f"{self.kind!r} has no parts. Remedy: give at least one block.")
+        if self.depth > DEEPEST or self.n_blocks > MOST_BLOCKS:
+            raise ModelError(
+                f"{self.kind!r} is nested {self.depth} deep and made of {self.n_blocks} blocks. "
+                f"Remedy: compose at most {MOST_BLOCKS} blocks, at most {DEEPEST} deep."
+            )
 
     @property
     def n_states(self) -> int:
@@ -100,7 +125,7 @@ class Series(Composition):
     parts: Parts
 
     def __post_init__(self) -> None:
-        _check_any(self)
+        self.check_parts()
         for before, after in pairwise(self.parts):
             driven = len(after.inputs) - len(after.scheduling)
             if len(before.outputs) != driven:
@@ -114,7 +139,7 @@ class Series(Composition):
         """Whether any part is."""
         return any(part.rate_dependent for part in self.parts)
 
-    @property
+    @cached_property  # asked for at every level of a nested model
     def inputs(self) -> tuple[Channel, ...]:
         """Those of the first part, then scheduling inputs of later parts."""
         channels = {channel.name: channel for channel in self.parts[0].inputs}
@@ -123,7 +148,7 @@ class Series(Composition):
                 channels.setdefault(channel.name, channel)
         return tuple(channels.values())
 
-    @property
+    @cached_property
     def scheduling(self) -> tuple[str, ...]:
         """Names of all scheduling inputs."""
         first = self.parts[0]
@@ -238,7 +263,7 @@ class Parallel(Composition):
     parts: Parts
 
     def __post_init__(self) -> None:
-        _check_any(self)
+        self.check_parts()
         for part in self.parts[1:]:
             if part.inputs != self.parts[0].inputs or part.outputs != self.parts[0].outputs:
                 raise ModelError(
@@ -312,7 +337,7 @@ class PerChannel(Composition):
     parts: Parts
 
     def __post_init__(self) -> None:
-        _check_any(self)
+        self.check_parts()
         for part in self.parts:
             if len(part.inputs) != 1 or len(part.outputs) != 1:
                 raise ModelError(
@@ -385,11 +410,6 @@ class PerChannel(Composition):
         first = replace(PI.example(), input=pressures[0], output=displacements[0])
         second = replace(GPI.example(), input=pressures[1], output=displacements[1])
         return cls((first, second))
-
-
-def _check_any(block: Composition) -> None:
-    if not block.parts:
-        raise ModelError(f"{block.kind!r} has no parts. Remedy: give at least one block.")
 
 
 def _shares(vector: Array, lengths: Sequence[int]) -> list[Array]:

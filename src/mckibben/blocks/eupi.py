@@ -265,7 +265,7 @@ class EUPIInverse(Inverse, Primitive):
         if output(low) < first < output(high):
             from scipy.optimize import brentq
 
-            u = brentq(lambda u: output(u) - first, low, high, xtol=1e-15)
+            u = brentq(lambda u: output(u) - first, low, high, xtol=1e-15, maxiter=2000)
         else:
             u = low if first <= output(low) else high
         state = forward.initial_state(np.array([u]), start)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cached_property
 from typing import Annotated, ClassVar, Self
 
 import numpy as np
@@ -41,6 +42,7 @@ class FeedforwardFeedback(Composition):
     feedback: Annotated[InstanceOf[PIDFeedback], BeforeValidator(nested)]
 
     def __post_init__(self) -> None:
+        self.check_parts()
         n = len(self.compensator.outputs)
         n_driven = len(self.compensator.inputs) - len(self.compensator.scheduling)
         if (len(self.feedback.driven), len(self.feedback.scheduled)) != (n_driven, n + n_driven):
@@ -76,13 +78,13 @@ class FeedforwardFeedback(Composition):
         """What is measured."""
         return self.feedback.scheduled[: len(self.feedback.driven)]
 
-    @property
+    @cached_property
     def inputs(self) -> tuple[Channel, ...]:
         """References, measurements, and what schedules the compensator."""
         n = len(self.feedback.driven)
         return (*self.compensator.inputs[:n], *self.measured, *self.compensator.inputs[n:])
 
-    @property
+    @cached_property
     def scheduling(self) -> tuple[str, ...]:
         """Measurements, and what schedules the compensator."""
         return (*(channel.name for channel in self.measured), *self.compensator.scheduling)

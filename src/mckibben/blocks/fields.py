@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Annotated, Any, Literal
 
 import numpy as np
+from annotated_types import MaxLen
 from numpy.typing import ArrayLike
 from pydantic import BeforeValidator, ConfigDict, FiniteFloat
 from pydantic.dataclasses import dataclass as validated_dataclass
@@ -26,8 +27,16 @@ def _plain_sequence(values: Any) -> Any:
     return tuple(values) if isinstance(values, list) else values
 
 
-Vector = Annotated[tuple[FiniteFloat, ...], BeforeValidator(_plain_sequence)]
+MOST_NUMBERS, MOST_COEFFICIENTS = 1_000_000, 1000
+"""That a field may hold; polynomials, whose roots are sought, have fewer."""
+
+Vector = Annotated[tuple[FiniteFloat, ...], MaxLen(MOST_NUMBERS), BeforeValidator(_plain_sequence)]
 """Finite numbers; arrays and lists are accepted and kept as a tuple."""
+
+Coefficients = Annotated[
+    tuple[FiniteFloat, ...], MaxLen(MOST_COEFFICIENTS), BeforeValidator(_plain_sequence)
+]
+"""Those of a polynomial."""
 
 
 def rows(value: Any) -> Any:

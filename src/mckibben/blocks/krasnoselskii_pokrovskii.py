@@ -32,7 +32,7 @@ from mckibben.blocks.kernels import kernel
 from mckibben.blocks.named import NamedParameters
 from mckibben.blocks.refusals import explicit_state
 from mckibben.blocks.saving import nested
-from mckibben.blocks.single import Ranged
+from mckibben.blocks.single import Ranged, check_input_range
 from mckibben.blocks.solved import SolvedInverse, solve_samples
 from mckibben.errors import ModelError
 
@@ -135,6 +135,7 @@ class KrasnoselskiiPokrovskii(Ranged, NamedParameters, Primitive):
             raise ModelError(
                 f"the levels of {self.kind!r} do not increase. Remedy: give two or more, in order."
             )
+        check_input_range(self.kind, self.input_range)
         if len(self.weights) != n * (n + 1) // 2:
             raise ModelError(
                 f"{self.kind!r} with {n + 1} levels has {len(self.weights)} weights. "

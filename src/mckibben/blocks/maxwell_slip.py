@@ -28,6 +28,7 @@ from mckibben.blocks.fields import (
     PRESSURE,
     STRICT,
     ChannelField,
+    Coefficients,
     Initial,
     StoredInitial,
     Vector,
@@ -153,7 +154,7 @@ class MaxwellSlip(Ranged, NamedParameters, Primitive):
 
     breakaways: Vector
     weights: Vector
-    polynomial: Vector
+    polynomial: Coefficients
     stiffness_ratio: Annotated[FiniteFloat, Gt(0)] = 1.0
     limit_ratio: Annotated[FiniteFloat, Gt(0)] = 1.0
     centre: FiniteFloat = 0.0

@@ -17,7 +17,14 @@ from pydantic import BeforeValidator, FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.blocks.base import Kernel, Primitive
-from mckibben.blocks.fields import DISPLACEMENT, STRICT, ChannelField, Initial, Rule, Vector
+from mckibben.blocks.fields import (
+    DISPLACEMENT,
+    STRICT,
+    ChannelField,
+    Coefficients,
+    Initial,
+    Rule,
+)
 from mckibben.blocks.kernels import kernel
 from mckibben.blocks.refusals import parameter_vector
 from mckibben.blocks.saving import nested
@@ -112,7 +119,7 @@ class Polynomial(Memoryless, Ranged, Primitive):
     kind: ClassVar[str] = "polynomial"
     kernel: ClassVar[Kernel] = polynomial_kernel
 
-    polynomial: Vector
+    polynomial: Coefficients
     centre: FiniteFloat = 0.0
     scale: Annotated[FiniteFloat, Gt(0)] = 1.0
     input_range: tuple[FiniteFloat, FiniteFloat] | None = None

@@ -39,7 +39,7 @@ from mckibben.blocks.kernels import kernel
 from mckibben.blocks.named import NamedParameters
 from mckibben.blocks.refusals import explicit_state
 from mckibben.blocks.saving import nested
-from mckibben.blocks.single import Inverse, Ranged
+from mckibben.blocks.single import Inverse, Ranged, check_input_range
 from mckibben.errors import ModelError
 
 Array = NDArray[np.float64]
@@ -241,6 +241,7 @@ class Preisach(Ranged, NamedParameters, Primitive):
             raise ModelError(
                 f"the levels of {self.kind!r} do not increase. Remedy: give two or more, in order."
             )
+        check_input_range(self.kind, self.input_range)
         if len(self.weights) != n * (n + 1) // 2:
             raise ModelError(
                 f"{self.kind!r} with {n + 1} levels has {len(self.weights)} weights. "

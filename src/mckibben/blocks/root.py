@@ -6,6 +6,9 @@ from typing import Any
 
 from mckibben.blocks.kernels import inlined
 
+MOST_STEPS = 200
+"""Of closing the bracket, and of the walk each way: far more than either takes."""
+
 
 @inlined
 def solve_near(
@@ -27,7 +30,7 @@ def solve_near(
     near, error_near, far, error_far = start, error_start, start, error_start
     direction = -1.0 if error_start > 0.0 else 1.0
     step = (highest - lowest) / 256.0
-    while True:
+    for _ in range(2 * MOST_STEPS):
         if direction > 0.0:
             near, error_near = above, error_above
             above = min(above + step, highest)
@@ -43,16 +46,18 @@ def solve_near(
         if (error_far > 0.0) != (error_start > 0.0):
             break
         if above == highest and below == lowest:
-            slack = 1e-9 * abs(error_above - error_below)
-            if abs(error_above) < abs(error_below):
-                return above, abs(error_above) > slack
-            return below, abs(error_below) > slack
+            break
         direction = -direction
         if direction * error_start < 0.0:
             step *= 1.5
+    if (error_far > 0.0) == (error_start > 0.0):
+        slack = 1e-9 * abs(error_above - error_below)
+        if abs(error_above) < abs(error_below):
+            return above, abs(error_above) > slack
+        return below, abs(error_below) > slack
     weight_near, weight_far = error_near, error_far
     side = 0
-    for iteration in range(200):
+    for iteration in range(MOST_STEPS):
         width = far - near
         if abs(width) <= tiny:
             break

@@ -15,7 +15,8 @@ from typing import Any
 
 from mckibben.atomic import write_text
 from mckibben.blocks.base import Block
-from mckibben.errors import ModelError
+from mckibben.errors import DataError, ModelError
+from mckibben.ordinary import read_text
 from mckibben.registry import load as load_plugin
 
 FORMAT = "mckibben-model"
@@ -49,7 +50,10 @@ def from_dict(content: Mapping[str, Any]) -> Block:
             "Remedy: save it again with a matching release of mckibben."
         )
     described = {key: value for key, value in content.items() if key not in ("format", "version")}
-    block: Block = part_from_dict(described)
+    try:
+        block: Block = part_from_dict(described)
+    except RecursionError:
+        raise ModelError("nested too deeply. Remedy: compose fewer blocks in each other.") from None
     return block
 
 
@@ -70,7 +74,7 @@ def part_from_dict(content: Any, group: str = "blocks") -> Any:
     kind = content["kind"]
     cls = load_plugin(group, kind)
     values = {key: _tuples(value) for key, value in content.items() if key != "kind"}
-    unknown = sorted(set(values) - {field.name for field in fields(cls)})
+    unknown = sorted(set(values) - {field.name for field in fields(cls)}, key=str)
     if unknown:
         raise ModelError(f"{kind!r} has no field {unknown[0]!r}. Remedy: save the model again.")
     return cls(**values)
@@ -81,9 +85,14 @@ def nested(content: Any) -> Any:
     return part_from_dict(content) if isinstance(content, Mapping) else content
 
 
+def to_text(block: Block) -> str:
+    """Return a block as the text of its file."""
+    return json.dumps(to_dict(block), indent=2, allow_nan=False) + "\n"
+
+
 def save(block: Block, path: str | Path) -> None:
-    """Write a block as JSON, by a temporary file that is then renamed."""
-    write_text(path, json.dumps(to_dict(block), indent=2, allow_nan=False) + "\n")
+    """Write a block as JSON, by a temporary file that is then renamed, over what had the name."""
+    write_text(path, to_text(block))
 
 
 def load(path: str | Path) -> Block:
@@ -101,16 +110,13 @@ def load(path: str | Path) -> Block:
     """
     path = Path(path)
     try:
-        if path.stat().st_size > LARGEST_FILE:
-            raise ModelError(f"larger than {LARGEST_FILE} bytes. Remedy: give a model file.")
-        text = path.read_text(encoding="utf-8")
+        text = read_text(path, most=LARGEST_FILE)
         return from_dict(json.loads(text, parse_constant=_refuse, object_pairs_hook=_unique))
-    except OSError as error:
-        reason = error.strerror or "unreadable"
-        raise ModelError(f"{path}: {reason}. Remedy: check the path of the model file.") from None
+    except DataError as error:
+        raise ModelError(str(error)) from None
     except (ValueError, RecursionError) as error:
         raise ModelError(
-            f"{path}: not readable as a model ({error}). Remedy: save the model again."
+            f"{path}: not readable as a model ({str(error)[:200]}). Remedy: save the model again."
         ) from None
     except ModelError as error:
         raise ModelError(f"{path}: {error}") from None

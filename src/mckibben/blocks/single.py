@@ -125,9 +125,18 @@ class Inverse(Backward):
             )
 
 
+NARROWEST, NARROWEST_SHARE = 1e-30, 1e-9
+"""Width of an input range, in the unit of the input and as a share of its larger end, at least."""
+
+
 def check_input_range(kind: str, input_range: tuple[float, float] | None) -> None:
-    """Refuse an input range that is empty."""
-    if input_range is not None and not input_range[0] < input_range[1]:
+    """Refuse an input range that is empty, or that steps through it could not be told apart in."""
+    if input_range is None:
+        return
+    low, high = input_range
+    narrowest = max(NARROWEST, NARROWEST_SHARE * max(abs(low), abs(high)))
+    if not narrowest <= high - low < np.inf:
         raise ModelError(
-            f"the input range {input_range} of {kind!r} is empty. Remedy: give (lowest, highest)."
+            f"the input range {input_range} of {kind!r} is empty, or too narrow or wide to compute "
+            "with. Remedy: give (lowest, highest)."
         )

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
+from mckibben.characterization.evidence import evidence
 from mckibben.characterization.loops import Array, Loop, largest_of, loops_of, pooled_curves
 from mckibben.characterization.mean_curve import mean_curve
 from mckibben.characterization.memory import dead_zones, minor_loop_errors
@@ -19,6 +21,13 @@ from mckibben.signals.reversals import whole_cycles
 JOULE_PER_SQUARE_METRE = 100.0
 """1 bar mm is 1e5 Pa times 1e-3 m."""
 
+SHAPE = (
+    *("loop_width", "mid_width", "asymmetry", "width_centroid", "loop_area", "loop_area_share"),
+    *("loss_per_area", "dead_zone_upper", "dead_zone_lower", "gain", "onset", "saturation"),
+    *("branch_gap", "creep", "creep_time", "drift", "rate_dependence"),
+    *("closure_error", "wiping_out_error"),
+)
+"""What nothing is known of where the output does not depend on the input."""
 
 COVERED = 0.8
 """Share of the input range that one cycle must cover to speak for all."""
@@ -33,7 +42,8 @@ def characterize(
 
     Sensor noise is averaged away first, over samples within which the input moves by no more than
     half a percent of its range. Ranges are those of all recordings together. What the recordings
-    cannot tell is None: widths without a whole cycle, rates and creep without time, and so on.
+    cannot tell is None: widths without a whole cycle, rates and creep without time, and all of it where
+    the output does not depend on the input by more than noise would give, tested at a level of 1 %.
 
     Parameters
     ----------
@@ -74,10 +84,11 @@ def characterize(
     closure, wiping_out = minor_loop_errors(tracks, scale)
     crept, creep_time = creep(tracks, scale)
     slope, verdict = rate_dependence(loops)
+    seen = evidence(tracks, scale)
     durations = [run.duration for run in runs]
     steps = {run.sample_time for run in runs}
     area = None if largest is None else largest.area
-    return Characterization(
+    found = Characterization(
         input=input,
         output=output,
         input_unit=units[0],
@@ -119,7 +130,13 @@ def characterize(
         rate_verdict=verdict,
         closure_error=closure,
         wiping_out_error=wiping_out,
+        p_dependence=seen.dependence,
+        p_loop=seen.loop,
     )
+    if found.depends:
+        return found
+    blank = replace(found, cycles=(), rate_verdict="unknown")
+    return replace(blank, **dict.fromkeys(SHAPE))  # type: ignore[arg-type]  # all of them may be None
 
 
 def _branch_curves(

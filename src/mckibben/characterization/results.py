@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass, fields
 from typing import Any
 
+from mckibben.characterization.evidence import LEVEL
 from mckibben.characterization.loops import Cycle
 
 Range = tuple[float, float]
@@ -65,6 +66,9 @@ class Characterization:
     closure_error, wiping_out_error : float or None
         Return-point memory and wiping-out: how far minor loops fail to close, and to be forgotten
         [%].
+    p_dependence, p_loop : float or None
+        How likely noise alone would show as much dependence of the output on the input, and on its
+        direction beside a curve without memory; None where there are too few samples.
     """
 
     input: str
@@ -102,6 +106,18 @@ class Characterization:
     rate_verdict: str
     closure_error: float | None
     wiping_out_error: float | None
+    p_dependence: float | None = None
+    p_loop: float | None = None
+
+    @property
+    def has_loop(self) -> bool:
+        """Whether there is a loop that noise would not give, or no test that says otherwise."""
+        return self.p_loop is None or self.p_loop <= LEVEL
+
+    @property
+    def depends(self) -> bool:
+        """Whether the output depends on the input by more than noise would give, likewise."""
+        return self.p_dependence is None or self.p_dependence <= LEVEL or self.has_loop
 
     @property
     def output_span(self) -> float:

@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
+from mckibben.characterization.evidence import LEVEL
+
 if TYPE_CHECKING:
     from mckibben.characterization.results import Characterization
 
@@ -26,6 +28,8 @@ Row = tuple[str, float | int | str | None, str, str]
 
 def sentences(found: Characterization) -> list[str]:
     """Return what the muscle does, in plain words, most important first."""
+    if not found.depends:
+        return [_independent(found)]
     said = [_headline(found), _motion(found), _memory(found), _rate(found), _trust(found)]
     return [sentence for sentence in said if sentence]
 
@@ -54,6 +58,13 @@ def table(found: Characterization) -> list[Row]:
         (f"highest {found.output}", found.output_range[1], y, "output range"),
         (f"noise of {found.input}", found.input_noise, u, "standard deviation of a sample"),
         (f"noise of {found.output}", found.output_noise, y, "standard deviation of a sample"),
+        (
+            "p of the dependence",
+            found.p_dependence,
+            "",
+            "how likely noise alone makes the output depend on the input as much",
+        ),
+        ("p of the loop", found.p_loop, "", "the same of its direction, beside a curve"),
         (
             "loop width e_w",
             found.loop_width,
@@ -123,10 +134,28 @@ def table(found: Characterization) -> list[Row]:
     ]
 
 
+def _independent(found: Characterization) -> str:
+    return (
+        f"{found.output[0].upper()}{found.output[1:]} does not depend on {found.input} by more than "
+        f"noise would give ({_level(found.p_dependence)}), so there is no loop, gain or saturation to "
+        "tell: check the channels and the sensor."
+    )
+
+
+def _level(p: float | None) -> str:
+    shown = "" if p is None else "p < 0.001, " if p < 0.001 else f"p = {p:.2g}, "
+    return f"{shown}tested at {100 * LEVEL:g} %"
+
+
 def _headline(found: Characterization) -> str:
     parts = []
     width = found.loop_width
-    if width is not None:
+    if not found.has_loop:
+        parts.append(
+            f"no loop that noise would not give ({_level(found.p_loop)}): {found.output} follows "
+            f"{found.input} along a curve without memory, as far as these recordings tell"
+        )
+    elif width is not None:
         size = (
             "narrow"
             if width < NARROW
@@ -172,7 +201,11 @@ def _motion(found: Characterization) -> str:
         unit = f"{found.output_unit}/{found.input_unit}" if found.input_unit else found.output_unit
         text += f", {_value(found.gain, unit)} at mid input"
     zones = [zone for zone in (found.dead_zone_upper, found.dead_zone_lower) if zone is not None]
-    if zones and max(zones) >= 0.01 * (found.input_range[1] - found.input_range[0]):
+    if (
+        found.has_loop
+        and zones
+        and max(zones) >= 0.01 * (found.input_range[1] - found.input_range[0])
+    ):
         low, high = (_value(zone, found.input_unit) for zone in (min(zones), max(zones)))
         dead = high if low == high else f"{low} to {high}"
         text += f"; after a reversal the input changes by {dead} before the output moves back"
@@ -181,11 +214,11 @@ def _motion(found: Characterization) -> str:
 
 def _memory(found: Characterization) -> str:
     parts = []
-    if found.closure_error is not None:
+    if found.closure_error is not None and found.has_loop:
         share = f"{_percent(found.closure_error)} of the output range"
         closed = found.closure_error < REMEMBERED
         parts.append(f"minor loops {'close within' if closed else 'miss their start by'} {share}")
-    if found.wiping_out_error is not None:
+    if found.wiping_out_error is not None and found.has_loop:
         share = _percent(found.wiping_out_error)
         wiped = found.wiping_out_error < REMEMBERED
         off = "as without them, within" if wiped else "off that without them by"
@@ -198,6 +231,8 @@ def _memory(found: Characterization) -> str:
 
 
 def _rate(found: Characterization) -> str:
+    if not found.has_loop:
+        return ""
     if found.rate_verdict == "unknown":
         return (
             "Whether the loop depends on speed cannot be told: that takes several cycles between the "

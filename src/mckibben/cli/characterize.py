@@ -15,7 +15,7 @@ from mckibben.cli.options import (
     Resample,
     Units,
 )
-from mckibben.cli.output import figure, print_json, print_table
+from mckibben.cli.output import figure, print_json, print_table, say
 
 
 def characterize(
@@ -32,18 +32,21 @@ def characterize(
     """Say what the muscle does: loop width, asymmetry, dead zone, creep, rate dependence."""
     recordings = Reading(column, unit, rate, gaps, resample).read(files, [input, output])
     from mckibben.characterization import characterize as find
+    from mckibben.recording import notes_by_file, reading_notes
 
     found = find(recordings, input, output)
     if as_json:
-        print_json(found.to_dict())
+        print_json(found.to_dict() | {"notes": notes_by_file(recordings)})
         return
     for sentence in found.sentences:
-        print(sentence)
-    print()
+        say(sentence)
+    say()
     print_table(
         ["quantity", "value", "unit"],
         [[str(name), _shown(value), str(units)] for name, value, units, _ in found.table()],
     )
+    for note in reading_notes(recordings):
+        say(f"Note: {note}")
 
 
 def _shown(value: object) -> str:

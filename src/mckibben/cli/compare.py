@@ -9,10 +9,11 @@ import typer
 
 from mckibben.cli.leaderboards import told
 from mckibben.cli.options import (
-    MOST_SAMPLES,
+    AllowShared,
     Columns,
     Dask,
     Files,
+    Force,
     GapPolicy,
     Gaps,
     Input,
@@ -32,7 +33,7 @@ from mckibben.cli.options import (
     chosen_models,
     settings_of_all,
 )
-from mckibben.cli.output import make_folder, print_json, progress_bar
+from mckibben.cli.output import make_folder, print_json, progress_bar, say
 from mckibben.cli.stopping import forget_kept, stop_short, stoppable
 
 
@@ -55,7 +56,9 @@ def compare(
     rate: Rate = None,
     gaps: GapPolicy = Gaps.ERROR,
     resample: Resample = None,
-    samples: Samples = MOST_SAMPLES,
+    samples: Samples = None,
+    allow_shared: AllowShared = False,
+    force: Force = False,
     as_json: Json = False,
 ) -> None:
     """Fit models, choose by cross-validation, test on data used for neither; all free-running.
@@ -65,6 +68,8 @@ def compare(
     """
     from mckibben import workers
     from mckibben.files.folders import expanded
+    from mckibben.outputs import Results
+    from mckibben.report.results_folder import LEADERBOARD, write_leaderboard
 
     folder = None if out is None else make_folder(out)
     with stoppable(folder):
@@ -74,13 +79,18 @@ def compare(
         given = settings_of_all(settings, chosen)
         reading = Reading(column, unit, rate, gaps, resample)
         fitted, checked, held_back = expanded(files, test or [])
+        results = None
+        if folder is not None:
+            results = Results(folder, inputs=[*fitted, *checked, *held_back], force=force)
+            results.claim(LEADERBOARD)
         train = reading.read([*fitted, *checked], [input, output])
         tests = reading.read(held_back, [input, output])
         from mckibben.cli.leaderboards import print_leaderboard
         from mckibben.comparison.cluster import on_cluster
         from mckibben.comparison.ranking import compare as rank
-        from mckibben.report import write_leaderboard
 
+        if results is not None:
+            results.clear()
         with on_cluster(dask), progress_bar("comparing", plainly=True) as tell:
             board = rank(
                 train,
@@ -92,18 +102,19 @@ def compare(
                 seed=seed,
                 jobs=jobs,
                 most_samples=samples,
+                allow_shared=allow_shared,
                 folder=folder,
                 clear=False,
                 progress=told(tell),
-                found=None if folder is None else lambda board: write_leaderboard(board, folder),
+                found=None if results is None else lambda board: write_leaderboard(board, results),
             )
-        if folder is not None:
-            write_leaderboard(board, folder)
+        if results is not None:
+            write_leaderboard(board, results)
         if as_json:
             print_json(board.to_dict())
         else:
             print_leaderboard(board)
             if folder is not None:
-                print(f"Written: {folder / 'leaderboard.json'}, {folder / 'leaderboard.csv'}")
+                say(f"Written: {folder / 'leaderboard.json'}, {folder / 'leaderboard.csv'}")
         stop_short(board)
         forget_kept(folder)

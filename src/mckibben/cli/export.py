@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from mckibben.cli.options import Json
-from mckibben.cli.output import print_json
+from mckibben.cli.output import print_json, say
 
 if TYPE_CHECKING:
     from mckibben.blocks.base import Block
@@ -88,9 +88,13 @@ def export_c(
     """Write C99 that compiles as it is: on a PC, a microcontroller, Arduino, MATLAB."""
     from mckibben.export import export_c as write_c
     from mckibben.export.c.building import self_test
+    from mckibben.export.folders import refuse_folder
     from mckibben.export.naming import name_from
+    from mckibben.outputs import refuse_inputs
 
     chosen = name or name_from(model)
+    refuse_inputs(out, [model])
+    refuse_folder(out, overwrite=overwrite)
     block = _loaded(model, inverse)
     write_c(
         block,
@@ -110,8 +114,8 @@ def export_c(
         )
         return
     for line in filter(None, (told, ran)):
-        print(line)
-    print(f"Written: {out} ({len(files)} files; start with {out / 'README.md'})")
+        say(line)
+    say(f"Written: {out} ({len(files)} files; start with {out / 'README.md'})")
 
 
 @app.command("fmu")
@@ -137,8 +141,12 @@ def export_fmu(
     import zipfile
 
     from mckibben.export import export_fmu as write_fmu
+    from mckibben.export.fmu.unit import refuse_file
     from mckibben.export.naming import name_from
+    from mckibben.outputs import refuse_inputs
 
+    refuse_inputs(out, [model])
+    refuse_file(out, overwrite=overwrite)
     named = [word.strip() for word in platforms.split(",")]
     write_fmu(
         _loaded(model, inverse),
@@ -155,5 +163,5 @@ def export_fmu(
         print_json({"file": str(out), "fmi": fmi.value, "libraries": built})
         return
     for path in built:
-        print(f"Library: {path}")
-    print(f"Written: {out} (FMI {fmi.value})")
+        say(f"Library: {path}")
+    say(f"Written: {out} (FMI {fmi.value})")

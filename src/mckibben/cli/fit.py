@@ -10,6 +10,7 @@ import typer
 from mckibben.cli.options import (
     Columns,
     Files,
+    Force,
     GapPolicy,
     Gaps,
     Json,
@@ -21,7 +22,7 @@ from mckibben.cli.options import (
     Units,
     parse_settings,
 )
-from mckibben.cli.output import figure, print_json, progress_bar
+from mckibben.cli.output import figure, print_json, progress_bar, say
 from mckibben.errors import DataError, ModelError
 
 if TYPE_CHECKING:
@@ -57,6 +58,7 @@ def fit(
     rate: Rate = None,
     gaps: GapPolicy = Gaps.ERROR,
     resample: Resample = None,
+    force: Force = False,
     as_json: Json = False,
 ) -> None:
     """Identify one model from recordings and save it as JSON.
@@ -65,7 +67,9 @@ def fit(
     channels by name: pressure_1 ..., displacement_1 ..., and pressure_extensor where there is one.
     """
     from mckibben import registry
+    from mckibben.outputs import claim_model
 
+    claim_model(out, inputs=[*files, *(validation or [])], force=force)
     if model in registry.names("coupled"):
         reading = Reading(column, unit, rate, gaps, resample)
         held_back = reading.read(validation or [], None)
@@ -118,18 +122,18 @@ def fit(
         )
         return
     stopped = " (interrupted: the best until then)" if found.interrupted else ""
-    print(
+    say(
         f"{model}: free-running RMSE {figure(found.rmse, 4)} {unit_name} on {found.n_samples} samples, "
         f"{estimator.model_.n_parameters} parameters, {found.seconds:.2f} s{stopped}"
     )
     if abs(found.rmse_from_rest - found.rmse) > STARTS_MATTER * found.rmse:
-        print(
+        say(
             "That starts every recording from its fitted state; from rest, as streams and generated "
             f"code start, the RMSE is {figure(found.rmse_from_rest, 4)} {unit_name}."
         )
     if undetermined:
-        print(f"Not determined by these recordings: {'; '.join(undetermined)}.")
-    print(f"Written: {out}")
+        say(f"Not determined by these recordings: {'; '.join(undetermined)}.")
+    say(f"Written: {out}")
 
 
 def _fit_coupled(
@@ -176,10 +180,10 @@ def _fit_coupled(
     errors = ", ".join(
         f"{name} {figure(value, 4)} mm" for name, value in zip(names, found.rmse, strict=True)
     )
-    print(
+    say(
         f"{model}: free-running RMSE {errors} on {found.n_samples} samples of {len(recordings)} "
         f"recordings, {block.n_parameters} parameters, {found.seconds:.2f} s"
     )
     for note in found.notes:
-        print(f"Note: {note}")
-    print(f"Written: {out}")
+        say(f"Note: {note}")
+    say(f"Written: {out}")

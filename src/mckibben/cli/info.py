@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from mckibben.cli.options import Columns, GapPolicy, Gaps, Json, Rate, Reading, Resample, Units
-from mckibben.cli.output import print_json, print_table
+from mckibben.cli.output import print_json, print_table, say
 from mckibben.errors import DataError
 
 
@@ -58,7 +58,7 @@ def _models(as_json: bool) -> None:
     print_table(["model", "what it is"], [[name, f["summary"]] for name, f in found.items()])
     for name, described in found.items():
         listed = ", ".join(f"{key}={value}" for key, value in described["settings"].items())
-        print(f"\n{name} settings (--set NAME=VALUE): {listed}")
+        say(f"\n{name} settings (--set NAME=VALUE): {listed}")
 
 
 def _model(file: Path, as_json: bool) -> None:
@@ -108,9 +108,11 @@ def _recordings(recordings: list[Any], as_json: bool) -> None:
         print_json(described)
         return
     for recording in recordings:
-        print(recording)
+        say(str(recording))
         rows = [
             [name, recording.units[name] or "-", f"{s.min():.6g}", f"{s.max():.6g}"]
             for name, s in recording.channels.items()
         ]
         print_table(["channel", "unit", "lowest", "highest"], rows)
+        for note in recording.notes:
+            say(f"Note: {note}")

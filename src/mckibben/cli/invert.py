@@ -7,13 +7,14 @@ from typing import Annotated
 
 import typer
 
-from mckibben.cli.options import Json
-from mckibben.cli.output import figure, print_json
+from mckibben.cli.options import Force, Json
+from mckibben.cli.output import figure, print_json, say
 
 
 def invert(
     model: Annotated[Path, typer.Argument(help="Model file (JSON).")],
     out: Annotated[Path, typer.Option("-o", "--out", help="Inverse to write (JSON).")],
+    force: Force = False,
     as_json: Json = False,
 ) -> None:
     """Write the inverse of a saved model: wished-for output in, input out.
@@ -24,7 +25,9 @@ def invert(
 
     from mckibben.blocks.force.feedforward import ForceFeedforward
     from mckibben.blocks.saving import load
+    from mckibben.outputs import claim_model
 
+    claim_model(out, inputs=[model], force=force)
     block = load(model)
     feedforward = ForceFeedforward.of(block)
     if feedforward is not None:
@@ -32,8 +35,8 @@ def invert(
         if as_json:
             print_json({"file": str(out), "reachable": {}})
             return
-        print("Pressure by force and length, in closed form; track it where length is imposed.")
-        print(f"Written: {out}")
+        say("Pressure by force and length, in closed form; track it where length is imposed.")
+        say(f"Written: {out}")
         return
     inverse = block.inverse()
     inverse.save(out)
@@ -48,11 +51,11 @@ def invert(
         print_json({"file": str(out), "reachable": reachable})
         return
     if not reachable:
-        print("What can be reached depends on the other muscles; track says what was clipped.")
+        say("What can be reached depends on the other muscles; track says what was clipped.")
     for channel in block.outputs if reachable else ():
         a, b = reachable[channel.name]
-        print(
+        say(
             f"Reachable whatever happened before: {channel.name} {figure(a, 5)} to {figure(b, 5)} "
             f"{channel.unit}; references beyond are clipped."
         )
-    print(f"Written: {out}")
+    say(f"Written: {out}")

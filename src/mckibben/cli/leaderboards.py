@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from mckibben.cli.output import figure, print_table
+from mckibben.cli.output import figure, print_table, say
 
 if TYPE_CHECKING:
     from mckibben.comparison.results import Leaderboard, Standing
@@ -45,7 +45,7 @@ def print_leaderboard(board: Leaderboard) -> None:
 
     validated = board.chosen_by != "fit"
     rows = []
-    for row in board.rows:
+    for row in board.ranking:
         if row.test is None:
             continue
         interval = row.rmse_interval or (float("nan"), float("nan"))
@@ -56,31 +56,33 @@ def print_leaderboard(board: Leaderboard) -> None:
                 figure(row.validation_rmse if validated else row.chosen_by),
                 figure(row.test.rmse),
                 f"{figure(interval[0])} to {figure(interval[1])}",
-                str(row.test_rank),
+                "-" if row.test_rank is None else str(row.test_rank),
                 figure(memory, 2),
             ]
         )
     unit = f" [{board.unit}]" if board.unit else ""
-    print(f"Split: {board.split}.")
+    say(f"Split: {board.split}.")
     heading, _ = CHOICES[board.chosen_by]
     headings = [f"{heading}{unit}", f"test RMSE{unit}", "95 % interval", "rank", "gap kept"]
     print_table(["model", *headings], rows)
-    print("All run free. Rank: by test RMSE. Gap between branches kept: 1 is right, 0 forgets.")
+    say("All run free. Rank: by test RMSE. Gap between branches kept: 1 is right, 0 forgets.")
+    if board.constant is not None and board.rows:
+        say("constant: the mean of the training output, which every model has to beat.")
     if board.chosen:
-        print(board.chosen)
+        say(board.chosen)
     careful = [row.model for row in board.rows if row.reason is None and row.caution]
     if careful:
-        print(
+        say(
             "* Good only near the motions fitted, however small the errors, so not chosen while another "
             f"works: {', '.join(careful)}."
         )
     for row in board.rows:
         if row.reason is None and row.invalid:
-            print(f"{row.model}: not chosen, its {heading.split()[0]} failed: {row.invalid}")
+            say(f"{row.model}: not chosen, its {heading.split()[0]} failed: {row.invalid}")
     for row in board.rows:
         if row.reason is not None:
-            print(f"{row.model}: failed, {row.reason}")
+            say(f"{row.model}: failed, {row.reason}")
     for note in board.notes:
-        print(f"Note: {note}")
+        say(f"Note: {note}")
     if board.left_out:
-        print(f"Left out: {len(board.left_out)} models that are made for other channels.")
+        say(f"Left out: {len(board.left_out)} models that are made for other channels.")

@@ -6,12 +6,16 @@ Heavy modules are imported inside the commands that use them, so that help comes
 from __future__ import annotations
 
 import os
+import re
 import sys
 import warnings
-from typing import Annotated
+from contextlib import suppress
+from io import TextIOWrapper
+from typing import Annotated, Any
 
 import typer
 
+from mckibben.caches import CacheWarning
 from mckibben.cli.app import app as workbench
 from mckibben.cli.characterize import characterize
 from mckibben.cli.compare import compare
@@ -19,17 +23,20 @@ from mckibben.cli.export import app as export_app
 from mckibben.cli.fit import fit
 from mckibben.cli.info import info
 from mckibben.cli.invert import invert
-from mckibben.cli.output import InterruptionError
+from mckibben.cli.output import InterruptionError, finish, say, visible
 from mckibben.cli.plot import plot
 from mckibben.cli.reproduce import reproduce
 from mckibben.cli.rig import app as rig_app
 from mckibben.cli.simulate import simulate
 from mckibben.cli.study import study
 from mckibben.cli.track import track
-from mckibben.errors import DataWarning, MckibbenError, ModelWarning
+from mckibben.errors import DataError, DataWarning, MckibbenError, ModelWarning
 
 BAD_INPUT = 2
 INTERRUPTED = 130
+
+_UsageError: Any = typer.BadParameter.__mro__[1]
+"""What is raised on options that there are not; under that name in no public module."""
 
 app = typer.Typer(
     name="mckibben",
@@ -51,7 +58,7 @@ def _show_version(wanted: bool) -> None:
     if wanted:
         from mckibben import __version__
 
-        typer.echo(__version__)
+        say(__version__)
         raise typer.Exit
 
 
@@ -68,24 +75,34 @@ def run() -> None:
     """Run the command line: errors become one paragraph on standard error, and exit code 2."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        for category in (DataWarning, ModelWarning):
+        for category in (CacheWarning, DataWarning, ModelWarning):
             warnings.simplefilter("always", category)
-        warnings.showwarning = lambda message, *_: print(f"Note: {message}", file=sys.stderr)
+        warnings.showwarning = lambda message, *_: say(
+            f"Note: {' '.join(str(message).split())}", error=True
+        )
+        for stream in (sys.stdout, sys.stderr):
+            if isinstance(stream, TextIOWrapper):  # whatever letters the terminal lacks
+                stream.reconfigure(errors="backslashreplace")
         _run()
 
 
 def _run() -> None:
     try:
-        app()
+        _refuse_nothing(sys.argv[1:])
+        code = app(standalone_mode=False)
+        finish()
+        if code == INTERRUPTED:
+            _leave("Interrupted: nothing was finished that could be kept.", INTERRUPTED)
+        sys.exit(code)
+    except _UsageError as error:
+        error.message = visible(error.message)
+        error.show()
+        sys.exit(error.exit_code)
     except InterruptionError as stopped:
         _leave(str(stopped), INTERRUPTED)
     except MckibbenError as error:
         _leave(str(error), BAD_INPUT)
-    except SystemExit as leaving:
-        if leaving.code == INTERRUPTED:
-            print("Interrupted: nothing was finished that could be kept.", file=sys.stderr)
-        raise
-    except KeyboardInterrupt:
+    except (KeyboardInterrupt, typer.Abort):
         _leave("Interrupted: nothing was finished that could be kept.", INTERRUPTED)
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
@@ -106,8 +123,23 @@ def _run() -> None:
         )
 
 
+def _refuse_nothing(arguments: list[str]) -> None:
+    """Refuse an empty word, such as a variable that is not set: as a path it is this folder."""
+    for word in arguments:
+        if not word.strip() or re.fullmatch(r"--[a-z-]+=", word):
+            raise DataError(
+                f"the argument {word!r} says nothing",
+                remedy="give it a value, or leave it out with its option",
+            )
+
+
 def _leave(message: str, code: int) -> None:
-    print(" ".join(message.split()), file=sys.stderr)
+    say(" ".join(message.split()), error=True)
+    with suppress(OSError, AttributeError, ValueError):
+        try:
+            sys.stdout.flush()
+        except OSError:  # or it would be tried again, and complained of
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     sys.exit(code)
 
 

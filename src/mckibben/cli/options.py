@@ -64,13 +64,25 @@ Models = Annotated[
 ]
 Quick = Annotated[bool, typer.Option("--quick", help="Same as --models quick.")]
 Samples = Annotated[
-    int,
+    int | None,
     typer.Option(
-        "--samples", metavar="N", help="Samples to fit to at most: longer recordings are thinned."
+        "--samples",
+        metavar="N",
+        min=1,
+        max=10**9,
+        help="Samples to fit to at most: longer recordings are thinned.",
     ),
 ]
-MOST_SAMPLES = 100_000
-"""As `mckibben.comparison.ranking` has it, which takes long to import."""
+AllowShared = Annotated[
+    bool,
+    typer.Option("--allow-shared", help="Test on data fitted to, and say so in every result."),
+]
+Force = Annotated[
+    bool,
+    typer.Option(
+        "--force", help="Replace files that this program did not write; never what is read."
+    ),
+]
 Settings = Annotated[
     list[str] | None,
     typer.Option(
@@ -152,9 +164,10 @@ def parse_settings(
     import dataclasses
 
     from mckibben import registry
-    from mckibben.estimators.settings import setting_value
+    from mckibben.estimators.settings import check_settings, setting_value
 
-    known = {field.name for field in dataclasses.fields(registry.load(group, model))}
+    estimator = registry.load(group, model)
+    known = {field.name for field in dataclasses.fields(estimator)}
     settings: dict[str, Any] = {}
     for item in given or []:
         name, equals, text = item.partition("=")
@@ -169,6 +182,8 @@ def parse_settings(
                 f"Remedy: use one of {', '.join(sorted(known))}."
             )
         settings[name] = setting_value(text)
+    if settings:  # now, and not when this model's turn has come
+        check_settings(estimator(**settings))
     return settings
 
 

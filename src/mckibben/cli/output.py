@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
+import re
 import sys
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -17,9 +18,63 @@ class InterruptionError(MckibbenError):
     """Work that the user stopped; the text says what was kept."""
 
 
+_UNSEEN = re.compile(
+    "[\x00-\x08\x0b-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ud800-\udfff]"
+)
+"""What a terminal would obey instead of showing it: control characters, marks of direction, and halves
+of characters, which stand for bytes of file names that are no text."""
+
+
+def visible(text: str) -> str:
+    r"""Return words with control characters written out, whoever chose the words.
+
+    Names of files and channels, and what models and recordings say of themselves, may hold anything.
+
+    >>> visible("\x1b[2J")
+    '\\u001b[2J'
+    """
+    return _UNSEEN.sub(lambda found: f"\\u{ord(found.group()):04x}", text)
+
+
+def say(text: str = "", *, end: str = "\n", flush: bool = False, error: bool = False) -> None:
+    """Print words on standard output, or standard error, with control characters made visible.
+
+    Raises
+    ------
+    MckibbenError
+        If standard output cannot be written to. Standard error is done without.
+    """
+    if error:
+        with suppress(OSError):
+            print(visible(text), end=end, file=sys.stderr, flush=True)
+        return
+    with _to_output():
+        print(visible(text), end=end, flush=flush)
+
+
+def finish() -> None:
+    """See to it that all that was printed is out; errors are those of `say`."""
+    with _to_output():
+        if sys.stdout is not None:
+            sys.stdout.flush()
+
+
+@contextmanager
+def _to_output() -> Iterator[None]:
+    try:
+        yield
+    except BrokenPipeError:  # whoever read it has seen enough
+        raise
+    except OSError as error:
+        raise MckibbenError(
+            f"Standard output cannot be written to ({error.strerror or error}). "
+            "Remedy: send it to a file on a disk that is not full."
+        ) from None
+
+
 def print_json(value: Any) -> None:
     """Print a value as JSON on standard output."""
-    print(to_json(value))
+    say(to_json(value))
 
 
 def print_table(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
@@ -30,13 +85,16 @@ def print_table(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
 
     table = Table(box=None, pad_edge=False, header_style="bold")
     for index, heading in enumerate(headings):
-        table.add_column(Text(heading), justify="left" if index == 0 else "right", overflow="fold")
+        table.add_column(
+            Text(visible(heading)), justify="left" if index == 0 else "right", overflow="fold"
+        )
     for row in rows:
-        table.add_row(*(Text(cell) for cell in row))
+        table.add_row(*(Text(visible(cell)) for cell in row))
     console = Console()
     if not console.is_terminal:
         console = Console(width=200)
-    console.print(table)
+    with _to_output():
+        console.print(table)
 
 
 def figure(value: float | None, digits: int = 3) -> str:
@@ -65,7 +123,7 @@ def progress_bar(what: str, *, plainly: bool = False) -> Iterator[Callable[[floa
         def line(share: float, text: str) -> None:
             nonlocal last
             if plainly and share > last and sys.stderr is not None:
-                print(text, file=sys.stderr, flush=True)
+                say(text, error=True)
                 last = share
 
         yield line
@@ -80,7 +138,7 @@ def progress_bar(what: str, *, plainly: bool = False) -> Iterator[Callable[[floa
 
         def tell(share: float, text: str) -> None:
             del share
-            bar.update(task, description=f"{what} {text}")
+            bar.update(task, description=visible(f"{what} {text}"))
 
         yield tell
 

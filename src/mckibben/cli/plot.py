@@ -10,6 +10,7 @@ import typer
 from mckibben.cli.options import (
     Columns,
     Files,
+    Force,
     GapPolicy,
     Gaps,
     Input,
@@ -19,6 +20,7 @@ from mckibben.cli.options import (
     Resample,
     Units,
 )
+from mckibben.cli.output import say
 
 
 def plot(
@@ -40,8 +42,14 @@ def plot(
     rate: Rate = None,
     gaps: GapPolicy = Gaps.ERROR,
     resample: Resample = None,
+    force: Force = False,
 ) -> None:
     """Draw recordings, or a saved model against them."""
+    from mckibben.outputs import claim_figure
+    from mckibben.report.printed import format_of
+
+    format_of(out)  # another ending is refused now
+    claim_figure(out, inputs=[*files, *([] if model is None else [model])], force=force)
     recordings = Reading(column, unit, rate, gaps, resample).read(files, [input, output])
     from mckibben.report.figures import plot_model, plot_recording
 
@@ -51,4 +59,4 @@ def plot(
         from mckibben.blocks.saving import load
 
         plot_model(load(model), recordings, kind or "fit", out)
-    typer.echo(f"Written: {out}")
+    say(f"Written: {out}")

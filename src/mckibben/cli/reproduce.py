@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from mckibben.cli.options import Gaps, Jobs, Json, Reading, Seed
-from mckibben.cli.output import figure, make_folder, print_json, print_table, progress_bar
+from mckibben.cli.options import Force, Gaps, Jobs, Json, Reading, Seed
+from mckibben.cli.output import figure, make_folder, print_json, print_table, progress_bar, say
 from mckibben.cli.stopping import forget_kept, stoppable
 from mckibben.errors import DataError
 
@@ -35,6 +35,7 @@ def reproduce(
     ] = None,
     seed: Seed = 0,
     jobs: Jobs = None,
+    force: Force = False,
     as_json: Json = False,
 ) -> None:
     """Run a paper's protocol on its rig: its methods as published, ours, and its tables beside.
@@ -47,10 +48,16 @@ def reproduce(
     if name is None:
         raise DataError("there is no paper to run again", remedy="name one, or give --list")
     from mckibben import registry, threads, workers
+    from mckibben.outputs import Results
 
     folder = None if out is None else make_folder(out)
     with stoppable(folder):
         registry.load("papers", name)
+        results = None
+        if folder is not None:
+            inputs = [file for file in (train, test) if file is not None]
+            results = Results(folder, inputs=inputs, force=force)
+            results.claim(["report.html", "tables.json"])
         own = _own(name, train, test)
         given = {"name": name, "quick": quick, "seed": seed, "jobs": jobs, "folder": folder} | own
         # in a process of its own, which can be ended whatever it is at
@@ -61,18 +68,19 @@ def reproduce(
             told = _once_a_word(tell)
             (outcome,) = one.results(_again, [given], told)
             found: Reproduction = outcome.result()
-        if folder is not None:
-            from mckibben.atomic import write_json
-            from mckibben.report import write_reproduction
+        if results is not None:
+            from mckibben.atomic import to_json
+            from mckibben.report.reproduction import reproduction_page
 
-            write_reproduction(found, folder / "report.html")
-            write_json(folder / "tables.json", found.to_dict())
+            results.clear()
+            results.write_text("report.html", reproduction_page(found))
+            results.write_text("tables.json", to_json(found.to_dict()) + "\n")
         if as_json:
             print_json(found.to_dict())
         else:
             _print(found)
             if folder is not None:
-                print(f"Written: {folder / 'report.html'}, {folder / 'tables.json'}")
+                say(f"Written: {folder / 'report.html'}, {folder / 'tables.json'}")
         forget_kept(folder)
 
 
@@ -137,13 +145,13 @@ def _cell(cell: str | float | None) -> str:
 
 def _print(found: Reproduction) -> None:
     for table in found.tables:
-        print(f"\n{table.title}")
+        say(f"\n{table.title}")
         rows = [[_cell(cell) for cell in row] for row in table.rows]
         print_table(table.columns, rows)
         if table.note:
-            print(table.note)
-    print()
+            say(table.note)
+    say()
     for sentence in found.summary:
-        print(sentence)
+        say(sentence)
     for note in found.notes:
-        print(f"Note: {note}")
+        say(f"Note: {note}")

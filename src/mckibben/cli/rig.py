@@ -3,13 +3,21 @@
 from __future__ import annotations
 
 import json
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from mckibben.cli.options import Json, Seed
-from mckibben.cli.output import InterruptionError, figure, make_folder, print_json, progress_bar
+from mckibben.cli.options import Force, Json, Seed
+from mckibben.cli.output import (
+    InterruptionError,
+    figure,
+    make_folder,
+    print_json,
+    progress_bar,
+    say,
+)
 from mckibben.errors import DataError
 
 if TYPE_CHECKING:
@@ -67,16 +75,16 @@ def list_rigs(as_json: Json = False) -> None:
             }
         )
         return
-    print("Rigs:")
+    say("Rigs:")
     for name, rig in rigs.items():
-        print(f"  {name}: {rig.title}")
-        print(f"    driven by {', '.join(rig.inputs)}; measures {', '.join(rig.outputs)}")
-    print("\nProtocols:")
+        say(f"  {name}: {rig.title}")
+        say(f"    driven by {', '.join(rig.inputs)}; measures {', '.join(rig.outputs)}")
+    say("\nProtocols:")
     for name, plan in protocols.items():
-        print(f"  {name}: {len(plan.runs)} runs on {plan.rig}")
-    print("\nSignals (--signal NAME:SETTING=VALUE,...):")
+        say(f"  {name}: {len(plan.runs)} runs on {plan.rig}")
+    say("\nSignals (--signal NAME:SETTING=VALUE,...):")
     for name, settings in signals.items():
-        print(f"  {name}: {', '.join(_setting(key, *rest) for key, rest in settings.items())}")
+        say(f"  {name}: {', '.join(_setting(key, *rest) for key, rest in settings.items())}")
 
 
 def _setting(name: str, kind: str, default: Any) -> str:
@@ -98,7 +106,7 @@ def show(
     if as_json:
         print_json(rig.model_dump(mode="json"))
     else:
-        print(describe(rig), end="")
+        say(describe(rig), end="")
 
 
 @app.command()
@@ -126,11 +134,15 @@ def run(
         bool, typer.Option("--ideal", help="Perfect sensors; adds volume and temperature.")
     ] = False,
     seed: Seed = 0,
+    force: Force = False,
     as_json: Json = False,
 ) -> None:
     """Run one experiment and write the recording."""
     from mckibben.files import write
+    from mckibben.outputs import claim_recording
 
+    read = [Path(name), *([] if inputs is None else [inputs])]
+    claim_recording(out, inputs=read, force=force)
     rig = _changed(name, changes)
     if (signal is None) == (inputs is None):
         raise DataError(
@@ -157,8 +169,8 @@ def run(
         )
         return
     for channel, (low, high) in spans.items():
-        print(f"{channel}: {figure(low + 0.0, 4)} to {figure(high, 4)} {recording.units[channel]}")
-    print(f"Written: {out}")
+        say(f"{channel}: {figure(low + 0.0, 4)} to {figure(high, 4)} {recording.units[channel]}")
+    say(f"Written: {out}")
 
 
 @app.command()
@@ -176,6 +188,7 @@ def record(
     ] = None,
     seed: Seed = 0,
     jobs: Annotated[int | None, typer.Option("--jobs", help="Runs at a time.")] = None,
+    force: Force = False,
     as_json: Json = False,
 ) -> None:
     """Record a paper's whole protocol: one file a run, and protocol.json that says what each is for.
@@ -183,6 +196,7 @@ def record(
     Files that a run stopped early has left are kept and not made again.
     """
     from mckibben.files import write
+    from mckibben.outputs import claim_recording
     from mckibben.rigs import record as record_runs
     from mckibben.signals.protocols import protocol as protocol_named
 
@@ -202,6 +216,8 @@ def record(
     said = _said(plan, plant, seed, file_format)
     kept = _kept(folder, said)
     wanted = [run.name for run in runs if run.name not in kept]
+    for name in wanted:
+        claim_recording(folder / f"{name}.{file_format}", inputs=[Path(rig or "")], force=force)
     done = 0
     try:
         with progress_bar(f"Recording {protocol}:") as tell:
@@ -217,7 +233,7 @@ def record(
         print_json({"folder": str(folder), "recorded": wanted, "kept": sorted(kept)})
         return
     note = f", {len(kept)} were there already" if kept else ""
-    print(f"Written: {len(wanted)} recordings to {folder}{note}; roles are in protocol.json")
+    say(f"Written: {len(wanted)} recordings to {folder}{note}; roles are in protocol.json")
 
 
 @app.command()
@@ -234,13 +250,13 @@ def new(
     loop_width: Annotated[
         float, typer.Option(help="Width of its loop, of its stroke, for instance 0.15.")
     ] = 0.15,
-    force: Annotated[bool, typer.Option("--force", help="Replace a file of that name.")] = False,
+    force: Force = False,
 ) -> None:
     """Make a rig of your own muscle from the numbers of its data sheet."""
+    from mckibben.outputs import claim, never
     from mckibben.rigs import rig_from_data_sheet, save_rig
 
-    if file.exists() and not force:
-        raise DataError("there is a file of that name", file=file, remedy="replace it with --force")
+    claim(file, never, force=force)
     rig = rig_from_data_sheet(
         name="".join(c if c.isalnum() else "-" for c in file.stem.lower()).strip("-") or "my-rig",
         diameter=diameter,
@@ -252,7 +268,7 @@ def new(
         loop_width=loop_width,
     )
     save_rig(rig, file)
-    print(
+    say(
         f"Written: {file}; run it with: mckibben rig run {file} --signal triangle:period=10 -o run.csv"
     )
 
@@ -271,7 +287,7 @@ def _changed(name: str, changes: list[str] | None) -> Rig:
             )
         try:
             settings[key.replace("-", "_")] = json.loads(text)
-        except ValueError:
+        except (ValueError, RecursionError):
             settings[key.replace("-", "_")] = text
     return rig.changed(settings) if settings else rig
 
@@ -354,14 +370,16 @@ def _said(plan: Any, rig: Rig, seed: int, file_format: str) -> dict[str, Any]:
 
 def _kept(folder: Path, said: dict[str, Any]) -> set[str]:
     """Write what the folder is to hold, and return the runs that it holds already."""
+    from mckibben import ordinary
     from mckibben.atomic import to_json, write_text
+    from mckibben.outputs import is_recording
 
     text, place = to_json(said) + "\n", folder / "protocol.json"
-    if place.exists() and place.read_text(encoding="utf-8") != text:
+    if os.path.lexists(place) and ordinary.read_text(place, most=ordinary.DESCRIPTION) != text:
         raise DataError(
             "the folder holds another protocol, rig or seed",
             file=place,
             remedy="give another folder with -o, or remove this one",
         )
     write_text(place, text)
-    return {run["name"] for run in said["runs"] if (folder / run["file"]).exists()}
+    return {run["name"] for run in said["runs"] if is_recording(folder / run["file"])}

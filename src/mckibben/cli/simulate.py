@@ -7,8 +7,18 @@ from typing import Annotated, Any
 
 import typer
 
-from mckibben.cli.options import Columns, GapPolicy, Gaps, Json, Rate, Reading, Resample, Units
-from mckibben.cli.output import figure, print_json
+from mckibben.cli.options import (
+    Columns,
+    Force,
+    GapPolicy,
+    Gaps,
+    Json,
+    Rate,
+    Reading,
+    Resample,
+    Units,
+)
+from mckibben.cli.output import figure, print_json, say
 from mckibben.errors import DataError
 
 
@@ -32,6 +42,7 @@ def simulate(
     rate: Rate = None,
     gaps: GapPolicy = Gaps.ERROR,
     resample: Resample = None,
+    force: Force = False,
     as_json: Json = False,
 ) -> None:
     """Run a saved model free over a recording; adds channels named OUTPUT_model.
@@ -44,7 +55,9 @@ def simulate(
     from mckibben.blocks.saving import load
     from mckibben.files import write
     from mckibben.metrics import score
+    from mckibben.outputs import claim_recording
 
+    claim_recording(out, inputs=[model, file], force=force)
     block = load(model)
     wanted = [channel.name for channel in block.inputs]
     recordings = Reading(column, unit, rate, gaps, resample).read([file], wanted, informative=False)
@@ -76,12 +89,12 @@ def simulate(
         print_json(head | {"metrics": metrics})
         return
     for name, figures in metrics.items():
-        print(
+        say(
             f"{name}{'' if horizon is None else f', {horizon} samples ahead'}: "
             f"RMSE {figure(figures['rmse'], 4)}, MAE {figure(figures['mae'], 4)}, worst "
             f"{figure(figures['max_error'], 4)} {recording.units[name]}, R² {figure(figures['r2'], 5)}"
         )
-    print(f"Written: {out}")
+    say(f"Written: {out}")
 
 
 def _predicted(block: Any, recording: Any, horizon: int) -> Any:

@@ -13,7 +13,7 @@ from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING
 
-from mckibben.cli.output import InterruptionError
+from mckibben.cli.output import InterruptionError, say
 from mckibben.workers import leave
 
 if TYPE_CHECKING:
@@ -61,7 +61,7 @@ def stoppable(folder: Path | None) -> Iterator[None]:
             said = str(error) or _kept(folder)
             if stopped:  # without the interpreter's farewell, long where much is loaded
                 with suppress(OSError, AttributeError):
-                    print(said, file=sys.stderr)
+                    say(said, error=True)
                     sys.stdout.flush()
                     sys.stderr.flush()
                 leave(INTERRUPTED)

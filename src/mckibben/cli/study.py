@@ -10,10 +10,11 @@ import typer
 
 from mckibben.cli.leaderboards import told
 from mckibben.cli.options import (
-    MOST_SAMPLES,
+    AllowShared,
     Columns,
     Dask,
     Files,
+    Force,
     GapPolicy,
     Gaps,
     Input,
@@ -33,9 +34,9 @@ from mckibben.cli.options import (
     chosen_models,
     settings_of_all,
 )
-from mckibben.cli.output import figure, make_folder, print_json, progress_bar
+from mckibben.cli.output import figure, make_folder, print_json, progress_bar, say
 from mckibben.cli.stopping import forget_kept, stop_short, stoppable
-from mckibben.errors import DataError, DataWarning
+from mckibben.errors import DataError
 
 if TYPE_CHECKING:
     from mckibben.comparison.results import Study
@@ -69,7 +70,9 @@ def study(
     rate: Rate = None,
     gaps: GapPolicy = Gaps.ERROR,
     resample: Resample = None,
-    samples: Samples = MOST_SAMPLES,
+    samples: Samples = None,
+    allow_shared: AllowShared = False,
+    force: Force = False,
     as_json: Json = False,
 ) -> None:
     """Say what the muscle does, choose a model by cross-validation, test, invert, and write a report.
@@ -80,8 +83,10 @@ def study(
     displacement_1 ...) get models that couple them, and a closed loop on a virtual rig. With --load
     force, models that are told the load are ranked against one model for every load.
     """
-    from mckibben import workers
+    from mckibben import registry, workers
     from mckibben.files.folders import expanded
+    from mckibben.outputs import Results
+    from mckibben.report.results_folder import study_files
 
     folder = make_folder(out)
     with stoppable(folder):
@@ -90,6 +95,9 @@ def study(
         chosen = chosen_models(models, quick)
         reading = Reading(column, unit, rate, gaps, resample)
         train, validation, tests = expanded(files, test or [])
+        kept = Results(folder, inputs=[*train, *validation, *tests], force=force)
+        names = registry.names("estimators") if isinstance(chosen, str) else chosen
+        kept.claim(study_files(names))
         if load is not None or _of_muscles(reading, train):
             from mckibben.cli.study_muscles import study_muscles
 
@@ -97,25 +105,24 @@ def study(
                 reading.read(some, None, informative=False) for some in (train, validation, tests)
             )
             study_muscles(
-                runs, checks, held_back, folder, chosen, settings, rig, load, seed, jobs, as_json
+                *(runs, checks, held_back, kept, chosen, settings, rig, load, seed, jobs),
+                *(as_json, allow_shared),
             )
             return
         if rig is not None:
             raise DataError("--rig is for recordings of several muscles", remedy="leave it out")
         given = settings_of_all(settings, chosen)
-        with warnings.catch_warnings(record=True) as caught:
-            warnings.simplefilter("always", DataWarning)
-            recordings = reading.read([*train, *validation], [input, output])
-            held_out = reading.read(tests, [input, output])
-        notes = [str(warning.message) for warning in caught]
-        for note in notes:
-            typer.echo(f"Note: {note}", err=True)
+        from mckibben.recording import notes_by_file
+
+        recordings = reading.read([*train, *validation], [input, output])
+        held_out = reading.read(tests, [input, output])
+        notes = notes_by_file([*recordings, *held_out])
 
         from mckibben.comparison.cluster import on_cluster
         from mckibben.comparison.studying import study as find
         from mckibben.report import StudyFolder
 
-        results = StudyFolder(folder)
+        results = StudyFolder(kept)
 
         def found(so_far: Study) -> None:
             results.take(so_far)
@@ -133,16 +140,16 @@ def study(
                 seed=seed,
                 jobs=jobs,
                 most_samples=samples,
+                allow_shared=allow_shared,
                 folder=folder,
                 clear=False,
                 progress=told(tell, "inverting and drawing"),
                 found=found,
-                notes=notes,
             )
         if done.leaderboard.stopped:
             results.take(done, last=True)
         if as_json:
-            print_json(_described(done, folder))
+            print_json(_described(done, folder) | {"notes": notes})
         else:
             _conclude(done, folder)
         stop_short(done.leaderboard)
@@ -152,25 +159,27 @@ def study(
 def _say(study: Study, folder: Path) -> None:
     """Print what the muscle does, before any model is fitted."""
     for sentence in study.characterization.sentences:
-        print(sentence)
-    print(f"Drawn: {folder / 'report.html'}, which grows with every model fitted.\n", flush=True)
+        say(sentence)
+    say(f"Drawn: {folder / 'report.html'}, which grows with every model fitted.\n", flush=True)
 
 
 def _conclude(study: Study, folder: Path) -> None:
     from mckibben.cli.leaderboards import print_leaderboard
 
     print_leaderboard(study.leaderboard)
-    print()
+    say()
     if study.inverse is not None:
         low, high = study.inverse.reachable
-        print(
+        say(
             f"Inverse of {study.inverse.model}: follows any reference from {figure(low, 4)} to "
             f"{figure(high, 4)} {study.leaderboard.unit} on the model itself, largest error "
             f"{study.inverse.error:.1e} of that range."
         )
+    elif study.leaderboard.not_recommended:
+        say("No inverse is written, since no model is recommended.")
     elif not study.leaderboard.stopped:
-        print("No model here has an inverse.")
-    print(
+        say("No model here has an inverse.")
+    say(
         f"Written: {folder / 'report.html'}, leaderboard.csv, leaderboard.json, models"
         + ("" if study.inverse is None else ", inverse.json")
     )

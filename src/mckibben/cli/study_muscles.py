@@ -6,21 +6,23 @@ import csv
 import io
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mckibben.atomic import write_json
+from mckibben.atomic import to_json
+from mckibben.blocks.saving import to_text
 from mckibben.cli.leaderboards import told
 from mckibben.cli.options import parse_settings
-from mckibben.cli.output import figure, print_json, print_table, progress_bar
+from mckibben.cli.output import figure, print_json, print_table, progress_bar, say
 from mckibben.cli.stopping import forget_kept
 from mckibben.errors import DataError
+from mckibben.report.results_folder import model_file, study_files
 
 if TYPE_CHECKING:
     from mckibben.comparison.muscles import MuscleRow
     from mckibben.control import Tracked
+    from mckibben.outputs import Results
     from mckibben.papers.reproduction import Cell
     from mckibben.recording import Recording
 
@@ -35,7 +37,7 @@ def study_muscles(
     recordings: Sequence[Recording],
     validation: Sequence[Recording],
     tests: Sequence[Recording],
-    folder: Path,
+    kept: Results,
     models: str | Sequence[str],
     settings: list[str] | None,
     rig: str | None,
@@ -43,18 +45,22 @@ def study_muscles(
     seed: int,
     jobs: int | None,
     as_json: bool,
+    allow_shared: bool,
 ) -> None:
     """Choose a model of several muscles, test it, invert the first that can be, track, and report."""
     from mckibben import registry
     from mckibben.comparison.muscles import (
         QUICK,
         compare_muscles,
+        constant_row,
         held_out_levels,
         in_order,
         per_load,
+        shared_runs,
         validation_of,
     )
-    from mckibben.comparison.splits import repeated
+    from mckibben.comparison.recommending import acceptable, recommended
+    from mckibben.recording import reading_notes
 
     train, split = list(recordings), "as given"
     if not tests:
@@ -72,13 +78,18 @@ def study_muscles(
     if isinstance(models, str):
         models = QUICK if models == "quick" else registry.names("coupled")
     given = {name: parse_settings(settings, name, group="coupled") for name in models}
-    shared = [name for name in tests[0].channels if all(name in run for run in (*train, *tests))]
+    if not tests:
+        raise DataError("there is no run to test on", remedy="give --test, or more runs")
+    kept.claim(study_files(models))
+    folder = kept.folder
     results = _Results(
-        folder,
+        kept,
         f"fitted to {len(train)} runs, tested on {len(tests)}: {split}",
         validation_of(train, validation).described,
         tests,
-        repeated(train, tests, shared),
+        shared_runs(train, validation, tests, allow=allow_shared),
+        reading_notes([*recordings, *validation, *tests]),
+        constant_row(train, tests, validation),
     )
     results.command = f"mckibben study FILES{'' if load is None else f' --load {load}'} -o {folder}"
     results.so_far([])
@@ -96,6 +107,7 @@ def study_muscles(
             },
             seed=seed,
             jobs=jobs,
+            allow_shared=allow_shared,
             folder=folder,
             progress=told(lambda share, text: tell(0.8 * share, text)),
             found=results.so_far,
@@ -113,27 +125,30 @@ def study_muscles(
                 jobs=jobs,
             )
             rows = in_order((*rows, *single))
-        best = next((row for row in rows if row.inverse is not None), None)
+        best = None
+        if recommended(rows, results.constant, "mm")[0] is not None:
+            able = (row for row in rows if row.inverse is not None)
+            best = next((row for row in able if acceptable(row, results.constant)), None)
         if best is not None and plant is not None:
             tell(0.85, "closing loops")
             loops = _loops(best, rows, plant, tests, seed)
     result = results.take(rows, best, loops, plant)
     if best is not None and best.inverse is not None:
-        best.inverse.save(folder / "inverse.json")
+        kept.write_text("inverse.json", to_text(best.inverse))
     if as_json:
         print_json(result)
         forget_kept(folder)
         return
-    for table in _tables(rows, loops):
-        print(f"\n{table.title}")
+    for table in _tables(rows, results.constant, loops):
+        say(f"\n{table.title}")
         cells = [[_cell(cell) for cell in row] for row in table.rows]
         print_table(list(table.columns), cells)
         if table.note:
-            print(table.note)
-    print()
-    for sentence in (*_summary(rows, best, loops, plant, results.chosen_on), *results.repeated):
-        print(sentence)
-    print(
+            say(table.note)
+    say()
+    for sentence in (*results.summary(rows, best, loops, plant), *results.shared, *results.notes):
+        say(sentence)
+    say(
         f"Written: {folder / 'report.html'}, leaderboard.csv, leaderboard.json, models"
         + ("" if best is None or best.inverse is None else ", inverse.json")
     )
@@ -147,19 +162,32 @@ class _Results:
 
     def __init__(
         self,
-        folder: Path,
+        kept: Results,
         split: str,
         chosen_on: str,
         tests: Sequence[Recording],
-        repeated: Sequence[str],
+        shared: Sequence[str],
+        notes: Sequence[str],
+        constant: MuscleRow,
     ) -> None:
-        self._folder, self._split, self._tests = folder, split, tests
-        self.chosen_on, self.repeated = chosen_on, repeated
-        (folder / "inverse.json").unlink(missing_ok=True)  # of an earlier study
+        self._kept, self._split, self._tests = kept, split, tests
+        self.chosen_on, self.shared, self.constant = chosen_on, shared, constant
+        self.notes = notes
+        kept.clear()  # of an earlier study
 
     def so_far(self, rows: Sequence[MuscleRow]) -> None:
         """Write what is finished, while more models are fitted."""
         self.take(rows, None, {}, None, whole=False)
+
+    def summary(
+        self,
+        rows: Sequence[MuscleRow],
+        best: MuscleRow | None,
+        loops: Mapping[str, Tracked],
+        plant: str | None,
+    ) -> list[str]:
+        """Return in words what is chosen, what comes of it, and why where nothing is."""
+        return _summary(rows, self.constant, best, loops, plant, self.chosen_on)
 
     def take(
         self,
@@ -170,46 +198,61 @@ class _Results:
         whole: bool = True,
     ) -> dict[str, Any]:
         """Write models, leaderboard and report as far as they are; return the leaderboard."""
+        from mckibben.comparison.recommending import recommended
         from mckibben.papers.reproduction import Reproduction
-        from mckibben.report import write_reproduction
+        from mckibben.report.reproduction import reproduction_page
 
         if rows:
-            _write(rows, self._folder)
+            _write(rows, self._kept)
         summary = ["Models are being fitted."]
         if whole:
-            summary = _summary(rows, best, loops, plant, self.chosen_on)
+            summary = [*self.summary(rows, best, loops, plant), *self.shared]
         found = Reproduction(
             name="study",
             title="Several muscles: models, inverses and loops",
             summary=tuple(summary),
-            tables=_tables(rows, loops) if rows else (),
+            tables=_tables(rows, self.constant, loops) if rows else (),
             figures=_figures(rows, self._tests, loops),
             notes=(
                 f"{self._split[0].upper()}{self._split[1:]}.",
                 f"Chosen on {self.chosen_on}: that orders the table. Nothing is chosen by the test.",
-                "Every figure is free-running, on runs not used to fit.",
+                "Every figure is free-running"
+                + (", on data fitted to." if self.shared else ", on runs not used to fit."),
+                "constant is the mean of the training output, which every model has to beat.",
                 *(
                     f"{name}: good only near the motions fitted, {why}."
                     for name, why in _careful(rows)
                 ),
-                *self.repeated,
+                *self.notes,
             ),
             lead="Models of muscles that move one another, chosen on the training side, then tested.",
             notes_title="How it was done",
             command=self.command,
         )
-        write_reproduction(found, self._folder / "report.html")
+        self._kept.write_text("report.html", reproduction_page(found))
+        chosen, objection = recommended(rows, self.constant, "mm")
         result = {
-            "folder": str(self._folder),
+            "folder": str(self._kept.folder),
             "split": self._split,
             "chosen_on": self.chosen_on,
-            "chosen": rows[0].model if rows and rows[0].block is not None else None,
-            "rows": [row.to_dict() for row in rows],
+            "notes": list(self.notes),
+            "chosen": None if chosen is None else chosen.model,
+            "not_recommended": objection or None,
+            "shared": list(self.shared),
+            "rows": [row.to_dict() for row in _with(rows, self.constant)],
             "inverse": None if best is None else best.model,
             "tracking": {name: dict(tracked.rmse) for name, tracked in loops.items()},
         }
-        write_json(self._folder / "leaderboard.json", result)
+        self._kept.write_text("leaderboard.json", to_json(result) + "\n")
         return result
+
+
+def _with(rows: Sequence[MuscleRow], constant: MuscleRow) -> list[MuscleRow]:
+    """Return rows with the constant in its place by validation."""
+    place = sum(
+        row.block is not None and row.mean_validation <= constant.mean_validation for row in rows
+    )
+    return [*rows[:place], constant, *rows[place:]]
 
 
 def _cell(cell: Any) -> str:
@@ -278,10 +321,7 @@ def _loops(
     return found
 
 
-def _write(rows: Sequence[MuscleRow], folder: Path) -> None:
-    from mckibben.atomic import write_text
-
-    (folder / "models").mkdir(exist_ok=True)
+def _write(rows: Sequence[MuscleRow], kept: Results) -> None:
     outputs = list(rows[0].test)
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
@@ -292,21 +332,26 @@ def _write(rows: Sequence[MuscleRow], folder: Path) -> None:
         reason = row.reason or row.invalid or ""
         writer.writerow([row.model, *errors, row.test_rank, row.worst, row.n_parameters, reason])
         if row.block is not None:
-            named = "".join(c if c.isalnum() or c in "-." else "-" for c in row.model)
-            row.block.save(folder / "models" / f"{named}.json")
-    write_text(folder / "leaderboard.csv", text.getvalue())
+            kept.write_text(model_file(row.model), to_text(row.block))
+    kept.write_text("leaderboard.csv", text.getvalue())
 
 
 def _summary(
     rows: Sequence[MuscleRow],
+    constant: MuscleRow,
     best: MuscleRow | None,
     loops: Mapping[str, Tracked],
     plant: str | None,
     chosen_on: str,
 ) -> list[str]:
-    first, lowest = rows[0], min(rows, key=lambda row: row.mean)
-    if first.block is None:
-        return [f"No model could be fitted: {first.reason}"]
+    from mckibben.comparison.recommending import recommended
+
+    first, objection = recommended(rows, constant, "mm")
+    if objection:
+        return [f"{objection}.", "No inverse is written, and no loop closed."]
+    if first is None:
+        return [f"No model could be fitted: {rows[0].reason}"]
+    lowest = min(rows, key=lambda row: row.mean)
     by = f"on {chosen_on}: {first.model}, {first.mean_validation:.3g} mm RMSE"
     if not first.validation:
         by = f"by its fit, since no model could be validated: {first.model}"
@@ -340,7 +385,9 @@ def _careful(rows: Sequence[MuscleRow]) -> list[tuple[str, str]]:
     return [(row.model, row.caution) for row in rows if row.block is not None and row.caution]
 
 
-def _tables(rows: Sequence[MuscleRow], loops: Mapping[str, Tracked]) -> tuple[Any, ...]:
+def _tables(
+    rows: Sequence[MuscleRow], constant: MuscleRow, loops: Mapping[str, Tracked]
+) -> tuple[Any, ...]:
     from mckibben.papers.reproduction import Table
 
     outputs = list(rows[0].test)
@@ -348,16 +395,16 @@ def _tables(rows: Sequence[MuscleRow], loops: Mapping[str, Tracked]) -> tuple[An
         (
             row.model + ("*" if row.caution else ""),
             row.mean_validation if row.validation else None,
-            row.mean if row.block is not None else None,
+            row.mean if row.test else None,
             row.test_rank,
             *(row.test.get(name) for name in outputs),
-            row.worst if row.block is not None else None,
+            row.worst if row.test else None,
             row.n_parameters,
             row.seconds,
             "yes" if row.inverse is not None else "no",
             row.reason or (f"not validated: {row.invalid}" if row.invalid else ""),
         )
-        for row in rows
+        for row in _with(rows, constant)
     )
     careful = ", ".join(name for name, _ in _careful(rows))
     board = Table(

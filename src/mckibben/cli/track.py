@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from mckibben.cli.options import Columns, Gaps, Json, Rate, Reading, Seed, Units
-from mckibben.cli.output import figure, print_json, print_table, progress_bar
+from mckibben.cli.options import Columns, Force, Gaps, Json, Rate, Reading, Seed, Units
+from mckibben.cli.output import figure, print_json, print_table, progress_bar, say
 from mckibben.errors import DataError
 
 if TYPE_CHECKING:
@@ -57,14 +57,22 @@ def track(
     column: Columns = None,
     unit: Units = None,
     rate: Rate = None,
+    force: Force = False,
     as_json: Json = False,
 ) -> None:
     """Let a compensator, or a controller with it, follow a reference on a virtual rig."""
     from mckibben.blocks.saving import load
     from mckibben.control import track as close
     from mckibben.files import write
+    from mckibben.outputs import claim_model, claim_recording
     from mckibben.rigs import load_rig
 
+    inputs = [compensator, reference, Path(rig)]
+    if out is not None:
+        claim_recording(out, inputs=inputs, force=force)
+        inputs.append(out)
+    if controller_out is not None:
+        claim_model(controller_out, inputs=inputs, force=force)
     block = load(compensator)
     plant = load_rig(rig)
     runs = Reading(column, unit, rate, Gaps.ERROR).read([reference], None, informative=False)
@@ -112,18 +120,18 @@ def track(
     measure = wanted.units[next(iter(found.rmse))]
     print_table(["followed", f"RMSE [{measure}]", f"largest [{measure}]"], rows)
     if found.clipped >= len(found.recording):
-        print("Pressures were at a limit throughout: the reference is out of reach.")
+        say("Pressures were at a limit throughout: the reference is out of reach.")
     elif found.clipped:
-        print(
+        say(
             f"Pressures were at a limit in {found.clipped} steps; RMSE there is "
             f"{figure(found.clipping_cost, 3)} {measure} above that of the other steps."
         )
-    print(
+    say(
         f"Controller: {1e6 * found.step_time[0]:.0f} µs a step (median), "
         f"{1e6 * found.step_time[1]:.0f} µs (99.9 %)."
     )
     if out is not None:
-        print(f"Written: {out}")
+        say(f"Written: {out}")
 
 
 def _fits(block: Block, plant: Rig, reference: Recording) -> None:

@@ -8,9 +8,11 @@ from __future__ import annotations
 
 import hashlib
 import json
-import shutil
+import os
+import re
 import warnings
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import asdict, fields, is_dataclass, replace
 from functools import cache
 from importlib.metadata import version
@@ -21,7 +23,8 @@ from typing import Any, TypeVar
 import numpy as np
 
 import mckibben
-from mckibben.atomic import write_text
+from mckibben import ordinary
+from mckibben.atomic import PART, write_text, written
 from mckibben.blocks.base import Block
 from mckibben.blocks.saving import LARGEST_FILE, from_dict, to_dict
 from mckibben.errors import DataWarning, MckibbenError
@@ -31,6 +34,9 @@ Result = TypeVar("Result")
 
 FOLDER = "unfinished"
 """Within the folder of results; it goes when all is done."""
+
+_OURS = re.compile(rf"-[0-9a-f]{{16}}\.(json|parquet)$|^{re.escape(PART)}[0-9a-f]{{16}}\.part$")
+"""Names that parts have, and what was being written when the program was killed."""
 
 
 class Kept:
@@ -61,10 +67,10 @@ class Kept:
             What this part depends on beside what everything does.
         """
         path = self._path(name, depends)
-        if path is None or not path.is_file() or path.stat().st_size > LARGEST_FILE:
+        if path is None or not path.is_file():
             return None
         try:
-            return _from_json(kind, json.loads(path.read_text(encoding="utf-8")))
+            return _from_json(kind, json.loads(ordinary.read_text(path, most=LARGEST_FILE)))
         except Exception as error:  # whatever is wrong with it, it can be computed again
             _warn(path, error)
             return None
@@ -75,9 +81,10 @@ class Kept:
         if path is not None:
             text = json.dumps(_to_json(result)) + "\n"
             try:
-                path.parent.mkdir(parents=True, exist_ok=True)
+                with written(path):
+                    path.parent.mkdir(parents=True, exist_ok=True)
                 write_text(path, text)
-            except (OSError, MckibbenError) as error:
+            except MckibbenError as error:
                 _warn(path, error)
 
     def once(
@@ -98,13 +105,20 @@ class Kept:
         """Return where a part is to be kept that is no JSON, or None to keep nothing."""
         path = self._path(name, depends, ending)
         if path is not None:
-            path.parent.mkdir(parents=True, exist_ok=True)
+            with written(path):
+                path.parent.mkdir(parents=True, exist_ok=True)
         return path
 
     def clear(self) -> None:
-        """Forget everything: all is done."""
-        if self._folder is not None:
-            shutil.rmtree(self._folder, ignore_errors=True)
+        """Forget everything: all is done. What somebody else put there stays."""
+        if self._folder is None or self._folder.is_symlink():
+            return
+        for place, _, names in os.walk(self._folder, topdown=False):
+            for name in filter(_OURS.search, names):
+                with suppress(OSError):
+                    Path(place, name).unlink()
+            with suppress(OSError):  # not empty
+                Path(place).rmdir()
 
     def _path(self, name: str, depends: object, ending: str = ".json") -> Path | None:
         if self._folder is None:

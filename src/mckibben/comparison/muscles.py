@@ -12,10 +12,13 @@ from numpy.typing import NDArray
 
 from mckibben import registry
 from mckibben.blocks.base import Block
+from mckibben.comparison.bootstrap import skill_of
 from mckibben.comparison.kept import Kept
 from mckibben.comparison.limits import caution
+from mckibben.comparison.recommending import CONSTANT
 from mckibben.comparison.results import Standing
-from mckibben.comparison.splits import within
+from mckibben.comparison.shared_stretches import told
+from mckibben.comparison.splits import listed, within
 from mckibben.errors import DataError, MckibbenError
 from mckibben.estimators.search import whole_searches
 from mckibben.recording import Recording
@@ -24,6 +27,9 @@ from mckibben.workers import Tell, all_of, checked, outcomes
 
 Array = NDArray[np.float64]
 Runs = tuple[Recording, ...]
+
+BLOCKS = 32
+"""Pieces of every part of the validation that errors are resampled in."""
 
 Scored = tuple[Recording, int]
 """A run, and its first sample that is scored."""
@@ -71,12 +77,15 @@ class Data:
         To fit, to test on, and to stop searches early.
     validation : Validation
         To choose on.
+    constant : tuple of float
+        Sums of squared errors of the mean on the blocks of the validation.
     """
 
     train: Runs
     test: Runs
     early: Runs
     validation: Validation
+    constant: tuple[float, ...]
 
 
 @dataclass(frozen=True)
@@ -103,6 +112,9 @@ class MuscleRow:
         Why it could not be validated, and so is not chosen unless nothing else can be.
     test_rank : int or None
         Place by mean test RMSE, from 1; nothing is chosen by it.
+    skill, skill_least : float or None
+        Share of the constant's squared error that the model removes in the validation, and what 99 % of
+        resamples exceed; see `mckibben.comparison.results.Row`.
     """
 
     __pydantic_config__: ClassVar[dict[str, bool]] = {"arbitrary_types_allowed": True}
@@ -119,6 +131,13 @@ class MuscleRow:
     reason: str | None = None
     invalid: str | None = None
     test_rank: int | None = None
+    skill: float | None = None
+    skill_least: float | None = None
+
+    @property
+    def test_error(self) -> float:
+        """Mean test RMSE over all displacements [mm]."""
+        return self.mean
 
     @property
     def mean(self) -> float:
@@ -156,6 +175,7 @@ class MuscleRow:
             "test": dict(self.test),
             "test_rank": self.test_rank,
             "worst": self.worst if np.isfinite(self.worst) else None,
+            "skill": self.skill,
             "invertible": self.inverse is not None,
             "reason": self.reason,
             "invalid": self.invalid,
@@ -172,6 +192,7 @@ def compare_muscles(
     settings: Mapping[str, Mapping[str, Any]] | None = None,
     seed: int = 0,
     jobs: int | None = None,
+    allow_shared: bool = False,
     folder: str | Path | None = None,
     progress: Callable[[Standing], None] | None = None,
     found: Callable[[tuple[MuscleRow, ...]], None] | None = None,
@@ -192,6 +213,9 @@ def compare_muscles(
         Of everything random.
     jobs : int, optional
         Processes; default as many as there are cores and models.
+    allow_shared : bool
+        Whether to go on where runs to fit, to choose and to test on are the same data; `shared_runs`
+        tells which.
     folder : path, optional
         Where finished models are kept, so that a comparison that was stopped goes on from there;
         whoever calls clears it.
@@ -203,23 +227,29 @@ def compare_muscles(
     Returns
     -------
     tuple of MuscleRow
-        By validation error, so that the first is the choice; models that failed last, with their
-        reasons.
+        By validation error, so that the first is the choice unless `recommended` finds something
+        against it beside `constant_row`; models that failed last, with their reasons.
 
     Raises
     ------
     DataError
-        If there is nothing to test on.
+        If there is nothing to fit to or to test on, or runs share samples.
     """
+    train, test, validation = listed(train), listed(test), listed(validation)
     if not test:
         raise DataError("there is no run to test on", remedy="give --test, or more runs")
+    if not train:
+        raise DataError("there is no run to fit to", remedy="give some beside those to test on")
+    shared_runs(train, validation, test, allow=allow_shared)
     names = {"all": registry.names("coupled"), "quick": QUICK}.get(str(models), tuple(models))
     efforts = {name: registry.load("coupled", name).effort for name in names}
     items = [
         (name, {"seed": seed} | dict((settings or {}).get(name, {})))
         for name in sorted(names, key=efforts.__getitem__)
     ]
-    data = Data(tuple(train), tuple(test), tuple(validation), validation_of(train, validation))
+    on = validation_of(train, validation)
+    _, squares = _constant(train, test, on)
+    data = Data(tuple(train), tuple(test), tuple(validation), on, squares)
     kept = Kept(folder, data)
     found_before = {name: kept.get(name, MuscleRow, own) for name, own in items}
     rows = {
@@ -233,7 +263,7 @@ def compare_muscles(
     def ranked() -> tuple[MuscleRow, ...]:
         return in_order(rows.values())
 
-    def told(index: int, *_: Any) -> None:
+    def tell_of(index: int, *_: Any) -> None:
         begun.append(remaining[index][0])
         tell()
 
@@ -247,7 +277,7 @@ def compare_muscles(
 
     if rows:
         tell()
-    for outcome in outcomes(_try, data, remaining, checked(jobs) or cores(), told):
+    for outcome in outcomes(_try, data, remaining, checked(jobs) or cores(), tell_of):
         name, own = remaining[outcome.index]
         rows[name] = outcome.value or MuscleRow(name, reason=str(outcome.error))
         if rows[name].block is not None:
@@ -258,13 +288,76 @@ def compare_muscles(
     return ranked()
 
 
+def shared_runs(
+    train: Sequence[Recording],
+    validation: Sequence[Recording],
+    test: Sequence[Recording],
+    *,
+    allow: bool = False,
+) -> tuple[str, ...]:
+    """Return in words where runs for different ends are the same data; refuse that unless allowed.
+
+    Raises
+    ------
+    DataError
+        If runs share samples, and that is not allowed.
+    """
+    runs = [*train, *validation, *test]
+    common = [name for name in runs[0].channels if all(name in run for run in runs)]
+    outputs = [name for name in common if name.startswith("displacement")]
+    inputs = [name for name in common if name not in outputs]
+    return told({"fit": train, "validate": validation, "test": test}, inputs, outputs, allow=allow)
+
+
+def constant_row(
+    train: Sequence[Recording], test: Sequence[Recording], validation: Sequence[Recording] = ()
+) -> MuscleRow:
+    """Return the row of the mean of every displacement fitted to: what every model has to beat."""
+    return _constant(train, test, validation_of(train, validation))[0]
+
+
+def _constant(
+    train: Sequence[Recording], test: Sequence[Recording], on: Validation
+) -> tuple[MuscleRow, tuple[float, ...]]:
+    """Return the constant's row, and its sums of squared errors on the blocks of the validation."""
+    names = [name for name in train[0].channels if name.startswith("displacement")]
+
+    def errors(fitted: Sequence[Recording], scored: Sequence[Scored]) -> dict[str, Array]:
+        means = {name: np.concatenate([run[name] for run in fitted]).mean() for name in names}
+        return {
+            name: np.concatenate([means[name] - run[name][start:] for run, start in scored])
+            for name in names
+        }
+
+    def rms(found: Sequence[Mapping[str, Array]]) -> dict[str, float]:
+        return {name: _rms(np.concatenate([one[name] for one in found])) for name in names}
+
+    parts = [errors(fitted or train, scored) for fitted, scored in on.parts]
+    tested = errors(train, [(run, 0) for run in test])
+    row = MuscleRow(
+        CONSTANT,
+        len(names),
+        train=rms([errors(train, [(run, 0) for run in train])]),
+        validation=rms(parts) if parts else {},
+        test=rms([tested]),
+        worst=float(max(np.abs(error).max() for error in tested.values())),
+    )
+    return row, tuple(square for part in parts for square in _squares(part))
+
+
+def _squares(errors: Mapping[str, Array]) -> list[float]:
+    """Return the sums of squared errors over all displacements, of consecutive pieces."""
+    total = np.sum([error**2 for error in errors.values()], axis=0)
+    return [float(piece.sum()) for piece in np.array_split(total, BLOCKS)]
+
+
 def _try(data: Data, item: Item, tell: Tell) -> MuscleRow:
     del tell
     name, settings = item
     try:
         estimator = registry.load("coupled", name)(**settings)
         row = _row(name, estimator.fit(list(data.train), validation=list(data.early)), data.test)
-        return _validated(row, settings, data.validation)
+        return _validated(row, settings, data.validation, data.constant)
     except MckibbenError as error:
         return MuscleRow(name, reason=str(error))
     except Exception as error:  # one model must not take the comparison down, whatever it does
@@ -291,7 +384,9 @@ def _row(name: str, estimator: Any, test: Sequence[Recording]) -> MuscleRow:
     )
 
 
-def _validated(row: MuscleRow, settings: Mapping[str, Any], on: Validation) -> MuscleRow:
+def _validated(
+    row: MuscleRow, settings: Mapping[str, Any], on: Validation, constant: Sequence[float]
+) -> MuscleRow:
     """Return a row with its validation error, or why there is none."""
     errors: list[dict[str, Array]] = []
     try:
@@ -304,8 +399,13 @@ def _validated(row: MuscleRow, settings: Mapping[str, Any], on: Validation) -> M
     except MckibbenError as error:  # a part of the runs may be too little where all are enough
         return replace(row, invalid=str(error))
     names = row.test
+    squares = [square for found in errors for square in _squares(found)]
+    skill, least = skill_of(squares, constant, int(settings.get("seed", 0)))
     return replace(
-        row, validation={name: _rms(np.concatenate([e[name] for e in errors])) for name in names}
+        row,
+        validation={name: _rms(np.concatenate([e[name] for e in errors])) for name in names},
+        skill=skill,
+        skill_least=least,
     )
 
 
@@ -455,7 +555,15 @@ def _try_single(common: None, item: Any, tell: Tell) -> MuscleRow:
             estimator = registry.load("estimators", model)(**how).fit(run)
         block: Block = estimator.model_
         errors = _errors(block, [(r, 0) for r in test])[output]
-        validation = {output: _rms(_errors(block, checks)[output])} if checks else {}
+        missed = _errors(block, checks) if checks else {}
+        validation = {output: _rms(missed[output])} if checks else {}
+        mean = run[output].mean()
+        flat = {output: np.concatenate([mean - r[output][s:] for r, s in checks])} if checks else {}
+        skill = (
+            skill_of(_squares({output: missed[output]}), _squares(flat), how["seed"])
+            if checks
+            else (None, None)
+        )
     except MckibbenError as error:
         return MuscleRow(name, reason=str(error))
     return MuscleRow(
@@ -467,4 +575,6 @@ def _try_single(common: None, item: Any, tell: Tell) -> MuscleRow:
         {output: _rms(errors)},
         float(np.abs(errors).max()),
         block,
+        skill=skill[0],
+        skill_least=skill[1],
     )

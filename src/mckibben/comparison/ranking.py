@@ -14,19 +14,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mckibben import registry
-from mckibben.comparison.bootstrap import BlockBootstrap, interval
+from mckibben.comparison.bootstrap import BlockBootstrap, interval, skill_of
 from mckibben.comparison.kept import Kept, source
+from mckibben.comparison.recommending import CONSTANT
 from mckibben.comparison.results import CHOICES, Leaderboard, Row, Standing
+from mckibben.comparison.shared_stretches import TESTED, told
 from mckibben.comparison.splits import (
     HELD_OUT,
     given_split,
     held_out_tail,
-    repeated,
+    listed,
     validation_folds,
 )
 from mckibben.comparison.trying import (
     Data,
     Tried,
+    constant_of,
     effort_of,
     errors_on_test,
     joined,
@@ -36,7 +39,7 @@ from mckibben.comparison.trying import (
     processes_for,
 )
 from mckibben.errors import ModelError
-from mckibben.recording import Recording
+from mckibben.recording import Recording, reading_notes
 from mckibben.signals import made_manageable
 from mckibben.workers import checked
 
@@ -46,9 +49,6 @@ Watch = Callable[[str, float, float], None]
 
 N_FOLDS = 4
 """Parts of the cross-validation."""
-
-MOST_SAMPLES = 100_000
-"""Samples to fit, and to test on; longer recordings are thinned."""
 
 QUICK = ("bouc-wen", "cpi", "gpi", "kp", "maxwell-slip", "mpi", "p2uz", "pi")
 """Models that are good or well known, and fitted in seconds."""
@@ -65,7 +65,8 @@ def compare(
     n_folds: int = N_FOLDS,
     seed: int = 0,
     jobs: int | None = None,
-    most_samples: int = MOST_SAMPLES,
+    most_samples: int | None = None,
+    allow_shared: bool = False,
     folder: str | Path | None = None,
     clear: bool = True,
     progress: Callable[[Standing], None] | None = None,
@@ -77,8 +78,9 @@ def compare(
     Every figure is free-running. Models are fitted on the training recordings, and chosen by
     cross-validation within them (over recordings, or over blocks of cycles of a single one): that sorts
     the leaderboard. Their errors on the test recordings, which nothing is chosen by, stand beside, with
-    their rank. A model that fails is a row with its reason. An interrupt ends the work at once; the
-    leaderboard then holds what was finished, and names what is pending.
+    their rank. A model that fails is a row with its reason. The mean of the training output is a row as
+    well: where no model beats it beyond chance, none is recommended. An interrupt ends the work at once;
+    the leaderboard then holds what was finished, and names what is pending.
 
     Parameters
     ----------
@@ -106,6 +108,11 @@ def compare(
         Results are the same to the bit.
     most_samples : int
         Longer recordings are thinned to so many samples to fit, and to test on, turning points kept.
+        Default: 100 000; of more than a million, 40 000, in stretches where thinning would lose the
+        motion. Scores are of the samples kept, and notes say what was done.
+    allow_shared : bool
+        Whether to go on where recordings to test on are those fitted to, or training has some twice; the
+        leaderboard then says so.
     folder : path, optional
         Where finished models are kept until all are, so that a comparison that was stopped and is
         called again goes on from there.
@@ -127,7 +134,7 @@ def compare(
     Raises
     ------
     DataError
-        On recordings that no model could use.
+        On recordings that no model could use, or that share samples, see ``allow_shared``.
     ModelError
         On unknown models.
     """
@@ -141,6 +148,7 @@ def compare(
         n_folds=n_folds,
         seed=seed,
         most_samples=most_samples,
+        allow_shared=allow_shared,
     )
     kept, board = plan.kept(folder), plan.board()
     try:
@@ -182,6 +190,8 @@ class Plan:
         Models without a place on these channels, and why.
     notes : tuple of str
         What was done to the recordings.
+    shared : tuple of str
+        Where recordings are the same data.
     """
 
     data: Data
@@ -192,6 +202,12 @@ class Plan:
     chosen_by: str
     left_out: Mapping[str, str]
     notes: tuple[str, ...]
+    shared: tuple[str, ...] = ()
+
+    @cached_property
+    def constant(self) -> Tried:
+        """What comes of predicting the mean of the training output."""
+        return constant_of(self.data)
 
     @cached_property
     def sources(self) -> dict[str, str]:
@@ -223,6 +239,8 @@ class Plan:
             left_out=self.left_out,
             pending=tuple(model for model in self.settings if model not in done),
             notes=self.notes,
+            constant=self.constant.row,
+            shared=self.shared,
         )
 
 
@@ -252,21 +270,25 @@ def plan_of(
     settings: Settings | None,
     n_folds: int,
     seed: int,
-    most_samples: int = MOST_SAMPLES,
+    most_samples: int | None = None,
+    allow_shared: bool = False,
 ) -> Plan:
     """Return what a comparison is to do; see `compare`."""
     from mckibben.estimators.data import training_data
 
-    recordings, tests = _listed(train), _listed(test)
+    recordings, tests = listed(train), listed(test)
     training_data(recordings, input, output)
     if tests:
         training_data([recordings[0], *tests], input, output)
+    roles = {"fit": recordings, "test": tests}
+    shared = told(roles, [input], [output], allow=allow_shared)
     recordings, tests, notes = made_manageable(recordings, tests, input, most_samples)
     split = given_split(recordings, tests) if tests else held_out_tail(recordings, input, HELD_OUT)
     parts, chosen_by = validation_folds(split.train, input, n_folds)
     validated = ""
     if chosen_by == "cross-validation":
         validated = f", cross-validated on {len(parts)} part(s) within the range of the rest"
+    marked = f"; {TESTED}" if any(one.startswith(TESTED) for one in shared) else ""
     chosen, left_out = _chosen(models, [*recordings, *tests], input, output)
     if not chosen:
         raise ModelError(
@@ -282,11 +304,12 @@ def plan_of(
             for model in sorted(chosen, key=efforts.__getitem__)
         },
         unit=recordings[0].units[output],
-        described=split.described + validated,
+        described=split.described + validated + marked,
         seed=seed,
         chosen_by=chosen_by,
         left_out=left_out,
-        notes=(*notes, *repeated(recordings, tests, (input, output))),
+        notes=(*notes, *shared, *reading_notes([*recordings, *tests])),
+        shared=shared,
     )
 
 
@@ -335,7 +358,7 @@ def ranked(
             working = tuple(model for model in begun if model not in finished)
             progress(Standing(len(finished), len(plan.settings), working, _best(plan, finished)))
 
-    def told(index: int, *what: float) -> None:
+    def tell_of(index: int, *what: float) -> None:
         model = parts[index].model
         if not what and model not in begun:
             begun.append(model)
@@ -348,19 +371,29 @@ def ranked(
         yield current()
     pieces: dict[str, dict[int, Tried]] = {model: {} for model in remaining}
     wanted = Counter(part.model for part in parts)
-    for outcome in outcomes(data, parts, workers, told):
+    for outcome in outcomes(data, parts, workers, tell_of):
         model = parts[outcome.index].model
         if outcome.error is None:
             pieces[model][outcome.index] = outcome.value
         else:
             pieces[model][outcome.index] = Tried(Row(model, reason=str(outcome.error)))
         if len(pieces[model]) == wanted[model]:
-            finished[model] = joined([piece for _, piece in sorted(pieces[model].items())])
+            whole = joined([piece for _, piece in sorted(pieces[model].items())])
+            finished[model] = _with_skill(whole, plan)
             row = finished[model].row
             if row is not None and row.sound:  # a failure may be the machine's, not the model's
                 kept.put(model, row, remaining[model], plan.sources[model])
             tell()
             yield current()
+
+
+def _with_skill(tried: Tried, plan: Plan) -> Tried:
+    """Return what came of a model with its skill over the constant, where it was cross-validated."""
+    row = tried.row
+    if row is None or row.validation_rmse is None:
+        return tried
+    skill, least = skill_of(tried.squares, plan.constant.squares, plan.seed)
+    return replace(tried, row=replace(row, skill=skill, skill_least=least))
 
 
 def _ranking(
@@ -385,13 +418,22 @@ def _ranking(
     failed = [t.row for t in finished.values() if t.row is not None and t.row.test is None]
     failed.sort(key=lambda row: row.model)
     outputs = {row.model: finished[row.model].outputs for row in rows}
-    return Ranking(plan.board([*rows, *failed]), outputs)
+    board = plan.board([*rows, *failed])
+    if done and plan.constant.row is not None:
+        samples = resampled(CONSTANT, plan.constant)
+        constant = replace(
+            plan.constant.row,
+            rmse_interval=interval(samples),
+            difference_interval=interval(samples - done[0][1]),
+        )
+        board = replace(board, constant=constant)
+    return Ranking(board, outputs)
 
 
 def _best(plan: Plan, finished: Mapping[str, Tried]) -> str:
     """Return in words which of the models finished would be chosen, and by what figure."""
     rows = [t.row for t in finished.values() if t.row is not None and t.row.test is not None]
-    best = min(rows, key=lambda row: row.order, default=None)
+    best = plan.board(sorted(rows, key=lambda row: row.order)).best
     if best is None:
         return ""
     heading, _ = CHOICES["fit" if best.validation_rmse is None else plan.chosen_by]
@@ -421,7 +463,3 @@ def _rmse(row: Row) -> float:
     if row.test is None:
         raise ModelError(f"{row.model!r} has no test score. Remedy: this is a defect; report it.")
     return row.test.rmse
-
-
-def _listed(recordings: Recording | Sequence[Recording]) -> list[Recording]:
-    return [recordings] if isinstance(recordings, Recording) else list(recordings)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from mckibben.blocks.base import Block
 from mckibben.comparison.limits import caution
+from mckibben.comparison.recommending import CONSTANT, recommended
 from mckibben.metrics import Scores
 from mckibben.recording import Recording
 
@@ -75,6 +76,11 @@ class Row:
     validation_rmse : float or None
         Cross-validated RMSE within the training set, by which models are chosen; None where that
         failed or was not asked for.
+    skill : float or None
+        Share of the squared error of the constant, the mean of what is fitted to, that the model removes
+        in the cross-validation: 1 is perfect, 0 no better.
+    skill_least : float or None
+        What 99 % of resamples of its blocks exceed; a model is recommended only where that is above 0.
     test_rank : int or None
         Place by test RMSE, from 1; nothing is chosen by it.
     rmse_interval : (float, float) or None
@@ -99,6 +105,8 @@ class Row:
     train: Scores | None = None
     test: Scores | None = None
     validation_rmse: float | None = None
+    skill: float | None = None
+    skill_least: float | None = None
     test_rank: int | None = None
     rmse_interval: tuple[float, float] | None = None
     difference_interval: tuple[float, float] | None = None
@@ -116,6 +124,11 @@ class Row:
             and self.test is not None
             and bool(np.isfinite([self.train.rmse, self.test.rmse]).all())
         )
+
+    @property
+    def test_error(self) -> float:
+        """RMSE on the test data, infinite where there is none."""
+        return float("inf") if self.test is None else self.test.rmse
 
     @property
     def chosen_by(self) -> float:
@@ -157,13 +170,15 @@ class Row:
             test["difference_to_chosen_interval"] = _listed(self.difference_interval)
         return {
             "model": self.model,
-            "status": "ok",
+            "status": "baseline" if self.model == CONSTANT else "ok",
             "n_parameters": self.n_parameters,
             "fit_seconds": self.fit_seconds,
             "step_ns": self.step_ns,
             "train": train,
             "test": test,
             "validation_rmse": self.validation_rmse,
+            "skill": _finite(self.skill),
+            "skill_least": _finite(self.skill_least),
             "memory": None if self.memory is None else asdict(self.memory),
             "rate_dependent": self.block is not None and bool(self.block.rate_dependent),
             "caution": self.caution,
@@ -198,6 +213,10 @@ class Leaderboard:
         What was done to the recordings before.
     stopped : bool
         Whether the work was interrupted, be it after the last model.
+    constant : Row or None
+        The mean of the training output as a model: what every model has to beat.
+    shared : tuple of str
+        Where recordings to fit to and to test on are the same data, which the user insisted on.
     """
 
     input: str
@@ -213,16 +232,33 @@ class Leaderboard:
     pending: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     stopped: bool = False
+    constant: Row | None = None
+    shared: tuple[str, ...] = ()
 
     @property
     def best(self) -> Row | None:
-        """The model chosen: of the first row that did not fail, or None.
+        """The model chosen: the first row that did not fail and beats the constant, or None.
 
         It has the least cross-validated error on the training side. One whose cross-validation failed
         is chosen only if every other's did. The test has no say, except that a model that cannot be
-        run on it at all has failed.
+        run on it at all has failed, and that nothing is recommended where the choice is no better there
+        than the constant; see `recommended`.
         """
-        return next((row for row in self.rows if row.reason is None), None)
+        return recommended(self.rows, self.constant, self.unit)[0]
+
+    @property
+    def not_recommended(self) -> str:
+        """Why no model is recommended though some worked; else empty."""
+        return recommended(self.rows, self.constant, self.unit)[1]
+
+    @property
+    def ranking(self) -> tuple[Row, ...]:
+        """The rows with the constant in its place."""
+        if self.constant is None or not self.rows:
+            return self.rows
+        order = self.constant.order
+        place = sum(row.test is not None and row.order <= order for row in self.rows)
+        return (*self.rows[:place], self.constant, *self.rows[place:])
 
     @property
     def lowest(self) -> Row | None:
@@ -237,6 +273,8 @@ class Leaderboard:
         The test error of another model is told where it is lower.
         """
         best, lowest = self.best, self.lowest
+        if best is None and self.not_recommended:
+            return f"{self.not_recommended}."
         if best is None or best.test is None or best.train is None or lowest is None:
             return ""
         heading, by = CHOICES[self.chosen_by]
@@ -250,9 +288,10 @@ class Leaderboard:
             f"Chosen by {by}: {best.model}, {heading} "
             f"{best.train.rmse if value is None else value:.3g} {self.unit}".strip()
         )
+        end = "".join(f" {one[0].upper()}{one[1:]}" for one in self.shared)
         if lowest.model == best.model:
-            return f"{said}; its test RMSE: {own}, the lowest."
-        return f"{said}; its test RMSE: {own}. Lowest test RMSE: {lowest.model}, {least}."
+            return f"{said}; its test RMSE: {own}, the lowest.{end}"
+        return f"{said}; its test RMSE: {own}. Lowest test RMSE: {lowest.model}, {least}.{end}"
 
     def to_dict(self) -> dict[str, Any]:
         """Return the leaderboard as ``leaderboard.json`` holds it."""
@@ -267,18 +306,24 @@ class Leaderboard:
             "n_test": self.n_test,
             "chosen_by": self.chosen_by,
             "chosen": None if best is None else best.model,
+            "not_recommended": self.not_recommended or None,
             "lowest_on_test": None if lowest is None else lowest.model,
             "left_out": dict(self.left_out),
             "pending": list(self.pending),
             "notes": list(self.notes),
-            "rows": [row.to_dict() for row in self.rows],
+            "shared": list(self.shared),
+            "rows": [row.to_dict() for row in self.ranking],
         }
 
     def to_frame(self) -> pd.DataFrame:
-        """Return the leaderboard as a table, one row a model, nested names joined by dots."""
+        """Return the leaderboard as a table, one row a model, nested names joined by dots.
+
+        Where tests are shared with training, a column says so.
+        """
         import pandas as pd
 
-        return pd.json_normalize([row.to_dict() for row in self.rows])
+        table = pd.json_normalize([row.to_dict() for row in self.ranking])
+        return table.assign(shared=" ".join(self.shared)) if self.shared else table
 
 
 @dataclass(frozen=True)
@@ -378,6 +423,10 @@ class Study:
     def output(self) -> str:
         """The output channel."""
         return self.leaderboard.output
+
+
+def _finite(value: float | None) -> float | None:
+    return value if value is not None and np.isfinite(value) else None
 
 
 def _listed(interval: tuple[float, float] | None) -> list[float] | None:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -109,6 +110,8 @@ def held_out_tail(recordings: Sequence[Recording], channel: str, share: float) -
         whole.insert(0, train.pop())
     last, travel = train[-1], travels[-1]
     start = int(np.searchsorted(travel, travel[-1] - wanted))
+    if start < FEWEST and len(train) > 1:  # nearly all of it, as of recordings equally long
+        whole.insert(0, train.pop())
     if min(start, len(last) - start) >= FEWEST:
         tail = np.zeros(len(last), dtype=bool)
         tail[start:] = True
@@ -215,15 +218,25 @@ def _interpolates(part: Fold, channel: str) -> bool:
     return within(tested, fitted)
 
 
-def repeated(
-    train: Sequence[Recording], test: Sequence[Recording], channels: Sequence[str]
-) -> tuple[str, ...]:
-    """Return a warning for every test recording that is a training recording once more."""
-    return tuple(
-        f"{one.name} is fitted to and tested on: its test error says nothing of new data."
-        for one in test
-        if any(all(np.array_equal(one[name], other[name]) for name in channels) for other in train)
-    )
+def listed(recordings: Recording | Sequence[Recording]) -> list[Recording]:
+    """Return recordings as a list, be it one.
+
+    Raises
+    ------
+    DataError
+        If something else is given, such as the name of a file.
+    """
+    given: Any = recordings  # whatever the annotation says
+    several = isinstance(given, Iterable) and not isinstance(given, Recording | str)
+    found = list(given) if several else [given]
+    kept = [one for one in found if isinstance(one, Recording)]
+    for one in found:
+        if not isinstance(one, Recording):
+            raise DataError(
+                f"a recording is needed here, not {type(one).__name__} {str(one)[:60]!r}",
+                remedy="read the file first: mckibben.read gives the list of its recordings",
+            )
+    return kept
 
 
 def predecessor(recording: Recording, others: Sequence[Recording]) -> Recording | None:

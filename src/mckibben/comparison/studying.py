@@ -13,8 +13,10 @@ from numpy.typing import NDArray
 
 from mckibben.blocks.base import Block
 from mckibben.characterization import characterize
-from mckibben.comparison.ranking import MOST_SAMPLES, N_FOLDS, Settings, plan_of, ranked
+from mckibben.comparison.ranking import N_FOLDS, Settings, plan_of, ranked
+from mckibben.comparison.recommending import acceptable
 from mckibben.comparison.results import InverseCheck, Leaderboard, Standing, Study
+from mckibben.comparison.splits import listed
 from mckibben.errors import ModelError, ModelWarning
 from mckibben.recording import Recording
 
@@ -36,7 +38,8 @@ def study(
     settings: Settings | None = None,
     seed: int = 0,
     jobs: int | None = None,
-    most_samples: int = MOST_SAMPLES,
+    most_samples: int | None = None,
+    allow_shared: bool = False,
     folder: str | Path | None = None,
     clear: bool = True,
     progress: Callable[[Standing], None] | None = None,
@@ -45,13 +48,15 @@ def study(
 ) -> Study:
     """Characterize recordings, choose a model by cross-validation, test it, and invert it if it can be.
 
-    Where it cannot, the next in the order of the choice is inverted that can.
+    Where it cannot, the next in the order of the choice is inverted that can. Where no model is worth
+    recommending, none is inverted.
 
     An interrupt ends the work at once; the study then holds what was finished.
 
     Parameters
     ----------
-    train, test, input, output, models, settings, seed, jobs, most_samples, folder, clear, progress
+    train, test, input, output, models, settings, seed, jobs, most_samples, allow_shared, folder, clear,
+    progress
         As for `compare`.
     found : callable, optional
         Told the study as far as it is: when it is known what the muscle does, before any model is
@@ -68,8 +73,7 @@ def study(
     DataError
         On recordings that cannot be used.
     """
-    recordings = [train] if isinstance(train, Recording) else list(train)
-    tests = [test] if isinstance(test, Recording) else list(test)
+    recordings, tests = listed(train), listed(test)
     plan = plan_of(
         recordings,
         tests,
@@ -80,6 +84,7 @@ def study(
         n_folds=N_FOLDS,
         seed=seed,
         most_samples=most_samples,
+        allow_shared=allow_shared,
     )
     kept = plan.kept(folder)
     so_far = Study(
@@ -112,9 +117,14 @@ def study(
 
 
 def invert_best(board: Leaderboard, recording: Recording) -> InverseCheck | None:
-    """Invert the first model of a leaderboard that has an inverse, and check it."""
+    """Invert the first model of a leaderboard that has an inverse, and check it.
+
+    None where no model is recommended, for an inverse is as good as its model.
+    """
+    if board.best is None:
+        return None
     for row in board.rows:
-        if row.block is None:
+        if row.block is None or not acceptable(row, board.constant):
             continue
         try:
             return check_inverse(row.model, row.block, recording)

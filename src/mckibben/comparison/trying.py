@@ -13,9 +13,10 @@ from numpy.typing import NDArray
 
 from mckibben import registry, workers
 from mckibben.blocks.base import Block
-from mckibben.comparison.cluster import in_backend, outer_backend, processes_outside
+from mckibben.comparison.cluster import outcomes_outside, outer_backend, processes_outside
 from mckibben.comparison.free_run import run_free
 from mckibben.comparison.memory_test import memory_test
+from mckibben.comparison.recommending import CONSTANT
 from mckibben.comparison.results import Row
 from mckibben.comparison.splits import Fold, Mask, Split
 from mckibben.errors import MckibbenError
@@ -23,11 +24,14 @@ from mckibben.estimators.search import Progress, whole_searches
 from mckibben.metrics import score
 from mckibben.recording import Recording
 from mckibben.threads import cores
-from mckibben.workers import Outcome
+from mckibben.workers import Outcome, WorkerError
 
 Array = NDArray[np.float64]
 
 TIMED_SAMPLES = 20_000
+
+PIECES = 8
+"""Blocks that the errors on a recording of the cross-validation are summed in, so that models pair."""
 
 WORTH_A_PROCESS = 4.0
 """Seconds of work below which starting processes takes longer than it saves."""
@@ -87,7 +91,7 @@ class Tried:
     outputs : tuple of array
         Free-running output on every training recording, then every test recording.
     squares : tuple of float
-        Sums of squared errors of the cross-validation, one a recording tested on.
+        Sums of squared errors of the cross-validation, `PIECES` a recording tested on.
     count : int
         Samples in them.
     invalid : str or None
@@ -136,10 +140,42 @@ def outcomes(
     data: Data, parts: Sequence[Part], n: int, told: Callable[..., None] | None = None
 ) -> Iterator[Outcome]:
     """Yield what comes of every part, as it comes, from so many processes; see `Workers.results`."""
-    if outer_backend():
-        yield from in_backend(try_part, data, parts)
-    else:
-        yield from workers.outcomes(try_part, data, parts, n, told)
+    found = (
+        outcomes_outside(try_part, data, parts)
+        if outer_backend()
+        else workers.outcomes(try_part, data, parts, n, told)
+    )
+    for outcome in found:
+        part = parts[outcome.index]
+        if outcome.error is None and not _is_of(outcome.value, part, data):
+            words = f"its process gave something that is not what came of {part.model}"
+            outcome = Outcome(outcome.index, error=WorkerError(words))
+        yield outcome
+
+
+def _is_of(tried: Any, part: Part, data: Data) -> bool:
+    """Tell whether this is what came of a part: complete, of its model, and scored as it says."""
+    if not isinstance(tried, Tried):
+        return False
+    row = tried.row
+    if row is None:
+        return not part.whole and all(isinstance(square, float) for square in tried.squares)
+    if not isinstance(row, Row) or row.model != part.model:
+        return False
+    if row.reason is not None:
+        return isinstance(row.reason, str)
+    recordings = (*data.split.train, *data.split.test)
+    if (
+        not (part.whole and isinstance(row.block, Block) and row.sound)
+        or row.test is None
+        or not all(isinstance(output, np.ndarray) for output in tried.outputs)
+        or [output.shape for output in tried.outputs] != [(len(r),) for r in recordings]
+    ):
+        return False
+    errors = errors_on_test(tried.outputs, data)
+    rmse = math.sqrt(float(errors @ errors) / errors.size)
+    most = max(float(np.abs(recording[data.output]).max()) for recording in recordings)
+    return math.isclose(rmse, row.test.rmse, rel_tol=1e-6, abs_tol=1e-9 * most)
 
 
 def joined(parts: Sequence[Tried]) -> Tried:
@@ -150,10 +186,52 @@ def joined(parts: Sequence[Tried]) -> Tried:
     (whole,) = (tried for tried in parts if tried.row is not None)
     assert whole.row is not None
     invalid = next((tried.invalid for tried in parts if tried.invalid is not None), None)
+    if invalid is None and not math.isfinite(rms_of(parts) or 0.0):
+        invalid = "its outputs ran away on a part of the data that it was not fitted to"
     if invalid is not None:
         noted = dict(whole.row.diagnostics) | {"validation_failed": invalid}
         return replace(whole, row=replace(whole.row, diagnostics=noted))
-    return replace(whole, row=replace(whole.row, validation_rmse=rms_of(parts)))
+    squares = tuple(square for tried in parts for square in tried.squares)
+    return replace(whole, row=replace(whole.row, validation_rmse=rms_of(parts)), squares=squares)
+
+
+def squares_of(errors: Array) -> list[float]:
+    """Return the sums of squared errors of consecutive pieces."""
+    return [float(piece @ piece) for piece in np.array_split(errors, PIECES)]
+
+
+def constant_of(data: Data) -> Tried:
+    """Return what comes of predicting the mean of the output that is fitted to, whatever the input."""
+    squares: list[float] = []
+    count = 0
+    for fold in data.folds:
+        mean = _mean(fold.train, data.output, fold.train_rows)
+        for recording, rows in zip(fold.test, fold.test_rows, strict=True):
+            errors = mean - recording[data.output][rows]
+            squares += squares_of(errors)
+            count += errors.size
+    split = data.split
+    mean = _mean(split.train, data.output, [np.ones(len(r), dtype=bool) for r in split.train])
+    outputs = tuple(np.full(len(recording), mean) for recording in (*split.train, *split.test))
+    scored, measured = _tested(outputs, data)
+    trained = np.concatenate([recording[data.output] for recording in split.train])
+    found = Tried(None, outputs, tuple(squares), count)
+    row = Row(
+        model=CONSTANT,
+        n_parameters=1,
+        fit_seconds=0.0,
+        step_ns=0.0,
+        train=score(trained, np.full(trained.size, mean)),
+        test=score(measured, scored),
+        validation_rmse=rms_of([found]),
+    )
+    return replace(found, row=row)
+
+
+def _mean(recordings: Sequence[Recording], output: str, rows: Sequence[Mask]) -> float:
+    return float(
+        np.concatenate([r[output][kept] for r, kept in zip(recordings, rows, strict=True)]).mean()
+    )
 
 
 def rms_of(parts: Sequence[Tried]) -> float | None:
@@ -209,7 +287,7 @@ def _try(data: Data, part: Part, tell: Callable[..., None]) -> Tried:
                 own, own_rows = [r for r, _ in known], [kept for _, kept in known]
                 modelled = run_free(block, recording, data.output, own, own_rows)
                 errors = (modelled - recording[data.output])[rows]
-                squares.append(float(errors @ errors))
+                squares += squares_of(errors)
                 count += errors.size
     except MckibbenError as error:  # a part of the data may be too little where all of it is enough
         invalid = str(error)

@@ -14,6 +14,7 @@ from mckibben.control.controller import Controller
 from mckibben.control.pressure_loop import PressureLoop
 from mckibben.errors import DataError, ModelError
 from mckibben.recording import Recording
+from mckibben.signals.checking import generator
 
 Array = NDArray[np.float64]
 
@@ -70,6 +71,16 @@ class Tracked:
     clipped: int
     clipping_cost: float
     step_time: tuple[float, float]
+
+
+MOST_STEPS = 10**7
+"""Of the approach, and of the time not scored."""
+
+MOST_DELAY = 10**4
+"""Steps."""
+
+MOST_NOISE = 1e6
+"""[mm or N]."""
 
 
 def track(
@@ -130,11 +141,8 @@ def track(
         raise DataError(
             "the reference has no time", file=reference.source, remedy="add a time column or --rate"
         )
-    if approach < 0 or settle < 0 or noise < 0 or delay < 0 or (slew is not None and not slew > 0):
-        raise ModelError(
-            "approach, settle, noise and delay must not be negative, and slew must be positive. "
-            "Remedy: correct the setting."
-        )
+    _check(approach, settle, noise, delay, slew, step)
+    rng = generator(seed)
     measured_too = [name for name in plant.outputs if name in reference]
     followed = [name for name in measured_too if name.startswith("displ")]
     followed = followed or [name for name in measured_too if name == "force"]
@@ -151,6 +159,12 @@ def track(
     path = reference.matrix(followed)
     ramp = np.linspace(0.0, 1.0, lead, endpoint=False)[:, np.newaxis] * path[0]
     path = np.concatenate([ramp, path])
+    n = len(path)
+    scored = slice(lead + round(settle / step), n)
+    if scored.start >= n:
+        raise ModelError(
+            "nothing is left to score. Remedy: give a longer reference, or less settle."
+        )
     scheduled = reference.matrix(held) if held else np.empty((len(reference), 0))
     scheduled = np.concatenate([np.tile(scheduled[:1], (lead, 1)), scheduled])
 
@@ -161,11 +175,9 @@ def track(
     limits = [changed.limits(name) for name in driven]
     low, high = (np.array([getattr(limit, end) for limit in limits]) for end in ("low", "high"))
     loop = PressureLoop(low, high, step)
-    rng = np.random.default_rng(seed)
     measured = changed.reset(seed)
     late = [measured] * (delay + 1)
     controller.reset(step)
-    n = len(path)
     seen, commands = np.empty((n, len(measured))), np.empty((n, len(driven)))
     clipped, times = np.zeros(n, dtype=bool), np.empty(n)
     last: Array | None = None
@@ -200,11 +212,6 @@ def track(
     # what was asked for at a step is due at the next
     due = np.concatenate([path[:1], path[:-1]])
     errors = seen[:, at_y] - due
-    scored = slice(lead + round(settle / step), n)
-    if scored.start >= n:
-        raise ModelError(
-            "nothing is left to score. Remedy: give a longer reference, or less settle."
-        )
     part, at_limit = errors[scored], clipped[scored]
     return Tracked(
         _recorded(reference, followed, driven, due, seen, commands, scheduled, held, changed, lead),
@@ -214,6 +221,24 @@ def track(
         _cost(part, at_limit),
         (float(np.median(times)), float(np.quantile(times, 0.999))),
     )
+
+
+def _check(
+    approach: float, settle: float, noise: float, delay: int, slew: float | None, step: float
+) -> None:
+    """Refuse settings out of range, and what is no number."""
+    longest = MOST_STEPS * step
+    ranges = {
+        "approach": (approach, longest, "s"),
+        "settle": (settle, longest, "s"),
+        "noise": (noise, MOST_NOISE, "mm or N"),
+        "delay": (delay, MOST_DELAY, "steps"),
+    }
+    for name, (value, most, unit) in ranges.items():
+        if not 0 <= value <= most:
+            raise ModelError(f"{name} is {value}. Remedy: give 0 to {most:g} {unit}.")
+    if slew is not None and not 0 < slew < np.inf:
+        raise ModelError(f"slew is {slew}. Remedy: give a positive number, in bar/s.")
 
 
 def _roles(plant: Plant, reference: Recording) -> tuple[list[str], list[str]]:

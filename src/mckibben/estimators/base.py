@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from typing import Annotated, ClassVar, Literal, Self
 
 import numpy as np
-from annotated_types import Ge, Interval
+from annotated_types import Interval
 from numpy.typing import NDArray
 
 from mckibben.blocks.base import Block
@@ -22,6 +22,7 @@ from mckibben.estimators.parameters import Parametrised
 from mckibben.estimators.search import Progress, Tracker
 from mckibben.estimators.settings import check_settings
 from mckibben.recording import Recording
+from mckibben.signals.checking import LARGEST_SEED
 from mckibben.threads import one_blas_thread
 
 Array = NDArray[np.float64]
@@ -100,7 +101,7 @@ class Estimator(Parametrised, ABC):
     input: str = "pressure"
     output: str = "displacement"
     initial: Literal["first_sample", "virgin", "fitted"] = "first_sample"
-    seed: Annotated[int, Ge(0)] = 0
+    seed: Annotated[int, Interval(ge=0, le=LARGEST_SEED)] = 0
 
     made_for: ClassVar[tuple[str, str] | None] = None
     """Kinds of channel, input and output, that the model is about; None for any."""

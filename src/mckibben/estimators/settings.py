@@ -18,7 +18,7 @@ def setting_value(text: str) -> Any:
     """Return a setting that was written as text: JSON where it is that, else ``none`` or a word."""
     try:
         value = json.loads(text)
-    except ValueError:
+    except (ValueError, RecursionError):
         value = None if text.lower() == "none" else text
     return tuple(value) if isinstance(value, list) else value
 

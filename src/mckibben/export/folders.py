@@ -6,20 +6,49 @@ only what an export wrote, and nobody has changed since.
 
 from __future__ import annotations
 
-import hashlib
 import io
-import os
 import shutil
+import tempfile
 import zipfile
 from collections.abc import Mapping
 from pathlib import Path
 
+from mckibben import manifest
+from mckibben.atomic import PART, written
 from mckibben.errors import DataError
 
 MANIFEST = "manifest.sha256"
 
 OLDEST = (1980, 1, 1, 0, 0, 0)
 """Date of the files in a zip, so that the same model gives the same bytes."""
+
+
+def refuse_folder(folder: Path, *, overwrite: bool = False) -> None:
+    """Refuse to write a folder where there is something that is not to be replaced.
+
+    Raises
+    ------
+    DataError
+        If its parent is missing, or there is anything of that name but an empty folder or, with
+        ``overwrite``, what an export wrote and nobody has changed since.
+    """
+    folder = folder.absolute()
+    if folder.is_symlink() or (folder.exists() and not folder.is_dir()):
+        raise DataError(
+            "there is a file of that name", file=folder, remedy="name a folder of its own"
+        )
+    with written(folder):
+        full = folder.is_dir() and any(folder.iterdir())
+    if full:
+        if not overwrite:
+            raise DataError(
+                "the folder exists and is not empty",
+                file=folder,
+                remedy="name another, or --overwrite",
+            )
+        _check_own(folder)
+    if not folder.parent.is_dir():
+        raise DataError("its folder does not exist", file=folder, remedy="create the folder first")
 
 
 def write_folder(folder: Path, files: Mapping[str, bytes], *, overwrite: bool = False) -> None:
@@ -37,68 +66,41 @@ def write_folder(folder: Path, files: Mapping[str, bytes], *, overwrite: bool = 
     Raises
     ------
     DataError
-        If there is something of that name that is not to be replaced, or it cannot be written.
+        As `refuse_folder` does, or if it cannot be written.
     """
     folder = folder.absolute()
-    if folder.is_symlink() or (folder.exists() and not folder.is_dir()):
-        raise DataError(
-            "there is a file of that name", file=folder, remedy="name a folder of its own"
-        )
-    if folder.is_dir() and any(folder.iterdir()):
-        if not overwrite:
-            raise DataError(
-                "the folder exists and is not empty",
-                file=folder,
-                remedy="name another, or --overwrite",
-            )
-        _check_own(folder)
-    if not folder.parent.is_dir():
-        raise DataError("its folder does not exist", file=folder, remedy="create the folder first")
-    new = folder.with_name(f".{folder.name}.{os.getpid()}.part")
-    old = folder.with_name(f".{folder.name}.{os.getpid()}.old")
-    try:
-        for path, content in {**files, MANIFEST: _manifest(files)}.items():
-            target = new / path
-            target.parent.mkdir(parents=True, exist_ok=True)
-            target.write_bytes(content)
-        if folder.exists():
-            folder.rename(old)
-        new.rename(folder)
-    except OSError as error:
-        raise DataError(
-            f"it cannot be written ({error.strerror or error})",
-            file=folder,
-            remedy="give a path in a folder that can be written to",
-        ) from None
-    finally:
-        # whatever happened in between, one of the two is there
-        if old.exists() and not folder.exists():
-            old.rename(folder)
-        shutil.rmtree(new, ignore_errors=True)
-        shutil.rmtree(old, ignore_errors=True)
+    refuse_folder(folder, overwrite=overwrite)
+    with written(folder):
+        place = Path(tempfile.mkdtemp(prefix=PART, suffix=".part", dir=folder.parent))
+        new, old = place / "new", place / "old"
+        try:
+            for path, content in {**files, MANIFEST: _manifest(files)}.items():
+                target = new / path
+                target.parent.mkdir(parents=True, exist_ok=True)
+                target.write_bytes(content)
+            if folder.exists():
+                folder.rename(old)
+            new.rename(folder)
+        finally:
+            # whatever happened in between, one of the two is there
+            if old.exists() and not folder.exists():
+                old.rename(folder)
+            shutil.rmtree(place, ignore_errors=True)
 
 
 def _manifest(files: Mapping[str, bytes]) -> bytes:
-    lines = [f"{_digest(content)}  {path}\n" for path, content in sorted(files.items())]
-    return "".join(lines).encode()
-
-
-def _digest(content: bytes) -> str:
-    return hashlib.sha256(content).hexdigest()
+    return manifest.lines(
+        {path: [manifest.digest(content)] for path, content in files.items()}
+    ).encode()
 
 
 def _check_own(folder: Path) -> None:
     """Refuse to replace a folder that holds anything but what an export wrote."""
-    try:
-        lines = (folder / MANIFEST).read_text(encoding="utf-8").splitlines()
-    except (OSError, UnicodeError):
-        lines = []
-    written = {line[66:]: line[:64] for line in lines}
-    found = [path for path in folder.rglob("*") if path.is_file() or path.is_symlink()]
+    digests = manifest.read(folder / MANIFEST)
+    found = [path for path in folder.rglob("*") if path.is_symlink() or not path.is_dir()]
     for path in sorted(found):
         name = path.relative_to(folder).as_posix()
-        own = not path.is_symlink() and written.get(name) == _digest(path.read_bytes())
-        if name != MANIFEST and not own:
+        if name != MANIFEST and not manifest.holds(path, digests.get(name, ())):
             raise DataError(
                 f"{name} in it was not written by an export, or has been changed since",
                 file=folder,

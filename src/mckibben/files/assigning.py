@@ -6,9 +6,11 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from mckibben.errors import DataError
-from mckibben.files.headers import channel_of, parse, snake_case
+from mckibben.files.headers import LONGEST, channel_of, parse, snake_case
 from mckibben.files.request import Request
 from mckibben.files.table import Column, Table
+
+_LISTED = 30
 
 
 def assign(table: Table, request: Request, path: Path) -> tuple[dict[str, Column], list[str]]:
@@ -22,6 +24,13 @@ def assign(table: Table, request: Request, path: Path) -> tuple[dict[str, Column
     DataError
         If a channel asked for is missing, or two columns are one channel.
     """
+    for column in table.columns:
+        if len(column.header) > LONGEST and not table.own:
+            raise DataError(
+                f"the header {column.header[:40]!r}... has {len(column.header)} characters",
+                file=path,
+                remedy=f"shorten it to {LONGEST} at most",
+            )
     mapped = {
         channel: _column(wanted, channel, table, path)
         for channel, wanted in request.columns.items()
@@ -103,4 +112,6 @@ def _require(named: Mapping[str, Column], table: Table, request: Request, path: 
 
 
 def _listed(table: Table) -> str:
-    return ", ".join(column.header for column in table.columns)
+    headers = [column.header for column in table.columns]
+    more = f" and {len(headers) - _LISTED} more" if len(headers) > _LISTED else ""
+    return ", ".join(headers[:_LISTED]) + more

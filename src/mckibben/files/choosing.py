@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 
 from mckibben.errors import DataError
+from mckibben.files import plausible, timebase
 from mckibben.files.assigning import assign
-from mckibben.files.headers import parse, unit_of
+from mckibben.files.headers import LONGEST, parse, unit_of
 from mckibben.files.notices import warn
 from mckibben.files.request import Request
 from mckibben.files.table import Column, Table
@@ -19,6 +20,8 @@ from mckibben.recording import Array
 
 IMPLAUSIBLE_BAR = 50.0
 """No muscle sees this pressure; larger numbers without a unit are kPa, psi or the like."""
+
+_LISTED = 30
 
 
 @dataclass(frozen=True)
@@ -76,6 +79,10 @@ def choose(table: Table, request: Request, path: Path) -> Choice:
             keeps = target is None or (table.own and unit_of(channel) is None)
             units[channel] = unit.name if keeps or target is None else target
             channels[channel] = convert(values, unit.name, units[channel])
+            if not table.own or channel in request.units:
+                plausible.check(
+                    channel, channels[channel], unit_of(channel), unit.name, table, path
+                )
     if not channels:
         raise DataError(
             "there is no column of numbers", file=path, remedy="give a file with samples in columns"
@@ -83,12 +90,17 @@ def choose(table: Table, request: Request, path: Path) -> Choice:
     if found.assumed:
         warn(
             path,
-            f"no unit is given, so these are assumed: {', '.join(found.assumed)}; "
+            f"no unit is given, so these are assumed: {_listed(found.assumed)}; "
             "say --unit CHANNEL=UNIT where that is wrong",
         )
     notes = {"ignored_columns": found.ignored, "pressure_reference": found.references}
     meta = {name: note for name, note in notes.items() if note}
     return Choice(channels, units, time, time_unit, meta)
+
+
+def _listed(items: list[str]) -> str:
+    more = f" and {len(items) - _LISTED} more" if len(items) > _LISTED else ""
+    return ", ".join(items[:_LISTED]) + more
 
 
 def _numbers(
@@ -105,16 +117,16 @@ def _numbers(
         )
     if column.flaw is None:
         return column.values
-    sample, cell = column.flaw
+    flaw = column.flaw
     if request.asks_for(channel) or unit_of(channel) is not None:
         raise DataError(
-            f"{cell[:40]!r} is not a number",
+            flaw.problem,
             file=path,
             channel=channel,
-            row=table.row(sample),
-            remedy="correct that cell, or leave it blank and say --gaps split or interpolate",
+            row=table.row(flaw.sample),
+            remedy=flaw.remedy,
         )
-    warn(path, f"column {column.header!r} is left out: {cell[:40]!r} is not a number")
+    warn(path, f"column {column.header!r} is left out: {flaw.problem}")
     found.ignored.append(column.header)
     return None
 
@@ -140,11 +152,11 @@ def _unit(
         return Unit(text, expected)
     unit = find(text)
     example = {"bar": "kPa", "N": "kN", "s": "ms"}.get(expected or "", "UNIT")
-    if unit is None and expected is None and given is None:
+    if unit is None and expected is None and given is None and len(text) <= LONGEST:
         return Unit(text, None)
     if unit is None:
         raise DataError(
-            f"the unit {text!r} is unknown",
+            f"the unit {text[:40]!r} is unknown",
             file=path,
             channel=channel,
             remedy=f"say which it is, as in --unit {channel}={example}",
@@ -193,7 +205,18 @@ def _time(
         return _instants(column, table, request, path, found), "s"
     values = _numbers("time", column, table, request, path, found)
     assert values is not None  # time is a channel that _numbers never leaves out
-    return values, _unit("time", column, values, table.own, request, path, found).name
+    stated = request.units.get("time") or column.unit or parse(column.header).unit
+    unit = None if stated else timebase.unit_by_size(values, table, path)
+    if unit is None:
+        unit = _unit("time", column, values, table.own, request, path, found).name
+    else:
+        warn(
+            path,
+            f"the times have no unit; by their size they are counted in {unit} since 1970; "
+            "say --unit time=UNIT where that is wrong",
+        )
+    plausible.check("time", convert(values, unit, "s"), "s", unit, table, path)
+    return values, unit
 
 
 def _instants(

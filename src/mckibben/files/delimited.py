@@ -8,24 +8,32 @@ from __future__ import annotations
 
 import csv
 import io
-import re
+import os
+from io import BufferedReader
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mckibben.atomic import replacing
 from mckibben.errors import DataError
 from mckibben.files import stored
+from mckibben.files.cells import Cells
 from mckibben.files.dialect import Dialect, detect
+from mckibben.files.limits import Budget
+from mckibben.files.lines import Lines
+from mckibben.files.marks import Doubt, doubts
 from mckibben.files.notices import warn
 from mckibben.files.stored import Stored
 from mckibben.files.table import Column, Table
+from mckibben.manifest import digest
+from mckibben.ordinary import DESCRIPTION, read_bytes
 from mckibben.recording import Recording
 
-_CONTROL = re.compile(r"[\x00-\x08\x0e-\x1f\x7f]")
-_SAMPLE = 200  # lines that the dialect is found from
+MOST_COLUMNS = 4096
+_CONTROL = bytes([*range(0x09), *range(0x0E, 0x20), 0x7F])
+_PART = 200_000  # cells that are read at once
+_LISTED = 10
 
 
 def sidecar(path: Path) -> Path:
@@ -37,11 +45,13 @@ def sidecar(path: Path) -> Path:
     return path.with_name(f"{path.name}-metadata.json")
 
 
-def read(path: Path) -> list[Table]:
+def read(file: BufferedReader, path: Path) -> list[Table]:
     """Read the one table of a text file."""
-    data = path.read_bytes()
+    data = file.read()
     description = _described(path, data)
-    return [_parse(_decode(data, path), path) if description is None else _own(data, description)]
+    if description is not None:
+        return [_own(data, description)]
+    return [_parse(_utf8(data, path), Budget(file, path), path)]
 
 
 def write(recording: Recording, path: Path) -> None:
@@ -66,15 +76,15 @@ def write(recording: Recording, path: Path) -> None:
 def _described(path: Path, data: bytes) -> Stored | None:
     """Return the sidecar's description, if there is one and it is of these bytes."""
     beside = sidecar(path)
-    try:
-        description = stored.parse(beside.read_bytes())
-    except FileNotFoundError:
+    if not os.path.lexists(beside):
         return None
-    except OSError as error:
-        description = error.strerror or "unreadable"
+    try:
+        description = stored.parse(read_bytes(beside, most=DESCRIPTION))
+    except DataError as error:
+        description = error.problem
     if isinstance(description, str):
         problem = f"is not a description by this package ({description})"
-    elif description.sha256 != stored.digest(data):
+    elif description.sha256 != digest(data):
         problem = "describes another version of the file"
     else:
         return description
@@ -100,54 +110,45 @@ def _own(data: bytes, description: Stored) -> Table:
     return description.table({name: frame[name].to_numpy() for name in names})
 
 
-def _decode(data: bytes, path: Path) -> str:
-    wide = data.startswith((b"\xff\xfe", b"\xfe\xff"))
+def _utf8(data: bytes, path: Path) -> bytes:
+    """Return the text in UTF-8, its lines ended by line feeds."""
     try:
-        text = data.decode("utf-16" if wide else "utf-8-sig")
+        if data.startswith((b"\xff\xfe", b"\xfe\xff")):
+            data = data.decode("utf-16").encode()
+        elif not data.isascii():
+            data.decode("utf-8")
     except UnicodeDecodeError:
-        text = data.decode("latin-1")
-    text = text.rstrip("\x1a").replace("\r\n", "\n").replace("\r", "\n")
-    if _CONTROL.search(text):
+        data = data.decode("latin-1").encode()
+    data = data.removeprefix(b"\xef\xbb\xbf").rstrip(b"\x1a")
+    if b"\r" in data:
+        data = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
+    if len(data.translate(None, _CONTROL)) < len(data):
         raise DataError(
             "this is not text",
             file=path,
             remedy="give the file the ending of its format, or export it as CSV",
         )
-    return text
+    return data
 
 
-def _parse(text: str, path: Path) -> Table:
-    comment = ""
-    lines: list[str] = []
-    numbers: list[int] = []
-    for number, line in enumerate(text.split("\n"), start=1):
-        if line.lstrip().startswith(("#", "%")):
-            comment = comment if lines else line.lstrip().lstrip("#% ")
-        elif line.strip():
-            lines.append(line)
-            numbers.append(number)
-    if not lines:
+def _parse(data: bytes, budget: Budget, path: Path) -> Table:
+    lines, comment = Lines.of(data, path)
+    dialect = detect(lines.sample())
+    headers, units, first = _head(lines.sample(), comment, dialect, path)
+    if len(headers) > MOST_COLUMNS:
         raise DataError(
-            "there is nothing in it", file=path, remedy="give a file with a header and samples"
+            f"{len(headers)} columns are more than the {MOST_COLUMNS} that are read",
+            file=path,
+            remedy="save the channels needed alone, each as one column",
         )
-    for number, line in zip(numbers, lines, strict=True):
-        if line.count('"') % 2:
-            raise DataError(
-                "a quotation mark is not closed",
-                file=path,
-                row=number,
-                remedy="close it, and keep line breaks out of cells",
-            )
-    dialect = detect(lines[:_SAMPLE])
-    headers, units, first = _head(lines, comment, dialect, path)
-    lines, numbers = lines[first:], numbers[first:]
-    if not lines:
+    lines = lines.after(first)
+    if not len(lines):
         raise DataError(
             "there is a header and no samples", file=path, remedy="give a file with samples"
         )
-    _refuse_ragged(lines, numbers, len(headers), dialect, path)
-    columns = _columns(lines, headers, units, dialect)
-    return Table(tuple(columns), lines=np.array(numbers))
+    budget.samples(len(headers) * len(lines))
+    _refuse_ragged(lines, len(headers), dialect, path)
+    return Table(_columns(lines, headers, units, dialect, path), lines=lines.numbers)
 
 
 def _head(
@@ -172,30 +173,28 @@ def _head(
     return headers, [None] * len(headers), 1
 
 
-def _refuse_ragged(
-    lines: list[str], numbers: list[int], expected: int, dialect: Dialect, path: Path
-) -> None:
-    for number, line in zip(numbers, lines, strict=True):
-        if dialect.separator is None or '"' in line:
-            found = len(dialect.split(line))
-        else:
-            found = line.count(dialect.separator) + 1
-        if found != expected:
-            raise DataError(
-                f"there are {found} cells where the header has {expected}",
-                file=path,
-                row=number,
-                remedy="complete or delete that line",
-            )
+def _refuse_ragged(lines: Lines, expected: int, dialect: Dialect, path: Path) -> None:
+    found = lines.counted(dialect.separator)
+    for at in lines.quoted:
+        found[at] = len(dialect.split(lines.text(at)))
+    wrong = np.flatnonzero(found != expected)
+    if wrong.size:
+        raise DataError(
+            f"there are {found[wrong[0]]} cells where the header has {expected}",
+            file=path,
+            row=int(lines.numbers[wrong[0]]),
+            remedy="complete or delete that line",
+        )
 
 
 def _columns(
-    lines: list[str], headers: list[str], units: list[str | None], dialect: Dialect
-) -> list[Column]:
+    lines: Lines, headers: list[str], units: list[str | None], dialect: Dialect, path: Path
+) -> tuple[Column, ...]:
     import pandas as pd
 
-    frame = pd.read_csv(
-        io.StringIO("\n".join(lines)),
+    columns = [Cells(header, unit, dialect) for header, unit in zip(headers, units, strict=True)]
+    with pd.read_csv(
+        lines.source(),
         sep=r"\s+" if dialect.separator is None else dialect.separator,
         decimal=dialect.decimal,
         header=None,
@@ -204,32 +203,37 @@ def _columns(
         skipinitialspace=True,
         **_exact(pd.__version__),
         low_memory=False,
+        chunksize=max(_PART // len(headers), 1),  # bounds the memory that text takes
+    ) as parts:
+        for part in parts:
+            for i, cells in enumerate(columns):
+                cells.take(part[i])
+    asked = [i for i, cells in enumerate(columns) if cells.may_be_doubted()]
+    doubted = doubts(
+        asked,
+        [cells.n_finite for cells in columns],
+        lines,
+        dialect,
     )
-    columns = []
-    for i, (header, unit) in enumerate(zip(headers, units, strict=True)):
-        cells = frame[i]
-        if cells.isna().all():
-            if header:
-                columns.append(Column(header, None, unit, texts=[""] * len(cells)))
-            continue
-        header = header or f"column_{i + 1}"
-        if pd.api.types.is_numeric_dtype(cells.dtype):
-            columns.append(Column(header, cells.to_numpy(np.float64), unit))
-        else:
-            texts = cells.fillna("").astype(str).str.strip().tolist()
-            columns.append(_mixed(header, texts, unit, dialect))
-    return columns
+    _say_understood(columns, doubted, dialect.decimal, path)
+    found = (cells.column(i, doubted.get(i)) for i, cells in enumerate(columns))
+    return tuple(column for column in found if column is not None)
 
 
-def _mixed(header: str, texts: list[str], unit: str | None, dialect: Dialect) -> Column:
-    """Return a column of text, or one of numbers whose flaw is the first cell that is none."""
-    numbers = [dialect.is_number(cell) for cell in texts]
-    filled = [bool(cell) for cell in texts]
-    if 2 * sum(numbers) <= sum(filled):
-        return Column(header, None, unit, texts=texts)
-    flaw = next(i for i, cell in enumerate(texts) if cell and not numbers[i])
-    values: NDArray[np.float64] = np.full(len(texts), np.nan)
-    return Column(header, values, unit, flaw=(flaw, texts[flaw]))
+def _say_understood(columns: list[Cells], doubted: dict[int, Doubt], mark: str, path: Path) -> None:
+    """Say which columns have decimals though all their numbers could be of thousands."""
+    listed = [i for i, doubt in doubted.items() if doubt.everywhere]
+    if not listed:
+        return
+    names = ", ".join(repr(columns[i].header) for i in listed[:_LISTED])
+    more = f" and {len(listed) - _LISTED} more" if len(listed) > _LISTED else ""
+    cell = doubted[listed[0]].cell
+    warn(
+        path,
+        f"all numbers of column(s) {names}{more} have three digits after the mark {mark!r}, which was "
+        f"taken for the decimal mark: {cell} is {float(cell.replace(mark, '.')):.6g}, "
+        f"not {cell.replace(mark, '')}",
+    )
 
 
 def _exact(version: str) -> dict[str, Any]:

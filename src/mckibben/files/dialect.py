@@ -13,11 +13,16 @@ SEPARATORS = ("\t", ";", "|", ",", None)
 
 _NUMBER = {
     mark: re.compile(
-        rf"\s*[+-]?(?:\d+(?:{re.escape(mark)}\d*)?|{re.escape(mark)}\d+)(?:[eE][+-]?\d+)?\s*"
+        rf"\s*[+-]?(?:\d+(?:{re.escape(mark)}\d*)?|{re.escape(mark)}\d+)(?:[eE][+-]?\d+)?\s*",
+        re.ASCII,
     )
     for mark in ".,"
 }
-_BETWEEN_HEADERS = re.compile(r"\s+(?![^\[(]*[\])])(?!\s*[\[(])")
+_SPACED = re.compile(r"[+-]?\d{1,3}(?: \d{3})+(?:[.,]\d*)?", re.ASCII)
+"""A number like 1 000, which is refused later, but is one cell where there is a better separator."""
+_BLANKS = re.compile(r"[ \t]+")
+_WIDE_BLANKS = re.compile(r"\s{2,}|\t")
+_BRACKET = re.compile(r"[\[\]()]")
 
 
 @dataclass(frozen=True)
@@ -33,14 +38,15 @@ class Dialect:
             line = line if self.separator else line.replace("\t", " ").strip()
             cells = next(csv.reader([line], delimiter=self.separator or " ", skipinitialspace=True))
             return [cell.strip() for cell in cells]
+        if self.separator is None:
+            return _BLANKS.split(line.strip(" \t"))
         return [cell.strip() for cell in line.split(self.separator)]
 
     def split_header(self, line: str, n_columns: int) -> list[str]:
         """Return the cells of a header line; ``Pressure (bar)`` is one also between blanks."""
         cells = self.split(line)
         if self.separator is None and len(cells) != n_columns and '"' not in line:
-            for blanks in (re.compile(r"\s{2,}|\t"), _BETWEEN_HEADERS):
-                wider = blanks.split(line.strip())
+            for wider in (_WIDE_BLANKS.split(line.strip()), _between_brackets(line)):
                 if len(wider) == n_columns:
                     return wider
         return cells
@@ -66,9 +72,27 @@ def detect(lines: Sequence[str]) -> Dialect:
     return max(candidates, key=lambda dialect: _fitness(dialect, data))
 
 
+def _between_brackets(line: str) -> list[str]:
+    """Split at blanks that are neither in brackets nor before some.
+
+    >>> _between_brackets("Pressure (bar) Stroke [mm s]")
+    ['Pressure (bar)', 'Stroke [mm s]']
+    """
+    cells: list[list[str]] = []  # all from the right, so that one look at a word is enough
+    inside = False
+    for word in reversed(line.split()):
+        if cells and (inside or cells[-1][-1].startswith(("[", "("))):
+            cells[-1].append(word)
+        else:
+            cells.append([word])
+        bracket = _BRACKET.search(word)
+        inside = inside if bracket is None else bracket[0] in ")]"
+    return [" ".join(reversed(words)) for words in reversed(cells)]
+
+
 def _fitness(dialect: Dialect, lines: Sequence[str]) -> tuple[float, bool]:
     rows = [dialect.split(line) for line in lines]
     length, agreeing = Counter(map(len, rows)).most_common(1)[0]
     cells = [cell for row in rows for cell in row if cell]
-    numbers = sum(map(dialect.is_number, cells)) / max(len(cells), 1)
-    return numbers * agreeing / len(rows), length > 1
+    numbers = sum(dialect.is_number(cell) or bool(_SPACED.fullmatch(cell)) for cell in cells)
+    return numbers / max(len(cells), 1) * agreeing / len(rows), length > 1

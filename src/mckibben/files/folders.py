@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Sequence
 from pathlib import Path
 
 from mckibben.errors import DataError
 from mckibben.files.formats import READERS
+from mckibben.ordinary import DESCRIPTION, read_text
 
 
 def roles(folder: Path) -> dict[str, list[Path]]:
@@ -24,12 +26,12 @@ def roles(folder: Path) -> dict[str, list[Path]]:
     )
     if not found:
         raise DataError("there is no recording in the folder", file=folder, remedy="name files")
-    if not protocol.is_file():
+    if not os.path.lexists(protocol):
         return {"train": found}
+    text = read_text(protocol, most=DESCRIPTION)
     try:
-        runs = json.loads(protocol.read_text(encoding="utf-8"))["runs"]
-        given = {str(run["name"]): str(run["role"]) for run in runs}
-    except (ValueError, KeyError, TypeError, OSError):
+        given = {str(run["name"]): str(run["role"]) for run in json.loads(text)["runs"]}
+    except (ValueError, KeyError, TypeError, RecursionError):
         raise DataError(
             "its protocol.json is not readable", file=folder, remedy="repair or remove it"
         ) from None

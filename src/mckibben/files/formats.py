@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from importlib import import_module
+from io import BufferedReader
 from pathlib import Path
 from types import ModuleType
 
 from mckibben.errors import DataError, MckibbenError
-from mckibben.files.table import Table
+from mckibben.files.limits import MOST_BYTES
+from mckibben.files.table import Table, printable
+from mckibben.ordinary import opened
 
 READERS: dict[str, str] = {
     ".csv": "delimited",
@@ -20,7 +25,7 @@ READERS: dict[str, str] = {
     ".hdf5": "hdf5",
     ".tdms": "tdms",
 }
-"""Ending of the file's name -> module of this folder with ``read(path) -> list[Table]``."""
+"""Ending of the file's name -> module of this folder with ``read(file, path) -> list[Table]``."""
 
 WRITERS: tuple[str, ...] = (".csv", ".tsv", ".parquet")
 """Endings whose module also has ``write(recording, path)``."""
@@ -37,18 +42,32 @@ _SIGNATURES: dict[bytes, tuple[str, tuple[str, ...]]] = {
 
 
 def tables(path: Path) -> list[Table]:
-    """Return what is in a file, as it stands there.
+    """Return what is in a file, as it stands there; errors are those of `read`."""
+    with opening(path) as file:
+        return read(file, path)
+
+
+@contextmanager
+def opening(path: Path) -> Iterator[BufferedReader]:
+    """Open a recording's file; `DataError` if its ending is unknown, or there is none to be read."""
+    _reader(path)
+    with opened(path, most=MOST_BYTES) as file:
+        yield file
+
+
+def read(file: BufferedReader, path: Path) -> list[Table]:
+    """Return what is in an open file, as it stands there.
 
     Raises
     ------
     DataError
-        If there is no such file, its ending is none that is known or not that of its content, or
-        it is damaged.
+        If its ending is none that is known or not that of its content, it is damaged, or it holds
+        more than is read.
     """
-    module = _module(path, tuple(READERS), "read")
+    module = _reader(path)
     try:
-        _refuse_impostor(path)
-        found: list[Table] = module.read(path)
+        _refuse_impostor(file, path)
+        found: list[Table] = [printable(table) for table in module.read(file, path)]
     except MckibbenError:
         raise
     except OSError as error:
@@ -75,6 +94,10 @@ def writer(path: Path) -> ModuleType:
     return _module(path, WRITERS, "written")
 
 
+def _reader(path: Path) -> ModuleType:
+    return _module(path, tuple(READERS), "read")
+
+
 def _module(path: Path, endings: tuple[str, ...], done: str) -> ModuleType:
     ending = path.suffix.casefold()
     if ending not in endings:
@@ -86,14 +109,10 @@ def _module(path: Path, endings: tuple[str, ...], done: str) -> ModuleType:
     return import_module(f"mckibben.files.{READERS[ending]}")
 
 
-def _refuse_impostor(path: Path) -> None:
-    """Refuse what is no file, is empty, or whose content is that of another ending."""
-    if path.is_dir():
-        raise DataError("this is a folder", file=path, remedy="give a file in it")
-    if path.exists() and not path.is_file():  # opening a pipe would wait for ever
-        raise DataError("this is no ordinary file", file=path, remedy="give a file on disk")
-    with path.open("rb") as file:
-        start = file.read(16)
+def _refuse_impostor(file: BufferedReader, path: Path) -> None:
+    """Refuse what is empty, or whose content is that of another ending."""
+    start = file.read(16)
+    file.seek(0)
     if not start:
         raise DataError(
             "there is nothing in it", file=path, remedy="give a file with a header and samples"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from functools import lru_cache
 
 from mckibben.files.units import find, find_listed
 from mckibben.recording import standard_unit
@@ -44,6 +45,10 @@ _ENDINGS = (
 )
 
 
+LONGEST = 256
+"""Characters of a header."""
+
+
 @dataclass(frozen=True)
 class Header:
     """What a header says: ``name`` without the unit, and the unit's text or None."""
@@ -52,6 +57,7 @@ class Header:
     unit: str | None
 
 
+@lru_cache(maxsize=8192)
 def parse(text: str) -> Header:
     """Split a header into name and unit.
 
@@ -60,7 +66,9 @@ def parse(text: str) -> Header:
     >>> parse("valve_voltage_V"), parse("pressure_in")
     (Header(name='valve_voltage', unit='V'), Header(name='pressure_in', unit=None))
     """
-    text = text.strip()
+    text = " ".join(text.split())
+    if len(text) > LONGEST:  # the forms below take time by the square of the length
+        return Header(text, None)
     bracketed = _BRACKETED.fullmatch(text)
     if bracketed and bracketed["name"] and not _EXTENSOR & set(_words(bracketed["unit"])):
         return Header(bracketed["name"], bracketed["unit"].strip())
@@ -122,10 +130,11 @@ def _standard(name: str) -> str | None:
             return "pressure_extensor"
     if name in _CHANNELS:
         return _CHANNELS[name]
-    numbered = re.fullmatch(r"(?P<alias>.*?)_?(?P<number>[0-9]+)", name)
-    if numbered and numbered["alias"] in _NUMBERED:
-        channel = _CHANNELS[numbered["alias"]]
-        return None if channel == "time" else f"{channel}_{numbered['number']}"
+    without = name.rstrip("0123456789")
+    alias, number = without.removesuffix("_"), name[len(without) :]
+    if number and alias in _NUMBERED:
+        channel = _CHANNELS[alias]
+        return None if channel == "time" else f"{channel}_{number}"
     return None
 
 

@@ -1,38 +1,175 @@
-"""MATLAB files: vectors, or structs of them; version 7.3 is HDF5 underneath."""
+"""MATLAB files: vectors, or structs of them; version 7.3 is HDF5 underneath.
+
+Version 5 is read here, by "MAT-File Format" (MathWorks): what is no vector is passed over unread,
+what a variable unpacks to is bounded, and structs within structs are followed to a certain depth.
+"""
 
 from __future__ import annotations
 
+import math
+import struct
+import zlib
+from collections.abc import Iterator
+from io import BufferedReader
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mckibben.files import hdf5
+from mckibben.files.limits import Budget
 from mckibben.files.table import Column, Table, column, of_equal_length
 
+_HEADER = 128
+_MATRIX, _COMPRESSED = 14, 15
+_NUMBERS = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8"}
+_NUMBERS |= {12: "i8", 13: "u8"}
+_TEXTS = {1: "latin-1", 2: "latin-1", 4: "utf-16", 16: "utf-8", 17: "utf-16", 18: "utf-32"}
+_CELL, _STRUCT, _OBJECT, _CHAR = 1, 2, 3, 4
+_NUMERIC = range(6, 16)
+_WITHOUT_SHAPE = (16, 17)
+"""Functions, and objects of newer kinds."""
+_COMPLEX = 0x800
 
-def read(path: Path) -> list[Table]:
-    """Read the vectors of a MAT file, of version 5 to 7.3."""
-    if hdf5.is_hdf5(path):
-        return hdf5.read(path)
-    from scipy.io import loadmat
 
-    variables = loadmat(path, squeeze_me=True, struct_as_record=True, chars_as_strings=True)
-    found: dict[str, Column] = {}
-    for name, value in variables.items():
-        if not name.startswith("__"):
-            _collect(name, value, found)
+def read(file: BufferedReader, path: Path) -> list[Table]:
+    """Read the vectors of a MAT file, of version 4 to 7.3."""
+    if hdf5.is_hdf5(file):
+        return hdf5.read(file, path)
+    start = file.read(_HEADER)
+    order = {b"IM": "<", b"MI": ">"}.get(start[126:])
+    if order is None or 0 in start[:4]:
+        found = _version_4(file, Budget(file, path))
+    else:
+        found = _Version5(order, Budget(file, path)).read(file)
     return [of_equal_length(found, path, meta={})]
 
 
-def _collect(place: str, value: Any, found: dict[str, Column]) -> None:
-    """Add a variable, or the fields of a struct, under the dotted place where it stands."""
-    array = np.asarray(value)
-    if array.dtype.names:
-        if array.size == 1:
-            for name in array.dtype.names:
-                _collect(f"{place}.{name}", array.reshape(-1)[0][name], found)
-    elif array.dtype == object and array.size == 1 and isinstance(array.item(), np.ndarray):
-        _collect(place, array.item(), found)
-    elif array.dtype.kind in "biufU" and array.ndim == 1:
-        found[place] = column(place.rpartition(".")[2], array)
+def _version_4(file: BufferedReader, budget: Budget) -> dict[str, Column]:
+    """Return the vectors of a file of version 4, which neither packs nor nests."""
+    from scipy.io import loadmat, whosmat
+
+    file.seek(0)
+    declared = whosmat(file)  # type: ignore[arg-type]  # the stubs know no files that are open
+    budget.parts(len(declared))
+    budget.samples(sum(math.prod(shape) for _, shape, _ in declared))
+    file.seek(0)
+    variables = loadmat(file, squeeze_me=True)  # type: ignore[arg-type]
+    arrays = {name: np.asarray(value) for name, value in variables.items()}
+    return {
+        name: column(name, array)
+        for name, array in arrays.items()
+        if not name.startswith("__") and array.ndim == 1 and array.dtype.kind in "biufU"
+    }
+
+
+class _Version5:
+    """The vectors of a file of version 5, by the dotted place where they stand."""
+
+    def __init__(self, order: str, budget: Budget) -> None:
+        self._order = order
+        self._budget = budget
+        self._found: dict[str, Column] = {}
+        self._bytes = 0
+
+    def read(self, file: BufferedReader) -> dict[str, Column]:
+        """Read the variables from where the file stands."""
+        while tag := file.read(8):
+            kind, size = struct.unpack(f"{self._order}II", tag)
+            content = memoryview(file.read(size))
+            if not 0 < len(content) == size:
+                raise ValueError("a variable is cut off")
+            if kind == _COMPRESSED:
+                kind, content = next(self._elements(self._unpacked(content)))
+            if kind != _MATRIX:
+                raise ValueError(f"a variable of type {kind}")
+            self._collect("", content, 0)
+        return self._found
+
+    def _unpacked(self, packed: memoryview) -> memoryview:
+        most = 8 * self._budget.allowed - self._bytes
+        unpacking = zlib.decompressobj()
+        content = unpacking.decompress(packed, most)
+        self._bytes += len(content)
+        if unpacking.unconsumed_tail:
+            self._budget.at_once(self._bytes // 8 + 1)
+        if not unpacking.eof:
+            raise ValueError("a packed variable is cut off")
+        return memoryview(content)
+
+    def _elements(self, content: memoryview) -> Iterator[tuple[int, memoryview]]:
+        """Return the type and content of each element of a matrix."""
+        at = 0
+        while at < len(content):
+            kind, size = struct.unpack_from(f"{self._order}II", content, at)
+            begin, at = at + 8, at + 8 + size + -size % 8
+            if kind >> 16:  # up to four bytes, within the tag
+                kind, size, begin, at = kind & 0xFFFF, kind >> 16, begin - 4, begin
+            if begin + size > len(content):
+                raise ValueError("an element is longer than what it is in")
+            yield kind, content[begin : begin + size]
+
+    def _collect(self, place: str, content: memoryview, depth: int) -> None:
+        """Add a matrix, or what is in a struct of one element, at its place.
+
+        Parameters
+        ----------
+        place : str
+            Empty for a variable, which has a name of its own.
+        """
+        self._budget.parts(1)
+        self._budget.depth(depth)
+        elements = self._elements(content)
+        flags = self._integers(next(elements)[1])[0]
+        of = flags & 0xFF
+        if of in _WITHOUT_SHAPE:
+            return
+        shape = self._integers(next(elements)[1])
+        name = bytes(next(elements)[1]).decode("latin-1")
+        if not place and (not name or name.startswith("__")):  # what functions keep
+            return
+        place = place or name
+        if of in _NUMERIC and not flags & _COMPLEX:
+            kind, data = next(elements)
+            self._add(place, shape, np.frombuffer(data, self._order + _NUMBERS[kind]))
+        elif of == _CHAR:
+            self._add(place, shape, self._characters(*next(elements)))
+        elif of == _CELL and math.prod(shape) == 1:
+            self._inside(place, elements, depth)
+        elif of in (_STRUCT, _OBJECT) and math.prod(shape) == 1:
+            if of == _OBJECT:
+                next(elements)  # the name of its class
+            length = self._integers(next(elements)[1])[0]
+            names = bytes(next(elements)[1])
+            for start in range(0, len(names), length):
+                field = names[start : start + length].partition(b"\0")[0].decode("latin-1")
+                self._inside(f"{place}.{field}", elements, depth)
+        elif not 0 < of < 16:
+            raise ValueError(f"a matrix of class {of}")
+
+    def _inside(self, place: str, elements: Iterator[tuple[int, memoryview]], depth: int) -> None:
+        kind, content = next(elements)
+        if kind == _MATRIX and content:
+            self._collect(place, content, depth + 1)
+
+    def _add(self, place: str, shape: tuple[int, ...], cells: NDArray[Any]) -> None:
+        """Add numbers, or the lines of a table of characters, if they are a vector."""
+        if math.prod(shape) == 1:
+            return
+        if cells.size != math.prod(shape):
+            raise ValueError(f"{cells.size} elements in a matrix of {shape}")
+        self._budget.samples(cells.size)
+        if cells.dtype.kind == "U" and cells.size:
+            lines = np.ascontiguousarray(cells.reshape(shape, order="F"))
+            cells, shape = lines.view(f"U{shape[-1]}")[..., 0], shape[:-1]
+        if sum(n != 1 for n in shape) == 1 or not cells.size:
+            self._found[place] = column(place.rpartition(".")[2], cells.reshape(-1))
+
+    def _characters(self, kind: int, data: memoryview) -> NDArray[np.str_]:
+        wide = {"<": "-le", ">": "-be"}[self._order] if kind in (4, 17, 18) else ""
+        text = bytes(data).decode(_TEXTS[kind] + wide, "replace")
+        return np.array(text).reshape(1).view("U1") if text else np.empty(0, "U1")
+
+    def _integers(self, data: memoryview) -> tuple[int, ...]:
+        return struct.unpack(f"{self._order}{len(data) // 4}i", data)

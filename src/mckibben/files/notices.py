@@ -4,15 +4,33 @@ from __future__ import annotations
 
 import inspect
 import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from pathlib import Path
 
 from mckibben.errors import DataWarning
 
 _HERE = str(Path(__file__).parent)
+_NOTED: ContextVar[list[str] | None] = ContextVar("noted", default=None)
+
+
+@contextmanager
+def noted() -> Iterator[list[str]]:
+    """Yield a list that takes what is said inside, without the name of the file."""
+    notes: list[str] = []
+    token = _NOTED.set(notes)
+    try:
+        yield notes
+    finally:
+        _NOTED.reset(token)
 
 
 def warn(path: Path, text: str) -> None:
-    """Issue a `DataWarning` about a file."""
+    """Issue a `DataWarning` about a file, and note it."""
+    notes = _NOTED.get()
+    if notes is not None and text not in notes:
+        notes.append(text)
     frame, level = inspect.currentframe(), 0
     while frame is not None and frame.f_code.co_filename.startswith(_HERE):
         frame, level = frame.f_back, level + 1

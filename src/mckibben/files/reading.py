@@ -12,11 +12,10 @@ from typing import Literal
 import numpy as np
 
 from mckibben.errors import DataError
-from mckibben.files import timebase
+from mckibben.files import formats, timebase
 from mckibben.files.choosing import Choice, choose
-from mckibben.files.formats import tables
 from mckibben.files.holes import Channels, treat
-from mckibben.files.notices import warn
+from mckibben.files.notices import noted, warn
 from mckibben.files.request import Request
 from mckibben.files.table import Table
 from mckibben.files.timebase import Span
@@ -75,7 +74,8 @@ def read(
     list of Recording
         One; or one for each stretch with ``gaps="split"``, and for each group of a TDMS file.
         In the package's units: bar, mm, N, s, rad, V, mm/s, degC. A file that `write` made gives
-        a recording equal to the one written.
+        a recording equal to the one written. What was assumed or mended on the way is in
+        ``meta["notes"]``, a list of sentences, if there was anything.
 
     Raises
     ------
@@ -91,10 +91,23 @@ def read(
     path = Path(path)
     request = Request(dict(columns or {}), dict(units or {}), rate, gaps, channels, informative)
     request.check(path)
-    return [recording for table in tables(path) for recording in _recordings(table, request, path)]
+    with noted() as notes:
+        with formats.opening(path) as file:
+            tables = formats.read(file, path)
+            file.seek(0)
+            digest = hashlib.file_digest(file, "sha256").hexdigest()
+        found = [each for table in tables for each in _recordings(table, request, path, digest)]
+    return [_with_notes(recording, notes) for recording in found]
 
 
-def _recordings(table: Table, request: Request, path: Path) -> list[Recording]:
+def _with_notes(recording: Recording, notes: list[str]) -> Recording:
+    """Return a recording that tells what was assumed or mended when it was read, now or before."""
+    known = list(recording.notes)
+    new = [note for note in notes if note not in known]
+    return recording.with_meta(notes=known + new) if new else recording
+
+
+def _recordings(table: Table, request: Request, path: Path, digest: str) -> list[Recording]:
     choice = choose(table, request, path)
     n = next(iter(choice.channels.values())).size
     if n < request.fewest:
@@ -120,7 +133,7 @@ def _recordings(table: Table, request: Request, path: Path) -> list[Recording]:
     else:
         pieces = _on_grid(channels, measured, spans, choice, table, request, path)
     units = {name: choice.units[name] for name in channels}
-    meta = _meta(choice, table, path)
+    meta = _meta(choice, table, path, digest)
     found = [Recording(piece.samples, piece.step, units, piece.start, meta) for piece in pieces]
     if len(found) == 1:
         return found
@@ -252,8 +265,6 @@ def _seconds(value: float, choice: Choice) -> float:
     return float(convert(np.array([value]), choice.time_unit, "s")[0])
 
 
-def _meta(choice: Choice, table: Table, path: Path) -> dict[str, object]:
-    with path.open("rb") as file:
-        digest = hashlib.file_digest(file, "sha256").hexdigest()
+def _meta(choice: Choice, table: Table, path: Path, digest: str) -> dict[str, object]:
     name = {} if table.name is None else {"name": f"{path.stem}[{table.name}]"}
     return {**table.meta, **choice.meta, **name, "file": str(path), "sha256": digest}

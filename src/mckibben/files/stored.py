@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 from pathlib import Path
 from typing import Any, Literal
@@ -11,6 +10,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 
 from mckibben.errors import DataError
 from mckibben.files.table import Column, Table
+from mckibben.manifest import digest
 from mckibben.recording import Array, Recording
 
 
@@ -55,6 +55,14 @@ class Stored(BaseModel):
                     channel=name,
                     remedy="rename the channel; the time is written from the sample time",
                 )
+        for name, unit in recording.units.items():
+            if not unit.isprintable():
+                raise DataError(
+                    f"no unit can be {unit[:40]!r}",
+                    file=path,
+                    channel=name,
+                    remedy="give the unit in plain letters",
+                )
         step = recording.sample_time
         stored = cls.model_construct(
             sha256=digest(samples),
@@ -91,13 +99,10 @@ class Stored(BaseModel):
 def parse(text: str | bytes) -> Stored | str:
     """Return what the JSON describes, or in words why it does not."""
     try:
-        return Stored.model_validate_json(text)
+        found = Stored.model_validate_json(text)
+        words = (*found.units, *found.units.values())
+        return found if all(map(str.isprintable, words)) else "its names cannot be printed"
     except ValidationError as error:
         first = error.errors()[0]
         where = ".".join(str(step) for step in first["loc"])
-        return f"{where}: {first['msg']}" if where else str(first["msg"])
-
-
-def digest(samples: bytes) -> str:
-    """Return the SHA-256 of bytes, in hexadecimal digits."""
-    return hashlib.sha256(samples).hexdigest()
+        return f"{where[:60]}: {first['msg'][:200]}" if where else str(first["msg"])[:200]

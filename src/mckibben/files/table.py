@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -14,8 +14,22 @@ from numpy.typing import NDArray
 from mckibben.errors import DataError
 from mckibben.recording import Array
 
-MAX_SAMPLES = 250_000_000
-"""Samples of one file (2 GB of memory); one that declares more is refused before it is read."""
+
+@dataclass(frozen=True)
+class Flaw:
+    """What keeps a column of numbers from being used.
+
+    Parameters
+    ----------
+    sample : int
+        The first that shows it, counted from 0.
+    problem, remedy : str
+        As in a `DataError`.
+    """
+
+    sample: int
+    problem: str
+    remedy: str
 
 
 @dataclass(frozen=True)
@@ -31,16 +45,16 @@ class Column:
     unit : str, optional
         The unit where the file states it apart from the header.
     texts : sequence of str, length n
-        The cells of a column of text.
-    flaw : (int, str), optional
-        Sample, from 0, and text of the first cell that should be a number and is not.
+        The cells of a column of text; of a text file the first ones only, if they are no times.
+    flaw : Flaw, optional
+        Why the samples cannot be used, if they cannot.
     """
 
     header: str
     values: Array | None
     unit: str | None = None
     texts: Sequence[str] = ()
-    flaw: tuple[int, str] | None = None
+    flaw: Flaw | None = None
 
 
 @dataclass(frozen=True)
@@ -89,6 +103,47 @@ def column(header: str, values: NDArray[Any], unit: str | None = None) -> Column
     return Column(header, None, unit, texts=[str(value) for value in values])
 
 
+def printable(table: Table) -> Table:
+    r"""Return a foreign table whose words hold nothing that steers a terminal or turns text round.
+
+    Blanks of any kind become plain ones, other signs that cannot be printed are written as
+    ``\x1b``. What this package wrote stands as it is: its names were looked at before.
+    """
+    if table.own:
+        return table
+    columns = tuple(
+        replace(
+            column,
+            header=plain(column.header),
+            unit=None if column.unit is None else plain(column.unit),
+        )
+        for column in table.columns
+    )
+    name = None if table.name is None else plain(table.name)
+    meta = {plain(key): _plain_value(value) for key, value in table.meta.items()}
+    return replace(table, columns=columns, name=name, meta=meta)
+
+
+def plain(text: str) -> str:
+    r"""Return text with what cannot be printed written out.
+
+    >>> print(plain("\x1b[31mpressure\xa0(bar)"))
+    \x1b[31mpressure (bar)
+    """
+    if text.isprintable():
+        return text
+    return "".join(
+        sign if sign.isprintable() else " " if sign.isspace() else ascii(sign)[1:-1]
+        for sign in text
+    )
+
+
+def _plain_value(value: Any) -> Any:
+    if isinstance(value, str):
+        return plain(value)
+    return [_plain_value(item) for item in value] if isinstance(value, list) else value
+
+
 def of_equal_length(
     columns: Mapping[str, Column], path: Path, *, meta: Mapping[str, Any], name: str | None = None
 ) -> Table:
@@ -111,16 +166,6 @@ def of_equal_length(
     kept = tuple(column for column in columns.values() if _length(column) == common)
     listed = {"ignored_columns": left_out} if left_out else {}
     return Table(kept, meta={**meta, **listed}, name=name)
-
-
-def refuse_huge(samples: int, path: Path) -> None:
-    """Raise a `DataError` if a file declares more samples than are reasonable to hold."""
-    if samples > MAX_SAMPLES:
-        raise DataError(
-            f"it declares {samples} samples, more than the {MAX_SAMPLES} that are read at once",
-            file=path,
-            remedy="split the file, or check that it is not damaged",
-        )
 
 
 def _length(column: Column) -> int:

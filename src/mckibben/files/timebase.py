@@ -19,6 +19,15 @@ Span = tuple[int, int]
 GAP = 3.0
 """Steps longer than this many median steps are gaps; shorter ones are jitter."""
 
+_SINCE_1970 = {"ms": (1e12, 4.2e12), "us": (1e15, 4.2e15), "ns": (1e18, 4.2e18)}
+"""Unit -> counts of it since 1970 in the years 2001 to 2103."""
+
+_DAYS = ((15_000.0, 80_000.0), (693_000.0, 800_000.0))
+"""Days since 1900, of spreadsheets, and since year 0, of MATLAB, in the years 1941 to 2119 or so."""
+
+_SHORT = 0.999e-3
+"""Steps of numbers as large as such days that may be days; longer ones are hardly of a muscle."""
+
 
 @dataclass(frozen=True)
 class Step:
@@ -62,6 +71,34 @@ def check(time: Array, table: Table, path: Path) -> None:
         problem = f"the time goes back from {time[at]:.10g} to {time[at + 1]:.10g}"
         remedy = "split the file there, or sort its rows by time"
     raise DataError(problem, file=path, channel="time", row=table.row(at + 1), remedy=remedy)
+
+
+def unit_by_size(time: Array, table: Table, path: Path) -> str | None:
+    """Return the unit of times without one where their size shows it, or None.
+
+    Raises
+    ------
+    DataError
+        If they may be days as well as seconds.
+    """
+    if time.size < 2 or not np.all(np.isfinite(time)):
+        return None
+    low, high = float(time.min()), float(time.max())
+    if any(first <= low and high <= last for first, last in _DAYS):
+        steps = np.abs(np.diff(time))
+        if 0 < float(np.median(steps)) < _SHORT:
+            raise DataError(
+                f"the times have no unit; {time[0]:.12g} and the short steps may be days, as "
+                "spreadsheets count them, or seconds",
+                file=path,
+                channel="time",
+                row=table.row(0),
+                remedy="say --unit time=day or --unit time=s",
+            )
+    for unit, (first, last) in _SINCE_1970.items():
+        if first <= low and high < last:
+            return unit
+    return None
 
 
 def gaps(time: Array) -> NDArray[np.intp]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, lru_cache
 from typing import Any, Literal
 
 from mckibben.recording import Array
@@ -37,8 +37,10 @@ SPELLINGS: dict[str, dict[str, str]] = {
         "s": "s sec secs second seconds",
         "ms": "ms msec millisecond milliseconds",
         "us": "us usec microsecond microseconds",
+        "ns": "ns nsec nanosecond nanoseconds",
         "min": "min minute minutes",
         "hour": "h hr hour hours",
+        "day": "day days",
     },
     "rad": {
         "rad": "rad radian radians",
@@ -63,7 +65,10 @@ _GAUGE = re.compile(
     r"(?P<unit>m?bar|[hkM]?Pa|psi)[\s_(\[]*(?P<kind>gauge|absolute|abs|g|a)[)\]]?", re.IGNORECASE
 )
 _WORD = r"[A-Za-zΩ°%]+(?:(?:\*\*|\^)?-?[1-3])?"
-_READABLE = re.compile(rf"{_WORD}(?:\s*[*/·\s]\s*\(?{_WORD}\)?)*")
+_READABLE = re.compile(rf"{_WORD}(?:[*/· ]\(?{_WORD}\)?)*")
+
+LONGEST = 40
+"""Characters of a unit; what is longer is none."""
 
 
 @dataclass(frozen=True)
@@ -88,6 +93,9 @@ class Unit:
 
 def find_listed(text: str) -> Unit | None:
     """Return the unit of a spelling in `SPELLINGS`, or None; longer ones in any case."""
+    text = text.strip()
+    if len(text) > LONGEST:
+        return None
     text = _plain(text)
     exact, folded = _lookup()
     found = exact.get(text)
@@ -100,6 +108,9 @@ def find(text: str) -> Unit | None:
     >>> find("kPa"), find("psig").reference, find("nonsense")
     (Unit(name='kPa', target='bar', reference=None), 'gauge', None)
     """
+    text = text.strip()
+    if len(text) > LONGEST:
+        return None
     text = _plain(text)
     if not text:
         return Unit("", "")
@@ -113,7 +124,7 @@ def find(text: str) -> Unit | None:
             kind = "gauge" if gauge["kind"].casefold().startswith("g") else "absolute"
             return Unit(unit.name, unit.target, "gauge" if kind == "gauge" else "absolute")
     # pint evaluates numbers, so only products of words with small exponents are handed to it.
-    return _ask_pint(text) if len(text) <= 40 and _READABLE.fullmatch(text) else None
+    return _ask_pint(text) if _READABLE.fullmatch(text) else None
 
 
 def convert(samples: Array, unit: str, target: str) -> Array:
@@ -152,7 +163,7 @@ def _registry() -> Any:
     return pint.UnitRegistry()
 
 
-@cache
+@lru_cache(maxsize=4096)
 def _ask_pint(text: str) -> Unit | None:
     registry = _registry()
     try:
@@ -171,4 +182,4 @@ def _plain(text: str) -> str:
     """Write the look-alikes of one sign in one way."""
     for looks, is_ in (("µ", "u"), ("μ", "u"), ("º", "°"), ("℃", "°C"), ("℉", "°F")):
         text = text.replace(looks, is_)
-    return re.sub(r"\s*([/*·])\s*", r"\1", text.strip())
+    return re.sub(r" ?([/*·]) ?", r"\1", " ".join(text.split()))

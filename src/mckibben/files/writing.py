@@ -11,6 +11,8 @@ from mckibben.recording import Recording
 def write(recording: Recording, path: str | Path) -> None:
     """Write a recording to a file, which `read` turns into an equal one.
 
+    What had that name before is replaced: the command line asks first, a function does as it is told.
+
     Parameters
     ----------
     recording : Recording

@@ -251,6 +251,8 @@ def _summary(tried: Mapping[str, Tried], board: Leaderboard, n_seeds: int) -> tu
         assert row.test is not None
         times = "" if name is None else f", {row.test.rmse / worked[name]:.2f} times {name}'s"
         sentences.append(f"{how}: {row.model}, {row.test.rmse:.3f} mm on the test{times}.")
+    if board.not_recommended:
+        sentences.append(f"{board.not_recommended}.")
     failed = [f"{name} failed in {one.reason}" for name, one in tried.items() if one.failures]
     return (*sentences, *failed)
 

@@ -18,6 +18,14 @@ from mckibben.report.drawing import Curve, Drawing, Panel
 Array = NDArray[np.float64]
 Json = dict[str, Any]
 
+CLOSED: Json = {"displaylogo": False, "showSendToCloud": False, "plotlyServerURL": ""}
+"""Settings without which plotly.js has a button that uploads the data."""
+
+BAR: Json = CLOSED | {
+    "modeBarButtons": [["toImage"], ["zoom2d", "pan2d"], ["zoomIn2d", "zoomOut2d", "resetScale2d"]]
+}
+"""The tool bar of every plot of a page: its buttons are named, so that none comes with a new version."""
+
 _WIDTHS = {"line": 1.5, "fine": 0.8, "broad": 5.0, "beads": 1.0}
 """Of lines [px], by style."""
 

@@ -6,10 +6,10 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from mckibben.report import interactive, model_subjects, subjects, wording
+from mckibben.recording import notes_by_file, reading_notes
+from mckibben.report import interactive, model_subjects, subjects, templating, wording
 from mckibben.report.drawing import N_COLOURS, POINTS, Drawing, series_colour
 from mckibben.report.shown import Shown, drawn, shown
-from mckibben.report.templating import template
 
 if TYPE_CHECKING:
     from mckibben.comparison.results import Leaderboard, Row, Study
@@ -46,25 +46,26 @@ def write_report(study: Study, path: str | Path) -> None:
 
 def page(study: Study) -> str:
     """Return the report of a study as HTML."""
-    from plotly.offline import get_plotlyjs
-
     from mckibben.comparison.results import CHOICES
 
     every = shown(study)
     pictured = drawn(every)
     figures, left_out = _figures(study, pictured)
-    return template("report.html.j2").render(
+    measured = [one.recording for one in every]
+    return templating.page(
+        "report.html.j2",
+        figures,
         study=study,
         board=study.leaderboard,
         shown=every,
         drawn=pictured,
-        figures=figures,
         left_out=left_out,
         models=_models(study.leaderboard),
         bars=_bars(study.leaderboard),
         choices=CHOICES,
+        reading=notes_by_file(measured),
+        notes=[note for note in study.notes if note not in reading_notes(measured)],
         wording=wording,
-        plotly=get_plotlyjs(),
     )
 
 

@@ -5,6 +5,7 @@ Neither pyplot nor any global state is touched, and the same drawing gives the s
 
 from __future__ import annotations
 
+import io
 from collections.abc import Mapping
 from pathlib import Path
 from types import MappingProxyType
@@ -14,6 +15,7 @@ import numpy as np
 
 from mckibben.atomic import replacing
 from mckibben.errors import DataError
+from mckibben.outputs import MAKER
 from mckibben.report.drawing import Curve, Drawing, Panel
 
 if TYPE_CHECKING:
@@ -76,14 +78,14 @@ _WIDTHS = {"line": 0.9, "fine": 0.4, "broad": 2.6, "beads": 0.5}
 _LEGEND = 45
 """Letters of three names that stand side by side above a panel at most."""
 
-METADATA: Mapping[str, Mapping[str, None]] = MappingProxyType(
+METADATA: Mapping[str, Mapping[str, str | None]] = MappingProxyType(
     {
-        "png": {"Software": None},
-        "svg": {"Date": None},
-        "pdf": {"CreationDate": None},
+        "png": {"Software": MAKER},
+        "svg": {"Creator": MAKER, "Date": None},
+        "pdf": {"Creator": MAKER, "CreationDate": None},
     }
 )
-"""What each format would record of when and by what it was made, left out."""
+"""What each format records of what it was made by, and not of when."""
 
 
 def save(drawing: Drawing, path: str | Path) -> None:
@@ -104,6 +106,16 @@ def save(drawing: Drawing, path: str | Path) -> None:
     from matplotlib import rc_context
 
     path, style = Path(path), dict(STYLE)
+    kind = format_of(path)
+    figure = io.BytesIO()
+    with rc_context(style):
+        drawn(drawing).savefig(figure, format=kind, dpi=RESOLUTION, metadata=dict(METADATA[kind]))
+    with replacing(path) as new:
+        new.write_bytes(figure.getbuffer())
+
+
+def format_of(path: Path) -> str:
+    """Return the format that a figure's name asks for, or refuse it as `save` does."""
     kind = path.suffix.lower().lstrip(".")
     if kind not in METADATA:
         raise DataError(
@@ -111,8 +123,7 @@ def save(drawing: Drawing, path: str | Path) -> None:
             file=path,
             remedy="name it .png, .svg or .pdf",
         )
-    with replacing(path) as new, rc_context(style):
-        drawn(drawing).savefig(new, format=kind, dpi=RESOLUTION, metadata=dict(METADATA[kind]))
+    return kind
 
 
 def drawn(drawing: Drawing) -> Figure:

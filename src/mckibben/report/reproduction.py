@@ -5,9 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from mckibben.report import interactive, wording
+from mckibben.report import interactive, templating, wording
 from mckibben.report.drawing import N_COLOURS, Curve, Drawing, Panel
-from mckibben.report.templating import template
 
 if TYPE_CHECKING:
     from mckibben.papers import Figure, Reproduction
@@ -35,14 +34,12 @@ def write_reproduction(found: Reproduction, path: str | Path) -> None:
 
 def reproduction_page(found: Reproduction) -> str:
     """Return the report of a re-run as HTML."""
-    from plotly.offline import get_plotlyjs
-
     figures = {
         f"figure-{place}": [interactive.plots(drawing(figure))]
         for place, figure in enumerate(found.figures)
     }
-    return template("reproduction.html.j2").render(
-        found=found, figures=figures, versions=wording.versions(), plotly=get_plotlyjs()
+    return templating.page(
+        "reproduction.html.j2", figures, found=found, versions=wording.versions()
     )
 
 

@@ -6,56 +6,76 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from mckibben import registry
-from mckibben.atomic import write_json, write_text
-from mckibben.report.page import write_report
+from mckibben.atomic import to_json
+from mckibben.blocks.saving import to_text
+from mckibben.outputs import Results
+from mckibben.report.page import page
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from mckibben.comparison.results import Leaderboard, Study
 
 PAGE_SHARE = 0.1
 """Share of the time that may go into pages which the next model makes old."""
 
+LEADERBOARD = ("leaderboard.json", "leaderboard.csv")
 
-def write_leaderboard(board: Leaderboard, folder: Path) -> None:
+
+def model_file(model: str) -> str:
+    """Return where in the folder a model is saved.
+
+    >>> model_file("memory a load")
+    'models/memory-a-load.json'
+    """
+    return f"models/{''.join(c if c.isalnum() or c in '-.' else '-' for c in model)}.json"
+
+
+def study_files(models: Iterable[str]) -> list[str]:
+    """Return the files that a study of these models may write."""
+    rest = ("report.html", "characterization.json", "inverse.json")
+    return [*LEADERBOARD, *rest, *map(model_file, models)]
+
+
+def write_leaderboard(board: Leaderboard, results: Results) -> None:
     """Write ``leaderboard.json`` and ``leaderboard.csv``."""
-    write_json(folder / "leaderboard.json", board.to_dict())
-    write_text(folder / "leaderboard.csv", board.to_frame().to_csv(index=False))
+    results.write_text("leaderboard.json", to_json(board.to_dict()) + "\n")
+    results.write_text("leaderboard.csv", board.to_frame().to_csv(index=False))
 
 
 class StudyFolder:
     """A study's results: what the muscle does, leaderboard, models, inverse and report.
 
+    What an earlier run wrote there is removed, so that no model of it stays.
+
     Parameters
     ----------
-    folder : Path
-        Exists.
+    results : Results or Path
+        The folder, which exists.
     """
 
-    def __init__(self, folder: Path) -> None:
-        self._folder = folder
+    def __init__(self, results: Results | Path) -> None:
+        self._results = Results(results) if isinstance(results, Path) else results
         self._saved: set[str] = set()
         self._next_page = 0.0
-        for name in registry.names("estimators"):  # of an earlier study
-            (folder / "models" / f"{name}.json").unlink(missing_ok=True)
-        (folder / "inverse.json").unlink(missing_ok=True)
+        self._results.clear()
 
     def take(self, study: Study, *, last: bool = False) -> None:
         """Write what is new; the page only when it is due, or the last."""
-        folder, board = self._folder, study.leaderboard
+        write, board = self._results.write_text, study.leaderboard
         if not board.rows:
-            write_json(folder / "characterization.json", study.characterization.to_dict())
-        (folder / "models").mkdir(exist_ok=True)
+            found = study.characterization.to_dict()
+            write("characterization.json", to_json(found) + "\n")
         for row in board.rows:
             if row.block is not None and row.model not in self._saved:
-                row.block.save(folder / "models" / f"{row.model}.json")
+                write(model_file(row.model), to_text(row.block))
                 self._saved.add(row.model)
-        write_leaderboard(board, folder)
+        write_leaderboard(board, self._results)
         if study.inverse is not None:
-            study.inverse.inverse.save(folder / "inverse.json")
+            write("inverse.json", to_text(study.inverse.inverse))
         started = time.monotonic()
         if last or not board.pending or started >= self._next_page:
-            write_report(study, folder / "report.html")
+            write("report.html", page(study))
             ended = time.monotonic()
             first = not board.rows  # the page of the first model is never waited for
             self._next_page = ended if first else ended + (ended - started) / PAGE_SHARE

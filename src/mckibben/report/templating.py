@@ -1,13 +1,53 @@
-"""The page templates, set up the same way for every report."""
+"""The pages, set up alike for every report: they run their own scripts and ask nobody anything."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import base64
+import hashlib
+from importlib import resources
+from typing import TYPE_CHECKING, Any
 
-from mckibben.report import wording
+from mckibben.report import interactive, wording
 
 if TYPE_CHECKING:
     from jinja2 import Template
+
+
+def page(name: str, figures: dict[str, Any], **about: Any) -> str:
+    """Return a page that opens without a network, and under which a browser runs nothing else.
+
+    Parameters
+    ----------
+    name : str
+        Of the template.
+    figures : dict of str to list
+        Figure -> variants -> its plots side by side.
+    **about
+        What else the template names.
+    """
+    from plotly.offline import get_plotlyjs
+
+    own = resources.files("mckibben.report").joinpath("templates/report.js").read_text("utf-8")
+    scripts = (get_plotlyjs(), own)
+    return template(name).render(
+        figures=figures,
+        bar=interactive.BAR,
+        scripts=scripts,
+        policy=policy(*scripts),
+        **about,
+    )
+
+
+def policy(*scripts: str) -> str:
+    """Return a page's content security policy: these scripts run, and nothing is fetched or sent."""
+    own = " ".join(
+        f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"
+        for text in scripts
+    )
+    return (
+        f"default-src 'none'; script-src {own}; style-src 'unsafe-inline'; img-src data: blob:; "
+        "connect-src 'none'; form-action 'none'; base-uri 'none'"
+    )
 
 
 def template(name: str) -> Template:

@@ -59,6 +59,11 @@ def verdict(study: Study) -> list[str]:
     """Return which model is chosen and by what, its test error, and whether it can be inverted."""
     board, best = study.leaderboard, study.leaderboard.best
     if best is None or best.test is None:
+        if board.not_recommended:
+            n_ok = sum(row.reason is None for row in board.rows)
+            return [
+                f"Models that worked{' so far' if board.pending else ''}: {n_ok}. {board.chosen}"
+            ]
         if board.pending:
             return ["No model is fitted yet."]
         return ["No model could be identified on these recordings."]
@@ -71,7 +76,7 @@ def verdict(study: Study) -> list[str]:
     share = percent(best.test.rmse / output_range(study))
     sentences = [
         f"Models that worked{so_far}: {n_ok}. {board.chosen}",
-        f"Free-running on the test data, which it was neither fitted to nor chosen by, {best.model} is "
+        f"Free-running on the test data{_untouched(board)}, {best.model} is "
         f"off by {number(best.test.rmse)} {board.unit} RMSE{between}, {share} of the measured range; "
         f"at worst by {number(best.test.max_error)} {board.unit}.",
     ]
@@ -86,6 +91,10 @@ def verdict(study: Study) -> list[str]:
             f"{best.model} is good only near the motions it was fitted to: {best.caution}."
         )
     return [*sentences, _invertibility(study, best)]
+
+
+def _untouched(board: Leaderboard) -> str:
+    return "" if board.shared else ", which it was neither fitted to nor chosen by"
 
 
 def cautions(board: Leaderboard) -> dict[str, str]:
@@ -123,6 +132,11 @@ def next_steps(study: Study) -> list[str]:
         return [
             f"Load this page again while models are fitted: {done} of {done + left} are done, "
             f"{_listed(pending)} to come. If the work was stopped, the same command goes on."
+        ]
+    if study.leaderboard.not_recommended:
+        return [
+            "Use none of these models. Check that input and output are the right channels, that the "
+            "sensor of the output was connected, and that several cycles are covered; then record again."
         ]
     if best is None or best.test is None or best.train is None:
         return [

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from pydantic import ValidationError
 
 from mckibben.errors import DataError
 from mckibben.recording import Recording
@@ -12,6 +13,7 @@ from mckibben.rigs.parameters import Air, Creep, Friction, Muscle, Range, Sensor
 from mckibben.rigs.physics.bladder import bladder_force
 from mckibben.rigs.physics.braid import braid_area
 from mckibben.rigs.physics.compiled import NEWTON_PER_BAR_MM2
+from mckibben.rigs.refusals import refused
 from mckibben.rigs.setups.moving_end import MovingEnd
 from mckibben.signals.excitations import triangle
 
@@ -33,6 +35,9 @@ VISCOSITY = 0.02
 
 CONDUCTANCE_PER_ML = 0.019
 """Of the regulator, for each millilitre to fill [l/(s bar)]: a tenth of a second or so."""
+
+LARGEST = 1e6
+"""Of every number of a data sheet."""
 
 PERIOD = 20.0
 """Of the triangle whose loop has the width asked for [s]."""
@@ -83,10 +88,29 @@ def rig_from_data_sheet(
         ("max_force", max_force),
         ("max_contraction", max_contraction),
     ):
-        if not 0 < value < math.inf:
-            raise DataError(f"{label} is {value}", remedy="give a positive number")
+        if not 0 < value <= LARGEST:
+            raise DataError(f"{label} is {value}", remedy=f"give a number from 0 to {LARGEST:g}")
     if not 0.05 <= loop_width <= 0.5:
         raise DataError(f"loop_width is {loop_width}", remedy="give a share from 0.05 to 0.5")
+    try:
+        return _rig(
+            name, diameter, length, max_pressure, max_force, max_contraction, payload, loop_width
+        )
+    except ValidationError as error:  # in range each, but not together
+        parts = {part.__name__: part for part in (Muscle, Friction, Creep, Air, Sensor, Range)}
+        raise refused(error, parts.get(error.title, MovingEnd)) from None
+
+
+def _rig(
+    name: str,
+    diameter: float,
+    length: float,
+    max_pressure: float,
+    max_force: float,
+    max_contraction: float,
+    payload: float,
+    loop_width: float,
+) -> MovingEnd:
     scale = max_force / length
     muscle = Muscle(
         kind="contractile",

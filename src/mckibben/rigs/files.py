@@ -13,13 +13,13 @@ from pydantic import BaseModel, ValidationError
 from mckibben import registry
 from mckibben.atomic import write_text
 from mckibben.errors import DataError
+from mckibben.ordinary import DESCRIPTION, read_text
 from mckibben.rigs.refusals import limits, refused, unit
 from mckibben.rigs.rig import Rig
 
 FORMAT = "mckibben-rig"
 FORMAT_VERSION = 1
 PUBLISHED = Path(__file__).parent / "published"
-MOST_BYTES = 1_000_000
 
 
 @cache
@@ -107,17 +107,11 @@ def _toml(value: Any) -> str:
 
 def _read(path: Path) -> dict[str, Any]:
     try:
-        size = path.stat().st_size
-    except FileNotFoundError:
-        raise DataError("there is no such file", file=path, remedy="check the path") from None
-    if size > MOST_BYTES:
+        fields = _plain(tomllib.loads(read_text(path, most=DESCRIPTION)))
+    except (ValueError, RecursionError) as error:
         raise DataError(
-            f"{size} bytes are too many for a rig", file=path, remedy="give a rig's TOML file"
-        )
-    try:
-        fields = tomllib.loads(path.read_bytes().decode())
-    except (UnicodeDecodeError, tomllib.TOMLDecodeError, RecursionError) as error:
-        raise DataError(f"this is not TOML: {error}", file=path, remedy="mend the file") from None
+            f"this is not TOML: {str(error)[:200]}", file=path, remedy="mend the file"
+        ) from None
     if fields.pop("format", None) != FORMAT:
         raise DataError(
             f"it does not begin with format = {FORMAT!r}",
@@ -127,7 +121,7 @@ def _read(path: Path) -> dict[str, Any]:
     version = fields.pop("format_version", None)
     if version != FORMAT_VERSION:
         raise DataError(
-            f"format_version is {version!r}, not {FORMAT_VERSION}",
+            f"format_version is {version!r:.60}, not {FORMAT_VERSION}",
             file=path,
             remedy="write it with this version of the package",
         )
@@ -138,18 +132,22 @@ def _from_fields(fields: dict[str, Any], path: Path) -> Rig:
     known = registry.names("setups")
     setup = fields.get("setup")
     if setup not in known:
-        raise DataError(f"setup is {setup!r}", file=path, remedy=f"give one of {', '.join(known)}")
+        raise DataError(
+            f"setup is {setup!r:.60}", file=path, remedy=f"give one of {', '.join(known)}"
+        )
     model: type[Rig] = registry.load("setups", str(setup))
     try:
-        return model.model_validate(_floats(fields))
+        return model.model_validate(fields)
     except ValidationError as error:
         raise refused(error, model, path) from None
 
 
-def _floats(value: Any) -> Any:
-    """Return TOML's nan and inf as words, which every number field refuses by name."""
+def _plain(value: Any) -> Any:
+    """Return TOML's nan, inf and endless integers as words, which every number field refuses."""
     if isinstance(value, dict):
-        return {key: _floats(item) for key, item in value.items()}
+        return {key: _plain(item) for key, item in value.items()}
     if isinstance(value, list):
-        return [_floats(item) for item in value]
+        return [_plain(item) for item in value]
+    if isinstance(value, int) and value.bit_length() > 63:
+        return "an integer beyond 64 bits"
     return str(value) if isinstance(value, float) and not math.isfinite(value) else value

@@ -24,6 +24,10 @@ def require_positive(name: str, value: float) -> None:
         raise DataError(f"{name} is {value}", remedy="give a positive number")
 
 
+LARGEST_SEED = 2**64 - 1
+"""Of 64 bits, as other tools have them."""
+
+
 def require_finite(name: str, values: ArrayLike) -> Array:
     """Return numbers as an array, or refuse those that are not finite."""
     numbers = np.atleast_1d(np.asarray(values, dtype=float))
@@ -40,6 +44,9 @@ def require_order(low: float, high: float) -> None:
 
 def generator(seed: int) -> np.random.Generator:
     """Return what draws random numbers, or say that the seed is impossible."""
-    if seed < 0:
-        raise DataError(f"seed {seed} is negative", remedy="give 0 or more")
+    if not 0 <= seed <= LARGEST_SEED:
+        raise DataError(
+            f"seed {seed} is {'negative' if seed < 0 else 'too large'}",
+            remedy=f"give 0 to {LARGEST_SEED}",
+        )
     return np.random.default_rng(seed)

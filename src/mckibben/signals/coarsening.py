@@ -15,6 +15,20 @@ from mckibben.signals.reversals import reversals
 FEWEST = 10
 """Samples that a recording keeps; shorter ones are left out."""
 
+MOST = 100_000
+"""Samples to fit to, and to test on, of recordings that are longer."""
+
+HUGE = 1_000_000
+"""Samples above which fewer are taken, of stretches: tens of models are then done in minutes."""
+
+MOST_OF_HUGE = 40_000
+
+PER_SWING = 20
+"""Samples that a swing of the input keeps, the median one, before stretches are cut out instead."""
+
+STRETCHES = 4
+"""Taken of each recording, spread evenly."""
+
 
 def coarsened(recording: Recording, factor: int, channel: str) -> Recording:
     """Return a recording with one sample for every ``factor``, turning points kept.
@@ -73,9 +87,12 @@ def _beyond(u: NDArray[np.float64]) -> bool:
 
 
 def made_manageable(
-    train: Sequence[Recording], test: Sequence[Recording], channel: str, most: int
+    train: Sequence[Recording], test: Sequence[Recording], channel: str, most: int | None = None
 ) -> tuple[list[Recording], list[Recording], tuple[str, ...]]:
     """Return recordings thinned alike, so that no more than so many samples are fitted or tested on.
+
+    Without a number given, huge recordings are thinned no further than leaves their swings in shape; of
+    what is then still too much, stretches of samples in a row are taken, each with a start of its own.
 
     Parameters
     ----------
@@ -83,8 +100,9 @@ def made_manageable(
         All have the channel.
     channel : str
         What drives.
-    most : int
-        Samples of all training recordings together, and of all test recordings.
+    most : int, optional
+        Samples of all training recordings together, and of all test recordings; default `MOST`, or
+        `MOST_OF_HUGE` where there are more than `HUGE`.
 
     Returns
     -------
@@ -97,15 +115,24 @@ def made_manageable(
     DataError
         If the limit is not positive, or leaves nothing.
     """
-    if most < FEWEST:
-        raise DataError(f"{most} samples are too few to fit to", remedy=f"allow {FEWEST} or more")
     total = max(sum(map(len, train)), sum(map(len, test)))
-    factor = -(-total // most)
+    stretched = most is None and total > HUGE
+    limit = most if most is not None else MOST_OF_HUGE if stretched else MOST
+    if limit < FEWEST:
+        raise DataError(f"{limit} samples are too few to fit to", remedy=f"allow {FEWEST} or more")
+    factor = -(-total // limit)
     if factor == 1:
         return list(train), list(test), ()
+    if stretched:
+        factor = max(1, min(factor, _swing(train, channel) // PER_SWING))
     step = train[0].sample_time
     grid = "" if step is None else f", {step * factor:g} s apart: models hold for that sample time"
-    notes = [f"{total} samples are many: one in {factor} is used{grid}, turning points first."]
+    notes = []
+    if factor > 1:
+        notes.append(
+            f"{total} samples are many: one in {factor} is used{grid}, turning points first. Models are "
+            "fitted, chosen and tested on those."
+        )
     aligned = [_continuing(recording, train, factor) for recording in test]
     parts, lost = [], 0
     for recordings in (list(train), aligned):
@@ -126,7 +153,41 @@ def made_manageable(
         notes.append(
             f"{lost} turning points lie too close to others and are lost: allow more samples."
         )
+    if stretched:
+        left = [sum(map(len, recordings)) for recordings in parts]
+        parts = [_stretches(some, limit) for some in parts]
+        for some, before, role in zip(parts, left, ("fitted to", "tested on"), strict=True):
+            now = sum(map(len, some))
+            if now < before:
+                notes.append(
+                    f"{total} samples are many: of {before} that could be {role}, {now} are used, in "
+                    f"{len(some)} stretches spread evenly, all samples in a row. --samples takes more."
+                )
     return parts[0], parts[1], tuple(notes)
+
+
+def _swing(recordings: Sequence[Recording], channel: str) -> int:
+    """Return how many samples the median swing of the input takes."""
+    swings = [np.diff(reversals(recording[channel])) for recording in recordings]
+    return int(np.median(np.concatenate(swings)))
+
+
+def _stretches(recordings: Sequence[Recording], most: int) -> list[Recording]:
+    """Return stretches of recordings, evenly spread, together no longer than a limit."""
+    share = most / max(sum(map(len, recordings)), 1)
+    if share >= 1:
+        return list(recordings)
+    found = []
+    for recording in recordings:
+        n = int(share * len(recording)) // STRETCHES
+        gap = (len(recording) - n) // (STRETCHES - 1)
+        if n >= FEWEST:
+            pieces = [recording.slice(k * gap, k * gap + n) for k in range(STRETCHES)]
+            found += [
+                piece.with_meta(name=f"{recording.name}, stretch {k}")
+                for k, piece in enumerate(pieces, start=1)
+            ]
+    return found
 
 
 def _continuing(recording: Recording, others: Sequence[Recording], factor: int) -> Recording:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import dataclasses
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -225,6 +226,8 @@ def _leaderboard(desk: Desk) -> None:
             "Memory: 1 where the model keeps rising and falling branches as far apart as the data do, "
             "0 where it forgot. Select one or two models to look closer."
         ).classes("text-xs opacity-70")
+        for said in _judged(desk.workspace.results()):
+            ui.label(said).classes("text-sm")
         place = named(ui.column().classes("w-full"), "closer")
 
         async def closer() -> None:
@@ -240,6 +243,23 @@ def _leaderboard(desk: Desk) -> None:
     desk.when("results", shown.refresh)
     desk.when("theme", shown.refresh)
     shown()
+
+
+def _judged(results: Sequence[dict[str, Any]]) -> list[str]:
+    """Return what every model has to beat, and what speaks against models or their tests."""
+    said = []
+    for result in results:
+        constant = result.get("constant") or {}
+        tested = wording.number((constant.get("test") or {}).get("rmse"))
+        validated = wording.number(constant.get("validation_rmse"))
+        if constant:
+            said.append(
+                f"constant, the mean of the training output: CV RMSE {validated}, test RMSE {tested}. "
+                "Every model has to beat it."
+            )
+        against = [result.get("not_recommended"), *result.get("shared", ())]
+        said += [f"{result['name']}: {one}" for one in against if one]
+    return list(dict.fromkeys(said))
 
 
 def _row(result: dict[str, Any]) -> dict[str, Any]:

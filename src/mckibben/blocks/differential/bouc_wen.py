@@ -31,9 +31,9 @@ from mckibben.blocks.fields import (
     PRESSURE,
     STRICT,
     ChannelField,
+    Coefficients,
     Initial,
     StoredInitial,
-    Vector,
 )
 from mckibben.blocks.kernels import kernel
 from mckibben.blocks.named import NamedParameters
@@ -124,7 +124,7 @@ class BoucWen(Ranged, NamedParameters, Primitive):
     kernel: ClassVar[Kernel] = bouc_wen_kernel
     parameters: ClassVar[tuple[str, ...]] = ("polynomial", "weight", "rate", "sigma")
 
-    polynomial: Vector
+    polynomial: Coefficients
     weight: FiniteFloat
     rate: Annotated[FiniteFloat, Gt(0)]
     sigma: Annotated[FiniteFloat, Ge(0.5)]

@@ -28,9 +28,9 @@ from mckibben.blocks.fields import (
     PRESSURE,
     STRICT,
     ChannelField,
+    Coefficients,
     Initial,
     StoredInitial,
-    Vector,
 )
 from mckibben.blocks.kernels import kernel
 from mckibben.blocks.named import NamedParameters
@@ -134,8 +134,8 @@ class Duhem(Ranged, NamedParameters, Primitive):
     kernel: ClassVar[Kernel] = duhem_kernel
     parameters: ClassVar[tuple[str, ...]] = ("target", "slope", "alpha")
 
-    target: Vector
-    slope: Vector
+    target: Coefficients
+    slope: Coefficients
     alpha: Annotated[FiniteFloat, Gt(0)]
     centre: FiniteFloat = 0.0
     scale: Annotated[FiniteFloat, Gt(0)] = 1.0

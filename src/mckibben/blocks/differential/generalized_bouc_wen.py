@@ -32,6 +32,7 @@ from mckibben.blocks.fields import (
     PRESSURE,
     STRICT,
     ChannelField,
+    Coefficients,
     Initial,
     StoredInitial,
     Vector,
@@ -144,7 +145,7 @@ class GeneralizedBoucWen(Ranged, NamedParameters, Primitive):
     kernel: ClassVar[Kernel] = generalized_bouc_wen_kernel
     parameters: ClassVar[tuple[str, ...]] = ("polynomial", "weight", "rate", "shape")
 
-    polynomial: Vector
+    polynomial: Coefficients
     weight: FiniteFloat
     rate: Annotated[FiniteFloat, Gt(0)]
     shape: Vector

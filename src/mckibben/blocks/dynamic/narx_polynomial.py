@@ -9,13 +9,14 @@ from dataclasses import replace
 from typing import Annotated, ClassVar, Self
 
 import numpy as np
+from annotated_types import MaxLen
 from numpy.typing import ArrayLike, NDArray
 from pydantic import BeforeValidator
 from pydantic.dataclasses import dataclass
 
 from mckibben.blocks.base import Kernel
 from mckibben.blocks.dynamic.narx import HEAD, Narx, give_output, take_input
-from mckibben.blocks.fields import STRICT, Vector
+from mckibben.blocks.fields import STRICT, Vector, rows
 from mckibben.blocks.kernels import kernel
 from mckibben.blocks.refusals import parameter_vector
 from mckibben.errors import ModelError
@@ -23,11 +24,10 @@ from mckibben.errors import ModelError
 Array = NDArray[np.float64]
 
 
-def _terms(value: object) -> object:
-    return tuple(tuple(term) for term in value) if isinstance(value, tuple | list) else value
+HIGHEST_DEGREE, MOST_TERMS = 20, 10_000
 
-
-Terms = Annotated[tuple[tuple[int, ...], ...], BeforeValidator(_terms)]
+Term = Annotated[tuple[int, ...], MaxLen(HIGHEST_DEGREE)]
+Terms = Annotated[tuple[Term, ...], MaxLen(MOST_TERMS), BeforeValidator(rows)]
 
 
 @kernel

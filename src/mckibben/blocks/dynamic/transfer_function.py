@@ -24,9 +24,9 @@ from mckibben.blocks.fields import (
     PRESSURE,
     STRICT,
     ChannelField,
+    Coefficients,
     FittedInitial,
     Initial,
-    Vector,
 )
 from mckibben.blocks.kernels import kernel
 from mckibben.blocks.named import NamedParameters
@@ -92,16 +92,16 @@ class TransferFunction(LinearStart, SingleChannel, NamedParameters, Primitive):
         "output_offset",
     )
 
-    numerator: Vector
-    denominator: Vector
+    numerator: Coefficients
+    denominator: Coefficients
     sample_time: Annotated[FiniteFloat, Gt(0)]
     input_offset: FiniteFloat = 0.0
     output_offset: FiniteFloat = 0.0
     initial: FittedInitial = "first_sample"
     input: ChannelField = PRESSURE
     output: ChannelField = DISPLACEMENT
-    noise_numerator: Vector = ()
-    noise_denominator: Vector = ()
+    noise_numerator: Coefficients = ()
+    noise_denominator: Coefficients = ()
     noise_deviation: Annotated[FiniteFloat, Ge(0)] | None = None
 
     def __post_init__(self) -> None:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import Annotated, ClassVar, Self
 
 import numpy as np
-from annotated_types import Ge
+from annotated_types import Interval
 from numpy.typing import NDArray
 
 from mckibben.blocks.base import Block
@@ -20,6 +20,7 @@ from mckibben.estimators.parameters import Parametrised
 from mckibben.estimators.search import whole_searches
 from mckibben.estimators.settings import check_settings
 from mckibben.recording import Recording
+from mckibben.signals.checking import LARGEST_SEED
 from mckibben.threads import one_blas_thread
 
 Array = NDArray[np.float64]
@@ -67,7 +68,7 @@ class CoupledEstimator(Parametrised, ABC):
     pressures: tuple[str, ...] | None = None
     displacements: tuple[str, ...] | None = None
     scheduling: tuple[str, ...] | None = None
-    seed: Annotated[int, Ge(0)] = 0
+    seed: Annotated[int, Interval(ge=0, le=LARGEST_SEED)] = 0
 
     effort: ClassVar[float] = 1.0
     """About how long a fit to 10 000 samples takes [s]: models are compared cheapest first."""

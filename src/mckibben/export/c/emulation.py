@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from mckibben.atomic import written
 from mckibben.blocks.base import Block
 from mckibben.errors import ModelError
 from mckibben.export.c.project import described, render, source_files, test_content
@@ -101,10 +102,11 @@ def emulate(block: Block, *, sample_time: float | None = None, seed: int = 0) ->
     content |= test_content(tests, single=True)
     with tempfile.TemporaryDirectory() as place:
         folder = Path(place)
-        for path, text in source_files(content).items():
-            (folder / path).parent.mkdir(exist_ok=True)
-            (folder / path).write_text(text, encoding="utf-8")
-        (folder / "main.c").write_text(render("emulated.c.j2", content), encoding="utf-8")
+        texts = source_files(content) | {"main.c": render("emulated.c.j2", content)}
+        with written(folder):
+            for path, text in texts.items():
+                (folder / path).parent.mkdir(exist_ok=True)
+                (folder / path).write_text(text, encoding="utf-8")
         flash = _build(folder)
         told = _run(
             EMULATOR,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Mapping
 from pathlib import Path
@@ -10,7 +9,7 @@ from typing import Any
 
 from mckibben.blocks.base import Block
 from mckibben.blocks.fields import Channel
-from mckibben.blocks.saving import to_dict
+from mckibben.blocks.saving import to_text
 from mckibben.errors import ModelError
 from mckibben.export import templating
 from mckibben.export.c.costs import cost_of
@@ -19,7 +18,7 @@ from mckibben.export.c.parts import PRIMITIVES, check_single
 from mckibben.export.c.rounding import warn_of_rounding
 from mckibben.export.c.vectors import Vectors, vectors
 from mckibben.export.c.wiring import Call, Wiring
-from mckibben.export.folders import write_folder
+from mckibben.export.folders import refuse_folder, write_folder
 from mckibben.export.naming import identifier, macros, said
 
 TOLERANCES = {False: "1e-9", True: "1e-4"}
@@ -69,6 +68,7 @@ def export_c(
         If the folder is in the way or cannot be written.
     """
     folder = Path(folder)
+    refuse_folder(folder, overwrite=overwrite)
     files = c_files(block, name=name, sample_time=sample_time, single=single)
     write_folder(folder, {path: text.encode() for path, text in files.items()}, overwrite=overwrite)
     return folder
@@ -90,7 +90,7 @@ def c_files(
         f"matlab/{name}_mex.c": render("mex.c.j2", content),
         "matlab/build.m": render("build.m.j2", content),
         f"test/{name}_selftest.c": render("selftest.c.j2", content),
-        "model.json": json.dumps(to_dict(block), indent=2, allow_nan=False) + "\n",
+        "model.json": to_text(block),
     }
 
 

@@ -11,9 +11,6 @@ from mckibben.blocks.feedforward_feedback import FeedforwardFeedback
 from mckibben.errors import ModelError
 from mckibben.export.c.parts import Part, part_of, starts_at_rest
 
-DEEPEST = 50
-"""Compositions in compositions."""
-
 
 @dataclass(frozen=True)
 class Call:
@@ -53,37 +50,33 @@ class Wiring:
 
     def __post_init__(self) -> None:
         given = [f"in[{index}]" for index in range(len(self.block.inputs))]
-        self.outputs = self._run(self.block, given, 0)
+        self.outputs = self._run(self.block, given)
 
     @property
     def calls(self) -> list[Call]:
         """The parts, in order."""
         return [step for step in self.steps if isinstance(step, Call)]
 
-    def _run(self, block: Block, given: Sequence[str], depth: int) -> list[str]:
+    def _run(self, block: Block, given: Sequence[str]) -> list[str]:
         """Append what a block does to signals, and return the signals that it gives."""
-        if depth > DEEPEST:
-            raise ModelError(
-                f"compositions are nested more than {DEEPEST} deep. Remedy: flatten the model."
-            )
         if isinstance(block, Series):
-            return self._series(block, given, depth)
+            return self._series(block, given)
         if isinstance(block, Parallel):
-            all_given = [self._run(part, given, depth + 1) for part in block.parts]
+            all_given = [self._run(part, given) for part in block.parts]
             return [self._sum(terms) for terms in zip(*all_given, strict=True)]
         if isinstance(block, PerChannel):
             pairs = zip(block.parts, given, strict=True)
-            return [self._run(part, [signal], depth + 1)[0] for part, signal in pairs]
+            return [self._run(part, [signal])[0] for part, signal in pairs]
         if isinstance(block, FeedforwardFeedback):
             n = len(block.feedback.driven)
-            bases = self._run(block.compensator, [*given[:n], *given[2 * n :]], depth + 1)
-            return self._run(block.feedback, [*given[: 2 * n], *bases], depth + 1)
+            bases = self._run(block.compensator, [*given[:n], *given[2 * n :]])
+            return self._run(block.feedback, [*given[: 2 * n], *bases])
         call = Call(part_of(block, self.sample_time), tuple(given), self.n_signals, self.n_numbers)
         self.steps.append(call)
         self.n_numbers += block.n_states + block.n_scratch
         return self._new_signals(len(block.outputs))
 
-    def _series(self, block: Series, given: Sequence[str], depth: int) -> list[str]:
+    def _series(self, block: Series, given: Sequence[str]) -> list[str]:
         by_name = dict(zip((channel.name for channel in block.inputs), given, strict=True))
         signals: list[str] | None = None
         for number, part in enumerate(block.parts):
@@ -96,7 +89,7 @@ class Wiring:
             scheduled = [by_name[name] for name in part.scheduling]
             n_driven = len(part.inputs) - len(scheduled)
             driven = list(given[:n_driven]) if signals is None else signals
-            signals = self._run(part, [*driven, *scheduled], depth + 1)
+            signals = self._run(part, [*driven, *scheduled])
         assert signals is not None
         return signals
 

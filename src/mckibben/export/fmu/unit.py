@@ -11,15 +11,17 @@ from __future__ import annotations
 import hashlib
 import json
 import tempfile
+import zipfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 
-from mckibben.atomic import replacing
+from mckibben import ordinary
+from mckibben.atomic import replacing, written
 from mckibben.blocks.base import Block
-from mckibben.blocks.saving import to_dict
+from mckibben.blocks.saving import to_dict, to_text
 from mckibben.blocks.trial import input_limits
 from mckibben.errors import DataError, ModelError
 from mckibben.export import templating
@@ -34,6 +36,9 @@ HERE = Path(__file__).parent
 
 DEFAULT_STEP = 0.01
 """Communication step suggested where the model has no time of its own [s]."""
+
+LARGEST_FILE = 256 * 2**20
+"""Bytes; a larger FMU is not one by this package."""
 
 BASE_UNITS: dict[str, dict[str, str] | None] = {
     "bar": {"kg": "1", "m": "-1", "s": "-2", "factor": "100000"},
@@ -78,7 +83,7 @@ def export_fmu(
         Of linux, windows, macos, macos-arm and linux-arm; default all that this machine can build
         for. Empty for sources only.
     overwrite : bool
-        Whether a file that is there may be replaced.
+        Whether what an export wrote there before may be replaced.
 
     Returns
     -------
@@ -95,8 +100,7 @@ def export_fmu(
     path = Path(path)
     if path.suffix != ".fmu":
         raise DataError("an FMU is a file that ends in .fmu", file=path, remedy="name it so")
-    if path.exists() and not overwrite:
-        raise DataError("the file exists already", file=path, remedy="name another, or --overwrite")
+    refuse_file(path, overwrite=overwrite)
     offered = [name for name in buildable() if version == "3.0" or PLATFORMS[name].fmi2]
     wanted = offered if platforms is None else list(platforms)
     unknown = [platform for platform in wanted if platform not in PLATFORMS]
@@ -119,6 +123,34 @@ def export_fmu(
     with replacing(path) as new:
         new.write_bytes(zipped(files))
     return path
+
+
+def refuse_file(path: Path, *, overwrite: bool = False) -> None:
+    """Refuse to write over a file; with ``overwrite``, over what is no FMU by this package.
+
+    Raises
+    ------
+    DataError
+        If there is one.
+    """
+    if not (path.exists() or path.is_symlink()):
+        return
+    if not overwrite:
+        raise DataError("the file exists already", file=path, remedy="name another, or --overwrite")
+    if not _is_own(path):
+        raise DataError(
+            "it was not written by an export", file=path, remedy="move it away, or name another"
+        )
+
+
+def _is_own(path: Path) -> bool:
+    if path.is_symlink():
+        return False
+    try:
+        with ordinary.opened(path, most=LARGEST_FILE) as file, zipfile.ZipFile(file) as archive:
+            return {"resources/model.json", "sources/unit_model.h"} <= set(archive.namelist())
+    except (DataError, zipfile.BadZipFile, ValueError, NotImplementedError):
+        return False
 
 
 def fmu_files(
@@ -155,7 +187,7 @@ def fmu_files(
     texts = {f"sources/{source}": text for source, text in sources.items()}
     texts["modelDescription.xml"] = _render(f"fmi{digit}.xml.j2", content)
     texts["documentation/index.html"] = _render("index.html.j2", content)
-    texts["resources/model.json"] = json.dumps(to_dict(block), indent=2, allow_nan=False) + "\n"
+    texts["resources/model.json"] = to_text(block)
     if version == "3.0":
         texts["sources/buildDescription.xml"] = _render("build.xml.j2", content)
     return {path: text.encode() for path, text in texts.items()}
@@ -198,12 +230,15 @@ def _libraries(
     files: Mapping[str, bytes], name: str, version: Version, platforms: Sequence[str]
 ) -> dict[str, bytes]:
     """Return the library for each platform, by path in the zip."""
-    built = {}
+    built: dict[str, bytes] = {}
+    if not platforms:
+        return built
     with tempfile.TemporaryDirectory() as place:
         folder = Path(place)
         for path, content in files.items():
             if path.startswith("sources/"):
-                (folder / Path(path).name).write_bytes(content)
+                with written(folder):
+                    (folder / Path(path).name).write_bytes(content)
         sources = sorted(path.name for path in folder.glob("*.c"))
         for platform in (PLATFORMS[key] for key in platforms):
             where = platform.fmi2 if version == "2.0" else platform.fmi3

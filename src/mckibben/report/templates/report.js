@@ -25,6 +25,7 @@ function styled(layout) {
     paper_bgcolor: "rgba(0,0,0,0)",
     plot_bgcolor: "rgba(0,0,0,0)",
     font: { family: getComputedStyle(document.body).fontFamily, size: 12, color: colour("--ink") },
+    modebar: { bgcolor: "rgba(0,0,0,0)", color: colour("--muted"), activecolor: colour("--accent") },
     margin: { l: 55, r: 10, t: layout.title ? 50 : 30, b: 45 },
     legend: { orientation: "h", x: 0, xanchor: "left", y: 1, yanchor: "bottom", itemsizing: "constant" },
     ...layout,
@@ -39,11 +40,7 @@ function styled(layout) {
   return whole;
 }
 
-const config = {
-  responsive: true,
-  displaylogo: false,
-  modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d"],
-};
+const config = { responsive: true, ...JSON.parse(document.getElementById("bar").textContent) };
 
 function draw(place) {
   const variants = figures[place.dataset.figure];

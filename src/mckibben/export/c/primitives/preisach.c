@@ -93,10 +93,12 @@ static mck_real solve(const model *m, mck_real target, mck_real other, int risin
     return near;
 }
 
-/* Remember a turning point where the direction changes; more than fit are forgotten in pairs. */
+/* Remember a turning point where the direction changes; more than fit are forgotten in pairs. A memory
+ * that was put there from elsewhere may hold anything: no place outside is believed. */
 static int turn(mck_real *state, mck_real going)
 {
-    int depth = (int)state[0];
+    const int known = state[0] >= MCK_R(1.0) && state[0] <= (mck_real)DEPTH;
+    int depth = known ? (int)state[0] : 1;
     if (!same(going, state[1])) {
         if (depth == DEPTH) {
             depth -= 2;

@@ -1,6 +1,5 @@
 /* FMI 2.0 for co-simulation. What a unit of this kind has no use for is in fmi2_refused.c. */
 #include <stdlib.h>
-#include <string.h>
 
 #include "fmi2Functions.h"
 #include "unit.h"
@@ -29,14 +28,7 @@ fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2Str
     (void)functions;
     (void)visible;
     (void)loggingOn;
-    if (fmuType != fmi2CoSimulation || fmuGUID == NULL || strcmp(fmuGUID, UNIT_TOKEN) != 0) {
-        return NULL;
-    }
-    unit *self = malloc(sizeof *self);
-    if (self != NULL) {
-        unit_reset(self);
-    }
-    return self;
+    return fmuType == fmi2CoSimulation ? unit_new(fmuGUID) : NULL;
 }
 
 void fmi2FreeInstance(fmi2Component c) { free(c); }
@@ -44,44 +36,37 @@ void fmi2FreeInstance(fmi2Component c) { free(c); }
 fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean toleranceDefined, fmi2Real tolerance,
                                fmi2Real startTime, fmi2Boolean stopTimeDefined, fmi2Real stopTime)
 {
-    unit *self = c;
     (void)toleranceDefined;
     (void)tolerance;
     (void)stopTimeDefined;
     (void)stopTime;
-    self->start = startTime;
-    self->time = startTime;
-    return fmi2OK;
+    return unit_start_at(c, startTime) ? fmi2OK : fmi2Error;
 }
 
 fmi2Status fmi2EnterInitializationMode(fmi2Component c)
 {
-    (void)c;
-    return fmi2OK;
+    return unit_enter(c, UNIT_NEW, UNIT_STARTING) ? fmi2OK : fmi2Error;
 }
 
 fmi2Status fmi2ExitInitializationMode(fmi2Component c)
 {
-    (void)c;
-    return fmi2OK;
+    return unit_enter(c, UNIT_STARTING, UNIT_RUNNING) ? fmi2OK : fmi2Error;
 }
 
 fmi2Status fmi2Terminate(fmi2Component c)
 {
-    (void)c;
-    return fmi2OK;
+    return unit_enter(c, UNIT_RUNNING, UNIT_ENDED) ? fmi2OK : fmi2Error;
 }
 
 fmi2Status fmi2Reset(fmi2Component c)
 {
-    unit_reset(c);
-    return fmi2OK;
+    return unit_reset(c) ? fmi2OK : fmi2Error;
 }
 
 fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, fmi2Real value[])
 {
     for (size_t i = 0; i < nvr; i++) {
-        if (!unit_get(c, vr[i], &value[i])) {
+        if (vr == NULL || value == NULL || !unit_get(c, vr[i], &value[i])) {
             return fmi2Error;
         }
     }
@@ -92,7 +77,7 @@ fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[], size_t nv
                        const fmi2Real value[])
 {
     for (size_t i = 0; i < nvr; i++) {
-        if (!unit_set(c, vr[i], value[i])) {
+        if (vr == NULL || value == NULL || !unit_set(c, vr[i], value[i])) {
             return fmi2Error;
         }
     }
@@ -104,7 +89,7 @@ fmi2Status fmi2GetInteger(fmi2Component c, const fmi2ValueReference vr[], size_t
 {
     const unit *self = c;
     for (size_t i = 0; i < nvr; i++) {
-        if (vr[i] != UNIT_STATUS) {
+        if (self == NULL || vr == NULL || value == NULL || vr[i] != UNIT_STATUS) {
             return fmi2Error;
         }
         value[i] = self->status;
@@ -125,8 +110,10 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real currentCommunicationPoint,
 
 fmi2Status fmi2GetStatus(fmi2Component c, const fmi2StatusKind s, fmi2Status *value)
 {
-    (void)c;
     (void)s;
+    if (c == NULL || value == NULL) {
+        return fmi2Error;
+    }
     *value = fmi2OK;
     return fmi2OK;
 }
@@ -134,6 +121,9 @@ fmi2Status fmi2GetStatus(fmi2Component c, const fmi2StatusKind s, fmi2Status *va
 fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind s, fmi2Real *value)
 {
     const unit *self = c;
+    if (self == NULL || value == NULL) {
+        return fmi2Error;
+    }
     if (s != fmi2LastSuccessfulTime) {
         return fmi2Discard;
     }
@@ -148,15 +138,16 @@ fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *FMUstate)
 
 fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate FMUstate)
 {
-    memcpy(c, FMUstate, sizeof(unit));
-    return fmi2OK;
+    return unit_restore(c, FMUstate) ? fmi2OK : fmi2Error;
 }
 
 fmi2Status fmi2FreeFMUstate(fmi2Component c, fmi2FMUstate *FMUstate)
 {
     (void)c;
-    free(*FMUstate);
-    *FMUstate = NULL;
+    if (FMUstate != NULL) {
+        free(*FMUstate);
+        *FMUstate = NULL;
+    }
     return fmi2OK;
 }
 
@@ -164,6 +155,9 @@ fmi2Status fmi2SerializedFMUstateSize(fmi2Component c, fmi2FMUstate FMUstate, si
 {
     (void)c;
     (void)FMUstate;
+    if (size == NULL) {
+        return fmi2Error;
+    }
     *size = sizeof(unit);
     return fmi2OK;
 }
@@ -172,19 +166,12 @@ fmi2Status fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate FMUstate, fmi2Byt
                                  size_t size)
 {
     (void)c;
-    if (size < sizeof(unit)) {
-        return fmi2Error;
-    }
-    memcpy(bytes, FMUstate, sizeof(unit));
-    return fmi2OK;
+    return unit_to_bytes(FMUstate, bytes, size) ? fmi2OK : fmi2Error;
 }
 
 fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte bytes[], size_t size,
                                    fmi2FMUstate *FMUstate)
 {
     (void)c;
-    if (size != sizeof(unit)) {
-        return fmi2Error;
-    }
-    return unit_keep(bytes, FMUstate) ? fmi2OK : fmi2Error;
+    return unit_from_bytes(bytes, size, FMUstate) ? fmi2OK : fmi2Error;
 }

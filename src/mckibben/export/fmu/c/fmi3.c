@@ -1,6 +1,5 @@
 /* FMI 3.0 for co-simulation. What a unit of this kind has no use for is in fmi3_refused.c. */
 #include <stdlib.h>
-#include <string.h>
 
 #include "fmi3Functions.h"
 #include "unit.h"
@@ -37,14 +36,7 @@ fmi3Instance fmi3InstantiateCoSimulation(
     (void)instanceEnvironment;
     (void)logMessage;
     (void)intermediateUpdate;
-    if (instantiationToken == NULL || strcmp(instantiationToken, UNIT_TOKEN) != 0) {
-        return NULL;
-    }
-    unit *self = malloc(sizeof *self);
-    if (self != NULL) {
-        unit_reset(self);
-    }
-    return self;
+    return unit_new(instantiationToken);
 }
 
 void fmi3FreeInstance(fmi3Instance instance) { free(instance); }
@@ -53,42 +45,40 @@ fmi3Status fmi3EnterInitializationMode(fmi3Instance instance, fmi3Boolean tolera
                                        fmi3Float64 tolerance, fmi3Float64 startTime,
                                        fmi3Boolean stopTimeDefined, fmi3Float64 stopTime)
 {
-    unit *self = instance;
     (void)toleranceDefined;
     (void)tolerance;
     (void)stopTimeDefined;
     (void)stopTime;
-    self->start = startTime;
-    self->time = startTime;
-    return fmi3OK;
+    const int begun = unit_start_at(instance, startTime);
+    return begun && unit_enter(instance, UNIT_NEW, UNIT_STARTING) ? fmi3OK : fmi3Error;
 }
 
 fmi3Status fmi3ExitInitializationMode(fmi3Instance instance)
 {
-    (void)instance;
-    return fmi3OK;
+    return unit_enter(instance, UNIT_STARTING, UNIT_RUNNING) ? fmi3OK : fmi3Error;
 }
 
 fmi3Status fmi3Terminate(fmi3Instance instance)
 {
-    (void)instance;
-    return fmi3OK;
+    return unit_enter(instance, UNIT_RUNNING, UNIT_ENDED) ? fmi3OK : fmi3Error;
 }
 
 fmi3Status fmi3Reset(fmi3Instance instance)
 {
-    unit_reset(instance);
-    return fmi3OK;
+    return unit_reset(instance) ? fmi3OK : fmi3Error;
 }
 
 fmi3Status fmi3GetFloat64(fmi3Instance instance, const fmi3ValueReference valueReferences[],
                           size_t nValueReferences, fmi3Float64 values[], size_t nValues)
 {
     const unit *self = instance;
-    if (nValues != nValueReferences) {
+    if (self == NULL || nValues != nValueReferences) {
         return fmi3Error;
     }
     for (size_t i = 0; i < nValues; i++) {
+        if (valueReferences == NULL || values == NULL) {
+            return fmi3Error;
+        }
         if (valueReferences[i] == TIME_REFERENCE) {
             values[i] = self->time;
         } else if (!unit_get(self, valueReferences[i], &values[i])) {
@@ -105,7 +95,8 @@ fmi3Status fmi3SetFloat64(fmi3Instance instance, const fmi3ValueReference valueR
         return fmi3Error;
     }
     for (size_t i = 0; i < nValues; i++) {
-        if (!unit_set(instance, valueReferences[i], values[i])) {
+        if (valueReferences == NULL || values == NULL ||
+            !unit_set(instance, valueReferences[i], values[i])) {
             return fmi3Error;
         }
     }
@@ -117,7 +108,8 @@ fmi3Status fmi3GetInt32(fmi3Instance instance, const fmi3ValueReference valueRef
 {
     const unit *self = instance;
     for (size_t i = 0; i < nValues; i++) {
-        if (nValues != nValueReferences || valueReferences[i] != UNIT_STATUS) {
+        if (self == NULL || valueReferences == NULL || values == NULL ||
+            nValues != nValueReferences || valueReferences[i] != UNIT_STATUS) {
             return fmi3Error;
         }
         values[i] = self->status;
@@ -133,6 +125,10 @@ fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 currentCommunicationPoi
 {
     unit *self = instance;
     (void)noSetFMUStatePriorToCurrentPoint;
+    if (eventHandlingNeeded == NULL || terminateSimulation == NULL || earlyReturn == NULL ||
+        lastSuccessfulTime == NULL) {
+        return fmi3Error;
+    }
     *eventHandlingNeeded = fmi3False;
     *terminateSimulation = fmi3False;
     *earlyReturn = fmi3False;
@@ -150,15 +146,16 @@ fmi3Status fmi3GetFMUState(fmi3Instance instance, fmi3FMUState *FMUState)
 
 fmi3Status fmi3SetFMUState(fmi3Instance instance, fmi3FMUState FMUState)
 {
-    memcpy(instance, FMUState, sizeof(unit));
-    return fmi3OK;
+    return unit_restore(instance, FMUState) ? fmi3OK : fmi3Error;
 }
 
 fmi3Status fmi3FreeFMUState(fmi3Instance instance, fmi3FMUState *FMUState)
 {
     (void)instance;
-    free(*FMUState);
-    *FMUState = NULL;
+    if (FMUState != NULL) {
+        free(*FMUState);
+        *FMUState = NULL;
+    }
     return fmi3OK;
 }
 
@@ -166,6 +163,9 @@ fmi3Status fmi3SerializedFMUStateSize(fmi3Instance instance, fmi3FMUState FMUSta
 {
     (void)instance;
     (void)FMUState;
+    if (size == NULL) {
+        return fmi3Error;
+    }
     *size = sizeof(unit);
     return fmi3OK;
 }
@@ -174,19 +174,12 @@ fmi3Status fmi3SerializeFMUState(fmi3Instance instance, fmi3FMUState FMUState,
                                  fmi3Byte serializedState[], size_t size)
 {
     (void)instance;
-    if (size < sizeof(unit)) {
-        return fmi3Error;
-    }
-    memcpy(serializedState, FMUState, sizeof(unit));
-    return fmi3OK;
+    return unit_to_bytes(FMUState, serializedState, size) ? fmi3OK : fmi3Error;
 }
 
 fmi3Status fmi3DeserializeFMUState(fmi3Instance instance, const fmi3Byte serializedState[],
                                    size_t size, fmi3FMUState *FMUState)
 {
     (void)instance;
-    if (size != sizeof(unit)) {
-        return fmi3Error;
-    }
-    return unit_keep(serializedState, FMUState) ? fmi3OK : fmi3Error;
+    return unit_from_bytes(serializedState, size, FMUState) ? fmi3OK : fmi3Error;
 }

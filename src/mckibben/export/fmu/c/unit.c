@@ -8,19 +8,46 @@
 
 static const double first_inputs[UNIT_N_INPUTS] = UNIT_START;
 
-void unit_reset(unit *self)
+unit *unit_new(const char *token)
 {
+    if (token == NULL || strcmp(token, UNIT_TOKEN) != 0) {
+        return NULL;
+    }
+    unit *self = malloc(sizeof *self);
+    (void)unit_reset(self);
+    return self;
+}
+
+int unit_reset(unit *self)
+{
+    if (self == NULL) {
+        return 0;
+    }
+    memset(self, 0, sizeof *self); /* gaps between its members too: they are serialised */
     UNIT_INIT(&self->model);
     for (int i = 0; i < UNIT_N_INPUTS; i++) {
         self->inputs[i] = first_inputs[i];
     }
-    for (int i = 0; i < UNIT_N_OUTPUTS; i++) {
-        self->outputs[i] = 0.0;
+    return 1;
+}
+
+int unit_start_at(unit *self, double time)
+{
+    if (self == NULL || self->phase != UNIT_NEW || !isfinite(time)) {
+        return 0;
     }
-    self->start = 0.0;
-    self->time = 0.0;
-    self->steps = 0.0;
-    self->status = 0;
+    self->start = time;
+    self->time = time;
+    return 1;
+}
+
+int unit_enter(unit *self, int from, int to)
+{
+    if (self == NULL || self->phase != from) {
+        return 0;
+    }
+    self->phase = to;
+    return 1;
 }
 
 static void take_step(unit *self)
@@ -39,13 +66,14 @@ static void take_step(unit *self)
 
 int unit_advance(unit *self, double time, double h)
 {
-    if (!(h > 0.0) || !isfinite(h) || !isfinite(time) || time < self->time - 1e-6 * (h + 1.0)) {
+    if (self == NULL || self->phase != UNIT_RUNNING || !(h > 0.0) || !isfinite(time + h) ||
+        time < self->time - 1e-6 * (h + 1.0)) {
         return 0;
     }
 #ifdef UNIT_SAMPLE_TIME
     /* a hair early is in time: importers add up their steps */
     const double due = floor((time + h - self->start) / UNIT_SAMPLE_TIME + 1e-6);
-    if (due - self->steps > MOST_STEPS) {
+    if (!(due - self->steps <= MOST_STEPS)) {
         return 0;
     }
     while (self->steps < due) {
@@ -60,6 +88,9 @@ int unit_advance(unit *self, double time, double h)
 
 int unit_get(const unit *self, unsigned reference, double *value)
 {
+    if (self == NULL || value == NULL) {
+        return 0;
+    }
     if (reference < UNIT_N_INPUTS) {
         *value = self->inputs[reference];
     } else if (reference < UNIT_STATUS) {
@@ -72,21 +103,68 @@ int unit_get(const unit *self, unsigned reference, double *value)
 
 int unit_set(unit *self, unsigned reference, double value)
 {
-    if (reference >= UNIT_N_INPUTS) {
+    if (self == NULL || self->phase == UNIT_ENDED || reference >= UNIT_N_INPUTS) {
         return 0;
     }
     self->inputs[reference] = value;
     return 1;
 }
 
-int unit_keep(const void *bytes, void **kept)
+/* What serialised bytes may hold is checked as far as it is used: numbers of the model's memory may be
+ * any, as inputs may. */
+static int possible(const unit *self)
+{
+    return isfinite(self->start) && isfinite(self->time) && isfinite(self->steps) &&
+           self->steps >= 0.0 && self->phase >= UNIT_NEW && self->phase <= UNIT_ENDED &&
+           self->status >= 0 && self->status <= 2;
+}
+
+static int copied(const unit *from, void **kept)
 {
     if (*kept == NULL) {
-        *kept = malloc(sizeof(unit));
+        *kept = malloc(sizeof *from);
     }
     if (*kept == NULL) {
         return 0;
     }
-    memcpy(*kept, bytes, sizeof(unit));
+    memcpy(*kept, from, sizeof *from);
     return 1;
+}
+
+int unit_keep(const unit *self, void **kept)
+{
+    return self != NULL && kept != NULL && copied(self, kept);
+}
+
+int unit_restore(unit *self, const void *kept)
+{
+    if (self == NULL || kept == NULL || !possible(kept)) {
+        return 0;
+    }
+    memcpy(self, kept, sizeof *self);
+    return 1;
+}
+
+int unit_to_bytes(const void *kept, void *bytes, size_t size)
+{
+    if (kept == NULL || bytes == NULL || size < sizeof(unit)) {
+        return 0;
+    }
+    memcpy(bytes, kept, sizeof(unit));
+    return 1;
+}
+
+int unit_from_bytes(const void *bytes, size_t size, void **kept)
+{
+    if (bytes == NULL || kept == NULL || size != sizeof(unit)) {
+        return 0;
+    }
+    unit *found = malloc(size); /* bytes may lie where a unit may not */
+    if (found == NULL) {
+        return 0;
+    }
+    memcpy(found, bytes, size);
+    const int good = possible(found) && copied(found, kept);
+    free(found);
+    return good;
 }

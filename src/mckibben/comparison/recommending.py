@@ -1,0 +1,83 @@
+"""Which model is recommended, if any: one that says more than the mean of the training output does."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Protocol, TypeVar
+
+CONSTANT = "constant"
+"""Name of the row that predicts the mean of the training output, whatever the input: never chosen."""
+
+
+class Ranked(Protocol):
+    """A row of a ranking."""
+
+    @property
+    def model(self) -> str:
+        """Short name."""
+
+    @property
+    def reason(self) -> str | None:
+        """Why it failed, or None."""
+
+    @property
+    def skill_least(self) -> float | None:
+        """Lower bound of `skill`."""
+
+    @property
+    def test_error(self) -> float:
+        """RMSE on the test data, infinite where there is none."""
+
+
+R = TypeVar("R", bound=Ranked)
+
+
+def recommended(rows: Sequence[R], constant: Ranked | None, unit: str) -> tuple[R | None, str]:
+    """Return the model to recommend, or None and why there is none.
+
+    It is the first in the order of the choice that beats the constant in the cross-validation beyond
+    what resampling its blocks gives. The test does not choose, but it may take the recommendation
+    away: a model that is no better there than the constant is not to be used, and no other is chosen
+    in its place, since that would be a choice by the test.
+
+    Parameters
+    ----------
+    rows : sequence of rows
+        In the order of the choice.
+    constant : row or None
+        The constant's; without one the first that did not fail is recommended.
+    unit : str
+        Of the errors.
+    """
+    working = [row for row in rows if row.reason is None]
+    if not working:
+        return None, ""
+    judged = [row for row in working if row.skill_least is not None]
+    better = [row for row in judged if row.skill_least is not None and row.skill_least > 0]
+    if judged and not better:
+        return None, (
+            "No model is recommended: none predicts better than the mean of the training output in the "
+            "cross-validation, beyond what chance gives. As far as these models can tell, the output "
+            "does not depend on the input in these recordings"
+        )
+    first = (better or working)[0]
+    if constant is not None and not first.test_error < constant.test_error:
+        return None, (
+            f"No model is recommended: {first.model} has the least error of those on the training "
+            f"side, but on the test data it is off by {_error(first, unit)} RMSE, and the mean of the "
+            f"training output by {_error(constant, unit)}. The test differs from what was trained on, "
+            "or training is too little: record more, or more alike"
+        )
+    return first, ""
+
+
+def acceptable(row: Ranked, constant: Ranked | None) -> bool:
+    """Tell whether nothing is known against a row beside one that is recommended."""
+    if row.reason is not None or constant is None:
+        return row.reason is None
+    judged = row.skill_least is None or row.skill_least > 0
+    return judged and row.test_error < constant.test_error
+
+
+def _error(row: Ranked, unit: str) -> str:
+    return f"{row.test_error:.3g} {unit}".strip()

@@ -1,0 +1,485 @@
+"""Files of recordings that name other files, declare more than memory holds, or are no files at all.
+
+Each hostile file is read in a process of its own, whose memory is measured.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+import struct
+import subprocess
+import sys
+import zlib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import mckibben
+from mckibben import DataError, MckibbenError
+from mckibben.blocks.play import Play
+from mckibben.comparison.kept import Kept
+from mckibben.export.folders import write_folder
+from mckibben.files import delimited, limits
+from mckibben.files.folders import roles
+from mckibben.rigs import load_rig
+from tests.files import malformed
+
+MOST_MB = 400
+"""Of memory that any of these may take, beside what the libraries do."""
+
+# Files that name others -----------------------------------------------------------------
+
+
+def external(path: Path, target: Path) -> None:
+    import h5py
+
+    with h5py.File(path, "w") as file:
+        file["time_s"] = np.arange(20.0)
+        file.create_dataset("rig/pressure_bar", (20,), "u1", external=[(str(target), 0, 20)])
+
+
+def virtual(path: Path, target: Path) -> None:
+    import h5py
+
+    with h5py.File(path, "w") as file:
+        file["time_s"] = np.arange(20.0)
+        layout = h5py.VirtualLayout((20,), "f8", maxshape=(None,))
+        source = h5py.VirtualSource(str(target), "a", (20,), maxshape=(None,))
+        layout[0 : h5py.h5s.UNLIMITED] = source[0 : h5py.h5s.UNLIMITED]
+        file.create_virtual_dataset("rig/pressure_bar", layout)
+
+
+@pytest.mark.parametrize("name", ["a.h5", "a.mat"])
+@pytest.mark.parametrize("make", [external, virtual])
+@pytest.mark.parametrize("target", ["secret", "pipe"])
+def test_samples_in_another_file_are_refused(
+    name: str, make: Callable[[Path, Path], None], target: str, tmp_path: Path
+) -> None:
+    (tmp_path / "secret").write_bytes(b"the words of another user")
+    os.mkfifo(tmp_path / "pipe")  # opening it would wait for ever
+    make(tmp_path / name, tmp_path / target)
+    with pytest.raises(DataError, match="'rig/pressure_bar' keeps its samples in another file"):
+        mckibben.read(tmp_path / name)
+
+
+def test_links_do_not_lead_out_of_a_file_nor_round_in_it(tmp_path: Path) -> None:
+    import h5py
+
+    with h5py.File(tmp_path / "other.h5", "w") as file:
+        file["a"] = np.arange(20.0)
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file["b"] = np.arange(20.0) ** 2
+        file["again"] = file["b"]
+        file["round"] = file["/"]
+        file["out"] = h5py.ExternalLink(str(tmp_path / "other.h5"), "a")
+        file["soft"] = h5py.SoftLink("/out")
+        for name, kind in (("r", h5py.ref_dtype), ("v", h5py.vlen_dtype("f8"))):
+            file.create_dataset(name, (20,), kind)
+        file.create_dataset("c", (20,), [("a", "f8"), ("b", "S5000")])
+    (recording,) = mckibben.read(tmp_path / "a.h5")
+    assert list(recording.channels) == ["again"]
+
+
+# Files that declare too much ------------------------------------------------------------
+
+
+def zeros_hdf5(path: Path) -> None:
+    import h5py
+
+    with h5py.File(path, "w") as file:
+        file.create_dataset("pressure_bar", (10**8,), "f8", chunks=(10**6,), compression="gzip")
+
+
+def many_zeros_hdf5(path: Path) -> None:
+    import h5py
+
+    with h5py.File(path, "w") as file:
+        for i in range(200):
+            file.create_dataset(f"pressure_{i}", (10**6,), "f8")
+
+
+def large_chunk_hdf5(path: Path) -> None:
+    import h5py
+
+    with h5py.File(path, "w") as file:
+        file.create_dataset("p", (20,), "f8", maxshape=(None,), chunks=(4 * 10**8,))
+
+
+def overfull_chunk_hdf5(path: Path) -> None:
+    import h5py
+
+    with h5py.File(path, "w") as file:
+        data = file.create_dataset("p", (20,), "f8", chunks=(20,), compression="gzip")
+        data.id.write_direct_chunk((0,), packed_zeros(10**9))
+
+
+def deep_hdf5(path: Path) -> None:
+    import h5py
+
+    with h5py.File(path, "w") as file:
+        group: Any = file
+        for _ in range(500):
+            group = group.create_group("g")
+        group["pressure_bar"] = np.arange(20.0)
+
+
+def endless_heap_hdf5(path: Path) -> None:
+    """Make HDF5 look for the end of a free piece of no length among the texts."""
+    import h5py
+
+    with h5py.File(path, "w") as file:
+        file["pressure"] = np.arange(20.0)
+        file["pressure"].attrs["units"] = "bar"
+    content = bytearray(path.read_bytes())
+    free = content.index(b"GCOL") + 16 + 16 + 8  # behind the collection's head, and one text
+    content[free : free + 16] = bytes(16)
+    path.write_bytes(content)
+
+
+def many_links_hdf5(path: Path) -> None:
+    import h5py
+
+    with h5py.File(path, "w") as file:
+        file["a"] = np.arange(20.0)
+        for i in range(limits.MOST_PARTS):
+            file.id.links.create_hard(b"a%d" % i, file.id, b"a")
+
+
+def zeros_parquet(path: Path) -> None:
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    table = pa.table({"pressure_bar": np.zeros(2 * 10**6)})
+    with pq.ParquetWriter(path, table.schema, compression="zstd") as writer:
+        for _ in range(10):
+            writer.write_table(table)
+
+
+def packed_zeros(n: int) -> bytes:
+    """Return zeros as zlib packs them; those in the middle are copies of what stands before."""
+    packing = zlib.compressobj(1)
+    start = packing.compress(bytes(10**6)) + packing.flush(zlib.Z_FULL_FLUSH)
+    more = packing.compress(bytes(10**6)) + packing.flush(zlib.Z_FULL_FLUSH)
+    return start + more * (n // 10**6 - 1) + b"\3\0"
+
+
+MAT = b"MATLAB 5.0 MAT-file".ljust(124) + struct.pack("<H", 0x100) + b"IM"
+
+
+def element(kind: int, content: bytes) -> bytes:
+    return struct.pack("<II", kind, len(content)) + content + bytes(-len(content) % 8)
+
+
+def head(of: int, name: bytes, *shape: int) -> bytes:
+    dimensions = struct.pack(f"<{len(shape)}i", *shape)
+    return element(6, struct.pack("<II", of, 0)) + element(5, dimensions) + element(1, name)
+
+
+def zeros_mat(path: Path) -> None:
+    path.write_bytes(MAT + element(15, packed_zeros(10**9)))
+
+
+def bytes_for_doubles_mat(path: Path) -> None:
+    """MATLAB keeps doubles that are whole numbers as bytes."""
+    packing = zlib.compressobj(1)
+    numbers = element(14, head(6, b"p", 1, 3 * 10**7) + element(2, bytes(3 * 10**7)))
+    path.write_bytes(MAT + element(15, packing.compress(numbers) + packing.flush()))
+
+
+def deep_mat(path: Path) -> None:
+    inner = head(6, b"", 1, 3) + element(9, bytes(24))
+    for _ in range(2000):
+        inner = head(1, b"", 1, 1) + element(14, inner)
+    path.write_bytes(MAT + element(14, head(1, b"x", 1, 1) + element(14, inner)))
+
+
+def segment(objects: list[bytes], data: bytes, contents: int) -> bytes:
+    about = struct.pack("<I", len(objects)) + b"".join(objects) if contents & 2 else b""
+    sizes = struct.pack("<QQ", len(about) + len(data), len(about))
+    return b"TDSm" + struct.pack("<II", contents, 4713) + sizes + about + data
+
+
+def channel(name: str, n: int, kind: int = 10) -> bytes:
+    place = f"/'run'/'{name}'".encode()
+    about = struct.pack("<IIIQ", 20, kind, 1, n)
+    return struct.pack("<I", len(place)) + place + about + struct.pack("<I", 0)
+
+
+def declared_tdms(path: Path) -> None:
+    path.write_bytes(segment([channel("p", 10**15)], bytes(80), 14))
+
+
+def shredded_tdms(path: Path) -> None:
+    many = segment([channel(f"c{i}", 1) for i in range(300)], bytes(2400), 14)
+    path.write_bytes(many + segment([], bytes(2400), 8) * 2000)
+
+
+REFUSED: dict[str, tuple[Callable[[Path], None], str]] = {
+    "zeros.h5": (zeros_hdf5, "none were measured"),
+    "many_zeros.h5": (many_zeros_hdf5, "none were measured"),
+    "large_chunk.h5": (large_chunk_hdf5, "declares 400000000 samples"),
+    "overfull_chunk.h5": (overfull_chunk_hdf5, "more closely than it says"),
+    "deep.h5": (deep_hdf5, "nested more than"),
+    "endless.h5": (endless_heap_hdf5, "have no end"),
+    "many_links.h5": (many_links_hdf5, "more than 10000 parts"),
+    "zeros.parquet": (zeros_parquet, "none were measured"),
+    "zeros.mat": (zeros_mat, "none were measured"),
+    "bytes.mat": (bytes_for_doubles_mat, "none were measured"),
+    "deep.mat": (deep_mat, "nested more than"),
+    "declared.tdms": (declared_tdms, "it cannot be read"),
+    "shredded.tdms": (shredded_tdms, "scattered"),
+}
+
+CHILD = """
+import resource, sys, warnings
+import h5py, mckibben, nptdms, pyarrow.parquet, scipy.io
+warnings.simplefilter("ignore")
+before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+for path in sys.argv[1:]:
+    try:
+        mckibben.read(path)
+        print("read")
+    except mckibben.MckibbenError as error:
+        print(str(error).replace(path, ""))
+print((resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) // 1024)
+"""
+
+
+def read_apart(*paths: Path) -> tuple[list[str], int]:
+    """Return what came of each file, and the megabytes that reading took at most."""
+    found = subprocess.run(
+        [sys.executable, "-c", CHILD, *map(str, paths)],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=True,
+    )
+    *said, memory = found.stdout.splitlines()
+    return said, int(memory)
+
+
+def test_what_declares_too_much_is_refused_before_it_is_unpacked(tmp_path: Path) -> None:
+    for name, (make, _) in REFUSED.items():
+        make(tmp_path / name)
+    said, memory = read_apart(*(tmp_path / name for name in REFUSED))
+    for line, (name, (_, problem)) in zip(said, REFUSED.items(), strict=True):
+        assert problem in line, name
+        assert len(line) < 600
+    assert memory < MOST_MB
+
+
+def test_only_numbers_of_parquet_are_read(tmp_path: Path) -> None:
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    n = 50_000
+    words = pa.DictionaryArray.from_arrays(np.zeros(n, np.int32), ["x" * 100_000])
+    table = {"note": words, "pressure_bar": np.sin(np.arange(n)), "list": [[0.0] * 10] * n}
+    pq.write_table(pa.table(table), tmp_path / "a.parquet")  # 5 GB of text, written once
+    said, memory = read_apart(tmp_path / "a.parquet")
+    assert said == ["read"]
+    assert memory < MOST_MB
+
+
+def test_times_in_words_are_still_read_from_parquet(tmp_path: Path) -> None:
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    times = [f"2026-01-31T12:00:{k / 10:04.1f}" for k in range(30)]
+    table = {"time": times, "pressure_bar": malformed.PRESSURE, "branch": ["up", None] * 15}
+    pq.write_table(pa.table(table), tmp_path / "a.parquet")
+    (recording,) = mckibben.read(tmp_path / "a.parquet")
+    assert recording.sample_time == pytest.approx(0.1)
+    assert recording.meta["ignored_columns"] == ["branch"]
+
+
+def test_closely_packed_samples_are_read_up_to_some_millions(tmp_path: Path) -> None:
+    import h5py
+
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        rising = np.arange(200_000) // 1000
+        file.create_dataset("a", data=rising, compression="gzip", shuffle=True)
+    (recording,) = mckibben.read(tmp_path / "a.h5")
+    assert np.array_equal(recording["a"], rising)
+
+
+def test_long_texts_about_a_recording_are_left_out(tmp_path: Path) -> None:
+    import h5py
+
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file["pressure"] = np.arange(20.0)
+        file["pressure"].attrs["units"] = "k" * 60_000
+        file.attrs["long"] = "x" * (limits.MOST_TEXT + 1)
+        file.attrs["many"] = np.array(["x" * 1000] * 50, dtype=object)
+    with pytest.raises(DataError, match="is unknown") as refused:
+        mckibben.read(tmp_path / "a.h5")
+    assert len(str(refused.value)) < 1500
+    (recording,) = mckibben.read(tmp_path / "a.h5", units={"pressure": "bar"})
+    assert not {"long", "many"} & set(recording.meta)
+
+
+# MATLAB's own files, as SciPy reads them ------------------------------------------------
+
+
+def test_vectors_of_matlab_files_are_those_that_scipy_reads(tmp_path: Path) -> None:
+    from scipy.io import loadmat, savemat
+
+    numbers = np.arange(12)
+    kinds = ("f8", "f4", "i1", "u1", "i2", "u2", "i4", "u4", "i8", "u8", "?")
+    content: dict[str, Any] = {f"v{kind.strip('?')}": numbers.astype(kind) for kind in kinds}
+    content |= {"matrix": np.eye(3), "complex": numbers * 1j, "words": ["up", "down"]}
+    content |= {
+        "cell": np.array([numbers, "a"], dtype=object),
+        "deep": {"er": {"p": numbers * 0.5}},
+    }
+    for packed in (False, True):
+        path = tmp_path / f"{packed}.mat"
+        savemat(path, content, do_compression=packed)
+        (recording,) = mckibben.read(path, units={"pressure": "bar"})
+        known = loadmat(path, squeeze_me=True)
+        for kind in kinds:
+            name = f"v{kind.strip('?')}"
+            assert np.array_equal(recording[name], known[name])
+        assert np.array_equal(recording["pressure"], numbers * 0.5)
+        assert len(recording.channels) == len(kinds) + 1
+
+
+# What is no file, in every place --------------------------------------------------------
+
+
+def sidecar_of(path: Path) -> None:
+    run = path.with_name("run.csv")
+    run.write_bytes(malformed.good())
+    path.rename(delimited.sidecar(run))
+    with pytest.warns(mckibben.DataWarning, match="it is ignored"):
+        mckibben.read(run)
+
+
+def protocol_of(path: Path) -> None:
+    path.with_name("run.csv").write_bytes(malformed.good())
+    path.rename(path.with_name("protocol.json"))
+    with pytest.raises(DataError, match=r"ordinary|cannot be read|folder"):
+        roles(path.parent)
+
+
+def manifest_of(path: Path) -> None:
+    folder = path.with_name("export")
+    folder.mkdir()
+    path.rename(folder / "manifest.sha256")
+    (folder / "mine.txt").write_text("mine", encoding="utf-8")
+    with pytest.raises(DataError, match=r"mine\.txt in it was not written"):
+        write_folder(folder, {"a.txt": b""}, overwrite=True)
+
+
+def kept_of(path: Path) -> None:
+    kept = Kept(path.parent)
+    place = kept.file("part", ".json")
+    assert place is not None
+    path.rename(place)
+    assert kept.get("part", Play) is None
+
+
+def refused_by(reader: Callable[[Path], object], ending: str) -> Callable[[Path], None]:
+    def check(path: Path) -> None:
+        with pytest.raises(MckibbenError, match=r"ordinary|cannot be read|folder"):
+            reader(path.rename(path.with_suffix(ending)))
+
+    return check
+
+
+PLACES: dict[str, Callable[[Path], None]] = {
+    **{f"read{ending}": refused_by(mckibben.read, ending) for ending in (".csv", ".parquet")},
+    **{f"read{ending}": refused_by(mckibben.read, ending) for ending in (".mat", ".h5", ".tdms")},
+    "model": refused_by(mckibben.load, ".json"),
+    "rig": refused_by(load_rig, ".toml"),
+    "sidecar": sidecar_of,
+    "protocol": protocol_of,
+    "manifest": manifest_of,
+    "kept": kept_of,
+}
+
+
+def circle(path: Path) -> None:
+    path.symlink_to(path.with_name("round"))
+    path.with_name("round").symlink_to(path)
+
+
+KINDS: dict[str, Callable[[Path], object]] = {
+    "pipe": os.mkfifo,
+    "device": lambda path: path.symlink_to("/dev/zero"),
+    "circle": circle,
+    "folder": Path.mkdir,
+}
+
+
+@pytest.mark.filterwarnings("ignore::mckibben.DataWarning")
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("place", PLACES)
+def test_what_is_no_ordinary_file_is_refused_wherever_one_is_read(
+    place: str, kind: str, tmp_path: Path
+) -> None:
+    KINDS[kind](tmp_path / "x")
+    PLACES[place](tmp_path / "x")
+
+
+# Descriptions ---------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "text", ["[" * 100_000, "9" * 5000, '{"runs": ' + "9" * 5000 + "}", "null", '{"runs": [null]}']
+)
+def test_hostile_descriptions_are_refused(text: str, tmp_path: Path) -> None:
+    run = tmp_path / "run.csv"
+    run.write_bytes(malformed.good())
+    (tmp_path / "protocol.json").write_text(text, encoding="utf-8")
+    with pytest.raises(DataError, match=r"protocol\.json is not readable"):
+        roles(tmp_path)
+    delimited.sidecar(run).write_text(text, encoding="utf-8")
+    with pytest.warns(mckibben.DataWarning, match="it is ignored") as warned:
+        mckibben.read(run)
+    assert all(len(str(one.message)) < 1000 for one in warned)
+
+
+def test_long_descriptions_are_not_read(tmp_path: Path) -> None:
+    run = tmp_path / "run.csv"
+    mckibben.write(mckibben.Recording({"a": np.arange(20, dtype=float)}, 0.1), run)
+    about = json.loads(delimited.sidecar(run).read_text(encoding="utf-8"))
+    about["meta"] = {"long": "x" * 2**22}
+    delimited.sidecar(run).write_text(json.dumps(about), encoding="utf-8")
+    with pytest.warns(mckibben.DataWarning, match="it is ignored"):
+        (recording,) = mckibben.read(run, units={"time": "s"})
+    assert "long" not in recording.meta
+
+
+def test_numbers_without_end_in_a_rig_are_refused(tmp_path: Path) -> None:
+    (tmp_path / "a.toml").write_text(
+        f'format = "mckibben-rig"\nformat_version = 1\nsetup = 0x{"f" * 9000}\n', encoding="utf-8"
+    )
+    with pytest.raises(DataError, match="setup is"):
+        load_rig(tmp_path / "a.toml")
+
+
+def test_the_digest_is_of_the_bytes_that_were_read(tmp_path: Path, monkeypatch: Any) -> None:
+    """A file that is replaced while it is read tells what was read, not what came after."""
+    import hashlib
+
+    from mckibben.files import formats
+
+    path, original = tmp_path / "a.csv", malformed.good()
+    path.write_bytes(original)
+    read = formats.read
+
+    def replace_after(file: io.BufferedReader, of: Path) -> Any:
+        found = read(file, of)
+        (tmp_path / "new").write_bytes(b"other")
+        (tmp_path / "new").replace(path)
+        return found
+
+    monkeypatch.setattr(formats, "read", replace_after)
+    (recording,) = mckibben.read(path)
+    assert recording.meta["sha256"] == hashlib.sha256(original).hexdigest()

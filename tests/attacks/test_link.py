@@ -1,0 +1,171 @@
+"""Attacked: a robot over UDP. Strangers, forged and old packets, floods, NaN; and clocks set back."""
+
+from __future__ import annotations
+
+import math
+import socket
+import threading
+import time
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+
+from mckibben import DataError
+from mckibben.stream import FixedRate, UDPLink
+from mckibben.stream.link import HALF, packed
+
+
+@pytest.fixture
+def peer() -> Iterator[socket.socket]:
+    """Be the other end that is named, by hand."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as made:
+        made.bind(("127.0.0.1", 0))
+        yield made
+
+
+@pytest.fixture
+def stranger() -> Iterator[socket.socket]:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as made:
+        made.bind(("127.0.0.1", 0))
+        made.settimeout(0.1)
+        yield made
+
+
+def test_nobody_is_heard_or_answered_before_a_peer_is_named(stranger: socket.socket) -> None:
+    with UDPLink(size=1) as link:
+        stranger.sendto(packed(1, [5.0]), link.address)
+        assert link.newest(timeout=0.1) is None
+        with pytest.raises(DataError, match=r"no peer is named.*Remedy: .*accept"):
+            link.send([1.0])
+        with pytest.raises(TimeoutError):
+            stranger.recv(100)
+
+
+def test_a_stranger_takes_over_neither_ear_nor_mouth(
+    peer: socket.socket, stranger: socket.socket
+) -> None:
+    with UDPLink(size=1) as link:
+        stranger.sendto(packed(1, [5.0]), link.address)  # in the buffer before the peer is named
+        link.accept(peer.getsockname())
+        stranger.sendto(packed(2, [6.0]), link.address)
+        assert link.newest(timeout=0.1) is None
+        link.send([7.0])
+        assert peer.recv(100) == packed(1, [7.0])
+        with pytest.raises(TimeoutError):
+            stranger.recv(100)
+
+
+@pytest.mark.parametrize("value", [5.01, -0.01, math.nan, math.inf, -math.inf, 1e300])
+def test_a_command_beyond_the_limits_is_dropped_whole(value: float, peer: socket.socket) -> None:
+    with UDPLink(peer.getsockname(), size=2, limits=[(0.0, 5.0), (0.0, 5.0)]) as link:
+        peer.sendto(packed(1, [5.0, 0.0]), link.address)
+        peer.sendto(packed(2, [1.0, value]), link.address)
+        np.testing.assert_array_equal(link.newest(timeout=2.0), [5.0, 0.0])
+        assert link.newest(timeout=0.05) is None
+        assert link.dropped == 1
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf])
+def test_what_is_not_finite_is_neither_taken_nor_sent(value: float, peer: socket.socket) -> None:
+    with UDPLink(peer.getsockname(), size=1, limits=[(0.0, math.inf)]) as link:
+        peer.sendto(packed(1, [value]), link.address)
+        assert link.newest(timeout=0.05) is None
+        for values in ([value], [], ["a"], [[1.0], [2.0, 3.0]], np.zeros(200), None):
+            with pytest.raises(DataError, match="Remedy: send 1 to 128 finite numbers"):
+                link.send(values)  # type: ignore[arg-type]  # that is the attack
+
+
+def test_an_old_packet_sent_again_does_not_command(peer: socket.socket) -> None:
+    with UDPLink(peer.getsockname(), size=1) as link:
+        for sequence in (1, 2, 3):
+            peer.sendto(packed(sequence, [float(sequence)]), link.address)
+        np.testing.assert_array_equal(link.newest(timeout=2.0), [3.0])
+        for sequence in (1, 2, 3):
+            peer.sendto(packed(sequence, [9.0]), link.address)
+        assert link.newest(timeout=0.05) is None
+        peer.sendto(packed(4, [4.0]), link.address)
+        np.testing.assert_array_equal(link.newest(timeout=2.0), [4.0])
+        assert link.restarts == 0
+
+
+def test_a_number_far_ahead_deafens_for_a_moment_only(
+    peer: socket.socket, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with UDPLink(peer.getsockname(), size=1) as link:
+        for sequence in (7, 7 + HALF - 1):
+            peer.sendto(packed(sequence, [0.0]), link.address)
+            assert link.newest(timeout=2.0) is not None
+        monkeypatch.setattr("mckibben.stream.link.SILENCE", 0.0)
+        peer.sendto(packed(8, [8.0]), link.address)
+        np.testing.assert_array_equal(link.newest(timeout=2.0), [8.0])
+        assert link.restarts == 1
+
+
+def flood(sender: socket.socket, address: Any, packet: bytes, ended: threading.Event) -> None:
+    while not ended.is_set():
+        sender.sendto(packet, address)
+
+
+@pytest.mark.parametrize("junk", [b"junk", packed(1, [math.nan]), packed(9, [1.0])])
+def test_a_flood_cannot_keep_newest_from_returning(junk: bytes, peer: socket.socket) -> None:
+    ended = threading.Event()
+    with UDPLink(peer.getsockname(), size=1) as link:
+        peer.sendto(packed(9, [1.0]), link.address)
+        assert link.newest(timeout=2.0) is not None
+        flooding = threading.Thread(target=flood, args=(peer, link.address, junk, ended))
+        flooding.start()
+        try:
+            started = time.monotonic()
+            for _ in range(3):
+                assert link.newest(timeout=0.1) is None
+            assert link.newest() is None
+            waited = time.monotonic() - started
+        finally:
+            ended.set()
+            flooding.join()
+        assert 0.3 <= waited < 5.0  # each packet started the wait anew
+        assert link.dropped > 10
+
+
+@pytest.mark.parametrize(
+    "named", [("no such host.invalid", 5005), ("127.0.0.1", 0), ("127.0.0.1", 70000), ("a",), 5]
+)
+def test_what_is_no_peer_is_refused(named: Any) -> None:
+    with pytest.raises(DataError, match="Remedy: give its address and port"):
+        UDPLink(named, size=1)
+
+
+def test_settings_that_do_not_fit_are_refused() -> None:
+    for limits in ([(0.0, 1.0)], [(1.0, 0.0)] * 2, [(0.0, math.nan)] * 2):
+        with pytest.raises(DataError, match="a lowest and a highest value"):
+            UDPLink(size=2, limits=limits)
+    with UDPLink(size=1) as link, pytest.raises(DataError, match="Remedy: give bind="):
+        link.accept(("192.0.2.1", 5005))
+
+
+class SetBack:
+    """A clock that is set back by an hour at a reading, and a sleep that moves it."""
+
+    def __init__(self, when: int) -> None:
+        self.now, self.slept, self.readings, self.when = 1000.0, 0.0, 0, when
+
+    def __call__(self) -> float:
+        self.readings += 1
+        self.now += 1e-6 - 3600.0 * (self.readings == self.when)
+        return self.now
+
+    def sleep(self, seconds: float) -> None:
+        self.now += seconds
+        self.slept += seconds
+
+
+@pytest.mark.parametrize("when", [2, 10, 11, 12, 13])
+def test_a_clock_set_back_costs_a_step_not_an_hour(when: int) -> None:
+    clock = SetBack(when)
+    rate = FixedRate(0.1, 1.0, clock=clock, sleep=clock.sleep)
+    assert list(rate) == list(range(10))
+    assert clock.slept < 1.2
+    assert rate.deadlines.lateness.max() < 0.01
+    assert rate.deadlines.work.min() >= 0.0

@@ -1,0 +1,182 @@
+"""Hostile models: nesting, ranges, sizes and numbers that hang, explode, or raise the unexpected."""
+
+from __future__ import annotations
+
+import multiprocessing
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from mckibben import Block, Channel, ModelError, Parallel, Series
+from mckibben.blocks import saving
+from mckibben.blocks.compose import DEEPEST, MOST_BLOCKS, PerChannel
+from mckibben.blocks.fields import MOST_COEFFICIENTS, MOST_NUMBERS
+from mckibben.export.c.project import c_files
+from mckibben.registry import load
+
+SAMPLE_TIME = 0.01
+
+
+def within_seconds(task: Callable[[], None], seconds: float = 30.0) -> None:
+    """Demand that something ends well, and soon."""
+    child = multiprocessing.get_context("fork").Process(target=task)
+    child.start()
+    child.join(seconds)
+    late = child.is_alive()
+    child.kill()
+    child.join()
+    assert not late, "this takes for ever"
+    assert child.exitcode == 0
+
+
+def described(block: str, **changed: Any) -> dict[str, Any]:
+    """Return an example as it is saved, some of its fields changed."""
+    return {**load("blocks", block).example().to_dict(), **changed}
+
+
+def refused(content: dict[str, Any], use: Callable[[Block], object] = lambda _: None) -> None:
+    """Demand that a model is refused, by its name, when it is loaded or when it is used."""
+    with pytest.raises(ModelError, match="Remedy:"):
+        use(saving.from_dict(content))
+
+
+def nested(depth: int, kind: str = "series", twice: bool = False) -> dict[str, Any]:
+    """Return a model in so many compositions."""
+    part = saving.part_to_dict(load("blocks", "pi").example())
+    for _ in range(depth):
+        part = {"kind": kind, "parts": [part, part] if twice else [part]}
+    return {"format": saving.FORMAT, "version": saving.VERSION, **part}
+
+
+def used(block: Block) -> None:
+    """Do with a model what takes longest where it is nested."""
+    inputs = np.ones((5, len(block.inputs)))
+    block.simulate(inputs, sample_time=SAMPLE_TIME)
+    block.stream(SAMPLE_TIME).step(inputs[0])
+    block.inverse().simulate(inputs, sample_time=SAMPLE_TIME)
+    block.reachable()
+    c_files(block, sample_time=SAMPLE_TIME)
+
+
+@pytest.mark.parametrize("kind", ["series", "parallel", "per-channel"])
+def test_compositions_in_compositions_take_no_longer_than_others(kind: str) -> None:
+    def task() -> None:
+        block = saving.from_dict(nested(DEEPEST, kind))
+        if kind == "parallel":
+            block.simulate([1.0, 2.0])
+        else:
+            used(block)
+
+    within_seconds(task)
+
+
+def test_nesting_and_blocks_are_limited() -> None:
+    for depth in (DEEPEST + 1, 100, 5000):
+        refused(nested(depth))
+    refused(nested(15, "parallel", twice=True))
+    refused(nested(1, "series") | {"parts": [nested(0)] * MOST_BLOCKS})
+    assert saving.from_dict(nested(8, "parallel", twice=True)).simulate([1.0]).shape == (1,)
+    pi = load("blocks", "pi").example()
+    block: Block = pi
+    for _ in range(DEEPEST):
+        block = Series((block,))
+    with pytest.raises(ModelError, match=r"nested 33 deep.*Remedy:"):
+        Parallel((block,))
+
+
+def test_scheduled_parts_deep_in_a_series_are_found() -> None:
+    """What is kept of a composition's channels is what they are."""
+    law = load("blocks", "chou-hannaford").example()
+    block: Block = Series((load("blocks", "polynomial").example(), law))
+    assert [channel.name for channel in block.inputs][1:] == ["pressure"]
+    assert block.scheduling == ("pressure",)
+    both = PerChannel(
+        tuple(
+            load("blocks", "pi")((0.0,), (1.0,), input=Channel(a, "bar"), output=Channel(b, "mm"))
+            for a, b in (("p", "x"), ("q", "y"))
+        )
+    )
+    assert [channel.name for channel in Series((both,)).inputs] == ["p", "q"]
+
+
+RANGES = ((0.0, 5e-324), (0.0, 1e-300), (1.0, 1.0 + 2e-16), (-1e308, 1e308))
+RANGED = sorted(
+    {"bouc-wen", "duhem", "eupi", "generalized-bouc-wen", "gpi", "maxwell-slip", "pi", "polynomial"}
+)
+
+
+@pytest.mark.parametrize("kind", RANGED)
+def test_ranges_too_narrow_or_wide_to_walk_through_are_refused(kind: str) -> None:
+    for low, high in RANGES:
+        refused(described(kind, input_range=[low, high]))
+
+
+@pytest.mark.parametrize("kind", ["preisach", "krasnoselskii-pokrovskii"])
+def test_levels_in_no_range_are_refused(kind: str) -> None:
+    refused(described(kind, levels=[0.0, 5e-324], weights=[1.0]))
+
+
+def test_the_walk_of_an_inverse_ends_where_its_steps_are_nothing() -> None:
+    """From the kernel itself: no range is small enough to walk in for ever."""
+    from mckibben.blocks.eupi import eupi_inverse_kernel
+
+    def task() -> None:
+        inverse = load("blocks", "eupi").example().inverse()
+        coefficients = inverse.coefficients(None)
+        coefficients[-2:] = 0.0, 5e-324
+        outputs = np.empty((3, 1))
+        state, inputs = np.zeros(inverse.n_states), np.array([[1.0], [3.0], [np.nan]])
+        eupi_inverse_kernel(coefficients, state, inputs, outputs)
+
+    within_seconds(task)
+
+
+BEYOND: dict[str, tuple[dict[str, Any], Callable[[Block], object]]] = {
+    "lags whose squares overflow": (
+        described("process-model", time_constants=[1e200]),
+        lambda block: block.simulate([1.0], sample_time=SAMPLE_TIME),
+    ),
+    "turns whose squares vanish": (
+        described("chou-hannaford", turns=1e-300),
+        lambda block: block.simulate([[1.0, 1.0]]),
+    ),
+    "terms that are no lists": (described("narx-polynomial", terms=[1.0, 2.0]), lambda _: None),
+    "terms of terms": (described("narx-polynomial", terms=[[[1]]], weights=[1.0]), lambda _: None),
+    "a term of a thousand factors": (
+        described("narx-polynomial", terms=[[0] * 1000], weights=[1.0]),
+        lambda _: None,
+    ),
+    "a polynomial of thousands": (
+        described("polynomial", polynomial=[1.0] * (MOST_COEFFICIENTS + 1)),
+        lambda _: None,
+    ),
+    "a filter of thousands": (
+        described("transfer-function", denominator=[0.0] * (MOST_COEFFICIENTS + 1)),
+        lambda _: None,
+    ),
+    "a million thresholds and more": (
+        described("pi", thresholds=[0.0] * (MOST_NUMBERS + 1), weights=[0.0] * (MOST_NUMBERS + 1)),
+        lambda _: None,
+    ),
+    "names of no kind": ({**described("pi"), 1: 2, None: 3}, lambda _: None),  # type: ignore[dict-item]
+    "another group's kind in a part": (nested(1) | {"parts": [{"kind": "tanh"}]}, lambda _: None),
+    "a kind in other letters": (described("pi", kind="ＰＩ"), lambda _: None),
+    "a kind with a mark": (described("pi", kind="pi\u200b"), lambda _: None),
+}
+
+
+@pytest.mark.parametrize("what", BEYOND)
+def test_what_cannot_be_computed_with_is_refused_as_a_model(what: str) -> None:
+    content, use = BEYOND[what]
+    with np.errstate(all="ignore"):
+        refused(content, use)
+
+
+def test_a_start_hard_to_find_is_found() -> None:
+    """A root near nothing in a wide range takes more steps than usual, and no error."""
+    content = described("eupi", input_range=[-1000.0, 1e20], polynomial=[1.0, 1.0, 1.0])
+    forward = saving.from_dict(content)
+    target = float(forward.simulate([1.0])[0])
+    assert np.isfinite(forward.inverse().simulate([target])).all()

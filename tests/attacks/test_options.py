@@ -1,0 +1,215 @@
+"""Values that no option can have, for every option of every command; names that terminals obey."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import typer
+
+from mckibben import GPI, Recording, control, write
+from mckibben.cli.main import app
+from mckibben.cli.output import visible
+from mckibben.errors import DataError, MckibbenError
+from mckibben.rigs import load_rig, rig_from_data_sheet
+from mckibben.signals import triangle
+from mckibben.workers import checked
+from tests.attacks.commands import call
+
+COMMANDS: dict[str, list[str]] = {
+    "study": ["run.csv", "--test", "two.csv", "--models", "pi", "--jobs", "1", "-o", "out"],
+    "characterize": ["run.csv"],
+    "fit": ["pi", "run.csv", "-o", "out.json"],
+    "compare": ["run.csv", "--test", "two.csv", "--models", "pi", "--jobs", "1"],
+    "simulate": ["model.json", "run.csv", "-o", "out.csv"],
+    "invert": ["model.json", "-o", "out.json"],
+    "track": ["inverse.json", "--rig", "mas20-hanging", "--reference", "run.csv"],
+    "plot": ["run.csv", "-o", "out.png"],
+    "reproduce": ["multistate", "--quick", "--jobs", "1"],
+    "info": ["run.csv"],
+    "app": ["workspace", "--no-show"],
+    "export c": ["model.json", "-o", "out"],
+    "export fmu": ["model.json", "-o", "out.fmu", "--platforms", "none"],
+    "rig list": [],
+    "rig show": ["rail"],
+    "rig run": ["rail", "-o", "out.csv", "--signal", "constant:value=1", "--duration", "1"],
+    "rig record": ["multistate", "-o", "out", "--jobs", "1"],
+    "rig new": [
+        *("out.toml", "--diameter", "20", "--length", "200", "--max-pressure", "6"),
+        *("--max-force", "1500", "--max-contraction", "0.25"),
+    ],
+}
+"""A call of each that works."""
+
+WHOLE = ["-1", "99999999999999999999", "-99999999999999999999", "1e3", "nan", ""]
+NUMBERS = ["nan", "inf", "-inf", "1e999", "-1", "1e300", ""]
+WORDS = ["", " "]
+SETTINGS = [
+    "=",
+    "a=",
+    "=b",
+    "n_operators=1e999",
+    "n_operators=nan",
+    "n_operators=99999999999999999999",
+]
+
+HARMLESS = {
+    ("study", "--samples", "99999999999999999999"),
+    ("track", "--slew", "1e300"),
+    ("export c", "--sample-time", "1e300"),
+    ("export fmu", "--sample-time", "1e300"),
+}
+"""Strange, and no error."""
+
+OTHERS = {("app", "--port"), ("app", "--host"), ("app", "--token")}
+"""Of the workbench, which has tests of its own."""
+
+
+def options() -> Iterator[tuple[str, str, tuple[str, ...], Any]]:
+    """Yield every option that takes a value: its command, name, spellings and type."""
+
+    def walk(
+        command: Any, path: tuple[str, ...]
+    ) -> Iterator[tuple[str, str, tuple[str, ...], Any]]:
+        for name, inner in getattr(command, "commands", {}).items():
+            yield from walk(inner, (*path, name))
+        for option in command.params if path and not hasattr(command, "commands") else ():
+            if option.param_type_name == "option" and not option.is_flag:
+                kind = getattr(option, "type_descriptor", None) or option.type
+                yield " ".join(path), option.opts[-1], tuple(option.opts), kind
+
+    yield from walk(typer.main.get_command(app), ())
+
+
+def hostile(name: str, kind: Any) -> list[str]:
+    if name == "--set":
+        return SETTINGS
+    said = f"{getattr(kind, 'annotation', '')} {getattr(kind, 'name', '')}".casefold()
+    return WHOLE if "int" in said else NUMBERS if "float" in said else WORDS
+
+
+CASES = [
+    (command, name, spellings, value)
+    for command, name, spellings, kind in options()
+    for value in hostile(name, kind)
+    if (command, name, value) not in HARMLESS and (command, name) not in OTHERS
+]
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with one file of every kind."""
+    place = tmp_path_factory.mktemp("files")
+    for name, peaks in (("run.csv", [5.0]), ("two.csv", [4.5])):
+        u = triangle(np.arange(0, 4, 0.02), 4.0, peaks)
+        y = GPI.example().simulate(u)
+        write(Recording({"pressure": u, "displacement": y}, 0.02), place / name)
+    GPI.example().save(place / "model.json")
+    GPI.example().inverse().save(place / "inverse.json")
+    return place
+
+
+def test_every_command_is_attacked() -> None:
+    assert {command for command, *_ in options()} <= set(COMMANDS)
+    assert len(CASES) > 300
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_what_no_option_can_be_is_refused_in_words(
+    command: str, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(folder)
+    before = sorted(folder.iterdir())
+    for name, spellings, value in [case[1:] for case in CASES if case[0] == command]:
+        words = list(COMMANDS[command])
+        for spelling in spellings:  # instead of what works
+            if spelling in words:
+                place = words.index(spelling)
+                del words[place : place + 2]
+        result = call(*command.split(), *words, name, value)
+        case = (command, name, value, result.err)
+        assert result.code == 2, case
+        assert "Internal error" not in result.err, case
+        assert "Traceback" not in result.err, case
+        assert result.err.strip(), case
+    left = [path for path in folder.iterdir() if path not in before]
+    assert not [path for path in left if path.is_file()]
+
+
+RUBBISH = [
+    {"approach": float("nan")},
+    {"approach": 1e300},
+    {"settle": float("inf")},
+    {"noise": float("nan")},
+    {"noise": 1e300},
+    {"delay": 10**20},
+    {"slew": float("inf")},
+    {"seed": -1},
+    {"seed": 10**20},
+]
+
+
+@pytest.mark.parametrize("given", RUBBISH, ids=str)
+def test_the_library_refuses_rubbish_too(given: dict[str, Any]) -> None:
+    reference = Recording({"displacement": np.linspace(1.0, 5.0, 20)}, 0.02)
+    controller = control.Feedforward(GPI.example().inverse())
+    with pytest.raises(MckibbenError, match=next(iter(given))):
+        control.track(controller, load_rig("mas20-hanging"), reference, **given)
+
+
+def test_numbers_of_no_muscle_and_no_machine_are_refused() -> None:
+    sheet = {"diameter": 20.0, "length": 200.0, "max_pressure": 6.0, "max_force": 1500.0}
+    for wrong in ({"payload": float("nan")}, {"payload": -1.0}, {"length": 1e300}):
+        numbers = {**sheet, "max_contraction": 0.25, **wrong}
+        with pytest.raises(DataError, match=next(iter(wrong))):
+            rig_from_data_sheet(name="mine", **numbers)
+    for jobs in (0, -1, 10**20):
+        with pytest.raises(DataError, match="jobs"):
+            checked(jobs)
+
+
+ESCAPE = "\x1b]0;owned\x07\x1b[2J\x9b31m\u202e"
+
+
+def test_control_characters_are_written_out() -> None:
+    assert visible("a\x1b[2J\x07\x9b\u202e\udcff\r b\n\tc") == (
+        "a\\u001b[2J\\u0007\\u009b\\u202e\\udcff\\u000d b\n\tc"
+    )
+    assert visible("R² 5 µs – naïve 日本") == "R² 5 µs – naïve 日本"
+
+
+def test_names_do_not_reach_the_terminal_raw(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    hostile = f"run{ESCAPE}.csv"
+    Path(hostile).write_text("pressure,displacement\n1,2\n2,4\n3,x\n")
+    Path(f"{ESCAPE}.json").write_text(f'{{"format": "{ESCAPE.encode("unicode_escape").decode()}"}}')
+    header = f"pres{ESCAPE}[bar]"
+    Path("header.csv").write_text(
+        f"time,{header},y\n" + "".join(f"{k},{k},{k}\n" for k in range(9))
+    )
+    Path("run.csv").write_text("time,pressure,displacement\n0,1,2\n1,2,4\n2,3,6\n")
+    calls = [
+        ["info", hostile],
+        ["info", f"{ESCAPE}.json"],
+        ["info", "header.csv"],
+        ["info", "header.csv", "--json"],
+        ["characterize", "header.csv", "--input", ESCAPE],
+        ["fit", ESCAPE, "run.csv", "-o", "out.json"],
+        ["plot", "run.csv", "-o", f"{ESCAPE}.png"],
+        ["info", "run.csv", ESCAPE],
+        [ESCAPE],
+        ["info", f"--{ESCAPE}"],
+        ["rig", "show", ESCAPE],
+        ["rig", "run", "rail", "--signal", ESCAPE, "-o", "out.csv"],
+    ]
+    for words in calls:
+        result = call(*words)
+        said = result.out + result.err
+        assert said.strip(), words
+        assert "Internal error" not in said, words
+        assert not set(ESCAPE) & set(said) - set("]0;owned[2J31m"), (words, said)

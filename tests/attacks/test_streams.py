@@ -1,0 +1,161 @@
+"""NaN, infinity and absurd sizes in a stream: it goes on as if they had not come, as C does."""
+
+from __future__ import annotations
+
+import ctypes
+import subprocess
+import warnings
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from mckibben import Block, DataError, ModelWarning
+from mckibben.blocks.running import Stream
+from mckibben.blocks.trial import input_limits, wander
+from mckibben.export.c.building import LOOP
+from mckibben.export.c.project import described, source_files
+from mckibben.registry import load, names
+from tests.tools import needs
+
+Array = NDArray[np.float64]
+
+SAMPLE_TIME = 0.01
+KINDS = names("blocks")
+BAD = (np.nan, np.inf, -np.inf)
+
+
+def path_for(block: Block, seed: int, n: int = 120) -> Array:
+    """Return inputs over the block's range, shape (n, n_inputs)."""
+    inputs = wander(*input_limits(block), np.random.default_rng(seed), 10, 14)
+    return np.resize(inputs, (n, inputs.shape[1]))
+
+
+def poisoned(good: Array, seed: int) -> tuple[Array, NDArray[np.bool_]]:
+    """Return inputs with bad samples between the good ones, and which are good."""
+    rng = np.random.default_rng(seed)
+    kept = rng.random(2 * len(good)) < 0.5
+    kept[0] = False  # before anything has come
+    n = len(good) + int((~kept).sum())
+    kept = np.concatenate([kept, np.ones(n, dtype=bool)])[:n]
+    kept[np.flatnonzero(kept)[len(good) :]] = False
+    inputs = np.empty((n, good.shape[1]))
+    inputs[kept] = good[: kept.sum()]
+    inputs[~kept] = good[rng.integers(0, len(good), (~kept).sum())]
+    for row in np.flatnonzero(~kept):
+        inputs[row, rng.integers(good.shape[1])] = rng.choice(BAD)
+    return inputs, kept
+
+
+def streamed(stream: Stream, inputs: Array) -> tuple[Array, Array, NDArray[np.int64]]:
+    """Return the outputs, the memory after every step, and the statuses."""
+    outputs, states, statuses = [], [], []
+    for row in inputs:
+        outputs.append(stream.step(row).copy())
+        states.append(stream.state.copy())
+        statuses.append(stream.status)
+    return np.array(outputs), np.array(states), np.array(statuses)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_bad_samples_change_nothing(kind: str) -> None:
+    block = load("blocks", kind).example()
+    inputs, kept = poisoned(path_for(block, 1), 2)
+    outputs, states, statuses = streamed(block.stream(SAMPLE_TIME), inputs)
+    expected, memory, good = streamed(block.stream(SAMPLE_TIME), inputs[kept])
+    assert not good.any()
+    np.testing.assert_array_equal(statuses, np.where(kept, Stream.GOOD, Stream.BAD_INPUT))
+    np.testing.assert_array_equal(outputs[kept], expected)
+    np.testing.assert_array_equal(states[kept], memory)
+    last = np.maximum.accumulate(np.where(kept, np.arange(len(kept)), -1))
+    held = np.where(last[:, np.newaxis] < 0, 0.0, outputs[last])
+    np.testing.assert_array_equal(outputs, held)
+    np.testing.assert_array_equal(states[1:][~kept[1:]], states[:-1][~kept[1:]])
+
+
+@pytest.fixture(scope="module")
+def compiled(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Any]:
+    """Return what runs the exported C of a block over inputs; all blocks are compiled at once."""
+    folder = tmp_path_factory.mktemp("c")
+    loops = []
+    for index, kind in enumerate(KINDS):
+        block, name = load("blocks", kind).example(), f"block_{index}"
+        content = described(block, name=name, sample_time=SAMPLE_TIME, single=False)
+        for path, text in source_files(content).items():
+            (folder / Path(path).name).write_text(text)
+        loops.append(LOOP.format(name=name, n_in=len(block.inputs), n_out=len(block.outputs)))
+    (folder / "loops.c").write_text("".join(loops))
+    library = folder / "all.so"
+    command = ["cc", "-std=c99", "-O0", "-ffp-contract=off", "-shared", "-fPIC", "-o", str(library)]
+    subprocess.run([*command, *map(str, folder.glob("*.c")), "-lm"], check=True)
+    functions = ctypes.CDLL(str(library))
+
+    def run(kind: str, inputs: Array, n_outputs: int) -> tuple[Array, NDArray[np.intc]]:
+        name = f"block_{KINDS.index(kind)}"
+        model = ctypes.create_string_buffer(1 << 16)
+        outputs, statuses = np.empty((len(inputs), n_outputs)), np.zeros(len(inputs), np.intc)
+        arrays = [ctypes.c_void_p(a.ctypes.data) for a in (inputs, outputs, statuses)]
+        getattr(functions, f"{name}_init")(model)
+        getattr(functions, f"{name}_loop")(model, *arrays, ctypes.c_long(len(inputs)))
+        return outputs, statuses
+
+    return run
+
+
+@needs("cc")
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_stream_does_as_exported_c(kind: str, compiled: Callable[..., Any]) -> None:
+    """Sample for sample, bad ones and the status included."""
+    block = load("blocks", kind).example()
+    inputs, _ = poisoned(path_for(block, 3), 4)
+    outputs, _, statuses = streamed(block.stream(SAMPLE_TIME), inputs)
+    expected, wanted = compiled(kind, inputs, len(block.outputs))
+    np.testing.assert_array_equal(statuses, wanted)
+    span = np.ptp(expected, axis=0) + 1e-300
+    assert (np.abs(outputs - expected) <= 1e-12 * span).all()
+
+
+@pytest.mark.parametrize("size", [1e308, -1e308, 1e154, 5e-324])
+@pytest.mark.parametrize("kind", KINDS)
+def test_absurd_sizes_give_finite_outputs(kind: str, size: float) -> None:
+    block = load("blocks", kind).example()
+    good = path_for(block, 5, 60)
+    rng = np.random.default_rng(6)
+    inputs = good.copy()
+    for row in range(0, len(inputs), 4):  # the first sample too
+        inputs[row, rng.integers(inputs.shape[1])] = size
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", (ModelWarning, RuntimeWarning))
+        outputs, _, statuses = streamed(block.stream(SAMPLE_TIME), inputs)
+    assert np.isfinite(outputs).all()
+    assert not (statuses == Stream.BAD_INPUT).any()
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_whole_recording_with_nan_is_refused(kind: str) -> None:
+    block = load("blocks", kind).example()
+    inputs, _ = poisoned(path_for(block, 7, 20), 8)
+    with pytest.raises(DataError, match="Remedy:"):
+        block.simulate(inputs, sample_time=SAMPLE_TIME)
+
+
+def test_what_is_no_sample_is_refused_and_changes_nothing() -> None:
+    block = load("blocks", "pi").example()
+    stream, plain = block.stream(), block.stream()
+    wrongs: list[Any] = [[1.0, 2.0], "two", 10**400, [[1.0], [2.0]], {}, []]
+    for value in (1.0, 3.0, 2.0):
+        for wrong in wrongs:
+            with pytest.raises(DataError, match="Remedy: give one number each: pressure"):
+                stream.step(wrong)
+        assert stream.step(value)[0] == plain.step(value)[0]
+
+
+def test_outputs_that_a_caller_wrote_over_are_held_all_the_same() -> None:
+    stream = load("blocks", "pi").example().stream()
+    outputs = stream.step(3.0)
+    first = outputs.copy()
+    outputs[:] = 7.0
+    np.testing.assert_array_equal(stream.step(np.nan), first)

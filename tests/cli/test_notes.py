@@ -1,0 +1,47 @@
+"""What was assumed while reading reaches results and reports, and standard error once."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from tests.cli.conftest import Cli
+
+ASSUMED = "no unit is given, so these are assumed: pressure in bar, displacement in mm"
+
+
+@pytest.fixture
+def folder(files: tuple[Path, Path], tmp_path: Path) -> Path:
+    """A folder of recordings whose units nobody wrote down."""
+    folder = tmp_path / "runs"
+    folder.mkdir()
+    for name, file in zip(("a.csv", "b.csv"), files, strict=True):
+        (folder / name).write_text(file.read_text().replace("time,", "time_s,", 1))
+    return folder
+
+
+def test_study_of_a_folder(cli: Cli, folder: Path, tmp_path: Path) -> None:
+    done = cli("study", folder, "-o", tmp_path / "out", "--models", "pi", "--jobs", 1, "--json")
+    assert done.code == 0, done.err
+    printed = json.loads(done.out)
+    for file in (folder / "a.csv", folder / "b.csv"):
+        (note,) = printed["notes"][str(file)]
+        assert note.startswith(ASSUMED)
+        assert f"{file}: {note}" in printed["leaderboard"]["notes"]
+        assert done.err.count(f"Note: {file}: {note}") == 1
+        page = (tmp_path / "out" / "report.html").read_text()
+        assert page.count(f"When {file} was read: {note}") == 1
+        assert f"<li>{file}: " not in page
+
+
+def test_compare_and_characterize(cli: Cli, folder: Path) -> None:
+    told = f"{folder / 'a.csv'}: {ASSUMED}"
+    board = cli("compare", folder / "a.csv", "--models", "pi", "--jobs", 1, "--json")
+    assert any(note.startswith(told) for note in json.loads(board.out)["notes"])
+    files = [folder / "a.csv", folder / "b.csv"]
+    described = cli("characterize", *files, "--json")
+    assert list(json.loads(described.out)["notes"]) == list(map(str, files))
+    spoken = cli("characterize", *files)
+    assert f"Note: {told}" in spoken.out
+    assert spoken.err.count(told) == 1
+    assert f"Note: {ASSUMED}" in cli("info", folder / "a.csv").out

@@ -1,0 +1,126 @@
+"""What two recordings have in common is found, whatever its form; what is merely alike is not."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from mckibben import GPI, DataError, Recording
+from mckibben.comparison.shared_stretches import shared_stretches, told
+from mckibben.signals import irregular_triangle, triangle
+
+STEP = 0.02
+TIME = np.arange(0, 24, STEP)
+
+
+def recorded(u: np.ndarray, seed: int, noise: float = 0.02) -> Recording:
+    rng = np.random.default_rng(seed)
+    y = GPI.example().simulate(u) + noise * rng.standard_normal(u.size)
+    return Recording({"pressure": u, "displacement": y}, STEP, meta={"name": f"run {seed}"})
+
+
+def common(*recordings: Recording) -> list[tuple[int, int]]:
+    found = shared_stretches(recordings, ["pressure"], ["displacement"])
+    return [(one.first, one.second) for one in found]
+
+
+def changed(recording: Recording, change: object) -> Recording:
+    assert callable(change)
+    return replace(
+        recording, channels={name: change(recording[name]) for name in recording.channels}
+    )
+
+
+RUN = recorded(irregular_triangle(TIME, 12, 5.0, seed=3), 0)
+
+
+@pytest.mark.parametrize(
+    "copy",
+    [
+        RUN,
+        changed(RUN, lambda x: x.astype(np.float32)),
+        changed(RUN, lambda x: np.array([float(f"{value:.6g}") for value in x])),
+        changed(RUN, lambda x: np.round(x, 3)),
+        replace(RUN, start_time=77.0, meta={"name": "another"}),
+        replace(RUN, sample_time=None),
+        RUN.slice(0, 300),
+        RUN.slice(900, 1200),
+    ],
+    ids=["same", "float32", "six digits", "three decimals", "later", "no time", "head", "tail"],
+)
+def test_a_copy_is_found_whatever_its_form(copy: Recording) -> None:
+    (found,) = shared_stretches([RUN, copy], ["pressure"], ["displacement"])
+    assert found.share > 0.99
+    assert common(copy, RUN) == [(0, 1)]
+
+
+@pytest.mark.parametrize("every", [2, 5])
+def test_every_so_many_th_sample_of_a_recording_is_found(every: int) -> None:
+    thin = replace(changed(RUN, lambda x: x[1::every]), sample_time=every * STEP)
+    assert common(RUN, thin) == common(thin, RUN) == [(0, 1)]
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_overlapping_slices_are_found_where_they_overlap(seed: int) -> None:
+    overlap = int(np.random.default_rng(seed).integers(150, 600))
+    (found,) = shared_stretches(
+        [RUN.slice(0, 700), RUN.slice(700 - overlap, 1200)], ["pressure"], ["displacement"]
+    )
+    assert found.start == pytest.approx(STEP * (700 - overlap))
+    assert found.stop == pytest.approx(STEP * 699)
+    assert common(RUN.slice(0, 700), RUN.slice(700, 1200)) == []
+
+
+def test_all_copies_are_found_among_others() -> None:
+    others = [recorded(irregular_triangle(TIME, 12, 5.0, seed=k), k) for k in (4, 5)]
+    assert common(RUN, others[0], RUN, others[1], RUN) == [(0, 2), (0, 4)]
+
+
+@pytest.mark.parametrize("noise", [0.003, 0.02, 0.2])
+@pytest.mark.parametrize("resolution", [0.0, 0.0277], ids=["fine", "ten bits"])
+def test_repeats_of_a_reference_with_sensor_noise_are_different_data(
+    noise: float, resolution: float
+) -> None:
+    reference = triangle(TIME, 4.0, 5.0)
+    runs = [recorded(reference, seed, noise) for seed in range(4)]
+    if resolution:
+        runs = [changed(run, lambda x: np.round(x / resolution) * resolution) for run in runs]
+    assert common(*runs) == []
+
+
+def test_holds_and_saturated_stretches_are_nothing_in_common() -> None:
+    still = np.concatenate([np.zeros(500), RUN["pressure"][:600], np.full(500, 5.0)])
+    runs = []
+    for seed in (1, 2):
+        run = recorded(still, seed)
+        y = run["displacement"].copy()
+        y[:500], y[-500:] = y[0].round(), y.max().round()
+        runs.append(run.with_channels(displacement=np.minimum(y, 8.0)))
+    first, second = (run["displacement"] for run in runs)
+    assert (first[1:500] == first[0]).all()
+    assert np.count_nonzero(first == second) > 100 or first[0] != second[0]
+    assert common(*runs) == []
+
+
+def test_periods_of_one_recording_without_noise_are_its_own_affair_but_a_second_run_is_not() -> (
+    None
+):
+    runs = [recorded(triangle(TIME, 4.0, 5.0), seed, 0.0) for seed in (1, 2)]
+    assert common(runs[0]) == []
+    assert common(*runs) == [(0, 1)]
+
+
+def test_a_little_in_common_is_told_and_more_is_refused() -> None:
+    before, little, much = RUN.slice(0, 700), RUN.slice(660, 1200), RUN.slice(500, 1200)
+    assert told({"fit": [before], "test": [little]}, ["pressure"], ["displacement"]) == ()
+    both = {"fit": [before], "test": [much]}
+    with pytest.raises(DataError, match=r"tested on data it was fitted to.*10 to 13.98 s.*--allow"):
+        told(both, ["pressure"], ["displacement"])
+    (said,) = told(both, ["pressure"], ["displacement"], allow=True)
+    assert "say nothing of other data" in said
+    with pytest.raises(DataError, match="count twice to fit"):
+        told({"fit": [before, before]}, ["pressure"], ["displacement"])
+    with pytest.raises(DataError, match="the choice would be made on what is tested on"):
+        told({"fit": [], "validate": [RUN], "test": [RUN]}, ["pressure"], ["displacement"])

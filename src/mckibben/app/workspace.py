@@ -318,8 +318,13 @@ class Workspace:
         return content if isinstance(content, dict) else None
 
     def names(self, kind: str) -> list[str]:
-        """Return the names of all JSON files of a kind."""
-        found = (path.name for path in (self.folder / kind).glob("*.json"))
+        """Return the names of all JSON files of a kind; an empty one is but a name that is taken."""
+        with os.scandir(self.folder / kind) as inside:
+            found = [
+                file.name
+                for file in inside
+                if file.name.endswith(".json") and file.stat(follow_symlinks=False).st_size
+            ]
         return sorted(
             name.removesuffix(".json")
             for name in found

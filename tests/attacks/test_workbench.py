@@ -185,7 +185,7 @@ def test_a_large_file_is_read_in_a_process_with_bounds(
         reading.read_upload(path, {})
     monkeypatch.undo()
     monkeypatch.setattr(reading, "LARGE", 0)
-    ((found,), _) = reading.read_upload(path, {})
+    (found,) = reading.read_upload(path, {})
     assert found == recording().with_meta(**found.meta)
     path.write_text("pressure_bar\nx\n")
     with pytest.raises(DataError, match="Remedy"):

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import sys
-import warnings
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from mckibben.errors import DataError, DataWarning
+from mckibben.errors import DataError
 from mckibben.files import read
 from mckibben.recording import Recording
 from mckibben.workers import Tell, Workers
@@ -25,8 +24,8 @@ MOST_CELLS = 40_000_000
 Options = Mapping[str, Any]
 
 
-def read_upload(path: Path, options: Options) -> tuple[list[Recording], list[str]]:
-    """Return the recordings of a file, and what was said when it was read.
+def read_upload(path: Path, options: Options) -> list[Recording]:
+    """Return the recordings of a file.
 
     Raises
     ------
@@ -37,13 +36,11 @@ def read_upload(path: Path, options: Options) -> tuple[list[Recording], list[str
         return _read(path, options)
     with Workers(1) as workers:
         (outcome,) = workers.results(_bounded, [(path, options)])
-        found: tuple[list[Recording], list[str]] = outcome.result()
+        found: list[Recording] = outcome.result()
     return found
 
 
-def _bounded(
-    _: object, item: tuple[Path, Options], tell: Tell
-) -> tuple[list[Recording], list[str]]:
+def _bounded(_: object, item: tuple[Path, Options], tell: Tell) -> list[Recording]:
     if sys.platform != "win32":
         import resource
 
@@ -51,14 +48,12 @@ def _bounded(
     return _read(*item)
 
 
-def _read(path: Path, options: Options) -> tuple[list[Recording], list[str]]:
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
-        found = read(path, informative=False, **options)
+def _read(path: Path, options: Options) -> list[Recording]:
+    found = read(path, informative=False, **options)
     if sum(len(one) * len(one.channels) for one in found) > MOST_CELLS:
         raise DataError(
             f"it holds more than {MOST_CELLS:,} numbers",
             file=path,
             remedy="cut or thin it, or use the command line",
         )
-    return found, [str(one.message) for one in caught if issubclass(one.category, DataWarning)]
+    return found

@@ -123,11 +123,10 @@ async def _take(desk: Desk, held: str, shown: str, options: dict[str, Any]) -> b
     call = scripts.read_call(str(path), options)
 
     def taken() -> tuple[int, list[str]]:
-        recordings, notes = read_upload(path, options)
+        recordings = read_upload(path, options)
         added: list[str] = []
         for recording in recordings:
-            entry = desk.workspace.add(recording, origin=f"file {shown}", call=call, notes=notes)
-            added += entry.notes
+            added += desk.workspace.add(recording, origin=f"file {shown}", call=call).notes
         desk.workspace.warm()
         return len(recordings), list(dict.fromkeys(added))
 
@@ -393,6 +392,7 @@ def _pieces(desk: Desk, name: str, cuts: list[tuple[int, int]]) -> None:
                 call=f"{entry.call}[0].slice({low}, {high})",
                 role=entry.role,
                 name=name,
+                notes=entry.notes,
             )
     desk.workspace.set_role(name, "unused")
     desk.did(f"cut {name}", f"recording.slice(...), {cuts}")

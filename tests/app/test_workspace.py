@@ -135,3 +135,11 @@ def test_results_are_in_the_order_of_the_choice(tmp_path: Path) -> None:
     workspace.write_json("results", "c", {"status": "failed"})
     assert [row["name"] for row in workspace.results()] == ["a", "b", "d"]
     assert json.loads((tmp_path / "results" / "a.json").read_text())["test"]["rmse"] == 2.0
+
+
+def test_notes_of_reading_stay_with_a_recording(tmp_path: Path) -> None:
+    workspace = Workspace(tmp_path)
+    given = recording().with_meta(notes=["the step was assumed"])
+    assert workspace.add(given, origin="", call="", name="run").notes == ("the step was assumed",)
+    workspace.set_role("run", "test")
+    assert Workspace(tmp_path).entry("run").notes == ("the step was assumed",)

@@ -25,7 +25,7 @@ import numpy as np
 import pytest
 
 from mckibben import DataError, Recording
-from mckibben.app import guard, kept
+from mckibben.app import guard, kept, reading
 from mckibben.app.guard import Guard, checked_token
 from mckibben.app.jobs import Job, Jobs
 from mckibben.app.pages.models import _judged
@@ -162,6 +162,23 @@ def test_archives_and_strangers_are_refused_and_not_kept(name: str, tmp_path: Pa
     with pytest.raises(DataError, match=r"unpack it|export as CSV"):
         workspace.keep_upload(name, packed.getvalue())
     assert not list((tmp_path / "uploads").iterdir())
+
+
+def test_a_large_file_is_read_in_a_process_with_bounds(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "run.csv"
+    write(recording(), path)
+    monkeypatch.setattr(reading, "MOST_CELLS", 99)
+    with pytest.raises(DataError, match="more than 99 numbers"):
+        reading.read_upload(path, {})
+    monkeypatch.undo()
+    monkeypatch.setattr(reading, "LARGE", 0)
+    (found,) = reading.read_upload(path, {})
+    assert found == recording().with_meta(**found.meta)
+    path.write_text("pressure_bar\nx\n")
+    with pytest.raises(DataError, match="Remedy"):
+        reading.read_upload(path, {})
 
 
 # -- others on this machine ------------------------------------------------------------------

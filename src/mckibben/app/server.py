@@ -5,9 +5,10 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import socket
+import sys
 import threading
 import webbrowser
-from collections.abc import Callable, Iterator
+from collections.abc import Awaitable, Callable, Iterator
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
@@ -98,14 +99,22 @@ def build(workspace: Workspace, jobs: Jobs) -> None:
     with holders["Data"]:
         _module("Data").build(desk)
 
-    async def opened(event: Any) -> None:
-        """Build a page when it is first opened."""
+    def opened(event: Any) -> Awaitable[None] | None:
+        """Build a page when it is first opened: at once, where its module is there."""
         name = str(event.value)
-        if name in PAGES and name not in built:
-            built.add(name)
-            module = await asyncio.to_thread(_module, name)
-            with holders[name]:
-                module.build(desk)
+        if name not in PAGES or name in built:
+            return None
+        built.add(name)
+        if not hasattr(sys.modules.get(_place(name)), "build"):
+            return load(name)
+        with holders[name]:
+            _module(name).build(desk)
+        return None
+
+    async def load(name: str) -> None:
+        module = await asyncio.to_thread(_module, name)
+        with holders[name]:
+            module.build(desk)
 
     panels.on_value_change(opened)
     _log(desk)
@@ -141,7 +150,8 @@ def build(workspace: Workspace, jobs: Jobs) -> None:
     async def match() -> None:
         """Draw figures for the theme that the browser has chosen."""
         query = "window.matchMedia('(prefers-color-scheme: dark)').matches"
-        desk.dark = bool(await ui.run_javascript(query, timeout=5.0))
+        with contextlib.suppress(TimeoutError):  # of a browser that is busy: it stays light
+            desk.dark = bool(await ui.run_javascript(query, timeout=5.0))
         dark.set_value(desk.dark)
         if desk.dark:
             desk.changed("theme")
@@ -165,7 +175,11 @@ def _switch(desk: Desk, dark: ui.dark_mode) -> None:
 
 
 def _module(name: str) -> ModuleType:
-    return import_module(f"mckibben.app.pages.{PAGES[name][1]}")
+    return import_module(_place(name))
+
+
+def _place(name: str) -> str:
+    return f"mckibben.app.pages.{PAGES[name][1]}"
 
 
 def _log(desk: Desk) -> None:

@@ -438,8 +438,7 @@ class Workspace:
 
         chosen = self.new_name("recordings", name or recording.name)
         path = self._recording_path(chosen, len(recording))
-        told = recording.meta.get("notes", [])
-        notes = list(dict.fromkeys([*(told if isinstance(told, list) else []), *notes]))
+        notes = dict.fromkeys([*recording.notes, *notes])
         try:
             write(recording.with_meta(name=chosen), path)
             self._describe(

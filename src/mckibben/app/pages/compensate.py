@@ -12,6 +12,7 @@ from nicegui.events import MouseEventArguments, UploadEventArguments
 from mckibben.app import plots
 from mckibben.app.desk import Desk, guarded, kept, named, on_event, tell
 from mckibben.app.guard import LARGEST_UPLOAD, TOO_LARGE
+from mckibben.app.reading import read_upload
 from mckibben.app.work import compensated, reference_recording
 from mckibben.errors import DataError, MckibbenError
 from mckibben.files import read, write
@@ -170,7 +171,7 @@ class Editor:
 
     async def _loaded(self, event: UploadEventArguments) -> None:
         path = await kept(self.desk, event.file)
-        found = await asyncio.to_thread(lambda: read(path, informative=False))
+        found = await asyncio.to_thread(read_upload, path, {})
         if len(found) != 1:
             raise DataError("it holds several recordings", file=path, remedy="give a file of one")
         self.file = found[0]

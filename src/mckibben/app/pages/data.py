@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import warnings
 from typing import TYPE_CHECKING, Any
 
 from nicegui import ui
@@ -13,7 +12,7 @@ from mckibben import registry
 from mckibben.app import scripts
 from mckibben.app.desk import LONGEST, Desk, guarded, kept, labelled, named, on_event, tell
 from mckibben.app.guard import LARGEST_UPLOAD, TOO_LARGE
-from mckibben.errors import DataError, DataWarning, MckibbenError
+from mckibben.errors import DataError, MckibbenError
 
 if TYPE_CHECKING:
     from mckibben.files.table import Column
@@ -118,20 +117,16 @@ async def _uploaded(desk: Desk, event: UploadEventArguments) -> None:
 
 async def _take(desk: Desk, held: str, shown: str, options: dict[str, Any]) -> bool:
     """Read an uploaded file and add its recordings; where that fails, ask how it is to be read."""
-    from mckibben.files import read
+    from mckibben.app.reading import read_upload
 
     path = desk.workspace.path("uploads", held)
     call = scripts.read_call(str(path), options)
 
     def taken() -> tuple[int, list[str]]:
-        with warnings.catch_warnings(record=True) as caught:
-            warnings.simplefilter("always")
-            recordings = read(path, informative=False, **options)
-        notes = [str(one.message) for one in caught if issubclass(one.category, DataWarning)]
+        recordings = read_upload(path, options)
         added: list[str] = []
         for recording in recordings:
-            entry = desk.workspace.add(recording, origin=f"file {shown}", call=call, notes=notes)
-            added += entry.notes
+            added += desk.workspace.add(recording, origin=f"file {shown}", call=call).notes
         desk.workspace.warm()
         return len(recordings), list(dict.fromkeys(added))
 
@@ -153,10 +148,13 @@ async def _ask(
     desk: Desk, held: str, shown: str, options: dict[str, Any], error: MckibbenError
 ) -> None:
     """Show why a file could not be read, what is in it, and let columns and units be named."""
+    from mckibben.app.reading import LARGE
     from mckibben.files import formats
 
     path = desk.workspace.path("uploads", held)
     try:
+        if path.stat().st_size > LARGE:  # it is not read again in this process
+            raise error
         tables = await asyncio.to_thread(formats.tables, path)
         columns = [column.header for column in tables[0].columns]
         first = [
@@ -394,6 +392,7 @@ def _pieces(desk: Desk, name: str, cuts: list[tuple[int, int]]) -> None:
                 call=f"{entry.call}[0].slice({low}, {high})",
                 role=entry.role,
                 name=name,
+                notes=entry.notes,
             )
     desk.workspace.set_role(name, "unused")
     desk.did(f"cut {name}", f"recording.slice(...), {cuts}")

@@ -12,6 +12,7 @@ import pytest
 
 pytest.importorskip("nicegui")
 
+from nicegui import Client
 from nicegui.testing import User, user_simulation
 
 from mckibben import DataError
@@ -36,8 +37,12 @@ def visit(workspace: Workspace, look: Callable[[User], Awaitable[None]]) -> None
             build(workspace, Jobs(workspace))
 
         async with user_simulation(root) as user:
-            await user.open("/")
-            await look(user)
+            try:
+                await user.open("/")
+                await look(user)
+            finally:
+                for client in Client.instances.values():
+                    client.outbox.stop()  # it can swallow a cancellation, and then would wait for ever
 
     kept = dict(os.environ)
     asyncio.run(run())

@@ -24,6 +24,7 @@ from mckibben.report.drawing import Curve, Drawing, Panel
 from mckibben.rigs import describe, load_rig
 from mckibben.signals import triangle
 from tests.attacks.commands import call
+from tests.tools import needs
 
 MODEL, RUN, INVERSE, RIG = "model.json", "run.csv", "inverse.json", "rail.toml"
 
@@ -254,7 +255,7 @@ def test_digests_that_the_user_took_make_nothing_ours(folder: Path) -> None:
     assert sorted(path.name for path in out.iterdir()) == [MANIFEST, "thesis.csv"]
 
 
-@pytest.mark.skipif(not shutil.which("sha256sum"), reason="no sha256sum here")
+@needs("sha256sum")
 def test_manifests_are_read_by_sha256sum(tmp_path: Path) -> None:
     Results(tmp_path).write_text("report.html", "new")
     check = ["sha256sum", "--check", "--strict", MANIFEST]

@@ -51,6 +51,8 @@ def _unpacked(file: BufferedReader, column: Fields, rows: int, footer: int, budg
     at, dictionary = column[9, _I64], column.get((11, _I64), 0)
     at = dictionary if 0 < dictionary < at else at
     end, left, total = at + column[7, _I64], column[5, _I64], 0
+    if rows == left == 0:
+        return 0  # which may be said to be nowhere
     if not 0 < at <= end <= footer:
         raise ValueError("its pages are outside of it")
     if len(column[3, _LIST]) == 1 and left > rows:

@@ -13,6 +13,7 @@ import subprocess
 import sys
 import zlib
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -184,6 +185,107 @@ def endless_heap_hdf5(path: Path) -> None:
     path.write_bytes(content)
 
 
+def disguised_heap_hdf5(path: Path) -> None:
+    """The same, with something in bytes that are kept for later versions."""
+    endless_heap_hdf5(path)
+    content = bytearray(path.read_bytes())
+    content[content.index(b"GCOL") + 5] = 1
+    path.write_bytes(content)
+
+
+def narrow_heap_hdf5(path: Path) -> None:
+    """The same again, where lengths have four bytes, and what is behind them nobody reads."""
+    import h5py
+
+    about = h5py.h5p.create(h5py.h5p.FILE_CREATE)
+    about.set_sizes(4, 4)
+    with h5py.File(h5py.h5f.create(bytes(path), h5py.h5f.ACC_TRUNC, fcpl=about)) as file:
+        file["pressure"] = np.arange(20.0)
+        file["pressure"].attrs["units"] = "bar"
+    content = bytearray(path.read_bytes())
+    free = content.index(b"GCOL") + 16 + 16 + 8
+    content[free : free + 16] = bytes(12) + b"\1\0\0\0"
+    path.write_bytes(content)
+
+
+def many_heaps_hdf5(path: Path) -> None:
+    """Let what looks like heaps begin everywhere within each other."""
+    import h5py
+
+    one = b"GCOL\1\0\0\0" + struct.pack("<QHHIQ", 10**5, 1, 1, 0, 16)
+    with h5py.File(path, "w") as file:
+        file["pressure_bar"] = np.frombuffer(one * 12_500, "f8")
+
+
+def endless_room_hdf5(path: Path) -> None:
+    """Let a piece of free room among the names lead to itself."""
+    import h5py
+
+    with h5py.File(path, "w") as file:
+        file["pressure"] = np.arange(20.0)
+    content = bytearray(path.read_bytes())
+    free, at = struct.unpack_from("<QQ", content, content.index(b"HEAP") + 16)
+    struct.pack_into("<Q", content, at + free, free)
+    path.write_bytes(content)
+
+
+def indexed(path: Path) -> tuple[bytearray, int, bytes]:
+    """Write a vector of 70 chunks; return the file, where its index begins, and that as it is."""
+    import h5py
+
+    with h5py.File(path, "w") as file:
+        file.create_dataset("pressure_bar", data=np.arange(70.0), chunks=(1,))
+    content = bytearray(path.read_bytes())
+    top = content.index(b"TREE\1\1")
+    return content, top, bytes(content[top : top + 24 + 65 * 32])
+
+
+def returning_index_hdf5(path: Path) -> None:
+    """Let an index be below itself."""
+    content, top, _ = indexed(path)
+    struct.pack_into("<Q", content, top + 48, top)
+    path.write_bytes(content)
+
+
+def repeating_index_hdf5(path: Path) -> None:
+    """Let each of six nodes name the next many times."""
+    content, top, node = indexed(path)
+    (below,) = struct.unpack_from("<Q", node, 48)
+    key = struct.pack("<IIQQ", 8, 0, 0, 0)
+    for level in range(1, 7):
+        head = b"TREE\1" + struct.pack("<BHqq", level, 64, -1, -1)
+        at = len(content) if level < 6 else top
+        node = head + (key + struct.pack("<Q", below)) * 64 + key
+        content[at : at + len(node)] = node
+        below = at
+    struct.pack_into("<Q", content, 40, len(content))
+    path.write_bytes(content)
+
+
+def long_places_hdf5(path: Path) -> None:
+    """Keep many vectors behind long names, each of which has those in its place."""
+    import h5py
+
+    with h5py.File(path, "w") as file:
+        group: Any = file
+        for _ in range(20):
+            group = group.create_group("g" * 50_000)
+        for i in range(1000):
+            group[str(i)] = np.arange(20.0)
+
+
+def nested_type_hdf5(path: Path) -> None:
+    """Let a type be of types, thousands deep, which are copied for each other."""
+    import h5py
+
+    kind = h5py.h5t.IEEE_F64LE
+    for _ in range(1600):
+        kind = h5py.h5t.vlen_create(kind)
+    with h5py.File(path, "w", libver="latest") as file:
+        file["pressure_bar"] = np.arange(20.0)
+        h5py.h5d.create(file.id, b"p", kind, h5py.h5s.create_simple((20,)))
+
+
 def packed_heap_hdf5(path: Path) -> None:
     """Say of the names in a group that they are packed."""
     import h5py
@@ -231,6 +333,59 @@ def wrong_pages_parquet(path: Path) -> None:
     path.write_bytes(content)
 
 
+def thrift(*fields: tuple[int, bytes | int]) -> bytes:
+    """Return a struct in Thrift's compact protocol, of numbers and structs."""
+    content, last = b"", 0
+    for number, value in fields:
+        kind = 5 if isinstance(value, int) else 12
+        content += bytes([(number - last) << 4 | kind])
+        content += varint(2 * value) if isinstance(value, int) else value
+        last = number
+    return content + b"\0"
+
+
+def varint(value: int) -> bytes:
+    return bytes([value & 127 | 128]) + varint(value >> 7) if value > 127 else bytes([value])
+
+
+def page_before_parquet(path: Path, *, kind: int = 1, name: str = "pressure_bar") -> None:
+    """Put a page before those of samples, of a kind that has none but says that it has all.
+
+    The one behind it unpacks to zeros without end.
+    """
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    n, size = 4000, 2**29
+    many = pa.Codec("zstd").compress(bytes(size)).to_pybytes()
+    few = pa.Codec("zstd").compress(bytes(16)).to_pybytes()
+    about = thrift((1, n), (2, 0), (3, 3), (4, 3))
+    pages = b"" if not kind else thrift((1, kind), (2, 16), (3, len(few)), (5, about)) + few
+    pages += thrift((1, 0), (2, size), (3, len(many)), (5, about)) + many
+    table = pa.table({"time_s": np.arange(n) * 1.0, name: np.random.default_rng(1).random(n)})
+    pq.write_table(table, path, compression="zstd", use_dictionary=False, write_statistics=False)
+    content, column = bytearray(path.read_bytes()), pq.read_metadata(path).row_group(0).column(1)
+    at = column.data_page_offset
+    assert len(pages) < column.total_compressed_size
+    content[at : at + len(pages)] = pages
+    path.write_bytes(content)
+
+
+def many_fields_parquet(path: Path) -> None:
+    """Describe a file by fields that nobody knows."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    pq.write_table(pa.table({"pressure_bar": np.arange(20.0)}), path)
+    content = path.read_bytes()
+    size = int.from_bytes(content[-8:-4], "little")
+    about = content[-8 - size : -9]  # without its end
+    about += b"\x09" + varint(200) + b"\xfc" + varint(200) + (b"\x11" * 30_000 + b"\0") * 200
+    path.write_bytes(
+        content[: -8 - size] + about + b"\0" + struct.pack("<I", len(about) + 1) + b"PAR1"
+    )
+
+
 def packed_zeros(n: int) -> bytes:
     """Return zeros as zlib packs them; those in the middle are copies of what stands before."""
     packing = zlib.compressobj(1)
@@ -269,6 +424,46 @@ def many_fields_mat(path: Path) -> None:
     n = limits.MOST_PARTS + 1
     about = head(2, b"s", 1, 1) + element(5, struct.pack("<i", 1)) + element(1, b"a" * n)
     path.write_bytes(MAT + element(14, about + struct.pack("<II", 14, 0) * n))
+
+
+def packed_mat(path: Path, content: bytes) -> None:
+    packed = zlib.compress(element(14, content), 1)
+    path.write_bytes(MAT + struct.pack("<II", 15, len(packed)) + packed)
+
+
+def many_axes_mat(path: Path) -> None:
+    """Multiply a million sizes."""
+    shape = element(5, b"\xff\xff\xff\x7f" * 10**6)
+    packed_mat(path, element(6, struct.pack("<II", 6, 0)) + shape + element(1, b"p"))
+
+
+def many_flags_mat(path: Path) -> None:
+    packed_mat(path, element(6, bytes(7 * 10**7)) + element(5, bytes(8)) + element(1, b"p"))
+
+
+def long_places_mat(path: Path) -> None:
+    """Give the many fields of a struct places with its long name in them."""
+    n = 2000
+    names = b"".join(b"%07d\0" % i for i in range(n))
+    fields = element(14, head(6, b"", 1, 20) + element(9, bytes(160))) * n
+    about = head(2, b"x" * 10**6, 1, 1) + element(5, struct.pack("<i", 8)) + element(1, names)
+    packed_mat(path, about + fields)
+
+
+def many_letters_mat(path: Path) -> None:
+    n = 7 * 10**7
+    packed_mat(path, head(4, b"t", n, 1) + element(1, b"a" * n))
+
+
+def many_words_mat(path: Path) -> None:
+    """Have a word for each letter."""
+    n = 9 * 10**6
+    packed_mat(path, head(4, b"t", n, 1) + element(4, b"\x00\x4e" * n))
+
+
+def returning_mat(path: Path) -> None:
+    """Lead from a variable of version 4 to itself, by a size that is negative."""
+    path.write_bytes(struct.pack("<iiiii", 0, -1, 3, 0, 4) + b"abc\0" + bytes(200))
 
 
 def bytes_for_doubles_mat(path: Path) -> None:
@@ -326,13 +521,31 @@ REFUSED: dict[str, tuple[Callable[[Path], None], str]] = {
     "wide_chunks.h5": (wide_chunks_hdf5, "none were measured"),
     "deep.h5": (deep_hdf5, "nested more than"),
     "endless.h5": (endless_heap_hdf5, "have no end"),
+    "disguised.h5": (disguised_heap_hdf5, "have no end"),
+    "narrow.h5": (narrow_heap_hdf5, "other than eight bytes"),
+    "many_heaps.h5": (many_heaps_hdf5, "have no end"),
+    "room.h5": (endless_room_hdf5, "have no end"),
+    "returning.h5": (returning_index_hdf5, "leads back"),
+    "repeating.h5": (repeating_index_hdf5, "have no end"),
+    "long_places.h5": (long_places_hdf5, "more than 4096 characters"),
+    "nested.h5": (nested_type_hdf5, "read"),
     "packed_heap.h5": (packed_heap_hdf5, "are packed"),
     "many_links.h5": (many_links_hdf5, "more than 10000 parts"),
     "zeros.parquet": (zeros_parquet, "none were measured"),
     "wrong_pages.parquet": (wrong_pages_parquet, "a page is longer than its column"),
+    "page.parquet": (page_before_parquet, "unpack to more"),
+    "words.parquet": (partial(page_before_parquet, kind=2), "damaged"),
+    "dot.parquet": (partial(page_before_parquet, kind=0, name="pressure.bar"), "unpack to more"),
+    "many_fields.parquet": (many_fields_parquet, "too many fields"),
     "zeros.mat": (zeros_mat, "none were measured"),
     "exact.mat": (exact_mat, "none were measured"),
     "many_fields.mat": (many_fields_mat, "more than 10000 parts"),
+    "many_axes.mat": (many_axes_mat, "more than 32 axes"),
+    "many_flags.mat": (many_flags_mat, "more than 32 axes"),
+    "long_places.mat": (long_places_mat, "more than 4096 characters"),
+    "many_letters.mat": (many_letters_mat, "none were measured"),
+    "many_words.mat": (many_words_mat, "none were measured"),
+    "returning.mat": (returning_mat, "is damaged"),
     "bytes.mat": (bytes_for_doubles_mat, "none were measured"),
     "deep.mat": (deep_mat, "nested more than"),
     "declared.tdms": (declared_tdms, "it cannot be read"),
@@ -454,6 +667,11 @@ def test_vectors_of_matlab_files_are_those_that_scipy_reads(tmp_path: Path) -> N
     kinds = ("f8", "f4", "i1", "u1", "i2", "u2", "i4", "u4", "i8", "u8", "?")
     content: dict[str, Any] = {f"v{kind.strip('?')}": numbers.astype(kind) for kind in kinds}
     content |= {"matrix": np.eye(3), "complex": numbers * 1j, "words": ["up", "down"]}
+    older = {"v": numbers.astype("f4"), "matrix": np.eye(3), "words": ["up", "down"], "w": numbers}
+    savemat(tmp_path / "4.mat", older | {"complex": numbers * 1j}, format="4")
+    (recording,) = mckibben.read(tmp_path / "4.mat")
+    assert list(recording.channels) == ["v", "w"]
+    assert all(np.array_equal(recording[name], numbers) for name in "vw")
     content |= {
         "cell": np.array([numbers, "a"], dtype=object),
         "deep": {"er": {"p": numbers * 0.5}},

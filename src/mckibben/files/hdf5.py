@@ -16,23 +16,16 @@ from typing import Any, NoReturn
 import numpy as np
 
 from mckibben.errors import DataError
+from mckibben.files import hdf5_pieces
 from mckibben.files.limits import MOST_TEXT, Budget
 from mckibben.files.table import Column, Table, column, of_equal_length
-
-_HEAP = b"GCOL\1\0\0\0"
-_FRACTAL = b"FRHP\0"
-_BLOCK = 2**22
-_KEPT = 8
-"""Bytes before a block that are looked at with it: a heap's first nine, less one."""
-
-_SIGNATURE = b"\x89HDF\r\n\x1a\n"
 
 
 def is_hdf5(file: BufferedReader) -> bool:
     """Tell whether a file is HDF5, also behind the 512 bytes that MATLAB puts in front."""
     start = file.read(520)
     file.seek(0)
-    return _SIGNATURE in (start[:8], start[512:])
+    return hdf5_pieces.SIGNATURE in (start[:8], start[512:])
 
 
 def read(file: BufferedReader, path: Path) -> list[Table]:
@@ -46,14 +39,17 @@ def read(file: BufferedReader, path: Path) -> list[Table]:
             remedy="pip install mckibben[hdf5]",
         ) from None
 
-    _refuse_endless(file)
+    hdf5_pieces.look(file)
     budget = Budget(file, path)
     found: dict[str, Column] = {}
+    numbers = (h5py.h5t.INTEGER, h5py.h5t.FLOAT, h5py.h5t.ENUM, h5py.h5t.BITFIELD)
     with h5py.File(file, "r") as tree:
         for place, data in _data_sets(tree, budget):
             _refuse_elsewhere(place, data, path)
             vector = data.ndim == 1 or (data.ndim == 2 and 1 in data.shape)
-            if vector and data.dtype.kind in "biuf" and not _is_text(data):
+            # types can be made of types without end: those are not asked for more
+            number = data.id.get_type().get_class() in numbers
+            if vector and number and data.dtype.kind in "biuf" and not _is_text(data):
                 budget.samples(data.size)
                 if data.chunks is not None:
                     steps = zip(data.shape, data.chunks, strict=True)
@@ -71,48 +67,6 @@ def read(file: BufferedReader, path: Path) -> list[Table]:
     ]
 
 
-def _refuse_endless(file: BufferedReader) -> None:
-    """Refuse heaps that HDF5 would never come to the end of.
-
-    A piece of one may have no length, and one that is packed unpacks to as much as it likes; h5py
-    packs none.
-    """
-    at, last = 0, b""
-    while block := file.read(_BLOCK):
-        window = last + block
-        start = at - len(last)
-        found = window.find(_HEAP)
-        while found >= 0:
-            _walk_heap(file, start + found)
-            found = window.find(_HEAP, found + 1)
-        _refuse_packed_heap(window)
-        at += len(block)
-        file.seek(at)
-        last = window[-_KEPT:]
-    file.seek(0)
-
-
-def _refuse_packed_heap(window: bytes) -> None:
-    found = window.find(_FRACTAL)
-    while found >= 0:
-        if any(window[found + 7 : found + 9]):  # how long the description of its filters is
-            raise ValueError("its names or attributes are packed")
-        found = window.find(_FRACTAL, found + 1)
-
-
-def _walk_heap(file: BufferedReader, at: int) -> None:
-    file.seek(at + len(_HEAP))
-    size = int.from_bytes(file.read(8), "little")
-    heap, inside = file.read(max(0, min(size, 2**32) - 16)), 0
-    while inside + 16 <= len(heap):
-        index = int.from_bytes(heap[inside : inside + 2], "little")
-        length = int.from_bytes(heap[inside + 8 : inside + 16], "little")
-        step = 16 + length + -length % 8 if index else length
-        if not 0 < step < 2**63:
-            raise ValueError("its texts have no end")
-        inside += step
-
-
 def _data_sets(tree: Any, budget: Budget) -> Iterator[tuple[str, Any]]:
     """Return every data set once, in the order of names.
 
@@ -120,26 +74,28 @@ def _data_sets(tree: Any, budget: Budget) -> Iterator[tuple[str, Any]]:
     """
     import h5py
 
-    seen: set[tuple[int, ...]] = set()
-    waiting: list[tuple[tuple[str, ...], Any, bytes]] = [((), tree.id, b".")]
+    seen: set[int] = set()
+    waiting: list[tuple[str, Any, bytes, int]] = [("", tree.id, b".", 0)]
     while waiting:
-        place, parent, name = waiting.pop()
-        where = h5py.h5o.get_info(parent, name)
-        if (where.fileno, where.addr) in seen:
+        place, parent, name, at = waiting.pop()
+        if at in seen:
             continue
-        seen.add((where.fileno, where.addr))
+        seen.add(at)
         node = h5py.h5o.open(parent, name)
         if isinstance(node, h5py.h5d.DatasetID):
-            yield "/".join(place), h5py.Dataset(node)
+            yield place, h5py.Dataset(node)
         elif isinstance(node, h5py.h5g.GroupID):
             budget.parts(node.get_num_objs())
-            budget.depth(len(place))
+            budget.depth(place.count("/") + bool(place))
             names: list[bytes] = []
             node.links.iterate(names.append)
             for name in reversed(names):
                 hidden = not place and name.startswith(b"#")  # what MATLAB refers to
-                if not hidden and node.links.get_info(name).type == h5py.h5l.TYPE_HARD:
-                    waiting.append(((*place, name.decode("utf-8", "replace")), node, name))
+                link = node.links.get_info(name)
+                if not hidden and link.type == h5py.h5l.TYPE_HARD:
+                    below = (f"{place}/" if place else "") + name.decode("utf-8", "replace")
+                    budget.place(below)
+                    waiting.append((below, node, name, link.u))
 
 
 def _refuse_elsewhere(place: str, data: Any, path: Path) -> None:

@@ -34,6 +34,9 @@ MOST_PIECES = 500_000
 MOST_DEPTH = 32
 """Groups, structs or cells within each other."""
 
+LONGEST_PLACE = 4096
+"""Characters of a place in a file: names of parts within each other."""
+
 MOST_TEXT = 2**16
 """Characters of a text about the recording, such as a unit; longer ones are left out."""
 
@@ -104,4 +107,13 @@ class Budget:
                 f"its parts are nested more than {MOST_DEPTH} deep",
                 file=self._path,
                 remedy="save each channel as a vector of its own",
+            )
+
+    def place(self, of: str) -> None:
+        """Refuse places of names without end."""
+        if len(of) > LONGEST_PLACE:
+            raise DataError(
+                f"names of its parts have more than {LONGEST_PLACE} characters",
+                file=self._path,
+                remedy="give shorter names",
             )

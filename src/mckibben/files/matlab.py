@@ -1,6 +1,6 @@
 """MATLAB files: vectors, or structs of them; version 7.3 is HDF5 underneath.
 
-Version 5 is read here, by "MAT-File Format" (MathWorks): what is no vector is passed over unread,
+Versions 4 and 5 are read here, by "MAT-File Format" (MathWorks): what is no vector is passed over,
 what a variable unpacks to is bounded, and structs within structs are followed to a certain depth.
 """
 
@@ -26,11 +26,19 @@ _MATRIX, _COMPRESSED = 14, 15
 _NUMBERS = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8"}
 _NUMBERS |= {12: "i8", 13: "u8"}
 _TEXTS = {1: "latin-1", 2: "latin-1", 4: "utf-16", 16: "utf-8", 17: "utf-16", 18: "utf-32"}
+_WIDTHS = {1: 1, 2: 1, 4: 2, 16: 1, 17: 2, 18: 4}
+"""Bytes that a letter takes at least."""
+_LINE = 8
+"""Samples that each line of a text counts for: Python keeps it apart."""
 _CELL, _STRUCT, _OBJECT, _CHAR = 1, 2, 3, 4
 _NUMERIC = range(6, 16)
 _WITHOUT_SHAPE = (16, 17)
 """Functions, and objects of newer kinds."""
 _COMPLEX = 0x800
+_MOST_AXES = 32
+_NUMBERS_4 = ("f8", "f4", "i4", "i2", "u2", "u1")
+_FULL, _WORDS, _SPARSE = range(3)
+"""Of version 4."""
 
 
 def read(file: BufferedReader, path: Path) -> list[Table]:
@@ -40,37 +48,69 @@ def read(file: BufferedReader, path: Path) -> list[Table]:
     start = file.read(_HEADER)
     order = {b"IM": "<", b"MI": ">"}.get(start[126:])
     if order is None or 0 in start[:4]:
-        found = _version_4(file, Budget(file, path))
+        file.seek(0)
+        order = "<" if 0 <= int.from_bytes(start[:4], "little", signed=True) <= 5000 else ">"
+        found = _Version4(order, Budget(file, path)).read(file)
     else:
         found = _Version5(order, Budget(file, path)).read(file)
     return [of_equal_length(found, path, meta={})]
 
 
-def _version_4(file: BufferedReader, budget: Budget) -> dict[str, Column]:
-    """Return the vectors of a file of version 4, which neither packs nor nests."""
-    from scipy.io import loadmat, whosmat
-
-    file.seek(0)
-    declared = whosmat(file)  # type: ignore[arg-type]  # the stubs know no files that are open
-    budget.parts(len(declared))
-    budget.samples(sum(math.prod(shape) for _, shape, _ in declared))
-    file.seek(0)
-    variables = loadmat(file, squeeze_me=True)  # type: ignore[arg-type]
-    arrays = {name: np.asarray(value) for name, value in variables.items()}
-    return {
-        name: column(name, array)
-        for name, array in arrays.items()
-        if not name.startswith("__") and array.ndim == 1 and array.dtype.kind in "biufU"
-    }
-
-
-class _Version5:
-    """The vectors of a file of version 5, by the dotted place where they stand."""
+class _Vectors:
+    """Those that were found, by the dotted place where they stand."""
 
     def __init__(self, order: str, budget: Budget) -> None:
         self._order = order
         self._budget = budget
         self._found: dict[str, Column] = {}
+
+    def _add(self, place: str, shape: tuple[int, ...], cells: NDArray[Any]) -> None:
+        """Add numbers, or the lines of a table of characters, if they are a vector."""
+        if math.prod(shape) == 1:
+            return
+        if cells.size != math.prod(shape):
+            raise ValueError(f"{cells.size} elements in a matrix of {shape}")
+        self._budget.samples(cells.size)
+        if cells.dtype.kind == "U" and cells.size:
+            self._budget.samples(_LINE * (cells.size // shape[-1]))
+            lines = np.ascontiguousarray(cells.reshape(shape, order="F"))
+            cells, shape = lines.view(f"U{shape[-1]}")[..., 0], shape[:-1]
+        if sum(n != 1 for n in shape) == 1 or not cells.size:
+            self._found[place] = column(place.rpartition(".")[2], cells.reshape(-1))
+
+
+class _Version4(_Vectors):
+    """The vectors of a file of version 4, which neither packs nor nests."""
+
+    def read(self, file: BufferedReader) -> dict[str, Column]:
+        """Read the variables from where the file stands."""
+        while head := file.read(20):
+            kind, *shape, imaginary, length = struct.unpack(f"{self._order}5i", head)
+            number, of = divmod(kind, 10)
+            if of not in (_FULL, _WORDS, _SPARSE) or min(*shape, length) < 0:
+                raise ValueError("the head of a variable is damaged")
+            self._budget.parts(1)
+            name = file.read(length).partition(b"\0")[0].decode("latin-1")
+            self._budget.place(name)
+            cells = np.dtype(self._order + _NUMBERS_4[number % 100])
+            size = math.prod(shape) * cells.itemsize * (2 if imaginary else 1)
+            data = file.read(size)
+            if len(data) < size:
+                raise ValueError("a variable is cut off")
+            if of == _SPARSE or imaginary:
+                continue
+            values = np.frombuffer(data, cells)
+            if of == _WORDS:
+                values = _letters(values.astype(np.uint8).tobytes().decode("latin-1"))
+            self._add(name, tuple(shape), values)
+        return self._found
+
+
+class _Version5(_Vectors):
+    """The vectors of a file of version 5."""
+
+    def __init__(self, order: str, budget: Budget) -> None:
+        super().__init__(order, budget)
         self._bytes = 0
 
     def read(self, file: BufferedReader) -> dict[str, Column]:
@@ -130,6 +170,7 @@ class _Version5:
         if not place and (not name or name.startswith("__")):  # what functions keep
             return
         place = place or name
+        self._budget.place(place)
         if of in _NUMERIC and not flags & _COMPLEX:
             kind, data = next(elements)
             self._add(place, shape, np.frombuffer(data, self._order + _NUMBERS[kind]))
@@ -154,23 +195,16 @@ class _Version5:
         if kind == _MATRIX and content:
             self._collect(place, content, depth + 1)
 
-    def _add(self, place: str, shape: tuple[int, ...], cells: NDArray[Any]) -> None:
-        """Add numbers, or the lines of a table of characters, if they are a vector."""
-        if math.prod(shape) == 1:
-            return
-        if cells.size != math.prod(shape):
-            raise ValueError(f"{cells.size} elements in a matrix of {shape}")
-        self._budget.samples(cells.size)
-        if cells.dtype.kind == "U" and cells.size:
-            lines = np.ascontiguousarray(cells.reshape(shape, order="F"))
-            cells, shape = lines.view(f"U{shape[-1]}")[..., 0], shape[:-1]
-        if sum(n != 1 for n in shape) == 1 or not cells.size:
-            self._found[place] = column(place.rpartition(".")[2], cells.reshape(-1))
-
     def _characters(self, kind: int, data: memoryview) -> NDArray[np.str_]:
         wide = {"<": "-le", ">": "-be"}[self._order] if kind in (4, 17, 18) else ""
-        text = bytes(data).decode(_TEXTS[kind] + wide, "replace")
-        return np.array(text).reshape(1).view("U1") if text else np.empty(0, "U1")
+        self._budget.at_once(len(data) // _WIDTHS[kind])
+        return _letters(bytes(data).decode(_TEXTS[kind] + wide, "replace"))
 
     def _integers(self, data: memoryview) -> tuple[int, ...]:
+        if len(data) > 4 * _MOST_AXES:
+            raise ValueError(f"a matrix of more than {_MOST_AXES} axes")
         return struct.unpack(f"{self._order}{len(data) // 4}i", data)
+
+
+def _letters(text: str) -> NDArray[np.str_]:
+    return np.array(text).reshape(1).view("U1") if text else np.empty(0, "U1")

@@ -18,6 +18,13 @@ _DEPTH = 16
 _HEADER = 2**14
 """Bytes of a page's header, with the extremes of its samples."""
 
+_WORDS = 2
+_ABOUT = {0: 5, _WORDS: 7, 3: 8}
+"""Field that tells what is in a page, by the page's type; PyArrow passes over other types."""
+
+_MOST_FIELDS, _FIELDS_OF_PAGE = 100 * MOST_PARTS, 64
+"""Of the footer, with its lists' items, and of the head of a page."""
+
 Fields = dict[tuple[int, int], Any]
 """By number and type."""
 
@@ -35,14 +42,21 @@ def look(file: BufferedReader, wanted: Set[str], most: int, budget: Budget) -> N
     if footer < 0:
         raise ValueError("its footer is longer than the file")
     file.seek(footer)
-    about = _Thrift(file.read(end - footer)).fields()
+    about = _Thrift(file.read(end - footer), _MOST_FIELDS).fields()
+    within = tuple(f"{name}." for name in wanted)
+    room = footer
     for group in about.get((4, _LIST), []):
         for column in group[1, _LIST]:
             described = column[3, _STRUCT]
-            if described[3, _LIST][0].decode("utf-8", "replace").partition(".")[0] in wanted:
+            # a dot may be in a name, or lead to what is within a column, which is read with it
+            name = b".".join(described[3, _LIST]).decode("utf-8", "replace")
+            if name in wanted or name.startswith(within):
                 most -= _unpacked(file, described, group[3, _I64], footer, budget)
                 if most < 0:
                     raise ValueError("its pages unpack to more than its samples take")
+                room -= described[7, _I64]
+                if room < 0:
+                    raise ValueError("its columns lie upon each other")
     file.seek(0)
 
 
@@ -60,28 +74,30 @@ def _unpacked(file: BufferedReader, column: Fields, rows: int, footer: int, budg
     while left > 0:
         budget.pieces(1)
         file.seek(at)
-        thrift = _Thrift(file.read(min(_HEADER, end - at)))
+        thrift = _Thrift(file.read(min(_HEADER, end - at)), _FIELDS_OF_PAGE)
         page = thrift.fields()
         size, packed = page[2, _I32], page[3, _I32]
         at += thrift.at + packed
         if size < 0 or packed < 0 or at > end:
             raise ValueError("a page is longer than its column")
         total += size
-        if words := page.get((7, _STRUCT)):
-            if not 0 <= words[1, _I32] <= size:
-                raise ValueError("a dictionary has more words than bytes")
-        elif data := page.get((5, _STRUCT)) or page.get((8, _STRUCT)):
-            left -= (held := data[1, _I32])
-            if held < 0 or left < 0:
+        kind = page[1, _I32]
+        held = page[_ABOUT[kind], _STRUCT][1, _I32] if kind in _ABOUT else 0
+        if held < 0 or (kind == _WORDS and held > size):
+            raise ValueError("a dictionary has more words than bytes")
+        if kind != _WORDS:
+            left -= held
+            if left < 0:
                 raise ValueError("a page has more samples than its column")
     return total
 
 
 class _Thrift:
-    """A struct in Thrift's compact protocol; each step takes at least a byte, so that it ends."""
+    """A struct in Thrift's compact protocol, of so many fields at most."""
 
-    def __init__(self, data: bytes) -> None:
+    def __init__(self, data: bytes, most: int) -> None:
         self._data = data
+        self._left = most
         self.at = 0
 
     def fields(self, depth: int = 0) -> Fields:
@@ -94,6 +110,7 @@ class _Thrift:
             if number in seen:
                 raise ValueError("a field comes twice")
             seen.add(number)
+            self._count(1)
             kind = head & 15
             found[number, kind] = kind == 1 if kind in (1, 2) else self._value(kind, depth)
         return found
@@ -110,6 +127,7 @@ class _Thrift:
             n = head >> 4 if head >> 4 < 15 else self._unsigned()
             if n > MOST_PARTS:
                 raise ValueError("a list in its footer is too long")
+            self._count(n)
             return [self._value(head & 15, depth + 1) for _ in range(n)]
         size = {1: 1, 2: 1, 3: 1, 7: 8}.get(kind)
         if size is None and kind != _BINARY:
@@ -119,6 +137,11 @@ class _Thrift:
         if self.at > len(self._data):
             raise ValueError("a field is cut off")
         return self._data[start : self.at]
+
+    def _count(self, fields: int) -> None:
+        self._left -= fields
+        if self._left < 0:
+            raise ValueError("it is described by too many fields")
 
     def _byte(self) -> int:
         self.at += 1

@@ -7,21 +7,23 @@ sends a file must not choose what else is read.
 from __future__ import annotations
 
 import math
-import zlib
 from collections.abc import Iterator
 from io import BufferedReader
+from operator import add
 from pathlib import Path
 from typing import Any, NoReturn
 
 import numpy as np
 
 from mckibben.errors import DataError
+from mckibben.files.chunks import DEFLATE, FLETCHER32, SHUFFLE, unpacked
 from mckibben.files.limits import MOST_TEXT, Budget
 from mckibben.files.table import Column, Table, column, of_equal_length
 
 _HEAP = b"GCOL\1\0\0\0"
 _FRACTAL = b"FRHP\0"
-_BLOCK = 2**22
+_HEAP_BEGINS, _FRACTAL_BEGINS = (np.frombuffer(sign[:4], "<u4")[0] for sign in (_HEAP, _FRACTAL))
+_BLOCK = 2**18
 _KEPT = 8
 """Bytes before a block that are looked at with it: a heap's first nine, less one."""
 
@@ -59,9 +61,9 @@ def read(file: BufferedReader, path: Path) -> list[Table]:
                     steps = zip(data.shape, data.chunks, strict=True)
                     padded = math.prod(-(-n // step) * step for n, step in steps)
                     budget.at_once(max(math.prod(data.chunks), padded // 2))
-                _refuse_overfull(place, data, path)
+                samples = _samples(place, data, path).reshape(-1)
                 unit = _text(data, "units") or _text(data, "unit")
-                found[place] = column(place.rpartition("/")[2], data[()].reshape(-1), unit)
+                found[place] = column(place.rpartition("/")[2], samples, unit)
         budget.parts(h5py.h5a.get_num_attrs(tree.id))
         meta = {name: _plain(tree, name) for name in tree.attrs}
     return [
@@ -77,22 +79,28 @@ def _refuse_endless(file: BufferedReader) -> None:
     A piece of one may have no length, and one that is packed unpacks to as much as it likes; h5py
     packs none.
     """
-    at, last = 0, b""
-    while block := file.read(_BLOCK):
-        window = last + block
-        start = at - len(last)
-        found = window.find(_HEAP)
-        while found >= 0:
-            _walk_heap(file, start + found)
-            found = window.find(_HEAP, found + 1)
-        _refuse_packed_heap(window)
-        at += len(block)
+    window = bytearray(_KEPT + _BLOCK)  # the same room for all of them, begun with zeros
+    block, at = memoryview(window)[_KEPT:], 0
+    # fours of bytes from each place on: looking at these is faster than looking for text
+    fours = [np.frombuffer(window, "<u4", _BLOCK // 4 + 1, offset) for offset in range(4)]
+    while size := file.readinto(block):
+        end = _KEPT + size
+        for four in fours:
+            if (four == _HEAP_BEGINS).any() or (four == _FRACTAL_BEGINS).any():
+                _look(file, window[:end], at - _KEPT)
+                break
+        at += size
         file.seek(at)
-        last = window[-_KEPT:]
+        window[:_KEPT] = window[size:end]
     file.seek(0)
 
 
-def _refuse_packed_heap(window: bytes) -> None:
+def _look(file: BufferedReader, window: bytearray, start: int) -> None:
+    """Refuse endless and packed heaps that begin in some bytes of a file."""
+    found = window.find(_HEAP)
+    while found >= 0:
+        _walk_heap(file, start + found)
+        found = window.find(_HEAP, found + 1)
     found = window.find(_FRACTAL)
     while found >= 0:
         if any(window[found + 7 : found + 9]):  # how long the description of its filters is
@@ -152,12 +160,13 @@ def _refuse_elsewhere(place: str, data: Any, path: Path) -> None:
         )
 
 
-def _refuse_overfull(place: str, data: Any, path: Path) -> None:
-    """Refuse samples that take other room than their shape says: HDF5 reads on past their end.
+def _samples(place: str, data: Any, path: Path) -> np.ndarray[Any, Any]:
+    """Return samples that take just the room that their shape says: HDF5 reads on past their end.
 
-    What is in chunks is unpacked here as well, since HDF5 would make room for all that comes out.
+    What was deflated is unpacked here, since HDF5 would make room for all that comes out.
     """
-    from h5py import h5d, h5z
+    import h5py
+    from h5py import h5d
 
     def refuse(problem: str) -> NoReturn:
         raise DataError(
@@ -166,42 +175,48 @@ def _refuse_overfull(place: str, data: Any, path: Path) -> None:
             remedy="save it with gzip or without compression",
         )
 
-    about, size = data.id.get_create_plist(), data.id.get_type().get_size()
-    if data.chunks is None:
+    about, kind, shape = data.id.get_create_plist(), data.id.get_type(), data.chunks
+    size = kind.get_size()
+    if shape is None:
         kept = about.get_layout() == h5d.COMPACT or data.id.get_offset() is not None
         if kept and data.id.get_storage_size() < data.size * size:
             refuse("has fewer samples than it says")
-        return
-    filters = [about.get_filter(i)[0] for i in range(about.get_nfilters())]
-    known = {h5z.FILTER_DEFLATE, h5z.FILTER_SHUFFLE, h5z.FILTER_FLETCHER32}
-    if not set(filters) <= known or len(set(filters)) < len(filters):
+        return np.asarray(data[()])
+    described = [about.get_filter(i) for i in range(about.get_nfilters())]
+    filters = [(number, values) for number, _, values, _ in described]
+    numbers = {number for number, _ in filters}
+    known = numbers <= {DEFLATE, SHUFFLE, FLETCHER32} and len(numbers) == len(filters)
+    if not known or any(one == SHUFFLE and values != (size,) for one, values in filters):
         refuse("is packed more than once, or in a way that is not read")
-    room = math.prod(data.chunks) * size
-    places = math.prod(-(-n // step) for n, step in zip(data.shape, data.chunks, strict=True))
+    room = math.prod(shape) * size
+    places = math.prod(-(-n // step) for n, step in zip(data.shape, shape, strict=True))
     if data.id.get_num_chunks() > places:
         refuse("has more chunks than it says")
     chunks: list[Any] = []
     data.id.chunk_iter(chunks.append)
+    deflated, dtype = DEFLATE in numbers, data.dtype
+    samples = None
+    if deflated and h5py.h5t.py_create(dtype, logical=True) == kind:  # else HDF5 converts them
+        whole = len({chunk.chunk_offset for chunk in chunks}) == places
+        samples = np.empty(data.shape, dtype)
+        if not whole:
+            samples[...] = data.fillvalue
     for chunk in chunks:
         used = [one for i, one in enumerate(filters) if not chunk.filter_mask >> i & 1]
-        if chunk.size > room + room // 8 + 1024 or (
-            _unpacked(data, chunk, used, room) if h5z.FILTER_DEFLATE in used else chunk.size
-        ) != room + 4 * (h5z.FILTER_FLETCHER32 in used):
+        fits = chunk.size <= room + room // 8 + 1024
+        if fits and deflated:
+            content = unpacked(data.id.read_direct_chunk(chunk.chunk_offset)[1], used, room)
+            fits = content is not None
+            if content is not None and samples is not None:
+                block = np.frombuffer(content, dtype).reshape(shape)
+                of = tuple(map(slice, chunk.chunk_offset, map(add, chunk.chunk_offset, shape)))
+                left = samples[of].shape  # of a chunk at the end
+                samples[of] = block[tuple(map(slice, left))]
+        elif fits:
+            fits = chunk.size == room + 4 * any(one == FLETCHER32 for one, _ in used)
+        if not fits:
             refuse("is packed more or less closely than it says")
-
-
-def _unpacked(data: Any, chunk: Any, filters: list[int], room: int) -> int:
-    """Return how many bytes a chunk unpacks to, with those of its checksum; -1 if it does not."""
-    from h5py import h5z
-
-    packed = memoryview(data.id.read_direct_chunk(chunk.chunk_offset)[1])
-    after = h5z.FILTER_FLETCHER32 in filters[filters.index(h5z.FILTER_DEFLATE) :]
-    unpacking = zlib.decompressobj()
-    try:
-        size = len(unpacking.decompress(packed[:-4] if after else packed, room + 5))
-    except zlib.error:
-        return -1
-    return size + 4 * after if unpacking.eof and not unpacking.unused_data else -1
+    return np.asarray(data[()]) if samples is None else samples
 
 
 def _is_text(data: Any) -> bool:

@@ -54,6 +54,7 @@ def test_real_levels_are_too_coarse_for_a_loop_but_show_the_gap() -> None:
     assert found.cycles == ()
     assert found.loop_width is found.dead_zone_upper is found.closure_error is None
     assert found.branch_gap == pytest.approx(1.4, abs=0.5)
+    assert found.has_loop
 
 
 @pytest.mark.parametrize(

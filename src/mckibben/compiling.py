@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable
 from contextlib import suppress
-from functools import cache, update_wrapper
+from functools import cache, partial, update_wrapper
 from pickle import UnpicklingError
 from typing import Any, TypeVar, cast
 
@@ -112,3 +112,32 @@ def _cache_class() -> Any:
 def resolved(function: Function) -> Function:
     """Return numba's own function, which is called without the detour, for calls sample by sample."""
     return cast("Function", function.dispatcher) if isinstance(function, Deferred) else function
+
+
+_entries: dict[tuple[Any, ...], Callable[..., None]] = {}
+
+
+def bound(function: Callable[..., None], *arrays: Any) -> Callable[[], None]:
+    """Return a call with these arrays; of one sample, their types are looked at now, not every time.
+
+    The last array has a row, or number, for every sample.
+    """
+    run = resolved(function)
+    if len(arrays[-1]) > 1 or not hasattr(run, "compile"):  # which a plain function has not
+        return partial(run, *arrays)
+    key = (run, *[(a.dtype, a.ndim, a.flags.num) for a in arrays])
+    if key not in _entries:
+        import numba
+
+        _entries[key] = run.compile(tuple(map(numba.typeof, arrays)))
+    return partial(_entries[key], *arrays)
+
+
+def in_turn(*runs: Callable[[], None]) -> Callable[[], None]:
+    """Return one call of several."""
+
+    def run() -> None:
+        for each in runs:
+            each()
+
+    return run

@@ -515,8 +515,8 @@ REFUSED: dict[str, tuple[Callable[[Path], None], str]] = {
     "masked.h5": (damaged_chunk(bytes(16), 1, compression="gzip"), "less closely"),
     "shuffled.h5": (damaged_chunk(bytes(16), shuffle=True), "less closely"),
     "checked.h5": (damaged_chunk(bytes(160), fletcher32=True), "less closely"),
-    "lzf.h5": (damaged_chunk(b"\3abcd", compression="lzf"), "in a way that is not read"),
-    "scaled.h5": (patched_scale_hdf5, "in a way that is not read"),
+    "lzf.h5": (damaged_chunk(b"\3abcd", compression="lzf"), "only deflate, shuffle and fletcher32"),
+    "scaled.h5": (patched_scale_hdf5, "only deflate, shuffle and fletcher32"),
     "short.h5": (short_hdf5, "Remedy"),
     "wide_chunks.h5": (wide_chunks_hdf5, "none were measured"),
     "deep.h5": (deep_hdf5, "nested more than"),
@@ -587,6 +587,85 @@ def test_what_declares_too_much_is_refused_before_it_is_unpacked(tmp_path: Path)
     for line, (name, (_, problem)) in zip(said, REFUSED.items(), strict=True):
         assert problem in line, name
         assert len(line) < 600
+    assert memory < MOST_MB
+
+
+def typed(*fields: tuple[int, int, bytes]) -> bytes:
+    """Return a struct in Thrift's compact protocol, of fields by number, type and content."""
+    last, content = 0, b""
+    for number, kind, value in fields:
+        content += bytes([number - last << 4 | kind]) + value
+        last = number
+    return content + b"\0"
+
+
+def whole(n: int) -> bytes:
+    """Return a number that is not negative, as Thrift has those with a sign."""
+    return unsigned(2 * n)
+
+
+def unsigned(n: int) -> bytes:
+    more = b""
+    while n > 127:
+        more, n = more + bytes([n & 127 | 128]), n >> 7
+    return more + bytes([n])
+
+
+def listed(kind: int, *items: bytes) -> bytes:
+    return bytes([len(items) << 4 | kind]) + b"".join(items)
+
+
+def page_bomb(path: Path, size: int, dictionary: bool) -> None:
+    """Write twenty samples whose one page, or dictionary, unpacks to so many zeros."""
+    import pyarrow as pa
+
+    sink = pa.BufferOutputStream()
+    with pa.CompressedOutputStream(sink, "zstd") as packing:
+        for _ in range(size >> 20):
+            packing.write(bytes(2**20))
+    packed, n = sink.getvalue().to_pybytes(), 20
+    about = (1, 5, whole(size // 8 if dictionary else n)), (2, 5, whole(0))
+    kind = (7, 12, typed(*about)) if dictionary else (5, 12, typed(*about, *LEVELS))
+    head = (1, 5, whole(2 if dictionary else 0)), (2, 5, whole(size)), (3, 5, whole(len(packed)))
+    pages = [typed(*head, kind) + packed]
+    if dictionary:
+        places = pa.Codec("zstd").compress(b"\1" + unsigned(2 * n) + b"\0").to_pybytes()
+        held = (1, 5, whole(n)), (2, 5, whole(8)), *LEVELS
+        sizes = (2, 5, whole(4 - 1)), (3, 5, whole(len(places)))
+        pages.append(typed((1, 5, whole(0)), *sizes, (5, 12, typed(*held))) + places)
+    length, name = sum(map(len, pages)), unsigned(12) + b"pressure_bar"
+    column = [
+        (1, 5, whole(5)),
+        (2, 9, listed(5, whole(0), whole(8))),
+        (3, 9, listed(8, name)),
+        (4, 5, whole(6)),
+        (5, 6, whole(n)),
+        (6, 6, whole(length)),
+        (7, 6, whole(length)),
+        (9, 6, whole(4 + (len(pages[0]) if dictionary else 0))),
+    ]
+    chunk = typed((2, 6, whole(4)), (3, 12, typed(*column, *[(11, 6, whole(4))] * dictionary)))
+    group = typed((1, 9, listed(12, chunk)), (2, 6, whole(length)), (3, 6, whole(n)))
+    root = typed((4, 8, unsigned(6) + b"schema"), (5, 5, whole(1)))
+    leaf = typed((1, 5, whole(5)), (3, 5, whole(0)), (4, 8, name))
+    schema = (2, 9, listed(12, root, leaf))
+    foot = typed((1, 5, whole(1)), schema, (3, 6, whole(n)), (4, 9, listed(12, group)))
+    path.write_bytes(b"PAR1" + b"".join(pages) + foot + struct.pack("<I", len(foot)) + b"PAR1")
+
+
+LEVELS = (3, 5, whole(3)), (4, 5, whole(3))
+
+
+@pytest.mark.parametrize("dictionary", [False, True])
+def test_pages_of_parquet_that_unpack_to_gigabytes_are_refused(
+    dictionary: bool, tmp_path: Path
+) -> None:
+    page_bomb(tmp_path / "small.parquet", 2**20, dictionary)
+    page_bomb(tmp_path / "bomb.parquet", 3 * 2**29, dictionary)
+    assert (tmp_path / "bomb.parquet").stat().st_size < 2**18
+    said, memory = read_apart(tmp_path / "small.parquet", tmp_path / "bomb.parquet")
+    assert said[0] == "read"  # so that it is the size which is refused
+    assert "pages unpack to more than its samples take" in said[1]
     assert memory < MOST_MB
 
 

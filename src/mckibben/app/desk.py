@@ -37,6 +37,8 @@ class Desk:
     jobs: Jobs
     input: str = "pressure"
     output: str = "displacement"
+    allow_shared: bool = False
+    """Whether models are tested on data that they were fitted to, which every result then says."""
     dark: bool = False
     preview: str | None = None
     _shown: dict[str, list[Refresh]] = field(default_factory=dict, repr=False)

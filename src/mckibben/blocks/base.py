@@ -10,7 +10,7 @@ from __future__ import annotations
 from abc import ABCMeta, abstractmethod
 from collections.abc import Callable
 from dataclasses import fields
-from functools import partial, wraps
+from functools import wraps
 from inspect import isfunction
 from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar, overload
 
@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic import ValidationError
 
 from mckibben.blocks.fields import Channel, Initial
-from mckibben.compiling import resolved
+from mckibben.compiling import bound
 from mckibben.errors import DataError, ModelError
 from mckibben.recording import Recording
 
@@ -408,5 +408,5 @@ class Primitive(Block):
 
     def bind(self, sample_time: float | None, state: Array, inputs: Array, outputs: Array) -> Run:
         """Return a function that runs the kernel in place."""
-        run, coefficients = resolved(type(self).kernel), self.coefficients(sample_time)
-        return partial(run, coefficients, state, inputs, outputs)
+        coefficients = self.coefficients(sample_time)
+        return bound(type(self).kernel, coefficients, state, inputs, outputs)

@@ -51,7 +51,7 @@ from mckibben.blocks.memory import (
 from mckibben.blocks.refusals import explicit_state, parameter_vector
 from mckibben.blocks.saving import nested
 from mckibben.blocks.single import Inverse, Ranged, check_input_range
-from mckibben.compiling import resolved
+from mckibben.compiling import bound, in_turn
 from mckibben.errors import ModelError
 
 Array = NDArray[np.float64]
@@ -218,16 +218,14 @@ class GPI(Ranged):
         coefficients = np.array([*self.thresholds, *self.weights])
         u = inputs.reshape(-1)
         rising, falling = np.empty(u.size), np.empty(u.size)
-        up, down = resolved(type(self.rising).value), resolved(type(self.falling).value)
-        operate = resolved(gpi_kernel)
+        up, down = type(self.rising).value, type(self.falling).value
         up_coefficients, down_coefficients = self.rising.coefficients(), self.falling.coefficients()
 
-        def run() -> None:
-            up(up_coefficients, u, rising)
-            down(down_coefficients, u, falling)
-            operate(coefficients, state, u, rising, falling, outputs)
-
-        return run
+        return in_turn(
+            bound(up, up_coefficients, u, rising),
+            bound(down, down_coefficients, u, falling),
+            bound(gpi_kernel, coefficients, state, u, rising, falling, outputs),
+        )
 
     def peaks(self) -> Array:
         """Return the peaks from which the operators just come back to the lowest input."""
@@ -312,18 +310,16 @@ class GPIInverse(Inverse):
         coefficients = np.array([*ends, *forward.thresholds, *forward.weights])
         references = inputs.reshape(-1)
         z, direction, rising, falling = (np.empty(references.size) for _ in range(4))
-        solve, choose = resolved(gpi_inverse_kernel), resolved(choose_branch)
-        up, down = resolved(type(forward.rising).inverse), resolved(type(forward.falling).inverse)
+        up, down = type(forward.rising).inverse, type(forward.falling).inverse
         up_coefficients = forward.rising.coefficients()
         down_coefficients = forward.falling.coefficients()
 
-        def run() -> None:
-            solve(coefficients, state, references, z, direction)
-            up(up_coefficients, z, rising)
-            down(down_coefficients, z, falling)
-            choose(limits, state, direction, rising, falling, outputs)
-
-        return run
+        return in_turn(
+            bound(gpi_inverse_kernel, coefficients, state, references, z, direction),
+            bound(up, up_coefficients, z, rising),
+            bound(down, down_coefficients, z, falling),
+            bound(choose_branch, limits, state, direction, rising, falling, outputs),
+        )
 
     @classmethod
     def example(cls) -> Self:

@@ -76,8 +76,9 @@ class Stream:
         """
         given, gives = self._given, self._gives
         # a sum is finite only if all terms are; it may overflow, and infinity less itself is NaN
-        if self._one_given and type(inputs) is float:
-            total = given[0] = inputs
+        if self._one_given and isinstance(inputs, float):  # also NumPy's
+            given[0] = inputs
+            total = given[0]
         else:
             try:
                 self._input[...] = inputs

@@ -79,9 +79,11 @@ def _means(track: Track, every: int) -> tuple[Array, Array, Array]:
     n = track.u.size // every
     u, y = (x[: n * every].reshape(n, every).mean(axis=1) for x in (track.u, track.y))
     amid = every * np.arange(n) + every // 2
-    branch = np.searchsorted(track.turns, amid, side="right") - 1
+    branch = (
+        np.searchsorted(track.turns, amid) - 1
+    )  # a turning point is reached by what is before it
     ways = np.sign(np.diff(track.heights))
-    return u, y, ways[np.minimum(branch, ways.size - 1)]
+    return u, y, ways[np.clip(branch, 0, ways.size - 1)]
 
 
 def _hats(x: Array) -> Array:

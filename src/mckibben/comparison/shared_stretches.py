@@ -158,7 +158,7 @@ def told(
                 file=listed[shared.second][1].source,
                 remedy="drop the copy, or cut the stretch out of one of them; to go on all the same "
                 "(runs of a sensor with few levels may agree and be two), give --allow-shared "
-                "(allow_shared=True), and every result will say so",
+                "(allow_shared=True, or the tick beside Fit), and every result will say so",
             )
         said.append(f"{sentence}.")
     return tuple(said)
@@ -167,9 +167,10 @@ def told(
 def _sentence(shared: Shared, listed: Sequence[tuple[str, Recording]]) -> str:
     (role, one), (other_role, other) = listed[shared.first], listed[shared.second]
     unit = "samples" if other.sample_time is None else "s"
+    start, stop = shared.start - other.start_time, shared.stop - other.start_time
     where = (
-        f"{shared.start:.6g} to {shared.stop:.6g} {unit} of {_called(other, one)} are those of "
-        f"{_called(one, other)} from {shared.begins:.6g} {unit} on, "
+        f"{start:.6g} to {stop:.6g} {unit} after the start of {_called(other, one)} are those of "
+        f"{_called(one, other)} from {shared.begins - one.start_time:.6g} {unit} on, "
         f"{100 * shared.share:.0f} % of the shorter one's motion"
     )
     if role == other_role:

@@ -274,5 +274,5 @@ def _check(recording: Recording, first: Recording, names: Sequence[str]) -> None
         raise DataError(
             f"the sample time is {ours:g} s here and {theirs:g} s in {first.source or first.name}",
             file=recording.source,
-            remedy="resample one of them with mckibben.signals.resample",
+            remedy="say --resample SECONDS, or use mckibben.signals.resample",
         )

@@ -17,7 +17,10 @@ from mckibben.files.dialect import Dialect
 from mckibben.files.lines import Lines
 from mckibben.recording import Array
 
-REMEDY = "write numbers without marks between thousands, and one decimal mark in the whole file"
+REMEDY = (
+    "write numbers without marks between thousands, with one decimal mark in the whole file, and "
+    "whole numbers with it too, such as 2.0 for 2"
+)
 
 _GROUPED = re.compile(
     r"[+-]?\d{1,3}(?P<mark>[.,'’`_ \xa0\u2009\u202f])(?:\d{2,3}(?P=mark))*\d{3}(?:[.,]\d*)?",

@@ -51,6 +51,9 @@ def check(
     """
     if target not in LARGEST or not values.size:
         return
+    largest = float(max(-values.min(), values.max()))
+    if largest <= LARGEST[target] and (target != "bar" or largest >= SMALLEST_BAR):
+        return  # as nearly always, without room for the sizes of all
     sizes = np.abs(np.where(np.isfinite(values), values, 0.0))
     at = int(np.argmax(sizes))
     largest = float(sizes[at])

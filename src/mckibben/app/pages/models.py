@@ -42,6 +42,10 @@ def build(desk: Desk) -> None:
             "flat"
         )
         named(ui.button("Fit", on_click=lambda: _fit(desk, list(chosen.value), settings)), "fit")
+        named(
+            ui.checkbox("Go on where recordings share data").bind_value(desk, "allow_shared"),
+            "allow-shared",
+        )
     with ui.row().classes("w-full items-start gap-4"):
         with ui.column().classes("min-w-72 flex-1"):
             _running(desk)
@@ -104,7 +108,7 @@ def _fit(desk: Desk, models: list[str], settings: dict[str, str]) -> None:
         desk.jobs.submit(
             "fit",
             {"model": model, "name": model, "input": desk.input, "output": desk.output}
-            | {"settings": given, "seed": 0, "call": call},
+            | {"settings": given, "seed": 0, "call": call, "allow_shared": desk.allow_shared},
         )
         desk.did(f"started fitting {model}", call)
     desk.changed("jobs")

@@ -180,7 +180,7 @@ def _report(desk: Desk) -> None:
             desk.jobs.submit(
                 "report",
                 {"models": models, "settings": settings, "input": desk.input, "output": desk.output}
-                | {"call": call, "title": "report", "seed": 0},
+                | {"call": call, "title": "report", "seed": 0, "allow_shared": desk.allow_shared},
             )
             desk.did("started the report", call)
             desk.changed("jobs")

@@ -333,21 +333,6 @@ def wrong_pages_parquet(path: Path) -> None:
     path.write_bytes(content)
 
 
-def thrift(*fields: tuple[int, bytes | int]) -> bytes:
-    """Return a struct in Thrift's compact protocol, of numbers and structs."""
-    content, last = b"", 0
-    for number, value in fields:
-        kind = 5 if isinstance(value, int) else 12
-        content += bytes([(number - last) << 4 | kind])
-        content += varint(2 * value) if isinstance(value, int) else value
-        last = number
-    return content + b"\0"
-
-
-def varint(value: int) -> bytes:
-    return bytes([value & 127 | 128]) + varint(value >> 7) if value > 127 else bytes([value])
-
-
 def page_before_parquet(path: Path, *, kind: int = 1, name: str = "pressure_bar") -> None:
     """Put a page before those of samples, of a kind that has none but says that it has all.
 
@@ -359,9 +344,13 @@ def page_before_parquet(path: Path, *, kind: int = 1, name: str = "pressure_bar"
     n, size = 4000, 2**29
     many = pa.Codec("zstd").compress(bytes(size)).to_pybytes()
     few = pa.Codec("zstd").compress(bytes(16)).to_pybytes()
-    about = thrift((1, n), (2, 0), (3, 3), (4, 3))
-    pages = b"" if not kind else thrift((1, kind), (2, 16), (3, len(few)), (5, about)) + few
-    pages += thrift((1, 0), (2, size), (3, len(many)), (5, about)) + many
+    about = (5, 12, thrift((1, 5, whole(n)), (2, 5, whole(0)), *LEVELS))
+
+    def page(of: int, holding: int, packed: bytes) -> bytes:
+        sizes = (2, 5, whole(holding)), (3, 5, whole(len(packed)))
+        return thrift((1, 5, whole(of)), *sizes, about) + packed
+
+    pages = (page(kind, 16, few) if kind else b"") + page(0, size, many)
     table = pa.table({"time_s": np.arange(n) * 1.0, name: np.random.default_rng(1).random(n)})
     pq.write_table(table, path, compression="zstd", use_dictionary=False, write_statistics=False)
     content, column = bytearray(path.read_bytes()), pq.read_metadata(path).row_group(0).column(1)
@@ -380,7 +369,7 @@ def many_fields_parquet(path: Path) -> None:
     content = path.read_bytes()
     size = int.from_bytes(content[-8:-4], "little")
     about = content[-8 - size : -9]  # without its end
-    about += b"\x09" + varint(200) + b"\xfc" + varint(200) + (b"\x11" * 30_000 + b"\0") * 200
+    about += b"\x09" + unsigned(200) + b"\xfc" + unsigned(200) + (b"\x11" * 30_000 + b"\0") * 200
     path.write_bytes(
         content[: -8 - size] + about + b"\0" + struct.pack("<I", len(about) + 1) + b"PAR1"
     )
@@ -590,7 +579,7 @@ def test_what_declares_too_much_is_refused_before_it_is_unpacked(tmp_path: Path)
     assert memory < MOST_MB
 
 
-def typed(*fields: tuple[int, int, bytes]) -> bytes:
+def thrift(*fields: tuple[int, int, bytes]) -> bytes:
     """Return a struct in Thrift's compact protocol, of fields by number, type and content."""
     last, content = 0, b""
     for number, kind, value in fields:
@@ -625,14 +614,14 @@ def page_bomb(path: Path, size: int, dictionary: bool) -> None:
             packing.write(bytes(2**20))
     packed, n = sink.getvalue().to_pybytes(), 20
     about = (1, 5, whole(size // 8 if dictionary else n)), (2, 5, whole(0))
-    kind = (7, 12, typed(*about)) if dictionary else (5, 12, typed(*about, *LEVELS))
+    kind = (7, 12, thrift(*about)) if dictionary else (5, 12, thrift(*about, *LEVELS))
     head = (1, 5, whole(2 if dictionary else 0)), (2, 5, whole(size)), (3, 5, whole(len(packed)))
-    pages = [typed(*head, kind) + packed]
+    pages = [thrift(*head, kind) + packed]
     if dictionary:
         places = pa.Codec("zstd").compress(b"\1" + unsigned(2 * n) + b"\0").to_pybytes()
         held = (1, 5, whole(n)), (2, 5, whole(8)), *LEVELS
         sizes = (2, 5, whole(4 - 1)), (3, 5, whole(len(places)))
-        pages.append(typed((1, 5, whole(0)), *sizes, (5, 12, typed(*held))) + places)
+        pages.append(thrift((1, 5, whole(0)), *sizes, (5, 12, thrift(*held))) + places)
     length, name = sum(map(len, pages)), unsigned(12) + b"pressure_bar"
     column = [
         (1, 5, whole(5)),
@@ -644,12 +633,12 @@ def page_bomb(path: Path, size: int, dictionary: bool) -> None:
         (7, 6, whole(length)),
         (9, 6, whole(4 + (len(pages[0]) if dictionary else 0))),
     ]
-    chunk = typed((2, 6, whole(4)), (3, 12, typed(*column, *[(11, 6, whole(4))] * dictionary)))
-    group = typed((1, 9, listed(12, chunk)), (2, 6, whole(length)), (3, 6, whole(n)))
-    root = typed((4, 8, unsigned(6) + b"schema"), (5, 5, whole(1)))
-    leaf = typed((1, 5, whole(5)), (3, 5, whole(0)), (4, 8, name))
+    chunk = thrift((2, 6, whole(4)), (3, 12, thrift(*column, *[(11, 6, whole(4))] * dictionary)))
+    group = thrift((1, 9, listed(12, chunk)), (2, 6, whole(length)), (3, 6, whole(n)))
+    root = thrift((4, 8, unsigned(6) + b"schema"), (5, 5, whole(1)))
+    leaf = thrift((1, 5, whole(5)), (3, 5, whole(0)), (4, 8, name))
     schema = (2, 9, listed(12, root, leaf))
-    foot = typed((1, 5, whole(1)), schema, (3, 6, whole(n)), (4, 9, listed(12, group)))
+    foot = thrift((1, 5, whole(1)), schema, (3, 6, whole(n)), (4, 9, listed(12, group)))
     path.write_bytes(b"PAR1" + b"".join(pages) + foot + struct.pack("<I", len(foot)) + b"PAR1")
 
 

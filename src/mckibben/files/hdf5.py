@@ -21,8 +21,6 @@ from mckibben.files.chunks import DEFLATE, FLETCHER32, SHUFFLE, unpacked
 from mckibben.files.limits import MOST_TEXT, Budget
 from mckibben.files.table import Column, Table, column, of_equal_length
 
-_SIGNATURE = b"\x89HDF\r\n\x1a\n"
-
 
 def is_hdf5(file: BufferedReader) -> bool:
     """Tell whether a file is HDF5, also behind the 512 bytes that MATLAB puts in front."""

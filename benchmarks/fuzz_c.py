@@ -17,9 +17,9 @@ import sys
 import tempfile
 from pathlib import Path
 
+from mckibben.blocks.laws.examples import examples
 from mckibben.export.c.project import described, source_files
 from mckibben.export.programs import own_compiler
-from mckibben.registry import load, names
 
 SAMPLE_TIME = 0.01
 
@@ -100,8 +100,8 @@ CASE = """    case {index}: {{
 def write_sources(folder: Path, single: bool) -> None:
     """Write all blocks and the harness."""
     includes, cases = [], []
-    for index, kind in enumerate(names("blocks")):
-        block, name = load("blocks", kind).example(), f"block_{index}"
+    for index, block in enumerate(examples().values()):
+        name = f"block_{index}"
         content = described(block, name=name, sample_time=SAMPLE_TIME, single=single)
         for path, text in source_files(content).items():
             (folder / Path(path).name).write_text(text, encoding="utf-8")

@@ -24,9 +24,10 @@ import numpy as np
 import fuzzing
 from mckibben import Block, check_block
 from mckibben.blocks.compose import Series
-from mckibben.blocks.running import run_many
-from mckibben.blocks.saving import load, part_to_dict
-from mckibben.blocks.trial import input_limits, wander
+from mckibben.blocks.core.running import run_many
+from mckibben.blocks.core.saving import load, part_to_dict
+from mckibben.blocks.laws.examples import examples
+from mckibben.blocks.laws.trial import input_limits, wander
 from mckibben.errors import MckibbenError
 from mckibben.export.c.project import c_files
 from mckibben.export.fmu.unit import fmu_files
@@ -76,7 +77,7 @@ OTHERS: tuple[Any, ...] = (
 
 def grounds() -> list[dict[str, Any]]:
     """Return what is damaged: examples of every block, the envelopes in one, and compositions."""
-    blocks: list[Block] = [load_plugin("blocks", kind).example() for kind in names("blocks")]
+    blocks: list[Block] = list(examples().values())
     gpi, pi = load_plugin("blocks", "gpi").example(), load_plugin("blocks", "pi").example()
     for kind in names("envelopes"):
         rising, falling = load_plugin("envelopes", kind).examples()

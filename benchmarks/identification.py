@@ -26,18 +26,12 @@ from scipy.signal import lfilter
 
 from mckibben import Recording
 from mckibben.blocks.dynamic.process_model import ProcessModel
-from mckibben.estimators.data import training_data
-from mckibben.estimators.linear.models import (
-    ARMAXEstimator,
-    ARXEstimator,
-    BoxJenkinsEstimator,
-    OutputErrorEstimator,
-)
+from mckibben.estimators.core.checking import training_data
 from mckibben.estimators.linear.polynomials import Orders
 from mckibben.estimators.linear.prediction_error import evaluate, minimise, starting_points
-from mckibben.estimators.linear.process import P2UZEstimator
-from mckibben.estimators.search import Tracker
-from mckibben.threads import one_blas_thread
+from mckibben.estimators.optimisers.tracker import Tracker
+from mckibben.registry import load
+from mckibben.system.threads import one_blas_thread
 
 Array = NDArray[np.float64]
 
@@ -82,11 +76,11 @@ def minima(seeds: int) -> None:
             e = s.deviation * rng.standard_normal(1000)
             y = lfilter(s.b, [1.0, *s.f], u) + lfilter([1.0, *s.c], [1.0, *s.d], e)
             data = training_data(recorded(u, y, 0.1), "pressure", "displacement")
-            run = replace(data.runs[0], u=u - u.mean(), y=y - y.mean())
+            run = data.runs[0].carrying(u - u.mean(), y - y.mean())
             constant = sum(s.b) / (1.0 + sum(s.f)) * u.mean() - y.mean()
             truth = np.array([*s.b, *s.f, *s.c, *s.d, constant])
             with one_blas_thread():
-                starts = starting_points([run], orders, 12, 0)
+                starts = starting_points([run], [run], orders, 12, 0)
                 costs = [
                     evaluate(minimise([run], orders, points, Tracker()), orders, [run])[2]
                     for points in (starts, [truth])
@@ -107,7 +101,7 @@ def warm(seeds: int) -> None:
         u = np.repeat(rng.uniform(0, 5, 50), 50)
         y = WARM.simulate(u, sample_time=0.5) + 0.1 * rng.standard_normal(u.size)
         recording = recorded(u[500:], y[500:], 0.5)
-        fit = P2UZEstimator().fit(recording)
+        fit = load("estimators", "p2uz")().fit(recording)
         off = np.abs(fit.fitted.pack() - WARM.pack())[:4]
         inside += bool(np.all(off < 3 * np.array(fit.diagnostics_.standard_errors)[:4]))
         left = fit.fitted.simulate(recording)["displacement"] - y[500:]
@@ -120,12 +114,12 @@ def coverage(seeds: int, n: int) -> None:
     """Print the share of 95 % intervals that hold the truth."""
     s, printed = SYSTEMS["fast"], SYSTEMS["printed"]
     models: dict[str, tuple[System, Callable[[], Any]]] = {
-        "arx": (replace(s, c=(), d=s.f), ARXEstimator),
-        "armax": (replace(s, d=s.f), ARMAXEstimator),
-        "oe, white noise": (replace(s, c=(), d=()), OutputErrorEstimator),
-        "oe, coloured noise": (s, OutputErrorEstimator),
-        "bj": (s, BoxJenkinsEstimator),
-        "bj, printed C and D": (replace(s, c=printed.c, d=printed.d), BoxJenkinsEstimator),
+        "arx": (replace(s, c=(), d=s.f), load("estimators", "arx")),
+        "armax": (replace(s, d=s.f), load("estimators", "armax")),
+        "oe, white noise": (replace(s, c=(), d=()), load("estimators", "oe")),
+        "oe, coloured noise": (s, load("estimators", "oe")),
+        "bj": (s, load("estimators", "bj")),
+        "bj, printed C and D": (replace(s, c=printed.c, d=printed.d), load("estimators", "bj")),
     }
     for name, (system, made) in models.items():
         inside = []

@@ -14,11 +14,11 @@ import numpy as np
 
 from mckibben import Block, Channel, Series
 from mckibben.blocks.compose import PerChannel
-from mckibben.blocks.coupling import Coupling
-from mckibben.blocks.fuzzy_network import FuzzyNetwork
-from mckibben.blocks.gpi import GPI
+from mckibben.blocks.coupled.coupling import Coupling
+from mckibben.blocks.coupled.fuzzy_network import FuzzyNetwork
+from mckibben.blocks.laws.examples import examples
+from mckibben.blocks.play_type.gpi import GPI
 from mckibben.export.c.emulation import Emulated, emulate
-from mckibben.registry import load, names
 
 SAMPLE_TIME = 0.01
 
@@ -94,8 +94,8 @@ def compositions() -> Iterator[tuple[str, Block]]:
 def models() -> Iterator[tuple[str, Block]]:
     """Give all that is measured."""
     yield from compositions()
-    for kind in names("blocks"):
-        yield f"`{kind}`", load("blocks", kind).example()
+    for title, block in examples().items():
+        yield f"`{title}`", block
 
 
 def row(name: str, found: Emulated) -> str:

@@ -30,12 +30,12 @@ from mckibben import (
     load_rig,
     registry,
 )
-from mckibben.blocks.base import Block
-from mckibben.blocks.envelopes.tanh import Tanh
-from mckibben.blocks.published.multistate import multistate_friction
+from mckibben.blocks.core.block import Block
+from mckibben.blocks.play_type.envelopes.tanh import Tanh
+from mckibben.papers.multistate_friction.published import multistate_friction
 from mckibben.rigs import record
 from mckibben.signals import decaying_triangle
-from mckibben.signals.protocols import protocol
+from mckibben.signals.protocol import protocol
 from references import Compiled, numpy_gpi, numpy_pi
 
 Array = NDArray[np.float64]

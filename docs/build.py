@@ -85,7 +85,7 @@ def recordings() -> dict[tuple[str, str], list[Any]]:
     """Return short recordings of virtual rigs to fit models to, by what they map."""
     from mckibben.rigs import load_rig, record
     from mckibben.signals import decaying_triangle
-    from mckibben.signals.protocols import protocol
+    from mckibben.signals.protocol import protocol
 
     time = np.arange(1200) * 0.05
     pressure = decaying_triangle(time, period=10.0, high=5.0, low=1.0)
@@ -158,7 +158,7 @@ def inverse_of(block: Any) -> str:
         inverse = block.inverse()
     except MckibbenError as error:
         return f"None: {error}"
-    return ", ".join(f"`{leaf.kind}`" for leaf in leaf_blocks(inverse)) + "."
+    return ", ".join(f"`{leaf.title}`" for leaf in leaf_blocks(inverse)) + "."
 
 
 def write_models() -> None:

@@ -18,7 +18,8 @@ from multiprocessing.connection import Connection
 import numpy as np
 
 import mckibben
-from mckibben.control import FeedforwardPID, tune_pid
+from mckibben.blocks.feedback.feedforward_feedback import FeedforwardFeedback
+from mckibben.control import tune_pid
 from mckibben.signals import decaying_triangle
 from mckibben.stream import FixedRate, Step, UDPLink
 
@@ -73,7 +74,7 @@ def main() -> None:
     recording = rig.run(mckibben.Recording({"pressure": pressure}, 0.05))
     inverse = mckibben.GPIEstimator().fit(recording).model_.inverse()
     pid = tune_pid(rig, sample_time=chosen.period)
-    block = FeedforwardPID(inverse, pid).block()
+    block = FeedforwardFeedback.of(inverse, pid)
 
     ours, theirs = multiprocessing.Pipe()
     context = multiprocessing.get_context("spawn")

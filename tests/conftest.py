@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import os
-from collections.abc import Iterator
-
 import pytest
 from hypothesis import settings
 
@@ -17,12 +14,3 @@ settings.load_profile("deterministic")
 def pytest_runtest_setup(item: pytest.Item) -> None:
     """Skip what this machine has no tools for."""
     skip_without_tools(item)
-
-
-@pytest.fixture(autouse=True)
-def same_rights() -> Iterator[None]:
-    """A workbench leaves its process with a mask of rights; the next test gets the one it began with."""
-    mask = os.umask(0o022)
-    os.umask(mask)
-    yield
-    os.umask(mask)

@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 import mckibben
-from mckibben.control import Feedforward, FeedforwardPID, track, tune_pid
+from mckibben.control import control_law, track, tune_pid
 
 (train,) = mckibben.read("examples/decaying-triangle.csv")
 inverse = mckibben.GPIEstimator().fit(train).model_.inverse()
@@ -16,15 +16,11 @@ t = np.arange(1500) * 0.02
 reference = mckibben.Recording({"displacement": 18 - 10 * np.cos(2 * np.pi * t / 10)}, 0.02)
 figure = Figure(figsize=(7, 3.5), layout="constrained")
 axis = figure.subplots()
-for name, controller in (
-    ("inverse", Feedforward(inverse)),
-    ("PID", pid),
-    ("inverse and PID", FeedforwardPID(inverse, pid)),
-):
-    found = track(controller, rig, reference).recording
+for law in ("feedforward", "pid", "feedforward-pid"):
+    found = track(control_law(law, inverse, lambda: pid), rig, reference).recording
     kept = found.time >= 0
     error = found["displacement"] - found["reference_displacement"]
-    axis.plot(found.time[kept], error[kept], label=name)
+    axis.plot(found.time[kept], error[kept], label=law)
 axis.set(xlabel="time [s]", ylabel="error [mm]")
 axis.legend()
 figure.savefig(sys.argv[1], dpi=150)

@@ -15,8 +15,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from mckibben import Recording
-from mckibben.comparison.muscles import compare_muscles
+from mckibben import Recording, compare
 
 TRAIN, TEST = (0, 1, 5, 9), (2, 6, 10)
 RATE = 12.0
@@ -59,17 +58,21 @@ def main() -> None:
     """Write the page."""
     folder = Path(sys.argv[1])
     train, test = ([trial(folder, number) for number in numbers] for numbers in (TRAIN, TEST))
-    inputs = {"pressures": ("input_1", "input_2", "input_3"), "scheduling": ()}
+    inputs = ("input_1", "input_2", "input_3")
     found = []
     for title, (model, settings) in MODELS.items():
-        (row,) = compare_muscles(train, test, models=[model], settings={model: inputs | settings})
-        if row.reason:
+        board = compare(
+            train, test, input=inputs, models=[model], settings={model: settings}, n_folds=0
+        )
+        (row,) = board.rows
+        if row.test is None:
             sys.exit(f"{title}: {row.reason}")
-        found.append((row.mean, title, row))
+        found.append((row.test, title, row))
     lines = [
-        f"| {title} | {row.test['displacement_1']:.2f} | {row.test['displacement_2']:.2f} "
-        f"| {row.worst:.1f} | {row.n_parameters} | {row.seconds:.2f} |"
-        for _, title, row in sorted(found, key=lambda item: item[0])
+        f"| {title} | {row.outputs['displacement_1'].rmse:.2f} "
+        f"| {row.outputs['displacement_2'].rmse:.2f} | {scores.max_error:.1f} "
+        f"| {row.n_parameters} | {row.fit_seconds:.2f} |"
+        for scores, title, row in sorted(found, key=lambda item: item[0].rmse)
     ]
     Path(__file__).with_name("real_arm.md").write_text(HEAD + "\n".join(lines) + "\n")
 

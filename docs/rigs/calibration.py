@@ -14,20 +14,20 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from mckibben.blocks.published.field_models import prandtl_ishlinskii
-from mckibben.blocks.published.mpi_narmax import modified_prandtl_ishlinskii
-from mckibben.estimators.gpi import GPIEstimator
-from mckibben.estimators.rdpi import RDPIEstimator
+from mckibben.estimators.play_type.gpi import GPIEstimator
+from mckibben.estimators.play_type.rdpi import RDPIEstimator
 from mckibben.metrics import err
+from mckibben.papers.field_models.published import prandtl_ishlinskii
+from mckibben.papers.mpi_narmax.protocol import HIGH, LOW
+from mckibben.papers.mpi_narmax.published import modified_prandtl_ishlinskii
+from mckibben.papers.multistate_friction.protocol import SHORTEST
 from mckibben.papers.sdchm.printed import ORDERS, PREDICTION
+from mckibben.papers.sdchm.protocol import PATTERNS
 from mckibben.recording import Recording
 from mckibben.rigs import load_rig, record
 from mckibben.signals import resample, sine, triangle
-from mckibben.signals.protocols import activation_pressure as activation
-from mckibben.signals.protocols import protocol
-from mckibben.signals.protocols.mpi_narmax import HIGH, LOW
-from mckibben.signals.protocols.multistate import SHORTEST
-from mckibben.signals.protocols.sdchm import PATTERNS
+from mckibben.signals.protocol import activation_pressure as activation
+from mckibben.signals.protocol import protocol
 
 Array = NDArray[np.float64]
 Row = tuple[str, str, str, str]

@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from mckibben.arrays import Array
 from mckibben.errors import DataError
 
 try:
@@ -35,7 +36,6 @@ if TYPE_CHECKING:
     from mckibben.recording import Recording
     from mckibben.rigs import Rig
 
-Array = NDArray[np.float64]
 Vector = NDArray[np.float32]
 
 FASTEST = 0.3

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from mckibben.arrays import Array
 from mckibben.errors import DataError
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -68,6 +68,15 @@ def score(measured: ArrayLike, modelled: ArrayLike) -> Scores:
         nrmse=nrmse(measured, modelled),
         err=err(measured, modelled),
     )
+
+
+def mean_scores(found: Sequence[Scores]) -> Scores:
+    """Return the errors of several outputs as one: means, and the largest of the largest errors."""
+    means = {
+        name: float(np.mean([getattr(one, name) for one in found]))
+        for name in ("rmse", "mae", "r2", "nrmse", "err")
+    }
+    return Scores(**means, max_error=max(one.max_error for one in found))
 
 
 def rmse(measured: ArrayLike, modelled: ArrayLike) -> float:

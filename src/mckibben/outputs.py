@@ -1,4 +1,4 @@
-"""What the commands write takes the place of no input, and of no file that this program did not write.
+"""What commands may replace: never an input, nor a file of others.
 
 What it wrote is known by what is in it: a model and a rig by how they begin, a recording by its
 description and the digest there, a figure by the digest in its seal, and what is in a folder of results
@@ -14,10 +14,10 @@ from collections.abc import Callable, Iterable
 from functools import partial
 from pathlib import Path
 
-from mckibben import manifest, ordinary
-from mckibben.atomic import write_text, written
 from mckibben.errors import DataError
-from mckibben.seals import is_sealed
+from mckibben.system import manifest, ordinary
+from mckibben.system.atomic import write_text, written
+from mckibben.system.seals import is_sealed
 
 MANIFEST = "results.sha256"
 """Of a folder of results."""
@@ -40,7 +40,7 @@ def is_model(path: Path) -> bool:
 
     One that was edited by hand since still counts as that.
     """
-    from mckibben.blocks.saving import FORMAT
+    from mckibben.blocks.core.saving import FORMAT
 
     start = b"".join(_beginning(path).split())
     return start.startswith(f'{{"format":"{FORMAT}",'.encode())

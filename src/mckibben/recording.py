@@ -9,11 +9,10 @@ from types import MappingProxyType
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from mckibben.arrays import Array
 from mckibben.errors import DataError
-
-Array = NDArray[np.float64]
 
 STANDARD_UNITS: Mapping[str, str] = MappingProxyType(
     {

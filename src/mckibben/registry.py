@@ -1,4 +1,4 @@
-"""Every plug-in of the package, one line each: group, name, and where it lives.
+"""Every plug-in of the package, one line each: group, name, and where it lives, or a preset of one.
 
 A plug-in is imported when it is first asked for, never before. Packages outside this one join by
 entry points in the groups ``mckibben.blocks``, ``mckibben.estimators`` and so on.
@@ -12,88 +12,77 @@ from importlib.metadata import entry_points
 from typing import Any
 
 from mckibben.errors import ModelError
+from mckibben.presets import Chosen, Preset, preset
 
-PLUGINS: dict[str, dict[str, str]] = {
+LINEAR = "mckibben.estimators.linear.models:PredictionErrorEstimator"
+PROCESS = "mckibben.estimators.linear.process:ProcessModelEstimator"
+FORCE_LAW = "mckibben.estimators.force.static:PolynomialForceEstimator"
+MULTISTATE = "mckibben.estimators.force.multistate:MultistateEstimator"
+GRID = "mckibben.estimators.preisach_type.preisach:GridEstimator"
+SLIP = "mckibben.estimators.play_type.maxwell_slip:MaxwellSlipEstimator"
+NARX = "mckibben.estimators.narx.polynomial:NarxPolynomialEstimator"
+SDCHM = "mckibben.estimators.coupled.sdchm:SDCHMEstimator"
+
+PLUGINS: dict[str, dict[str, str | Preset]] = {
     "blocks": {
         "activation-memory": "mckibben.blocks.force.activation_memory:ActivationMemory",
         "activation-pressure": "mckibben.blocks.force.activation_pressure:ActivationPressure",
-        "affine": "mckibben.blocks.affine:Affine",
+        "affine": "mckibben.blocks.memoryless.affine:Affine",
         "bouc-wen": "mckibben.blocks.differential.bouc_wen:BoucWen",
-        "bouc-wen-inverse": "mckibben.blocks.differential.bouc_wen:BoucWenInverse",
-        "braid-equilibrium": "mckibben.blocks.braid_equilibrium:BraidEquilibrium",
-        "braid-equilibrium-inverse": "mckibben.blocks.braid_equilibrium:BraidEquilibriumInverse",
+        "braid-equilibrium": "mckibben.blocks.force.braid_equilibrium:BraidEquilibrium",
         "chou-hannaford": "mckibben.blocks.force.chou_hannaford:ChouHannaford",
-        "coupled-memory": "mckibben.blocks.coupled_memory:CoupledMemory",
-        "coupling": "mckibben.blocks.coupling:Coupling",
-        "creep": "mckibben.blocks.creep:Creep",
-        "creep-inverse": "mckibben.blocks.creep:CreepInverse",
+        "coupled-memory": "mckibben.blocks.coupled.coupled_memory:CoupledMemory",
+        "coupling": "mckibben.blocks.coupled.coupling:Coupling",
+        "creep": "mckibben.blocks.dynamic.creep:Creep",
         "duhem": "mckibben.blocks.differential.duhem:Duhem",
-        "duhem-inverse": "mckibben.blocks.differential.duhem:DuhemInverse",
-        "eupi": "mckibben.blocks.eupi:EUPI",
-        "eupi-inverse": "mckibben.blocks.eupi:EUPIInverse",
-        "exponential": "mckibben.blocks.logarithm:Exponential",
-        "feedforward-feedback": "mckibben.blocks.feedforward_feedback:FeedforwardFeedback",
-        "force-balance": "mckibben.blocks.force_balance:ForceBalance",
-        "force-balance-inverse": "mckibben.blocks.force_balance:ForceBalanceInverse",
+        "eupi": "mckibben.blocks.play_type.eupi:EUPI",
+        "exponential": "mckibben.blocks.memoryless.logarithm:Exponential",
+        "feedforward-feedback": "mckibben.blocks.feedback.feedforward_feedback:FeedforwardFeedback",
+        "force-balance": "mckibben.blocks.coupled.force_balance:ForceBalance",
         "force-feedforward": "mckibben.blocks.force.feedforward:ForceFeedforward",
-        "fuzzy-network": "mckibben.blocks.fuzzy_network:FuzzyNetwork",
-        "fuzzy-network-inverse": "mckibben.blocks.fuzzy_network:FuzzyNetworkInverse",
+        "fuzzy-network": "mckibben.blocks.coupled.fuzzy_network:FuzzyNetwork",
         "generalized-bouc-wen": (
             "mckibben.blocks.differential.generalized_bouc_wen:GeneralizedBoucWen"
         ),
-        "generalized-bouc-wen-inverse": (
-            "mckibben.blocks.differential.generalized_bouc_wen:GeneralizedBoucWenInverse"
-        ),
-        "gpi": "mckibben.blocks.gpi:GPI",
-        "gpi-inverse": "mckibben.blocks.gpi:GPIInverse",
+        "gpi": "mckibben.blocks.play_type.gpi:GPI",
+        "inverse": "mckibben.blocks.core.inverse:Inverse",
         "krasnoselskii-pokrovskii": (
-            "mckibben.blocks.krasnoselskii_pokrovskii:KrasnoselskiiPokrovskii"
+            "mckibben.blocks.preisach_type.krasnoselskii_pokrovskii:KrasnoselskiiPokrovskii"
         ),
-        "krasnoselskii-pokrovskii-inverse": (
-            "mckibben.blocks.krasnoselskii_pokrovskii:KrasnoselskiiPokrovskiiInverse"
-        ),
-        "logarithm": "mckibben.blocks.logarithm:Logarithm",
-        "maxwell-slip": "mckibben.blocks.maxwell_slip:MaxwellSlip",
-        "maxwell-slip-inverse": "mckibben.blocks.maxwell_slip:MaxwellSlipInverse",
+        "logarithm": "mckibben.blocks.memoryless.logarithm:Logarithm",
+        "maxwell-slip": "mckibben.blocks.play_type.maxwell_slip:MaxwellSlip",
         "multistate-friction": "mckibben.blocks.force.multistate_friction:MultistateFriction",
         "narx-network": "mckibben.blocks.dynamic.narx_network:NarxNetwork",
         "narx-polynomial": "mckibben.blocks.dynamic.narx_polynomial:NarxPolynomial",
-        "negative": "mckibben.blocks.negative:Negative",
+        "negative": "mckibben.blocks.memoryless.negative:Negative",
         "parallel": "mckibben.blocks.compose:Parallel",
         "per-channel": "mckibben.blocks.compose:PerChannel",
-        "pi": "mckibben.blocks.pi:PI",
-        "pi-inverse": "mckibben.blocks.pi:PIInverse",
-        "pid": "mckibben.blocks.pid:PIDFeedback",
-        "piecewise-linear": "mckibben.blocks.piecewise_linear:PiecewiseLinear",
-        "play": "mckibben.blocks.play:Play",
-        "polynomial": "mckibben.blocks.polynomial:Polynomial",
+        "pi": "mckibben.blocks.play_type.pi:PI",
+        "pid": "mckibben.blocks.feedback.pid:PIDFeedback",
+        "piecewise-linear": "mckibben.blocks.memoryless.piecewise_linear:PiecewiseLinear",
+        "play": "mckibben.blocks.play_type.play:Play",
+        "polynomial": "mckibben.blocks.memoryless.polynomial:Polynomial",
         "polynomial-force": "mckibben.blocks.force.polynomial_force:PolynomialForce",
-        "polynomial-inverse": "mckibben.blocks.polynomial:PolynomialInverse",
-        "preisach": "mckibben.blocks.preisach:Preisach",
-        "preisach-inverse": "mckibben.blocks.preisach:PreisachInverse",
+        "preisach": "mckibben.blocks.preisach_type.preisach:Preisach",
         "process-model": "mckibben.blocks.dynamic.process_model:ProcessModel",
-        "rate-dependent-pi": "mckibben.blocks.rate_dependent_pi:RateDependentPI",
-        "rate-dependent-pi-inverse": "mckibben.blocks.rate_dependent_pi:RateDependentPIInverse",
+        "rate-dependent-pi": "mckibben.blocks.play_type.rate_dependent_pi:RateDependentPI",
         "recurrent-fuzzy-network": (
-            "mckibben.blocks.recurrent_fuzzy_network:RecurrentFuzzyNetwork"
+            "mckibben.blocks.coupled.recurrent_fuzzy_network:RecurrentFuzzyNetwork"
         ),
         "series": "mckibben.blocks.compose:Series",
         "tondu-lopez": "mckibben.blocks.force.tondu_lopez:TonduLopez",
         "transfer-function": "mckibben.blocks.dynamic.transfer_function:TransferFunction",
     },
-    "coupled": {
-        "coupled-memory": "mckibben.estimators.coupled.memory:CoupledMemoryEstimator",
-        "coupled-pi": "mckibben.estimators.coupled.sdchm:CoupledPIEstimator",
-        "force-balance": "mckibben.estimators.coupled.force_balance:ForceBalanceEstimator",
-        "mpi-narmax": "mckibben.estimators.coupled.mpi_narmax:MPINarmaxEstimator",
-        "sdchm": "mckibben.estimators.coupled.sdchm:SDCHMEstimator",
-        "sdchm-published": "mckibben.estimators.coupled.sdchm:PublishedSDCHMEstimator",
-        "tsfnn": "mckibben.estimators.coupled.sdchm:TSFNNEstimator",
+    "controllers": {
+        "feedforward": "mckibben.control.laws:feedforward",
+        "feedforward-pid": "mckibben.control.laws:feedforward_pid",
+        "observer": "mckibben.control.laws:observer",
+        "pid": "mckibben.control.laws:pid",
     },
     "envelopes": {
-        "exponential": "mckibben.blocks.envelopes.exponential:Exponential",
-        "piecewise-linear": "mckibben.blocks.envelopes.piecewise_linear:PiecewiseLinear",
-        "tanh": "mckibben.blocks.envelopes.tanh:Tanh",
+        "exponential": "mckibben.blocks.play_type.envelopes.exponential:Exponential",
+        "piecewise-linear": "mckibben.blocks.play_type.envelopes.piecewise_linear:PiecewiseLinear",
+        "tanh": "mckibben.blocks.play_type.envelopes.tanh:Tanh",
     },
     "estimators": {
         "activation-memory": (
@@ -102,68 +91,148 @@ PLUGINS: dict[str, dict[str, str]] = {
         "activation-pressure": (
             "mckibben.estimators.force.activation_pressure:ActivationPressureEstimator"
         ),
-        "armax": "mckibben.estimators.linear.models:ARMAXEstimator",
-        "arx": "mckibben.estimators.linear.models:ARXEstimator",
-        "bj": "mckibben.estimators.linear.models:BoxJenkinsEstimator",
-        "bouc-wen": "mckibben.estimators.bouc_wen:BoucWenEstimator",
-        "cpi": "mckibben.estimators.creep_pi:CreepPIEstimator",
-        "duhem": "mckibben.estimators.duhem:DuhemEstimator",
-        "eupi": "mckibben.estimators.eupi:EUPIEstimator",
-        "force-bilinear": "mckibben.estimators.force.static:BilinearForceEstimator",
+        "armax": preset(LINEAR, "ARMAX model, A y = B u + C e.", n_noise=2, effort=1.0),
+        "arx": preset(LINEAR, "ARX model, A y = B u + e, by linear least squares."),
+        "bj": preset(
+            LINEAR,
+            "Box-Jenkins model, y = B / F u + C / D e; second order each by default.",
+            shared_poles=False,
+            n_noise=2,
+            n_noise_poles=2,
+            effort=1.0,
+        ),
+        "bouc-wen": "mckibben.estimators.differential.bouc_wen:BoucWenEstimator",
+        "coupled-memory": "mckibben.estimators.coupled.memory:CoupledMemoryEstimator",
+        "coupled-pi": preset(
+            SDCHM,
+            "Hysteresis of every muscle and a coupling, whatever the stiffness: a baseline.",
+            memory="gpi",
+            n_sets=0,
+            n_friction=0,
+        ),
+        "cpi": "mckibben.estimators.play_type.creep_pi:CreepPIEstimator",
+        "duhem": "mckibben.estimators.differential.duhem:DuhemEstimator",
+        "eupi": "mckibben.estimators.play_type.eupi:EUPIEstimator",
+        "force-balance": "mckibben.estimators.coupled.force_balance:ForceBalanceEstimator",
+        "force-bilinear": preset(FORCE_LAW, "The bilinear-quadratic law.", law="bilinear"),
         "force-chou": "mckibben.estimators.force.static:ChouHannafordEstimator",
-        "force-minh": "mckibben.estimators.force.static:MinhForceEstimator",
-        "force-petrovic": "mckibben.estimators.force.static:PetrovicForceEstimator",
-        "force-schindele": "mckibben.estimators.force.static:SchindeleForceEstimator",
+        "force-minh": preset(
+            FORCE_LAW,
+            "Minh's law: cubic in length, with coefficients linear in pressure.",
+            law="minh",
+        ),
+        "force-petrovic": preset(
+            FORCE_LAW,
+            "Petrovic's polynomial: quadratic in length with pressure, and without.",
+            law="petrovic",
+        ),
+        "force-schindele": preset(
+            FORCE_LAW,
+            "Schindele and Aschemann's polynomials: cubic with pressure, of fourth order without.",
+            law="schindele",
+        ),
         "force-tondu": "mckibben.estimators.force.static:TonduLopezEstimator",
-        "gbw": "mckibben.estimators.generalized_bouc_wen:GeneralizedBoucWenEstimator",
-        "gpi": "mckibben.estimators.gpi:GPIEstimator",
-        "grey-box": "mckibben.estimators.grey_box:GreyBoxEstimator",
-        "kp": "mckibben.estimators.preisach:KrasnoselskiiPokrovskiiEstimator",
-        "maxwell-slip": "mckibben.estimators.maxwell_slip:MaxwellSlipEstimator",
-        "mms": "mckibben.estimators.maxwell_slip:ModifiedMaxwellSlipEstimator",
-        "mpi": "mckibben.estimators.mpi:MPIEstimator",
-        "multistate": "mckibben.estimators.force.multistate:MultistateEachWayEstimator",
-        "multistate-11": "mckibben.estimators.force.multistate:MultistateEstimator",
-        "multistate-18": "mckibben.estimators.force.multistate:MultistateEighteenEstimator",
-        "narx": "mckibben.estimators.narx.polynomial:NarxPolynomialEstimator",
+        "gbw": "mckibben.estimators.differential.generalized_bouc_wen:GeneralizedBoucWenEstimator",
+        "gpi": "mckibben.estimators.play_type.gpi:GPIEstimator",
+        "grey-box": "mckibben.estimators.force.grey_box:GreyBoxEstimator",
+        "kp": preset(
+            GRID,
+            "Krasnosel'skii-Pokrovskii model by (non-negative) least squares on its operators.",
+            relays="gradual",
+        ),
+        "maxwell-slip": preset(SLIP, "Maxwell-slip model by least squares.", asymmetric=False),
+        "mms": preset(
+            SLIP,
+            "Modified Maxwell-slip model: the two ratios of its directions are searched.",
+            asymmetric=True,
+            effort=0.5,
+        ),
+        "mpi": "mckibben.estimators.play_type.mpi:MPIEstimator",
+        "mpi-narmax": "mckibben.estimators.coupled.mpi_narmax:MPINarmaxEstimator",
+        "multistate": preset(
+            MULTISTATE,
+            "Multistate friction with one shared element and one for each direction: "
+            "eleven parameters.",
+            elements="each-way",
+            effort=3.0,
+        ),
+        "multistate-11": preset(
+            MULTISTATE,
+            "Multistate friction by bounded least squares from many starts, and exchange of elements.",
+            elements="eleven",
+        ),
+        "multistate-18": preset(
+            MULTISTATE,
+            "Multistate friction with three elements in both directions: eighteen parameters.",
+            elements="eighteen",
+        ),
+        "narx": NARX,
         "narx-network": "mckibben.estimators.narx.network:NarxNetworkEstimator",
-        "narx-play": "mckibben.estimators.narx.polynomial:NarxPlayEstimator",
-        "oe": "mckibben.estimators.linear.models:OutputErrorEstimator",
-        "p1": "mckibben.estimators.linear.process:P1Estimator",
-        "p1z": "mckibben.estimators.linear.process:P1ZEstimator",
-        "p2": "mckibben.estimators.linear.process:P2Estimator",
-        "p2u": "mckibben.estimators.linear.process:P2UEstimator",
-        "p2uz": "mckibben.estimators.linear.process:P2UZEstimator",
-        "p2z": "mckibben.estimators.linear.process:P2ZEstimator",
-        "p3": "mckibben.estimators.linear.process:P3Estimator",
-        "pi": "mckibben.estimators.pi:PIEstimator",
-        "preisach": "mckibben.estimators.preisach:PreisachEstimator",
-        "rdpi": "mckibben.estimators.rdpi:RDPIEstimator",
+        "narx-play": preset(
+            NARX,
+            "Polynomial NARX model with play operators among its regressors, so that it keeps its "
+            "branch.",
+            output_lags=1,
+            input_lags=1,
+            n_play=6,
+            effort=0.2,
+        ),
+        "oe": preset(
+            LINEAR,
+            "Output-error model, y = B / F u + e: the best free run of its orders.",
+            shared_poles=False,
+            effort=0.8,
+        ),
+        "p1": preset(PROCESS, "One lag.", structure="P1"),
+        "p1z": preset(PROCESS, "One lag and a zero.", structure="P1Z"),
+        "p2": preset(PROCESS, "Two lags.", structure="P2"),
+        "p2u": preset(PROCESS, "Two poles that may oscillate.", structure="P2U"),
+        "p2uz": preset(PROCESS, "Two poles that may oscillate, and a zero.", structure="P2UZ"),
+        "p2z": preset(PROCESS, "Two lags and a zero.", structure="P2Z"),
+        "p3": preset(PROCESS, "Three lags.", structure="P3"),
+        "pi": "mckibben.estimators.play_type.pi:PIEstimator",
+        "preisach": preset(
+            GRID, "Preisach model by (non-negative) least squares on its cells.", relays="sudden"
+        ),
+        "rdpi": "mckibben.estimators.play_type.rdpi:RDPIEstimator",
+        "sdchm": SDCHM,
+        "sdchm-published": preset(
+            SDCHM,
+            "SDCHM as its paper identifies it: GPI, coupling, and a network trained by particle swarm.",
+            effort=25.0,
+            constants=False,
+            method="pso",
+            ridge=1e-9,
+            memory="gpi",
+            memory_settings={"threshold_rule": "paper", "initial": "virgin"},
+            n_friction=0,
+        ),
+        "tsfnn": "mckibben.estimators.coupled.sdchm:TSFNNEstimator",
     },
     "papers": {
-        "activation-pressure": "mckibben.papers.activation_pressure:activation_pressure",
-        "field-models": "mckibben.papers.field_models:field_models",
-        "mpi-narmax": "mckibben.papers.mpi_narmax:mpi_narmax",
-        "multistate-friction": "mckibben.papers.multistate_friction:multistate_friction",
-        "sdchm": "mckibben.papers.sdchm:sdchm",
+        "activation-pressure": "mckibben.papers.activation_pressure.rerun:activation_pressure",
+        "field-models": "mckibben.papers.field_models.rerun:field_models",
+        "mpi-narmax": "mckibben.papers.mpi_narmax.rerun:mpi_narmax",
+        "multistate-friction": "mckibben.papers.multistate_friction.rerun:multistate_friction",
+        "sdchm": "mckibben.papers.sdchm.rerun:sdchm",
     },
     "protocols": {
-        "activation-pressure": "mckibben.signals.protocols.activation_pressure:activation_pressure",
-        "field-models": "mckibben.signals.protocols.field_models:field_models",
-        "mpi-narmax": "mckibben.signals.protocols.mpi_narmax:mpi_narmax",
-        "multistate": "mckibben.signals.protocols.multistate:multistate",
-        "sdchm": "mckibben.signals.protocols.sdchm:sdchm",
+        "activation-pressure": "mckibben.papers.activation_pressure.protocol:activation_pressure",
+        "field-models": "mckibben.papers.field_models.protocol:field_models",
+        "mpi-narmax": "mckibben.papers.mpi_narmax.protocol:mpi_narmax",
+        "multistate-friction": "mckibben.papers.multistate_friction.protocol:multistate_friction",
+        "sdchm": "mckibben.papers.sdchm.protocol:sdchm",
     },
     "published": {
         "activation-pressure-profile": (
-            "mckibben.blocks.published.activation_pressure:activation_pressure"
+            "mckibben.papers.activation_pressure.published:activation_pressure"
         ),
-        "field-models-p2uz": "mckibben.blocks.published.field_models:process_model",
-        "field-models-pi": "mckibben.blocks.published.field_models:prandtl_ishlinskii",
-        "mpi-narmax-mpi": "mckibben.blocks.published.mpi_narmax:modified_prandtl_ishlinskii",
-        "multistate-friction": "mckibben.blocks.published.multistate:multistate_friction",
-        "multistate-static-force": "mckibben.blocks.published.multistate:static_force",
-        "sdchm-coupling": "mckibben.blocks.published.coupling:coupling",
+        "field-models-p2uz": "mckibben.papers.field_models.published:process_model",
+        "field-models-pi": "mckibben.papers.field_models.published:prandtl_ishlinskii",
+        "mpi-narmax-mpi": "mckibben.papers.mpi_narmax.published:modified_prandtl_ishlinskii",
+        "multistate-friction": "mckibben.papers.multistate_friction.published:multistate_friction",
+        "multistate-static-force": "mckibben.papers.multistate_friction.published:static_force",
+        "sdchm-coupling": "mckibben.papers.sdchm.published:coupling",
     },
     "setups": {
         "arm": "mckibben.rigs.setups.arm:Arm",
@@ -189,7 +258,7 @@ PLUGINS: dict[str, dict[str, str]] = {
         "triangle": "mckibben.signals.excitations:triangle",
     },
 }
-"""Group -> name -> ``"module:attribute"``. Adding a plug-in is one line here."""
+"""Group -> name -> ``"module:attribute"``, or a preset. Adding a plug-in is one line here."""
 
 
 def names(group: str) -> tuple[str, ...]:
@@ -207,7 +276,8 @@ def load(group: str, name: str) -> Any:
     Raises
     ------
     ModelError
-        If the group has no plug-in of that name; the text lists those it has.
+        If the group has no plug-in of that name, where the text lists those it has, or it cannot be
+        imported.
     """
     locations = _locations(group)
     if name not in locations:
@@ -215,11 +285,22 @@ def load(group: str, name: str) -> Any:
             f"there is no {group[:-1] if group.endswith('s') else group} named {name!r}. "
             f"Remedy: use one of {', '.join(sorted(locations))}."
         )
-    module, _, attribute = locations[name].partition(":")
-    return getattr(import_module(module), attribute)
+    found: Any = locations[name]
+    if isinstance(found, str):
+        module, _, attribute = found.partition(":")
+        try:
+            found = getattr(import_module(module), attribute)
+        except (ImportError, AttributeError, SyntaxError) as error:
+            raise ModelError(
+                f"{name!r} of the {group} cannot be imported: {error}. Remedy: mend "
+                f"{locations[name]}, or take it out of the registry."
+            ) from error
+    return Chosen(name, found) if isinstance(found, Preset) else found
 
 
 @cache
-def _locations(group: str) -> dict[str, str]:
-    outside = {entry.name: entry.value for entry in entry_points(group=f"mckibben.{group}")}
+def _locations(group: str) -> dict[str, str | Preset]:
+    outside: dict[str, str | Preset] = {
+        entry.name: entry.value for entry in entry_points(group=f"mckibben.{group}")
+    }
     return outside | PLUGINS[group]

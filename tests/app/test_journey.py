@@ -55,6 +55,10 @@ def address(tmp_path: Path) -> Iterator[str]:
     process.terminate()
     process.wait(20)
     process.stdout.close()
+    if (
+        os.name == "posix"
+    ):  # all that it wrote is for nobody else, whatever the rights of this process
+        assert not [path for path in (tmp_path / "ws").rglob("*") if path.stat().st_mode & 0o077]
 
 
 def answering(address: str) -> None:

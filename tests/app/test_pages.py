@@ -12,19 +12,22 @@ import pytest
 
 pytest.importorskip("nicegui")
 
-from nicegui import Client
+from nicegui import Client, ui
 from nicegui.testing import User, user_simulation
 
 from mckibben import DataError
 from mckibben.app import plots, scripts
+from mckibben.app.desk import Desk
 from mckibben.app.jobs import Jobs
 from mckibben.app.pages.compensate import _points
+from mckibben.app.pages.models import SEPARATOR
 from mckibben.app.server import _load_the_rest, build
-from mckibben.app.work import reference_recording
+from mckibben.app.work import fit, reference_recording
 from mckibben.app.workspace import Workspace
 from mckibben.registry import load
 from mckibben.report import subjects
 from tests.app.test_jobs import filled
+from tests.comparison.test_several import run as two_muscles
 
 
 def visit(workspace: Workspace, look: Callable[[User], Awaitable[None]]) -> None:
@@ -89,6 +92,50 @@ def test_what_is_there_is_shown(tmp_path: Path) -> None:
     visit(workspace, look)
 
 
+def test_recordings_of_two_muscles_get_models_that_couple_them(tmp_path: Path) -> None:
+    workspace = Workspace(tmp_path)
+    workspace.add(two_muscles(5.0), origin="", call="", role="train")
+    workspace.add(two_muscles(4.5), origin="", call="", role="test")
+    desk = Desk(workspace, Jobs(workspace))
+    desk.settle_channels()
+    assert desk.inputs == ("pressure_1", "pressure_2")
+    assert desk.channels["output"] == ["displacement_1", "displacement_2"]
+    models = {"coupled-memory", "coupled-pi", "force-balance"}
+    for seed, name in enumerate(("first", "second")):
+        given = {"model": "coupled-memory", "name": name, "seed": seed}
+        fit(workspace, given | desk.channels, lambda share, cost: None)
+
+    async def look(user: User) -> None:
+        user.find(marker="tab-models").click()
+        await user.should_see(marker="leaderboard")
+        (offered,) = user.find(marker="models").elements
+        assert isinstance(offered, ui.select)
+        assert models < set(offered.options)
+        assert models == set(offered.value)
+        assert not {"pi", "gpi", "arx"} & set(offered.options)
+        (table,) = user.find(marker="leaderboard").elements
+        assert isinstance(table, ui.table)
+        assert {row["name"] for row in table.rows} == {"first", "second"}
+        labels = [column["label"] for column in table.columns]
+        assert labels[1:3] == ["validation RMSE [mm]", "test RMSE [mm]"]
+        assert "test RMSE of displacement_2 [mm]" in labels
+        await user.should_see(marker="closer-5")
+
+    visit(workspace, look)
+
+
+def test_models_of_other_channels_are_not_compared(tmp_path: Path) -> None:
+    workspace = filled(tmp_path)
+    figures = {"rmse": 0.5}
+    for name, output in (("mine", "displacement"), ("other", "force")):
+        result = {"status": "ok", "model": "pi", "input": "pressure", "output": output}
+        workspace.write_json("results", name, result | {"test": figures, "train": figures})
+    desk = Desk(workspace, Jobs(workspace))
+    assert [result["name"] for result in desk.results()] == ["mine"]
+    desk.outputs = ("force",)
+    assert [result["name"] for result in desk.results()] == ["other"]
+
+
 def test_a_damaged_recording_is_told_and_harms_nothing_else(tmp_path: Path) -> None:
     workspace = filled(tmp_path)
     workspace.entry("run").path.write_text("pressure,displacement\n1,x\n")
@@ -112,6 +159,15 @@ def test_fitting_without_a_recording_is_answered(tmp_path: Path) -> None:
     visit(Workspace(tmp_path), look)
 
 
+def test_settings_are_lines_or_between_commas() -> None:
+    text = "n_operators=12, method=ls\nthresholds=[0, 0.5]"
+    assert [part.strip() for part in SEPARATOR.split(text)] == [
+        "n_operators=12",
+        "method=ls",
+        "thresholds=[0, 0.5]",
+    ]
+
+
 def test_cutting_needs_a_selection(tmp_path: Path) -> None:
     async def look(user: User) -> None:
         await user.should_see(marker="keep")
@@ -124,7 +180,8 @@ def test_cutting_needs_a_selection(tmp_path: Path) -> None:
 def test_the_script_runs(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     workspace = filled(tmp_path)
     workspace.write_json("results", "mine", {"status": "ok", "model": "pi", "settings": {}})
-    text = scripts.script(workspace, ["mine"], ("pressure", "displacement"))
+    channels = {"input": "pressure", "output": "displacement"}
+    text = scripts.script(workspace, ["mine"], channels)
     here = Path.cwd()
     os.chdir(tmp_path)
     try:

@@ -15,7 +15,6 @@ from typer.testing import CliRunner
 import mckibben
 from mckibben import GPI, DataError, Recording, characterize, compare, study
 from mckibben.cli.main import app
-from mckibben.comparison.muscles import compare_muscles, constant_row
 from mckibben.comparison.recommending import acceptable, recommended
 from mckibben.comparison.splits import held_out_tail
 from mckibben.signals import irregular_triangle, made_manageable, triangle
@@ -175,14 +174,13 @@ def muscles(seed: int, moves: bool) -> Recording:
 @pytest.mark.parametrize("moves", [True, False])
 def test_muscles_have_to_beat_the_constant_too(moves: bool) -> None:
     train, test = [muscles(0, moves), muscles(1, moves)], [muscles(2, moves)]
-    rows = compare_muscles(train, test, models=["coupled-memory"], jobs=1)
-    constant = constant_row(train, test)
-    chosen, why = recommended(rows, constant, "mm")
+    board = compare(train, test, models=["coupled-memory"], jobs=1)
+    chosen, why = recommended(board.rows, board.constant, "mm")
     assert (chosen is not None) == moves
-    assert acceptable(rows[0], constant) == moves
+    assert acceptable(board.rows[0], board.constant) == moves
     assert ("better than the mean" in why) == (not moves)
     with pytest.raises(DataError, match="tested on data it was fitted to"):
-        compare_muscles(train, train[:1], models=["coupled-memory"], jobs=1)
+        compare(train, train[:1], models=["coupled-memory"], jobs=1)
 
 
 def test_huge_recordings_are_cut_to_stretches_with_their_swings_in_shape() -> None:

@@ -22,7 +22,7 @@ import pytest
 
 import mckibben
 from mckibben import DataError, MckibbenError
-from mckibben.blocks.play import Play
+from mckibben.blocks.play_type.play import Play
 from mckibben.comparison.kept import Kept
 from mckibben.export.folders import write_folder
 from mckibben.files import delimited, limits

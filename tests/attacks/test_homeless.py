@@ -13,7 +13,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mckibben import Recording, caches, write
+from mckibben import Recording, write
+from mckibben.system import caches
 
 NOBODY = 65534
 
@@ -31,15 +32,15 @@ if os.getuid() == 0:  # nobody, who may read this interpreter wherever it lies, 
 RUN = """
 import warnings
 warnings.simplefilter("always")
-from mckibben.compiling import deferred
+from mckibben.system.compiling import deferred
 import written
 assert written.double(4.0) == 8.0
-from mckibben.caches import place
+from mckibben.system.caches import place
 print(place(), sum(written.double.dispatcher.stats.cache_hits.values()))
 """
 
 WRITTEN = """
-from mckibben.compiling import deferred
+from mckibben.system.compiling import deferred
 
 @deferred
 def double(x):

@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 from mckibben import Block, Channel, ModelError, Parallel, Series
-from mckibben.blocks import saving
 from mckibben.blocks.compose import DEEPEST, MOST_BLOCKS, PerChannel
-from mckibben.blocks.fields import MOST_COEFFICIENTS, MOST_NUMBERS
-from mckibben.blocks.trial import input_limits, wander
+from mckibben.blocks.core import saving
+from mckibben.blocks.core.fields import MOST_COEFFICIENTS, MOST_NUMBERS
+from mckibben.blocks.laws.trial import input_limits, wander
 from mckibben.export.c.project import c_files
 from mckibben.registry import load
 
@@ -125,14 +125,13 @@ def test_levels_in_no_range_are_refused(kind: str) -> None:
 
 def test_the_walk_of_an_inverse_ends_where_its_steps_are_nothing() -> None:
     """From the kernel itself: no range is small enough to walk in for ever."""
-    from mckibben.blocks.eupi import eupi_inverse_kernel
+    from mckibben.blocks.play_type.eupi import eupi_inverse_kernel
 
     def task() -> None:
-        inverse = load("blocks", "eupi").example().inverse()
-        coefficients = inverse.coefficients(None)
-        coefficients[-2:] = 0.0, 5e-324
+        block = load("blocks", "eupi").example()
+        coefficients = np.array([*block.coefficients(None), 0.0, 5e-324])
         outputs = np.empty((3, 1))
-        state, inputs = np.zeros(inverse.n_states), np.array([[1.0], [3.0], [np.nan]])
+        state, inputs = np.zeros(block.inverse().n_states), np.array([[1.0], [3.0], [np.nan]])
         eupi_inverse_kernel(coefficients, state, inputs, outputs)
 
     within_seconds(task)

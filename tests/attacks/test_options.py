@@ -16,7 +16,7 @@ from mckibben.cli.output import visible
 from mckibben.errors import DataError, MckibbenError
 from mckibben.rigs import load_rig, rig_from_data_sheet
 from mckibben.signals import triangle
-from mckibben.workers import checked
+from mckibben.system.workers import checked
 from tests.attacks.commands import call
 
 COMMANDS: dict[str, list[str]] = {
@@ -36,7 +36,7 @@ COMMANDS: dict[str, list[str]] = {
     "rig list": [],
     "rig show": ["rail"],
     "rig run": ["rail", "-o", "out.csv", "--signal", "constant:value=1", "--duration", "1"],
-    "rig record": ["multistate", "-o", "out", "--jobs", "1"],
+    "rig record": ["multistate-friction", "-o", "out", "--jobs", "1"],
     "rig new": [
         *("out.toml", "--diameter", "20", "--length", "200", "--max-pressure", "6"),
         *("--max-force", "1500", "--max-contraction", "0.25"),
@@ -155,7 +155,7 @@ RUBBISH = [
 @pytest.mark.parametrize("given", RUBBISH, ids=str)
 def test_the_library_refuses_rubbish_too(given: dict[str, Any]) -> None:
     reference = Recording({"displacement": np.linspace(1.0, 5.0, 20)}, 0.02)
-    controller = control.Feedforward(GPI.example().inverse())
+    controller = GPI.example().inverse()
     with pytest.raises(MckibbenError, match=next(iter(given))):
         control.track(controller, load_rig("mas20-hanging"), reference, **given)
 

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from mckibben import ordinary
 from mckibben.errors import DataError
+from mckibben.system import ordinary
 
 
 def test_a_file_is_read_whole(tmp_path: Path) -> None:

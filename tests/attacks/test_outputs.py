@@ -14,8 +14,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from mckibben import GPI, Recording, manifest, write
-from mckibben.atomic import PART, replacing, write_text
+from mckibben import GPI, Recording, write
 from mckibben.comparison.kept import Kept
 from mckibben.errors import DataError
 from mckibben.outputs import MANIFEST, Results, is_figure
@@ -23,6 +22,8 @@ from mckibben.report import printed
 from mckibben.report.drawing import Curve, Drawing, Panel
 from mckibben.rigs import describe, load_rig
 from mckibben.signals import triangle
+from mckibben.system import manifest
+from mckibben.system.atomic import PART, replacing, write_text
 from tests.attacks.commands import call
 from tests.tools import needs
 
@@ -282,7 +283,7 @@ def test_planted_links_are_not_written_through(
     assert (tmp_path / "victim").read_text() == "mine"
     assert not (tmp_path / "out").is_symlink()
     assert (tmp_path / "out").read_text() == "new"
-    monkeypatch.setattr("mckibben.atomic.secrets.token_hex", lambda n: "00" * n)
+    monkeypatch.setattr("mckibben.system.atomic.secrets.token_hex", lambda n: "00" * n)
     with pytest.raises(DataError, match="File exists"):  # even if the name were guessed
         write_text(tmp_path / "out", "newer")
     assert (tmp_path / "victim").read_text() == "mine"

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from mckibben.blocks.gpi import GPI
-from mckibben.papers import Figure, Reproduction, Table
+from mckibben.blocks.play_type.gpi import GPI
+from mckibben.papers.reproduction import Figure, Reproduction, Table
 from mckibben.report import page as report
 from mckibben.report.reproduction import reproduction_page
 from tests.app.test_journey import SLOW

@@ -14,17 +14,19 @@ import pytest
 from numpy.typing import NDArray
 
 from mckibben import Block, DataError, ModelWarning
-from mckibben.blocks.running import Stream
-from mckibben.blocks.trial import input_limits, wander
+from mckibben.blocks.core.running import Stream
+from mckibben.blocks.laws.examples import examples
+from mckibben.blocks.laws.trial import input_limits, wander
 from mckibben.export.c.building import LOOP
 from mckibben.export.c.project import described, source_files
-from mckibben.registry import load, names
+from mckibben.registry import load
 from tests.tools import needs
 
 Array = NDArray[np.float64]
 
 SAMPLE_TIME = 0.01
-KINDS = names("blocks")
+EXAMPLES = examples()
+KINDS = list(EXAMPLES)
 BAD = (np.nan, np.inf, -np.inf)
 
 
@@ -62,7 +64,7 @@ def streamed(stream: Stream, inputs: Array) -> tuple[Array, Array, NDArray[np.in
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_bad_samples_change_nothing(kind: str) -> None:
-    block = load("blocks", kind).example()
+    block = EXAMPLES[kind]
     inputs, kept = poisoned(path_for(block, 1), 2)
     outputs, states, statuses = streamed(block.stream(SAMPLE_TIME), inputs)
     expected, memory, good = streamed(block.stream(SAMPLE_TIME), inputs[kept])
@@ -82,7 +84,7 @@ def compiled(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Any]:
     folder = tmp_path_factory.mktemp("c")
     loops = []
     for index, kind in enumerate(KINDS):
-        block, name = load("blocks", kind).example(), f"block_{index}"
+        block, name = EXAMPLES[kind], f"block_{index}"
         content = described(block, name=name, sample_time=SAMPLE_TIME, single=False)
         for path, text in source_files(content).items():
             (folder / Path(path).name).write_text(text)
@@ -109,7 +111,7 @@ def compiled(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Any]:
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_stream_does_as_exported_c(kind: str, compiled: Callable[..., Any]) -> None:
     """Sample for sample, bad ones and the status included."""
-    block = load("blocks", kind).example()
+    block = EXAMPLES[kind]
     inputs, _ = poisoned(path_for(block, 3), 4)
     outputs, _, statuses = streamed(block.stream(SAMPLE_TIME), inputs)
     expected, wanted = compiled(kind, inputs, len(block.outputs))
@@ -121,7 +123,7 @@ def test_a_stream_does_as_exported_c(kind: str, compiled: Callable[..., Any]) ->
 @pytest.mark.parametrize("size", [1e308, -1e308, 1e154, 5e-324])
 @pytest.mark.parametrize("kind", KINDS)
 def test_absurd_sizes_give_finite_outputs(kind: str, size: float) -> None:
-    block = load("blocks", kind).example()
+    block = EXAMPLES[kind]
     good = path_for(block, 5, 60)
     rng = np.random.default_rng(6)
     inputs = good.copy()
@@ -136,7 +138,7 @@ def test_absurd_sizes_give_finite_outputs(kind: str, size: float) -> None:
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_whole_recording_with_nan_is_refused(kind: str) -> None:
-    block = load("blocks", kind).example()
+    block = EXAMPLES[kind]
     inputs, _ = poisoned(path_for(block, 7, 20), 8)
     with pytest.raises(DataError, match="Remedy:"):
         block.simulate(inputs, sample_time=SAMPLE_TIME)

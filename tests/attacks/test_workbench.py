@@ -26,10 +26,12 @@ import pytest
 
 from mckibben import DataError, Recording
 from mckibben.app import guard, kept, reading
+from mckibben.app.claim import keep_to_the_user
+from mckibben.app.folder import FOLDERS
 from mckibben.app.guard import Guard, checked_token
 from mckibben.app.jobs import Job, Jobs
 from mckibben.app.pages.models import _judged
-from mckibben.app.workspace import FOLDERS, Workspace
+from mckibben.app.workspace import Workspace
 from mckibben.files import write
 from mckibben.registry import load
 
@@ -196,6 +198,7 @@ def test_nobody_else_may_read_or_write_a_workspace(tmp_path: Path) -> None:
         old = tmp_path / "ws"
         (old / "recordings").mkdir(parents=True)
         (old / "recordings" / "old.csv").write_text("pressure_bar\n1\n")
+        keep_to_the_user()
         workspace = Workspace(old)
         assert workspace.claim()
         workspace.add(recording(), origin="", call="")
@@ -291,7 +294,7 @@ time.sleep(60)
 HOLDING = """
 import ctypes, multiprocessing, os, sys, time
 from mckibben.app.workspace import Workspace
-from mckibben.workers import end_with_parent
+from mckibben.system.workers import end_with_parent
 
 def hold(folder):
     end_with_parent()
@@ -339,7 +342,7 @@ def test_a_job_ends_with_a_killed_workbench_whatever_it_is_at(tmp_path: Path) ->
 def test_while_a_job_of_a_killed_workbench_lives_nothing_is_written(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("mckibben.app.workspace.PATIENCE", 0.1)
+    monkeypatch.setattr("mckibben.app.folder.PATIENCE", 0.1)
     held = Workspace(tmp_path).work()
     second = Workspace(tmp_path)
     assert not second.claim()
@@ -509,7 +512,7 @@ def test_models_are_loaded_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
     load("blocks", "pi").example().save(workspace.path("models", "pi.json"))
     (tmp_path / "models" / "bad.json").write_text("{}")
     assert workspace.models() == ["pi"]
-    monkeypatch.setattr("mckibben.blocks.saving.load", full)
+    monkeypatch.setattr("mckibben.blocks.core.saving.load", full)
     assert workspace.models() == ["pi"]
     os.utime(tmp_path / "models" / "pi.json", (0, 0))
     assert workspace.models() == []

@@ -16,10 +16,10 @@ import pytest
 
 from mckibben import compare
 from mckibben.comparison import cluster, trying
-from mckibben.comparison.ranking import plan_of
+from mckibben.comparison.planning import plan_of
 from mckibben.comparison.results import Leaderboard
-from mckibben.comparison.trying import Part, Tried
-from mckibben.workers import WorkerError, Workers, answered
+from mckibben.comparison.trying import Item, Part, Tried
+from mckibben.system.workers import WorkerError, Workers, answered
 from tests.report.studies_by_hand import measured
 
 DATA = measured(300), measured(300, seed=1, name="another day")
@@ -102,23 +102,23 @@ LIES: dict[str, Callable[[Any], Any]] = {
 
 def lie(data: Any, part: Any, tell: Any) -> Any:
     """Try a part, and lie about it as its settings say."""
-    settings = dict(part.settings)
-    kind = settings.pop("lie", "nonsense" if part.model == "eupi" else "none")
-    return LIES[kind](HONEST(data, replace(part, settings=settings), tell))
+    settings = dict(part.item.settings)
+    kind = settings.pop("lie", "nonsense" if part.name == "eupi" else "none")
+    return LIES[kind](HONEST(data, replace(part, item=replace(part.item, settings=settings)), tell))
 
 
 def test_what_is_not_of_the_part_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(trying, "try_part", lie)
     data = plan_of(
         *DATA,
-        input="pressure",
-        output="displacement",
+        inputs="pressure",
+        outputs="displacement",
         models=["eupi"],
         settings=None,
         n_folds=0,
         seed=0,
     ).data
-    parts = [Part("eupi", {"lie": kind}, (), whole=True) for kind in LIES]
+    parts = [Part("eupi", Item("eupi", {"lie": kind}), (), whole=True) for kind in LIES]
     first, *others = trying.outcomes(data, parts, 1)
     assert first.result().row.model == "eupi"
     assert len(others) == len(LIES) - 1
@@ -146,7 +146,7 @@ def test_a_cross_validation_that_ran_away_is_not_chosen_by(
 ) -> None:
     def run_away(data: Any, part: Any, tell: Any) -> Any:
         tried = HONEST(data, part, tell)
-        return replace(tried, squares=(float("nan"),)) if part.model == "eupi" else tried
+        return replace(tried, squares=((float("nan"),),)) if part.name == "eupi" else tried
 
     monkeypatch.setattr(trying, "try_part", run_away)
     board = compare(*DATA, models=["pi", "eupi"], jobs=1)
@@ -219,7 +219,7 @@ def test_answers_to_nothing_asked_and_twice_are_passed_over(
 SPAWNED = """
 import multiprocessing
 from tests.attacks.test_workers import board_of
-from mckibben.workers import context
+from mckibben.system.workers import context
 
 if __name__ == "__main__":
     multiprocessing.set_start_method("spawn")

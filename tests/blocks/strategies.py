@@ -7,12 +7,12 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from mckibben import EUPI, GPI, PI, Polynomial, RateDependentPI
-from mckibben.blocks.envelopes.base import Envelope
-from mckibben.blocks.envelopes.exponential import Exponential
-from mckibben.blocks.envelopes.piecewise_linear import PiecewiseLinear
-from mckibben.blocks.envelopes.tanh import Tanh
-from mckibben.blocks.fields import vector
-from mckibben.blocks.trial import through
+from mckibben.blocks.core.fields import vector
+from mckibben.blocks.laws.trial import through
+from mckibben.blocks.play_type.envelopes.base import Envelope
+from mckibben.blocks.play_type.envelopes.exponential import Exponential
+from mckibben.blocks.play_type.envelopes.piecewise_linear import PiecewiseLinear
+from mckibben.blocks.play_type.envelopes.tanh import Tanh
 
 Array = NDArray[np.float64]
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from mckibben.blocks.braid_equilibrium import BraidEquilibrium
+from mckibben.blocks.force.braid_equilibrium import BraidEquilibrium
 
 
 def test_slopes_are_those_of_finite_differences_up_to_both_limits() -> None:

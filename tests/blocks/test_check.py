@@ -24,12 +24,12 @@ from mckibben import (
     Series,
     check_block,
 )
-from mckibben.blocks import saving
-from mckibben.blocks.envelopes.exponential import Exponential
-from mckibben.blocks.envelopes.tanh import Tanh
-from mckibben.blocks.fields import vector
-from mckibben.blocks.pi import PIInverse
-from mckibben.blocks.running import Stream
+from mckibben.blocks.core import saving
+from mckibben.blocks.core.fields import vector
+from mckibben.blocks.core.inverse import Inverse
+from mckibben.blocks.core.running import Stream
+from mckibben.blocks.play_type.envelopes.exponential import Exponential
+from mckibben.blocks.play_type.envelopes.tanh import Tanh
 from mckibben.errors import ContractError
 
 Array = NDArray[np.float64]
@@ -181,15 +181,15 @@ BROKEN: dict[str, tuple[Patch, str]] = {
         "inverse of the inverse",
     ),
     "an inverse that is a little off": (
-        replaced(PIInverse, "_run", after(lambda u: u * (1 + 1e-8))),
+        replaced(Inverse, "_run", after(lambda u: u * (1 + 1e-8))),
         "forward of inverse",
     ),
     "an inverse deaf to states": (
-        replaced(PIInverse, "initial_state", holds_still),
+        replaced(Inverse, "initial_state", holds_still),
         "carried-over state",
     ),
     "clipping in silence": (
-        replaced(PIInverse, "report", lambda _: lambda self, state: None),
+        replaced(Inverse, "report", lambda _: lambda self, state: None),
         "warns",
     ),
 }

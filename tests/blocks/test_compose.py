@@ -27,15 +27,16 @@ from mckibben import (
     Recording,
     Series,
 )
-from mckibben.blocks.base import Run
-from mckibben.blocks.fields import DISPLACEMENT, Initial
-from mckibben.blocks.inverse_laws import inverts
-from mckibben.blocks.trial import Trial
-from mckibben.registry import load, names
+from mckibben.blocks.core.block import Run
+from mckibben.blocks.core.fields import DISPLACEMENT, Initial
+from mckibben.blocks.laws.examples import examples
+from mckibben.blocks.laws.inverse_laws import inverts
+from mckibben.blocks.laws.trial import Trial
 from tests.blocks.strategies import paths, pi_models
 
 Array = NDArray[np.float64]
 
+EXAMPLES = examples()
 FORCE = Channel("force", "N")
 TEMPERATURE = Channel("temperature", "degC")
 
@@ -185,9 +186,9 @@ def test_absent_scheduling_channel_is_named() -> None:
         scheduled().simulate(Recording({"pressure": np.linspace(0, 1, 9)}, 0.1))
 
 
-@pytest.mark.parametrize("kind", [k for k in names("blocks") if k != "parallel"])
+@pytest.mark.parametrize("kind", [kind for kind in EXAMPLES if kind != "parallel"])
 def test_inverse_of_a_series_is_the_reversed_series_of_inverses(kind: str) -> None:
-    block = load("blocks", kind).example()
+    block = EXAMPLES[kind]
     if len(block.inputs) > 1:
         return
     try:

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from mckibben import ModelError
-from mckibben.blocks.coupling import Coupling
-from mckibben.blocks.fields import Channel
-from mckibben.blocks.fuzzy_network import FuzzyNetwork
+from mckibben.blocks.core.fields import Channel
+from mckibben.blocks.coupled.coupling import Coupling
+from mckibben.blocks.coupled.fuzzy_network import FuzzyNetwork
 from mckibben.registry import load
 
 CHANNELS = tuple(Channel(f"displacement_{k}", "mm") for k in (1, 2))

@@ -10,11 +10,11 @@ import pytest
 from scipy.signal import lfilter, lsim
 
 from mckibben import ModelError
-from mckibben.blocks.creep import Creep
+from mckibben.blocks.dynamic.creep import Creep
 from mckibben.blocks.dynamic.narx_polynomial import NarxPolynomial
 from mckibben.blocks.dynamic.process_model import ProcessModel
 from mckibben.blocks.dynamic.transfer_function import TransferFunction
-from mckibben.blocks.published.field_models import process_model
+from mckibben.papers.field_models.published import process_model
 
 STEP = 0.01
 INPUT = np.cumsum(np.random.default_rng(0).standard_normal(1500)) * 0.05

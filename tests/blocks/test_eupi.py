@@ -10,7 +10,7 @@ from hypothesis import given
 from numpy.typing import NDArray
 
 from mckibben import EUPI, PI, ModelError, ModelWarning
-from mckibben.blocks.eupi import eupi_matrix
+from mckibben.blocks.play_type.eupi import eupi_matrix
 from tests.blocks.strategies import HIGH, LOW, eupi_models, paths, pi_models
 
 Array = NDArray[np.float64]

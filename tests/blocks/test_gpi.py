@@ -8,11 +8,11 @@ from hypothesis import given
 from numpy.typing import NDArray
 
 from mckibben import GPI, PI, ModelError, ModelWarning
-from mckibben.blocks.envelopes.exponential import Exponential
-from mckibben.blocks.envelopes.piecewise_linear import PiecewiseLinear
-from mckibben.blocks.envelopes.tanh import Tanh
-from mckibben.blocks.fields import vector
-from mckibben.blocks.gpi import gpi_matrix
+from mckibben.blocks.core.fields import vector
+from mckibben.blocks.play_type.envelopes.exponential import Exponential
+from mckibben.blocks.play_type.envelopes.piecewise_linear import PiecewiseLinear
+from mckibben.blocks.play_type.envelopes.tanh import Tanh
+from mckibben.blocks.play_type.gpi import gpi_matrix
 from tests.blocks.strategies import HIGH, LOW, gpi_models, numbers, paths, pi_models
 
 Array = NDArray[np.float64]

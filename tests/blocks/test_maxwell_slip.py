@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mckibben.blocks.maxwell_slip import slip_matrix
+from mckibben.blocks.play_type.maxwell_slip import slip_matrix
 
 
 def test_springs_side_by_side_agree_with_each_alone() -> None:

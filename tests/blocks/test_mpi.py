@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from mckibben import PI, Affine, ModelError, ModelWarning, PiecewiseLinear, Polynomial, Series
-from mckibben.blocks.fields import vector
+from mckibben.blocks.core.fields import vector
 from tests.blocks.strategies import HIGH, LOW, increasing_cubics, numbers, paths, pi_models
 
 Array = NDArray[np.float64]

@@ -15,7 +15,7 @@ from mckibben import ModelError, Parallel, Recording
 from mckibben.blocks.force.feedforward import ForceFeedforward
 from mckibben.blocks.force.multistate_friction import EIGHTEEN, ELEVEN, MultistateFriction
 from mckibben.blocks.force.tondu_lopez import TonduLopez
-from mckibben.blocks.published.multistate import multistate_friction, static_force
+from mckibben.papers.multistate_friction.published import multistate_friction, static_force
 
 Array = NDArray[np.float64]
 STEP = 0.01

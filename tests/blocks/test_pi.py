@@ -8,7 +8,7 @@ from hypothesis import given
 from numpy.typing import NDArray
 
 from mckibben import PI, ModelError, ModelWarning
-from mckibben.blocks.fields import vector
+from mckibben.blocks.core.fields import vector
 from tests.blocks.strategies import HIGH, LOW, numbers, paths, pi_models
 
 Array = NDArray[np.float64]

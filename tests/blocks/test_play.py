@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from mckibben import PI, DataError, ModelError, Play
-from mckibben.blocks.play import play_matrix
+from mckibben.blocks.play_type.play import play_matrix
 from tests.blocks.strategies import numbers, paths
 
 Array = NDArray[np.float64]

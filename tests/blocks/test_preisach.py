@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from mckibben import ModelError
-from mckibben.blocks.krasnoselskii_pokrovskii import KrasnoselskiiPokrovskii
-from mckibben.blocks.preisach import DEPTH, Preisach
+from mckibben.blocks.preisach_type.krasnoselskii_pokrovskii import KrasnoselskiiPokrovskii
+from mckibben.blocks.preisach_type.preisach import DEPTH, Preisach
 
 Array = NDArray[np.float64]
 PATHS = st.lists(st.floats(0.0, 5.0), min_size=1, max_size=20)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mckibben import ModelError
-from mckibben.blocks.published.mpi_narmax import POLYNOMIAL, TURNING_POINT
+from mckibben.papers.mpi_narmax.published import POLYNOMIAL, TURNING_POINT
 from mckibben.registry import load
 
 R_FIELD = [0, 0.3392, 0.6654, 0.9917, 1.3179, 1.6442, 1.9704]

@@ -13,11 +13,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mckibben import GPI, PI, DataError, ModelError, Series, load
-from mckibben.blocks import saving
-from mckibben.registry import load as load_plugin
-from mckibben.registry import names
+from mckibben.blocks.core import saving
+from mckibben.blocks.laws.examples import examples
 from tests.blocks.strategies import gpi_models, pi_models, rate_dependent_models
 
+EXAMPLES = examples()
 GOOD: dict[str, Any] = GPI.example().to_dict()
 TEXT = json.dumps(GOOD)
 
@@ -75,7 +75,9 @@ DAMAGES: dict[str, Callable[[dict[str, Any]], object]] = {
     "an unknown kind": lambda d: d | {"kind": "preisach"},
     "a kind that is a list": lambda d: d | {"kind": ["gpi"]},
     "a kind that is a location": lambda d: d | {"kind": "os:system"},
-    "a kind that is a location of ours": lambda d: d | {"kind": "mckibben.blocks.gpi:GPI"},
+    "a kind that is a location of ours": lambda d: (
+        d | {"kind": "mckibben.blocks.play_type.gpi:GPI"}
+    ),
     "a kind that is a path": lambda d: d | {"kind": "../gpi"},
     "a kind of another group": lambda d: d | {"kind": "tanh"},
     "an estimator as a kind": lambda d: d | {"kind": "mpi"},
@@ -164,14 +166,23 @@ def test_huge_files_are_refused_before_they_are_read(tmp_path: Path) -> None:
     assert "bytes are more than" in refused(path)
 
 
-@pytest.mark.parametrize("kind", names("blocks"))
+@pytest.mark.parametrize("kind", EXAMPLES)
 @pytest.mark.parametrize(
     "surplus", ["__init__", "unknown", "kernel", "self", "cls", "__dataclass_self__"]
 )
 def test_no_block_takes_an_unknown_field(kind: str, surplus: str) -> None:
-    content = load_plugin("blocks", kind).example().to_dict()
+    content = EXAMPLES[kind].to_dict()
     with pytest.raises(ModelError, match="Remedy:"):
         saving.from_dict({**content, surplus: 1.0})
+
+
+def test_inverses_that_had_kinds_of_their_own_still_load() -> None:
+    content = PI.example().inverse().to_dict()
+    assert content["kind"] == "inverse"
+    assert saving.from_dict({**content, "kind": "pi-inverse"}) == PI.example().inverse()
+    for kind in ("nothing-inverse", "pi-inverse-inverse", "-inverse"):
+        with pytest.raises(ModelError, match="Remedy:"):
+            saving.from_dict({**content, "kind": kind})
 
 
 def test_nothing_is_imported_on_the_word_of_a_file(

@@ -7,8 +7,6 @@ from pathlib import Path
 
 import pytest
 
-from mckibben.cli.options import parse_settings
-from mckibben.errors import ModelError
 from tests.cli.conftest import Cli
 from tests.files.malformed import CASES, Case
 
@@ -95,27 +93,6 @@ def test_a_defect_is_reported_without_a_traceback(
     assert "Traceback" not in result.err
 
 
-def test_settings_are_read_as_json_or_words() -> None:
-    found = parse_settings(
-        [
-            "n_operators=7",
-            "nonnegative=false",
-            "spacing=dense",
-            "thresholds=[0, 0.5]",
-            "gpi.seed=3",
-        ],
-        "pi",
-    )
-    assert found == {
-        "n_operators": 7,
-        "nonnegative": False,
-        "spacing": "dense",
-        "thresholds": (0, 0.5),
-    }
-    with pytest.raises(ModelError, match="Remedy"):
-        parse_settings(["n_operators"], "pi")
-
-
 def test_help_loads_nothing_heavy() -> None:
     heavy = ["numba", "scipy", "pandas", "plotly", "sklearn", "matplotlib", "pint", "numpy"]
     code = f"import sys, mckibben.cli.main; print([m for m in {heavy} if m in sys.modules])"
@@ -128,7 +105,7 @@ def test_help_loads_nothing_heavy() -> None:
 def test_interrupt_while_fitting_keeps_the_best_so_far(
     cli: Cli, files: tuple[Path, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from mckibben.estimators.search import Tracker
+    from mckibben.estimators.optimisers.tracker import Tracker
 
     seen = Tracker.saw
 

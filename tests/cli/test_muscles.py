@@ -39,7 +39,7 @@ def test_from_recordings_to_a_closed_loop(cli: Cli, arm: Path, tmp_path: Path) -
     model, inverse, run = (tmp_path / name for name in ("model.json", "inverse.json", "run.csv"))
     result = cli("fit", "force-balance", *sorted(arm.glob("*.csv")), "-o", model, "--json")
     assert result.code == 0, result.err
-    assert max(json.loads(result.out)["rmse"].values()) < 2.0
+    assert max(json.loads(result.out)["rmse_by_output"].values()) < 2.0
     first = next(iter(sorted(arm.glob("*drive-1.csv"))))
     result = cli("simulate", model, first, "-o", run, "--json")
     assert result.code == 0, result.err
@@ -56,21 +56,40 @@ def test_from_recordings_to_a_closed_loop(cli: Cli, arm: Path, tmp_path: Path) -
     assert "reference_displacement_1" in run.read_text().splitlines()[0]
 
 
+def test_one_output_of_several_muscles_is_compared(cli: Cli, arm: Path, tmp_path: Path) -> None:
+    runs = sorted(arm.glob("*drive-123.csv"))
+    channel = ["--output", "displacement_1", "--models", "coupled-memory"]
+    result = cli("compare", *runs[:2], "--test", runs[2], *channel, "-o", tmp_path / "out")
+    assert result.code == 0, result.err
+    first, *_ = json.loads((tmp_path / "out" / "leaderboard.json").read_text())["rows"]
+    assert set(first["outputs"]) == {"displacement_1"}
+    gap = tmp_path / "gap.csv"
+    for place in (1, -1):
+        lines = runs[0].read_text().splitlines()
+        cells = lines[50].split(",")
+        cells[place] = ""
+        lines[50] = ",".join(cells)
+        gap.write_text("\n".join(lines))
+        result = cli("compare", gap, runs[1], "--test", runs[2], *channel)
+        assert result.code == 2
+        assert "missing" in result.err
+
+
 def test_study_of_a_folder_closes_the_loop(cli: Cli, arm: Path, tmp_path: Path) -> None:
     out = tmp_path / "study"
     result = cli("study", arm, "-o", out, "--models", "force-balance,coupled-pi", "--json")
     assert result.code == 0, result.err
     found = json.loads(result.out)
-    assert found["inverse"] == found["chosen"] == "force-balance"
-    first, second, constant = found["rows"]
+    board = found["leaderboard"]
+    assert found["inverse"]["model"] == board["chosen"] == "force-balance"
+    first, second, constant = board["rows"]
     assert constant["model"] == "constant"
-    assert np.mean(list(first["validation"].values())) < np.mean(
-        list(second["validation"].values())
-    )
-    assert "1.2 bar held out" in found["split"]
-    noted = [note for note in found["notes"] if note.endswith(".csv: its clock was mended")]
+    assert first["validation_rmse"] < second["validation_rmse"]
+    assert set(first["outputs"]) == {f"displacement_{k}" for k in (1, 2, 3)}
+    assert "1.2 bar held out" in board["split"]
+    noted = [note for note in board["notes"] if note.endswith(".csv: its clock was mended")]
     assert len(noted) == len(list(arm.glob("*.csv")))
-    assert noted[0] in (out / "report.html").read_text()
+    assert "its clock was mended" in (out / "report.html").read_text()
     errors = {name: max(rmse.values()) for name, rmse in found["tracking"].items()}
     assert errors["force-balance inverse + PID"] < errors["force-balance inverse"]
     for name in ("report.html", "leaderboard.csv", "leaderboard.json", "inverse.json"):
@@ -82,7 +101,7 @@ def test_study_of_a_folder_closes_the_loop(cli: Cli, arm: Path, tmp_path: Path) 
     [
         (["track", "nowhere.json", "--rig", "soft-arm", "--reference", "x.csv"], "nowhere.json"),
         (["study", "EMPTY", "-o", "x"], "no recording"),
-        (["fit", "pi", "FILE", "-o", "x.json", "--validation", "FILE"], "several muscles"),
+        (["fit", "pi", "FILE", "-o", "x.json", "--validation", "FILE"], "does not stop early"),
         (["fit", "coupled-pi", "FILE", "-o", "x.json", "--set", "luck=1"], "no setting 'luck'"),
         (["fit", "sdchm", "REST", "-o", "x.json"], "no channel displacement_1"),
         (["study", "ONE", "-o", "x", "--rig", "soft-arm"], "several muscles"),
@@ -137,9 +156,9 @@ def test_study_under_loads_ranks_one_model_for_all(cli: Cli, tmp_path: Path) -> 
     given = ["--models", "force-balance", "--load", "force", "-o", tmp_path / "out", "--json"]
     result = cli("study", folder, *given)
     assert result.code == 0, result.err
-    rows = json.loads(result.out)["rows"]
+    rows = json.loads(result.out)["leaderboard"]["rows"]
     assert rows[0]["model"] == "force-balance"
-    assert any("98 N" in row["model"] for row in rows[1:])
+    assert any("98.5 N" in row["model"] for row in rows[1:])
     result = cli("study", folder, "--load", "weight", "-o", tmp_path / "out")
     assert result.code == 2
     assert "weight" in result.err

@@ -1,6 +1,7 @@
 """Ctrl-C sent to the real commands at random moments.
 
-``MCKIBBEN_STOPS=20 pytest tests/cli/test_stopping.py`` stops each command twenty times.
+``MCKIBBEN_STOPS=20 pytest tests/cli/test_stopping.py`` stops each command twenty times, and holds
+them to the two seconds within which they stop on a machine that has nothing else to do.
 """
 
 from __future__ import annotations
@@ -20,13 +21,12 @@ import pytest
 from mckibben import GPI, Recording, write
 from mckibben.signals import irregular_triangle, triangle
 
+MEASURED = "MCKIBBEN_STOPS" in os.environ
+
 STOPS = int(os.environ.get("MCKIBBEN_STOPS", "2"))
 
-PROMPT = 2.0
-"""Within which a command stops [s]."""
-
-SLACK = 1.5
-"""For a machine that has more to do than this [s]."""
+PROMPT = 2.0 if MEASURED else 20.0
+"""Within which a command stops [s]: without being measured, only that it does not hang."""
 
 MODELS = "pi,maxwell-slip,mpi,p1,bouc-wen"
 
@@ -85,7 +85,7 @@ def check_stopped(code: int, said: str, took: float) -> None:
     assert code == 130, said
     assert "Stopp" in said or "Interrupted" in said
     assert "Traceback" not in said
-    assert took < PROMPT + SLACK
+    assert took < PROMPT
 
 
 @pytest.mark.parametrize("command", ["compare", "study"])
@@ -159,4 +159,4 @@ def test_a_second_signal_ends_at_once(recordings: tuple[Path, Path], tmp_path: P
     said = process.communicate(timeout=60)[1]
     assert process.returncode in (130, -signal.SIGINT)
     assert "Traceback" not in said
-    assert time.monotonic() - started < PROMPT + SLACK
+    assert time.monotonic() - started < PROMPT

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mckibben import GPI, PI, Affine, ModelError, RateDependentPI, Recording, Series
-from mckibben.blocks.base import Block
+from mckibben.blocks.core.block import Block
 from mckibben.comparison.free_run import measured_start, run_free
 
 T = np.linspace(0, 1, 800)

@@ -9,6 +9,12 @@ from mckibben.signals import triangle
 
 U = triangle(np.arange(0, 24, 0.01), 6.0, [5.0, 4.0, 3.0, 2.0])
 
+PAIRS = (("pressure", "displacement"),)
+
+
+def column(samples: np.ndarray) -> np.ndarray:
+    return samples[:, np.newaxis]
+
 
 def recorded(y: np.ndarray) -> Recording:
     return Recording({"pressure": U, "displacement": y}, 0.01)
@@ -27,7 +33,7 @@ def test_gap_of_a_parallelogram_is_its_width() -> None:
 @pytest.mark.parametrize("block", [PI.example(), GPI.example()], ids=lambda b: b.kind)
 def test_a_model_of_the_right_memory_scores_one(block: PI | GPI) -> None:
     y = block.simulate(U)
-    found = memory_test(block, [recorded(y)], [y], "pressure", "displacement")
+    found = memory_test(block, [recorded(y)], [column(y)], PAIRS)
     assert found.gap_ratio == pytest.approx(1.0)
     assert found.hold_ratio == pytest.approx(1.0)
     assert found.n_pairs > 100
@@ -38,14 +44,14 @@ def test_a_model_with_half_the_memory_scores_half() -> None:
     y = block.simulate(U)
     reversible = PI((0.0,), (sum(block.weights),), 0.0)
     halved = 0.5 * (y + reversible.simulate(U))
-    found = memory_test(block, [recorded(y)], [halved], "pressure", "displacement")
+    found = memory_test(block, [recorded(y)], [column(halved)], PAIRS)
     assert found.gap_ratio == pytest.approx(0.5, abs=1e-6)
 
 
 def test_a_model_without_memory_scores_nothing() -> None:
     block = replace(Affine.example(), input=PI.example().input)
     y = PI.example().simulate(U)
-    found = memory_test(block, [recorded(y)], [block.simulate(U)], "pressure", "displacement")
+    found = memory_test(block, [recorded(y)], [column(block.simulate(U))], PAIRS)
     assert found.gap_ratio == pytest.approx(0.0, abs=1e-9)
     assert found.hold_ratio is None
     assert hold_test(block, recorded(y), "pressure", "displacement") is None
@@ -55,6 +61,6 @@ def test_data_without_hysteresis_give_no_ratio() -> None:
     ramp = Recording({"pressure": np.linspace(0, 5, 50), "displacement": np.linspace(0, 9, 50)})
     block = PI.example()
     output = block.simulate(ramp)["displacement"]
-    found = memory_test(block, [ramp], [output], "pressure", "displacement")
+    found = memory_test(block, [ramp], [column(output)], PAIRS)
     assert found.gap_ratio is None
     assert found.n_pairs == 0

@@ -23,12 +23,14 @@ from mckibben import (
     compare,
     registry,
 )
+from mckibben.comparison.channels import Channels
 from mckibben.comparison.results import CHOICES, Leaderboard, Standing
 from mckibben.comparison.splits import folds, given_split, held_out_tail, validation_folds
-from mckibben.comparison.trying import Data, errors_on_test, joined, parts_of, try_part
-from mckibben.estimators.base import Estimator
+from mckibben.comparison.trying import Data, Item, errors_on_test, joined, parts_of, try_part
+from mckibben.estimators.core.estimator import Estimator
 from mckibben.signals import irregular_triangle, triangle
 
+CHANNELS = Channels(("pressure",), ("displacement",))
 TIME = np.arange(0, 24, 0.02)
 
 
@@ -104,20 +106,20 @@ def test_the_choice_has_the_least_error_of_what_it_is_by(
 
 def test_too_few_cycles_are_held_out_at_the_end_and_too_few_samples_not_at_all() -> None:
     rising = np.linspace(0, 5, 200)
-    parts, chosen_by = validation_folds([recorded(rising)], "pressure", 4)
+    parts, chosen_by = validation_folds([recorded(rising)], CHANNELS, 4)
     assert (len(parts), chosen_by) == (1, "validation")
     (scored,) = parts[0].test_rows
     assert scored[-50:].all()
     assert len(parts[0].train[0]) == 200 - int(scored.sum())
-    assert validation_folds([recorded(rising[::20])], "pressure", 4) == ((), "fit")
+    assert validation_folds([recorded(rising[::20])], CHANNELS, 4) == ((), "fit")
 
 
 def test_a_part_that_goes_beyond_the_rest_does_not_decide(train: Recording) -> None:
-    parts, _ = validation_folds([train], "pressure", 4)
+    parts, _ = validation_folds([train], CHANNELS, 4)
     assert len(parts) == 3
     for part in parts:
         assert train["pressure"][part.test_rows[0]].max() < train["pressure"].max()
-    assert len(validation_folds([recorded(triangle(TIME, 4.0, 5.0))], "pressure", 4)[0]) == 4
+    assert len(validation_folds([recorded(triangle(TIME, 4.0, 5.0))], CHANNELS, 4)[0]) == 4
 
 
 def test_a_model_whose_cross_validation_failed_is_chosen_only_where_all_did(
@@ -209,7 +211,10 @@ def test_a_model_that_fails_is_a_row_with_its_reason(
     broken.Failing = FailingEstimator  # type: ignore[attr-defined]
     broken.Overflowing = OverflowingEstimator  # type: ignore[attr-defined]
     monkeypatch.setitem(sys.modules, "broken_models", broken)
-    extra = {"failing": "broken_models:Failing", "overflowing": "broken_models:Overflowing"}
+    extra: dict[str, Any] = {
+        "failing": "broken_models:Failing",
+        "overflowing": "broken_models:Overflowing",
+    }
     monkeypatch.setitem(registry.PLUGINS, "estimators", registry.PLUGINS["estimators"] | extra)
     registry._locations.cache_clear()
     try:
@@ -246,7 +251,7 @@ def test_bad_input_is_refused_at_once(train: Recording) -> None:
     with pytest.raises(ModelError, match=r"no estimator named 'spline'.*Remedy"):
         compare(train, models=["spline"])
     with pytest.raises(DataError, match="no channel 'force'"):
-        compare(train, output="force")
+        compare(train, outputs="force")
     with pytest.raises(DataError, match="no recordings"):
         compare([])
     with pytest.raises(DataError, match="too few"):
@@ -451,16 +456,15 @@ def test_parts_of_a_model_make_the_same_row(
 ) -> None:
     data = Data(
         given_split([train], [test_set]),
-        validation_folds([train], "pressure", 4)[0],
-        "pressure",
-        "displacement",
+        validation_folds([train], CHANNELS, 4)[0],
+        CHANNELS,
     )
-    parts = parts_of("pi", {"seed": 0}, 3, split)
+    parts = parts_of("pi", Item("pi", {"seed": 0}), 3, split)
     assert len(parts) == (3 if split else 1)
     pieces = [try_part(data, part, lambda *_: None) for part in parts]
-    tried = joined(pieces)
+    tried = joined(pieces, CHANNELS.outputs)
     for order in permutations(pieces):  # whichever process was first
-        again = joined(order)
+        again = joined(order, CHANNELS.outputs)
         assert again.row is not None
         assert tried.row is not None
         assert again.row.validation_rmse == tried.row.validation_rmse

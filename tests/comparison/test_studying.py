@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from mckibben import GPI, PI, ModelError, Recording, study
-from mckibben.blocks.base import Block
-from mckibben.comparison.studying import check_inverse, invert_best
+from mckibben.blocks.core.block import Block
+from mckibben.comparison.inverting import check_inverse, invert_best
 from mckibben.signals import irregular_triangle, triangle
 
 TIME = np.arange(0, 24, 0.02)
@@ -28,18 +28,19 @@ def test_a_study_holds_everything_the_report_shows(train: Recording) -> None:
     assert found.leaderboard.best.model == "gpi"
     assert set(found.predictions) == {"pi", "gpi"}
     for outputs in found.predictions.values():
-        assert [output.size for output in outputs] == [len(train), len(test)]
+        assert [output.shape for output in outputs] == [(len(train), 1), (len(test), 1)]
     assert found.inverse is not None
     assert found.inverse.model == "gpi"
     assert found.inverse.error <= 1e-9
     assert found.notes == ("a note",)
+    assert found.characterization is not None
     assert found.characterization.sentences
 
 
 def test_predictions_are_those_that_were_scored(train: Recording) -> None:
     found = study(train, models=["pi"], jobs=1)
     (row,) = found.leaderboard.rows
-    error = found.predictions["pi"][-1] - train["displacement"]
+    error = found.predictions["pi"][-1][:, 0] - train["displacement"]
     tail = error[len(found.train[0]) :]
     assert row.test is not None
     assert row.test.rmse == pytest.approx(float(np.sqrt(np.mean(tail**2))), rel=1e-12)
@@ -49,6 +50,7 @@ def test_predictions_are_those_that_were_scored(train: Recording) -> None:
 def test_inverse_check_covers_the_reachable_range(block: Block, train: Recording) -> None:
     check = check_inverse("it", block, train)
     assert check.error <= 1e-12
+    assert check.reachable is not None
     low, high = check.reachable
     assert np.ptp(check.reference) > 0.9 * (high - low)
     assert np.all((check.pressure >= 0) & (check.pressure <= 5))

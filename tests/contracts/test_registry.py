@@ -13,7 +13,7 @@ import pytest
 
 import mckibben
 from mckibben import Block, ModelError
-from mckibben.blocks.envelopes import Envelope
+from mckibben.blocks.play_type.envelopes import Envelope
 from mckibben.registry import PLUGINS, load, names
 
 SOURCE = Path(mckibben.__file__).parent
@@ -41,7 +41,7 @@ def concrete(base: type, *folders: str) -> set[type]:
 
 
 def registered(group: str) -> set[Any]:
-    return {load(group, name) for name in PLUGINS[group]}
+    return {inspect.unwrap(load(group, name)) for name in PLUGINS[group]}
 
 
 @pytest.mark.parametrize(("group", "name"), EVERYTHING)
@@ -54,39 +54,34 @@ def test_every_block_is_registered() -> None:
 
 
 def test_every_envelope_is_registered() -> None:
-    assert concrete(Envelope, "blocks/envelopes") == registered("envelopes")
+    assert concrete(Envelope, "blocks/play_type/envelopes") == registered("envelopes")
 
 
 def test_every_published_model_is_registered() -> None:
-    assert functions("blocks/published") == registered("published")
+    assert functions("papers", "published") == registered("published")
 
 
 def test_every_estimator_is_registered() -> None:
-    from mckibben.estimators.base import Estimator
+    from mckibben.estimators.core.estimator import Estimator
 
-    assert concrete(Estimator, "estimators", "compensators") == registered("estimators")
-
-
-def test_every_estimator_of_several_muscles_is_registered() -> None:
-    from mckibben.estimators.coupled.base import CoupledEstimator
-
-    assert concrete(CoupledEstimator, "estimators/coupled") - registered("coupled") == set()
+    assert concrete(Estimator, "estimators") == registered("estimators")
 
 
-def functions(folder: str) -> set[Any]:
-    """Return the public functions that the modules of a folder define."""
+def functions(folder: str, named: str = "") -> set[Any]:
+    """Return the public functions that the modules of a folder define, or those so named."""
     return {
         value
         for module in modules_under(folder)
+        if module.__name__.endswith(named)
         for name, value in inspect.getmembers(module, inspect.isfunction)
         if value.__module__ == module.__name__ and not name.startswith("_")
     }
 
 
 def test_every_protocol_is_registered() -> None:
-    from mckibben.signals.protocols.protocol import protocol
+    from mckibben.signals.protocol import protocol
 
-    assert functions("signals/protocols") == registered("protocols") | {protocol}
+    assert functions("papers", "protocol") == registered("protocols")
     for name in PLUGINS["protocols"]:
         assert protocol(name).name == name
 
@@ -111,7 +106,7 @@ def test_every_setup_is_registered() -> None:
 def test_every_group_is_checked_here() -> None:
     assert set(PLUGINS) == {
         "blocks",
-        "coupled",
+        "controllers",
         "envelopes",
         "estimators",
         "papers",

@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 import inspect
+import os
 import sys
 from typing import Any
 
 import numpy as np
 import pytest
 
-from mckibben.blocks.trial import Trial
-from mckibben.compiling import Deferred
+from mckibben.blocks.laws.examples import examples
+from mckibben.blocks.laws.trial import Trial
 from mckibben.registry import load, names
+from mckibben.system.compiling import Deferred
 from tests.twins import ENVELOPES, STEP_ERROR, STEPPED, TWINS
 
 SAMPLE_TIME = 0.01
+UNCOMPILED = bool(os.environ.get("NUMBA_DISABLE_JIT"))
+TURNS, SEEDS = (4, 1) if UNCOMPILED else (24, 2)
+"""Turning points of the inputs, and how many; fewer where kernels take their time."""
 
 
 def kernels_in(module: str) -> list[str]:
@@ -27,7 +32,12 @@ def kernels_in(module: str) -> list[str]:
     ]
 
 
-COMPILED = [kind for kind in names("blocks") if kernels_in(load("blocks", kind).__module__)]
+EXAMPLES = examples()
+COMPILED = [
+    title
+    for title, block in EXAMPLES.items()
+    if kernels_in(type(getattr(block, "forward", block)).__module__)
+]
 
 
 def test_every_compiled_block_has_a_twin_and_every_twin_a_block() -> None:
@@ -38,11 +48,11 @@ def test_every_envelope_has_a_twin_and_every_twin_an_envelope() -> None:
     assert set(ENVELOPES) == set(names("envelopes"))
 
 
-@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize("seed", range(SEEDS))
 @pytest.mark.parametrize("kind", COMPILED)
 def test_kernel_agrees_with_its_twin(kind: str, seed: int) -> None:
-    block = load("blocks", kind).example()
-    trial = Trial.of(block, SAMPLE_TIME, seed)
+    block = EXAMPLES[kind]
+    trial = Trial.of(block, SAMPLE_TIME, seed, TURNS)
     inputs = trial.inputs[: STEPPED.get(kind, 1000)]
     expected = np.array(TWINS[kind](block, inputs.tolist(), SAMPLE_TIME))
     error = np.abs(trial.outputs[: len(inputs)] - expected)

@@ -15,9 +15,9 @@ from mckibben import Recording, write
 from mckibben.blocks.compose import Parallel
 from mckibben.blocks.force.feedforward import ForceFeedforward
 from mckibben.blocks.force.multistate_friction import EACH_WAY, MultistateFriction
-from mckibben.blocks.pi import PI
-from mckibben.blocks.published.multistate import static_force
-from mckibben.control import Feedforward, track
+from mckibben.blocks.play_type.pi import PI
+from mckibben.control import track
+from mckibben.papers.multistate_friction.published import static_force
 from tests.cli.conftest import Cli
 from tests.cli.conftest import cli as cli  # a fixture
 
@@ -64,12 +64,10 @@ def reference() -> Recording:
 def test_feedforward_gives_the_force_exactly_where_the_model_is_the_plant() -> None:
     ahead = ForceFeedforward.of(MODEL)
     assert ahead is not None
-    found = track(Feedforward(ahead), Stand(), reference(), approach=2.0, pressure_loop=False)
+    found = track(ahead, Stand(), reference(), approach=2.0, pressure_loop=False)
     assert found.rmse["force"] < 1e-9
     assert found.recording.units["reference_force"] == "N"
-    blind = track(
-        Feedforward(ForceFeedforward(LAW)), Stand(), reference(), approach=2.0, pressure_loop=False
-    )
+    blind = track(ForceFeedforward(LAW), Stand(), reference(), approach=2.0, pressure_loop=False)
     assert blind.rmse["force"] > 30.0
 
 

@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
-from mckibben import PI, DataError, ModelError, Recording, load_rig
-from mckibben.control import PID, DisturbanceObserver, Feedforward, FeedforwardPID, track, tune_pid
+from mckibben import PI, DataError, ModelError, Recording, load, load_rig, write
+from mckibben.blocks.core.fields import Channel
+from mckibben.blocks.feedback.feedforward_feedback import FeedforwardFeedback
+from mckibben.blocks.feedback.pid import PIDFeedback
+from mckibben.control import DisturbanceObserver, control_law, track, tune_pid
+from tests.cli.conftest import Cli
+from tests.cli.conftest import cli as cli  # a fixture
 
 
 class Simple:
@@ -44,6 +51,11 @@ BLOCK = PI.example()
 LOW, HIGH = (float(end[0]) for end in BLOCK.reachable())
 
 
+def feedback(kp: float, ki: float, kd: float = 0.0, *, highest: float = 5.0) -> PIDFeedback:
+    channels = (Channel("displacement", "mm"),), (Channel("pressure", "bar"),)
+    return PIDFeedback.of(*channels, (kp,), (ki,), (kd,), limits=(0.0, highest))
+
+
 def reference(cycles: int = 3) -> Recording:
     t = np.arange(500 * cycles) * 0.02
     middle, half = 0.5 * (LOW + HIGH), 0.3 * (HIGH - LOW)
@@ -51,7 +63,7 @@ def reference(cycles: int = 3) -> Recording:
 
 
 def test_an_exact_inverse_tracks_its_own_plant_exactly() -> None:
-    found = track(Feedforward(BLOCK.inverse()), Simple(), reference(), pressure_loop=False)
+    found = track(BLOCK.inverse(), Simple(), reference(), pressure_loop=False)
     assert found.rmse["displacement"] < 1e-9 * (HIGH - LOW)
     assert found.clipped == 0
     assert {"reference_displacement", "command_pressure", "displacement"} <= set(
@@ -59,22 +71,19 @@ def test_an_exact_inverse_tracks_its_own_plant_exactly() -> None:
     )
 
 
-@pytest.mark.parametrize("kind", ["pid", "observer"])
-def test_feedback_removes_a_load_that_no_model_knows(kind: str) -> None:
+@pytest.mark.parametrize("law", ["feedforward-pid", "observer"])
+def test_feedback_removes_a_load_that_no_model_knows(law: str) -> None:
     plant = Simple(lag=0.05, load=-0.8)
     ahead = BLOCK.inverse()
-    pid = tune_pid(plant, sample_time=0.02)
-    controller = FeedforwardPID(ahead, pid) if kind == "pid" else DisturbanceObserver(ahead)
-    blind = track(Feedforward(ahead), plant, reference(), settle=5.0, pressure_loop=False)
+    controller = control_law(law, ahead, lambda: tune_pid(plant, sample_time=0.02))
+    blind = track(ahead, plant, reference(), settle=5.0, pressure_loop=False)
     seeing = track(controller, plant, reference(), settle=5.0, pressure_loop=False)
     assert blind.rmse["displacement"] > 0.7
     assert seeing.rmse["displacement"] < 0.2 * blind.rmse["displacement"]
 
 
 def test_limits_and_slew_are_counted_with_their_cost() -> None:
-    found = track(
-        Feedforward(BLOCK.inverse()), Simple(), reference(), slew=0.5, pressure_loop=False
-    )
+    found = track(BLOCK.inverse(), Simple(), reference(), slew=0.5, pressure_loop=False)
     assert found.clipped > 0
     assert found.rmse["displacement"] > 0.01
     steps = np.diff(found.recording["command_pressure"])
@@ -82,19 +91,17 @@ def test_limits_and_slew_are_counted_with_their_cost() -> None:
 
 
 def test_integral_does_not_wind_up() -> None:
-    pid = PID((0.1,), (1.0,), limits=(0.0, 5.0))
-    pid.reset(0.02)
-    far = np.array([100.0])
+    pid = feedback(0.1, 1.0).stream(0.02)
     for _ in range(1000):
-        out = pid.step(far, np.zeros(1), np.empty(0))
+        out = pid.step([100.0, 0.0])
     assert out[0] == 5.0
     for _ in range(60):
-        out = pid.step(np.array([-10.0]), np.zeros(1), np.empty(0))
+        out = pid.step([-10.0, 0.0])
     assert out[0] < 5.0
 
 
 def test_the_same_seed_gives_the_same_loop() -> None:
-    pid = PID((0.05,), (0.2,), limits=(0.0, 5.0))
+    pid = feedback(0.05, 0.2)
     first, again = (track(pid, Simple(), reference(1), noise=0.1, seed=3) for _ in range(2))
     np.testing.assert_array_equal(first.recording["displacement"], again.recording["displacement"])
 
@@ -114,7 +121,7 @@ def test_the_arm_follows_with_feedback() -> None:
 
 
 def test_bad_loops_are_refused() -> None:
-    controller = Feedforward(BLOCK.inverse())
+    controller = BLOCK.inverse()
     with pytest.raises(DataError, match="no displacement"):
         track(controller, Simple(), Recording({"pressure": np.ones(10)}, 0.02))
     with pytest.raises(DataError, match="no time"):
@@ -124,25 +131,46 @@ def test_bad_loops_are_refused() -> None:
     with pytest.raises(ModelError, match="nothing is left"):
         track(controller, Simple(), reference(1), settle=1e3)
     with pytest.raises(ModelError, match="kp, ki"):
-        PID((1.0, 2.0), (1.0,))
+        PIDFeedback.of(BLOCK.outputs, BLOCK.inputs, (1.0, 2.0), (1.0,), limits=(0.0, 5.0))
+    with pytest.raises(ModelError, match=r"no controller named 'bang'.*Remedy: use one of feedf"):
+        control_law("bang", controller, PIDFeedback.example)
     with pytest.raises(ModelError, match="filter_time"):
         DisturbanceObserver(BLOCK.inverse(), filter_time=0.0)
 
 
+class Scripted(Simple):
+    """A plant that measures what stands in a table, whatever is applied."""
+
+    def changed(self, settings: Mapping[str, Any]) -> Scripted:
+        return self
+
+    def reset(self, seed: int = 0) -> np.ndarray:
+        self.rows = iter(np.random.default_rng(seed).normal(10.0, 1.0, (1000, 2)))
+        return next(self.rows)
+
+    def step(self, action: Any) -> np.ndarray:
+        return next(self.rows)
+
+
 @pytest.mark.parametrize("behind", [False, True])
-def test_a_controller_as_a_block_gives_the_same_pressures(behind: bool) -> None:
-    pid = PID((0.05,), (0.2,), (0.002,), limits=(0.0, 2.0))
-    controller = FeedforwardPID(BLOCK.inverse(), pid) if behind else pid
-    stream = controller.block().stream(0.02)
-    controller.reset(0.02)
-    rng = np.random.default_rng(0)
-    wanted = np.cumsum(rng.normal(0.0, 0.3, 400)) + 10.0
-    for value, noise in zip(wanted, rng.normal(0.0, 1.0, 400), strict=True):
-        reference, measured = np.array([value]), np.array([value + noise])
-        expected = controller.step(reference, measured, np.empty(0))
-        np.testing.assert_allclose(stream.step([value, value + noise]), expected, atol=1e-13)
+def test_what_is_tracked_is_what_the_saved_block_gives(behind: bool, tmp_path: Path) -> None:
+    pid = feedback(0.05, 0.2, 0.002, highest=2.0)
+    block = FeedforwardFeedback.of(BLOCK.inverse(), pid) if behind else pid
+    found = track(block, Scripted(), reference(1), approach=0.0, pressure_loop=False).recording
+    block.save(tmp_path / "controller.json")
+    measured = found["displacement"]
+    # what is due at a step was asked for at the one before
+    asked = np.append(found["reference_displacement"][1:], reference(1)["displacement"][-1])
+    stream = load(tmp_path / "controller.json").stream(0.02)
+    again = [stream.step([r, y])[0] for r, y in zip(asked, measured, strict=True)]
+    np.testing.assert_array_equal(np.clip(again, 0.0, 5.0), found["command_pressure"])
 
 
-def test_a_controller_that_is_no_block_says_so() -> None:
-    with pytest.raises(ModelError, match=r"DisturbanceObserver is no block.*Remedy:"):
-        DisturbanceObserver(BLOCK.inverse()).block()
+def test_a_controller_that_is_no_block_says_so(cli: Cli, tmp_path: Path) -> None:
+    BLOCK.inverse().save(tmp_path / "inverse.json")
+    write(reference(1), tmp_path / "wished.csv")
+    given = ["--rig", "mas20-hanging", "--reference", tmp_path / "wished.csv"]
+    kept = ["--controller", "observer", "--controller-out", tmp_path / "controller.json"]
+    result = cli("track", tmp_path / "inverse.json", *given, *kept)
+    assert result.code == 2
+    assert re.search(r"'observer' is no block.*Remedy:", " ".join(result.err.split()))

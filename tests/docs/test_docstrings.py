@@ -20,7 +20,7 @@ EXPORTED = [
 ]
 PLUGINS = [
     (group, name)
-    for group in ("blocks", "estimators", "coupled", "signals", "setups", "envelopes")
+    for group in ("blocks", "estimators", "signals", "setups", "envelopes")
     for name in registry.names(group)
 ]
 COMMON = {
@@ -33,6 +33,7 @@ COMMON = {
 def parts(found: Any) -> set[str]:
     """Return the names that a docstring, or one of a base class, documents as parameters."""
     names: set[str] = set()
+    found = inspect.unwrap(found)
     for cls in inspect.getmro(found) if inspect.isclass(found) else (found,):
         text = inspect.cleandoc(cls.__doc__ or "")
         for section in re.findall(
@@ -44,6 +45,7 @@ def parts(found: Any) -> set[str]:
 
 
 def arguments(found: Any) -> set[str]:
+    found = inspect.unwrap(found)
     if dataclasses.is_dataclass(found):
         return {f.name for f in dataclasses.fields(found) if f.init and not f.name.startswith("_")}
     if inspect.isclass(found) and hasattr(found, "model_fields"):
@@ -75,7 +77,7 @@ def test_every_plugin_documents_its_arguments(group: str, name: str) -> None:
     check(registry.load(group, name), f"{group} {name}")
 
 
-MODELS = (*registry.names("estimators"), *registry.names("coupled"))
+MODELS = registry.names("estimators")
 
 
 def test_every_model_has_its_limits_and_nothing_else_has() -> None:

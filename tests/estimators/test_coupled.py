@@ -10,17 +10,18 @@ import pytest
 
 from mckibben import GPI, DataError, ModelError, Recording, registry
 from mckibben.blocks.compose import PerChannel, Series
-from mckibben.blocks.coupling import Coupling
-from mckibben.blocks.fields import Channel
-from mckibben.blocks.force_balance import ForceBalance
-from mckibben.blocks.gpi import gpi_matrix
-from mckibben.blocks.memory import named_state
-from mckibben.estimators.coupled.data import coupled_data
+from mckibben.blocks.core.fields import Channel
+from mckibben.blocks.coupled.coupling import Coupling
+from mckibben.blocks.coupled.force_balance import ForceBalance
+from mckibben.blocks.play_type.gpi import gpi_matrix
+from mckibben.blocks.play_type.memory import named_state
 from mckibben.estimators.coupled.fuzzy import Consequents, Fitted, Problem, Sets
 from mckibben.estimators.coupled.fuzzy_fit import solve_in_parts
 from mckibben.estimators.coupled.fuzzy_projection import sensitivities
-from mckibben.estimators.coupled.fuzzy_swarm import Swarm
+from mckibben.estimators.coupled.fuzzy_swarm import printed_swarm, swarmed
 from mckibben.estimators.coupled.sdchm import coupled, softest
+from mckibben.estimators.optimisers.tracker import Tracker, whole_searches
+from tests.estimators.examples import quick, recorded
 
 STEP = 0.05
 
@@ -52,11 +53,11 @@ def balance_runs() -> list[Recording]:
 
 
 def rmse(estimator: Any) -> float:
-    return float(max(estimator.diagnostics_.rmse))
+    return float(max(estimator.diagnostics_.rmse_by_output))
 
 
 def test_force_balance_recovers_an_arm_of_its_own_kind(balance_runs: list[Recording]) -> None:
-    estimator = registry.load("coupled", "force-balance")().fit(balance_runs)
+    estimator = registry.load("estimators", "force-balance")().fit(balance_runs)
     assert rmse(estimator) < 0.35
     model = estimator.model_
     low, high = model.inverse().pressure_range
@@ -67,7 +68,7 @@ def test_force_balance_recovers_an_arm_of_its_own_kind(balance_runs: list[Record
 def test_every_model_fits_saves_and_repeats(
     name: str, balance_runs: list[Recording], tmp_path: object
 ) -> None:
-    estimator_class = registry.load("coupled", name)
+    estimator_class = registry.load("estimators", name)
     fast = {"n_sets": 2, "method": "ls"} if name != "coupled-pi" else {}
     if name == "sdchm":
         fast["memory_settings"] = {"n_starts": 1, "n_refined": 1}
@@ -116,7 +117,7 @@ def test_coupling_is_found_by_least_squares() -> None:
                 STEP,
             )
         )
-    data = coupled_data([*alone])
+    data = registry.load("estimators", "coupled-pi")().data(alone)
     found = coupled(list(memories), [softest(data, 0), softest(data, 1)], data)
     np.testing.assert_allclose(found.matrix, truth.matrix, atol=1e-9)
 
@@ -124,12 +125,12 @@ def test_coupling_is_found_by_least_squares() -> None:
 def test_muscles_that_never_move_alone_are_said() -> None:
     both = runs(ForceBalance.example().inverse())[2::3]
     with pytest.raises(DataError, match=r"pressure_1.*alone.*force-balance"):
-        registry.load("coupled", "sdchm")().fit(both)
-    registry.load("coupled", "force-balance")().fit(both)
+        registry.load("estimators", "sdchm")().fit(both)
+    registry.load("estimators", "force-balance")().fit(both)
 
 
 def test_bad_recordings_are_named(balance_runs: list[Recording]) -> None:
-    fit = registry.load("coupled", "force-balance")().fit
+    fit = registry.load("estimators", "force-balance")().fit
     with pytest.raises(DataError, match="displacement_1"):
         fit(Recording({"pressure_1": waves(), "pressure_2": waves()}, STEP))
     stiff = balance_runs[0]
@@ -139,7 +140,7 @@ def test_bad_recordings_are_named(balance_runs: list[Recording]) -> None:
     with pytest.raises(DataError, match="too few"):
         fit(balance_runs[0].slice(0, 20))
     with pytest.raises(ModelError, match="degree"):
-        registry.load("coupled", "force-balance")(degree=9).fit(balance_runs)
+        registry.load("estimators", "force-balance")(degree=9).fit(balance_runs)
 
 
 def test_projected_derivatives_agree_with_differences() -> None:
@@ -175,7 +176,7 @@ def test_swarms_start_is_the_printed_one() -> None:
     rng = np.random.default_rng(3)
     x = rng.uniform(0, 40, (200, 2))
     problem = Problem(x, x**2, Consequents(False, 1e-9))
-    found = Swarm(particles=1, iterations=0).best(problem, 3, 5, lambda share: None)
+    found = swarmed(problem, 3, printed_swarm(particles=1, iterations=0), 5, Tracker())
     start = np.random.default_rng(5).standard_normal(12)
     np.testing.assert_array_equal(found.centres.ravel(), start[:6])
     np.testing.assert_array_equal(found.widths.ravel(), np.abs(start[6:]))
@@ -190,3 +191,26 @@ def test_a_problems_cost_orders_as_the_printed_loss() -> None:
     sets = Sets.even(np.zeros(1), np.ones(1), 3)
     errors = Fitted(sets, solve_in_parts(x, y, sets, solver)).predict(x, True) - y
     assert problem.cost(sets) ** 2 * y.shape[1] == pytest.approx(np.mean((errors**2).sum(axis=1)))
+
+
+@pytest.mark.parametrize(
+    ("name", "kind", "method"),
+    [
+        *((name, "two muscles", method) for name in ("sdchm", "tsfnn") for method in ("ls", "pso")),
+        *(("mpi-narmax", "loaded", method) for method in ("trust-region", "pso")),
+    ],
+)
+def test_an_interrupt_of_the_networks_search_keeps_the_best(
+    name: str, kind: str, method: str
+) -> None:
+    def impatient(share: float, best: float) -> None:
+        if share > 0.4 and np.isfinite(best):
+            raise KeyboardInterrupt
+
+    estimator = quick(name, kind, method=method)
+    with pytest.raises(KeyboardInterrupt), whole_searches():
+        estimator.fit(recorded(kind), progress=impatient)
+    assert not hasattr(estimator, "model_")
+    estimator.fit(recorded(kind), progress=impatient)
+    assert estimator.diagnostics_.interrupted
+    assert estimator.score(recorded(kind)) > 0.3

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-import numpy as np
+from collections.abc import Callable
 
-from mckibben.estimators.descent import descend, trusted
+import numpy as np
+import pytest
+
+from mckibben.estimators.optimisers.descent import Damping, Radius, Trust, descend, trusted
 
 
 def valley(point: np.ndarray) -> np.ndarray:
@@ -16,23 +19,27 @@ def slopes(point: np.ndarray) -> np.ndarray:
     return np.array([[-20 * point[0], 10.0], [-1.0, 0.0]])
 
 
-def test_descent_falls_at_every_step_and_arrives() -> None:
+@pytest.mark.parametrize("trust", [Radius(np.array([-1.2, 1.0]), np.ones(2)), Damping(1e-3, 1e9)])
+def test_descent_falls_at_every_step_and_arrives(trust: Trust) -> None:
     start = np.array([-1.2, 1.0])
-    path = list(descend(valley, slopes, start, np.ones(2), most_evaluations=100, least_gain=1e-12))
-    costs = [float(np.sum(valley(point) ** 2)) for point in path]
+    path = list(descend(valley, slopes, start, trust, most_evaluations=100, least_gain=1e-12))
+    costs = [float(np.sum(valley(point) ** 2)) for point, _ in path]
+    assert costs == [cost for _, cost in path]
     assert np.all(np.diff(costs) < 0)
-    np.testing.assert_allclose(path[-1], [1, 1], atol=1e-6)
+    np.testing.assert_allclose(path[-1][0], [1, 1], atol=1e-6)
 
 
-def test_descent_leaves_alone_what_has_no_effect() -> None:
+@pytest.mark.parametrize("made", [lambda start: Radius(start, np.ones(3)), lambda _: Damping(1e-3)])
+def test_descent_leaves_alone_what_has_no_effect(made: Callable[[np.ndarray], Trust]) -> None:
     def blind(point: np.ndarray) -> np.ndarray:
         return np.pad(slopes(point[:2]), ((0, 1), (0, 1)))
 
-    *_, end = descend(
+    start = np.array([-1.2, 1.0, 7.0])
+    *_, (end, _) = descend(
         lambda point: np.append(valley(point[:2]), 0.5),
         blind,
-        np.array([-1.2, 1.0, 7.0]),
-        np.ones(3),
+        start,
+        made(start),
         most_evaluations=100,
         least_gain=1e-12,
     )

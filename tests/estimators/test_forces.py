@@ -11,8 +11,6 @@ import pytest
 from mckibben import DataError, Recording
 from mckibben.blocks.force.multistate_friction import EACH_WAY, MultistateFriction
 from mckibben.blocks.force.tondu_lopez import TonduLopez
-from mckibben.blocks.published.activation_pressure import activation_pressure
-from mckibben.blocks.published.multistate import static_force
 from mckibben.estimators.force.activation_memory import ActivationMemoryEstimator
 from mckibben.estimators.force.activation_pressure import (
     ActivationPressureEstimator,
@@ -20,10 +18,12 @@ from mckibben.estimators.force.activation_pressure import (
 )
 from mckibben.estimators.force.multistate import MultistateEstimator, extract_hysteresis
 from mckibben.estimators.force.static import (
-    BilinearForceEstimator,
     ChouHannafordEstimator,
+    PolynomialForceEstimator,
     TonduLopezEstimator,
 )
+from mckibben.papers.activation_pressure.published import activation_pressure
+from mckibben.papers.multistate_friction.published import static_force
 
 TRUTH = MultistateFriction(
     EACH_WAY,
@@ -56,7 +56,7 @@ def isobaric(pressure: float = 4.0, noise: float = 0.5) -> Recording:
 
 def test_static_laws_recover_their_own_forces() -> None:
     printed = static_force()
-    fit: Any = BilinearForceEstimator().fit(isometric(printed))
+    fit: Any = PolynomialForceEstimator(law="bilinear").fit(isometric(printed))
     assert fit.diagnostics_.rmse < 0.55
     lengths = np.array([185.0, 199.0])
     for ours, theirs in zip(fit.model_.terms(lengths), printed.terms(lengths), strict=True):
@@ -168,7 +168,7 @@ def test_a_muscle_that_never_moves_has_no_characteristic_points() -> None:
 
 
 def test_frequency_is_read_off_the_input() -> None:
-    from mckibben.estimators.data import training_data
+    from mckibben.estimators.core.checking import training_data
 
     for frequency in (0.5, 1.5):
         data = training_data(sines(frequency, 100.0), "contraction", "pressure", None, ["force"])

@@ -12,22 +12,16 @@ from scipy.optimize import approx_fprime
 from scipy.signal import lfilter
 
 from mckibben import DataError, ModelError, Recording, identify
+from mckibben.blocks.core.saving import from_dict
 from mckibben.blocks.dynamic.process_model import ProcessModel
 from mckibben.blocks.dynamic.transfer_function import TransferFunction
-from mckibben.blocks.saving import from_dict
 from mckibben.comparison.free_run import run_free
-from mckibben.estimators.affine_match import affine_match
-from mckibben.estimators.data import training_data
-from mckibben.estimators.gpi import GPIEstimator
-from mckibben.estimators.linear.models import (
-    ARMAXEstimator,
-    ARXEstimator,
-    BoxJenkinsEstimator,
-    OutputErrorEstimator,
-)
+from mckibben.estimators.core.affine_match import affine_match
+from mckibben.estimators.core.checking import training_data
 from mckibben.estimators.linear.polynomials import Orders, errors
 from mckibben.estimators.linear.prediction_error import evaluate
-from mckibben.estimators.linear.process import P2UZEstimator
+from mckibben.estimators.play_type.gpi import GPIEstimator
+from mckibben.registry import load
 
 Array = NDArray[np.float64]
 
@@ -49,6 +43,20 @@ def recorded(
     clean = lfilter(B, [1.0, *F], u)
     e = lfilter([1.0, *c], [1.0, *d], noise * rng.standard_normal(n))
     return Recording({"pressure": u, "displacement": clean + e}, STEP)
+
+
+@pytest.mark.parametrize("name", ["oe", "p2uz", "gpi", "narx"])
+def test_an_interrupt_leaves_the_best_found_until_then(name: str) -> None:
+    told: list[float] = []
+
+    def impatient(share: float, best: float) -> None:
+        told.append(best)
+        if len(told) == 2:
+            raise KeyboardInterrupt
+
+    fit = load("estimators", name)().fit(recorded(0, 600), progress=impatient)
+    assert fit.diagnostics_.interrupted
+    assert np.isfinite(fit.diagnostics_.rmse)
 
 
 @pytest.mark.parametrize(
@@ -93,7 +101,7 @@ def test_prediction_errors_are_those_of_a_naive_loop() -> None:
 
 @pytest.mark.parametrize("seed", range(8))
 def test_box_jenkins_finds_the_truth_whatever_the_noise(seed: int) -> None:
-    fit = BoxJenkinsEstimator().fit(recorded(seed, 2000, c=C, d=D))
+    fit = load("estimators", "bj")().fit(recorded(seed, 2000, c=C, d=D))
     model = fit.model_
     assert isinstance(model, TransferFunction)
     np.testing.assert_allclose(model.numerator, B, atol=0.06)
@@ -104,7 +112,7 @@ def test_box_jenkins_finds_the_truth_whatever_the_noise(seed: int) -> None:
 def test_output_error_recovers_with_intervals() -> None:
     inside = []
     for seed in range(30):
-        fit = OutputErrorEstimator(n_starts=6).fit(recorded(seed, 600))
+        fit = load("estimators", "oe")(n_starts=6).fit(recorded(seed, 600))
         truth = np.array([*B, *F])
         spread = np.array(fit.diagnostics_.standard_errors)[:4]
         inside.append(np.abs(fit.model_.pack()[:4] - truth) < 1.96 * spread)
@@ -117,7 +125,7 @@ def test_arx_is_ordinary_least_squares() -> None:
     rows = np.arange(2, 400)
     columns = np.column_stack([u[rows], u[rows - 1], y[rows - 1], y[rows - 2], np.ones(398)])
     expected = np.linalg.lstsq(columns, y[rows], rcond=None)[0]
-    model: Any = ARXEstimator().fit(recording).model_
+    model: Any = load("estimators", "arx")().fit(recording).model_
     # the start of the run is estimated too, so the first two samples tell nothing
     np.testing.assert_allclose(model.numerator, expected[:2], rtol=1e-6)
     np.testing.assert_allclose(model.denominator, -expected[2:4], rtol=1e-6)
@@ -130,7 +138,7 @@ def test_armax_agrees_with_statsmodels() -> None:
     u, e = rng.standard_normal(1500), 0.3 * rng.standard_normal(1500)
     y = lfilter([0.5], [1.0, -0.8], u) + lfilter([1.0, 0.4], [1.0, -0.8], e)
     recording = Recording({"pressure": u, "displacement": y}, STEP)
-    ours: Any = ARMAXEstimator(n_poles=1, n_zeros=1, n_noise=1).fit(recording).model_
+    ours: Any = load("estimators", "armax")(n_poles=1, n_zeros=1, n_noise=1).fit(recording).model_
     # statsmodels lets the input enter statically: the same model, its input filtered by hand
     theirs = SARIMAX(y, exog=lfilter([1.0], [1.0, -0.8], u), order=(1, 0, 1)).fit(disp=False)
     assert ours.denominator[0] == pytest.approx(-0.8, abs=0.02)
@@ -142,7 +150,7 @@ def test_process_model_recovers_its_own_numbers() -> None:
     rng = np.random.default_rng(6)
     u = np.repeat(rng.uniform(0, 5, 60), 20)
     y = truth.simulate(u, sample_time=0.05) + 0.05 * rng.standard_normal(u.size)
-    fit = P2UZEstimator().fit(Recording({"pressure": u, "displacement": y}, 0.05))
+    fit = load("estimators", "p2uz")().fit(Recording({"pressure": u, "displacement": y}, 0.05))
     assert fit.diagnostics_.rmse < 0.055
     model = fit.model_
     assert isinstance(model, ProcessModel)
@@ -155,18 +163,18 @@ def test_process_model_recovers_its_own_numbers() -> None:
 def test_outputs_of_several_runs_are_started_apart() -> None:
     pieces = [recorded(seed, 400) for seed in (7, 8)]
     raised = [pieces[0], replace(pieces[1], start_time=100.0)]
-    model: Any = OutputErrorEstimator().fit(raised).model_
+    model: Any = load("estimators", "oe")().fit(raised).model_
     np.testing.assert_allclose(model.denominator, F, atol=0.05)
 
 
 def test_bad_data_and_settings_are_refused() -> None:
     recording = recorded(9, 400)
     with pytest.raises(DataError, match="no time"):
-        OutputErrorEstimator().fit(replace(recording, sample_time=None))
+        load("estimators", "oe")().fit(replace(recording, sample_time=None))
     with pytest.raises(DataError, match="too few for"):
-        OutputErrorEstimator(n_poles=10, n_zeros=10).fit(recording.slice(0, 25))
+        load("estimators", "oe")(n_poles=10, n_zeros=10).fit(recording.slice(0, 25))
     with pytest.raises(ModelError, match="n_zeros is 0"):
-        OutputErrorEstimator(n_zeros=0).fit(recording)
+        load("estimators", "oe")(n_zeros=0).fit(recording)
 
 
 def test_identify_chooses_orders_by_cross_validation() -> None:
@@ -230,7 +238,7 @@ def warm(seed: int, n: int = 1000) -> Recording:
 
 
 def test_a_run_that_starts_warm_gives_the_truth_within_its_errors() -> None:
-    fit = P2UZEstimator().fit(warm(0))
+    fit = load("estimators", "p2uz")().fit(warm(0))
     off = np.abs(fit.model_.pack() - WARM.pack())[:4]
     assert np.all(off < 3 * np.array(fit.diagnostics_.standard_errors)[:4])
 
@@ -238,7 +246,7 @@ def test_a_run_that_starts_warm_gives_the_truth_within_its_errors() -> None:
 @pytest.mark.parametrize("initial", ["fitted", "first_sample"])
 def test_what_is_delivered_is_what_was_optimised(initial: Any) -> None:
     recording = warm(1)
-    fits: list[Any] = [P2UZEstimator(initial=initial), OutputErrorEstimator(initial=initial)]
+    fits: list[Any] = [load("estimators", name)(initial=initial) for name in ("p2uz", "oe")]
     for fit in fits:
         model = fit.fit(recording).model_
         for modelled in (
@@ -252,7 +260,7 @@ def test_what_is_delivered_is_what_was_optimised(initial: Any) -> None:
 
 def test_prediction_goes_from_one_step_errors_to_the_free_run() -> None:
     recording = recorded(12, 1000, c=C, d=D)
-    fit = BoxJenkinsEstimator().fit(recording)
+    fit = load("estimators", "bj")().fit(recording)
     model = from_dict(fit.model_.to_dict())
     assert isinstance(model, TransferFunction)
     assert model == fit.model_
@@ -277,7 +285,7 @@ def test_starts_that_explain_everything_are_not_believed() -> None:
     drift = np.linspace(0.0, 10.0, 600) + 0.5 * rng.standard_normal(600)
     y = lfilter([0.1], [1.0, -0.9], u) + drift
     recording = Recording({"pressure": u, "displacement": y}, STEP)
-    for fit in (P2UZEstimator(), OutputErrorEstimator()):
+    for fit in (load("estimators", "p2uz")(), load("estimators", "oe")()):
         found = fit.fit(recording).diagnostics_
         assert found.rmse == found.rmse_from_rest < np.ptp(y)
         assert fit.model_.to_dict()["initial"] == "first_sample"
@@ -285,7 +293,7 @@ def test_starts_that_explain_everything_are_not_believed() -> None:
 
 def test_scores_look_at_no_measured_output_to_start_from() -> None:
     recording = warm(1)
-    fit = OutputErrorEstimator().fit(recording)
+    fit = load("estimators", "oe")().fit(recording)
     moved = recording.with_channels(
         {"displacement": "mm"}, displacement=recording["displacement"] + 7.0
     )

@@ -10,12 +10,12 @@ import pytest
 
 from mckibben import ModelError, Recording
 from mckibben.blocks.dynamic.narx_polynomial import NarxPolynomial
-from mckibben.blocks.gpi import GPI
+from mckibben.blocks.play_type.gpi import GPI
 from mckibben.comparison.memory_test import hold_test
-from mckibben.estimators.data import training_data
+from mckibben.estimators.core.checking import training_data
 from mckibben.estimators.narx.base import stable
 from mckibben.estimators.narx.free_run import FreeRuns, feed_back, segments
-from mckibben.estimators.narx.polynomial import NarxPlayEstimator, NarxPolynomialEstimator
+from mckibben.estimators.narx.polynomial import NarxPolynomialEstimator
 from mckibben.estimators.narx.selection import candidate_terms, select
 from mckibben.registry import load
 from tests.twins import fed_back
@@ -124,7 +124,7 @@ def test_play_operators_keep_the_branch_that_plain_narx_forgets() -> None:
     recording = loop()
     plain, kept = (
         hold_test(estimator.fit(recording).model_, recording, "pressure", "displacement")
-        for estimator in (NarxPolynomialEstimator(), NarxPlayEstimator())
+        for estimator in (NarxPolynomialEstimator(), load("estimators", "narx-play")())
     )
     assert plain is not None
     assert kept is not None

@@ -4,9 +4,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from mckibben.blocks.fields import DISPLACEMENT
+from mckibben.blocks.core.fields import DISPLACEMENT
 from mckibben.errors import ModelError
-from mckibben.estimators.output_maps import MAPS, output_map
+from mckibben.estimators.core.output_maps import MAPS, output_map
 
 weights = arrays(float, 5, elements=st.floats(1e-3, 10))
 

@@ -11,7 +11,7 @@ import pytest
 from mckibben import ModelError, Recording, load, write
 from mckibben.blocks.force.multistate_friction import ELEVEN, MultistateFriction
 from mckibben.blocks.force.polynomial_force import PolynomialForce
-from mckibben.estimators.ranges import parameter_ranges
+from mckibben.estimators.core.ranges import parameter_ranges
 from tests.cli.conftest import Cli
 from tests.cli.conftest import cli as cli  # a fixture
 

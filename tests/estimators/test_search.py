@@ -6,18 +6,14 @@ from scipy.optimize import lsq_linear
 
 from mckibben import Recording
 from mckibben.blocks.compose import Series
-from mckibben.blocks.creep import Creep
-from mckibben.blocks.pi import PI
-from mckibben.estimators.data import training_data
-from mckibben.estimators.search import (
-    Choice,
-    Swarm,
-    Tracker,
-    multi_start,
-    particle_swarm,
-    solve_linear,
-)
-from mckibben.estimators.separable import SeparableEstimator
+from mckibben.blocks.dynamic.creep import Creep
+from mckibben.blocks.play_type.pi import PI
+from mckibben.estimators.core.checking import training_data
+from mckibben.estimators.core.separable import SeparableEstimator
+from mckibben.estimators.optimisers.linear import solve_linear
+from mckibben.estimators.optimisers.multi_start import Choice, multi_start
+from mckibben.estimators.optimisers.swarm import Swarm, particle_swarm
+from mckibben.estimators.optimisers.tracker import Tracker
 from mckibben.registry import load
 
 CPI = Series((PI.example(), Creep.example()))

@@ -11,7 +11,7 @@ from threadpoolctl import threadpool_info, threadpool_limits
 
 from mckibben import GPI, GPIEstimator, Recording
 from mckibben.signals import triangle
-from mckibben.workers import Workers
+from mckibben.system.workers import Workers
 
 
 def threads() -> set[int]:

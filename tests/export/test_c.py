@@ -14,12 +14,13 @@ import pytest
 from numpy.typing import NDArray
 
 from mckibben import Block, Channel, ModelError, ModelWarning, Series
-from mckibben.blocks.coupling import Coupling
-from mckibben.blocks.feedforward_feedback import FeedforwardFeedback
-from mckibben.blocks.fuzzy_network import FuzzyNetwork
-from mckibben.blocks.gpi import GPI
-from mckibben.blocks.recurrent_fuzzy_network import RecurrentFuzzyNetwork
-from mckibben.blocks.trial import input_limits, wander
+from mckibben.blocks.coupled.coupling import Coupling
+from mckibben.blocks.coupled.fuzzy_network import FuzzyNetwork
+from mckibben.blocks.coupled.recurrent_fuzzy_network import RecurrentFuzzyNetwork
+from mckibben.blocks.feedback.feedforward_feedback import FeedforwardFeedback
+from mckibben.blocks.laws.examples import examples
+from mckibben.blocks.laws.trial import input_limits, wander
+from mckibben.blocks.play_type.gpi import GPI
 from mckibben.export import export_c
 from mckibben.export.c.building import CompiledModel, self_test
 from mckibben.registry import load, names
@@ -89,7 +90,7 @@ def feedforward(initial: Any) -> Block:
 
 
 MODELS: dict[str, Block] = {
-    **{kind: load("blocks", kind).example() for kind in names("blocks")},
+    **examples(),
     "SDCHM": sdchm(),
     "SDIHC": sdchm().inverse(),
     "MPI-NARMAX": mpi_narmax(),
@@ -159,7 +160,7 @@ def test_double_precision_is_python_and_a_parameter_changed_is_seen(
 ) -> None:
     """The comparison has teeth: a hair's change of one number in Python fails it."""
     block = changed(MODELS[name], np.random.default_rng(len(name)))
-    n = 5_000 if block.kind in SLOW or "SD" in name else STEPS
+    n = 5_000 if block.title in SLOW or "SD" in name else STEPS
     inputs = path_for(block, 1, n)
     outputs, statuses = compiled(block, tmp_path / "c").run(inputs)
     assert not statuses.any()
@@ -180,13 +181,11 @@ def test_double_precision_is_python_and_a_parameter_changed_is_seen(
     assert seen >= 0.5 * tried > 0
 
 
-@pytest.mark.parametrize(
-    "name", [*names("blocks"), "SDCHM", "MPI-NARMAX", "virgin preisach inverse"]
-)
+@pytest.mark.parametrize("name", [*examples(), "SDCHM", "MPI-NARMAX", "virgin preisach inverse"])
 def test_single_precision_is_near(name: str, tmp_path: Path) -> None:
     block = MODELS[name]
     inputs = path_for(block, 2, 20_000).astype(np.float32).astype(np.float64)
-    if block.kind in SLOW or "SD" in name:
+    if block.title in SLOW or "SD" in name:
         inputs = inputs[:3000]
     outputs, statuses = compiled(block, tmp_path / "c", single=True).run(inputs)
     assert not statuses.any()

@@ -11,9 +11,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from mckibben.blocks.laws.examples import examples
 from mckibben.export import export_c
 from mckibben.export.c.parts import PRIMITIVES
-from mckibben.registry import names
 from tests.export.test_c import MODELS, SAMPLE_TIME, difference, path_for, simulated
 from tests.tools import needs
 
@@ -32,7 +32,7 @@ def run(command: Sequence[str | Path], cwd: Path) -> str:
 @needs("clang")
 @pytest.mark.parametrize(
     ("name", "single"),
-    [*((name, False) for name in names("blocks")), *((name, True) for name in SHOWN)],
+    [*((name, False) for name in examples()), *((name, True) for name in SHOWN)],
 )
 def test_sanitizers_find_nothing(name: str, single: bool, tmp_path: Path) -> None:
     folder = export_c(MODELS[name], tmp_path / "c", sample_time=SAMPLE_TIME, single=single)

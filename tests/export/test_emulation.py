@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from mckibben import Block, ModelError
+from mckibben.blocks.laws.examples import examples
 from mckibben.export.c import emulation
 from mckibben.export.c.emulation import emulate
-from mckibben.registry import names
 from tests.export.test_c import MODELS, SAMPLE_TIME, SINGLE
 from tests.tools import needs
 
@@ -24,7 +24,7 @@ def emulated(test: Callable[..., None]) -> Callable[..., None]:
 
 
 @emulated
-@pytest.mark.parametrize("name", [*names("blocks"), "SDCHM", "MPI-NARMAX", "virgin preisach"])
+@pytest.mark.parametrize("name", [*examples(), "SDCHM", "MPI-NARMAX", "virgin preisach"])
 def test_a_cortex_m4f_gives_pythons_numbers(name: str) -> None:
     found = emulate(MODELS[name], sample_time=SAMPLE_TIME)
     assert found.difference <= SINGLE

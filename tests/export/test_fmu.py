@@ -16,9 +16,9 @@ import pytest
 from numpy.typing import NDArray
 
 from mckibben import Block, DataError, ModelError
+from mckibben.blocks.laws.examples import examples
 from mckibben.export import export_fmu
 from mckibben.export.fmu.toolchains import own_platform
-from mckibben.registry import load, names
 from tests.export.test_c import MODELS, SAMPLE_TIME, difference, path_for, simulated
 from tests.tools import needs
 
@@ -90,10 +90,10 @@ def test_a_parameter_changed_is_seen(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("version", VERSIONS)
-@pytest.mark.parametrize("kind", names("blocks"))
+@pytest.mark.parametrize("kind", examples())
 def test_every_block_makes_a_valid_description(kind: str, version: str, tmp_path: Path) -> None:
     validation = pytest.importorskip("fmpy.validation")
-    path = exported(load("blocks", kind).example(), tmp_path, version, platforms=[])
+    path = exported(MODELS[kind], tmp_path, version, platforms=[])
     assert validation.validate_fmu(str(path)) == []
 
 

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 
 import mckibben
 from mckibben import DataError, DataWarning, Recording
+from mckibben.arrays import Array
 from mckibben.files import timebase
-from mckibben.recording import Array
 
 
 @settings(deadline=None)

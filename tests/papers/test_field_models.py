@@ -16,11 +16,12 @@ from scipy.signal import lfilter
 
 from mckibben import PIEstimator, Recording, read
 from mckibben.blocks.dynamic.transfer_function import TransferFunction
-from mckibben.blocks.published.field_models import THRESHOLDS, prandtl_ishlinskii
 from mckibben.cli.main import run
-from mckibben.estimators.linear.models import BoxJenkinsEstimator
-from mckibben.papers import Reproduction, field_models, reproduce
-from mckibben.papers.field_models import LEAST_SQUARES, PRINTED
+from mckibben.papers.field_models import rerun as field_models
+from mckibben.papers.field_models.published import THRESHOLDS, prandtl_ishlinskii
+from mckibben.papers.field_models.rerun import LEAST_SQUARES, PRINTED
+from mckibben.papers.reproduction import Reproduction, reproduce
+from mckibben.registry import load
 from tests.cli.conftest import files  # noqa: F401  # a fixture
 
 pytestmark = pytest.mark.xdist_group("field-models")  # one quick run serves all its tests
@@ -80,7 +81,7 @@ def test_the_headline_is_that_of_the_tables_and_says_how_it_was_chosen(found: Fo
     lowest = min(
         medians(found, "test", match)[name] for name in PAPERS for match in ("none", "by range")
     )
-    best = min(row["RMSE test [mm]"] for row in rows(found, "The whole field"))
+    best = min(row["test RMSE [mm]"] for row in rows(found, "The whole field"))
     summary = " ".join(found["summary"])
     said = re.search(
         r"known only from the test itself: \w+, ([\d.]+) mm .*, ([\d.]+) times", summary
@@ -89,7 +90,7 @@ def test_the_headline_is_that_of_the_tables_and_says_how_it_was_chosen(found: Fo
     assert float(said[1]) == pytest.approx(best, abs=5e-4)
     assert float(said[2]) == pytest.approx(best / lowest, abs=5e-3)
     assert "cross-validation" not in summary  # which the quick run does not do
-    table = [row["RMSE test [mm]"] for row in rows(found, "The whole field")]
+    table = [row["test RMSE [mm]"] for row in rows(found, "The whole field")]
     assert table == sorted(table)
     assert "MATLAB" not in json.dumps(found)
 
@@ -150,7 +151,7 @@ def test_box_jenkins_finds_a_numerator_of_the_printed_structure() -> None:
     clean = lfilter([0.8, 0.0, -0.3], [1.0, -1.2, 0.36], u)
     noise = lfilter([1.0, 0.1284, -0.5], [1.0, -1.2, 0.4], 0.01 * rng.standard_normal(1500))
     recording = Recording({"pressure": u, "displacement": clean + noise}, 0.02)
-    model = BoxJenkinsEstimator(lags=(0, 2)).fit(recording).model_
+    model = load("estimators", "bj")(lags=(0, 2)).fit(recording).model_
     assert isinstance(model, TransferFunction)
     assert model.numerator[1] == 0.0
     assert model.numerator == pytest.approx((0.8, 0.0, -0.3), abs=0.01)

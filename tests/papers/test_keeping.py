@@ -10,8 +10,9 @@ import pytest
 
 from mckibben import GPI, PIEstimator, Recording
 from mckibben.comparison.kept import Kept
-from mckibben.comparison.muscles import MuscleRow
-from mckibben.estimators.base import Estimator
+from mckibben.comparison.results import Row
+from mckibben.estimators.core.estimator import Estimator
+from mckibben.metrics import score
 from mckibben.papers.keeping import fitted, recorded
 from mckibben.signals import triangle
 
@@ -45,7 +46,7 @@ def test_an_interrupted_fit_is_not_kept(
     tmp_path: Path, recording: Recording, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     from mckibben import GPIEstimator
-    from mckibben.estimators.search import Tracker
+    from mckibben.estimators.optimisers.tracker import Tracker
 
     saw = Tracker.saw
 
@@ -61,16 +62,27 @@ def test_an_interrupted_fit_is_not_kept(
     assert GPIEstimator().fit(recording).diagnostics_.interrupted  # by itself it is
 
 
-def test_rows_of_several_muscles_are_read_back(tmp_path: Path) -> None:
-    row = MuscleRow("a", 3, 0.1, {"y": 0.1}, {"y": 0.2}, {"y": 1 / 3}, block=GPI.example())
+def test_rows_of_several_outputs_are_read_back(tmp_path: Path) -> None:
+    scores = score([0.0, 1.0, 2.0], [0.1, 1.0, 2.0])
+    row = Row(
+        "a",
+        n_parameters=3,
+        train=scores,
+        test=scores,
+        fit_seconds=0.1,
+        step_ns=1.0,
+        outputs={"y": scores},
+        validation_by_output={"y": 1 / 3},
+        block=GPI.example(),
+    )
     Kept(tmp_path).put("a", row)
-    assert Kept(tmp_path).get("a", MuscleRow) == row
+    assert Kept(tmp_path).get("a", Row) == row
 
 
 def test_recordings_are_read_back_and_damaged_ones_made_again(tmp_path: Path) -> None:
     def again() -> Recording:
         ((_, found),) = recorded(
-            Kept(tmp_path), "multistate", ["isobaric-1bar"], 0, lambda share, text: None
+            Kept(tmp_path), "multistate-friction", ["isobaric-1bar"], 0, lambda share, text: None
         )
         return found
 

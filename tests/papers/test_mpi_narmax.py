@@ -6,16 +6,16 @@ from typing import Any
 
 import pytest
 
-from mckibben.papers import reproduce
-from mckibben.papers.mpi_narmax import (
+from mckibben.papers.mpi_narmax.models import (
     AS_PRINTED,
     ONE_RECORD,
     OURS,
     PLAIN,
-    PRINTED_MAE,
     THREE_RATES,
     UNLOADED,
 )
+from mckibben.papers.mpi_narmax.tables import PRINTED_MAE
+from mckibben.papers.reproduction import reproduce
 
 pytestmark = pytest.mark.xdist_group("mpi-narmax")  # one quick run serves all its tests
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mckibben.papers import Reproduction, reproduce
+from mckibben.papers.reproduction import Reproduction, reproduce
 
 PAPERS, OURS, EIGHTEEN = "11 parameters, the paper's", "11 parameters, ours", "18 parameters"
 WORST = "at most, of the static law's"

@@ -8,7 +8,7 @@ import pytest
 
 from mckibben import registry
 from mckibben.errors import ModelError
-from mckibben.papers import reproduce
+from mckibben.papers.reproduction import reproduce
 from tests.cli.conftest import Cli
 from tests.cli.conftest import cli as cli  # a fixture
 

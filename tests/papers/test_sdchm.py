@@ -9,11 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-import mckibben.papers.sdchm
 from mckibben import Recording
-from mckibben.papers import reproduce
-from mckibben.papers.reproduction import Reproduction, Table
-from mckibben.papers.sdchm import compensation
+from mckibben.papers.reproduction import Reproduction, Table, reproduce
+from mckibben.papers.sdchm import compensation, rerun
 from mckibben.papers.sdchm.compensation import OURS_INVERTED, references
 from mckibben.papers.sdchm.models import (
     BALANCE,
@@ -29,7 +27,7 @@ from mckibben.papers.sdchm.models import (
 )
 from mckibben.papers.sdchm.prediction import Predictions
 from mckibben.papers.sdchm.recordings import EXTENSOR, OUTPUTS, Recordings, plan
-from mckibben.signals.protocols import protocol
+from mckibben.signals.protocol import protocol
 
 pytestmark = pytest.mark.xdist_group("sdchm")  # one quick run serves all its tests
 
@@ -144,7 +142,7 @@ def quick() -> Iterator[Seen]:
         return inverses
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(mckibben.papers.sdchm, "fit_models", fitted)
+        patch.setattr(rerun, "fit_models", fitted)
         patch.setattr(compensation, "compensators", inverted)
         found = reproduce("sdchm", quick=True, jobs=1)
         yield Seen(found, **kept)

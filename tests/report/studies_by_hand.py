@@ -8,16 +8,17 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from mckibben.blocks.base import Block
 from mckibben.blocks.compose import Series
-from mckibben.blocks.fields import Channel
-from mckibben.blocks.gpi import GPI
-from mckibben.blocks.pi import PI
-from mckibben.blocks.piecewise_linear import PiecewiseLinear
-from mckibben.blocks.rate_dependent_pi import RateDependentPI
+from mckibben.blocks.core.block import Block
+from mckibben.blocks.core.fields import Channel
+from mckibben.blocks.memoryless.piecewise_linear import PiecewiseLinear
+from mckibben.blocks.play_type.gpi import GPI
+from mckibben.blocks.play_type.pi import PI
+from mckibben.blocks.play_type.rate_dependent_pi import RateDependentPI
 from mckibben.characterization import characterize
-from mckibben.comparison.results import InverseCheck, Leaderboard, Memory, Row, Study
-from mckibben.comparison.studying import check_inverse
+from mckibben.comparison.inverting import InverseCheck, check_inverse
+from mckibben.comparison.results import Leaderboard, Memory, Row
+from mckibben.comparison.studying import Study
 from mckibben.metrics import score
 from mckibben.recording import Recording
 
@@ -73,15 +74,16 @@ def study(
     input_name, output_name = list(train[0].channels)[:2]
     predictions = {
         name: tuple(
-            block.simulate(r[input_name], sample_time=r.sample_time or 1.0) for r in (*train, *test)
+            block.simulate(r[input_name], sample_time=r.sample_time or 1.0)[:, np.newaxis]
+            for r in (*train, *test)
         )
         for name, block in blocks.items()
     }
     rows = []
     for place, (name, block) in enumerate(blocks.items()):
         n_train = len(train)
-        fitted = score(train[0][output_name], predictions[name][0])
-        tested = score(test[0][output_name], predictions[name][n_train])
+        fitted = score(train[0][output_name], predictions[name][0][:, 0])
+        tested = score(test[0][output_name], predictions[name][n_train][:, 0])
         rows.append(
             Row(
                 model=name,
@@ -99,8 +101,8 @@ def study(
         )
     rows.append(Row(model="eupi", reason=reason))
     board = Leaderboard(
-        input=input_name,
-        output=output_name,
+        inputs=(input_name,),
+        outputs=(output_name,),
         unit=train[0].units[output_name],
         rows=tuple(rows),
         split="last 25 % of muscle to test, all before it to fit",

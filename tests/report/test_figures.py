@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from mckibben.blocks.gpi import GPI
+from mckibben.blocks.play_type.gpi import GPI
 from mckibben.errors import DataError, ModelError
 from mckibben.report.figures import (
     FIGURES,

@@ -3,13 +3,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mckibben import registry
 from mckibben.blocks.compose import Parallel, Series
-from mckibben.blocks.gpi import GPI
-from mckibben.blocks.pi import PI
-from mckibben.blocks.piecewise_linear import PiecewiseLinear
-from mckibben.blocks.play import Play
-from mckibben.blocks.rate_dependent_pi import RateDependentPI
+from mckibben.blocks.core.block import Block
+from mckibben.blocks.laws.examples import examples
+from mckibben.blocks.memoryless.piecewise_linear import PiecewiseLinear
+from mckibben.blocks.play_type.gpi import GPI
+from mckibben.blocks.play_type.pi import PI
+from mckibben.blocks.play_type.play import Play
+from mckibben.blocks.play_type.rate_dependent_pi import RateDependentPI
 from mckibben.errors import ModelError
 from mckibben.report import interactive, model_subjects
 from tests.report.studies_by_hand import models, study
@@ -39,9 +40,8 @@ def test_sums_of_operators_are_found_however_nested() -> None:
     assert list(model_subjects.operator_sums(LINE)) == []
 
 
-@pytest.mark.parametrize("name", registry.names("blocks"))
-def test_any_model_is_drawn_or_refused(name: str) -> None:
-    block = registry.load("blocks", name).example()
+@pytest.mark.parametrize(("name", "block"), examples().items())
+def test_any_model_is_drawn_or_refused(name: str, block: Block) -> None:
     if list(model_subjects.operator_sums(block)):
         interactive.plots(model_subjects.weights({name: block}))
     else:

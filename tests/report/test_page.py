@@ -10,9 +10,9 @@ from typing import Any
 
 import pytest
 
-from mckibben.blocks.gpi import GPI
-from mckibben.blocks.pi import PI
-from mckibben.comparison.results import Study
+from mckibben.blocks.play_type.gpi import GPI
+from mckibben.blocks.play_type.pi import PI
+from mckibben.comparison.studying import Study
 from mckibben.report import write_report
 from mckibben.report.page import page
 from tests.report.studies_by_hand import measured, models, renamed, study
@@ -119,6 +119,7 @@ def test_every_colour_of_the_plots_is_in_the_style_in_light_and_dark(parsed: Par
 
 
 def test_what_was_found_is_said_with_units(parsed: Parsed, whole: Study) -> None:
+    assert whole.characterization is not None
     for words in (*whole.characterization.sentences, *whole.notes, "gpi", "[mm]", "seed 0"):
         assert words in parsed.words
     assert "eupi" in parsed.words

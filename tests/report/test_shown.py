@@ -32,8 +32,8 @@ def test_outputs_belong_to_their_recording_and_are_ranked() -> None:
     one = study((measured(400),), (measured(200, seed=1, name="other"),))
     first, second = shown(one)
     assert list(first.outputs) == [row.model for row in one.leaderboard.rows if row.block]
-    np.testing.assert_array_equal(first.outputs["pi"], one.predictions["pi"][1])
-    np.testing.assert_array_equal(second.outputs["pi"], one.predictions["pi"][0])
+    np.testing.assert_array_equal(first.outputs["pi"], one.predictions["pi"][1][:, 0])
+    np.testing.assert_array_equal(second.outputs["pi"], one.predictions["pi"][0][:, 0])
 
 
 def test_recordings_tested_on_are_drawn_first_and_then_the_longest() -> None:

@@ -12,9 +12,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mckibben import DataError
-from mckibben.ordinary import DESCRIPTION
 from mckibben.rigs import describe, load_rig, rig_from_data_sheet, rig_names, save_rig
 from mckibben.rigs.data_sheet import _loop_width
+from mckibben.system.ordinary import DESCRIPTION
 
 
 @pytest.mark.parametrize("name", rig_names())

@@ -11,11 +11,11 @@ from scipy.integrate import solve_ivp
 
 from mckibben.recording import Recording
 from mckibben.rigs import Rig, load_rig, rig_names
-from mckibben.rigs.physics.bladder import bladder_energy
 from mckibben.rigs.physics.motion import march
 from mckibben.rigs.rig import quantity
 from mckibben.rigs.setups.moving_end import MovingEnd
 from mckibben.signals import irregular_triangle, sine, triangle
+from tests.rigs.energy import bladder_energy
 
 ATMOSPHERE = 1.013
 

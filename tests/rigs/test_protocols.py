@@ -11,7 +11,7 @@ from mckibben import DataError, read
 from mckibben.registry import names
 from mckibben.rigs import load_rig, record
 from mckibben.signals import reversals
-from mckibben.signals.protocols import Protocol, protocol
+from mckibben.signals.protocol import Protocol, protocol
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
@@ -102,7 +102,7 @@ def test_activation_pressure_has_28_conditions_twice() -> None:
 
 
 def test_multistate_holds_lengths_and_pressures() -> None:
-    plan = protocol("multistate")
+    plan = protocol("multistate-friction")
     assert [run.labels["pressure"] for run in plan.select("train", stage="friction")] == [4.0]
     for run in plan.select(stage="static"):
         late = run.inputs["length"][int(run.lead / 0.02) :]
@@ -131,7 +131,7 @@ def test_recording_is_repeatable_whatever_else_is_recorded() -> None:
 
 
 def test_a_lead_is_driven_but_not_recorded() -> None:
-    (run, recording), *_ = record("multistate", runs=["isometric-190mm"])
+    (run, recording), *_ = record("multistate-friction", runs=["isometric-190mm"])
     assert run.lead > 0
     assert recording.start_time == 0.0
     assert recording.duration == pytest.approx(60.0)

@@ -15,10 +15,10 @@ from pathlib import Path
 import numpy as np
 
 from mckibben import Block
-from mckibben.atomic import write_text
-from mckibben.blocks.trial import Trial
+from mckibben.blocks.laws.trial import Trial
 from mckibben.errors import ModelError
 from mckibben.registry import load, names
+from mckibben.system.atomic import write_text
 
 SAMPLE_TIME = 0.01
 SAMPLES = 25

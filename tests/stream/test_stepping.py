@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mckibben.blocks.polynomial import Polynomial
+from mckibben.blocks.memoryless.polynomial import Polynomial
 from mckibben.registry import load
 from mckibben.stream import Step, run
 

@@ -17,6 +17,11 @@ WAIT = 0.05
 """Between two tries [s]."""
 
 
+def keep_to_the_user() -> None:
+    """Leave this process with a mask of rights that keeps all that it writes to its user."""
+    os.umask(0o077)
+
+
 class Lock:
     """A file that one process holds, or several that share it, until they end.
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Awaitable, Callable, Iterator
+import re
+from collections.abc import Awaitable, Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -35,8 +36,8 @@ class Desk:
 
     workspace: Workspace
     jobs: Jobs
-    input: str = "pressure"
-    output: str = "displacement"
+    inputs: tuple[str, ...] = ("pressure",)
+    outputs: tuple[str, ...] = ("displacement",)
     allow_shared: bool = False
     """Whether models are tested on data that they were fitted to, which every result then says."""
     dark: bool = False
@@ -44,9 +45,36 @@ class Desk:
     _shown: dict[str, list[Refresh]] = field(default_factory=dict, repr=False)
 
     @property
-    def channels(self) -> tuple[str, str]:
-        """Input and output."""
-        return self.input, self.output
+    def input(self) -> str:
+        """The first input."""
+        return self.inputs[0]
+
+    @property
+    def output(self) -> str:
+        """The first output."""
+        return self.outputs[0]
+
+    @property
+    def channels(self) -> dict[str, str | list[str]]:
+        """Input and output, or all of them, as the library's functions take them."""
+        named = {"input": self.inputs, "output": self.outputs}
+        return {key: names[0] if len(names) == 1 else list(names) for key, names in named.items()}
+
+    @property
+    def pairs(self) -> tuple[tuple[str, str], ...]:
+        """Every output with the input that is its own."""
+        from mckibben.comparison.channels import Channels
+
+        return Channels(self.inputs, self.outputs).pairs()
+
+    def results(self) -> list[dict[str, Any]]:
+        """Return what is known of the models of these channels: other errors do not compare."""
+        named = ", ".join(self.inputs), ", ".join(self.outputs)
+        return [
+            result
+            for result in self.workspace.results()
+            if result["input"] in ("", named[0]) and result["output"] in ("", named[1])
+        ]
 
     def when(self, topic: str, refresh: Refresh) -> None:
         """Call a function whenever something of a topic has changed."""
@@ -64,14 +92,21 @@ class Desk:
         self.changed("log")
 
     def settle_channels(self) -> None:
-        """Choose an input and an output that the recordings have."""
+        """Choose inputs and outputs that the recordings have: of several muscles, all of them."""
         known = self.workspace.channels()
-        if known and self.input not in known:
-            self.input = next((c for c in known if c.startswith(("pressure", "voltage"))), known[0])
-        if known and (self.output not in known or self.output == self.input):
-            wished = [c for c in known if c.startswith(("displacement", "length", "contraction"))]
-            rest = [c for c in known if c != self.input]
-            self.output = (wished or rest or known)[0]
+        if known and not set(self.inputs) <= set(known):
+            self.inputs = _all_of(known, "pressure", "voltage") or (known[0],)
+        if known and (not set(self.outputs) <= set(known) or set(self.outputs) & set(self.inputs)):
+            rest = [name for name in known if name not in self.inputs]
+            wished = _all_of(rest, "displacement", "length", "contraction")
+            self.outputs = wished or ((rest or known)[0],)
+
+
+def _all_of(known: Sequence[str], *quantities: str) -> tuple[str, ...]:
+    """Return the channels of a quantity that are numbered, else the first of any of them."""
+    several = [name for name in known if re.fullmatch(rf"{quantities[0]}_\d+", name)]
+    one = [name for name in known if name.startswith(quantities)]
+    return tuple(several or one[:1])
 
 
 def named(element: Any, name: str) -> Any:

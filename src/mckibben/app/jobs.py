@@ -18,11 +18,12 @@ from pathlib import Path
 from typing import Any
 
 from mckibben.app import kept
+from mckibben.app.claim import keep_to_the_user
 from mckibben.app.workspace import Workspace
 from mckibben.errors import DataError
-from mckibben.ordinary import DESCRIPTION, read_bytes
-from mckibben.threads import cores
-from mckibben.workers import context, end_with_parent, prepare
+from mckibben.system.ordinary import DESCRIPTION, read_bytes
+from mckibben.system.threads import cores
+from mckibben.system.workers import context, end_with_parent, prepare
 
 WAITING, RUNNING, DONE, FAILED = "waiting", "running", "done", "failed"
 CANCELLED, INTERRUPTED = "cancelled", "interrupted"
@@ -269,6 +270,7 @@ def run(folder: str, name: str, kind: str, given: dict[str, Any]) -> None:
     end_with_parent()
     if hasattr(os, "nice"):
         os.nice(KINDNESS)
+    keep_to_the_user()
     workspace = Workspace(folder)
     held = workspace.work()
     path = workspace.path("jobs", f"{name}.progress")
@@ -295,14 +297,3 @@ def run(folder: str, name: str, kind: str, given: dict[str, Any]) -> None:
     except DataError:
         sys.exit(UNWRITTEN)
     held.leave()
-
-
-def parse_settings(text: str) -> dict[str, Any]:
-    """Return settings given as ``name=value`` lines, values as JSON where they are that."""
-    from mckibben.estimators.settings import setting_value
-
-    settings: dict[str, Any] = {}
-    for line in filter(None, (part.strip() for part in text.replace(",", "\n").splitlines())):
-        name, _, value = line.partition("=")
-        settings[name.strip()] = setting_value(value.strip())
-    return settings

@@ -59,6 +59,7 @@ class Figures(Kept):
 
     rmse: Number = None
     r2: Number = None
+    max_error: Number = None
     rmse_interval: list[Number] | None = Field(default=None, min_length=2, max_length=2)
 
 
@@ -66,6 +67,7 @@ class Memory(Kept):
     """Whether a model keeps its branches apart."""
 
     gap_ratio: Number = None
+    hold_ratio: Number = None
 
 
 class Constant(Kept):
@@ -80,13 +82,19 @@ class Fitted(Kept):
 
     status: Literal["ok"]
     model: Text = ""
+    input: Text = ""
+    output: Text = ""
+    unit: Text = ""
+    chosen_by: Literal["cross-validation", "validation", "given", "fit"] = "cross-validation"
     settings: dict[str, Any] = {}
     validation_rmse: Number = None
     test: Figures | None = None
     train: Figures | None = None
     memory: Memory | None = None
+    outputs: dict[Text, Figures] = {}
     n_parameters: Count | None = None
     fit_seconds: Number = None
+    step_ns: Number = None
     constant: Constant | None = None
     not_recommended: Text | None = None
     shared: list[Text] = []

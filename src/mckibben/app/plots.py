@@ -9,14 +9,13 @@ from importlib import resources
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mckibben.arrays import Array
 from mckibben.recording import Recording
 from mckibben.report import interactive
 from mckibben.report.drawing import Drawing, over_time
 from mckibben.report.interactive import text
 
-Array = NDArray[np.float64]
 Json = dict[str, Any]
 
 POINTS = 4000

@@ -10,7 +10,7 @@ from typing import Any
 from mckibben.errors import DataError
 from mckibben.files import read
 from mckibben.recording import Recording
-from mckibben.workers import Tell, Workers
+from mckibben.system.workers import Tell, Workers
 
 LARGE = 16 * 2**20
 """Bytes of a file beyond which it is worth starting a process for."""

@@ -15,20 +15,20 @@ def read_call(path: str, options: Mapping[str, Any]) -> str:
 
 
 def fit_call(
-    model: str,
-    channels: tuple[str, str],
-    settings: Mapping[str, Any],
-    seed: int,
+    model: str, channels: Mapping[str, Any], settings: Mapping[str, Any], seed: int
 ) -> str:
     """Return the call that fits and tests a model on the recordings in use."""
     given = f", settings={ {model: dict(settings)}!r}" if settings else ""
     return (
-        f"mckibben.compare(train, test, input={channels[0]!r}, output={channels[1]!r}, "
-        f"models=[{model!r}]{given}, seed={seed})"
+        f"mckibben.compare(train, test, {_given(channels)}, models=[{model!r}]{given}, seed={seed})"
     )
 
 
-def script(workspace: Workspace, models: Sequence[str], channels: tuple[str, str]) -> str:
+def _given(channels: Mapping[str, Any]) -> str:
+    return ", ".join(f"{name}s={value!r}" for name, value in channels.items())
+
+
+def script(workspace: Workspace, models: Sequence[str], channels: Mapping[str, Any]) -> str:
     """Return a Python script that does again what was done: read, fit, choose, invert, save."""
     lines = ['"""What was done in the workbench, as a script."""', "", "import mckibben", ""]
     for role in ("train", "test"):
@@ -37,7 +37,7 @@ def script(workspace: Workspace, models: Sequence[str], channels: tuple[str, str
         lines.append(f"{role} = [{listed}]")
     lines += [
         "",
-        f"board = mckibben.compare(train, test, input={channels[0]!r}, output={channels[1]!r},",
+        f"board = mckibben.compare(train, test, {_given(channels)},",
     ]
     chosen = [row for row in workspace.results() if row["name"] in models]
     settings = {row["model"]: row["settings"] for row in chosen if row["settings"]}

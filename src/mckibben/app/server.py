@@ -17,13 +17,14 @@ from typing import Any
 from nicegui import Client, app, ui
 
 from mckibben import registry
+from mckibben.app.claim import keep_to_the_user
 from mckibben.app.desk import Desk, code, named, tell, unexpected
 from mckibben.app.guard import Guard, checked_token, new_token
 from mckibben.app.jobs import Job, Jobs
 from mckibben.app.workspace import Workspace
-from mckibben.atomic import write_text
 from mckibben.errors import DataError, MckibbenError
-from mckibben.workers import PRELOADED
+from mckibben.system.atomic import write_text
+from mckibben.system.workers import PRELOADED
 
 PAGES = {
     "Data": ("folder_open", "data"),
@@ -245,6 +246,7 @@ def serve(
         If the workspace cannot be made, the port is taken, or the token could be guessed.
     """
     token = new_token() if token is None else checked_token(token)
+    keep_to_the_user()
     workspace = Workspace(folder)
     port = _free(host, port)
     workspace.claim()

@@ -27,8 +27,8 @@ def fit(workspace: Workspace, given: dict[str, Any], tell: Tell) -> str:
     board = compare(
         train,
         test,
-        input=given["input"],
-        output=given["output"],
+        inputs=given["input"],
+        outputs=given["output"],
         models=[model],
         settings={model: given.get("settings", {})},
         seed=int(given.get("seed", 0)),
@@ -46,6 +46,7 @@ def fit(workspace: Workspace, given: dict[str, Any], tell: Tell) -> str:
         "output": board.output,
         "unit": board.unit,
         "split": board.split,
+        "chosen_by": board.chosen_by,
         "constant": None if board.constant is None else board.constant.to_dict(),
         "not_recommended": board.not_recommended,
         "shared": list(board.shared),
@@ -61,14 +62,8 @@ def fit(workspace: Workspace, given: dict[str, Any], tell: Tell) -> str:
 
 def loop(workspace: Workspace, given: dict[str, Any], tell: Tell) -> str:
     """Let a controller follow a reference on a virtual rig, and keep the recording."""
-    from mckibben.control import (
-        Controller,
-        DisturbanceObserver,
-        Feedforward,
-        FeedforwardPID,
-        track,
-        tune_pid,
-    )
+    from mckibben.blocks.core.block import Block
+    from mckibben.control import control_law, track, tune_pid
     from mckibben.files import read, write
     from mckibben.rigs import load_rig
 
@@ -76,14 +71,8 @@ def loop(workspace: Workspace, given: dict[str, Any], tell: Tell) -> str:
     rig = load_rig(given["rig"])
     (reference,) = read(workspace.path("runs", given["reference"]), informative=False)
     kind = given["controller"]
-    controller: Controller
-    if kind == "feedforward":
-        controller = Feedforward(inverse)
-    elif kind == "observer":
-        controller = DisturbanceObserver(inverse)
-    else:
-        pid = tune_pid(rig, sample_time=reference.sample_time or 0.02)
-        controller = pid if kind == "pid" else FeedforwardPID(inverse, pid)
+    step = reference.sample_time or 0.02
+    controller = control_law(kind, inverse, lambda: tune_pid(rig, sample_time=step))
     found = track(controller, rig, reference, progress=lambda share: tell(share, float("nan")))
     name = str(given["name"])
     write(found.recording.with_meta(name=name), workspace.path("runs", f"{name}.csv"))
@@ -102,8 +91,8 @@ def loop(workspace: Workspace, given: dict[str, Any], tell: Tell) -> str:
             "call": given.get("call", ""),
         },
     )
-    if kind != "observer":
-        controller.block(inverse).save(workspace.path("models", f"{name}-controller.json"))
+    if isinstance(controller, Block):
+        controller.save(workspace.path("models", f"{name}-controller.json"))
     return ", ".join(f"{channel} RMSE {value:.3g} mm" for channel, value in errors.items())
 
 
@@ -115,8 +104,8 @@ def report(workspace: Workspace, given: dict[str, Any], tell: Tell) -> str:
     found = study(
         workspace.with_role("train"),
         workspace.with_role("test"),
-        input=given["input"],
-        output=given["output"],
+        inputs=given["input"],
+        outputs=given["output"],
         models=given["models"],
         settings=given.get("settings") or None,
         seed=int(given.get("seed", 0)),
@@ -133,7 +122,7 @@ def record(workspace: Workspace, given: dict[str, Any], tell: Tell) -> str:
     """Run one run of a protocol on a virtual rig, and keep the recording."""
     from mckibben.rigs import load_rig
     from mckibben.rigs import record as record_runs
-    from mckibben.signals.protocols import protocol
+    from mckibben.signals.protocol import protocol
 
     plan = protocol(given["protocol"])
     runs = list(given["runs"])

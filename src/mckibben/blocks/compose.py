@@ -13,18 +13,17 @@ from itertools import pairwise
 from typing import Annotated, ClassVar, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 from pydantic import BeforeValidator, InstanceOf
 from pydantic.dataclasses import dataclass
 
-from mckibben.blocks.base import Block, Run
-from mckibben.blocks.fields import STRICT, Channel, Initial
-from mckibben.blocks.refusals import explicit_state, parameter_vector
-from mckibben.blocks.saving import nested
+from mckibben.arrays import Array
+from mckibben.blocks.core.block import Block, Run
+from mckibben.blocks.core.exportable import Board
+from mckibben.blocks.core.fields import STRICT, Channel, Initial
+from mckibben.blocks.core.refusals import explicit_state
+from mckibben.blocks.core.saving import nested
 from mckibben.errors import ModelError
-
-Array = NDArray[np.float64]
-
+from mckibben.system.compiling import in_turn
 
 DEEPEST, MOST_BLOCKS = 32, 1000
 """Compositions in compositions, and blocks in all."""
@@ -40,7 +39,14 @@ Parts = Annotated[tuple[InstanceOf[Block], ...], BeforeValidator(_parts)]
 class Composition(Block):
     """What all compositions share: states and parameters are those of the parts, one after another."""
 
+    parameters: ClassVar[tuple[str, ...]] = ("parts",)
+
     parts: tuple[Block, ...]
+
+    @property
+    def rate_dependent(self) -> bool:  # type: ignore[override]
+        """Whether any part is."""
+        return any(part.rate_dependent for part in self.parts)
 
     @property
     def depth(self) -> int:
@@ -72,29 +78,8 @@ class Composition(Block):
         """The scratch of all parts."""
         return sum(part.n_scratch for part in self.parts)
 
-    @property
-    def n_parameters(self) -> int:
-        """The parameters of all parts."""
-        return sum(part.n_parameters for part in self.parts)
-
-    @property
-    def parameter_names(self) -> tuple[str, ...]:
-        """Those of all parts, one after another."""
-        return tuple(name for part in self.parts for name in part.parameter_names)
-
-    def pack(self) -> Array:
-        """Return the parameters of all parts, one after another."""
-        return np.concatenate([part.pack() for part in self.parts])
-
-    def unpack(self, parameters: ArrayLike) -> Self:
-        """Return a composition of the same structure with other parameters."""
-        vector = parameter_vector(self, parameters)
-        shares = _shares(vector, [part.n_parameters for part in self.parts])
-        parts = tuple(part.unpack(share) for part, share in zip(self.parts, shares, strict=True))
-        return replace(self, parts=parts)  # type: ignore[type-var]
-
     def _states(self, state: Array) -> list[Array]:
-        return _shares(state, [part.n_states for part in self.parts])
+        return np.split(state, np.cumsum([part.n_states for part in self.parts])[:-1])
 
     def report(self, state: Array) -> None:
         """Pass on what the parts have to say."""
@@ -133,11 +118,6 @@ class Series(Composition):
                     f"{before.kind!r} gives {len(before.outputs)} output(s), {after.kind!r} behind it "
                     f"wants {driven}. Remedy: connect blocks that fit."
                 )
-
-    @property
-    def rate_dependent(self) -> bool:  # type: ignore[override]
-        """Whether any part is."""
-        return any(part.rate_dependent for part in self.parts)
 
     @cached_property  # asked for at every level of a nested model
     def inputs(self) -> tuple[Channel, ...]:
@@ -187,11 +167,7 @@ class Series(Composition):
             runs.append(part.bind(sample_time, own, given, into))
             signal = into
 
-        def run() -> None:
-            for step in runs:
-                step()
-
-        return run
+        return in_turn(*runs)
 
     def _gathered(
         self, part: Block, inputs: Array, signal: Array | None
@@ -212,21 +188,33 @@ class Series(Composition):
         return gathered, gather
 
     def _sample(self, part: Block, first: Array, driven: Array | None) -> Array:
-        given, gather = self._gathered(
-            part, first[np.newaxis], None if driven is None else driven[np.newaxis]
-        )
+        signal = None if driven is None else driven[np.newaxis]
+        given, gather = self._gathered(part, first[np.newaxis], signal)
         if gather is not None:
             gather()
         return given[0]
 
-    def inverse(self) -> Series:
-        """Return the reversed series of the inverses.
+    def wired(self, board: Board, given: Sequence[str]) -> list[str]:
+        """Lay out the parts one behind the other."""
+        by_name = dict(zip((channel.name for channel in self.inputs), given, strict=True))
+        signals: list[str] | None = None
+        for number, part in enumerate(self.parts):
+            at_rest = not part.rate_dependent or part.start == "first_sample"
+            if number < len(self.parts) - 1 and not at_rest:
+                raise ModelError(
+                    f"{part.kind!r} starts from a memory of its own and depends on the rate, so parts "
+                    "behind it would start from another sample than in Python. Remedy: start it from "
+                    "'first_sample'."
+                )
+            scheduled = [by_name[name] for name in part.scheduling]
+            n_driven = len(part.inputs) - len(scheduled)
+            driven = list(given[:n_driven]) if signals is None else signals
+            signals = part.wired(board, [*driven, *scheduled])
+        assert signals is not None
+        return signals
 
-        Raises
-        ------
-        ModelError
-            If a part has no inverse.
-        """
+    def inverse(self) -> Series:
+        """Return the reversed series of the inverses; each part must have one."""
         return Series(tuple(part.inverse() for part in reversed(self.parts)))
 
     def reachable(self) -> tuple[Array, Array]:
@@ -242,8 +230,8 @@ class Series(Composition):
     @classmethod
     def example(cls) -> Self:
         """Return a modified Prandtl-Ishlinskii model: a PI model and a saturating curve."""
-        from mckibben.blocks.pi import PI
-        from mckibben.blocks.piecewise_linear import PiecewiseLinear
+        from mckibben.blocks.memoryless.piecewise_linear import PiecewiseLinear
+        from mckibben.blocks.play_type.pi import PI
 
         return cls((PI.example(), PiecewiseLinear.example()))
 
@@ -272,11 +260,6 @@ class Parallel(Composition):
                 )
 
     @property
-    def rate_dependent(self) -> bool:  # type: ignore[override]
-        """Whether any part is."""
-        return any(part.rate_dependent for part in self.parts)
-
-    @property
     def inputs(self) -> tuple[Channel, ...]:
         """Those of every part."""
         return self.parts[0].inputs
@@ -299,11 +282,8 @@ class Parallel(Composition):
     def bind(self, sample_time: float | None, state: Array, inputs: Array, outputs: Array) -> Run:
         """Return a function that runs every part and adds the outputs."""
         own = [np.empty_like(outputs) for _ in self.parts]
-        states = self._states(state)
-        runs = [
-            part.bind(sample_time, share, inputs, into)
-            for part, share, into in zip(self.parts, states, own, strict=True)
-        ]
+        shares = zip(self.parts, self._states(state), own, strict=True)
+        runs = [part.bind(sample_time, share, inputs, into) for part, share, into in shares]
 
         def run() -> None:
             outputs[:] = 0.0
@@ -313,11 +293,16 @@ class Parallel(Composition):
 
         return run
 
+    def wired(self, board: Board, given: Sequence[str]) -> list[str]:
+        """Lay out the parts on the same signals, and add what they give."""
+        all_given = [part.wired(board, given) for part in self.parts]
+        return [board.add(terms) for terms in zip(*all_given, strict=True)]
+
     @classmethod
     def example(cls) -> Self:
         """Return the sum of a PI model and a play operator."""
-        from mckibben.blocks.pi import PI
-        from mckibben.blocks.play import Play
+        from mckibben.blocks.play_type.pi import PI
+        from mckibben.blocks.play_type.play import Play
 
         return cls((PI.example(), Play.example()))
 
@@ -352,11 +337,6 @@ class PerChannel(Composition):
                 )
 
     @property
-    def rate_dependent(self) -> bool:  # type: ignore[override]
-        """Whether any part is."""
-        return any(part.rate_dependent for part in self.parts)
-
-    @property
     def inputs(self) -> tuple[Channel, ...]:
         """One of every part."""
         return tuple(part.inputs[0] for part in self.parts)
@@ -375,12 +355,8 @@ class PerChannel(Composition):
         """Return a function that runs every part on its own channel."""
         n = inputs.shape[0]
         columns = [(np.empty((n, 1)), np.empty((n, 1))) for _ in self.parts]
-        runs = [
-            part.bind(sample_time, share, given, into)
-            for part, share, (given, into) in zip(
-                self.parts, self._states(state), columns, strict=True
-            )
-        ]
+        shares = zip(self.parts, self._states(state), columns, strict=True)
+        runs = [part.bind(sample_time, share, *column) for part, share, column in shares]
 
         def run() -> None:
             for index, (step, (given, into)) in enumerate(zip(runs, columns, strict=True)):
@@ -389,6 +365,11 @@ class PerChannel(Composition):
                 outputs[:, index] = into[:, 0]
 
         return run
+
+    def wired(self, board: Board, given: Sequence[str]) -> list[str]:
+        """Lay out the parts, each on its own signal."""
+        pairs = zip(self.parts, given, strict=True)
+        return [part.wired(board, [signal])[0] for part, signal in pairs]
 
     def inverse(self) -> PerChannel:
         """Return the inverses, channel by channel."""
@@ -402,16 +383,11 @@ class PerChannel(Composition):
     @classmethod
     def example(cls) -> Self:
         """Return two muscles with models of their own."""
-        from mckibben.blocks.gpi import GPI
-        from mckibben.blocks.pi import PI
+        from mckibben.blocks.play_type.gpi import GPI
+        from mckibben.blocks.play_type.pi import PI
 
         pressures = [Channel(f"pressure_{number}", "bar") for number in (1, 2)]
         displacements = [Channel(f"displacement_{number}", "mm") for number in (1, 2)]
         first = replace(PI.example(), input=pressures[0], output=displacements[0])
         second = replace(GPI.example(), input=pressures[1], output=displacements[1])
         return cls((first, second))
-
-
-def _shares(vector: Array, lengths: Sequence[int]) -> list[Array]:
-    ends = np.cumsum(lengths)
-    return [vector[end - length : end] for end, length in zip(ends, lengths, strict=True)]

@@ -7,8 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from mckibben.arrays import Array
 from mckibben.characterization.evidence import evidence
-from mckibben.characterization.loops import Array, Loop, largest_of, loops_of, pooled_curves
+from mckibben.characterization.loops import Loop, largest_of, loops_of, pooled_curves
 from mckibben.characterization.mean_curve import mean_curve
 from mckibben.characterization.memory import dead_zones, minor_loop_errors
 from mckibben.characterization.results import Characterization

@@ -14,11 +14,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mckibben.arrays import Array
 from mckibben.characterization.tracks import Scale, Track
-
-Array = NDArray[np.float64]
 
 LEVEL = 0.01
 """Of the tests: white noise passes for a dependence, or a loop, in about one of a hundred recordings.

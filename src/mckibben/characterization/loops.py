@@ -8,11 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from mckibben.arrays import Array
 from mckibben.characterization.tracks import STILL, Scale, Track
 from mckibben.metrics import loop_area
 from mckibben.signals.reversals import whole_cycles
-
-Array = NDArray[np.float64]
 
 SHARES = np.linspace(0.02, 0.98, 49)
 """Input levels of a curve, as shares of its range; the middle one is mid input."""

@@ -5,11 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mckibben.arrays import Array
 from mckibben.characterization.tracks import Scale
-
-Array = NDArray[np.float64]
 
 FLAT = 0.2
 """Share of the steepest slope below which the output hardly follows the input."""

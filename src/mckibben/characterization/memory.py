@@ -6,11 +6,9 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mckibben.arrays import Array
 from mckibben.characterization.tracks import Scale, Track
-
-Array = NDArray[np.float64]
 
 MOVED = 0.02
 """Output change, as a share of its range, from which the output is taken to have moved."""

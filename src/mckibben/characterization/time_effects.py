@@ -6,13 +6,10 @@ from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mckibben.characterization.loops import Cycle, Loop
 from mckibben.characterization.tracks import Scale, Track
 from mckibben.signals.reversals import swing_threshold
-
-Array = NDArray[np.float64]
 
 HELD = 0.005
 """Share of its range within which an input counts as held."""

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from mckibben.arrays import Array
 from mckibben.errors import DataError
 from mckibben.recording import Recording
 from mckibben.signals.reversals import noise_level, reversals, swing_threshold
 
-Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 QUIET = 1e-3

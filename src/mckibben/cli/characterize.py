@@ -2,35 +2,28 @@
 
 from __future__ import annotations
 
+from mckibben.cli.grouping import spread
 from mckibben.cli.options import (
-    Columns,
     Files,
-    GapPolicy,
-    Gaps,
     Input,
     Json,
     Output,
-    Rate,
     Reading,
-    Resample,
-    Units,
 )
-from mckibben.cli.output import figure, print_json, print_table, say
+from mckibben.cli.output import print_json, print_table, say
+from mckibben.numerals import numeral
 
 
+@spread
 def characterize(
     files: Files,
+    reading: Reading,
     input: Input = "pressure",  # noqa: A002
     output: Output = "displacement",
-    column: Columns = None,
-    unit: Units = None,
-    rate: Rate = None,
-    gaps: GapPolicy = Gaps.ERROR,
-    resample: Resample = None,
     as_json: Json = False,
 ) -> None:
     """Say what the muscle does: loop width, asymmetry, dead zone, creep, rate dependence."""
-    recordings = Reading(column, unit, rate, gaps, resample).read(files, [input, output])
+    recordings = reading.read(files, [input, output])
     from mckibben.characterization import characterize as find
     from mckibben.recording import notes_by_file, reading_notes
 
@@ -50,4 +43,4 @@ def characterize(
 
 
 def _shown(value: object) -> str:
-    return figure(value, 4) if isinstance(value, float) else ("-" if value is None else str(value))
+    return numeral(value, 4) if isinstance(value, float) else ("-" if value is None else str(value))

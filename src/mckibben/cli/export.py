@@ -12,7 +12,7 @@ from mckibben.cli.options import Json
 from mckibben.cli.output import print_json, say
 
 if TYPE_CHECKING:
-    from mckibben.blocks.base import Block
+    from mckibben.blocks.core.block import Block
 
 app = typer.Typer(
     name="export",
@@ -46,7 +46,7 @@ class Version(StrEnum):
 
 
 def _loaded(model: Path, inverse: bool) -> Block:
-    from mckibben.blocks.saving import load
+    from mckibben.blocks.core.saving import load
 
     block = load(model)
     return block.inverse() if inverse else block

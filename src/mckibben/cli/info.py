@@ -7,21 +7,19 @@ from typing import Annotated, Any
 
 import typer
 
-from mckibben.cli.options import Columns, GapPolicy, Gaps, Json, Rate, Reading, Resample, Units
+from mckibben.cli.grouping import spread
+from mckibben.cli.options import Json, Reading
 from mckibben.cli.output import print_json, print_table, say
 from mckibben.errors import DataError
 
 
+@spread
 def info(
+    reading: Reading,
     file: Annotated[
         Path | None, typer.Argument(help="A recording, or a model saved as JSON.")
     ] = None,
     models: Annotated[bool, typer.Option("--models", help="List the models and settings.")] = False,
-    column: Columns = None,
-    unit: Units = None,
-    rate: Rate = None,
-    gaps: GapPolicy = Gaps.ERROR,
-    resample: Resample = None,
     as_json: Json = False,
 ) -> None:
     """List the models, or say what a recording or a model file holds."""
@@ -33,36 +31,30 @@ def info(
         _model(file, as_json)
     else:
         _recordings(
-            Reading(column, unit, rate, gaps, resample).read([file], None, informative=False),
+            reading.read([file], None, informative=False),
             as_json,
         )
 
 
 def _models(as_json: bool) -> None:
-    import dataclasses
-
     from mckibben import registry
+    from mckibben.comparison.offered import defaults, summary
 
-    found = {}
-    for group, name in ((g, n) for g in ("estimators", "coupled") for n in registry.names(g)):
-        estimator = registry.load(group, name)
-        settings = {
-            field.name: field.default
-            for field in dataclasses.fields(estimator)
-            if field.default is not dataclasses.MISSING
-        }
-        found[name] = {"summary": estimator.__doc__.strip().splitlines()[0], "settings": settings}
+    found = {
+        name: {"summary": summary(name), "settings": defaults(name)}
+        for name in registry.names("estimators")
+    }
     if as_json:
         print_json(found)
         return
-    print_table(["model", "what it is"], [[name, f["summary"]] for name, f in found.items()])
-    for name, described in found.items():
-        listed = ", ".join(f"{key}={value}" for key, value in described["settings"].items())
+    print_table(["model", "what it is"], [[name, summary(name)] for name in found])
+    for name in found:
+        listed = ", ".join(f"{key}={value}" for key, value in defaults(name).items())
         say(f"\n{name} settings (--set NAME=VALUE): {listed}")
 
 
 def _model(file: Path, as_json: bool) -> None:
-    from mckibben.blocks.saving import load
+    from mckibben.blocks.core.saving import load
 
     block = load(file)
     try:

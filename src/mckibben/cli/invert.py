@@ -8,7 +8,8 @@ from typing import Annotated
 import typer
 
 from mckibben.cli.options import Force, Json
-from mckibben.cli.output import figure, print_json, say
+from mckibben.cli.output import print_json, say
+from mckibben.numerals import numeral
 
 
 def invert(
@@ -23,8 +24,8 @@ def invert(
     """
     import numpy as np
 
+    from mckibben.blocks.core.saving import load
     from mckibben.blocks.force.feedforward import ForceFeedforward
-    from mckibben.blocks.saving import load
     from mckibben.outputs import claim_model
 
     claim_model(out, inputs=[model], force=force)
@@ -55,7 +56,7 @@ def invert(
     for channel in block.outputs if reachable else ():
         a, b = reachable[channel.name]
         say(
-            f"Reachable whatever happened before: {channel.name} {figure(a, 5)} to {figure(b, 5)} "
+            f"Reachable whatever happened before: {channel.name} {numeral(a, 5)} to {numeral(b, 5)} "
             f"{channel.unit}; references beyond are clipped."
         )
     say(f"Written: {out}")

@@ -5,10 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from mckibben.cli.output import figure, print_table, say
+from mckibben.cli.output import print_table, say
 
 if TYPE_CHECKING:
     from mckibben.comparison.results import Leaderboard, Standing
+
+
+PRINTED = ("chosen", "test", "interval", "rank", "gap")
+"""Columns for a terminal of 80; the files have the rest."""
 
 
 def told(tell: Callable[[float, str], None], last: str = "") -> Callable[[Standing], None]:
@@ -37,35 +41,21 @@ def told(tell: Callable[[float, str], None], last: str = "") -> Callable[[Standi
 
 
 def print_leaderboard(board: Leaderboard) -> None:
-    """Print a leaderboard as a table, what is chosen, and what is to be said of models that failed.
-
-    Few columns, for a terminal of 80; the files have the rest.
-    """
+    """Print a leaderboard as a table, what is chosen, and what is to be said of models that failed."""
+    from mckibben.comparison.columns import columns_of_board
     from mckibben.comparison.results import CHOICES
 
-    validated = board.chosen_by != "fit"
+    columns = [column for column in columns_of_board(board) if column.key in PRINTED]
+    heading, _ = CHOICES[board.chosen_by]
     rows = []
     for row in board.ranking:
-        if row.test is None:
-            continue
-        interval = row.rmse_interval or (float("nan"), float("nan"))
-        memory = None if row.memory is None else row.memory.gap_ratio
-        rows.append(
-            [
-                row.model + ("*" if row.caution else ""),
-                figure(row.validation_rmse if validated else row.chosen_by),
-                figure(row.test.rmse),
-                f"{figure(interval[0])} to {figure(interval[1])}",
-                "-" if row.test_rank is None else str(row.test_rank),
-                figure(memory, 2),
-            ]
-        )
-    unit = f" [{board.unit}]" if board.unit else ""
+        if row.test is not None:
+            given = row.to_dict()
+            name = row.model + ("*" if row.caution else "")
+            rows.append([name, *(column.text(given) for column in columns)])
     say(f"Split: {board.split}.")
-    heading, _ = CHOICES[board.chosen_by]
-    headings = [f"{heading}{unit}", f"test RMSE{unit}", "95 % interval", "rank", "gap kept"]
-    print_table(["model", *headings], rows)
-    say("All run free. Rank: by test RMSE. Gap between branches kept: 1 is right, 0 forgets.")
+    print_table(["model", *(column.label for column in columns)], rows)
+    say("All run free. Rank: by test RMSE. Gap between branches kept: 100 % is right, 0 forgets.")
     if board.constant is not None and board.rows:
         say("constant: the mean of the training output, which every model has to beat.")
     if board.chosen:

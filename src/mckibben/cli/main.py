@@ -15,9 +15,9 @@ from typing import Annotated, Any
 
 import typer
 
-from mckibben.caches import CacheWarning
 from mckibben.cli.app import app as workbench
 from mckibben.cli.characterize import characterize
+from mckibben.cli.check_block import check_block
 from mckibben.cli.compare import compare
 from mckibben.cli.export import app as export_app
 from mckibben.cli.fit import fit
@@ -31,6 +31,7 @@ from mckibben.cli.simulate import simulate
 from mckibben.cli.study import study
 from mckibben.cli.track import track
 from mckibben.errors import DataError, DataWarning, MckibbenError, ModelWarning
+from mckibben.system.caches import CacheWarning
 
 BAD_INPUT = 2
 INTERRUPTED = 130
@@ -49,6 +50,7 @@ app = typer.Typer(
 )
 for command in (study, characterize, fit, compare, simulate, invert, track, plot, reproduce, info):
     app.command()(command)
+app.command("check-block")(check_block)
 app.command("app")(workbench)
 app.add_typer(export_app)
 app.add_typer(rig_app)

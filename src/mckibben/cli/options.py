@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import re
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -34,6 +36,26 @@ Test = Annotated[
 ]
 Input = Annotated[str, typer.Option("--input", metavar="CHANNEL", help="Input channel.")]
 Output = Annotated[str, typer.Option("--output", metavar="CHANNEL", help="Output channel.")]
+Inputs = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--input",
+        metavar="CHANNEL",
+        help="Input channel; repeatable. Default: pressure, pressure_1 ...",
+    ),
+]
+Outputs = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--output",
+        metavar="CHANNEL",
+        help="Output channel; repeatable. Default: displacement, displacement_1 ...",
+    ),
+]
+Load = Annotated[
+    str | None,
+    typer.Option("--load", metavar="CHANNEL", help="Load that varies: one model for all loads."),
+]
 Columns = Annotated[
     list[str] | None,
     typer.Option("--column", metavar="CHANNEL=COLUMN", help="Column to read a channel from."),
@@ -105,15 +127,19 @@ _POLICIES: dict[Gaps, Literal["error", "split", "interpolate"]] = {
 }
 
 
+SEVERAL = re.compile(r"(pressure|displacement)_\d+")
+"""Names of channels by which recordings of several muscles are told."""
+
+
 @dataclass(frozen=True)
 class Reading:
     """How files are to be read."""
 
-    columns: list[str] | None
-    units: list[str] | None
-    rate: float | None
-    gaps: Gaps
-    sample_time: float | None = None
+    column: Columns = None
+    unit: Units = None
+    rate: Rate = None
+    gaps: GapPolicy = Gaps.ERROR
+    resample: Resample = None
 
     def read(
         self, files: Sequence[Path], channels: Sequence[str] | None, *, informative: bool = True
@@ -125,18 +151,53 @@ class Reading:
         for file in files:
             recordings += read(
                 file,
-                columns=_pairs("--column", self.columns),
-                units=_pairs("--unit", self.units),
+                columns=_pairs("--column", self.column),
+                units=_pairs("--unit", self.unit),
                 rate=self.rate,
                 gaps=_POLICIES[self.gaps],
                 channels=channels,
                 informative=informative,
             )
-        if self.sample_time is not None:
+        if self.resample is not None:
             from mckibben.signals import resample
 
-            recordings = [resample(recording, self.sample_time) for recording in recordings]
+            recordings = [resample(recording, self.resample) for recording in recordings]
         return recordings
+
+    def read_all(
+        self,
+        files: Sequence[Sequence[Path]],
+        inputs: Sequence[str] | None,
+        outputs: Sequence[str] | None,
+        load: str | None,
+    ) -> list[list[Recording]]:
+        """Return the recordings in several lists of files, to compare models on.
+
+        Those of one muscle are asked for, or what is named instead, unless the first file is of several:
+        which of theirs are meant, the comparison finds by name.
+        """
+        asked = [*(inputs or ["pressure"]), *(outputs or ["displacement"])]
+        if load is not None or len(asked) > 2:
+            return [self.read(some, None, informative=False) for some in files]
+        (first, *rest), *others = files
+        try:
+            begun = self.read([first], asked)
+        except DataError:
+            if not self._is_of_several(first):
+                raise
+            return [self.read(some, None, informative=False) for some in files]
+        return [begun + self.read(rest, asked), *(self.read(some, asked) for some in others)]
+
+    def _is_of_several(self, file: Path) -> bool:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            try:
+                (found, *_) = self.read([file], None, informative=False)
+            except DataError as error:
+                if SEVERAL.fullmatch(error.channel or ""):
+                    raise
+                return False  # what is wrong with one muscle's file is said by whoever asks
+        return any(map(SEVERAL.fullmatch, found.channels))
 
 
 def _pairs(option: str, given: list[str] | None) -> dict[str, str]:
@@ -153,40 +214,6 @@ def _pairs(option: str, given: list[str] | None) -> dict[str, str]:
     return pairs
 
 
-def parse_settings(
-    given: list[str] | None, model: str, group: str = "estimators"
-) -> dict[str, Any]:
-    """Return the settings of one model's estimator, checked against those it has.
-
-    Values are read as JSON where they are that, else as words. A name may be preceded by a model and
-    a dot, and is then for that model only.
-    """
-    import dataclasses
-
-    from mckibben import registry
-    from mckibben.estimators.settings import check_settings, setting_value
-
-    estimator = registry.load(group, model)
-    known = {field.name for field in dataclasses.fields(estimator)}
-    settings: dict[str, Any] = {}
-    for item in given or []:
-        name, equals, text = item.partition("=")
-        owner, dot, rest = name.partition(".")
-        if dot and owner != model:
-            continue
-        name = rest if dot else name
-        name = name.replace("-", "_")
-        if not equals or name not in known:
-            raise ModelError(
-                f"--set {item!r}: {model!r} has no setting {name!r}. "
-                f"Remedy: use one of {', '.join(sorted(known))}."
-            )
-        settings[name] = setting_value(text)
-    if settings:  # now, and not when this model's turn has come
-        check_settings(estimator(**settings))
-    return settings
-
-
 def chosen_models(given: str, quick: bool = False) -> str | list[str]:
     """Return ``"all"``, ``"quick"`` or the list of names."""
     if quick and given != "all":
@@ -194,34 +221,3 @@ def chosen_models(given: str, quick: bool = False) -> str | list[str]:
     if given in ("all", "quick"):
         return "quick" if quick else given
     return [name.strip() for name in given.split(",") if name.strip()]
-
-
-def settings_of_all(given: list[str] | None, models: str | list[str]) -> dict[str, dict[str, Any]]:
-    """Return the settings of several models; a bare setting goes to the models that have it."""
-    import dataclasses
-
-    from mckibben import registry
-
-    if not given:
-        return {}
-    names = registry.names("estimators") if isinstance(models, str) else models
-    found: dict[str, dict[str, Any]] = {}
-    used: set[str] = set()
-    for model in names:
-        known = {field.name for field in dataclasses.fields(registry.load("estimators", model))}
-        mine = []
-        for item in given or []:
-            name = item.partition("=")[0].replace("-", "_")
-            owner, dot, rest = name.partition(".")
-            if (dot and owner == model) or (not dot and name in known):
-                mine.append(item)
-                used.add(item)
-            del rest
-        found[model] = parse_settings(mine, model)
-    for item in given or []:
-        if item not in used:
-            raise ModelError(
-                f"--set {item!r}: none of the models {', '.join(names)} has that setting. "
-                "Remedy: see mckibben info --models."
-            )
-    return found

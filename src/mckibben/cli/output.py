@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import re
 import sys
 from collections.abc import Callable, Iterator, Sequence
@@ -10,8 +9,8 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
-from mckibben.atomic import to_json
 from mckibben.errors import MckibbenError
+from mckibben.system.atomic import to_json
 
 
 class InterruptionError(MckibbenError):
@@ -95,15 +94,6 @@ def print_table(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
         console = Console(width=200)
     with _to_output():
         console.print(table)
-
-
-def figure(value: float | None, digits: int = 3) -> str:
-    """Return a number for a table, or a dash.
-
-    >>> figure(0.123456), figure(None)
-    ('0.123', '-')
-    """
-    return "-" if value is None or not math.isfinite(value) else f"{value:.{digits}g}"
 
 
 @contextmanager

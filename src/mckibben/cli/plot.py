@@ -7,25 +7,22 @@ from typing import Annotated
 
 import typer
 
+from mckibben.cli.grouping import spread
 from mckibben.cli.options import (
-    Columns,
     Files,
     Force,
-    GapPolicy,
-    Gaps,
     Input,
     Output,
-    Rate,
     Reading,
-    Resample,
-    Units,
 )
 from mckibben.cli.output import say
 
 
+@spread
 def plot(
     files: Files,
     out: Annotated[Path, typer.Option("-o", "--out", help="Figure to write: .png, .svg or .pdf.")],
+    reading: Reading,
     model: Annotated[
         Path | None, typer.Option("--model", help="Saved model to draw against the recordings.")
     ] = None,
@@ -37,11 +34,6 @@ def plot(
     ] = None,
     input: Input = "pressure",  # noqa: A002
     output: Output = "displacement",
-    column: Columns = None,
-    unit: Units = None,
-    rate: Rate = None,
-    gaps: GapPolicy = Gaps.ERROR,
-    resample: Resample = None,
     force: Force = False,
 ) -> None:
     """Draw recordings, or a saved model against them."""
@@ -50,13 +42,13 @@ def plot(
 
     format_of(out)  # another ending is refused now
     claim_figure(out, inputs=[*files, *([] if model is None else [model])], force=force)
-    recordings = Reading(column, unit, rate, gaps, resample).read(files, [input, output])
+    recordings = reading.read(files, [input, output])
     from mckibben.report.figures import plot_model, plot_recording
 
     if model is None:
         plot_recording(recordings, input, output, kind or "loop", out)
     else:
-        from mckibben.blocks.saving import load
+        from mckibben.blocks.core.saving import load
 
         plot_model(load(model), recordings, kind or "fit", out)
     say(f"Written: {out}")

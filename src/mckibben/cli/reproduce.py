@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from mckibben.cli.options import Force, Gaps, Jobs, Json, Reading, Seed
-from mckibben.cli.output import figure, make_folder, print_json, print_table, progress_bar, say
+from mckibben.cli.options import Force, Jobs, Json, Reading, Seed
+from mckibben.cli.output import make_folder, print_json, print_table, progress_bar, say
 from mckibben.cli.stopping import forget_kept, stoppable
 from mckibben.errors import DataError
+from mckibben.numerals import numeral
 
 if TYPE_CHECKING:
-    from mckibben.papers import Reproduction
+    from mckibben.papers.reproduction import Reproduction
     from mckibben.recording import Recording
 
 
@@ -47,8 +48,9 @@ def reproduce(
         return
     if name is None:
         raise DataError("there is no paper to run again", remedy="name one, or give --list")
-    from mckibben import registry, threads, workers
+    from mckibben import registry
     from mckibben.outputs import Results
+    from mckibben.system import threads, workers
 
     folder = None if out is None else make_folder(out)
     with stoppable(folder):
@@ -69,8 +71,8 @@ def reproduce(
             (outcome,) = one.results(_again, [given], told)
             found: Reproduction = outcome.result()
         if results is not None:
-            from mckibben.atomic import to_json
             from mckibben.report.reproduction import reproduction_page
+            from mckibben.system.atomic import to_json
 
             results.clear()
             results.write_text("report.html", reproduction_page(found))
@@ -86,7 +88,7 @@ def reproduce(
 
 def _again(common: None, given: dict[str, Any], tell: Callable[..., None]) -> Reproduction:
     """Run a paper again in a worker's process."""
-    from mckibben.papers import reproduce as run
+    from mckibben.papers.reproduction import reproduce as run
 
     return run(**given, clear=False, progress=tell)
 
@@ -113,7 +115,7 @@ def _own(name: str, train: Path | None, test: Path | None) -> dict[str, Recordin
             "--train and --test go together, and with field-models only",
             remedy="give both files, or neither",
         )
-    reading = Reading(None, None, None, Gaps.ERROR)
+    reading = Reading()
     (first, *_), (second, *_) = (
         reading.read([file], ["pressure", "displacement"]) for file in (train, test)
     )
@@ -140,7 +142,7 @@ def _source(name: str) -> str:
 def _cell(cell: str | float | None) -> str:
     if cell is None:
         return "-"
-    return figure(cell, 4) if isinstance(cell, float) else str(cell)
+    return numeral(cell, 4) if isinstance(cell, float) else str(cell)
 
 
 def _print(found: Reproduction) -> None:

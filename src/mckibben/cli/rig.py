@@ -12,13 +12,13 @@ import typer
 from mckibben.cli.options import Force, Json, Seed
 from mckibben.cli.output import (
     InterruptionError,
-    figure,
     make_folder,
     print_json,
     progress_bar,
     say,
 )
 from mckibben.errors import DataError
+from mckibben.numerals import numeral
 
 if TYPE_CHECKING:
     from mckibben.recording import Recording
@@ -47,7 +47,7 @@ def list_rigs(as_json: Json = False) -> None:
     from mckibben import registry
     from mckibben.rigs import load_rig, rig_names
     from mckibben.signals import settings_of
-    from mckibben.signals.protocols import protocol
+    from mckibben.signals.protocol import protocol
 
     rigs = {name: load_rig(name) for name in rig_names()}
     protocols = {name: protocol(name) for name in registry.names("protocols")}
@@ -169,7 +169,7 @@ def run(
         )
         return
     for channel, (low, high) in spans.items():
-        say(f"{channel}: {figure(low + 0.0, 4)} to {figure(high, 4)} {recording.units[channel]}")
+        say(f"{channel}: {numeral(low + 0.0, 4)} to {numeral(high, 4)} {recording.units[channel]}")
     say(f"Written: {out}")
 
 
@@ -198,7 +198,7 @@ def record(
     from mckibben.files import write
     from mckibben.outputs import claim_recording
     from mckibben.rigs import record as record_runs
-    from mckibben.signals.protocols import protocol as protocol_named
+    from mckibben.signals.protocol import protocol as protocol_named
 
     if file_format not in ("csv", "tsv", "parquet"):
         raise DataError(
@@ -370,9 +370,9 @@ def _said(plan: Any, rig: Rig, seed: int, file_format: str) -> dict[str, Any]:
 
 def _kept(folder: Path, said: dict[str, Any]) -> set[str]:
     """Write what the folder is to hold, and return the runs that it holds already."""
-    from mckibben import ordinary
-    from mckibben.atomic import to_json, write_text
     from mckibben.outputs import is_recording
+    from mckibben.system import ordinary
+    from mckibben.system.atomic import to_json, write_text
 
     text, place = to_json(said) + "\n", folder / "protocol.json"
     if os.path.lexists(place) and ordinary.read_text(place, most=ordinary.DESCRIPTION) != text:

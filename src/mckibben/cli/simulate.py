@@ -7,25 +7,23 @@ from typing import Annotated, Any
 
 import typer
 
+from mckibben.cli.grouping import spread
 from mckibben.cli.options import (
-    Columns,
     Force,
-    GapPolicy,
-    Gaps,
     Json,
-    Rate,
     Reading,
-    Resample,
-    Units,
 )
-from mckibben.cli.output import figure, print_json, say
+from mckibben.cli.output import print_json, say
 from mckibben.errors import DataError
+from mckibben.numerals import numeral
 
 
+@spread
 def simulate(
     model: Annotated[Path, typer.Argument(help="Model file (JSON).")],
     file: Annotated[Path, typer.Argument(help="Recording with the model's inputs.")],
     out: Annotated[Path, typer.Option("-o", "--out", help="File to write: .csv, .tsv, .parquet.")],
+    reading: Reading,
     initial: Annotated[
         str,
         typer.Option(
@@ -37,11 +35,6 @@ def simulate(
         int | None,
         typer.Option(help="Predict so many samples ahead from measured outputs, instead of free."),
     ] = None,
-    column: Columns = None,
-    unit: Units = None,
-    rate: Rate = None,
-    gaps: GapPolicy = Gaps.ERROR,
-    resample: Resample = None,
     force: Force = False,
     as_json: Json = False,
 ) -> None:
@@ -52,7 +45,7 @@ def simulate(
     """
     from dataclasses import asdict
 
-    from mckibben.blocks.saving import load
+    from mckibben.blocks.core.saving import load
     from mckibben.files import write
     from mckibben.metrics import score
     from mckibben.outputs import claim_recording
@@ -60,7 +53,7 @@ def simulate(
     claim_recording(out, inputs=[model, file], force=force)
     block = load(model)
     wanted = [channel.name for channel in block.inputs]
-    recordings = Reading(column, unit, rate, gaps, resample).read([file], wanted, informative=False)
+    recordings = reading.read([file], wanted, informative=False)
     if len(recordings) > 1:
         raise DataError(
             f"the file splits into {len(recordings)} recordings at its gaps",
@@ -91,8 +84,8 @@ def simulate(
     for name, figures in metrics.items():
         say(
             f"{name}{'' if horizon is None else f', {horizon} samples ahead'}: "
-            f"RMSE {figure(figures['rmse'], 4)}, MAE {figure(figures['mae'], 4)}, worst "
-            f"{figure(figures['max_error'], 4)} {recording.units[name]}, R² {figure(figures['r2'], 5)}"
+            f"RMSE {numeral(figures['rmse'], 4)}, MAE {numeral(figures['mae'], 4)}, worst "
+            f"{numeral(figures['max_error'], 4)} {recording.units[name]}, R² {numeral(figures['r2'], 5)}"
         )
     say(f"Written: {out}")
 

@@ -14,7 +14,7 @@ from types import FrameType
 from typing import TYPE_CHECKING
 
 from mckibben.cli.output import InterruptionError, say
-from mckibben.workers import leave
+from mckibben.system.workers import leave
 
 if TYPE_CHECKING:
     from mckibben.comparison.results import Leaderboard

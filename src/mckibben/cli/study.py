@@ -2,78 +2,34 @@
 
 from __future__ import annotations
 
-import warnings
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from mckibben.cli.leaderboards import told
-from mckibben.cli.options import (
-    AllowShared,
-    Columns,
-    Dask,
-    Files,
-    Force,
-    GapPolicy,
-    Gaps,
-    Input,
-    Jobs,
-    Json,
-    Models,
-    Output,
-    Quick,
-    Rate,
-    Reading,
-    Resample,
-    Samples,
-    Seed,
-    Settings,
-    Test,
-    Units,
-    chosen_models,
-    settings_of_all,
-)
-from mckibben.cli.output import figure, make_folder, print_json, progress_bar, say
+from mckibben.cli.comparing import Asked
+from mckibben.cli.grouping import spread
+from mckibben.cli.leaderboards import print_leaderboard, told
+from mckibben.cli.options import Files, Reading
+from mckibben.cli.output import make_folder, print_json, say
 from mckibben.cli.stopping import forget_kept, stop_short, stoppable
-from mckibben.errors import DataError
+from mckibben.numerals import numeral
 
 if TYPE_CHECKING:
-    from mckibben.comparison.results import Study
+    from mckibben.comparison.studying import Study
 
 
+@spread
 def study(
     files: Files,
-    test: Test = None,
-    input: Input = "pressure",  # noqa: A002
-    output: Output = "displacement",
+    asked: Asked,
+    reading: Reading,
     out: Annotated[Path, typer.Option("-o", "--out", help="Folder for the results.")] = Path(
         "study"
     ),
-    models: Models = "all",
-    quick: Quick = False,
-    settings: Settings = None,
     rig: Annotated[
         str | None, typer.Option("--rig", help="Several muscles: rig to close a loop on.")
     ] = None,
-    load: Annotated[
-        str | None,
-        typer.Option(
-            "--load", metavar="CHANNEL", help="Load that varies: one model for all loads."
-        ),
-    ] = None,
-    seed: Seed = 0,
-    jobs: Jobs = None,
-    dask: Dask = None,
-    column: Columns = None,
-    unit: Units = None,
-    rate: Rate = None,
-    gaps: GapPolicy = Gaps.ERROR,
-    resample: Resample = None,
-    samples: Samples = None,
-    allow_shared: AllowShared = False,
-    force: Force = False,
-    as_json: Json = False,
 ) -> None:
     """Say what the muscle does, choose a model by cross-validation, test, invert, and write a report.
 
@@ -83,73 +39,35 @@ def study(
     displacement_1 ...) get models that couple them, and a closed loop on a virtual rig. With --load
     force, models that are told the load are ranked against one model for every load.
     """
-    from mckibben import registry, workers
-    from mckibben.files.folders import expanded
-    from mckibben.outputs import Results
     from mckibben.report.results_folder import study_files
 
     folder = make_folder(out)
     with stoppable(folder):
-        if jobs != 1 and dask is None:
-            workers.prepare()
-        chosen = chosen_models(models, quick)
-        reading = Reading(column, unit, rate, gaps, resample)
-        train, validation, tests = expanded(files, test or [])
-        kept = Results(folder, inputs=[*train, *validation, *tests], force=force)
-        names = registry.names("estimators") if isinstance(chosen, str) else chosen
-        kept.claim(study_files(names))
-        if load is not None or _of_muscles(reading, train):
-            from mckibben.cli.study_muscles import study_muscles
-
-            runs, checks, held_back = (
-                reading.read(some, None, informative=False) for some in (train, validation, tests)
-            )
-            study_muscles(
-                *(runs, checks, held_back, kept, chosen, settings, rig, load, seed, jobs),
-                *(as_json, allow_shared),
-            )
-            return
-        if rig is not None:
-            raise DataError("--rig is for recordings of several muscles", remedy="leave it out")
-        given = settings_of_all(settings, chosen)
-        from mckibben.recording import notes_by_file
-
-        recordings = reading.read([*train, *validation], [input, output])
-        held_out = reading.read(tests, [input, output])
-        notes = notes_by_file([*recordings, *held_out])
-
-        from mckibben.comparison.cluster import on_cluster
+        begun = asked.begin(files, reading, folder, study_files)
         from mckibben.comparison.studying import study as find
+        from mckibben.recording import notes_by_file
         from mckibben.report import StudyFolder
 
-        results = StudyFolder(kept)
+        results = StudyFolder(begun.results or folder)
 
         def found(so_far: Study) -> None:
             results.take(so_far)
-            if not so_far.leaderboard.rows and not as_json:
+            if not so_far.leaderboard.rows and not asked.as_json:
                 _say(so_far, folder)
 
-        with on_cluster(dask), progress_bar("studying", plainly=True) as tell:
+        with asked.telling("studying") as tell:
             done = find(
-                recordings,
-                held_out,
-                input=input,
-                output=output,
-                models=chosen,
-                settings=given,
-                seed=seed,
-                jobs=jobs,
-                most_samples=samples,
-                allow_shared=allow_shared,
-                folder=folder,
-                clear=False,
+                *begun.recordings,
+                **begun.given,
+                rig=rig,
                 progress=told(tell, "inverting and drawing"),
                 found=found,
             )
         if done.leaderboard.stopped:
             results.take(done, last=True)
-        if as_json:
-            print_json(_described(done, folder) | {"notes": notes})
+        if asked.as_json:
+            notes = {"notes": notes_by_file(begun.every)}
+            print_json({"folder": str(folder)} | done.to_dict() | notes)
         else:
             _conclude(done, folder)
         stop_short(done.leaderboard)
@@ -158,57 +76,36 @@ def study(
 
 def _say(study: Study, folder: Path) -> None:
     """Print what the muscle does, before any model is fitted."""
-    for sentence in study.characterization.sentences:
-        say(sentence)
+    if study.characterization is not None:
+        for sentence in study.characterization.sentences:
+            say(sentence)
     say(f"Drawn: {folder / 'report.html'}, which grows with every model fitted.\n", flush=True)
 
 
 def _conclude(study: Study, folder: Path) -> None:
-    from mckibben.cli.leaderboards import print_leaderboard
-
     print_leaderboard(study.leaderboard)
     say()
-    if study.inverse is not None:
-        low, high = study.inverse.reachable
+    check = study.inverse
+    if check is not None and check.reachable is not None:
+        low, high = check.reachable
         say(
-            f"Inverse of {study.inverse.model}: follows any reference from {figure(low, 4)} to "
-            f"{figure(high, 4)} {study.leaderboard.unit} on the model itself, largest error "
-            f"{study.inverse.error:.1e} of that range."
+            f"Inverse of {check.model}: follows any reference from {numeral(low, 4)} to "
+            f"{numeral(high, 4)} {study.leaderboard.unit} on the model itself, largest error "
+            f"{check.error:.1e} of that range."
+        )
+    elif check is not None:
+        say(
+            f"Inverse of {check.model}: follows {study.test[0].name} on the model itself, largest "
+            f"error {numeral(100 * check.error, 2)} % of its range."
         )
     elif study.leaderboard.not_recommended:
         say("No inverse is written, since no model is recommended.")
     elif not study.leaderboard.stopped:
         say("No model here has an inverse.")
+    for name, tracked in study.loops.items():
+        errors = ", ".join(numeral(error, 2) for error in tracked.rmse.values())
+        say(f"Following a measured motion on {study.plant}: {name}, RMSE {errors} mm.")
     say(
         f"Written: {folder / 'report.html'}, leaderboard.csv, leaderboard.json, models"
         + ("" if study.inverse is None else ", inverse.json")
     )
-
-
-def _described(study: Study, folder: Path) -> dict[str, Any]:
-    inverse = study.inverse
-    return {
-        "folder": str(folder),
-        "characterization": study.characterization.to_dict(),
-        "leaderboard": study.leaderboard.to_dict(),
-        "inverse": None
-        if inverse is None
-        else {
-            "model": inverse.model,
-            "error": inverse.error,
-            "reachable": list(inverse.reachable),
-        },
-    }
-
-
-def _of_muscles(reading: Reading, files: list[Path]) -> bool:
-    """Tell whether the first file is of several muscles; what is wrong with it is said later."""
-    from mckibben.cli.study_muscles import is_of_muscles
-    from mckibben.errors import MckibbenError
-
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        try:
-            return is_of_muscles(reading.read(files[:1], None, informative=False))
-        except (MckibbenError, OSError):
-            return False

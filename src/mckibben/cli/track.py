@@ -2,30 +2,21 @@
 
 from __future__ import annotations
 
-from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from mckibben import registry
 from mckibben.cli.options import Columns, Force, Gaps, Json, Rate, Reading, Seed, Units
-from mckibben.cli.output import figure, print_json, print_table, progress_bar, say
-from mckibben.errors import DataError
+from mckibben.cli.output import print_json, print_table, progress_bar, say
+from mckibben.errors import DataError, ModelError
+from mckibben.numerals import numeral
 
 if TYPE_CHECKING:
-    from mckibben.blocks.base import Block
-    from mckibben.control import Controller
+    from mckibben.blocks.core.block import Block
     from mckibben.recording import Recording
     from mckibben.rigs import Rig
-
-
-class Kind(StrEnum):
-    """Controllers."""
-
-    FEEDFORWARD = "feedforward"
-    PID = "pid"
-    FEEDFORWARD_PID = "feedforward-pid"
-    OBSERVER = "observer"
 
 
 def track(
@@ -36,8 +27,13 @@ def track(
         typer.Option("--reference", metavar="FILE", help="Displacements, or force, to follow."),
     ],
     controller: Annotated[
-        Kind, typer.Option("--controller", help="Which controller; pid does without the inverse.")
-    ] = Kind.FEEDFORWARD,
+        str,
+        typer.Option(
+            metavar="NAME",
+            help="feedforward, feedforward-pid, observer, or pid, which does without the inverse.",
+            autocompletion=lambda: registry.names("controllers"),
+        ),
+    ] = "feedforward",
     out: Annotated[
         Path | None, typer.Option("-o", "--out", help="Recording of the run to write.")
     ] = None,
@@ -61,7 +57,9 @@ def track(
     as_json: Json = False,
 ) -> None:
     """Let a compensator, or a controller with it, follow a reference on a virtual rig."""
-    from mckibben.blocks.saving import load
+    from mckibben.blocks.core.block import Block
+    from mckibben.blocks.core.saving import load
+    from mckibben.control import control_law, tune_pid
     from mckibben.control import track as close
     from mckibben.files import write
     from mckibben.outputs import claim_model, claim_recording
@@ -81,8 +79,17 @@ def track(
     # pressures recorded with the reference are not what the compensator will give
     given = {channel.name for channel in block.outputs}
     wanted = wanted.select([name for name in wanted.channels if name not in given])
-    with progress_bar(f"{controller.value} on {plant.name}") as tell:
-        chosen = _controller(controller, block, plant, wanted)
+    held = {name: float(wanted[name][0]) for name in plant.inputs if name in wanted}
+    step = wanted.sample_time or 0.02
+    with progress_bar(f"{controller} on {plant.name}") as tell:
+        chosen = control_law(
+            controller, block, lambda: tune_pid(plant, sample_time=step, scheduled=held)
+        )
+        if controller_out is not None and not isinstance(chosen, Block):
+            raise ModelError(
+                f"{controller!r} is no block that could be saved or exported. "
+                "Remedy: leave out --controller-out, or use a compensator, PID, or both together."
+            )
         found = close(
             chosen,
             plant,
@@ -98,12 +105,12 @@ def track(
         )
     if out is not None:
         write(found.recording, out)
-    if controller_out is not None:
-        chosen.block(block).save(controller_out)
+    if controller_out is not None and isinstance(chosen, Block):
+        chosen.save(controller_out)
     if as_json:
         print_json(
             {
-                "controller": controller.value,
+                "controller": controller,
                 "rmse": dict(found.rmse),
                 "largest": dict(found.largest),
                 "clipped": found.clipped,
@@ -115,7 +122,7 @@ def track(
         )
         return
     rows = [
-        [name, figure(found.rmse[name], 3), figure(found.largest[name], 3)] for name in found.rmse
+        [name, numeral(found.rmse[name], 3), numeral(found.largest[name], 3)] for name in found.rmse
     ]
     measure = wanted.units[next(iter(found.rmse))]
     print_table(["followed", f"RMSE [{measure}]", f"largest [{measure}]"], rows)
@@ -124,7 +131,7 @@ def track(
     elif found.clipped:
         say(
             f"Pressures were at a limit in {found.clipped} steps; RMSE there is "
-            f"{figure(found.clipping_cost, 3)} {measure} above that of the other steps."
+            f"{numeral(found.clipping_cost, 3)} {measure} above that of the other steps."
         )
     say(
         f"Controller: {1e6 * found.step_time[0]:.0f} µs a step (median), "
@@ -150,20 +157,3 @@ def _fits(block: Block, plant: Rig, reference: Recording) -> None:
                 channel=channel.name,
                 remedy="add the column",
             )
-
-
-def _controller(kind: Kind, block: Block, plant: Rig, reference: Recording) -> Controller:
-    from mckibben.control import DisturbanceObserver, Feedforward, FeedforwardPID, tune_pid
-
-    if kind is Kind.FEEDFORWARD:
-        return Feedforward(block)
-    if kind is Kind.OBSERVER:
-        return DisturbanceObserver(block)
-    driven = {channel.name for channel in block.outputs}
-    held = {
-        name: float(reference[name][0])
-        for name in plant.inputs
-        if name in reference and name not in driven
-    }
-    pid = tune_pid(plant, sample_time=reference.sample_time or 0.02, scheduled=held)
-    return pid if kind is Kind.PID else FeedforwardPID(block, pid)

@@ -7,9 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from mckibben.arrays import Array
 from mckibben.signals.checking import generator
-
-Array = NDArray[np.float64]
 
 RESAMPLES = 1000
 
@@ -37,13 +36,16 @@ class BlockBootstrap:
             offset += n
 
     def rmse(self, errors: Array) -> Array:
-        """Return the RMSE of every resample, shape (RESAMPLES,).
+        """Return the RMSE of every resample, shape (RESAMPLES,); of several outputs their mean.
 
         Parameters
         ----------
-        errors : array, shape (sum of lengths,)
+        errors : array, shape (sum of lengths,) or (sum of lengths, k)
             Errors of one model at all scored samples.
         """
+        if errors.ndim == 2:
+            found: Array = np.mean([self.rmse(column) for column in errors.T], axis=0)
+            return found
         total, count = np.zeros(RESAMPLES), 0
         for offset, n, block, starts in self._parts:
             squares = np.concatenate([[0.0], np.cumsum(errors[offset : offset + n] ** 2)])

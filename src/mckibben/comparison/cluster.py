@@ -16,8 +16,8 @@ from queue import Empty, SimpleQueue
 from typing import Any
 
 from mckibben.errors import DataError
-from mckibben.threads import one_blas_thread
-from mckibben.workers import Outcome, Work, WorkerError, answered, said, understood
+from mckibben.system.threads import one_blas_thread
+from mckibben.system.workers import Outcome, Work, WorkerError, answered, said, understood
 
 PATIENCE = 30.0
 """How long to wait for a scheduler to answer [s]; it may be busy."""

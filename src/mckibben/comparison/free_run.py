@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mckibben.blocks.base import Block
+from mckibben.arrays import Array
 from mckibben.blocks.compose import Series
+from mckibben.blocks.core.block import Block
 from mckibben.blocks.dynamic.linear_start import LinearStart
 from mckibben.comparison.splits import Mask, predecessor
+from mckibben.errors import ModelWarning
 from mckibben.recording import Recording
-
-Array = NDArray[np.float64]
 
 SETTLING = 256
 """Samples for which the first input is held after the peak before it, so that rates die away."""
@@ -22,14 +22,15 @@ SETTLING = 256
 def run_free(
     block: Block,
     recording: Recording,
-    output: str,
+    output: str | Sequence[str],
     known: Sequence[Recording] = (),
     known_rows: Sequence[Mask] | None = None,
 ) -> Array:
-    """Return the modelled output over a recording, shape (n,).
+    """Return modelled outputs over a recording, shape (n,) of one that is named, (n, k) of several.
 
     Memory starts from the end of the known recording that this one continues; else from the one
     excursion before the first sample that best explains the first measured output (`measured_start`).
+    A model of several driving inputs starts from its own rule, for there is no one such excursion.
     A linear model whose start is fitted starts from what explains best those of its samples that are
     known: the recording is one of the known ones, or begins as one of them does. After that nothing
     measured but the inputs is used.
@@ -46,30 +47,34 @@ def run_free(
     ModelError
         If the output is not finite.
     """
+    outputs = (output,) if isinstance(output, str) else output
     before = predecessor(recording, known)
     rows = [np.ones(len(r), dtype=bool) for r in known] if known_rows is None else known_rows
     if before is not None:
-        start = block.final_state(before, initial=known_start(block, before, output).tolist())
+        start = block.final_state(before, initial=known_start(block, before, outputs).tolist())
     else:
         begun = ((r, mask) for r, mask in zip(known, rows, strict=True) if _begins(recording, r))
         own, mask = next(begun, (None, None))
         start = (
-            measured_start(block, recording, output)
+            measured_start(block, recording, outputs)
             if own is None
-            else known_start(block, own, output, mask)
+            else known_start(block, own, outputs, mask)
         )
-    return block.simulate(recording, initial=start.tolist())[output]
+    found = block.simulate(recording, initial=start.tolist()).matrix(outputs)
+    return found[:, 0] if isinstance(output, str) else found
 
 
-def known_start(block: Block, recording: Recording, output: str, rows: Mask | None = None) -> Array:
+def known_start(
+    block: Block, recording: Recording, outputs: Sequence[str], rows: Mask | None = None
+) -> Array:
     """Return the state before the first sample of a recording whose outputs are known.
 
     That of the least squared error where the block's start is fitted; else `measured_start`.
     """
     if isinstance(block, LinearStart) and block.initial == "fitted":
         inputs = recording.matrix(channel.name for channel in block.inputs)
-        return block.fitted_state(inputs, recording[output], recording.sample_time, rows)
-    return measured_start(block, recording, output)
+        return block.fitted_state(inputs, recording[outputs[0]], recording.sample_time, rows)
+    return measured_start(block, recording, outputs)
 
 
 def _begins(recording: Recording, known: Recording) -> bool:
@@ -83,7 +88,7 @@ def _begins(recording: Recording, known: Recording) -> bool:
     )
 
 
-def measured_start(block: Block, recording: Recording, output: str) -> Array:
+def measured_start(block: Block, recording: Recording, names: str | Sequence[str]) -> Array:
     """Return the state before the first sample that best explains the first measured output.
 
     The candidates are memories of a single excursion: the input came down from a peak between the
@@ -92,7 +97,8 @@ def measured_start(block: Block, recording: Recording, output: str) -> Array:
     """
     inputs = recording.matrix(channel.name for channel in block.inputs)
     first = inputs[0]
-    if block.n_states == 0:
+    driving = len(block.inputs) - len(block.scheduling)
+    if block.n_states == 0 or driving > 1:
         return block.initial_state(first)
     highest = inputs[:, 0].max()
     limits = getattr(_first_part(block), "input_range", None)
@@ -102,8 +108,9 @@ def measured_start(block: Block, recording: Recording, output: str) -> Array:
     known = block.state_at(first, outputs)
     if known is not None:
         return known
-    measured = float(recording[output][0])
-    place = [channel.name for channel in block.outputs].index(output)
+    name = names if isinstance(names, str) else names[0]
+    measured = float(recording[name][0])
+    place = [channel.name for channel in block.outputs].index(name)
 
     def after(peak: float) -> tuple[float, Array]:
         history = np.repeat(first[np.newaxis], SETTLING + 1, axis=0)
@@ -111,6 +118,12 @@ def measured_start(block: Block, recording: Recording, output: str) -> Array:
         state = block.initial_state(history[0], "first_sample" if peak > first[0] else None)
         outputs = np.empty((len(history), len(block.outputs)))
         block.bind(recording.sample_time or 1.0, state, history, outputs)()
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("error", ModelWarning)
+                block.report(state)
+        except ModelWarning:  # a start that the model itself warns of is none
+            return np.inf, state
         return abs(float(outputs[-1, place]) - measured), state
 
     best_error, best_state = after(first[0])

@@ -16,19 +16,20 @@ from contextlib import suppress
 from dataclasses import asdict, fields, is_dataclass, replace
 from functools import cache
 from importlib.metadata import version
-from inspect import getsourcefile
+from inspect import getsourcefile, unwrap
 from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
 
 import mckibben
-from mckibben import ordinary
-from mckibben.atomic import PART, write_text, written
-from mckibben.blocks.base import Block
-from mckibben.blocks.saving import LARGEST_FILE, from_dict, to_dict
+from mckibben.blocks.core.block import Block
+from mckibben.blocks.core.saving import LARGEST_FILE, from_dict, to_dict
 from mckibben.errors import DataWarning, MckibbenError
+from mckibben.presets import Chosen
 from mckibben.recording import PROVENANCE, Recording
+from mckibben.system import ordinary
+from mckibben.system.atomic import PART, write_text, written
 
 Result = TypeVar("Result")
 
@@ -170,10 +171,11 @@ def program() -> str:
     return digest({str(p.relative_to(home)): p.read_bytes() for p in files}, libraries)
 
 
-def source(plugin: type) -> str:
-    """Return a digest of the file that defines a class, such as an estimator of another package."""
-    path = getsourcefile(plugin)
-    return "" if path is None else digest(Path(path).read_bytes())
+def source(plugin: Any) -> str:
+    """Return a digest of the file that defines an estimator, and of its settings as a preset."""
+    path = getsourcefile(unwrap(plugin))
+    own = str(plugin) if isinstance(plugin, Chosen) else ""
+    return "" if path is None else digest(Path(path).read_bytes(), own)
 
 
 def _to_json(value: Any) -> Any:

@@ -6,15 +6,13 @@ from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mckibben.blocks.base import Block
+from mckibben.arrays import Array
+from mckibben.blocks.core.block import Block
 from mckibben.comparison.results import Memory
 from mckibben.errors import MckibbenError
 from mckibben.recording import Recording
 from mckibben.signals import branches
-
-Array = NDArray[np.float64]
 
 LEVELS = 41
 """Input levels at which branches are compared, between 5 and 95 % of the range."""
@@ -27,28 +25,34 @@ def memory_test(
     block: Block,
     recordings: Sequence[Recording],
     outputs: Sequence[Array],
-    input_name: str,
-    output_name: str,
+    pairs: Sequence[tuple[str, str]],
 ) -> Memory:
     """Compare the branch gaps of a model with the measured ones, and let it hold.
+
+    Of several outputs, each over the input that is its own, while the others do what they do.
 
     Parameters
     ----------
     recordings : sequence of Recording
         Measured.
-    outputs : sequence of array, shape (n,)
-        The model's free-running output on each.
+    outputs : sequence of array, shape (n, k)
+        The model's free-running outputs on each.
+    pairs : sequence of (str, str), length k
+        Every output's input, and the output.
     """
     measured, modelled = [], []
-    for recording, output in zip(recordings, outputs, strict=True):
-        pair = np.column_stack([recording[output_name], output])
-        gaps = branch_gaps(recording[input_name], pair)
-        measured.append(gaps[:, 0])
-        modelled.append(gaps[:, 1])
+    for recording, found in zip(recordings, outputs, strict=True):
+        for place, (input_name, output_name) in enumerate(pairs):
+            both = np.column_stack([recording[output_name], found[:, place]])
+            gaps = branch_gaps(recording[input_name], both)
+            measured.append(gaps[:, 0])
+            modelled.append(gaps[:, 1])
     gap, own = np.concatenate(measured), np.concatenate(modelled)
     power = float(gap @ gap)
     ratio = float(own @ gap) / power if gap.size and power > 0 else None
-    return Memory(ratio, gap.size, hold_test(block, recordings[0], input_name, output_name))
+    held = [hold_test(block, recordings[0], *pair) for pair in pairs]
+    kept = [share for share in held if share is not None]
+    return Memory(ratio, gap.size, float(np.mean(kept)) if kept else None)
 
 
 def branch_gaps(u: Array, y: Array) -> Array:
@@ -92,7 +96,8 @@ def hold_test(
     """Return the share of the model's own mid-range branch gap that survives a long hold.
 
     The input goes up to mid-range and stays, and in a second run up to the top, down to mid-range and
-    stays; ramps last as long as the recording's median branch, the hold ten times that.
+    stays; ramps last as long as the recording's median branch, the hold ten times that. Other inputs
+    stay at the middle of theirs.
     """
     u = recording[input_name]
     low, high = float(u.min()), float(u.max())
@@ -102,13 +107,13 @@ def hold_test(
     hold = np.full(HOLD * ramp, middle)
     up = np.linspace(low, middle, ramp)
     over = np.concatenate([np.linspace(low, high, 2 * ramp), np.linspace(high, middle, ramp)])
-    if len(block.inputs) > 1:
-        return None
+    names = [channel.name for channel in block.inputs]
+    rest = 0.5 * (recording.matrix(names).min(axis=0) + recording.matrix(names).max(axis=0))
     place = [channel.name for channel in block.outputs].index(output_name)
     try:
         ends = [
             block.simulate(
-                np.concatenate([way, hold])[:, np.newaxis],
+                _with_rest(np.concatenate([way, hold]), rest, names.index(input_name)),
                 initial="first_sample",
                 sample_time=recording.sample_time,
             )[:, place]
@@ -119,3 +124,10 @@ def hold_test(
     before = float(ends[1][over.size] - ends[0][up.size])
     after = float(ends[1][-1] - ends[0][-1])
     return after / before if before != 0 else None
+
+
+def _with_rest(along: Array, rest: Array, place: int) -> Array:
+    """Return inputs of which one goes along, and all others stay."""
+    inputs = np.tile(rest, (along.size, 1))
+    inputs[:, place] = along
+    return inputs

@@ -10,12 +10,22 @@ from typing import Any
 import numpy as np
 
 from mckibben import registry
+from mckibben.comparison.channels import Channels
 from mckibben.comparison.splits import folds, given_split
-from mckibben.comparison.trying import Data, Part, Tried, effort_of, outcomes, processes_for, rms_of
+from mckibben.comparison.trying import (
+    Data,
+    Item,
+    Part,
+    Tried,
+    effort_of,
+    outcomes,
+    processes_for,
+    rms_of,
+)
 from mckibben.errors import ModelError
-from mckibben.estimators.base import Estimator
+from mckibben.estimators.core.single import SingleEstimator
 from mckibben.recording import Recording
-from mckibben.workers import checked
+from mckibben.system.workers import checked
 
 GRIDS: Mapping[str, Mapping[str, tuple[Any, ...]]] = {
     "arx": {"n_poles": (1, 2, 3, 4), "n_zeros": (1, 2, 3)},
@@ -40,7 +50,7 @@ class Choice:
 
     Parameters
     ----------
-    estimator : Estimator
+    estimator : SingleEstimator
         Fitted to all recordings with the orders chosen; its block is ``model_``.
     orders : mapping
         The orders chosen.
@@ -48,7 +58,7 @@ class Choice:
         All orders with their cross-validated free-run RMSE, infinite where they failed, and why.
     """
 
-    estimator: Estimator
+    estimator: SingleEstimator
     orders: Mapping[str, Any]
     tried: tuple[tuple[Mapping[str, Any], float, str], ...]
 
@@ -97,19 +107,21 @@ def identify(
             "{'n_operators': (5, 10)}."
         )
     listed = [recordings] if isinstance(recordings, Recording) else list(recordings)
-    named: Estimator = estimator_class(**settings)
+    named: SingleEstimator = estimator_class(**settings)
     parts = tuple(folds(listed, named.input, max(n_folds, 2)))
-    data = Data(given_split(listed, ()), parts, named.input, named.output)
+    data = Data(given_split(listed, ()), parts, Channels((named.input,), (named.output,)))
     combinations = [dict(zip(grid, values, strict=True)) for values in product(*grid.values())]
     every = tuple(range(len(parts)))
-    work = [Part(family, settings | chosen, every, whole=False) for chosen in combinations]
+    work = [
+        Part(family, Item(family, settings | chosen), every, whole=False) for chosen in combinations
+    ]
     n = checked(jobs) or processes_for(effort_of(family, data) * len(parts) * len(work))
     found = {outcome.index: outcome.result() for outcome in outcomes(data, work, n)}
     tried = [(chosen, *_error(found[place])) for place, chosen in enumerate(combinations)]
     chosen, lowest, reason = min(tried, key=lambda item: item[1])
     if not np.isfinite(lowest):
         raise ModelError(f"every order of {family!r} failed: {reason}")
-    fitted: Estimator = estimator_class(**settings, **chosen).fit(listed)
+    fitted: SingleEstimator = estimator_class(**settings, **chosen).fit(listed)
     return Choice(fitted, chosen, tuple(tried))
 
 

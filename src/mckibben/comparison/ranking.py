@@ -6,30 +6,17 @@ from collections import Counter
 from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 from pathlib import Path
-from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
-from mckibben import registry
+from mckibben.arrays import Array
 from mckibben.comparison.bootstrap import BlockBootstrap, interval, skill_of
-from mckibben.comparison.kept import Kept, source
+from mckibben.comparison.channels import Names
+from mckibben.comparison.kept import Kept
+from mckibben.comparison.planning import N_FOLDS, Plan, Settings, plan_of
 from mckibben.comparison.recommending import CONSTANT
 from mckibben.comparison.results import CHOICES, Leaderboard, Row, Standing
-from mckibben.comparison.shared_stretches import TESTED, told
-from mckibben.comparison.splits import (
-    HELD_OUT,
-    given_split,
-    held_out_tail,
-    listed,
-    validation_folds,
-)
 from mckibben.comparison.trying import (
-    Data,
     Tried,
-    constant_of,
     effort_of,
     errors_on_test,
     joined,
@@ -39,27 +26,20 @@ from mckibben.comparison.trying import (
     processes_for,
 )
 from mckibben.errors import ModelError
-from mckibben.recording import Recording, reading_notes
-from mckibben.signals import made_manageable
-from mckibben.workers import checked
+from mckibben.recording import Recording
+from mckibben.system.workers import checked
 
-Array = NDArray[np.float64]
-Settings = Mapping[str, Mapping[str, Any]]
 Watch = Callable[[str, float, float], None]
-
-N_FOLDS = 4
-"""Parts of the cross-validation."""
-
-QUICK = ("bouc-wen", "cpi", "gpi", "kp", "maxwell-slip", "mpi", "p2uz", "pi")
-"""Models that are good or well known, and fitted in seconds."""
 
 
 def compare(
     train: Recording | Sequence[Recording],
     test: Recording | Sequence[Recording] = (),
     *,
-    input: str = "pressure",  # noqa: A002  # the field's word, as everywhere in the package
-    output: str = "displacement",
+    inputs: Names = None,
+    outputs: Names = None,
+    load: str | None = None,
+    validation: Sequence[Recording] = (),
     models: str | Sequence[str] = "all",
     settings: Settings | None = None,
     n_folds: int = N_FOLDS,
@@ -88,9 +68,15 @@ def compare(
         To fit and to choose.
     test : Recording or sequence of Recording, optional
         To test on. Default: the last quarter of the input's travel over the
-        training recordings, which is then left out of training.
-    input, output : str
-        Channels.
+        training recordings, which is then left out of training; of several muscles, or under loads,
+        every third level of what schedules, or every third recording.
+    inputs, outputs : str or sequence of str, optional
+        Channels. Default ``pressure`` and ``displacement``; of several muscles ``pressure_1`` and so on,
+        and ``displacement_1`` and so on. Of several outputs, models are chosen by the mean error.
+    load : str, optional
+        Channel of a load that varies: models are told it, and `mpi` for each load stands beside.
+    validation : sequence of Recording
+        To stop searches early and to choose on; nothing is fitted to them.
     models : "all", "quick", str or sequence of str
         Short names, in a text with commas between; "all" leaves out models that are made for other
         channels, "quick" is a choice that takes seconds.
@@ -141,8 +127,10 @@ def compare(
     plan = plan_of(
         train,
         test,
-        input=input,
-        output=output,
+        inputs=inputs,
+        outputs=outputs,
+        load=load,
+        validation=validation,
         models=models,
         settings=settings,
         n_folds=n_folds,
@@ -169,82 +157,6 @@ def compare(
 
 
 @dataclass(frozen=True)
-class Plan:
-    """What is to be compared, on what.
-
-    Parameters
-    ----------
-    data : Data
-        What all models are given.
-    settings : mapping of str to mapping
-        Every model's short name, cheapest first, and the settings of its estimator.
-    unit : str
-        Of the output.
-    described : str
-        How the data were split, in words.
-    seed : int
-        Of everything random.
-    chosen_by : {"cross-validation", "validation", "fit"}
-        What the choice is by.
-    left_out : mapping of str to str
-        Models without a place on these channels, and why.
-    notes : tuple of str
-        What was done to the recordings.
-    shared : tuple of str
-        Where recordings are the same data.
-    """
-
-    data: Data
-    settings: Mapping[str, Mapping[str, Any]]
-    unit: str
-    described: str
-    seed: int
-    chosen_by: str
-    left_out: Mapping[str, str]
-    notes: tuple[str, ...]
-    shared: tuple[str, ...] = ()
-
-    @cached_property
-    def constant(self) -> Tried:
-        """What comes of predicting the mean of the training output."""
-        return constant_of(self.data)
-
-    @cached_property
-    def sources(self) -> dict[str, str]:
-        """Digests of the files that define the estimators."""
-        return {model: source(registry.load("estimators", model)) for model in self.settings}
-
-    def kept(self, folder: str | Path | None) -> Kept:
-        """Return where finished models are kept."""
-        return Kept(folder, self.data)
-
-    @property
-    def n_scored(self) -> list[int]:
-        """Samples of every test recording that are scored."""
-        return [int(rows.sum()) for rows in self.data.split.test_rows]
-
-    def board(self, rows: Sequence[Row] = ()) -> Leaderboard:
-        """Return the leaderboard of the models that are finished."""
-        done = {row.model for row in rows}
-        return Leaderboard(
-            input=self.data.input,
-            output=self.data.output,
-            unit=self.unit,
-            rows=tuple(rows),
-            split=self.described,
-            seed=self.seed,
-            n_train=sum(len(recording) for recording in self.data.split.train),
-            n_test=sum(self.n_scored),
-            chosen_by=self.chosen_by,
-            left_out=self.left_out,
-            pending=tuple(model for model in self.settings if model not in done),
-            notes=self.notes,
-            constant=self.constant.row,
-            shared=self.shared,
-        )
-
-
-@dataclass(frozen=True)
 class Ranking:
     """A leaderboard, perhaps of a part of the models, and what they give.
 
@@ -260,59 +172,6 @@ class Ranking:
     outputs: Mapping[str, tuple[Array, ...]] = field(repr=False)
 
 
-def plan_of(
-    train: Recording | Sequence[Recording],
-    test: Recording | Sequence[Recording],
-    *,
-    input: str,  # noqa: A002
-    output: str,
-    models: str | Sequence[str],
-    settings: Settings | None,
-    n_folds: int,
-    seed: int,
-    most_samples: int | None = None,
-    allow_shared: bool = False,
-) -> Plan:
-    """Return what a comparison is to do; see `compare`."""
-    from mckibben.estimators.data import training_data
-
-    recordings, tests = listed(train), listed(test)
-    training_data(recordings, input, output)
-    if tests:
-        training_data([recordings[0], *tests], input, output)
-    roles = {"fit": recordings, "test": tests}
-    shared = told(roles, [input], [output], allow=allow_shared)
-    recordings, tests, notes = made_manageable(recordings, tests, input, most_samples)
-    split = given_split(recordings, tests) if tests else held_out_tail(recordings, input, HELD_OUT)
-    parts, chosen_by = validation_folds(split.train, input, n_folds)
-    validated = ""
-    if chosen_by == "cross-validation":
-        validated = f", cross-validated on {len(parts)} part(s) within the range of the rest"
-    marked = f"; {TESTED}" if any(one.startswith(TESTED) for one in shared) else ""
-    chosen, left_out = _chosen(models, [*recordings, *tests], input, output)
-    if not chosen:
-        raise ModelError(
-            "there are no models to compare. "
-            f"Remedy: name some of {', '.join(registry.names('estimators'))}, or all."
-        )
-    efforts = {model: registry.load("estimators", model).effort for model in chosen}
-    given = settings or {}
-    return Plan(
-        data=Data(split, parts, input, output),
-        settings={
-            model: {"seed": seed} | dict(given.get(model, {}))
-            for model in sorted(chosen, key=efforts.__getitem__)
-        },
-        unit=recordings[0].units[output],
-        described=split.described + validated + marked,
-        seed=seed,
-        chosen_by=chosen_by,
-        left_out=left_out,
-        notes=(*notes, *shared, *reading_notes([*recordings, *tests])),
-        shared=shared,
-    )
-
-
 def ranked(
     plan: Plan,
     *,
@@ -325,21 +184,22 @@ def ranked(
     checked(jobs)
     data = plan.data
     finished: dict[str, Tried] = {}
-    for model, settings in plan.settings.items():
-        row = kept.get(model, Row, settings, plan.sources[model])
-        if row is not None and row.model == model and row.sound:
+    for name, item in plan.items.items():
+        row = kept.get(name, Row, item, plan.sources[item.model])
+        if row is not None and row.model == name and row.sound:
             assert row.block is not None
-            finished[model] = Tried(row, outputs_of(row.block, data))
-    remaining = {m: s for m, s in plan.settings.items() if m not in finished}
-    efforts = {m: effort_of(m, data) * (1 + len(data.folds)) for m in remaining}
+            finished[name] = Tried(row, outputs_of(row.block, data))
+    remaining = {name: item for name, item in plan.items.items() if name not in finished}
+    efforts = {
+        name: effort_of(item.model, data) * (1 + len(data.folds))
+        for name, item in remaining.items()
+    }
     workers = jobs or processes_for(sum(efforts.values()))
     large = sum(efforts.values()) / (4 * workers)
     parts = [
         part
-        for model, settings in remaining.items()
-        for part in parts_of(
-            model, settings, len(data.folds), workers > 1 and efforts[model] > large
-        )
+        for name, item in remaining.items()
+        for part in parts_of(name, item, len(data.folds), workers > 1 and efforts[name] > large)
     ]
     bootstrap = BlockBootstrap(plan.n_scored, plan.seed)
     begun: list[str] = []
@@ -356,10 +216,10 @@ def ranked(
     def tell() -> None:
         if progress is not None:
             working = tuple(model for model in begun if model not in finished)
-            progress(Standing(len(finished), len(plan.settings), working, _best(plan, finished)))
+            progress(Standing(len(finished), len(plan.items), working, _best(plan, finished)))
 
     def tell_of(index: int, *what: float) -> None:
-        model = parts[index].model
+        model = parts[index].name
         if not what and model not in begun:
             begun.append(model)
             tell()
@@ -370,19 +230,22 @@ def ranked(
         tell()
         yield current()
     pieces: dict[str, dict[int, Tried]] = {model: {} for model in remaining}
-    wanted = Counter(part.model for part in parts)
+    wanted = Counter(part.name for part in parts)
     for outcome in outcomes(data, parts, workers, tell_of):
-        model = parts[outcome.index].model
+        model = parts[outcome.index].name
         if outcome.error is None:
             pieces[model][outcome.index] = outcome.value
         else:
             pieces[model][outcome.index] = Tried(Row(model, reason=str(outcome.error)))
         if len(pieces[model]) == wanted[model]:
-            whole = joined([piece for _, piece in sorted(pieces[model].items())])
+            whole = joined(
+                [piece for _, piece in sorted(pieces[model].items())], data.channels.outputs
+            )
             finished[model] = _with_skill(whole, plan)
             row = finished[model].row
             if row is not None and row.sound:  # a failure may be the machine's, not the model's
-                kept.put(model, row, remaining[model], plan.sources[model])
+                item = remaining[model]
+                kept.put(model, row, item, plan.sources[item.model])
             tell()
             yield current()
 
@@ -392,7 +255,12 @@ def _with_skill(tried: Tried, plan: Plan) -> Tried:
     row = tried.row
     if row is None or row.validation_rmse is None:
         return tried
-    skill, least = skill_of(tried.squares, plan.constant.squares, plan.seed)
+    pairs = [
+        (sum(own), sum(constant))
+        for own, constant in zip(tried.squares, plan.constant.squares, strict=True)
+        if own is not None and constant is not None
+    ]
+    skill, least = skill_of([one for one, _ in pairs], [other for _, other in pairs], plan.seed)
     return replace(tried, row=replace(row, skill=skill, skill_least=least))
 
 
@@ -438,25 +306,6 @@ def _best(plan: Plan, finished: Mapping[str, Tried]) -> str:
         return ""
     heading, _ = CHOICES["fit" if best.validation_rmse is None else plan.chosen_by]
     return f"{best.model}, {heading} {best.chosen_by:.3g} {plan.unit}".strip()
-
-
-def _chosen(
-    models: str | Sequence[str],
-    recordings: Sequence[Recording],
-    input: str,  # noqa: A002
-    output: str,
-) -> tuple[tuple[str, ...], dict[str, str]]:
-    """Return the models to try, and why others of "all" have no place on these recordings."""
-    if models not in ("all", "quick"):
-        named = models.split(",") if isinstance(models, str) else models
-        return tuple(dict.fromkeys(name.strip() for name in named)), {}
-    names = registry.names("estimators") if models == "all" else QUICK
-    objections = {
-        name: registry.load("estimators", name).objection(recordings, input, output)
-        for name in names
-    }
-    left_out = {name: reason for name, reason in objections.items() if reason is not None}
-    return tuple(name for name in names if name not in left_out), left_out
 
 
 def _rmse(row: Row) -> float:

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Protocol, TypeVar
 
+from mckibben.comparison.limits import caution
+
 CONSTANT = "constant"
 """Name of the row that predicts the mean of the training output, whatever the input: never chosen."""
 
@@ -32,6 +34,26 @@ class Ranked(Protocol):
 R = TypeVar("R", bound=Ranked)
 
 
+def order(
+    model: str, validated: float | None, fitted: float | None
+) -> tuple[bool, bool, float, str]:
+    """Return what models are sorted by: the validated ones first, by that; nothing of the test is in it.
+
+    Those that are good only near what they were trained on come after the others, since parts of the
+    same motion cannot tell.
+
+    Parameters
+    ----------
+    model : str
+        Short name.
+    validated, fitted : float or None
+        Error of the cross-validation, and on the data fitted, by which the others are sorted.
+    """
+    error = fitted if validated is None else validated
+    last = float("inf") if error is None else error
+    return validated is None, caution(model) is not None, last, model
+
+
 def recommended(rows: Sequence[R], constant: Ranked | None, unit: str) -> tuple[R | None, str]:
     """Return the model to recommend, or None and why there is none.
 
@@ -56,9 +78,9 @@ def recommended(rows: Sequence[R], constant: Ranked | None, unit: str) -> tuple[
     better = [row for row in judged if row.skill_least is not None and row.skill_least > 0]
     if judged and not better:
         return None, (
-            "No model is recommended: none predicts better than the mean of the training output in the "
-            "cross-validation, beyond what chance gives. As far as these models can tell, the output "
-            "does not depend on the input in these recordings"
+            "No model is recommended: on what was left out to validate them, none predicts better than "
+            "the mean of the training output beyond what chance gives. As far as these models can tell "
+            "from so much data, the output does not depend on the input"
         )
     first = (better or working)[0]
     if constant is not None and not first.test_error < constant.test_error:

@@ -1,26 +1,23 @@
-"""What a comparison and a study hold: plain results, ready to be shown, saved or compared."""
+"""What a comparison holds: plain results, ready to be shown, saved or compared."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mckibben.blocks.base import Block
+from mckibben.blocks.core.block import Block
 from mckibben.comparison.limits import caution
-from mckibben.comparison.recommending import CONSTANT, recommended
+from mckibben.comparison.recommending import CONSTANT, order, recommended
+from mckibben.errors import MckibbenError
 from mckibben.metrics import Scores
-from mckibben.recording import Recording
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from mckibben.characterization import Characterization
-
-Array = NDArray[np.float64]
 
 CHOICES = {
     "cross-validation": ("CV RMSE", "cross-validation on the training side"),
@@ -28,6 +25,7 @@ CHOICES = {
         "validation RMSE",
         "the last part of the training data, left out of a fit for it",
     ),
+    "given": ("validation RMSE", "runs given for it, to which nothing is fitted"),
     "fit": ("fit RMSE", "the error on the data fitted, for want of a validation"),
 }
 """What a model may be chosen by: the heading of its figure, and in words. The test is not among them."""
@@ -72,10 +70,15 @@ class Row:
     step_ns : float
         Time of one sample in a long simulation [ns].
     train, test : Scores or None
-        Free-running scores, in the unit of the output; test is on data not used to fit or choose.
+        Free-running scores, in the unit of the output; test is on data not used to fit or choose. Of
+        several outputs, the means of theirs, and the largest of their largest errors.
+    outputs : mapping of str to Scores
+        The same on the test data, of every output.
     validation_rmse : float or None
         Cross-validated RMSE within the training set, by which models are chosen; None where that
-        failed or was not asked for.
+        failed or was not asked for. Of several outputs, the mean of theirs.
+    validation_by_output : mapping of str to float
+        The same of every output.
     skill : float or None
         Share of the squared error of the constant, the mean of what is fitted to, that the model removes
         in the cross-validation: 1 is perfect, 0 no better.
@@ -104,7 +107,9 @@ class Row:
     step_ns: float = float("nan")
     train: Scores | None = None
     test: Scores | None = None
+    outputs: Mapping[str, Scores] = field(default_factory=dict)
     validation_rmse: float | None = None
+    validation_by_output: Mapping[str, float] = field(default_factory=dict)
     skill: float | None = None
     skill_least: float | None = None
     test_rank: int | None = None
@@ -133,19 +138,21 @@ class Row:
     @property
     def chosen_by(self) -> float:
         """The error that the model is chosen by: the validated one, else that of the fit."""
-        if self.validation_rmse is not None:
-            return self.validation_rmse
-        return float("inf") if self.train is None else self.train.rmse
+        return self.order[2]
 
     @property
     def order(self) -> tuple[bool, bool, float, str]:
-        """What rows are sorted by: the validated ones first, by that; nothing of the test is in it.
+        """What rows are sorted by."""
+        fitted = None if self.train is None else self.train.rmse
+        return order(self.model, self.validation_rmse, fitted)
 
-        Those that are good only near what they were trained on come after the others, since parts of the
-        same motion cannot tell.
-        """
-        cautioned = self.caution is not None
-        return self.validation_rmse is None, cautioned, self.chosen_by, self.model
+    @cached_property
+    def inverse(self) -> Block | None:
+        """The model's inverse, or None where it has none."""
+        try:
+            return None if self.block is None else self.block.inverse()
+        except MckibbenError:
+            return None
 
     @property
     def invalid(self) -> str | None:
@@ -177,10 +184,15 @@ class Row:
             "train": train,
             "test": test,
             "validation_rmse": self.validation_rmse,
+            "outputs": {
+                name: asdict(scores) | {"validation_rmse": self.validation_by_output.get(name)}
+                for name, scores in self.outputs.items()
+            },
             "skill": _finite(self.skill),
             "skill_least": _finite(self.skill_least),
             "memory": None if self.memory is None else asdict(self.memory),
             "rate_dependent": self.block is not None and bool(self.block.rate_dependent),
+            "invertible": self.inverse is not None,
             "caution": self.caution,
         }
 
@@ -191,10 +203,10 @@ class Leaderboard:
 
     Parameters
     ----------
-    input, output : str
+    inputs, outputs : tuple of str
         Channels.
     unit : str
-        Unit of the output and of every RMSE.
+        Unit of the outputs and of every RMSE.
     rows : tuple of Row
         Sorted by what they are chosen by; those for which it failed behind, models that failed last.
     split : str
@@ -203,7 +215,7 @@ class Leaderboard:
         The seed of everything random.
     n_train, n_test : int
         Samples.
-    chosen_by : {"cross-validation", "validation", "fit"}
+    chosen_by : {"cross-validation", "validation", "given", "fit"}
         What the model is chosen by, see `CHOICES`: never the test.
     left_out : mapping of str to str
         Models that were not asked for by name and have no place on these channels, and why.
@@ -219,8 +231,8 @@ class Leaderboard:
         Where recordings to fit to and to test on are the same data, which the user insisted on.
     """
 
-    input: str
-    output: str
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
     unit: str
     rows: tuple[Row, ...]
     split: str
@@ -234,6 +246,16 @@ class Leaderboard:
     stopped: bool = False
     constant: Row | None = None
     shared: tuple[str, ...] = ()
+
+    @property
+    def input(self) -> str:
+        """The input, or all of them in words."""
+        return ", ".join(self.inputs)
+
+    @property
+    def output(self) -> str:
+        """The output, or all of them in words."""
+        return ", ".join(self.outputs)
 
     @property
     def best(self) -> Row | None:
@@ -297,8 +319,8 @@ class Leaderboard:
         """Return the leaderboard as ``leaderboard.json`` holds it."""
         best, lowest = self.best, self.lowest
         return {
-            "input": self.input,
-            "output": self.output,
+            "input": self.inputs[0] if len(self.inputs) == 1 else list(self.inputs),
+            "output": self.outputs[0] if len(self.outputs) == 1 else list(self.outputs),
             "unit": self.unit,
             "split": self.split,
             "seed": self.seed,
@@ -354,75 +376,6 @@ class Standing:
         fitting = f", fitting {self.fitting[-1]}" if self.fitting else ""
         best = f"; best so far {self.best}" if self.best else ""
         return f"{self.done} of {self.total}{fitting}{best}"
-
-
-@dataclass(frozen=True)
-class InverseCheck:
-    """The inverse of a model, tried on a reference it can reach.
-
-    Parameters
-    ----------
-    model : str
-        Short name of the model inverted.
-    inverse : Block
-        The compensator.
-    reference, pressure, output : array, shape (n,)
-        Wished-for output, input the inverse gives, and what the model makes of it.
-    time : array, shape (n,)
-        Time [s], or sample numbers.
-    reachable : (float, float)
-        Outputs reachable whatever happened before.
-    error : float
-        Largest difference between reference and output, relative to the reachable range.
-    """
-
-    model: str
-    inverse: Block
-    reference: Array
-    pressure: Array
-    output: Array
-    time: Array
-    reachable: tuple[float, float]
-    error: float
-
-
-@dataclass(frozen=True)
-class Study:
-    """Everything that ``mckibben study`` finds.
-
-    Parameters
-    ----------
-    train, test : tuple of Recording
-        Data to fit, and data to test on.
-    characterization : Characterization
-        What the muscle does.
-    leaderboard : Leaderboard
-        Models in the order of the choice.
-    predictions : mapping of str to tuple of array
-        Model name to its free-running output on every training recording, then every test recording.
-    inverse : InverseCheck or None
-        Of the first model of the leaderboard that has one, or None where no model has.
-    notes : tuple of str
-        What was assumed or mended on the way.
-    """
-
-    train: tuple[Recording, ...]
-    test: tuple[Recording, ...]
-    characterization: Characterization
-    leaderboard: Leaderboard
-    predictions: Mapping[str, tuple[Array, ...]] = field(repr=False)
-    inverse: InverseCheck | None
-    notes: tuple[str, ...] = ()
-
-    @property
-    def input(self) -> str:
-        """The input channel."""
-        return self.leaderboard.input
-
-    @property
-    def output(self) -> str:
-        """The output channel."""
-        return self.leaderboard.output
 
 
 def _finite(value: float | None) -> float | None:

@@ -18,10 +18,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from mckibben.arrays import Array
 from mckibben.errors import DataError
 from mckibben.recording import Recording
 
-Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 Hashes = NDArray[np.uint64]
 
@@ -54,7 +54,6 @@ MOST_SHIFTS = 16
 
 MOST_STRIDE = 10
 """Longest sample time, as a multiple of another's, at which every so many-th sample is looked at."""
-
 
 TESTED = "tested on data it was fitted to, so that the figures say nothing of other data"
 """What every result says where that is so."""

@@ -4,25 +4,34 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from mckibben.arrays import Array
+from mckibben.comparison.channels import Channels
 from mckibben.errors import DataError
 from mckibben.recording import Recording
 from mckibben.signals import reversals, split_cycles
 
-Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
-
 
 FEWEST = 10
 """Samples in either part of a split."""
 
 HELD_OUT = 0.25
 """Share of the input's travel that is held out where nothing else says what."""
+
+EVERY = 3
+"""Of the runs of several muscles, or of a muscle under loads, each so-manieth is held out."""
+
+ENOUGH = 12
+"""Fewest runs of which a third can be spared: of a few, each shows what no other does."""
+
+STEADY = 0.05
+"""What schedules is a level of its run where it varies in it by no more than this share of its range."""
 
 BEYOND = 0.05
 """Share of the range of an input that a part may go beyond and still be within it: noise does."""
@@ -81,6 +90,39 @@ def given_split(train: Sequence[Recording], test: Sequence[Recording]) -> Split:
         rows.append(mask)
     described = f"{len(train)} recording(s) to fit, {len(test)} to test"
     return Split(tuple(train), tuple(test), tuple(rows), described)
+
+
+def held_out(recordings: Sequence[Recording], channels: Channels) -> Split:
+    """Return the split of recordings where the user gave nothing to test on.
+
+    Of one muscle, the last part. Of several, or under loads, every third level of what schedules, ends
+    excepted; without several levels, every third run; of fewer, the last part as well.
+    """
+    if not channels.single:
+        for name in channels.scheduled(recordings):
+            means = [round(float(recording[name].mean()), 1) for recording in recordings]
+            span = np.ptp(np.concatenate([recording[name] for recording in recordings]))
+            steady = all(np.ptp(recording[name]) <= STEADY * span for recording in recordings)
+            unseen = set(sorted(set(means))[1:-1][::EVERY])
+            if steady and unseen:
+                listed = ", ".join(f"{level:g}" for level in sorted(unseen))
+                unit = recordings[0].units[name]
+                return _parted(
+                    recordings,
+                    [mean in unseen for mean in means],
+                    f"runs at {name} {listed} {unit} held out",
+                )
+        if len(recordings) >= EVERY:
+            chosen = [place % EVERY == EVERY - 1 for place in range(len(recordings))]
+            return _parted(recordings, chosen, "every third run held out")
+    return held_out_tail(recordings, channels.inputs[0], HELD_OUT)
+
+
+def _parted(recordings: Sequence[Recording], tested: Sequence[bool], how: str) -> Split:
+    train = [run for run, is_test in zip(recordings, tested, strict=True) if not is_test]
+    test = [run for run, is_test in zip(recordings, tested, strict=True) if is_test]
+    split = given_split(train, test)
+    return replace(split, described=f"{split.described}: {how}")
 
 
 def held_out_tail(recordings: Sequence[Recording], channel: str, share: float) -> Split:
@@ -167,7 +209,7 @@ def folds(train: Sequence[Recording], channel: str, n: int) -> Iterator[Fold]:
 
 
 def validation_folds(
-    train: Sequence[Recording], channel: str, n: int
+    train: Sequence[Recording], channels: Channels, n: int, given: Sequence[Recording] = ()
 ) -> tuple[tuple[Fold, ...], str]:
     """Return the parts on which models are chosen within the training data, and what that is called.
 
@@ -177,18 +219,33 @@ def validation_folds(
     the largest of decaying cycles would otherwise decide, by how models extrapolate to it, though the
     model that is delivered has seen it.
 
+    Of several muscles, or of one under loads, every third run is left out in turn, and scored where its
+    inputs stay within those of the rest; of fewer runs than twelve, the last quarter of each is.
+
     Parameters
     ----------
-    channel : str
-        The input.
+    channels : Channels
+        What drives, and what schedules.
     n : int
         Largest number of parts.
+    given : sequence of Recording
+        Runs to choose on, to which nothing is fitted: then there are no other parts.
 
     Returns
     -------
     parts : tuple of Fold
-    chosen_by : {"cross-validation", "validation", "fit"}
+    chosen_by : {"cross-validation", "validation", "given", "fit"}
     """
+    train = tuple(train)
+    if given:
+        return (Fold(train, _all_rows(train), tuple(given), _all_rows(given)),), "given"
+    channel = channels.inputs[0]
+    if n >= 1 and not channels.single:
+        if len(train) >= ENOUGH and (found := tuple(_left_in_turn(train, channels))):
+            return found, "cross-validation"
+        starts = [len(run) - round(HELD_OUT * len(run)) for run in train]
+        tails = tuple(np.arange(len(run)) >= s for run, s in zip(train, starts, strict=True))
+        return (Fold(train, tuple(~tail for tail in tails), train, tails),), "validation"
     if n >= 2:
         with suppress(DataError):  # of an input that never turns
             parts = tuple(folds(train, channel, n))
@@ -201,6 +258,20 @@ def validation_folds(
             fold = Fold(tail.train, _all_rows(tail.train), tail.test, tail.test_rows)
             return (fold,), "validation"
     return (), "fit"
+
+
+def _left_in_turn(train: Sequence[Recording], channels: Channels) -> Iterator[Fold]:
+    names = (*channels.inputs, *channels.scheduled(train))
+    for first in range(EVERY):
+        kept = tuple(run for place, run in enumerate(train) if place % EVERY != first)
+        seen = {name: np.concatenate([run[name] for run in kept]) for name in names}
+        left = tuple(
+            run
+            for run in train[first::EVERY]
+            if all(within(run[name], seen[name]) for name in names)
+        )
+        if left:
+            yield Fold(kept, _all_rows(kept), left, _all_rows(left))
 
 
 def within(values: Array, others: Array) -> bool:

@@ -2,38 +2,93 @@
 
 from __future__ import annotations
 
-import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
-from mckibben.blocks.base import Block
-from mckibben.characterization import characterize
-from mckibben.comparison.ranking import N_FOLDS, Settings, plan_of, ranked
-from mckibben.comparison.recommending import acceptable
-from mckibben.comparison.results import InverseCheck, Leaderboard, Standing, Study
+from mckibben.arrays import Array
+from mckibben.characterization import Characterization, characterize
+from mckibben.comparison.channels import Names
+from mckibben.comparison.inverting import InverseCheck, invert_best
+from mckibben.comparison.loops import closed_loops, published_rig
+from mckibben.comparison.planning import Settings, plan_of
+from mckibben.comparison.ranking import ranked
+from mckibben.comparison.results import Leaderboard, Standing
 from mckibben.comparison.splits import listed
-from mckibben.errors import ModelError, ModelWarning
+from mckibben.control import Tracked
+from mckibben.errors import DataError
 from mckibben.recording import Recording
 
-Array = NDArray[np.float64]
 
-CHECK_SAMPLES = 2000
+@dataclass(frozen=True)
+class Study:
+    """Everything that ``mckibben study`` finds.
 
-FOLLOWED = 1e-6
-"""Largest error of an inverse that counts as one, relative to the reachable range."""
+    Parameters
+    ----------
+    train, test : tuple of Recording
+        Data to fit, and data to test on.
+    characterization : Characterization or None
+        What the muscle does; None of several, whose loops say nothing while all move.
+    leaderboard : Leaderboard
+        Models in the order of the choice.
+    predictions : mapping of str to tuple of array
+        Model name to its free-running output on every training recording, then every test recording.
+    inverse : InverseCheck or None
+        Of the first model of the leaderboard that has one, or None where no model has.
+    loops : mapping of str to Tracked
+        What came of following a measured motion on a virtual rig, by controller.
+    plant : str or None
+        The rig.
+    load : str or None
+        The channel that models are told as the load, where one was named.
+    notes : tuple of str
+        What was assumed or mended on the way.
+    """
+
+    train: tuple[Recording, ...]
+    test: tuple[Recording, ...]
+    characterization: Characterization | None
+    leaderboard: Leaderboard
+    predictions: Mapping[str, tuple[Array, ...]] = field(repr=False)
+    inverse: InverseCheck | None
+    loops: Mapping[str, Tracked] = field(default_factory=dict, repr=False)
+    plant: str | None = None
+    load: str | None = None
+    notes: tuple[str, ...] = ()
+
+    @property
+    def input(self) -> str:
+        """The input channel."""
+        return self.leaderboard.input
+
+    @property
+    def output(self) -> str:
+        """The output channel."""
+        return self.leaderboard.output
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return what was found, without the models and what they give."""
+        known = self.characterization
+        return {
+            "characterization": None if known is None else known.to_dict(),
+            "leaderboard": self.leaderboard.to_dict(),
+            "inverse": None if self.inverse is None else self.inverse.to_dict(),
+            "tracking": {name: dict(tracked.rmse) for name, tracked in self.loops.items()},
+        }
 
 
 def study(
     train: Recording | Sequence[Recording],
     test: Recording | Sequence[Recording] = (),
     *,
-    input: str = "pressure",  # noqa: A002  # the field's word, as everywhere in the package
-    output: str = "displacement",
+    inputs: Names = None,
+    outputs: Names = None,
+    load: str | None = None,
+    validation: Sequence[Recording] = (),
+    rig: str | None = None,
     models: str | Sequence[str] = "all",
     settings: Settings | None = None,
     seed: int = 0,
@@ -51,13 +106,18 @@ def study(
     Where it cannot, the next in the order of the choice is inverted that can. Where no model is worth
     recommending, none is inverted.
 
-    An interrupt ends the work at once; the study then holds what was finished.
+    Of several muscles, or under a load, a motion of the test is followed on a virtual rig by every
+    inverse, with PID feedback beside. An interrupt ends the work at once; the study then holds what was
+    finished.
 
     Parameters
     ----------
-    train, test, input, output, models, settings, seed, jobs, most_samples, allow_shared, folder, clear,
-    progress
+    train, test, inputs, outputs, load, validation, models, settings, seed, jobs, most_samples,
+    allow_shared, folder, clear, progress
         As for `compare`.
+    rig : str, optional
+        Virtual rig to close loops on; default the one that recordings of several muscles say they come
+        from.
     found : callable, optional
         Told the study as far as it is: when it is known what the muscle does, before any model is
         fitted, then whenever a model is finished.
@@ -77,23 +137,35 @@ def study(
     plan = plan_of(
         recordings,
         tests,
-        input=input,
-        output=output,
+        inputs=inputs,
+        outputs=outputs,
+        load=load,
+        validation=validation,
         models=models,
         settings=settings,
-        n_folds=N_FOLDS,
         seed=seed,
         most_samples=most_samples,
         allow_shared=allow_shared,
     )
-    kept = plan.kept(folder)
+    kept, channels = plan.kept(folder), plan.data.channels
+    if rig is not None and channels.single:
+        raise DataError(
+            "loops are closed on a rig with recordings of several muscles, or under a load",
+            remedy="leave --rig out, or use mckibben track",
+        )
+    one = len(channels.inputs) == len(channels.outputs) == 1
     so_far = Study(
         train=plan.data.split.train,
         test=plan.data.split.test,
-        characterization=characterize([*recordings, *tests], input, output),
+        characterization=(
+            characterize([*recordings, *tests], channels.inputs[0], channels.outputs[0])
+            if one
+            else None
+        ),
         leaderboard=plan.board(),
         predictions={},
         inverse=None,
+        load=load,
         notes=(*notes, *plan.notes),
     )
     if found is not None:
@@ -108,80 +180,17 @@ def study(
         if not so_far.leaderboard.rows:
             raise
         return replace(so_far, leaderboard=replace(so_far.leaderboard, stopped=True))
-    so_far = replace(so_far, inverse=invert_best(so_far.leaderboard, recordings[0]))
+    board = so_far.leaderboard
+    if channels.single:
+        so_far = replace(so_far, inverse=invert_best(board, recordings[0]))
+    else:
+        so_far = replace(so_far, inverse=invert_best(board, so_far.test[0]))
+        plant = rig or published_rig(recordings)
+        if so_far.inverse is not None and plant is not None:
+            loops = closed_loops(board, so_far.inverse.model, plant, so_far.test, seed)
+            so_far = replace(so_far, loops=loops, plant=plant)
     if found is not None:
         found(so_far)
     if clear:
         kept.clear()
     return so_far
-
-
-def invert_best(board: Leaderboard, recording: Recording) -> InverseCheck | None:
-    """Invert the first model of a leaderboard that has an inverse, and check it.
-
-    None where no model is recommended, for an inverse is as good as its model.
-    """
-    if board.best is None:
-        return None
-    for row in board.rows:
-        if row.block is None or not acceptable(row, board.constant):
-            continue
-        try:
-            return check_inverse(row.model, row.block, recording)
-        except ModelError:
-            continue
-    return None
-
-
-def check_inverse(model: str, block: Block, recording: Recording) -> InverseCheck:
-    """Send a reference with minor loops through the inverse and back through the model.
-
-    Parameters
-    ----------
-    model : str
-        Short name.
-    block : Block
-        The model.
-    recording : Recording
-        Gives the sample time and the pace of the reference.
-
-    Raises
-    ------
-    ModelError
-        If the model has no inverse, nothing can be reached whatever happened before, or the inverse
-        does not follow the reference.
-    """
-    inverse = block.inverse()
-    lows, highs = block.reachable()
-    low, high = float(lows[0]), float(highs[0])
-    if not (np.isfinite([low, high]).all() and low < high):
-        raise ModelError(
-            f"{model!r} has no output that it can reach whatever happened before. "
-            "Remedy: identify it on a recording that covers the range of interest."
-        )
-    phase = np.linspace(0, 1, CHECK_SAMPLES)
-    slow = 1 - np.abs(2 * ((3 * phase) % 1) - 1)
-    wave = slow * (1 - 0.5 * phase) + 0.12 * np.sin(2 * np.pi * 11 * phase) * phase
-    share = (wave - wave.min()) / np.ptp(wave)
-    reference = low + (high - low) * (0.02 + 0.96 * share)
-    step = recording.sample_time
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", ModelWarning)
-        pressure = inverse.simulate(reference, sample_time=step)
-    output = block.simulate(pressure, sample_time=step)
-    error = float(np.abs(output - reference).max() / (high - low))
-    if not error <= FOLLOWED:
-        raise ModelError(
-            f"the inverse of {model!r} misses a reachable reference by {error:.1e} of its range. "
-            "Remedy: invert another model."
-        )
-    return InverseCheck(
-        model=model,
-        inverse=inverse,
-        reference=reference,
-        pressure=pressure,
-        output=output,
-        time=np.arange(CHECK_SAMPLES, dtype=np.float64) * (1.0 if step is None else step),
-        reachable=(low, high),
-        error=error,
-    )

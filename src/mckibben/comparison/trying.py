@@ -9,24 +9,24 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mckibben import registry, workers
-from mckibben.blocks.base import Block
+from mckibben import registry
+from mckibben.arrays import Array
+from mckibben.blocks.core.block import Block
+from mckibben.comparison.channels import Channels
 from mckibben.comparison.cluster import outcomes_outside, outer_backend, processes_outside
 from mckibben.comparison.free_run import run_free
 from mckibben.comparison.memory_test import memory_test
-from mckibben.comparison.recommending import CONSTANT
+from mckibben.comparison.offered import objections
 from mckibben.comparison.results import Row
 from mckibben.comparison.splits import Fold, Mask, Split
 from mckibben.errors import MckibbenError
-from mckibben.estimators.search import Progress, whole_searches
-from mckibben.metrics import score
+from mckibben.estimators.optimisers.tracker import Progress, whole_searches
+from mckibben.metrics import Scores, mean_scores, score
 from mckibben.recording import Recording
-from mckibben.threads import cores
-from mckibben.workers import Outcome, WorkerError
-
-Array = NDArray[np.float64]
+from mckibben.system import workers
+from mckibben.system.threads import cores
+from mckibben.system.workers import Outcome, WorkerError
 
 TIMED_SAMPLES = 20_000
 
@@ -47,14 +47,35 @@ class Data:
         Data to fit and to test on.
     folds : tuple of Fold
         Parts of the cross-validation within the training data.
-    input, output : str
-        Channels.
+    channels : Channels
+        What drives, what is to be modelled, and what schedules.
+    early : tuple of Recording
+        For searches that stop early.
     """
 
     split: Split
     folds: tuple[Fold, ...]
-    input: str
-    output: str
+    channels: Channels
+    early: tuple[Recording, ...] = ()
+
+
+@dataclass(frozen=True)
+class Item:
+    """A model to try.
+
+    Parameters
+    ----------
+    model : str
+        Short name.
+    settings : mapping
+        Of its estimator.
+    only : int or None
+        Place of the only recording that it is fitted to; None for all of them.
+    """
+
+    model: str
+    settings: Mapping[str, Any]
+    only: int | None = None
 
 
 @dataclass(frozen=True)
@@ -63,10 +84,10 @@ class Part:
 
     Parameters
     ----------
-    model : str
-        Short name.
-    settings : mapping
-        Of its estimator.
+    name : str
+        What its row is called.
+    item : Item
+        The model.
     folds : tuple of int
         Places of folds. They come first: they load the compiled kernels, which the fit that is timed
         then finds ready.
@@ -74,8 +95,8 @@ class Part:
         Whether to fit to all of the training data, and to test.
     """
 
-    model: str
-    settings: Mapping[str, Any]
+    name: str
+    item: Item
     folds: tuple[int, ...]
     whole: bool
 
@@ -88,10 +109,11 @@ class Tried:
     ----------
     row : Row or None
         Of the leaderboard; None in parts that do not fit the whole.
-    outputs : tuple of array
-        Free-running output on every training recording, then every test recording.
-    squares : tuple of float
-        Sums of squared errors of the cross-validation, `PIECES` a recording tested on.
+    outputs : tuple of array, shape (n, k)
+        Free-running outputs on every training recording, then every test recording.
+    squares : tuple of tuple of float or None
+        Sums of squared errors of the cross-validation, `PIECES` a recording tested on, each of all k
+        outputs; None for those of the only recording that a model was fitted to.
     count : int
         Samples in them.
     invalid : str or None
@@ -100,27 +122,37 @@ class Tried:
 
     row: Row | None = None
     outputs: tuple[Array, ...] = ()
-    squares: tuple[float, ...] = ()
+    squares: tuple[tuple[float, ...] | None, ...] = ()
     count: int = 0
     invalid: str | None = None
 
 
-def parts_of(model: str, settings: Mapping[str, Any], n_folds: int, split: bool) -> list[Part]:
+def parts_of(name: str, item: Item, n_folds: int, split: bool) -> list[Part]:
     """Return the parts of trying a model: one, or as many as there are folds."""
-    if not split or n_folds < 2:
-        return [Part(model, settings, tuple(range(n_folds)), whole=True)]
-    others = [Part(model, settings, (k,), whole=False) for k in range(1, n_folds)]
-    return [Part(model, settings, (0,), whole=True), *others]
+    if not split or n_folds < 2 or item.only is not None:
+        return [Part(name, item, tuple(range(n_folds)), whole=True)]
+    others = [Part(name, item, (k,), whole=False) for k in range(1, n_folds)]
+    return [Part(name, item, (0,), whole=True), *others]
 
 
 def try_part(data: Data, part: Part, tell: Callable[..., None]) -> Tried:
     """Do a part of trying a model; whatever goes wrong is in the row."""
     try:
+        if refused := _refused(part.item.model, data):
+            return Tried(Row(part.name, reason=refused))
         return _try(data, part, tell)
     except MckibbenError as error:
-        return Tried(Row(part.model, reason=str(error)))
+        return Tried(Row(part.name, reason=str(error)))
     except Exception as error:  # one model must not take the comparison down, whatever it does
-        return Tried(Row(part.model, reason=f"{type(error).__name__}: {error}"))
+        return Tried(Row(part.name, reason=f"{type(error).__name__}: {error}"))
+
+
+def _refused(model: str, data: Data) -> str | None:
+    """Return why a model has no place on the channels; that it is told no load is no reason."""
+    asked, channels = data.split.train, data.channels
+    if not objections([model], asked, channels):
+        return None
+    return objections([model], asked, replace(channels, scheduling=None)).get(model)
 
 
 def effort_of(model: str, data: Data) -> float:
@@ -148,7 +180,7 @@ def outcomes(
     for outcome in found:
         part = parts[outcome.index]
         if outcome.error is None and not _is_of(outcome.value, part, data):
-            words = f"its process gave something that is not what came of {part.model}"
+            words = f"its process gave something that is not what came of {part.name}"
             outcome = Outcome(outcome.index, error=WorkerError(words))
         yield outcome
 
@@ -159,8 +191,10 @@ def _is_of(tried: Any, part: Part, data: Data) -> bool:
         return False
     row = tried.row
     if row is None:
-        return not part.whole and all(isinstance(square, float) for square in tried.squares)
-    if not isinstance(row, Row) or row.model != part.model:
+        return not part.whole and all(
+            isinstance(square, float) for piece in tried.squares for square in piece or ()
+        )
+    if not isinstance(row, Row) or row.model != part.name:
         return False
     if row.reason is not None:
         return isinstance(row.reason, str)
@@ -169,155 +203,176 @@ def _is_of(tried: Any, part: Part, data: Data) -> bool:
         not (part.whole and isinstance(row.block, Block) and row.sound)
         or row.test is None
         or not all(isinstance(output, np.ndarray) for output in tried.outputs)
-        or [output.shape for output in tried.outputs] != [(len(r),) for r in recordings]
+        or [output.shape for output in tried.outputs]
+        != [(len(r), len(data.channels.outputs)) for r in recordings]
     ):
         return False
-    errors = errors_on_test(tried.outputs, data)
-    rmse = math.sqrt(float(errors @ errors) / errors.size)
-    most = max(float(np.abs(recording[data.output]).max()) for recording in recordings)
+    rmse = np.sqrt(np.mean(errors_on_test(tried.outputs, data) ** 2, axis=0)).mean()
+    measured = [recording[name] for recording in recordings for name in data.channels.outputs]
+    most = max(float(np.abs(samples).max()) for samples in measured)
     return math.isclose(rmse, row.test.rmse, rel_tol=1e-6, abs_tol=1e-9 * most)
 
 
-def joined(parts: Sequence[Tried]) -> Tried:
-    """Return what came of all parts of a model, given in their order, as one."""
+def joined(parts: Sequence[Tried], names: Sequence[str]) -> Tried:
+    """Return what came of all parts of a model, given in their order, as one.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Of the outputs.
+    """
     failed = [tried for tried in parts if tried.row is not None and tried.row.reason is not None]
     if failed:
         return failed[0]
     (whole,) = (tried for tried in parts if tried.row is not None)
     assert whole.row is not None
     invalid = next((tried.invalid for tried in parts if tried.invalid is not None), None)
-    if invalid is None and not math.isfinite(rms_of(parts) or 0.0):
+    by_output = rms_by_output(parts)
+    if invalid is None and not np.isfinite(by_output).all():
         invalid = "its outputs ran away on a part of the data that it was not fitted to"
     if invalid is not None:
         noted = dict(whole.row.diagnostics) | {"validation_failed": invalid}
         return replace(whole, row=replace(whole.row, diagnostics=noted))
     squares = tuple(square for tried in parts for square in tried.squares)
-    return replace(whole, row=replace(whole.row, validation_rmse=rms_of(parts)), squares=squares)
-
-
-def squares_of(errors: Array) -> list[float]:
-    """Return the sums of squared errors of consecutive pieces."""
-    return [float(piece @ piece) for piece in np.array_split(errors, PIECES)]
-
-
-def constant_of(data: Data) -> Tried:
-    """Return what comes of predicting the mean of the output that is fitted to, whatever the input."""
-    squares: list[float] = []
-    count = 0
-    for fold in data.folds:
-        mean = _mean(fold.train, data.output, fold.train_rows)
-        for recording, rows in zip(fold.test, fold.test_rows, strict=True):
-            errors = mean - recording[data.output][rows]
-            squares += squares_of(errors)
-            count += errors.size
-    split = data.split
-    mean = _mean(split.train, data.output, [np.ones(len(r), dtype=bool) for r in split.train])
-    outputs = tuple(np.full(len(recording), mean) for recording in (*split.train, *split.test))
-    scored, measured = _tested(outputs, data)
-    trained = np.concatenate([recording[data.output] for recording in split.train])
-    found = Tried(None, outputs, tuple(squares), count)
-    row = Row(
-        model=CONSTANT,
-        n_parameters=1,
-        fit_seconds=0.0,
-        step_ns=0.0,
-        train=score(trained, np.full(trained.size, mean)),
-        test=score(measured, scored),
-        validation_rmse=rms_of([found]),
+    row = replace(
+        whole.row,
+        validation_rmse=rms_of(parts),
+        validation_by_output=dict(zip(names, by_output, strict=False)),
     )
-    return replace(found, row=row)
+    return replace(whole, row=row, squares=squares)
 
 
-def _mean(recordings: Sequence[Recording], output: str, rows: Sequence[Mask]) -> float:
-    return float(
-        np.concatenate([r[output][kept] for r, kept in zip(recordings, rows, strict=True)]).mean()
-    )
+def squares_of(errors: Array) -> list[tuple[float, ...]]:
+    """Return the sums of squared errors (n, k) of consecutive pieces."""
+    return [tuple((piece**2).sum(axis=0).tolist()) for piece in np.array_split(errors, PIECES)]
+
+
+def rms_by_output(parts: Sequence[Tried]) -> list[float]:
+    """Return the root mean square of the cross-validation of every output; none without one."""
+    count = sum(tried.count for tried in parts)
+    squares = (square for tried in parts for square in tried.squares if square is not None)
+    columns = zip(*squares, strict=True)
+    return [math.sqrt(math.fsum(column) / count) for column in columns]  # in any order
 
 
 def rms_of(parts: Sequence[Tried]) -> float | None:
-    """Return the root mean square of the cross-validation, or None where there was none."""
-    count = sum(tried.count for tried in parts)
-    total = math.fsum(square for tried in parts for square in tried.squares)  # in any order
-    return math.sqrt(total / count) if count else None
+    """Return the mean of that over the outputs, or None where there was no cross-validation."""
+    found = rms_by_output(parts)
+    return math.fsum(found) / len(found) if found else None
 
 
 def outputs_of(block: Block, data: Data) -> tuple[Array, ...]:
-    """Return a model's free-running output on every training recording, then every test recording."""
-    split = data.split
-    on_train = [run_free(block, recording, data.output, (recording,)) for recording in split.train]
-    on_test = [run_free(block, recording, data.output, split.train) for recording in split.test]
+    """Return a model's free-running outputs on every training recording, then every test recording."""
+    split, names = data.split, data.channels.outputs
+    on_train = [run_free(block, recording, names, (recording,)) for recording in split.train]
+    on_test = [run_free(block, recording, names, split.train) for recording in split.test]
     return (*on_train, *on_test)
 
 
 def errors_on_test(outputs: Sequence[Array], data: Data) -> Array:
-    """Return the errors at all samples of the test that are scored."""
+    """Return the errors at all samples of the test that are scored, shape (n, k)."""
     scored, measured = _tested(outputs, data)
     return scored - measured
+
+
+def scores_of(outputs: Sequence[Array], data: Data) -> tuple[Scores, Scores, dict[str, Scores]]:
+    """Return the errors on the training data and on the test, and on the test by output."""
+    split, names = data.split, data.channels.outputs
+    trained = np.concatenate([recording.matrix(names) for recording in split.train])
+    modelled = np.concatenate(outputs[: len(split.train)])
+    scored, measured = _tested(outputs, data)
+    by_output = {
+        name: score(measured[:, place], scored[:, place]) for place, name in enumerate(names)
+    }
+    on_train = [score(trained[:, place], modelled[:, place]) for place in range(len(names))]
+    return mean_scores(on_train), mean_scores(list(by_output.values())), by_output
 
 
 def _tested(outputs: Sequence[Array], data: Data) -> tuple[Array, Array]:
     split = data.split
     on_test = outputs[len(split.train) :]
     rows = list(zip(on_test, split.test, split.test_rows, strict=True))
+    names = data.channels.outputs
     return (
         np.concatenate([modelled[kept] for modelled, _, kept in rows]),
-        np.concatenate([recording[data.output][kept] for _, recording, kept in rows]),
+        np.concatenate([recording.matrix(names)[kept] for _, recording, kept in rows]),
     )
 
 
 def _try(data: Data, part: Part, tell: Callable[..., None]) -> Tried:
-    estimator_class = registry.load("estimators", part.model)
-    settings = {"input": data.input, "output": data.output} | dict(part.settings)
+    item, split, names = part.item, data.split, data.channels.outputs
+    estimator_class = registry.load("estimators", item.model)
+    channels = data.channels
+    settings = estimator_class.channel_settings(
+        channels.inputs, channels.outputs, channels.scheduling
+    ) | dict(item.settings)
 
     def fitted(
         recordings: Sequence[Recording], rows: Sequence[Mask] | None, progress: Progress | None
     ) -> Any:
         with whole_searches():
-            return estimator_class(**settings).fit(recordings, rows=rows, progress=progress)
+            return estimator_class(**settings).fit(
+                recordings, rows=rows, validation=data.early, progress=progress
+            )
 
-    squares: list[float] = []
+    squares: list[tuple[float, ...] | None] = []
     count, invalid = 0, None
+
+    def validate(block: Block, fold: Fold) -> None:
+        nonlocal count
+        # a single recording is fitted and tested on samples of its own
+        fitted_to = list(zip(fold.train, fold.train_rows, strict=True))
+        for recording, rows in zip(fold.test, fold.test_rows, strict=True):
+            known = [pair for pair in fitted_to if pair[0] is recording]
+            own, own_rows = [r for r, _ in known], [kept for _, kept in known]
+            modelled = run_free(block, recording, names, own, own_rows)
+            errors = (modelled - recording.matrix(names))[rows]
+            squares.extend(squares_of(errors))
+            count += len(errors)
+
+    folds = [data.folds[place] for place in part.folds]
+    if item.only is not None:  # not validated, since no other model is by the same samples
+        squares.extend([None] * (PIECES * sum(len(fold.test) for fold in folds)))
+        folds = []
+    # what is fitted to all there is is validated as it is delivered
+    delivered = [_is_whole(fold, split) for fold in folds]
     try:
-        for fold in (data.folds[place] for place in part.folds):
-            block = fitted(fold.train, fold.train_rows, None).model_
-            # a single recording is fitted and tested on samples of its own
-            fitted_to = list(zip(fold.train, fold.train_rows, strict=True))
-            for recording, rows in zip(fold.test, fold.test_rows, strict=True):
-                known = [pair for pair in fitted_to if pair[0] is recording]
-                own, own_rows = [r for r, _ in known], [kept for _, kept in known]
-                modelled = run_free(block, recording, data.output, own, own_rows)
-                errors = (modelled - recording[data.output])[rows]
-                squares += squares_of(errors)
-                count += errors.size
+        for fold, later in zip(folds, delivered, strict=True):
+            if not later:
+                validate(fitted(fold.train, fold.train_rows, None).model_, fold)
     except MckibbenError as error:  # a part of the data may be too little where all of it is enough
         invalid = str(error)
     if not part.whole:
         return Tried(squares=tuple(squares), count=count, invalid=invalid)
-    split = data.split
     started = time.perf_counter()
-    estimator = fitted(split.train, None, tell)
+    learned = split.train if item.only is None else (split.train[item.only],)
+    estimator = fitted(learned, None, tell)
     seconds = time.perf_counter() - started
     block = estimator.model_
+    for fold, now in zip(folds, delivered, strict=True):
+        if now:
+            validate(block, fold)
     outputs = outputs_of(block, data)
-    on_train, on_test = outputs[: len(split.train)], outputs[len(split.train) :]
     diagnostics = asdict(estimator.diagnostics_)
     diagnostics.pop("covariance")
-    scored, measured = _tested(outputs, data)
+    train, test, by_output = scores_of(outputs, data)
     row = Row(
-        model=part.model,
+        model=part.name,
         n_parameters=block.n_parameters,
         fit_seconds=seconds,
         step_ns=_step_cost(block, split.train[0]),
-        train=score(
-            np.concatenate([recording[data.output] for recording in split.train]),
-            np.concatenate(on_train),
-        ),
-        test=score(measured, scored),
-        memory=memory_test(block, split.test, on_test, data.input, data.output),
+        train=train,
+        test=test,
+        outputs=by_output,
+        memory=memory_test(block, split.test, outputs[len(split.train) :], channels.pairs()),
         block=block,
         diagnostics=diagnostics,
     )
     return Tried(row, outputs, tuple(squares), count, invalid)
+
+
+def _is_whole(fold: Fold, split: Split) -> bool:
+    return fold.train is split.train and all(rows.all() for rows in fold.train_rows)
 
 
 def _step_cost(block: Block, recording: Recording) -> float:

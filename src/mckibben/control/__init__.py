@@ -1,11 +1,10 @@
 """Controllers, and loops closed on anything that steps like a rig."""
 
+from mckibben.control.controller import BlockController as BlockController
 from mckibben.control.controller import Controller as Controller
 from mckibben.control.estimated_load import EstimatedLoad as EstimatedLoad
-from mckibben.control.feedforward import Feedforward as Feedforward
-from mckibben.control.feedforward_pid import FeedforwardPID as FeedforwardPID
+from mckibben.control.laws import control_law as control_law
 from mckibben.control.loop import Tracked as Tracked
 from mckibben.control.loop import track as track
 from mckibben.control.observer import DisturbanceObserver as DisturbanceObserver
-from mckibben.control.pid import PID as PID
 from mckibben.control.tuning import tune_pid as tune_pid

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mckibben.blocks.base import Block
-from mckibben.errors import ModelError
-
-Array = NDArray[np.float64]
+from mckibben.arrays import Array
+from mckibben.blocks.core.block import Block
+from mckibben.blocks.feedback.pid import MEASURED
 
 
 class Controller(ABC):
@@ -39,25 +38,30 @@ class Controller(ABC):
         """Learn all that was just measured, by channel, before `step`."""
         del readings
 
-    def block(self, compensator: Block | None = None) -> Block:
-        """Return the controller as a block, to be saved, streamed and exported.
-
-        Parameters
-        ----------
-        compensator : Block, optional
-            Whose channels name references and pressures, for feedback that stands alone.
-
-        Raises
-        ------
-        ModelError
-            If it is not one.
-        """
-        del compensator
-        raise ModelError(
-            f"{type(self).__name__} is no block that could be saved or exported. "
-            "Remedy: use a compensator, PID feedback, or both together."
-        )
-
     def applied(self, pressures: Array) -> None:
         """Learn what was applied in the end, after limits."""
         del pressures
+
+
+@dataclass
+class BlockController(Controller):
+    """A block in a loop: a compensator alone, feedback, or both, as it is saved and exported.
+
+    Parameters
+    ----------
+    block : Block
+        From references, what is measured of them (inputs named ``..._measured``) if it asks for that,
+        and what schedules it, to pressures. What it does not ask for is passed over.
+    """
+
+    block: Block
+
+    def reset(self, sample_time: float) -> None:
+        self._stream = self.block.stream(sample_time)
+        self._taken = len(self.block.inputs)
+        self._feels = any(channel.name.endswith(MEASURED) for channel in self.block.inputs)
+
+    def step(self, reference: Array, displacement: Array, scheduled: Array) -> Array:
+        measured = (displacement,) if self._feels else ()
+        given = np.concatenate([reference, *measured, scheduled])
+        return self._stream.step(given[: self._taken]).copy()

@@ -6,13 +6,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mckibben.blocks.base import Block
+from mckibben.arrays import Array
+from mckibben.blocks.core.block import Block
 from mckibben.control.controller import Controller
 from mckibben.errors import ModelError
-
-Array = NDArray[np.float64]
 
 
 @dataclass
@@ -41,7 +39,6 @@ class EstimatedLoad(Controller):
         self._names = [channel.name for channel in self.estimate.inputs]
 
     def reset(self, sample_time: float) -> None:
-        """Start controller and estimate afresh."""
         self.controller.reset(sample_time)
         self._stream = self.estimate.stream(sample_time)
         self._share = 1.0 - np.exp(-sample_time / self.filter_time)
@@ -66,10 +63,8 @@ class EstimatedLoad(Controller):
         self._load = self._load + self._share * (found - self._load)
 
     def step(self, reference: Array, displacement: Array, scheduled: Array) -> Array:
-        """Return the controller's pressures under the estimated load."""
         del scheduled
         return self.controller.step(reference, displacement, self._load)
 
     def applied(self, pressures: Array) -> None:
-        """Pass on what was applied."""
         self.controller.applied(pressures)

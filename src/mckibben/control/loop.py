@@ -10,13 +10,13 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mckibben.control.controller import Controller
+from mckibben.arrays import Array
+from mckibben.blocks.core.block import Block
+from mckibben.control.controller import BlockController, Controller
 from mckibben.control.pressure_loop import PressureLoop
 from mckibben.errors import DataError, ModelError
 from mckibben.recording import Recording
 from mckibben.signals.checking import generator
-
-Array = NDArray[np.float64]
 
 
 class Plant(Protocol):
@@ -84,7 +84,7 @@ MOST_NOISE = 1e6
 
 
 def track(
-    controller: Controller,
+    controller: Block | Controller,
     plant: Plant,
     reference: Recording,
     *,
@@ -101,7 +101,8 @@ def track(
 
     Parameters
     ----------
-    controller : Controller
+    controller : Block or Controller
+        A block is driven as `BlockController` drives it.
     plant : Plant
         A rig; it is run at the reference's sample time, which is the control rate.
     reference : Recording
@@ -142,6 +143,8 @@ def track(
             "the reference has no time", file=reference.source, remedy="add a time column or --rate"
         )
     _check(approach, settle, noise, delay, slew, step)
+    if isinstance(controller, Block):
+        controller = BlockController(controller)
     rng = generator(seed)
     measured_too = [name for name in plant.outputs if name in reference]
     followed = [name for name in measured_too if name.startswith("displ")]

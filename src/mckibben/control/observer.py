@@ -11,13 +11,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mckibben.blocks.base import Block
+from mckibben.arrays import Array
+from mckibben.blocks.core.block import Block
 from mckibben.control.controller import Controller
 from mckibben.errors import ModelError
-
-Array = NDArray[np.float64]
 
 
 @dataclass
@@ -43,7 +41,6 @@ class DisturbanceObserver(Controller):
         self._model = self.compensator.inverse()
 
     def reset(self, sample_time: float) -> None:
-        """Start compensator, model and filter afresh."""
         self._ahead = self.compensator.stream(sample_time)
         self._beside = self._model.stream(sample_time)
         self._share = 1.0 - np.exp(-sample_time / self.filter_time)

@@ -7,14 +7,16 @@ PID controller tuning", 2003) give the gains, with a closed-loop time constant o
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
-from numpy.typing import NDArray
 
+from mckibben.arrays import Array
+from mckibben.blocks.core.fields import Channel
+from mckibben.blocks.feedback.pid import PIDFeedback
 from mckibben.control.loop import Plant, actuated
-from mckibben.control.pid import PID
 from mckibben.errors import ModelError
-
-Array = NDArray[np.float64]
+from mckibben.recording import standard_unit
 
 STEP = 0.1
 """Of pressure, relative to its range."""
@@ -28,7 +30,7 @@ def tune_pid(
     hold: float = 15.0,
     scheduled: dict[str, float] | None = None,
     seed: int = 0,
-) -> PID:
+) -> PIDFeedback:
     """Return PID feedback tuned on a plant.
 
     Parameters
@@ -60,7 +62,7 @@ def tune_pid(
         name: 0.5 * (limit.low + limit.high) for name, limit in zip(driven, limits, strict=True)
     }
     n = round(hold / sample_time)
-    gains = []
+    gains, references = [], []
     for name, limit in zip(driven, limits, strict=True):
         rig.reset(seed)
         followed = name.replace("pressure", "displacement").replace("voltage", "displacement")
@@ -69,6 +71,7 @@ def tune_pid(
                 f"PID follows a displacement, and {plant.name} gives {', '.join(rig.outputs)}. "
                 "Remedy: use the compensator alone, or another rig."
             )
+        references.append(followed)
         place = rig.outputs.index(followed)
         for _ in range(n):
             before = rig.step({**middle, **scheduled})[place]
@@ -78,7 +81,13 @@ def tune_pid(
         gains.append(_simc(response, size, sample_time, closed_loop_time, name))
     kp, ki = zip(*gains, strict=True)
     lowest, highest = min(limit.low for limit in limits), max(limit.high for limit in limits)
-    return PID(tuple(kp), tuple(ki), limits=(float(lowest), float(highest)))
+    return PIDFeedback.of(
+        _channels(references), _channels(driven), kp, ki, limits=(float(lowest), float(highest))
+    )
+
+
+def _channels(names: Sequence[str]) -> tuple[Channel, ...]:
+    return tuple(Channel(name, standard_unit(name) or "") for name in names)
 
 
 def _simc(

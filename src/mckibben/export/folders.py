@@ -13,9 +13,9 @@ import zipfile
 from collections.abc import Mapping
 from pathlib import Path
 
-from mckibben import manifest
-from mckibben.atomic import PART, written
 from mckibben.errors import DataError
+from mckibben.system import manifest
+from mckibben.system.atomic import PART, written
 
 MANIFEST = "manifest.sha256"
 

@@ -58,7 +58,8 @@ def name_from(path: Path) -> str:
     from mckibben.registry import names
 
     words = re.sub(r"[^A-Za-z0-9_]+", "_", path.stem).strip("_")[: LONGEST - 6]
-    taken = RESERVED | {kind.replace("-", "_") for kind in names("blocks")}
+    kinds = {kind.replace("-", "_") for kind in names("blocks")}
+    taken = RESERVED | kinds | {f"{kind}_inverse" for kind in kinds}
     fits = words and words[0].isalpha() and words.lower() not in taken
     return words if fits and not words.lower().startswith("mck") else f"model_{words}".rstrip("_")
 

@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from mckibben.arrays import Array
 from mckibben.files.dialect import Dialect
 from mckibben.files.marks import REMEDY, Doubt, is_marked, may_be_doubted
 from mckibben.files.table import Column, Flaw
-from mckibben.recording import Array
 
 _SHOWN = 5  # cells of text that are kept, where they are no times
 _INSTANT = re.compile(r"\d{4}\D?\d\d")

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from mckibben.arrays import Array
 from mckibben.errors import DataError
 from mckibben.files import plausible, timebase
 from mckibben.files.assigning import assign
@@ -16,7 +17,6 @@ from mckibben.files.notices import warn
 from mckibben.files.request import Request
 from mckibben.files.table import Column, Table
 from mckibben.files.units import Unit, convert, find
-from mckibben.recording import Array
 
 IMPLAUSIBLE_BAR = 50.0
 """No muscle sees this pressure; larger numbers without a unit are kPa, psi or the like."""

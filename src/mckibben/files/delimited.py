@@ -17,7 +17,6 @@ from typing import Any
 
 import numpy as np
 
-from mckibben.atomic import replacing
 from mckibben.errors import DataError
 from mckibben.files import stored
 from mckibben.files.cells import Cells
@@ -28,9 +27,10 @@ from mckibben.files.marks import Doubt, doubts
 from mckibben.files.notices import warn
 from mckibben.files.stored import Stored
 from mckibben.files.table import Column, Table
-from mckibben.manifest import digest
-from mckibben.ordinary import DESCRIPTION, read_bytes
 from mckibben.recording import Recording
+from mckibben.system.atomic import replacing
+from mckibben.system.manifest import digest
+from mckibben.system.ordinary import DESCRIPTION, read_bytes
 
 MOST_COLUMNS = 4096
 _CONTROL = bytes([*range(0x09), *range(0x0E, 0x20), 0x7F])

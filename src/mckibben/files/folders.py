@@ -9,7 +9,7 @@ from pathlib import Path
 
 from mckibben.errors import DataError
 from mckibben.files.formats import READERS
-from mckibben.ordinary import DESCRIPTION, read_text
+from mckibben.system.ordinary import DESCRIPTION, read_text
 
 
 def roles(folder: Path) -> dict[str, list[Path]]:

@@ -12,7 +12,7 @@ from types import ModuleType
 from mckibben.errors import DataError, MckibbenError
 from mckibben.files.limits import MOST_BYTES
 from mckibben.files.table import Table, printable
-from mckibben.ordinary import opened
+from mckibben.system.ordinary import opened
 
 READERS: dict[str, str] = {
     ".csv": "delimited",

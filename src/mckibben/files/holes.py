@@ -6,12 +6,12 @@ from pathlib import Path
 
 import numpy as np
 
+from mckibben.arrays import Array
 from mckibben.errors import DataError
 from mckibben.files.notices import warn
 from mckibben.files.request import Request
 from mckibben.files.table import Table
 from mckibben.files.timebase import Span
-from mckibben.recording import Array
 
 Channels = dict[str, Array]
 

@@ -13,9 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from mckibben.arrays import Array
 from mckibben.files.dialect import Dialect
 from mckibben.files.lines import Lines
-from mckibben.recording import Array
 
 REMEDY = (
     "write numbers without marks between thousands, with one decimal mark in the whole file, and "

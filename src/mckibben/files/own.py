@@ -5,10 +5,10 @@ from __future__ import annotations
 import warnings
 from pathlib import Path
 
-from mckibben import manifest, ordinary
 from mckibben.errors import MckibbenError
 from mckibben.files import stored
 from mckibben.files.formats import READERS, tables
+from mckibben.system import manifest, ordinary
 
 
 def description(path: Path) -> Path | None:

@@ -8,14 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from mckibben.atomic import replacing
 from mckibben.files import pages, stored
 from mckibben.files.limits import MOST_PARTS, Budget
 from mckibben.files.notices import warn
 from mckibben.files.stored import Stored
 from mckibben.files.table import Column, Table, column, of_equal_length
-from mckibben.manifest import digest
 from mckibben.recording import Recording
+from mckibben.system.atomic import replacing
+from mckibben.system.manifest import digest
 
 _KEY = b"mckibben"
 

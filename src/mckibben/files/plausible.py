@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
+from mckibben.arrays import Array
 from mckibben.errors import DataError
 from mckibben.files.table import Table
-from mckibben.recording import Array
 
 LARGEST: dict[str, float] = {
     "bar": 2e3,

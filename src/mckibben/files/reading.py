@@ -11,6 +11,7 @@ from typing import Literal
 
 import numpy as np
 
+from mckibben.arrays import Array
 from mckibben.errors import DataError
 from mckibben.files import formats, timebase
 from mckibben.files.choosing import Choice, choose
@@ -20,7 +21,7 @@ from mckibben.files.request import Request
 from mckibben.files.table import Table
 from mckibben.files.timebase import Span
 from mckibben.files.units import convert
-from mckibben.recording import Array, Recording
+from mckibben.recording import Recording
 
 LONGEST_BRIDGE = 100
 """Times the samples there are: interpolating gaps to more than that is refused."""

@@ -8,10 +8,11 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from mckibben.arrays import Array
 from mckibben.errors import DataError
 from mckibben.files.table import Column, Table
-from mckibben.manifest import digest
-from mckibben.recording import Array, Recording
+from mckibben.recording import Recording
+from mckibben.system.manifest import digest
 
 
 class Stored(BaseModel):

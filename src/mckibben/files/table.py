@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mckibben.arrays import Array
 from mckibben.errors import DataError
-from mckibben.recording import Array
 
 
 @dataclass(frozen=True)

@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from mckibben.arrays import Array
 from mckibben.errors import DataError
 from mckibben.files.table import Table
-from mckibben.recording import Array
 
 Span = tuple[int, int]
 """Samples from the first to, not including, the second."""

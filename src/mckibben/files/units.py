@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from functools import cache, lru_cache
 from typing import Any, Literal
 
-from mckibben.recording import Array
+from mckibben.arrays import Array
 
 SPELLINGS: dict[str, dict[str, str]] = {
     "bar": {

@@ -1,5 +1,1 @@
-"""Re-runs of the papers: their protocol on their rig, their methods as published beside our best."""
-
-from mckibben.papers.reproduction import Figure, Reproduction, Table, reproduce
-
-__all__ = ["Figure", "Reproduction", "Table", "reproduce"]
+"""The papers, one folder each: its protocol, what it prints, and its re-run, published beside ours."""

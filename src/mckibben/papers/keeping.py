@@ -9,15 +9,14 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from mckibben.blocks.base import Block
+from mckibben.blocks.core.block import Block
 from mckibben.comparison.kept import Kept
 from mckibben.errors import MckibbenError
-from mckibben.estimators.search import whole_searches
+from mckibben.estimators.optimisers.tracker import whole_searches
 from mckibben.files import read, write
 from mckibben.recording import Recording
 from mckibben.rigs import record
-from mckibben.signals.protocols import protocol
-from mckibben.signals.protocols.protocol import Protocol, Run
+from mckibben.signals.protocol import Protocol, Run, protocol
 
 
 @dataclass(frozen=True)

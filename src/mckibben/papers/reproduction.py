@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from itertools import compress
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mckibben import registry
+from mckibben.arrays import Array
 from mckibben.comparison.kept import Kept
-from mckibben.threads import one_blas_thread
+from mckibben.system.threads import one_blas_thread
 
-Array = NDArray[np.float64]
 Cell = str | float | None
 Progress = Callable[[float, str], None]
 
@@ -39,6 +39,17 @@ class Table:
     columns: tuple[str, ...]
     rows: tuple[tuple[Cell, ...], ...]
     note: str = ""
+
+    def filled(self) -> Table:
+        """Return the table without columns in which there is nothing to say."""
+        kept = [any(cell is not None for cell in cells) for cells in zip(*self.rows, strict=True)]
+        if all(kept):
+            return self
+        return replace(
+            self,
+            columns=tuple(compress(self.columns, kept)),
+            rows=tuple(tuple(compress(row, kept)) for row in self.rows),
+        )
 
     def to_dict(self) -> dict[str, Any]:
         """Return the table as ``tables.json`` holds it."""
@@ -163,7 +174,7 @@ def reproduce(
         )
     if clear:
         kept.clear()
-    return found
+    return replace(found, tables=tuple(table.filled() for table in found.tables))
 
 
 def rms(errors: Array) -> float:

@@ -5,7 +5,6 @@ twice: for the page (`interactive`) and for print (`printed`).
 """
 
 from mckibben.report.page import write_report
-from mckibben.report.reproduction import write_reproduction
 from mckibben.report.results_folder import StudyFolder, write_leaderboard
 
-__all__ = ["StudyFolder", "write_leaderboard", "write_report", "write_reproduction"]
+__all__ = ["StudyFolder", "write_leaderboard", "write_report"]

@@ -7,11 +7,10 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mckibben.arrays import Array
 from mckibben.recording import Recording
 
-Array = NDArray[np.float64]
 Style = Literal["line", "fine", "broad", "beads", "specks", "dots", "rings", "ticks", "stems"]
 """How points are drawn: a line, a thin one, a pale wide one to lie under others, a line with a bead
 at every point, small dots without a line, or separate marks."""

@@ -8,25 +8,26 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
-from mckibben.blocks.base import Block
+from mckibben.arrays import Array
+from mckibben.blocks.core.block import Block
 from mckibben.errors import ModelError
 from mckibben.recording import Recording
 from mckibben.report import model_subjects, printed, subjects
 from mckibben.report.drawing import N_COLOURS, Drawing, Panel, left_out
-from mckibben.report.shown import Shown, shown
+from mckibben.report.shown import Shown, shown, unique
 
 if TYPE_CHECKING:
-    from mckibben.comparison.results import Study
+    from mckibben.comparison.studying import Study
 
 
 def time(study: Study) -> Drawing:
     """Input and output of all recordings over time."""
-    return subjects.time_course(_recordings(study), (study.input, study.output))
+    return subjects.time_course(_recordings(study), _pair(study))
 
 
 def loop(study: Study) -> Drawing:
     """Output over input of all recordings."""
-    return subjects.loop(_recordings(study), study.input, study.output)
+    return subjects.loop(_recordings(study), *_pair(study))
 
 
 def leaderboard(study: Study) -> Drawing:
@@ -38,9 +39,7 @@ def fit(study: Study) -> Drawing:
     """Measured and modelled output over time, of the model chosen."""
     return _one_each(
         shown(study),
-        lambda one: subjects.fit_over_time(
-            one.recording, study.output, _chosen(one), one.test_from
-        ),
+        lambda one: subjects.fit_over_time(one.recording, one.output, _chosen(one), one.test_from),
     )
 
 
@@ -48,7 +47,7 @@ def loops(study: Study) -> Drawing:
     """Measured and modelled loop, of the model chosen."""
     return _one_each(
         shown(study),
-        lambda one: subjects.fit_loops(one.recording, study.input, study.output, _chosen(one)),
+        lambda one: subjects.fit_loops(one.recording, one.input, one.output, _chosen(one)),
     )
 
 
@@ -56,7 +55,7 @@ def residuals(study: Study) -> Drawing:
     """Residuals of the model chosen against input and time, on the recording tested on."""
     first = shown(study)[0]
     return subjects.residuals(
-        first.recording, study.input, study.output, _chosen(first), first.test_from
+        first.recording, first.input, first.output, _chosen(first), first.test_from
     )
 
 
@@ -69,7 +68,7 @@ def weights(study: Study) -> Drawing:
 
 def inverse(study: Study) -> Drawing:
     """Wished-for and modelled output, error, and the input that the inverse gives."""
-    if study.inverse is None:
+    if study.inverse is None or study.inverse.reachable is None:
         raise ModelError(
             "no model of this study has an inverse. Remedy: compare pi, mpi and gpi, which can."
         )
@@ -181,7 +180,10 @@ def plot_model(block: Block, recordings: Sequence[Recording], kind: str, path: s
         printed.save(model_subjects.weights({name: block}), path)
         return
     given, wanted = block.inputs[0].name, block.outputs[0].name
-    runs = [Shown(r, {name: run_free(block, r, wanted)}, "") for r in recordings[:N_COLOURS]]
+    runs = [
+        Shown(r, given, wanted, {name: run_free(block, r, wanted)}, "")
+        for r in recordings[:N_COLOURS]
+    ]
 
     def drawing(one: Shown) -> Drawing:
         if kind == "fit":
@@ -200,17 +202,23 @@ def _one_each(
     panels: list[Panel] = []
     for one in runs[:N_COLOURS]:
         drawing = draw(one)
-        title = one.recording.name if len(runs) > 1 else ""
+        title = one.name if len(runs) > 1 else ""
         panels += [replace(panel, title=title) for panel in drawing.panels]
-    named = [*(one.recording.name for one in runs[N_COLOURS:]), *others]
+    named = [*(one.name for one in runs[N_COLOURS:]), *others]
     return replace(drawing, panels=tuple(panels), note=left_out(named))
 
 
 def _recordings(study: Study) -> list[Recording]:
-    return [one.recording for one in shown(study)]
+    return [one.recording for one in unique(shown(study))]
 
 
-def _chosen(one: Shown) -> dict[str, subjects.Array]:
+def _pair(study: Study) -> tuple[str, str]:
+    """Return the first output, and the input that is its own."""
+    first = shown(study)[0]
+    return first.input, first.output
+
+
+def _chosen(one: Shown) -> dict[str, Array]:
     if not one.outputs:
         raise ModelError(
             "no model of this study worked. Remedy: read the reasons in its leaderboard."

@@ -11,11 +11,10 @@ from html import escape
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mckibben.arrays import Array
 from mckibben.report.drawing import Curve, Drawing, Panel
 
-Array = NDArray[np.float64]
 Json = dict[str, Any]
 
 CLOSED: Json = {"displaylogo": False, "showSendToCloud": False, "plotlyServerURL": ""}

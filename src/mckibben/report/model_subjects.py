@@ -7,24 +7,28 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mckibben.blocks.base import Block
-from mckibben.blocks.eupi import EUPI
-from mckibben.blocks.gpi import GPI
-from mckibben.blocks.pi import PI
-from mckibben.blocks.rate_dependent_pi import RateDependentPI
+from mckibben.blocks.core.block import Block
+from mckibben.blocks.play_type.eupi import EUPI
+from mckibben.blocks.play_type.gpi import GPI
+from mckibben.blocks.play_type.pi import PI
+from mckibben.blocks.play_type.rate_dependent_pi import RateDependentPI
 from mckibben.errors import ModelError
 from mckibben.report.drawing import (
     N_COLOURS,
+    POINTS,
     Curve,
     Drawing,
     Panel,
     axis_label,
     over_time,
     series_colour,
+    time_label,
 )
 
 if TYPE_CHECKING:
-    from mckibben.comparison.results import InverseCheck, Leaderboard
+    from mckibben.comparison.inverting import InverseCheck
+    from mckibben.comparison.results import Leaderboard
+    from mckibben.control import Tracked
 
 OFF_THE_CHART = 3.0
 """Cross-validated errors beyond so many times the largest test error would squeeze all others."""
@@ -106,6 +110,19 @@ def operator_sums(block: Block) -> Iterator[OperatorSum]:
     else:
         for part in getattr(block, "parts", ()):
             yield from operator_sums(part)
+
+
+def tracking(loops: Mapping[str, Tracked], output: str, points: int = POINTS) -> Drawing:
+    """Draw a wished-for motion of one output, and what every controller made of it."""
+    first = next(iter(loops.values())).recording
+    wanted = over_time(first.time, first[f"reference_{output}"], points)
+    curves = [Curve(*wanted, "reference", style="broad")]
+    for place, (name, found) in enumerate(loops.items()):
+        if place < N_COLOURS:
+            followed = over_time(found.recording.time, found.recording[output], points)
+            curves.append(Curve(*followed, name, series_colour(place)))
+    label = axis_label(output, first.units[output])
+    return Drawing((Panel(time_label(first), label, tuple(curves)),))
 
 
 def inverse_check(check: InverseCheck, timed: bool = True) -> Drawing:

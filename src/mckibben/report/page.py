@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING, Any
 from mckibben.recording import notes_by_file, reading_notes
 from mckibben.report import interactive, model_subjects, subjects, templating, wording
 from mckibben.report.drawing import N_COLOURS, POINTS, Drawing, series_colour
-from mckibben.report.shown import Shown, drawn, shown
+from mckibben.report.shown import Shown, drawn, shown, unique
 
 if TYPE_CHECKING:
-    from mckibben.comparison.results import Leaderboard, Row, Study
+    from mckibben.comparison.results import Leaderboard, Row
+    from mckibben.comparison.studying import Study
 
 N_VALUES = 180_000
 """Numbers in all plots together, so that the file stays under 6 MB beside plotly.js."""
@@ -39,29 +40,32 @@ def write_report(study: Study, path: str | Path) -> None:
     OSError
         If the file cannot be written.
     """
-    from mckibben.atomic import write_text
+    from mckibben.system.atomic import write_text
 
     write_text(path, page(study))
 
 
 def page(study: Study) -> str:
     """Return the report of a study as HTML."""
+    from mckibben.comparison.columns import columns_of_board
     from mckibben.comparison.results import CHOICES
 
     every = shown(study)
     pictured = drawn(every)
     figures, left_out = _figures(study, pictured)
-    measured = [one.recording for one in every]
+    measured = [one.recording for one in unique(every)]
     return templating.page(
         "report.html.j2",
         figures,
         study=study,
         board=study.leaderboard,
-        shown=every,
+        shown=unique(every),
+        listed_drawn=unique(pictured),
         drawn=pictured,
         left_out=left_out,
         models=_models(study.leaderboard),
         bars=_bars(study.leaderboard),
+        columns=columns_of_board(study.leaderboard),
         choices=CHOICES,
         reading=notes_by_file(measured),
         notes=[note for note in study.notes if note not in reading_notes(measured)],
@@ -75,34 +79,44 @@ def _figures(study: Study, pictured: tuple[Shown, ...]) -> tuple[Plots, str]:
     # A recording has two panels over time and its loop, then each model in four panels more.
     n_values = len(pictured) * 2 * (5 + 4 * n_models)
     points = max(FEWEST_POINTS, min(POINTS, N_VALUES // n_values))
-    u, y = study.input, study.output
 
     def each(draw: Callable[[Shown], Drawing]) -> list[list[interactive.Json]]:
         return [interactive.plots(draw(one)) for one in pictured]
 
     figures: Plots = {
-        "time": each(lambda one: subjects.time_course([one.recording], (u, y), points)),
-        "loop": each(lambda one: subjects.loop([one.recording], u, y, points)),
+        "time": each(
+            lambda one: subjects.time_course([one.recording], (one.input, one.output), points)
+        ),
+        "loop": each(lambda one: subjects.loop([one.recording], one.input, one.output, points)),
     }
     if n_models:
         figures["leaderboard"] = [interactive.plots(model_subjects.leaderboard(study.leaderboard))]
         figures["fit"] = each(
-            lambda one: subjects.fit_over_time(one.recording, y, one.outputs, one.test_from, points)
+            lambda one: subjects.fit_over_time(
+                one.recording, one.output, one.outputs, one.test_from, points
+            )
         )
         figures["loops"] = each(
-            lambda one: subjects.fit_loops(one.recording, u, y, one.outputs, points)
+            lambda one: subjects.fit_loops(
+                one.recording, one.input, one.output, one.outputs, points
+            )
         )
         figures["residuals"] = each(
-            lambda one: subjects.residuals(one.recording, u, y, one.outputs, one.test_from, points)
+            lambda one: subjects.residuals(
+                one.recording, one.input, one.output, one.outputs, one.test_from, points
+            )
         )
     blocks = {row.model: row.block for row in study.leaderboard.rows if row.block is not None}
     left_out = ""
     if any(any(model_subjects.operator_sums(block)) for block in blocks.values()):
         drawing = model_subjects.weights(blocks)
         figures["weights"], left_out = [interactive.plots(drawing)], drawing.note
-    if study.inverse is not None:
+    if study.inverse is not None and study.inverse.reachable is not None:
         timed = study.train[0].sample_time is not None
         figures["inverse"] = [interactive.plots(model_subjects.inverse_check(study.inverse, timed))]
+    for name in study.leaderboard.outputs if study.loops else ():
+        drawing = model_subjects.tracking(study.loops, name, points)
+        figures[f"tracking {name}"] = [interactive.plots(drawing)]
     return figures, left_out
 
 

@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mckibben.atomic import replacing
 from mckibben.errors import DataError
 from mckibben.report.drawing import Curve, Drawing, Panel
-from mckibben.seals import MAKER, sealed
+from mckibben.system.atomic import replacing
+from mckibben.system.seals import MAKER, sealed
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

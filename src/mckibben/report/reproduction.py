@@ -2,34 +2,13 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mckibben.report import interactive, templating, wording
 from mckibben.report.drawing import N_COLOURS, Curve, Drawing, Panel
 
 if TYPE_CHECKING:
-    from mckibben.papers import Figure, Reproduction
-
-
-def write_reproduction(found: Reproduction, path: str | Path) -> None:
-    """Write the report of a re-run as one HTML file that opens without a network.
-
-    Parameters
-    ----------
-    found : Reproduction
-        What came out.
-    path : path
-        File to write; a failure on the way leaves what was there before.
-
-    Raises
-    ------
-    OSError
-        If the file cannot be written.
-    """
-    from mckibben.atomic import write_text
-
-    write_text(path, reproduction_page(found))
+    from mckibben.papers.reproduction import Figure, Reproduction
 
 
 def reproduction_page(found: Reproduction) -> str:

@@ -6,15 +6,16 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from mckibben.atomic import to_json
-from mckibben.blocks.saving import to_text
+from mckibben.blocks.core.saving import to_text
 from mckibben.outputs import Results
 from mckibben.report.page import page
+from mckibben.system.atomic import to_json
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from mckibben.comparison.results import Leaderboard, Study
+    from mckibben.comparison.results import Leaderboard
+    from mckibben.comparison.studying import Study
 
 PAGE_SHARE = 0.1
 """Share of the time that may go into pages which the next model makes old."""
@@ -63,7 +64,7 @@ class StudyFolder:
     def take(self, study: Study, *, last: bool = False) -> None:
         """Write what is new; the page only when it is due, or the last."""
         write, board = self._results.write_text, study.leaderboard
-        if not board.rows:
+        if not board.rows and study.characterization is not None:
             found = study.characterization.to_dict()
             write("characterization.json", to_json(found) + "\n")
         for row in board.rows:

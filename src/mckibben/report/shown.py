@@ -7,14 +7,12 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mckibben.arrays import Array
 from mckibben.recording import Recording
 
 if TYPE_CHECKING:
-    from mckibben.comparison.results import Study
-
-Array = NDArray[np.float64]
+    from mckibben.comparison.studying import Study
 
 MOST_RECORDINGS = 6
 """Recordings with figures of their own; the others are named."""
@@ -28,6 +26,8 @@ class Shown:
     ----------
     recording : Recording
         Measured.
+    input, output : str
+        Channels.
     outputs : mapping of str to array, shape (n,)
         Model name to its output, the chosen model first.
     role : str
@@ -37,17 +37,30 @@ class Shown:
     """
 
     recording: Recording
+    input: str
+    output: str
     outputs: Mapping[str, Array]
     role: str
     test_from: int | None = None
+    several: bool = False
+    """Whether the recording has other outputs, which are shown apart."""
+
+    @property
+    def name(self) -> str:
+        """What it is called where it is chosen."""
+        return f"{self.recording.name}: {self.output}" if self.several else self.recording.name
 
 
 def shown(study: Study) -> tuple[Shown, ...]:
-    """Return all recordings of a study, those tested on first.
+    """Return all recordings of a study, those tested on first; of several outputs, each once for each.
 
     Where the last part of a recording is held out, the study holds its first part once more to fit;
     that is not repeated here.
     """
+    from mckibben.comparison.channels import Channels
+
+    board = study.leaderboard
+    pairs = Channels(board.inputs, board.outputs).pairs()
     ranked = [row.model for row in study.leaderboard.rows if row.model in study.predictions]
     n_train = len(study.train)
     parts = [_part_of(study, recording) for recording in study.test]
@@ -55,12 +68,14 @@ def shown(study: Study) -> tuple[Shown, ...]:
     for index, (recording, part) in enumerate(zip(study.test, parts, strict=True)):
         role = "test" if part is None else "first part to fit, rest to test"
         start = None if part is None else len(study.train[part])
-        outputs = {model: study.predictions[model][n_train + index] for model in ranked}
-        found.append(Shown(recording, outputs, role, start))
+        for place, pair in enumerate(pairs):
+            outputs = {m: study.predictions[m][n_train + index][:, place] for m in ranked}
+            found.append(Shown(recording, *pair, outputs, role, start, len(pairs) > 1))
     for index, recording in enumerate(study.train):
         if index not in parts:
-            outputs = {model: study.predictions[model][index] for model in ranked}
-            found.append(Shown(recording, outputs, "fit"))
+            for place, pair in enumerate(pairs):
+                outputs = {model: study.predictions[model][index][:, place] for model in ranked}
+                found.append(Shown(recording, *pair, outputs, "fit", None, len(pairs) > 1))
     return tuple(found)
 
 
@@ -68,6 +83,11 @@ def drawn(found: Sequence[Shown]) -> tuple[Shown, ...]:
     """Return those with figures of their own: recordings tested on first, then the longest."""
     by_weight = sorted(found, key=lambda one: (one.role == "fit", -len(one.recording)))
     return tuple(by_weight[:MOST_RECORDINGS])
+
+
+def unique(found: Sequence[Shown]) -> tuple[Shown, ...]:
+    """Return every recording once, whatever its outputs."""
+    return tuple({id(one.recording): one for one in reversed(found)}.values())[::-1]
 
 
 def _part_of(study: Study, whole: Recording) -> int | None:
@@ -79,7 +99,8 @@ def _part_of(study: Study, whole: Recording) -> int | None:
             and part.name == whole.name
             and part.start_time == whole.start_time
             and all(
-                np.array_equal(part[name], whole[name][:n]) for name in (study.input, study.output)
+                np.array_equal(part[name], whole[name][:n])
+                for name in (*study.leaderboard.inputs, *study.leaderboard.outputs)
             )
         ):
             return index

@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mckibben.arrays import Array
 from mckibben.recording import Recording
 from mckibben.report.drawing import (
     FEW,
@@ -29,7 +29,6 @@ from mckibben.report.drawing import (
     time_label,
 )
 
-Array = NDArray[np.float64]
 Outputs = Mapping[str, Array]
 """Model name to its output on one recording, best first."""
 

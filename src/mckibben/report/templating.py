@@ -7,6 +7,7 @@ import hashlib
 from importlib import resources
 from typing import TYPE_CHECKING, Any
 
+from mckibben.numerals import typeset
 from mckibben.report import interactive, wording
 
 if TYPE_CHECKING:
@@ -61,6 +62,10 @@ def template(name: str) -> Template:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters |= {"number": wording.number, "percent": wording.percent}
+    environment.filters |= {
+        "number": wording.number,
+        "percent": wording.percent,
+        "typeset": typeset,
+    }
     environment.policies["json.dumps_kwargs"] = {"allow_nan": False, "separators": (",", ":")}
     return environment.get_template(name)

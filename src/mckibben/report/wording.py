@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
-import math
 import shlex
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+import numpy as np
+
+from mckibben import registry
+from mckibben.numerals import numeral, typeset
+
 if TYPE_CHECKING:
-    from mckibben.comparison.results import Leaderboard, Row, Study
+    from mckibben.comparison.results import Leaderboard, Row
+    from mckibben.comparison.studying import Study
     from mckibben.recording import Recording
 
 WORSE_ON_TEST = 1.5
@@ -22,22 +27,12 @@ MISLEADING = 0.05
 
 
 def number(value: float | None, digits: int = 3) -> str:
-    """Return a number to so many significant digits, without an exponent where that is readable.
+    """Return a number to so many significant digits, as it is printed.
 
-    Counts are whole, and nothing is a dash.
-
-    >>> number(0.012345), number(-12345.6), number(1.5e-12), number(7), number(None)
-    ('0.0123', '−12346', '1.5e−12', '7', '–')
+    >>> number(-12345.6), number(None)
+    ('−12346', '–')
     """
-    if isinstance(value, int):
-        return str(value)
-    if value is None or not math.isfinite(value):
-        return "–"
-    if value == 0:
-        return "0"
-    size = math.floor(math.log10(abs(value)))
-    form = f".{max(0, digits - 1 - size)}f" if -4 <= size <= 6 else f".{digits}g"
-    return f"{value:{form}}".replace("-", "−")
+    return typeset(numeral(value, digits))
 
 
 def percent(value: float | None, digits: int = 2) -> str:
@@ -50,9 +45,11 @@ def percent(value: float | None, digits: int = 2) -> str:
 
 
 def output_range(study: Study) -> float:
-    """Return the range of the measured output over all recordings."""
-    outputs = [recording[study.output] for recording in (*study.train, *study.test)]
-    return float(max(y.max() for y in outputs) - min(y.min() for y in outputs))
+    """Return the range of the measured output over all recordings; of several, the mean range."""
+    names = study.leaderboard.outputs
+    outputs = [recording.matrix(names) for recording in (*study.train, *study.test)]
+    highest = np.max([y.max(axis=0) for y in outputs], axis=0)
+    return float((highest - np.min([y.min(axis=0) for y in outputs], axis=0)).mean())
 
 
 def verdict(study: Study) -> list[str]:
@@ -113,11 +110,16 @@ def _invertibility(study: Study, best: Row) -> str:
         return "The first of the leaderboard that can be inverted is inverted when all are fitted."
     if check is None:
         return "None of the models that worked can be inverted."
-    low, high = check.reachable
     if check.model == best.model:
         which = "It can be inverted"
     else:
         which = f"It cannot be inverted here; the next of the leaderboard that can is {check.model}"
+    if check.reachable is None:
+        share = percent(check.error)
+        return (
+            f"{which}: on the model itself, it follows the test's motion to {share} of its range."
+        )
+    low, high = check.reachable
     return (
         f"{which}: any {study.output} from {number(low)} to {number(high)} "
         f"{study.leaderboard.unit} can be asked for, whatever happened before."
@@ -178,17 +180,22 @@ def commands(study: Study) -> list[tuple[str, str]]:
     """Return what to type to repeat the study and to use its results, each with what it does."""
     board = study.leaderboard
     train, test = _files(study.train), _files(study.test)
-    channels = f"--input {shlex.quote(board.input)} --output {shlex.quote(board.output)}"
+    named = [("--input", name) for name in board.inputs]
+    named += [("--output", name) for name in board.outputs]
+    channels = " ".join(f"{option} {shlex.quote(name)}" for option, name in named)
     tested = "".join(f" --test {file}" for file in test if file not in train)
-    models = ",".join(sorted((*(row.model for row in board.rows), *board.pending)))
+    told = "" if study.load is None else f" --load {shlex.quote(study.load)}"
+    known = registry.names("estimators")
+    rows = {*(row.model for row in board.rows), *board.pending}
+    models = ",".join(sorted(rows.intersection(known)))
     lines = [
         (
             "Repeat this study",
-            f"mckibben study {' '.join(train)}{tested} {channels} --models {models} "
+            f"mckibben study {' '.join(train)}{tested} {channels}{told} --models {models} "
             f"--seed {board.seed} -o study",
         )
     ]
-    if board.best is not None:
+    if board.best is not None and board.best.model in known:
         model = board.best.model
         lines.append(
             (

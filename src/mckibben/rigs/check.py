@@ -7,15 +7,13 @@ import warnings
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mckibben.arrays import Array
 from mckibben.errors import ContractError, DataError, DataWarning
 from mckibben.recording import Recording
 from mckibben.rigs.files import load_rig, save_rig
 from mckibben.rigs.rig import Rig, quantity
 from mckibben.signals import irregular_triangle
-
-Array = NDArray[np.float64]
 
 DURATION = 30.0
 """Of the trial runs [s]."""

@@ -11,11 +11,11 @@ from typing import Any
 from pydantic import BaseModel, ValidationError
 
 from mckibben import registry
-from mckibben.atomic import write_text
 from mckibben.errors import DataError
-from mckibben.ordinary import DESCRIPTION, read_text
 from mckibben.rigs.refusals import limits, refused, unit
 from mckibben.rigs.rig import Rig
+from mckibben.system.atomic import write_text
+from mckibben.system.ordinary import DESCRIPTION, read_text
 
 FORMAT = "mckibben-rig"
 FORMAT_VERSION = 1

@@ -13,8 +13,8 @@ from mckibben.rigs.files import load_rig
 from mckibben.rigs.rig import Rig
 from mckibben.signals import cut
 from mckibben.signals.checking import generator
-from mckibben.signals.protocols import Protocol, Run, protocol
-from mckibben.threads import cores
+from mckibben.signals.protocol import Protocol, Run, protocol
+from mckibben.system.threads import cores
 
 
 def record(

@@ -7,18 +7,17 @@ from collections.abc import Mapping
 from typing import Any, ClassVar, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from pydantic import PrivateAttr, ValidationError, model_validator
 
+from mckibben.arrays import Array
 from mckibben.errors import DataError
 from mckibben.recording import PROVENANCE, Recording
-from mckibben.rigs.commands import command_of, commands_of, limited
+from mckibben.rigs.commands import Commands
 from mckibben.rigs.parameters import Air, Range, Section, Sensor, parameter
 from mckibben.rigs.refusals import refused
 from mckibben.rigs.system import Demands, State, System, Traces
 from mckibben.signals.checking import generator
-
-Array = NDArray[np.float64]
 
 ROOM_TEMPERATURE = 20.0
 """Where every muscle starts [degC]."""
@@ -55,6 +54,7 @@ class Rig(Section, ABC):
 
     _system: System | None = PrivateAttr(default=None)
     _rest: State | None = PrivateAttr(default=None)
+    _commands: Commands | None = PrivateAttr(default=None)
     _running: _Running | None = PrivateAttr(default=None)
 
     @model_validator(mode="after")
@@ -89,9 +89,9 @@ class Rig(Section, ABC):
         """Channels that drive it, the first of which must be given."""
 
     @property
-    @abstractmethod
     def outputs(self) -> tuple[str, ...]:
-        """Channels that it measures."""
+        """Channels that it measures: what there are sensors for."""
+        return tuple(name for name in self.measurable if name in self.sensor)
 
     @abstractmethod
     def build(self) -> System:
@@ -176,8 +176,8 @@ class Rig(Section, ABC):
         DataError
             On missing or unknown channels, or a recording without time.
         """
-        given, saturated = commands_of(self, inputs)
-        step = float(inputs.sample_time or 0.0)  # commands_of refuses recordings without time
+        given, saturated = self._commanded().of_recording(inputs)
+        step = float(inputs.sample_time or 0.0)  # one without is refused above
         traces = self._march(self._at_rest().copy(), given, step, held)
         # A held command is seen from the next sample on.
         seen = np.vstack([self.resting, given[:-1]]) if held else given
@@ -240,8 +240,8 @@ class Rig(Section, ABC):
         running = self._running
         if running is None:
             raise DataError("the rig is not running", remedy="call reset() first")
-        asked = command_of(self, action)
-        given = limited(self, asked)
+        asked = self._commanded().of_action(action)
+        given = self._commanded().limited(asked)
         for name, beyond in zip(self.inputs, given != asked, strict=True):
             if beyond:
                 running.saturated[name] = running.saturated.get(name, 0) + 1
@@ -286,6 +286,12 @@ class Rig(Section, ABC):
         if self._system is None:
             self._system = self.build()
         return self._system
+
+    def _commanded(self) -> Commands:
+        if self._commands is None:
+            ranges = {name: self.limits(name) for name in self.inputs}
+            self._commands = Commands(self.name, ranges, self.resting[0], self.outputs)
+        return self._commands
 
     def _march(self, state: State, inputs: Array, sample_time: float, held: bool) -> Traces:
         return self._built().run(

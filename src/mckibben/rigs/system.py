@@ -7,12 +7,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from mckibben.arrays import Array
 from mckibben.rigs.physics.motion import MOTION, march
 from mckibben.rigs.physics.muscle import MUSCLE_STATE
 
-Array = NDArray[np.float64]
 Records = NDArray[np.void]
-
 
 SETTLING_SHARE = 0.3
 """Share of the settling time in which pressure and load rise; the rest is waited."""

@@ -5,12 +5,11 @@ from __future__ import annotations
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from mckibben.arrays import Array
 from mckibben.errors import DataError
 from mckibben.signals.checking import as_time, generator, require_order, require_positive
-
-Array = NDArray[np.float64]
 
 N_WAVES = 64
 """Sines in a random wave: enough for it to look random, few enough to be quick."""

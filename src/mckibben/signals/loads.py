@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from mckibben.arrays import Array
 from mckibben.errors import DataError
 from mckibben.signals.checking import as_time, require_finite, require_positive
-
-Array = NDArray[np.float64]
 
 
 def constant(time: ArrayLike, value: float) -> Array:

@@ -7,12 +7,11 @@ from collections.abc import Sequence
 from typing import Any, Literal, get_args, get_origin, get_type_hints
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from mckibben import registry
+from mckibben.arrays import Array
 from mckibben.errors import DataError
-
-Array = NDArray[np.float64]
 
 
 def settings_of(name: str) -> dict[str, tuple[str, Any]]:

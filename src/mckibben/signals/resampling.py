@@ -5,12 +5,10 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mckibben.arrays import Array
 from mckibben.errors import DataError
 from mckibben.recording import Recording
-
-Array = NDArray[np.float64]
 
 STOP_BAND = 60.0
 """Attenuation of what could alias [dB]."""

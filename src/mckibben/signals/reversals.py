@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mckibben.compiling import deferred
+from mckibben.arrays import Array
 from mckibben.errors import DataError
+from mckibben.system.compiling import deferred
 
-Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 NOISE_SHARE = 0.05

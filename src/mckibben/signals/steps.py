@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from mckibben.arrays import Array
 from mckibben.errors import DataError
 from mckibben.signals.checking import (
     as_time,
@@ -15,8 +16,6 @@ from mckibben.signals.checking import (
     require_order,
     require_positive,
 )
-
-Array = NDArray[np.float64]
 
 REGISTER_BITS = 15
 """Length of the shift register: its sequence repeats after 2**15 - 1 holds."""

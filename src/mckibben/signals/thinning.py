@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from mckibben.arrays import Array
 from mckibben.errors import DataError
-
-Array = NDArray[np.float64]
 
 
 def decimate_minmax(t: ArrayLike, *series: ArrayLike, max_points: int) -> tuple[Array, ...]:

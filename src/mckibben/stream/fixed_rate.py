@@ -15,11 +15,9 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mckibben.arrays import Array
 from mckibben.errors import ModelError
-
-Array = NDArray[np.float64]
 
 KEPT = 1_000_000
 """Steps that statistics are of, at most: the latest."""

@@ -19,11 +19,10 @@ from types import TracebackType
 from typing import Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from mckibben.arrays import Array
 from mckibben.errors import DataError
-
-Array = NDArray[np.float64]
 
 MAGIC = b"mck1"
 HEAD = struct.Struct("<4sII")

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from mckibben.blocks.base import Block
-from mckibben.blocks.running import Stream
+from mckibben.arrays import Array
+from mckibben.blocks.core.block import Block
+from mckibben.blocks.core.running import Stream
 from mckibben.stream.fixed_rate import Deadlines, FixedRate
-
-Array = NDArray[np.float64]
 
 
 class Step(Stream):

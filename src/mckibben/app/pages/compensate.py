@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from inspect import getdoc
 from typing import Any
 
 import numpy as np
@@ -14,17 +15,11 @@ from mckibben.app.desk import Desk, guarded, kept, named, on_event, tell
 from mckibben.app.guard import LARGEST_UPLOAD, TOO_LARGE
 from mckibben.app.reading import read_upload
 from mckibben.app.work import compensated, reference_recording
+from mckibben.arrays import Array
 from mckibben.errors import DataError, MckibbenError
 from mckibben.files import read, write
 from mckibben.recording import Recording
 from mckibben.report import wording
-
-CONTROLLERS = {
-    "feedforward": "compensator alone",
-    "feedforward-pid": "compensator and PID",
-    "observer": "compensator and disturbance observer",
-    "pid": "PID alone",
-}
 
 WIDTH, HEIGHT = 600, 220
 """Of the place to draw in [px]."""
@@ -264,8 +259,10 @@ def _listed(values: dict[str, float | None]) -> str:
 
 
 def _loops(desk: Desk, model: str, reference: str) -> None:
+    from mckibben import registry
     from mckibben.rigs import load_rig, rig_names
 
+    laws = {name: registry.load("controllers", name) for name in registry.names("controllers")}
     rigs = [
         rig.name
         for rig in map(load_rig, rig_names())
@@ -277,7 +274,7 @@ def _loops(desk: Desk, model: str, reference: str) -> None:
         rig = named(ui.select(rigs, value=rigs[0], label="Rig").classes("min-w-48"), "loop-rig")
         kinds = named(
             ui.select(
-                CONTROLLERS,
+                {name: (getdoc(law) or name).rstrip(".") for name, law in laws.items()},
                 value=["feedforward", "feedforward-pid"],
                 multiple=True,
                 label="Controllers",
@@ -318,7 +315,7 @@ def _loops(desk: Desk, model: str, reference: str) -> None:
             for key, label in zip(rows[0], labels, strict=True)
         ]
         named(ui.table(rows=rows, columns=columns, row_key="name").props("dense flat"), "runs")
-        curves: list[tuple[str, plots.Array, plots.Array, str]] = []
+        curves: list[tuple[str, Array, Array, str]] = []
         for place, name in enumerate(list(runs)[-4:]):
             try:
                 (run_,) = read(desk.workspace.path("runs", f"{name}.csv"), informative=False)

@@ -9,7 +9,7 @@ from nicegui import ui
 
 from mckibben.app import plots
 from mckibben.app.desk import Desk, guarded, named
-from mckibben.app.pages.data import time_plot
+from mckibben.app.pages.cutting import time_plot
 from mckibben.errors import MckibbenError
 from mckibben.recording import Recording
 from mckibben.report import subjects, wording

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import asyncio
-import dataclasses
 import math
+import re
 from collections.abc import Sequence
 from typing import Any
 
@@ -14,17 +14,28 @@ from nicegui import ui
 from mckibben import registry
 from mckibben.app import plots, scripts
 from mckibben.app.desk import Desk, code, guarded, labelled, named, on_event, tell
-from mckibben.app.jobs import ENDED, RUNNING, Job, parse_settings
-from mckibben.atomic import to_json
+from mckibben.app.jobs import ENDED, RUNNING, Job
+from mckibben.comparison.channels import Channels
+from mckibben.comparison.columns import Column, columns_of
 from mckibben.comparison.free_run import run_free
+from mckibben.comparison.offered import defaults, objections, settings_of, summary
 from mckibben.errors import DataError, MckibbenError, ModelError
+from mckibben.numerals import typeset
 from mckibben.report import subjects, wording
+from mckibben.system.atomic import to_json
 
 LONGEST = 200_000
 """Characters of a model's parameters that are shown."""
 
-SENSIBLE = ("pi", "gpi", "mpi", "cpi", "preisach")
-"""Models to start with."""
+SENSIBLE = (
+    *("pi", "gpi", "mpi", "cpi", "preisach"),
+    *("coupled-memory", "coupled-pi", "force-balance"),
+)
+"""Models to start with, of those that have a place."""
+
+
+SEPARATOR = re.compile(r"\n|,(?![^\[]*\])")
+"""Between settings: ends of lines, and commas that are in no list."""
 
 
 def build(desk: Desk) -> None:
@@ -32,12 +43,10 @@ def build(desk: Desk) -> None:
     settings: dict[str, str] = {}
     with ui.row().classes("w-full items-end gap-3"):
         chosen = named(
-            ui.select(
-                _offered(), value=list(SENSIBLE), multiple=True, label="Models to fit"
-            ).classes("min-w-80 flex-1"),
-            "models",
+            ui.select([], multiple=True, label="Models to fit").classes("min-w-80 flex-1"), "models"
         )
         _names_only(chosen)
+        _offer(desk, chosen)
         ui.button("Settings", on_click=lambda: _settings(list(chosen.value), settings)).props(
             "flat"
         )
@@ -63,11 +72,29 @@ def _names_only(chosen: ui.select) -> None:
     show()
 
 
-def _offered() -> dict[str, str]:
-    return {
-        name: f"{name}: {registry.load('estimators', name).__doc__.strip().splitlines()[0]}"
-        for name in registry.names("estimators")
-    }
+def _offer(desk: Desk, chosen: ui.select) -> None:
+    """Offer the models that have a place on the channels of the recordings in use."""
+
+    def offer() -> None:
+        offered = _offered(desk)
+        if set(offered) != set(chosen.options):
+            kept = [name for name in chosen.value or [] if name in offered]
+            first = [name for name in SENSIBLE if name in offered]
+            chosen.set_options(offered, value=kept or first)
+
+    desk.when("recordings", offer)
+    desk.when("channels", offer)
+    offer()
+
+
+def _offered(desk: Desk) -> dict[str, str]:
+    names = registry.names("estimators")
+    recordings = desk.workspace.readable()
+    has_channels = set(desk.inputs + desk.outputs) <= set(desk.workspace.channels())
+    against = {}
+    if recordings and has_channels:
+        against = objections(names, recordings, Channels(desk.inputs, desk.outputs))
+    return {name: f"{name}: {summary(name)}" for name in names if name not in against}
 
 
 def _settings(models: list[str], kept: dict[str, str]) -> None:
@@ -76,10 +103,9 @@ def _settings(models: list[str], kept: dict[str, str]) -> None:
         ui.label("Settings, one name=value a line; empty for the defaults").classes("text-lg")
         for model in models:
             known = [
-                f"{field.name}={field.default}"
-                for field in dataclasses.fields(registry.load("estimators", model))
-                if field.default is not dataclasses.MISSING
-                and field.name not in ("input", "output")
+                f"{name}={default}"
+                for name, default in defaults(model).items()
+                if name not in ("input", "output", "scheduling")
             ]
             ui.label(f"{model}: {', '.join(known)}").classes("text-xs opacity-70")
             ui.textarea(model, value=kept.get(model, "")).classes("w-full").on_value_change(
@@ -96,18 +122,16 @@ def _fit(desk: Desk, models: list[str], settings: dict[str, str]) -> None:
         )
         return
     for model in models:
-        given = parse_settings(settings.get(model, ""))
-        known = {field.name for field in dataclasses.fields(registry.load("estimators", model))}
-        unknown = sorted(set(given) - known)
-        if unknown:
-            tell(
-                f"{model} has no setting {unknown[0]!r}. Remedy: use one of {', '.join(sorted(known))}."
-            )
+        lines = SEPARATOR.split(settings.get(model, ""))
+        try:
+            given = settings_of(model, filter(None, map(str.strip, lines)))
+        except ModelError as error:
+            tell(error)
             continue
         call = scripts.fit_call(model, desk.channels, given, 0)
         desk.jobs.submit(
             "fit",
-            {"model": model, "name": model, "input": desk.input, "output": desk.output}
+            {"model": model, "name": model, **desk.channels}
             | {"settings": given, "seed": 0, "call": call, "allow_shared": desk.allow_shared},
         )
         desk.did(f"started fitting {model}", call)
@@ -181,23 +205,10 @@ def _best_so_far(desk: Desk, fits: list[Job]) -> None:
     if curves:
         ui.label("Best so far").classes("text-sm")
         figure = plots.lines(
-            curves, x="time [s]", y=f"training RMSE of {desk.output}", dark=desk.dark
+            curves, x="time [s]", y=f"training RMSE of {', '.join(desk.outputs)}", dark=desk.dark
         )
         figure["layout"]["yaxis"]["type"] = "log"
         named(ui.plotly(figure).classes("w-full"), "best-so-far")
-
-
-COLUMNS = (
-    ("name", "Model"),
-    ("cv", "CV RMSE"),
-    ("rmse", "Test RMSE"),
-    ("interval", "95 % interval"),
-    ("r2", "R² [%]"),
-    ("train", "Train RMSE"),
-    ("memory", "Memory"),
-    ("parameters", "Parameters"),
-    ("seconds", "Fit [s]"),
-)
 
 
 def _leaderboard(desk: Desk) -> None:
@@ -205,17 +216,20 @@ def _leaderboard(desk: Desk) -> None:
 
     @ui.refreshable
     def shown() -> None:
-        rows = [_row(result) for result in desk.workspace.results()]
-        if not rows:
+        results = desk.results()
+        if not results:
             ui.label("Fit models to see them compared here.").classes("opacity-70")
             return
+        by = results[0]["chosen_by"]
+        columns = columns_of(results, results[0]["unit"], desk.outputs, by)
+        rows = [_row(result, columns) for result in results]
         table = named(
             ui.table(
                 rows=rows,
                 columns=[
                     {"name": key, "label": label, "field": key, "sortable": True}
                     | {"align": "left" if key == "name" else "right"}
-                    for key, label in COLUMNS
+                    for key, label in (("name", "model"), *((c.key, c.label) for c in columns))
                 ],
                 row_key="name",
                 selection="multiple",
@@ -227,10 +241,10 @@ def _leaderboard(desk: Desk) -> None:
         ui.label(
             "The first is to be chosen: least error in cross-validation on the training side; nothing "
             "is chosen by the test. "
-            "Memory: 1 where the model keeps rising and falling branches as far apart as the data do, "
-            "0 where it forgot. Select one or two models to look closer."
+            "Gap kept: 100 % where the model keeps rising and falling branches as far apart as the data "
+            "do, 0 where it forgot. Select one or two models to look closer."
         ).classes("text-xs opacity-70")
-        for said in _judged(desk.workspace.results()):
+        for said in _judged(results):
             ui.label(said).classes("text-sm")
         place = named(ui.column().classes("w-full"), "closer")
 
@@ -266,22 +280,9 @@ def _judged(results: Sequence[dict[str, Any]]) -> list[str]:
     return list(dict.fromkeys(said))
 
 
-def _row(result: dict[str, Any]) -> dict[str, Any]:
-    test, train = result["test"] or {}, result["train"] or {}
-    interval = test.get("rmse_interval")
-    memory = (result["memory"] or {}).get("gap_ratio")
-    number = wording.number
-    return {
-        "name": result["name"],
-        "rmse": number(test.get("rmse")),
-        "interval": f"{number(interval[0])} to {number(interval[1])}" if interval else "",
-        "r2": number(100 * test["r2"], 4) if test.get("r2") is not None else "",
-        "cv": number(result["validation_rmse"]),
-        "train": number(train.get("rmse")),
-        "memory": number(memory, 2),
-        "parameters": result["n_parameters"],
-        "seconds": number(result["fit_seconds"], 2),
-    }
+def _row(result: dict[str, Any], columns: Sequence[Column]) -> dict[str, str]:
+    shown = {column.key: typeset(column.text(result)) for column in columns}
+    return {"name": result["name"]} | shown
 
 
 async def _closer(desk: Desk, names: list[str], place: Any) -> None:
@@ -295,7 +296,7 @@ async def _closer(desk: Desk, names: list[str], place: Any) -> None:
 
     def modelled() -> dict[str, Any]:
         return {
-            name: run_free(block, recording, desk.output, known) for name, block in blocks.items()
+            name: run_free(block, recording, desk.outputs, known) for name, block in blocks.items()
         }
 
     try:
@@ -304,11 +305,14 @@ async def _closer(desk: Desk, names: list[str], place: Any) -> None:
         raise ModelError(f"{', '.join(names)} on {recording.name}: {error}") from None
     with place:
         ui.label(f"On {recording.name}").classes("text-base")
-        drawings = (
-            subjects.fit_over_time(recording, desk.output, outputs),
-            subjects.fit_loops(recording, desk.input, desk.output, outputs),
-            subjects.residuals(recording, desk.input, desk.output, outputs),
-        )
+        drawings = []
+        for place, pair in enumerate(desk.pairs):
+            own = {name: found[:, place] for name, found in outputs.items()}
+            drawings += [
+                subjects.fit_over_time(recording, pair[1], own),
+                subjects.fit_loops(recording, *pair, own),
+                subjects.residuals(recording, *pair, own),
+            ]
         for number, drawing in enumerate(drawings):
             with ui.row().classes("w-full"):
                 for figure in plots.figures(drawing, dark=desk.dark, height=360):

@@ -10,10 +10,10 @@ from nicegui import ui
 
 from mckibben.app import scripts
 from mckibben.app.desk import Desk, code, guarded, named
-from mckibben.atomic import replacing
-from mckibben.blocks.base import Block
+from mckibben.blocks.core.block import Block
 from mckibben.errors import DataError
-from mckibben.ordinary import read_bytes
+from mckibben.system.atomic import replacing
+from mckibben.system.ordinary import read_bytes
 
 LARGEST = 256 * 2**20
 """Bytes of a file that is handed over."""
@@ -38,7 +38,7 @@ def build(desk: Desk) -> None:
         if not names:
             ui.label("Fit a model first, under Models.")
             return
-        ranked = [row["name"] for row in desk.workspace.results()]
+        ranked = [row["name"] for row in desk.results()]
         first = next((name for name in ranked if name in names), names[0])
         with ui.row().classes("items-end gap-3"):
             model = named(
@@ -172,14 +172,14 @@ def _report(desk: Desk) -> None:
 
         async def start() -> None:
             models, settings = [], {}
-            for row in desk.workspace.results():
+            for row in desk.results():
                 if row["model"] not in models:
                     models.append(row["model"])
                     settings[row["model"]] = row["settings"]
             call = f"write_report(mckibben.study(train, test, models={models!r}), 'report.html')"
             desk.jobs.submit(
                 "report",
-                {"models": models, "settings": settings, "input": desk.input, "output": desk.output}
+                {"models": models, "settings": settings, **desk.channels}
                 | {"call": call, "title": "report", "seed": 0, "allow_shared": desk.allow_shared},
             )
             desk.did("started the report", call)
@@ -207,7 +207,7 @@ def _report(desk: Desk) -> None:
 
 def _script(desk: Desk) -> None:
     def text() -> str:
-        models = [row["name"] for row in desk.workspace.results()]
+        models = [row["name"] for row in desk.results()]
         return scripts.script(desk.workspace, models, desk.channels)
 
     with ui.card().classes("w-full"):

@@ -20,31 +20,24 @@ from typing import Annotated, ClassVar, Literal, Self
 
 import numpy as np
 from annotated_types import Ge, Gt
-from numpy.typing import NDArray
-from pydantic import BeforeValidator, FiniteFloat
+from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
-from mckibben.blocks.base import Kernel, Primitive
-from mckibben.blocks.differential.flow import flow
-from mckibben.blocks.fields import (
+from mckibben.arrays import Array
+from mckibben.blocks.core.block import Kernel
+from mckibben.blocks.core.fields import (
     DISPLACEMENT,
     PRESSURE,
     STRICT,
     ChannelField,
     Coefficients,
-    Initial,
     StoredInitial,
 )
-from mckibben.blocks.kernels import kernel
-from mckibben.blocks.named import NamedParameters
-from mckibben.blocks.refusals import explicit_state
-from mckibben.blocks.reversible import least_slope, polynomial_at
-from mckibben.blocks.saving import nested
-from mckibben.blocks.single import Ranged, check_input_range
-from mckibben.blocks.solved import SolvedInverse, solve_samples
-from mckibben.errors import ModelError
-
-Array = NDArray[np.float64]
+from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.core.solved_inverse import solve_samples
+from mckibben.blocks.differential.flow import flow
+from mckibben.blocks.differential.loop import BoucWenLoop
+from mckibben.blocks.memoryless.reversible import least_slope, polynomial_at
 
 
 @kernel
@@ -89,12 +82,12 @@ def bouc_wen_kernel(coefficients: Array, state: Array, inputs: Array, outputs: A
 def bouc_wen_inverse_kernel(
     coefficients: Array, state: Array, inputs: Array, outputs: Array
 ) -> None:
-    """Solve for the input; see `mckibben.blocks.solved`."""
+    """Solve for the input; see `mckibben.blocks.core.solved_inverse`."""
     solve_samples(_trial, _advance, coefficients, state, inputs, outputs)
 
 
 @dataclass(frozen=True, config=STRICT)
-class BoucWen(Ranged, NamedParameters, Primitive):
+class BoucWen(BoucWenLoop):
     """Normalised Bouc-Wen model with a reversible polynomial.
 
     Parameters
@@ -122,6 +115,7 @@ class BoucWen(Ranged, NamedParameters, Primitive):
 
     kind: ClassVar[str] = "bouc-wen"
     kernel: ClassVar[Kernel] = bouc_wen_kernel
+    inverse_kernel: ClassVar[Kernel] = bouc_wen_inverse_kernel
     parameters: ClassVar[tuple[str, ...]] = ("polynomial", "weight", "rate", "sigma")
 
     polynomial: Coefficients
@@ -136,27 +130,6 @@ class BoucWen(Ranged, NamedParameters, Primitive):
     input: ChannelField = PRESSURE
     output: ChannelField = DISPLACEMENT
 
-    def __post_init__(self) -> None:
-        check_input_range(self.kind, self.input_range)
-        if not self.polynomial:
-            raise ModelError(
-                f"{self.kind!r} has no polynomial. Remedy: give one coefficient or more."
-            )
-
-    @property
-    def n_states(self) -> int:
-        """Z and the previous input."""
-        return 2
-
-    def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
-        """Return [z, first input]."""
-        start = self.initial if initial is None else initial
-        if start == "first_sample":
-            return np.array([1.0, first[0]])
-        if start == "virgin":
-            return np.array([0.0, first[0]])
-        return explicit_state(self, start)
-
     def coefficients(self, sample_time: float | None) -> Array:
         """Return [rate, sigma, exponent, weight, centre, scale, polynomial]."""
         del sample_time
@@ -169,46 +142,7 @@ class BoucWen(Ranged, NamedParameters, Primitive):
         reversible = least_slope(self.polynomial, self.centre, self.scale, self.limits)
         return reversible + min(0.0, self.weight * steepest)
 
-    def input_of(self, state: Array) -> float:
-        """Return the input last seen."""
-        return float(state[1])
-
-    def peaks(self) -> Array:
-        """Return peaks spread over the input range."""
-        return np.linspace(*self.limits, 33)
-
-    def inverse(self) -> BoucWenInverse:
-        """Return the inverse, solved for every sample to rounding.
-
-        Raises
-        ------
-        ModelError
-            If there is no input range, or the output need not rise with the input.
-        """
-        return BoucWenInverse(self)
-
     @classmethod
     def example(cls) -> Self:
         """Return a saturating loop over 0 to 5 bar."""
         return cls((14.0, 16.0, -1.0, -1.0), -2.5, 1.2, 0.7, 1, 2.5, 2.5, (0.0, 5.0))
-
-
-@dataclass(frozen=True, config=STRICT)
-class BoucWenInverse(SolvedInverse):
-    """Inverse of a `BoucWen` model, solved for every sample.
-
-    Parameters
-    ----------
-    forward : BoucWen
-        The model inverted.
-    """
-
-    kind: ClassVar[str] = "bouc-wen-inverse"
-    kernel: ClassVar[Kernel] = bouc_wen_inverse_kernel
-
-    forward: Annotated[BoucWen, BeforeValidator(nested)]
-
-    @classmethod
-    def example(cls) -> Self:
-        """Return the inverse of the example model."""
-        return cls(BoucWen.example())

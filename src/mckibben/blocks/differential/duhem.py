@@ -18,12 +18,13 @@ from typing import Annotated, ClassVar, Self
 
 import numpy as np
 from annotated_types import Gt
-from numpy.typing import ArrayLike, NDArray
-from pydantic import BeforeValidator, FiniteFloat
+from numpy.typing import ArrayLike
+from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
-from mckibben.blocks.base import Kernel, Primitive
-from mckibben.blocks.fields import (
+from mckibben.arrays import Array
+from mckibben.blocks.core.block import Kernel
+from mckibben.blocks.core.fields import (
     DISPLACEMENT,
     PRESSURE,
     STRICT,
@@ -32,16 +33,13 @@ from mckibben.blocks.fields import (
     Initial,
     StoredInitial,
 )
-from mckibben.blocks.kernels import kernel
-from mckibben.blocks.named import NamedParameters
-from mckibben.blocks.refusals import explicit_state
-from mckibben.blocks.reversible import polynomial_at
-from mckibben.blocks.saving import nested
-from mckibben.blocks.single import Ranged, check_input_range
-from mckibben.blocks.solved import SolvedInverse, solve_samples
+from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.core.refusals import explicit_state
+from mckibben.blocks.core.single_channel import check_input_range
+from mckibben.blocks.core.solved_inverse import solve_samples
+from mckibben.blocks.differential.loop import Loop
+from mckibben.blocks.memoryless.reversible import polynomial_at
 from mckibben.errors import ModelError
-
-Array = NDArray[np.float64]
 
 
 @kernel
@@ -82,7 +80,7 @@ def duhem_kernel(coefficients: Array, state: Array, inputs: Array, outputs: Arra
 
 @kernel
 def duhem_inverse_kernel(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
-    """Solve for the input; see `mckibben.blocks.solved`."""
+    """Solve for the input; see `mckibben.blocks.core.solved_inverse`."""
     solve_samples(_trial, _advance, coefficients, state, inputs, outputs)
 
 
@@ -108,7 +106,7 @@ def particular(alpha: float, target: ArrayLike, slope: ArrayLike, direction: flo
 
 
 @dataclass(frozen=True, config=STRICT)
-class Duhem(Ranged, NamedParameters, Primitive):
+class Duhem(Loop):
     """Duhem model with a polynomial to tend to and a polynomial slope.
 
     Parameters
@@ -132,6 +130,7 @@ class Duhem(Ranged, NamedParameters, Primitive):
 
     kind: ClassVar[str] = "duhem"
     kernel: ClassVar[Kernel] = duhem_kernel
+    inverse_kernel: ClassVar[Kernel] = duhem_inverse_kernel
     parameters: ClassVar[tuple[str, ...]] = ("target", "slope", "alpha")
 
     target: Coefficients
@@ -151,11 +150,6 @@ class Duhem(Ranged, NamedParameters, Primitive):
                 f"{self.kind!r} has an empty polynomial. Remedy: give one coefficient or more to each."
             )
 
-    @property
-    def n_states(self) -> int:
-        """Output and previous input."""
-        return 2
-
     def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
         """Return [output, first input]."""
         start = self.initial if initial is None else initial
@@ -173,6 +167,12 @@ class Duhem(Ranged, NamedParameters, Primitive):
         both = [particular(self.alpha, self.target, self.slope, way) for way in (1.0, -1.0)]
         return np.array([self.alpha, self.centre, self.scale, *both[0], *both[1]])
 
+    def c_numbers(self, sample_time: float | None) -> Array:
+        """Return the coefficients, then f filled up to as many numbers as P."""
+        own = self.coefficients(sample_time)
+        size = (own.size - 3) // 2
+        return np.array([*own, *self.target, *[0.0] * (size - len(self.target))])
+
     def least_slope(self) -> float:
         """Return a lower bound of the slope of the output by the input, on loops within the range.
 
@@ -186,46 +186,7 @@ class Duhem(Ranged, NamedParameters, Primitive):
         rising, falling = self.alpha * (f - high) + g, -self.alpha * (f - low) + g
         return float(min(rising.min(), falling.min())) / self.scale
 
-    def input_of(self, state: Array) -> float:
-        """Return the input last seen."""
-        return float(state[1])
-
-    def peaks(self) -> Array:
-        """Return peaks spread over the input range."""
-        return np.linspace(*self.limits, 33)
-
-    def inverse(self) -> DuhemInverse:
-        """Return the inverse, solved for every sample to rounding.
-
-        Raises
-        ------
-        ModelError
-            If there is no input range, or the output need not rise with the input.
-        """
-        return DuhemInverse(self)
-
     @classmethod
     def example(cls) -> Self:
         """Return a loop over 0 to 5 bar that saturates."""
         return cls((14.0, 16.0, -1.0), (12.0, -1.0), 1.5, 2.5, 2.5, (0.0, 5.0))
-
-
-@dataclass(frozen=True, config=STRICT)
-class DuhemInverse(SolvedInverse):
-    """Inverse of a `Duhem` model, solved for every sample.
-
-    Parameters
-    ----------
-    forward : Duhem
-        The model inverted.
-    """
-
-    kind: ClassVar[str] = "duhem-inverse"
-    kernel: ClassVar[Kernel] = duhem_inverse_kernel
-
-    forward: Annotated[Duhem, BeforeValidator(nested)]
-
-    @classmethod
-    def example(cls) -> Self:
-        """Return the inverse of the example model."""
-        return cls(Duhem.example())

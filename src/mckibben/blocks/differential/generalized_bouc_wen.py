@@ -21,32 +21,26 @@ from typing import Annotated, ClassVar, Literal, Self
 
 import numpy as np
 from annotated_types import Gt
-from numpy.typing import NDArray
-from pydantic import BeforeValidator, FiniteFloat
+from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
-from mckibben.blocks.base import Kernel, Primitive
-from mckibben.blocks.differential.flow import flow
-from mckibben.blocks.fields import (
+from mckibben.arrays import Array
+from mckibben.blocks.core.block import Kernel
+from mckibben.blocks.core.fields import (
     DISPLACEMENT,
     PRESSURE,
     STRICT,
     ChannelField,
     Coefficients,
-    Initial,
     StoredInitial,
     Vector,
 )
-from mckibben.blocks.kernels import kernel
-from mckibben.blocks.named import NamedParameters
-from mckibben.blocks.refusals import explicit_state
-from mckibben.blocks.reversible import least_slope, polynomial_at
-from mckibben.blocks.saving import nested
-from mckibben.blocks.single import Ranged, check_input_range
-from mckibben.blocks.solved import SolvedInverse, solve_samples
+from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.core.solved_inverse import solve_samples
+from mckibben.blocks.differential.flow import flow
+from mckibben.blocks.differential.loop import BoucWenLoop
+from mckibben.blocks.memoryless.reversible import least_slope, polynomial_at
 from mckibben.errors import ModelError
-
-Array = NDArray[np.float64]
 
 
 @kernel
@@ -110,12 +104,12 @@ def generalized_bouc_wen_kernel(
 def generalized_bouc_wen_inverse_kernel(
     coefficients: Array, state: Array, inputs: Array, outputs: Array
 ) -> None:
-    """Solve for the input; see `mckibben.blocks.solved`."""
+    """Solve for the input; see `mckibben.blocks.core.solved_inverse`."""
     solve_samples(_trial, _advance, coefficients, state, inputs, outputs)
 
 
 @dataclass(frozen=True, config=STRICT)
-class GeneralizedBoucWen(Ranged, NamedParameters, Primitive):
+class GeneralizedBoucWen(BoucWenLoop):
     """Generalised Bouc-Wen model with a reversible polynomial.
 
     Parameters
@@ -143,6 +137,7 @@ class GeneralizedBoucWen(Ranged, NamedParameters, Primitive):
 
     kind: ClassVar[str] = "generalized-bouc-wen"
     kernel: ClassVar[Kernel] = generalized_bouc_wen_kernel
+    inverse_kernel: ClassVar[Kernel] = generalized_bouc_wen_inverse_kernel
     parameters: ClassVar[tuple[str, ...]] = ("polynomial", "weight", "rate", "shape")
 
     polynomial: Coefficients
@@ -158,30 +153,12 @@ class GeneralizedBoucWen(Ranged, NamedParameters, Primitive):
     output: ChannelField = DISPLACEMENT
 
     def __post_init__(self) -> None:
-        check_input_range(self.kind, self.input_range)
-        if not self.polynomial:
-            raise ModelError(
-                f"{self.kind!r} has no polynomial. Remedy: give one coefficient or more."
-            )
+        super().__post_init__()
         if len(self.shape) != 5 or not np.abs(self.shape).sum() < 1:
             raise ModelError(
                 f"the shape of {self.kind!r} is {self.shape}. Remedy: give five numbers whose sizes add "
                 "up to less than 1."
             )
-
-    @property
-    def n_states(self) -> int:
-        """Z and the previous input."""
-        return 2
-
-    def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
-        """Return [z, first input]."""
-        start = self.initial if initial is None else initial
-        if start == "first_sample":
-            return np.array([1.0, first[0]])
-        if start == "virgin":
-            return np.array([0.0, first[0]])
-        return explicit_state(self, start)
 
     def coefficients(self, sample_time: float | None) -> Array:
         """Return [rate, exponent, weight, centre, scale, 1, shape, polynomial]."""
@@ -213,24 +190,6 @@ class GeneralizedBoucWen(Ranged, NamedParameters, Primitive):
         smallest = 1.0 + min(float(np.dot(self.shape, sign)) for sign in signs)
         return float(smallest ** (-1.0 / self.exponent))
 
-    def input_of(self, state: Array) -> float:
-        """Return the input last seen."""
-        return float(state[1])
-
-    def peaks(self) -> Array:
-        """Return peaks spread over the input range."""
-        return np.linspace(*self.limits, 33)
-
-    def inverse(self) -> GeneralizedBoucWenInverse:
-        """Return the inverse, solved for every sample to rounding.
-
-        Raises
-        ------
-        ModelError
-            If there is no input range, or the output need not rise with the input.
-        """
-        return GeneralizedBoucWenInverse(self)
-
     @classmethod
     def example(cls) -> Self:
         """Return a saturating loop over 0 to 5 bar."""
@@ -244,24 +203,3 @@ class GeneralizedBoucWen(Ranged, NamedParameters, Primitive):
             2.5,
             (0.0, 5.0),
         )
-
-
-@dataclass(frozen=True, config=STRICT)
-class GeneralizedBoucWenInverse(SolvedInverse):
-    """Inverse of a `GeneralizedBoucWen` model, solved for every sample.
-
-    Parameters
-    ----------
-    forward : GeneralizedBoucWen
-        The model inverted.
-    """
-
-    kind: ClassVar[str] = "generalized-bouc-wen-inverse"
-    kernel: ClassVar[Kernel] = generalized_bouc_wen_inverse_kernel
-
-    forward: Annotated[GeneralizedBoucWen, BeforeValidator(nested)]
-
-    @classmethod
-    def example(cls) -> Self:
-        """Return the inverse of the example model."""
-        return cls(GeneralizedBoucWen.example())

@@ -14,11 +14,11 @@ from abc import abstractmethod
 import numpy as np
 from numpy.typing import NDArray
 
-from mckibben.blocks.base import Block
-from mckibben.blocks.fields import FittedInitial, Initial
+from mckibben.arrays import Array
+from mckibben.blocks.core.block import Block
+from mckibben.blocks.core.fields import FittedInitial, Initial
 from mckibben.recording import Recording
 
-Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 KNOWN = 0.5

@@ -15,12 +15,12 @@ from typing import Annotated, ClassVar
 
 import numpy as np
 from annotated_types import Gt, Interval
-from numpy.typing import NDArray
 from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
-from mckibben.blocks.base import Block, Primitive
-from mckibben.blocks.fields import (
+from mckibben.arrays import Array
+from mckibben.blocks.core.block import Block, Primitive
+from mckibben.blocks.core.fields import (
     DISPLACEMENT,
     PRESSURE,
     STRICT,
@@ -29,13 +29,11 @@ from mckibben.blocks.fields import (
     StoredInitial,
     Vector,
 )
-from mckibben.blocks.kernels import kernel
-from mckibben.blocks.memory import named_state
-from mckibben.blocks.refusals import explicit_state, own_sample_time
-from mckibben.blocks.single import SingleChannel
+from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.core.refusals import explicit_state, own_sample_time
+from mckibben.blocks.core.single_channel import SingleChannel
+from mckibben.blocks.play_type.memory import named_state
 from mckibben.errors import ModelError
-
-Array = NDArray[np.float64]
 
 HEAD = 7
 """Coefficients before the thresholds: lags of the output, of the input, operators, and the

@@ -11,18 +11,15 @@ import math
 from typing import ClassVar, Literal, Self
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
-from mckibben.blocks.base import Kernel
+from mckibben.arrays import Array
+from mckibben.blocks.core.block import Kernel
+from mckibben.blocks.core.fields import STRICT, Vector
+from mckibben.blocks.core.kernels import kernel
 from mckibben.blocks.dynamic.narx import HEAD, Narx, give_output, take_input
-from mckibben.blocks.fields import STRICT, Vector
-from mckibben.blocks.kernels import kernel
-from mckibben.blocks.named import NamedParameters
 from mckibben.errors import ModelError
-
-Array = NDArray[np.float64]
 
 
 @kernel
@@ -57,7 +54,7 @@ def narx_network_kernel(coefficients: Array, state: Array, inputs: Array, output
 
 
 @dataclass(frozen=True, kw_only=True, config=STRICT)
-class NarxNetwork(Narx, NamedParameters):
+class NarxNetwork(Narx):
     """NARX model with one hidden layer.
 
     Parameters

@@ -5,24 +5,19 @@ Source: Chen, Billings and Luo 1989 (orthogonal least squares); see `mckibben.bl
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Annotated, ClassVar, Self
 
 import numpy as np
 from annotated_types import MaxLen
-from numpy.typing import ArrayLike, NDArray
 from pydantic import BeforeValidator
 from pydantic.dataclasses import dataclass
 
-from mckibben.blocks.base import Kernel
+from mckibben.arrays import Array
+from mckibben.blocks.core.block import Kernel
+from mckibben.blocks.core.fields import STRICT, Vector, rows
+from mckibben.blocks.core.kernels import kernel
 from mckibben.blocks.dynamic.narx import HEAD, Narx, give_output, take_input
-from mckibben.blocks.fields import STRICT, Vector, rows
-from mckibben.blocks.kernels import kernel
-from mckibben.blocks.refusals import parameter_vector
 from mckibben.errors import ModelError
-
-Array = NDArray[np.float64]
-
 
 HIGHEST_DEGREE, MOST_TERMS = 20, 10_000
 
@@ -74,6 +69,7 @@ class NarxPolynomial(Narx):
 
     kind: ClassVar[str] = "narx-polynomial"
     kernel: ClassVar[Kernel] = narx_polynomial_kernel
+    parameters: ClassVar[tuple[str, ...]] = ("weights",)
 
     terms: Terms
     weights: Vector
@@ -88,19 +84,6 @@ class NarxPolynomial(Narx):
                 f"the terms of {self.kind!r} do not fit. Remedy: give one weight a term, and factors "
                 f"between 0 and {most - 1}."
             )
-
-    @property
-    def n_parameters(self) -> int:
-        """One a term."""
-        return len(self.weights)
-
-    def pack(self) -> Array:
-        """Return the weights."""
-        return np.array(self.weights)
-
-    def unpack(self, parameters: ArrayLike) -> Self:
-        """Return a model of the same terms with other weights."""
-        return replace(self, weights=tuple(parameter_vector(self, parameters).tolist()))
 
     def coefficients(self, sample_time: float | None) -> Array:
         """Return what the kernel reads."""

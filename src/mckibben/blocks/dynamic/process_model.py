@@ -17,13 +17,12 @@ from typing import Annotated, ClassVar, Literal, Self
 
 import numpy as np
 from annotated_types import Ge, Gt
-from numpy.typing import NDArray
 from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
-from mckibben.blocks.base import Block, Kernel, Primitive
-from mckibben.blocks.dynamic.linear_start import LinearStart
-from mckibben.blocks.fields import (
+from mckibben.arrays import Array
+from mckibben.blocks.core.block import Block, Kernel, Primitive
+from mckibben.blocks.core.fields import (
     DISPLACEMENT,
     PRESSURE,
     STRICT,
@@ -32,13 +31,11 @@ from mckibben.blocks.fields import (
     Initial,
     Vector,
 )
-from mckibben.blocks.kernels import kernel
-from mckibben.blocks.named import NamedParameters
-from mckibben.blocks.refusals import explicit_state, needs_sample_time
-from mckibben.blocks.single import SingleChannel
+from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.core.refusals import explicit_state, needs_sample_time
+from mckibben.blocks.core.single_channel import SingleChannel
+from mckibben.blocks.dynamic.linear_start import LinearStart
 from mckibben.errors import ModelError
-
-Array = NDArray[np.float64]
 
 LONGEST_DELAY = 254
 """Samples."""
@@ -74,7 +71,7 @@ def process_model_kernel(coefficients: Array, state: Array, inputs: Array, outpu
 
 
 @dataclass(frozen=True, config=STRICT)
-class ProcessModel(LinearStart, SingleChannel, NamedParameters, Primitive):
+class ProcessModel(LinearStart, SingleChannel, Primitive):
     """A gain, one to three lags, perhaps a zero and a delay, about an operating point.
 
     Parameters
@@ -104,6 +101,7 @@ class ProcessModel(LinearStart, SingleChannel, NamedParameters, Primitive):
     kind: ClassVar[str] = "process-model"
     kernel: ClassVar[Kernel] = process_model_kernel
     rate_dependent: ClassVar[bool] = True
+    filters: ClassVar[bool] = True
 
     gain: FiniteFloat
     time_constants: Vector

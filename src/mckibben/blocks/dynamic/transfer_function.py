@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
-from mckibben.blocks.base import Kernel, Primitive
-from mckibben.blocks.dynamic.linear_start import LinearStart
-from mckibben.blocks.fields import (
+from mckibben.arrays import Array
+from mckibben.blocks.core.block import Kernel, Primitive
+from mckibben.blocks.core.fields import (
     DISPLACEMENT,
     PRESSURE,
     STRICT,
@@ -28,14 +28,12 @@ from mckibben.blocks.fields import (
     FittedInitial,
     Initial,
 )
-from mckibben.blocks.kernels import kernel
-from mckibben.blocks.named import NamedParameters
-from mckibben.blocks.refusals import explicit_state, own_sample_time
-from mckibben.blocks.single import SingleChannel
+from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.core.refusals import explicit_state, own_sample_time
+from mckibben.blocks.core.single_channel import SingleChannel
+from mckibben.blocks.dynamic.linear_start import LinearStart
 from mckibben.errors import ModelError
 from mckibben.recording import Recording
-
-Array = NDArray[np.float64]
 
 
 @kernel
@@ -58,7 +56,7 @@ def transfer_function_kernel(
 
 
 @dataclass(frozen=True, config=STRICT)
-class TransferFunction(LinearStart, SingleChannel, NamedParameters, Primitive):
+class TransferFunction(LinearStart, SingleChannel, Primitive):
     """Discrete transfer function about an operating point.
 
     Parameters
@@ -85,6 +83,7 @@ class TransferFunction(LinearStart, SingleChannel, NamedParameters, Primitive):
     kind: ClassVar[str] = "transfer-function"
     kernel: ClassVar[Kernel] = transfer_function_kernel
     rate_dependent: ClassVar[bool] = True
+    filters: ClassVar[bool] = True
     parameters: ClassVar[tuple[str, ...]] = (
         "numerator",
         "denominator",
@@ -165,6 +164,11 @@ class TransferFunction(LinearStart, SingleChannel, NamedParameters, Primitive):
         """
         own_sample_time(self.kind, self.sample_time, sample_time)
         return np.concatenate([[self.input_offset, self.output_offset], *self._padded()])
+
+    def c_numbers(self, sample_time: float | None) -> Array:
+        """Return the coefficients, then the state at rest at an input of 1 above the operating point."""
+        at_rest = self.initial_state(np.array([self.input_offset + 1.0]), "first_sample")
+        return np.array([*self.coefficients(sample_time), *at_rest])
 
     def predict(self, recording: Recording, horizon: int = 1) -> Recording:
         """Predict the output some samples ahead from outputs measured until then; no free run.

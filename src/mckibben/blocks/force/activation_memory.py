@@ -13,34 +13,30 @@ every frequency.
 
 from __future__ import annotations
 
-import math
 from typing import Annotated, ClassVar, Self
 
 import numpy as np
 from annotated_types import Ge, Interval
-from numpy.typing import NDArray
 from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
-from mckibben.blocks.base import Block, Kernel, Primitive
-from mckibben.blocks.fields import (
+from mckibben.arrays import Array
+from mckibben.blocks.core.block import Kernel
+from mckibben.blocks.core.fields import (
     CONTRACTION,
     FORCE,
     PRESSURE,
     STRICT,
-    Channel,
     ChannelField,
     Initial,
     StoredInitial,
     Vector,
 )
-from mckibben.blocks.kernels import kernel
-from mckibben.blocks.memory import named_state
-from mckibben.blocks.named import NamedParameters
-from mckibben.blocks.refusals import explicit_state, needs_sample_time
+from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.core.refusals import explicit_state, needs_sample_time
+from mckibben.blocks.force.activation import Activation
+from mckibben.blocks.play_type.memory import named_state
 from mckibben.errors import ModelError
-
-Array = NDArray[np.float64]
 
 
 @kernel
@@ -84,7 +80,7 @@ def activation_memory_kernel(
 
 
 @dataclass(frozen=True, config=STRICT)
-class ActivationMemory(NamedParameters, Primitive):
+class ActivationMemory(Activation):
     """Pressure that gives a contraction under a force, whatever the frequency.
 
     Parameters
@@ -115,7 +111,6 @@ class ActivationMemory(NamedParameters, Primitive):
 
     kind: ClassVar[str] = "activation-memory"
     kernel: ClassVar[Kernel] = activation_memory_kernel
-    rate_dependent: ClassVar[bool] = True
     parameters: ClassVar[tuple[str, ...]] = ("surface", "friction", "viscosity", "relaxation")
 
     surface: Vector
@@ -160,21 +155,6 @@ class ActivationMemory(NamedParameters, Primitive):
             )
 
     @property
-    def inputs(self) -> tuple[Channel, ...]:
-        """Contraction, then force."""
-        return (self.input, self.force)
-
-    @property
-    def outputs(self) -> tuple[Channel, ...]:
-        """Pressure."""
-        return (self.output,)
-
-    @property
-    def scheduling(self) -> tuple[str, ...]:
-        """Force."""
-        return (self.force.name,)
-
-    @property
     def n_states(self) -> int:
         """Operators, previous contraction, filtered rate, and what follows."""
         return len(self.thresholds) + 2 + len(self.time_constants)
@@ -200,20 +180,11 @@ class ActivationMemory(NamedParameters, Primitive):
             Without a sample time.
         """
         step = needs_sample_time(self.kind, sample_time)
-        tau = self.rate_time_constant
-        smoothing = math.exp(-step / tau) if tau > 0 else 0.0
-        head = [smoothing, (1 - smoothing) / step, *self.input_scale, *self.force_scale]
+        head = [*self.rate_filter(step), *self.input_scale, *self.force_scale]
         counts = [self.degree, self.force_degree, len(self.time_constants)]
         decays = np.exp(-step / np.array(self.time_constants))
         tail = [*self.thresholds, *self.friction, *self.viscosity, *self.relaxation, *decays]
         return np.array([*head, *counts, *self.surface, *tail])
-
-    def inverse(self) -> Block:
-        """Refuse: this model is itself the inverse of a muscle."""
-        raise ModelError(
-            f"{self.kind!r} has no inverse here: it already gives the pressure for a contraction. "
-            "Remedy: use it as the compensator, or fit pressure to contraction by another model."
-        )
 
     @classmethod
     def example(cls) -> Self:

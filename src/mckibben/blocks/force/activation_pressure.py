@@ -14,33 +14,29 @@ noisy.
 
 from __future__ import annotations
 
-import math
 from typing import Annotated, ClassVar, Self
 
 import numpy as np
 from annotated_types import Ge
-from numpy.typing import NDArray
 from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
-from mckibben.blocks.base import Block, Kernel, Primitive
-from mckibben.blocks.fields import (
+from mckibben.arrays import Array
+from mckibben.blocks.core.block import Kernel
+from mckibben.blocks.core.fields import (
     CONTRACTION,
     FORCE,
     PRESSURE,
     STRICT,
-    Channel,
     ChannelField,
     Initial,
     StoredInitial,
     Vector,
 )
-from mckibben.blocks.kernels import kernel
-from mckibben.blocks.named import NamedParameters
-from mckibben.blocks.refusals import explicit_state, needs_sample_time
+from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.core.refusals import explicit_state, needs_sample_time
+from mckibben.blocks.force.activation import Activation
 from mckibben.errors import ModelError
-
-Array = NDArray[np.float64]
 
 POINTS = 4
 
@@ -79,7 +75,7 @@ def activation_pressure_kernel(
 
 
 @dataclass(frozen=True, config=STRICT)
-class ActivationPressure(NamedParameters, Primitive):
+class ActivationPressure(Activation):
     """Pressure that gives a contraction under a force, at one frequency of excitation.
 
     Parameters
@@ -105,7 +101,6 @@ class ActivationPressure(NamedParameters, Primitive):
 
     kind: ClassVar[str] = "activation-pressure"
     kernel: ClassVar[Kernel] = activation_pressure_kernel
-    rate_dependent: ClassVar[bool] = True
     parameters: ClassVar[tuple[str, ...]] = ("contractions", "pressures", "phi", "gamma")
 
     contractions: Vector
@@ -128,21 +123,6 @@ class ActivationPressure(NamedParameters, Primitive):
             )
 
     @property
-    def inputs(self) -> tuple[Channel, ...]:
-        """Contraction, then force."""
-        return (self.input, self.force)
-
-    @property
-    def outputs(self) -> tuple[Channel, ...]:
-        """Pressure."""
-        return (self.output,)
-
-    @property
-    def scheduling(self) -> tuple[str, ...]:
-        """Force."""
-        return (self.force.name,)
-
-    @property
     def n_states(self) -> int:
         """Previous contraction and filtered rate."""
         return 2
@@ -163,18 +143,9 @@ class ActivationPressure(NamedParameters, Primitive):
             Without a sample time.
         """
         step = needs_sample_time(self.kind, sample_time)
-        tau = self.rate_time_constant
-        smoothing = math.exp(-step / tau) if tau > 0 else 0.0
         gamma = self.gamma[0] * self.frequency + self.gamma[1]
-        head = [smoothing, (1 - smoothing) / step, gamma]
+        head = [*self.rate_filter(step), gamma]
         return np.array([*head, *self.phi, *self.contractions, *self.pressures])
-
-    def inverse(self) -> Block:
-        """Refuse: this model is itself the inverse of a muscle."""
-        raise ModelError(
-            f"{self.kind!r} has no inverse here: it already gives the pressure for a contraction. "
-            "Remedy: use it as the compensator, or fit pressure to contraction by another model."
-        )
 
     @classmethod
     def example(cls) -> Self:

@@ -12,17 +12,15 @@ from typing import Annotated, ClassVar, Self
 
 import numpy as np
 from annotated_types import Gt
-from numpy.typing import NDArray
 from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
-from mckibben.blocks.base import Kernel
-from mckibben.blocks.braid_equilibrium import NEWTONS_PER_BAR
-from mckibben.blocks.fields import FORCE, LENGTH, PRESSURE, STRICT, ChannelField
+from mckibben.arrays import Array
+from mckibben.blocks.core.block import Kernel
+from mckibben.blocks.core.fields import FORCE, LENGTH, PRESSURE, STRICT, ChannelField
+from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.force.braid_equilibrium import NEWTONS_PER_BAR
 from mckibben.blocks.force.law import ForceLaw
-from mckibben.blocks.kernels import kernel
-
-Array = NDArray[np.float64]
 
 
 @kernel
@@ -50,6 +48,7 @@ class ChouHannaford(ForceLaw):
     """
 
     kind: ClassVar[str] = "chou-hannaford"
+    number: ClassVar[int] = 1
     kernel: ClassVar[Kernel] = chou_hannaford_kernel
     parameters: ClassVar[tuple[str, ...]] = ("thread_length", "turns", "constant")
 

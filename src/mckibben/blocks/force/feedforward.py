@@ -11,21 +11,18 @@ from __future__ import annotations
 from typing import Annotated, ClassVar, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 from pydantic import BeforeValidator, InstanceOf
 from pydantic.dataclasses import dataclass
 
-from mckibben.blocks.base import Block, Run
+from mckibben.arrays import Array
 from mckibben.blocks.compose import Parallel
-from mckibben.blocks.fields import STRICT, Channel, Initial
+from mckibben.blocks.core.block import Block, Run
+from mckibben.blocks.core.fields import STRICT, Channel, Initial
+from mckibben.blocks.core.saving import nested
 from mckibben.blocks.force.law import ForceLaw
 from mckibben.blocks.force.multistate_friction import MultistateFriction
 from mckibben.blocks.force.polynomial_force import PolynomialForce
-from mckibben.blocks.refusals import parameter_vector
-from mckibben.blocks.saving import nested
 from mckibben.errors import ModelError
-
-Array = NDArray[np.float64]
 
 LEAST_PULL = 1e-9
 """Force per bar below which no pressure gives a force [N/bar]."""
@@ -44,6 +41,7 @@ class ForceFeedforward(Block):
     """
 
     kind: ClassVar[str] = "force-feedforward"
+    parameters: ClassVar[tuple[str, ...]] = ("law", "friction")
 
     law: Annotated[InstanceOf[ForceLaw], BeforeValidator(nested)]
     friction: Annotated[InstanceOf[MultistateFriction] | None, BeforeValidator(nested)] = None
@@ -107,23 +105,6 @@ class ForceFeedforward(Block):
         """That of the friction."""
         return 0 if self.friction is None else self.friction.n_scratch
 
-    @property
-    def n_parameters(self) -> int:
-        """Those of both parts."""
-        return self.law.n_parameters + (0 if self.friction is None else self.friction.n_parameters)
-
-    def pack(self) -> Array:
-        """Return the law's parameters, then the friction's."""
-        own = [self.law.pack()]
-        return np.concatenate(own if self.friction is None else [*own, self.friction.pack()])
-
-    def unpack(self, parameters: ArrayLike) -> Self:
-        """Return a feedforward of the same structure with other parameters."""
-        vector = parameter_vector(self, parameters)
-        n = self.law.n_parameters
-        friction = None if self.friction is None else self.friction.unpack(vector[n:])
-        return type(self)(self.law.unpack(vector[:n]), friction)
-
     def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
         """Return the friction's state at the first length."""
         if self.friction is None:
@@ -152,6 +133,19 @@ class ForceFeedforward(Block):
             outputs[:, 0] = np.where(small, np.nan, missing / np.where(small, 1.0, pull))
 
         return run
+
+    @property
+    def start(self) -> Initial:
+        """The friction's."""
+        return self.law.start if self.friction is None else self.friction.start
+
+    def c_numbers(self, sample_time: float | None) -> Array:
+        """Return [number of the law, size, the law's], then the friction's."""
+        law = self.law.coefficients(sample_time)
+        own = np.array([self.law.number, law.size, *law])
+        if self.friction is None:
+            return own
+        return np.concatenate([own, self.friction.coefficients(sample_time)])
 
     @classmethod
     def example(cls) -> Self:

@@ -5,50 +5,25 @@ from __future__ import annotations
 from abc import abstractmethod
 from typing import ClassVar
 
-import numpy as np
-from numpy.typing import NDArray
-
-from mckibben.blocks.base import Block, Primitive
-from mckibben.blocks.fields import Channel, Initial
-from mckibben.blocks.named import NamedParameters
+from mckibben.arrays import Array
+from mckibben.blocks.core.block import Block, Primitive
+from mckibben.blocks.core.fields import Channel, Initial
+from mckibben.blocks.core.single_channel import ScheduledChannel
+from mckibben.blocks.core.stateless import Stateless
 from mckibben.errors import ModelError
 
-Array = NDArray[np.float64]
 
-
-class ForceLaw(NamedParameters, Primitive):
+class ForceLaw(Stateless, ScheduledChannel, Primitive):
     """A static force law: driven by length [mm], scheduled by pressure [bar], giving force [N]."""
 
     initial: ClassVar[Initial] = "first_sample"
 
-    input: Channel
+    scheduled_by: ClassVar[str] = "pressure"
+
     pressure: Channel
-    output: Channel
 
-    @property
-    def inputs(self) -> tuple[Channel, ...]:
-        """Length, then pressure."""
-        return (self.input, self.pressure)
-
-    @property
-    def outputs(self) -> tuple[Channel, ...]:
-        """Force."""
-        return (self.output,)
-
-    @property
-    def scheduling(self) -> tuple[str, ...]:
-        """Pressure."""
-        return (self.pressure.name,)
-
-    @property
-    def n_states(self) -> int:
-        """None."""
-        return 0
-
-    def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
-        """Return an empty state."""
-        del first, initial
-        return np.empty(0)
+    number: ClassVar[int]
+    """What C tells it by, in a feedforward."""
 
     @abstractmethod
     def terms(self, length: Array) -> tuple[Array, Array]:

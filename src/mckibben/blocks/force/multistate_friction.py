@@ -25,28 +25,25 @@ import math
 from typing import Annotated, ClassVar, Literal, Self
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import BeforeValidator, FiniteFloat
 from pydantic.dataclasses import dataclass
 
-from mckibben.blocks.base import Block, Kernel, Primitive
-from mckibben.blocks.fields import (
+from mckibben.arrays import Array
+from mckibben.blocks.core.block import Block, Kernel, Primitive
+from mckibben.blocks.core.fields import (
     FORCE,
     LENGTH,
     PRESSURE,
     STRICT,
-    Channel,
     ChannelField,
     Initial,
     StoredInitial,
     Vector,
 )
-from mckibben.blocks.kernels import kernel
-from mckibben.blocks.named import NamedParameters
-from mckibben.blocks.refusals import explicit_state, needs_sample_time
+from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.core.refusals import explicit_state, needs_sample_time
+from mckibben.blocks.core.single_channel import ScheduledChannel
 from mckibben.errors import ModelError
-
-Array = NDArray[np.float64]
 
 Direction = Literal["shared", "both", "lengthening", "shortening"]
 SIZES: dict[str, int] = {"shared": 5, "both": 6, "lengthening": 3, "shortening": 3}
@@ -118,7 +115,7 @@ def _directions(value: object) -> object:
 
 
 @dataclass(frozen=True, config=STRICT)
-class MultistateFriction(NamedParameters, Primitive):
+class MultistateFriction(ScheduledChannel, Primitive):
     """Friction force by length, with elements that switch with the direction of motion.
 
     Parameters
@@ -141,6 +138,7 @@ class MultistateFriction(NamedParameters, Primitive):
     """
 
     kind: ClassVar[str] = "multistate-friction"
+    scheduled_by: ClassVar[str] = "pressure"
     kernel: ClassVar[Kernel] = multistate_friction_kernel
     rate_dependent: ClassVar[bool] = True
 
@@ -179,21 +177,6 @@ class MultistateFriction(NamedParameters, Primitive):
         if self.pressure_gain != 0:
             names.append("pressure gain [1/bar]")
         return tuple(names)
-
-    @property
-    def inputs(self) -> tuple[Channel, ...]:
-        """Length, then pressure."""
-        return (self.input, self.pressure)
-
-    @property
-    def outputs(self) -> tuple[Channel, ...]:
-        """Force."""
-        return (self.output,)
-
-    @property
-    def scheduling(self) -> tuple[str, ...]:
-        """Pressure."""
-        return (self.pressure.name,)
 
     @property
     def n_states(self) -> int:

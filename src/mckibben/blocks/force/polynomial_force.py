@@ -14,18 +14,16 @@ from typing import Annotated, ClassVar, Self
 
 import numpy as np
 from annotated_types import Gt
-from numpy.typing import NDArray
 from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
-from mckibben.blocks.base import Kernel
-from mckibben.blocks.fields import FORCE, LENGTH, PRESSURE, STRICT, ChannelField, Vector
+from mckibben.arrays import Array
+from mckibben.blocks.core.block import Kernel
+from mckibben.blocks.core.fields import FORCE, LENGTH, PRESSURE, STRICT, ChannelField, Vector
+from mckibben.blocks.core.kernels import kernel
 from mckibben.blocks.force.law import ForceLaw
-from mckibben.blocks.kernels import kernel
-from mckibben.blocks.reversible import polynomial_at
+from mckibben.blocks.memoryless.reversible import polynomial_at
 from mckibben.errors import ModelError
-
-Array = NDArray[np.float64]
 
 
 @kernel
@@ -58,6 +56,7 @@ class PolynomialForce(ForceLaw):
     """
 
     kind: ClassVar[str] = "polynomial-force"
+    number: ClassVar[int] = 0
     kernel: ClassVar[Kernel] = polynomial_force_kernel
     parameters: ClassVar[tuple[str, ...]] = ("per_bar", "elastic")
 

@@ -16,21 +16,19 @@ from typing import Annotated, ClassVar, Self
 
 import numpy as np
 from annotated_types import Gt, Interval
-from numpy.typing import NDArray
 from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
-from mckibben.blocks.base import Kernel
-from mckibben.blocks.braid_equilibrium import NEWTONS_PER_BAR
-from mckibben.blocks.fields import FORCE, LENGTH, PRESSURE, STRICT, ChannelField
+from mckibben.arrays import Array
+from mckibben.blocks.core.block import Kernel
+from mckibben.blocks.core.fields import FORCE, LENGTH, PRESSURE, STRICT, ChannelField
+from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.force.braid_equilibrium import NEWTONS_PER_BAR
 from mckibben.blocks.force.law import ForceLaw
-from mckibben.blocks.kernels import kernel
 from mckibben.errors import ModelError
 
-Array = NDArray[np.float64]
-
-MU_DECAY, KAPPA_DECAY = 40.0, 1.0
-"""Per contraction, and per bar."""
+MU_DECAY = 40.0
+"""Per contraction."""
 
 
 @kernel
@@ -65,6 +63,7 @@ class TonduLopez(ForceLaw):
     """
 
     kind: ClassVar[str] = "tondu-lopez"
+    number: ClassVar[int] = 2
     kernel: ClassVar[Kernel] = tondu_lopez_kernel
     parameters: ClassVar[tuple[str, ...]] = ("braid_angle", "mu", "kappa", "constant")
 

@@ -1,157 +1,188 @@
-"""What an estimator of several muscles is: settings that find a block from recordings."""
+"""Estimators of several muscles that move one another, or of a muscle and its load."""
 
 from __future__ import annotations
 
-import time
-import warnings
-from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
+import re
+from abc import abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Annotated, ClassVar, Self
+from typing import Any, ClassVar
 
 import numpy as np
-from annotated_types import Interval
-from numpy.typing import NDArray
 
-from mckibben.blocks.base import Block
-from mckibben.errors import ModelWarning
-from mckibben.estimators.coupled.data import CoupledData, coupled_data
-from mckibben.estimators.parameters import Parametrised
-from mckibben.estimators.search import whole_searches
-from mckibben.estimators.settings import check_settings
+from mckibben.arrays import Array
+from mckibben.blocks.core.block import Block
+from mckibben.errors import DataError
+from mckibben.estimators.core.checking import training_data
+from mckibben.estimators.core.data import Mask, TrainingData
+from mckibben.estimators.core.estimator import Estimator
+from mckibben.estimators.core.uncertainty import unknown
+from mckibben.estimators.optimisers.tracker import Tracker
 from mckibben.recording import Recording
-from mckibben.signals.checking import LARGEST_SEED
-from mckibben.threads import one_blas_thread
 
-Array = NDArray[np.float64]
-Tell = Callable[[float, str], None]
+SCHEDULES = ("pressure_extensor", "force")
+"""Channels that schedule a model by default, where there are any."""
 
-
-@dataclass(frozen=True)
-class CoupledDiagnostics:
-    """What a fit has to say of itself.
-
-    Parameters
-    ----------
-    rmse : tuple of float
-        Free-running RMSE of every displacement over all recordings fitted [mm].
-    n_samples : int
-        Samples fitted.
-    seconds : float
-        Wall time.
-    notes : tuple of str
-        What the user should know.
-    """
-
-    rmse: tuple[float, ...]
-    n_samples: int
-    seconds: float
-    notes: tuple[str, ...] = ()
+FEWEST_SAMPLES = 50
+"""Fewer samples than this in a row identify nothing of several muscles."""
 
 
 @dataclass(kw_only=True, repr=False, eq=False)
-class CoupledEstimator(Parametrised, ABC):
-    """Settings common to all estimators of several muscles.
+class CoupledEstimator(Estimator):
+    """Settings common to all estimators of several inputs and outputs.
+
+    What counts of a recording is learned from in stretches, each with a memory of its own.
 
     Parameters
     ----------
-    pressures, displacements : sequence of str, optional
-        Channels; default ``pressure_1`` and so on, as many as there are; or, of a single muscle,
-        ``voltage`` or else ``pressure``, and ``displacement``.
+    input, output : str or sequence of str, optional
+        Channels; default ``pressure_1`` and so on and ``displacement_1`` and so on, as many as there
+        are; or, of a single muscle, ``voltage`` or else ``pressure``, and ``displacement``.
     scheduling : sequence of str, optional
         Channels that schedule the model: an extensor's pressure, a load, a temperature. Default
         ``pressure_extensor`` and ``force``, where there are any.
-    seed : int
-        Of everything random.
     """
 
-    pressures: tuple[str, ...] | None = None
-    displacements: tuple[str, ...] | None = None
+    input: str | tuple[str, ...] | None = None
+    output: str | tuple[str, ...] | None = None
     scheduling: tuple[str, ...] | None = None
-    seed: Annotated[int, Interval(ge=0, le=LARGEST_SEED)] = 0
-
-    effort: ClassVar[float] = 1.0
-    """About how long a fit to 10 000 samples takes [s]: models are compared cheapest first."""
 
     paired: ClassVar[bool] = True
-    """Whether there must be a displacement to every pressure."""
+    """Whether there must be an output to every input."""
 
-    def fit(
-        self,
-        recordings: Recording | Sequence[Recording],
-        y: None = None,
-        *,
-        validation: Sequence[Recording] = (),
-        progress: Tell | None = None,
-    ) -> Self:
-        """Find the block that runs free closest to the recordings.
+    fewest_inputs: ClassVar[int] = 1
+    most_inputs: ClassVar[float] = np.inf
+    """How many muscles there may be."""
 
-        Parameters
-        ----------
-        recordings : Recording or sequence of Recording
-            All runs; what each stage needs is found by which inputs move.
-        y : None
-            Ignored; scikit-learn passes it.
-        validation : sequence of Recording
-            To stop a search early; nothing is fitted to them.
-        progress : callable, optional
-            Told the share of the work done, and what is next.
+    @classmethod
+    def objection(
+        cls,
+        recordings: Sequence[Recording],
+        inputs: Sequence[str],
+        outputs: Sequence[str],
+        scheduling: Sequence[str] | None = None,
+    ) -> str | None:
+        if len(inputs) < cls.fewest_inputs:
+            return "it is of several muscles"
+        if len(inputs) > cls.most_inputs:
+            return "it is of one muscle under a load"
+        scheduled = scheduling
+        if scheduled is None:
+            scheduled = schedules(recordings, (*inputs, *outputs))
+        if len(inputs) == len(outputs) == 1 and not any(
+            np.ptp(np.concatenate([recording[name] for recording in recordings]))
+            for name in scheduled
+        ):
+            return "it is of several muscles, or of one under a measured load that changes"
+        if cls.paired and len(inputs) != len(outputs):
+            return "it needs an output to every input"
+        return None
 
-        Returns
-        -------
-        self
-            With ``model_`` (pressures to displacements) and ``diagnostics_``.
+    @classmethod
+    def channel_settings(
+        cls,
+        inputs: Sequence[str],
+        outputs: Sequence[str],
+        scheduling: Sequence[str] | None = None,
+    ) -> dict[str, Any]:
+        told = None if scheduling is None else tuple(scheduling)
+        return {"input": tuple(inputs), "output": tuple(outputs), "scheduling": told}
 
-        Raises
-        ------
-        DataError
-            On recordings that cannot be learned from.
-        ModelError
-            On settings out of range.
-        """
-        del y
-        with one_blas_thread(), whole_searches():  # the parts of a model are searched whole
-            return self._fit(recordings, validation, progress)
-
-    def _fit(
-        self,
-        recordings: Recording | Sequence[Recording],
-        validation: Sequence[Recording],
-        progress: Tell | None,
-    ) -> Self:
-        started = time.perf_counter()
-        check_settings(self)
+    def data(
+        self, recordings: Recording | Sequence[Recording], rows: Sequence[Mask] | None = None
+    ) -> TrainingData:
+        """Return what is learned from recordings, their channels found by name where not given."""
         listed = [recordings] if isinstance(recordings, Recording) else list(recordings)
-        names = (self.pressures, self.displacements, self.scheduling)
-        data = coupled_data(listed, *names)
-        held_back = coupled_data(list(validation), *names) if validation else None
-        if self.paired:
-            data.check_pairs(listed[0].source)
-        self.notes: list[str] = []
-        self.model_ = self.identify(data, held_back, progress or (lambda share, text: None))
-        with warnings.catch_warnings(record=True) as caught:
-            warnings.simplefilter("always", ModelWarning)
-            errors = np.concatenate(
-                [
-                    self.predict_run(run.inputs, run.sample_time) - run.displacements
-                    for run in data.runs
-                ]
-            )
-        self.notes += sorted({str(warning.message) for warning in caught})
-        self.diagnostics_ = CoupledDiagnostics(
-            tuple(np.sqrt(np.mean(errors**2, axis=0)).tolist()),
-            len(errors),
-            time.perf_counter() - started,
-            tuple(self.notes),
+        if not listed:
+            raise DataError("there are no recordings", remedy="give at least one")
+        first = listed[0]
+        inputs, outputs = (
+            (given,) if isinstance(given, str) else given for given in (self.input, self.output)
         )
-        return self
+        inputs = inputs or driving(first)
+        outputs = outputs or numbered(first, "displacement") or one(first, "displacement")
+        for what, names in (("pressure", inputs), ("displacement", outputs)):
+            if not names:
+                raise DataError(
+                    f"there is no channel {what}_1, nor {what}",
+                    file=first.source,
+                    remedy=f"name the columns {what}_1, {what}_2 and so on, or use --column",
+                )
+        scheduling = self.scheduling
+        if scheduling is None:
+            scheduling = schedules(listed, (*inputs, *outputs))
+        for recording in listed:
+            for name in (*inputs, *outputs, *scheduling):
+                if name not in recording:
+                    raise DataError(
+                        "the model needs it, and the recording has no such channel",
+                        file=recording.source,
+                        channel=name,
+                        remedy="give all recordings the same channels, or name others",
+                    )
+            if len(recording) < FEWEST_SAMPLES:
+                raise DataError(
+                    f"{len(recording)} samples are too few for several muscles",
+                    file=recording.source,
+                    remedy=f"give recordings of at least {FEWEST_SAMPLES} samples",
+                )
+        if self.paired and len(inputs) != len(outputs):
+            raise DataError(
+                f"there are {len(inputs)} inputs and {len(outputs)} outputs",
+                file=first.source,
+                remedy="record as many of both, or fit coupled-memory or tsfnn",
+            )
+        found = training_data(listed, inputs, outputs, rows, scheduling, one_rate=False)
+        kept = found.stretches(FEWEST_SAMPLES - 1)
+        if not kept.runs:
+            raise DataError(
+                f"no {FEWEST_SAMPLES} samples in a row count", remedy="give longer recordings"
+            )
+        return kept
+
+    def find(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
+        """Return the block found."""
+        return self.identify(data, tracker), data
 
     @abstractmethod
-    def identify(self, data: CoupledData, validation: CoupledData | None, tell: Tell) -> Block:
+    def identify(self, data: TrainingData, tracker: Tracker) -> Block:
         """Return the block found."""
 
-    def predict_run(self, inputs: Array, sample_time: float | None) -> Array:
-        """Return the model's free-running displacements."""
-        found: Block = self.model_
-        taken = np.ascontiguousarray(inputs[:, : len(found.inputs)])
-        return found.simulate(taken, sample_time=sample_time)
+    def uncertainty(
+        self, block: Block, data: TrainingData, residual: Array, at_bounds: Sequence[int]
+    ) -> tuple[float, Array]:
+        """Return that neither is known: these models have hundreds of parameters."""
+        return np.nan, unknown(block)
+
+    def undetermined(self) -> tuple[int, ...]:
+        """Return none, since it is not known."""
+        return ()
+
+
+def driving(recording: Recording) -> tuple[str, ...]:
+    """Return the channels that drive the muscles of a recording, by their names."""
+    return numbered(recording, "pressure") or one(recording, "voltage", "pressure")
+
+
+def schedules(recordings: Sequence[Recording], others: Sequence[str] = ()) -> tuple[str, ...]:
+    """Return the channels of any recording that schedule a model by default, others excepted."""
+    return tuple(
+        name
+        for name in SCHEDULES
+        if name not in others and any(name in recording for recording in recordings)
+    )
+
+
+def one(recording: Recording, *names: str) -> tuple[str, ...]:
+    """Return the first of some channels that a recording has, if any."""
+    return tuple(name for name in names if name in recording)[:1]
+
+
+def numbered(recording: Recording, quantity: str) -> tuple[str, ...]:
+    """Return the channels ``quantity_1``, ``quantity_2`` ... of a recording, in order."""
+    found = {
+        int(match.group(1)): name
+        for name in recording.channels
+        if (match := re.fullmatch(rf"{quantity}_(\d+)", name))
+    }
+    return tuple(found[number] for number in sorted(found))

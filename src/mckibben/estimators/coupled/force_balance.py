@@ -8,21 +8,22 @@ and no search over starting points.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import islice
 from typing import Annotated, ClassVar
 
 import numpy as np
 from annotated_types import Ge, Gt, Interval
-from numpy.typing import NDArray
 
-from mckibben.blocks.base import Block
-from mckibben.blocks.fields import rows, vector
-from mckibben.blocks.force_balance import AREA, ForceBalance
-from mckibben.blocks.play import play_matrix
+from mckibben.arrays import Array
+from mckibben.blocks.core.block import Block
+from mckibben.blocks.core.fields import rows, vector
+from mckibben.blocks.coupled.force_balance import AREA, ForceBalance
+from mckibben.blocks.play_type.play import play_matrix
 from mckibben.errors import ModelError
-from mckibben.estimators.coupled.base import CoupledEstimator, Tell
-from mckibben.estimators.coupled.data import CoupledData, CoupledRun
-
-Array = NDArray[np.float64]
+from mckibben.estimators.core.data import Run, TrainingData
+from mckibben.estimators.coupled.base import CoupledEstimator
+from mckibben.estimators.optimisers.descent import LIGHTEST, Damping, descend
+from mckibben.estimators.optimisers.tracker import Tracker
 
 LEAST_AREA = 0.05
 """Smallest effective area on the data, relative to that at rest."""
@@ -60,42 +61,41 @@ class ForceBalanceEstimator(CoupledEstimator):
     degree: Annotated[int, Interval(ge=1, le=4)] = 2
     ridge: Annotated[float, Ge(0)] = 1e-5
 
-    def identify(self, data: CoupledData, validation: CoupledData | None, tell: Tell) -> Block:
+    def identify(self, data: TrainingData, tracker: Tracker) -> Block:
         """Return the balance, solved for displacements."""
-        del validation
-        n = len(data.pressures)
-        y = data.stacked("displacements")
+        n = len(data.inputs)
+        y = data.stacked("outputs")
         scale = float(np.abs(y).max())
         if not scale > 0:
             raise ModelError("no displacement ever changes. Remedy: record muscles that move.")
         every = max(1, len(y) // MOST_SAMPLES)
-        degree = self._degree(data)
+        degree = self._degree(data, tracker)
         forces, areas = [], []
         for k in range(n):
-            tell(k / n, data.pressures[k].name)
+            tracker.reached(k / n)
             tables = [self._columns(run, k, scale, degree) for run in data.runs]
             top = np.concatenate([a[::every] for a, _ in tables])
             bottom = np.concatenate([b[::every] for _, b in tables])
-            p = np.concatenate([run.pressures[::every, k] for run in data.runs])
+            p = np.concatenate([run.driven[::every, k] for run in data.runs])
             force, area = ratio(top, bottom, p, self.ridge)
             forces.append(force)
             areas.append(area)
         low, high = float(data.lowest.min()), float(data.highest.max())
         # pressures and voltages have limits; a force that is estimated has none
-        limited = data.pressures[0].unit in LIMITED
+        limited = data.inputs[0].unit in LIMITED
         return ForceBalance(
             rows(np.array(forces)),
             rows(np.array(areas)),
             vector(np.array(self.thresholds) * scale),
             scale,
             degree,
-            data.displacements,
+            data.outputs,
             data.scheduled,
-            data.pressures,
+            data.inputs,
             (min(low, 0.0), high) if limited else None,
         ).inverse()
 
-    def _degree(self, data: CoupledData) -> int:
+    def _degree(self, data: TrainingData, tracker: Tracker) -> int:
         """Return the highest power that the levels of what schedules can determine."""
         levels = [
             np.unique(np.round(x / (LEVEL * max(float(np.ptp(x)), 1e-9)))).size
@@ -103,14 +103,14 @@ class ForceBalanceEstimator(CoupledEstimator):
         ]
         most = max(min([self.degree, *(n - 1 for n in levels)]), 1)
         if most < self.degree and data.scheduled:
-            self.notes.append(
+            tracker.notes.append(
                 f"what schedules has few levels: degree {most} instead of {self.degree}"
             )
         return most
 
-    def _columns(self, run: CoupledRun, k: int, scale: float, degree: int) -> tuple[Array, Array]:
+    def _columns(self, run: Run, k: int, scale: float, degree: int) -> tuple[Array, Array]:
         """Return what the coefficients of the force and of the area multiply over a run."""
-        y = run.displacements / scale
+        y = run.outputs / scale
         powers = [np.ones(len(y))]
         for x in run.scheduled.T:
             powers += [x**d for d in range(1, degree + 1)]
@@ -137,32 +137,21 @@ def ratio(top: Array, bottom: Array, p: Array, ridge: float) -> tuple[Array, Arr
     damping = ridge * len(p) * np.eye(n + m)
     first = np.hstack([top, -bottom * p[:, np.newaxis]])
     values: Array = np.asarray(np.linalg.solve(first.T @ first + damping, first.T @ p), np.float64)
+    own = np.sqrt(damping)
 
-    def cost(values: Array) -> float:
+    def errors(values: Array) -> Array:
         area = 1.0 + bottom @ values[n:]
         if area.min() < LEAST_AREA:
-            return np.inf
-        missed = p - (top @ values[:n]) / area
-        return float(missed @ missed + ridge * len(p) * (values @ values))
+            return np.full(len(p) + n + m, np.inf)
+        return np.concatenate([(top @ values[:n]) / area - p, own @ values])
 
-    least = cost(values)
-    if not np.isfinite(least):  # the linear start may have no area somewhere: begin without
-        start = np.linalg.lstsq(top, p, rcond=None)[0]
-        values = np.concatenate([start, np.zeros(m)]).astype(np.float64)
-        least = cost(values)
-    for _ in range(STEPS):
-        area = 1.0 + bottom @ values[n:]
-        found = (top @ values[:n]) / area
-        jacobian = np.hstack([top, -bottom * found[:, np.newaxis]]) / area[:, np.newaxis]
-        slope = jacobian.T @ (p - found) - ridge * len(p) * values
-        move = np.asarray(np.linalg.solve(jacobian.T @ jacobian + damping, slope), dtype=np.float64)
-        share = 1.0
-        while share > 1e-4 and not cost(values + share * move) < least:
-            share /= 2
-        if share <= 1e-4:
-            break
-        values = values + share * move
-        before, least = least, cost(values)
-        if before - least < 1e-9 * before:
-            break
+    def slopes(values: Array) -> Array:
+        area = (1.0 + bottom @ values[n:])[:, np.newaxis]
+        found = (top @ values[:n])[:, np.newaxis] / area
+        return np.vstack([np.hstack([top, -bottom * found]) / area, own])
+
+    if not np.isfinite(errors(values)).all():  # the linear start may have no area somewhere
+        values = np.append(np.linalg.lstsq(top, p, rcond=None)[0], np.zeros(m))
+    path = descend(errors, slopes, values, Damping(LIGHTEST, 1.0), least_gain=1e-9)
+    *_, (values, _) = islice(path, STEPS + 1)
     return values[:n], values[n:]

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mckibben.blocks.base import Block
+from mckibben.blocks.core.block import Block
 from mckibben.errors import DataError
 from mckibben.estimators.coupled.force_balance import ForceBalanceEstimator
 from mckibben.recording import Recording
@@ -82,8 +82,8 @@ def fit_force_estimate(
 
     def fitted(runs: Sequence[Recording]) -> Block:
         estimator = ForceBalanceEstimator(
-            pressures=("force",),
-            displacements=(displacement,),
+            input=("force",),
+            output=(displacement,),
             scheduling=(pressure,),
             ridge=RIDGE,
         )

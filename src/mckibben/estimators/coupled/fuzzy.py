@@ -9,9 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from mckibben.arrays import Array
 
 
 @dataclass(frozen=True)
@@ -121,11 +120,18 @@ class Problem:
     y: Array
     solver: Consequents
 
+    def fitted(self, sets: Sets) -> Fitted:
+        """Return the antecedents with consequents solved for."""
+        columns = regressors(self.x, firing(memberships(self.x, sets)), self.solver.constants)
+        return Fitted(sets, self.solver.fit(self.x, columns, self.y))
+
+    def errors(self, sets: Sets) -> Array:
+        """Return the errors, shape (n, outputs), the consequents solved for."""
+        return self.fitted(sets).predict(self.x, self.solver.constants) - self.y
+
     def cost(self, sets: Sets) -> float:
         """Return the root of the mean square over all outputs, the consequents solved for.
 
         It orders antecedents as the paper's loss does, Eq. (26): the plain sum of squares.
         """
-        columns = regressors(self.x, firing(memberships(self.x, sets)), self.solver.constants)
-        errors = columns @ self.solver.fit(self.x, columns, self.y) - self.y
-        return float(np.sqrt(np.mean(errors**2)))
+        return float(np.sqrt(np.mean(self.errors(sets) ** 2)))

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mckibben.arrays import Array
 from mckibben.estimators.coupled.fuzzy import (
     Consequents,
     Fitted,
@@ -19,9 +18,10 @@ from mckibben.estimators.coupled.fuzzy import (
     regressors,
 )
 from mckibben.estimators.coupled.fuzzy_projection import project
-from mckibben.estimators.coupled.fuzzy_swarm import Swarm
+from mckibben.estimators.coupled.fuzzy_swarm import swarmed
+from mckibben.estimators.optimisers.swarm import Swarm
+from mckibben.estimators.optimisers.tracker import Tracker
 
-Array = NDArray[np.float64]
 Method = Literal["ls", "pso"]
 
 
@@ -54,8 +54,8 @@ def fit_network(
     solver: Consequents,
     search: Search,
     *,
+    tracker: Tracker,
     validation: tuple[Array, Array] | None = None,
-    tell: Callable[[float], None] = lambda share: None,
 ) -> Fitted:
     """Fit a network to inputs x (n, inputs) and outputs y (n, outputs).
 
@@ -63,10 +63,10 @@ def fit_network(
     """
     problem = Problem(*thinned(x, y, search.samples), solver)
     if search.method == "pso":
-        sets = search.swarm.best(problem, n_sets, search.seed, tell)
+        sets = swarmed(problem, n_sets, search.swarm, search.seed, tracker)
     else:
         held = None if validation is None else thinned(*validation, search.samples)
-        sets = project(problem, n_sets, x.min(axis=0), x.max(axis=0), held, tell)
+        sets = project(problem, n_sets, x.min(axis=0), x.max(axis=0), held, tracker)
     return Fitted(sets, solve_in_parts(x, y, sets, solver))
 
 

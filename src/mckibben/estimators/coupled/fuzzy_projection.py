@@ -5,13 +5,13 @@ Kaufman's form, with Levenberg-Marquardt steps from even sets.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Iterator
+from itertools import islice
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mckibben.arrays import Array
 from mckibben.estimators.coupled.fuzzy import (
-    Fitted,
     Problem,
     Sets,
     firing,
@@ -19,13 +19,16 @@ from mckibben.estimators.coupled.fuzzy import (
     memberships,
     regressors,
 )
-
-Array = NDArray[np.float64]
+from mckibben.estimators.optimisers.descent import Damping, damped, descend
+from mckibben.estimators.optimisers.tracker import Tracker
 
 NARROWEST, WIDEST = 0.15, 1.5
 """Widths of sets, relative to the range of their input."""
 
 MOST_STEPS = 15
+
+LEAST_GAIN = 2e-4
+"""Share of the squared error that a step has to gain for another to follow."""
 
 
 def project(
@@ -34,7 +37,7 @@ def project(
     low: Array,
     high: Array,
     validation: tuple[Array, Array] | None,
-    tell: Callable[[float], None],
+    tracker: Tracker,
 ) -> Sets:
     """Return antecedents found from sets spread evenly between low and high, (inputs,) each.
 
@@ -46,44 +49,33 @@ def project(
         return start
     lower, upper = _limits(start, low, scale)
     unit = np.concatenate([np.repeat(scale, start.centres.shape[1])] * 2)
-    theta, damping = start.vector, 1e-2
-    cost = problem.cost(start)
-    kept, least = start, _held(problem, start, validation, cost)
-    for step in range(MOST_STEPS):
-        sets = start.replaced(theta)
-        jacobian, residual = sensitivities(problem, sets)
-        jacobian = jacobian * unit
-        gram, slope = jacobian.T @ jacobian, jacobian.T @ residual
-        improved = False
-        for _ in range(6):
-            damped = gram + damping * np.diag(np.diag(gram) + 1e-9 * np.trace(gram))
-            move = -np.linalg.solve(damped, slope) * unit
-            trial = np.clip(theta + move, lower, upper)
-            trial_cost = problem.cost(start.replaced(trial))
-            if trial_cost < cost:
-                improved = cost - trial_cost > 1e-4 * cost
-                theta, cost, damping = trial, trial_cost, damping / 5
-                break
-            damping *= 5
-        found = start.replaced(theta)
-        held = _held(problem, found, validation, cost)
-        if held < least:
-            kept, least = found, held
-        tell((step + 1) / MOST_STEPS)
-        if not improved:
-            break
-    return kept
+
+    def errors(theta: Array) -> Array:
+        return problem.errors(start.replaced(theta)).ravel()
+
+    def slopes(theta: Array) -> Array:
+        return sensitivities(problem, start.replaced(theta))[0]
+
+    def within(theta: Array, by: Array, left: Array, damping: float) -> Iterator[Array]:
+        step = unit * damped(by * unit, left, damping, 1e-9)
+        yield np.clip(theta + step, lower, upper)
+
+    trust = Damping(1e-2, growth=5.0, speeding=1.0, easing=5.0, tries=6, steps=within)
+    path = descend(errors, slopes, start.vector, trust, least_gain=LEAST_GAIN)
+    tracker.budget = MOST_STEPS + 1
+    with tracker.searching():
+        for step, (theta, squares) in enumerate(islice(path, MOST_STEPS + 1)):
+            cost = float(np.sqrt(squares / problem.y.size))
+            if validation is not None:
+                cost = _held(problem, start.replaced(theta), *validation)
+            tracker.saw(theta, cost)
+            tracker.reached(step / MOST_STEPS)
+    return start if tracker.best is None else start.replaced(tracker.best)
 
 
-def _held(
-    problem: Problem, sets: Sets, validation: tuple[Array, Array] | None, cost: float
-) -> float:
-    if validation is None:
-        return cost
-    columns = regressors(problem.x, firing(memberships(problem.x, sets)), problem.solver.constants)
-    fitted = Fitted(sets, problem.solver.fit(problem.x, columns, problem.y))
-    x, y = validation
-    errors = fitted.predict(x, problem.solver.constants) - y
+def _held(problem: Problem, sets: Sets, x: Array, y: Array) -> float:
+    """Return the RMSE on data held back."""
+    errors = problem.fitted(sets).predict(x, problem.solver.constants) - y
     return float(np.sqrt(np.mean(errors**2)))
 
 

@@ -8,15 +8,12 @@ once. The inertia is not printed.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
-
 import numpy as np
-from numpy.typing import NDArray
 
+from mckibben.arrays import Array
 from mckibben.estimators.coupled.fuzzy import Problem, Sets
-
-Array = NDArray[np.float64]
+from mckibben.estimators.optimisers.swarm import Swarm, particle_swarm
+from mckibben.estimators.optimisers.tracker import Tracker
 
 ATTRACTION = 0.5
 """Of a particle's own best and of the swarm's, c_1 and c_2 as printed."""
@@ -27,36 +24,23 @@ LEAST_WIDTH = 1e-3
 """Of a set; the sign of a width means nothing, since only its square is used."""
 
 
-@dataclass(frozen=True)
-class Swarm:
-    """A particle swarm; the defaults are the paper's."""
+def printed_swarm(particles: int = 20, iterations: int = 50) -> Swarm:
+    """Return the paper's swarm, of its size or another."""
+    return Swarm(particles, iterations, (INERTIA, INERTIA), ATTRACTION, ATTRACTION)
 
-    particles: int = 20
-    iterations: int = 50
 
-    def best(self, problem: Problem, n_sets: int, seed: int, tell: Callable[[float], None]) -> Sets:
-        """Return the best antecedents found."""
-        rng = np.random.default_rng(seed)
-        shape = (problem.x.shape[1], n_sets)
-        places = rng.standard_normal((self.particles, 2 * shape[0] * shape[1]))
+def swarmed(problem: Problem, n_sets: int, swarm: Swarm, seed: int, tracker: Tracker) -> Sets:
+    """Return the best antecedents that a swarm without bounds finds."""
+    rng = np.random.default_rng(seed)
+    shape = (problem.x.shape[1], n_sets)
+    start = rng.standard_normal((swarm.particles, 2 * shape[0] * shape[1]))
+    nowhere = np.full(start.shape[1], np.inf)
 
-        def sets(place: Array) -> Sets:
-            centres, widths = place.reshape(2, *shape)
-            return Sets(centres, np.maximum(np.abs(widths), LEAST_WIDTH))
+    def sets(place: Array) -> Sets:
+        centres, widths = place.reshape(2, *shape)
+        return Sets(centres, np.maximum(np.abs(widths), LEAST_WIDTH))
 
-        def cost(place: Array) -> float:
-            return problem.cost(sets(place))
+    def costs(places: Array) -> Array:
+        return np.array([problem.cost(sets(place)) for place in places])
 
-        speeds = np.zeros_like(places)
-        own, costs = places.copy(), np.array([cost(place) for place in places])
-        for iteration in range(self.iterations):
-            best = own[np.argmin(costs)]
-            pull = ATTRACTION * rng.uniform(size=(2, *places.shape))
-            speeds = INERTIA * speeds + pull[0] * (own - places) + pull[1] * (best - places)
-            places = places + speeds
-            for k, place in enumerate(places):
-                found = cost(place)
-                if found < costs[k]:
-                    own[k], costs[k] = place, found
-            tell((iteration + 1) / self.iterations)
-        return sets(own[np.argmin(costs)])
+    return sets(particle_swarm(costs, -nowhere, nowhere, swarm, tracker, rng, start=start))

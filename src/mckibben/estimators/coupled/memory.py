@@ -11,16 +11,14 @@ from typing import Annotated, ClassVar
 
 import numpy as np
 from annotated_types import Gt, Interval
-from numpy.typing import NDArray
 
-from mckibben.blocks.base import Block
-from mckibben.blocks.coupled_memory import CoupledMemory, readout_width
-from mckibben.blocks.fields import rows, vector
-from mckibben.errors import DataError
-from mckibben.estimators.coupled.base import CoupledEstimator, Tell
-from mckibben.estimators.coupled.data import CoupledData, CoupledRun
-
-Array = NDArray[np.float64]
+from mckibben.arrays import Array
+from mckibben.blocks.core.block import Block
+from mckibben.blocks.core.fields import rows, vector
+from mckibben.blocks.coupled.coupled_memory import CoupledMemory, readout_width
+from mckibben.estimators.core.data import Run, TrainingData
+from mckibben.estimators.coupled.base import CoupledEstimator
+from mckibben.estimators.optimisers.tracker import Tracker
 
 
 @dataclass(kw_only=True, repr=False, eq=False)
@@ -46,34 +44,28 @@ class CoupledMemoryEstimator(CoupledEstimator):
 
     paired: ClassVar[bool] = False
 
-    def identify(self, data: CoupledData, validation: CoupledData | None, tell: Tell) -> Block:
-        """Return the memory with its readout."""
-        del validation
-        if any(run.sample_time is None for run in data.runs):
-            raise DataError(
-                "the recordings have no time, and this model depends on rate",
-                remedy="read them with a time column or --rate",
-            )
-        inputs = (*data.pressures, *data.scheduled)
+    def identify(self, data: TrainingData, tracker: Tracker) -> Block:
+        data.timed()
+        inputs = (*data.inputs, *data.scheduled)
         every = np.concatenate([run.inputs for run in data.runs])
         spans = np.maximum(np.ptp(every, axis=0), 1e-9)
         width = readout_width(len(inputs), len(self.lags), len(self.thresholds), self.degree)
         template = CoupledMemory(
             vector(self.lags),
             rows(spans[:, np.newaxis] * np.array(self.thresholds)),
-            rows(np.zeros((len(data.displacements), width))),
+            rows(np.zeros((len(data.outputs), width))),
             self.degree,
-            data.pressures,
+            data.inputs,
             data.scheduled,
-            data.displacements,
+            data.outputs,
         )
-        gram, right = np.zeros((width, width)), np.zeros((width, len(data.displacements)))
+        gram, right = np.zeros((width, width)), np.zeros((width, len(data.outputs)))
         total = 0
         for place, run in enumerate(data.runs):
-            tell(place / len(data.runs), run.name)
+            tracker.reached(place / len(data.runs))
             columns = features(template, run)
             gram += columns.T @ columns
-            right += columns.T @ run.displacements
+            right += columns.T @ run.outputs
             total += len(columns)
         size = np.sqrt(np.maximum(np.diag(gram), 1e-12 * np.diag(gram).max()))
         scaled = gram / size / size[:, np.newaxis]
@@ -83,7 +75,7 @@ class CoupledMemoryEstimator(CoupledEstimator):
         return template.unpack((found / size[:, np.newaxis]).T.ravel())
 
 
-def features(block: CoupledMemory, run: CoupledRun) -> Array:
+def features(block: CoupledMemory, run: Run) -> Array:
     """Return what the readout multiplies over a run, shape (n, width)."""
     inputs = run.inputs
     n, width = inputs.shape[1], len(block.readout[0])

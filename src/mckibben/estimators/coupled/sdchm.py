@@ -15,25 +15,24 @@ from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from annotated_types import Ge, Interval
-from numpy.typing import NDArray
 
 from mckibben import registry
-from mckibben.blocks.base import Block
+from mckibben.arrays import Array
 from mckibben.blocks.compose import PerChannel, Series
-from mckibben.blocks.coupling import Coupling
-from mckibben.blocks.fields import Channel, rows, vector
-from mckibben.blocks.fuzzy_network import FuzzyNetwork
-from mckibben.blocks.pi import PI
-from mckibben.errors import DataError, ModelWarning
-from mckibben.estimators.coupled.base import CoupledEstimator, Tell
-from mckibben.estimators.coupled.data import CoupledData, CoupledRun
+from mckibben.blocks.core.block import Block
+from mckibben.blocks.core.fields import Channel, rows, vector
+from mckibben.blocks.coupled.coupling import Coupling
+from mckibben.blocks.coupled.fuzzy_network import FuzzyNetwork
+from mckibben.blocks.play_type.pi import PI
+from mckibben.errors import DataError, ModelError, ModelWarning
+from mckibben.estimators.core.data import Run, TrainingData
+from mckibben.estimators.coupled.base import CoupledEstimator
 from mckibben.estimators.coupled.fuzzy import Consequents, Fitted
 from mckibben.estimators.coupled.fuzzy_fit import Method, Search, fit_network
-from mckibben.estimators.coupled.fuzzy_swarm import Swarm
-from mckibben.estimators.pi import play_operators
+from mckibben.estimators.coupled.fuzzy_swarm import printed_swarm
+from mckibben.estimators.optimisers.tracker import Tracker, whole_searches
+from mckibben.estimators.play_type.pi import play_operators
 from mckibben.recording import Recording
-
-Array = NDArray[np.float64]
 
 BEYOND = 0.1
 """How far beyond the data the inverse may go, relative to their range."""
@@ -67,6 +66,8 @@ class NetworkEstimator(CoupledEstimator):
         Samples on which antecedents are searched; consequents are solved for on all.
     """
 
+    fewest_inputs: ClassVar[int] = 2
+
     n_sets: Annotated[int, Interval(ge=1, le=6)] = 3
     constants: bool = False
     method: Method = "ls"
@@ -76,9 +77,14 @@ class NetworkEstimator(CoupledEstimator):
     search_samples: Annotated[int, Ge(100)] = 6000
 
     @property
+    def stops_early(self) -> bool:
+        """Where there is a network."""
+        return self.n_sets > 0
+
+    @property
     def search(self) -> Search:
         """How antecedents are searched."""
-        swarm = Swarm(self.particles, self.iterations)
+        swarm = printed_swarm(self.particles, self.iterations)
         return Search(self.method, self.search_samples, swarm, self.seed)
 
     def network(
@@ -86,9 +92,9 @@ class NetworkEstimator(CoupledEstimator):
         x: Array,
         y: Array,
         driven: tuple[Channel, ...],
-        data: CoupledData,
-        validation: tuple[Array, Array] | None,
-        tell: Tell,
+        data: TrainingData,
+        early: tuple[Array, Array] | None,
+        tracker: Tracker,
     ) -> FuzzyNetwork:
         """Return a network from driven and scheduling inputs to displacements."""
         found = fit_network(
@@ -97,14 +103,14 @@ class NetworkEstimator(CoupledEstimator):
             self.n_sets,
             Consequents(self.constants, self.ridge),
             self.search,
-            validation=validation,
-            tell=lambda share: tell(share, "network"),
+            tracker=tracker,
+            validation=early,
         )
         n = len(driven)
         low, high = x[:, :n].min(axis=0), x[:, :n].max(axis=0)
         margin = BEYOND * (high - low)
         limits = np.column_stack([low - margin, high + margin])
-        return as_block(found, driven, data.displacements, data.scheduled, limits, self.constants)
+        return as_block(found, driven, data.outputs, data.scheduled, limits, self.constants)
 
 
 def as_block(
@@ -138,17 +144,9 @@ class TSFNNEstimator(NetworkEstimator):
 
     paired: ClassVar[bool] = False
 
-    def identify(self, data: CoupledData, validation: CoupledData | None, tell: Tell) -> Block:
-        """Return the network."""
-        held = None
-        if validation is not None:
-            held = (
-                np.concatenate([run.inputs for run in validation.runs]),
-                validation.stacked("displacements"),
-            )
-        x = np.concatenate([run.inputs for run in data.runs])
-        y = data.stacked("displacements")
-        return self.network(x, y, data.pressures, data, held, tell)
+    def identify(self, data: TrainingData, tracker: Tracker) -> Block:
+        held = None if data.early is None else _table(data.early)
+        return self.network(*_table(data), data.inputs, data, held, tracker)
 
 
 @dataclass(kw_only=True, repr=False, eq=False)
@@ -159,8 +157,16 @@ class SDCHMEstimator(NetworkEstimator):
     whole. The last part is beyond the paper: a muscle that is moved by the others rubs in its own braid,
     and a Prandtl-Ishlinskii memory of its own motion says so.
 
+    ``sdchm-published`` follows Algorithm 1, with thresholds by Eq. (7), operators started by Eq. (1) and
+    the loss of Eq. (26). What differs: the GPI models' search does not start from weights and envelopes
+    of 0 (see `GPIEstimator`); gains and consequents are solved for, so that their printed starts are of
+    no effect; and rules are normalised input by input in the log domain, since printed centres near 0
+    are so far from most displacements that every rule's product underflows.
+
     Parameters
     ----------
+    n_sets : int
+        Gaussian sets of every input of the network; 0 for neither network nor friction.
     memory : str
         Model of every muscle's hysteresis: any with an exact inverse. ``cpi`` knows creep.
     memory_settings : mapping
@@ -173,65 +179,66 @@ class SDCHMEstimator(NetworkEstimator):
 
     effort: ClassVar[float] = 20.0
 
-    memory_defaults: ClassVar[dict[str, dict[str, Any]]] = {}
-    """Settings of memories that differ from their own defaults, by memory."""
-
+    n_sets: Annotated[int, Interval(ge=0, le=6)] = 3
     constants: bool = True
     memory: Literal["gpi", "pi", "mpi", "eupi", "cpi"] = "cpi"
     memory_settings: dict[str, Any] | None = None
     n_friction: Annotated[int, Interval(ge=0, le=20)] = 6
     n_rounds: Annotated[int, Interval(ge=1, le=5)] = 2
 
-    def identify(self, data: CoupledData, validation: CoupledData | None, tell: Tell) -> Block:
-        """Return the series of all stages."""
-        chosen = [softest(data, muscle) for muscle in range(len(data.pressures))]
-        tell(0.0, "hysteresis of every muscle")
+    def identify(self, data: TrainingData, tracker: Tracker) -> Block:
+        chosen = [softest(data, muscle) for muscle in range(len(data.inputs))]
+        tracker.reached(0.0)
         memories = [self.hysteresis(run, k, data) for k, run in enumerate(chosen)]
         hysteresis = PerChannel(tuple(memories))
-        tell(0.2, "coupling")
+        tracker.reached(0.2)
         coupling = coupled(memories, chosen, data)
         front = Series((hysteresis, coupling))
+        if not self.n_sets:
+            if data.scheduled:
+                tracker.notes.append(f"{data.scheduled[0].name} is not used by this model")
+            return front
         used = {id(run) for run in chosen}
         rest = [run for run in data.runs if id(run) not in used] or list(data.runs)
         x = stacked_inputs(front, rest)
         held = None
-        if validation is not None:
-            moved = np.concatenate([run.displacements for run in validation.runs])
-            held = (stacked_inputs(front, list(validation.runs)), moved)
-        target = [run.displacements for run in rest]
+        if data.early is not None:
+            held = (stacked_inputs(front, list(data.early.runs)), data.early.stacked("outputs"))
+        target = [run.outputs for run in rest]
         rounds = self.n_rounds if self.n_friction else 1
         for number in range(rounds):
-
-            def told(share: float, text: str, number: int = number) -> None:
-                tell(0.25 + 0.75 * (number + share) / rounds, text)
-
+            first, last = (0.25 + 0.75 * (number + end) / rounds for end in (0, 1))
+            own = tracker.part(first, last)
             network = self.network(
                 x,
                 np.concatenate(target),
-                data.displacements,
+                data.outputs,
                 data,
                 held if number == 0 else None,
-                told,
+                own,
             )
+            tracker.saw_all(own)
             if not self.n_friction:
                 return Series((hysteresis, coupling, network))
             straight = np.split(
-                network.simulate(x), np.cumsum([len(run.displacements) for run in rest])[:-1]
+                network.simulate(x), np.cumsum([len(run.outputs) for run in rest])[:-1]
             )
             rubbing = PerChannel(
                 tuple(
                     self.friction(
                         [part[:, k] for part in straight],
-                        [run.displacements[:, k] for run in rest],
+                        [run.outputs[:, k] for run in rest],
                         channel,
                     )
-                    for k, channel in enumerate(data.displacements)
+                    for k, channel in enumerate(data.outputs)
                 )
             )
+            if tracker.interrupted:
+                break
             unrubbed = rubbing.inverse()
             with warnings.catch_warnings():  # noise at the ends is clipped
                 warnings.simplefilter("ignore", ModelWarning)
-                target = [unrubbed.simulate(run.displacements) for run in rest]
+                target = [unrubbed.simulate(run.outputs) for run in rest]
         return Series((hysteresis, coupling, network, rubbing))
 
     def friction(self, given: list[Array], wanted: list[Array], channel: Channel) -> PI:
@@ -264,32 +271,40 @@ class SDCHMEstimator(NetworkEstimator):
             channel,
         )
 
-    def hysteresis(self, run: CoupledRun, muscle: int, data: CoupledData) -> Block:
+    def hysteresis(self, run: Run, muscle: int, data: TrainingData) -> Block:
         """Return the hysteresis of one muscle, from a run in which it moves alone."""
-        given, wanted = data.pressures[muscle], data.displacements[muscle]
+        given, wanted = data.inputs[muscle], data.outputs[muscle]
         recording = Recording(
-            {given.name: run.pressures[:, muscle], wanted.name: run.displacements[:, muscle]},
+            {given.name: run.driven[:, muscle], wanted.name: run.outputs[:, muscle]},
             run.sample_time,
         )
         settings = {"input": given.name, "output": wanted.name, "seed": self.seed}
-        estimator = registry.load("estimators", self.memory)(
-            **settings | self.memory_defaults.get(self.memory, {}) | (self.memory_settings or {})
-        )
-        block: Block = estimator.fit(recording).model_
+        estimator = registry.load("estimators", self.memory)()
+        try:
+            estimator.set_params(**settings | (self.memory_settings or {}))
+        except ValueError as error:
+            raise ModelError(f"memory_settings: {error}") from None
+        with whole_searches():
+            block: Block = estimator.fit(recording).model_
         return block
 
 
-def stacked_inputs(front: Block, runs: list[CoupledRun]) -> Array:
+def _table(data: TrainingData) -> tuple[Array, Array]:
+    """Return the inputs and outputs of all runs, one under another."""
+    return data.stacked("inputs"), data.stacked("outputs")
+
+
+def stacked_inputs(front: Block, runs: list[Run]) -> Array:
     """Return what the network is given over all runs: coupled hysteresis, then what schedules."""
     return np.concatenate([np.column_stack([simulated(front, run), run.scheduled]) for run in runs])
 
 
-def simulated(block: Block, run: CoupledRun) -> Array:
+def simulated(block: Block, run: Run) -> Array:
     """Return a block's outputs over a run's pressures."""
-    return block.simulate(np.ascontiguousarray(run.pressures), sample_time=run.sample_time)
+    return block.simulate(np.ascontiguousarray(run.driven), sample_time=run.sample_time)
 
 
-def softest(data: CoupledData, muscle: int) -> CoupledRun:
+def softest(data: TrainingData, muscle: int) -> Run:
     """Return the run to identify a muscle's hysteresis from.
 
     It moves alone; what schedules is lowest; and the run is the longest of those.
@@ -303,64 +318,24 @@ def softest(data: CoupledData, muscle: int) -> CoupledRun:
     if not runs:
         raise DataError(
             "no run moves this muscle alone, so its hysteresis cannot be told from the coupling",
-            channel=data.pressures[muscle].name,
+            channel=data.inputs[muscle].name,
             remedy="add a run in which the other pressures rest, or fit force-balance",
         )
     if not data.scheduled:
-        return max(runs, key=lambda run: len(run.pressures))
+        return max(runs, key=lambda run: len(run.driven))
     lowest = min(float(run.scheduled.mean()) for run in runs)
     span = float(np.ptp(data.stacked("scheduled"))) or 1.0
     near = [run for run in runs if run.scheduled.mean() <= lowest + 0.02 * span]
-    return max(near, key=lambda run: len(run.pressures))
+    return max(near, key=lambda run: len(run.driven))
 
 
-def coupled(memories: list[Block], runs: list[CoupledRun], data: CoupledData) -> Coupling:
+def coupled(memories: list[Block], runs: list[Run], data: TrainingData) -> Coupling:
     """Return the coupling: what moves with muscle i alone, by least squares on its hysteresis."""
     n = len(memories)
     gains = np.eye(n)
     for i, (block, run) in enumerate(zip(memories, runs, strict=True)):
-        v = block.simulate(run.pressures[:, i], sample_time=run.sample_time)
+        v = block.simulate(run.driven[:, i], sample_time=run.sample_time)
         for j in range(n):
             if j != i:
-                gains[i, j] = float(v @ run.displacements[:, j]) / float(v @ v)
-    return Coupling(rows(gains), data.displacements, data.displacements)
-
-
-@dataclass(kw_only=True, repr=False, eq=False)
-class PublishedSDCHMEstimator(SDCHMEstimator):
-    """The model as its paper identifies it: GPI, coupling, and a network trained by particle swarm.
-
-    Algorithm 1, with thresholds by Eq. (7), operators started by Eq. (1) and the loss of Eq. (26). What
-    differs: the GPI models' search does not start from weights and envelopes of 0 (see `GPIEstimator`);
-    gains and consequents are solved for, so that their printed starts are of no effect; and rules are
-    normalised input by input in the log domain, since printed centres near 0 are so far from most
-    displacements that every rule's product underflows.
-    """
-
-    effort: ClassVar[float] = 25.0
-
-    constants: bool = False
-    method: Method = "pso"
-    ridge: Annotated[float, Ge(0)] = 1e-9
-    memory: Literal["gpi", "pi", "mpi", "eupi", "cpi"] = "gpi"
-    memory_defaults: ClassVar[dict[str, dict[str, Any]]] = {
-        "gpi": {"threshold_rule": "paper", "initial": "virgin"}
-    }
-    n_friction: Annotated[int, Interval(ge=0, le=20)] = 0
-
-
-@dataclass(kw_only=True, repr=False, eq=False)
-class CoupledPIEstimator(SDCHMEstimator):
-    """Hysteresis of every muscle and a coupling, whatever the stiffness: a baseline."""
-
-    memory: Literal["gpi", "pi", "mpi", "eupi", "cpi"] = "gpi"
-
-    def identify(self, data: CoupledData, validation: CoupledData | None, tell: Tell) -> Block:
-        """Return the series of hysteresis and coupling."""
-        del validation
-        tell(0.0, "hysteresis of every muscle")
-        chosen = [softest(data, muscle) for muscle in range(len(data.pressures))]
-        memories = [self.hysteresis(run, k, data) for k, run in enumerate(chosen)]
-        if data.scheduled:
-            self.notes.append(f"{data.scheduled[0].name} is not used by this model")
-        return Series((PerChannel(tuple(memories)), coupled(memories, chosen, data)))
+                gains[i, j] = float(v @ run.outputs[:, j]) / float(v @ v)
+    return Coupling(rows(gains), data.outputs, data.outputs)

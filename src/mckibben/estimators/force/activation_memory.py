@@ -7,18 +7,15 @@ from typing import Annotated, ClassVar
 
 import numpy as np
 from annotated_types import Ge, Interval
-from numpy.typing import NDArray
 
-from mckibben.blocks.base import Block
-from mckibben.blocks.fields import Channel, vector
+from mckibben.arrays import Array
+from mckibben.blocks.core.block import Block
+from mckibben.blocks.core.fields import vector
 from mckibben.blocks.force.activation_memory import ActivationMemory
-from mckibben.errors import DataError
-from mckibben.estimators.base import Operators
-from mckibben.estimators.data import Run, TrainingData
-from mckibben.estimators.search import Tracker
-from mckibben.estimators.separable import SeparableEstimator
-
-Array = NDArray[np.float64]
+from mckibben.estimators.core.data import Run, TrainingData
+from mckibben.estimators.core.estimator import Operators
+from mckibben.estimators.core.separable import SeparableEstimator
+from mckibben.estimators.optimisers.tracker import Tracker
 
 
 @dataclass(kw_only=True, repr=False, eq=False)
@@ -55,32 +52,14 @@ class ActivationMemoryEstimator(SeparableEstimator):
     nonnegative: bool = False
 
     made_for: ClassVar[tuple[str, str] | None] = ("contraction", "pressure")
+    told: ClassVar[tuple[str, ...]] = ("force",)
     rises: ClassVar[bool] = False
     searches_condensed: ClassVar[bool] = False
-
-    @property
-    def scheduling(self) -> tuple[str, ...]:
-        """Force."""
-        return (self.force,)
+    reach: ClassVar[tuple[float, float]] = (2.0, 0.05)
 
     def identify(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
-        """Return the block found, and the data with the memories at the start that belong to it."""
-        if data.sample_time is None:
-            raise DataError(
-                "the recordings have no time, and this model depends on rate",
-                remedy="read them with a time column or --rate",
-            )
+        data.timed()
         return super().identify(data, tracker)
-
-    def bounds(self, data: TrainingData) -> tuple[Array, Array]:
-        """Return nothing: every parameter is linear."""
-        del data
-        return np.empty(0), np.empty(0)
-
-    def guesses(self, data: TrainingData) -> list[Array]:
-        """Return nothing to guess."""
-        del data
-        return []
 
     def unit(self, data: TrainingData) -> ActivationMemory:
         """Return the model with zero parameters."""
@@ -107,14 +86,8 @@ class ActivationMemoryEstimator(SeparableEstimator):
             **self.channels(data),
         )
 
-    def channels(self, data: TrainingData) -> dict[str, Channel]:
-        """Return contraction, force and pressure."""
-        force = Channel(data.scheduling[0], data.scheduling_units[0])
-        return super().channels(data) | {"force": force}
-
     def basis(self, theta: Array, run: Run, data: TrainingData) -> Array:
         """Return the output by each coefficient alone but the constant, over the run's history."""
-        del theta
         unit = self.unit(data)
         alone = np.eye(unit.n_parameters)[1:]
         return unit.simulate_many(alone, run.inputs, sample_time=run.sample_time).T
@@ -134,13 +107,4 @@ class ActivationMemoryEstimator(SeparableEstimator):
         return found[1:], float(found[0])
 
     def build(self, theta: Array, linear: Array, offset: float, data: TrainingData) -> Block:
-        """Return the model."""
-        del theta
         return self.unit(data).unpack([offset, *linear])
-
-    def parameter_bounds(self, data: TrainingData) -> tuple[Block, Array, Array]:
-        """Return the model solved for, and bounds twice as far as it goes."""
-        template = self.build(np.empty(0), *self._solve(np.empty(0), data), data)
-        values = template.pack()
-        span = np.maximum(np.abs(values), 0.05 * np.abs(values).max())
-        return template, values - 2 * span, values + 2 * span

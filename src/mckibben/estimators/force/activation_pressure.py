@@ -12,19 +12,17 @@ from typing import Annotated, ClassVar
 
 import numpy as np
 from annotated_types import Ge
-from numpy.typing import NDArray
 
-from mckibben.blocks.base import Block
-from mckibben.blocks.fields import Channel, vector
+from mckibben.arrays import Array
+from mckibben.blocks.core.block import Block
+from mckibben.blocks.core.fields import vector
 from mckibben.blocks.force.activation_pressure import ActivationPressure
-from mckibben.errors import DataError
-from mckibben.estimators.base import simulate_all
-from mckibben.estimators.data import Run, TrainingData
+from mckibben.estimators.core.data import Run, TrainingData
+from mckibben.estimators.core.searching import SearchingEstimator
+from mckibben.estimators.core.uncertainty import simulate_all
 from mckibben.estimators.force.characteristic_points import characteristic_points
-from mckibben.estimators.search import Tracker, particle_swarm
-from mckibben.estimators.searching import SearchingEstimator
-
-Array = NDArray[np.float64]
+from mckibben.estimators.optimisers.swarm import particle_swarm
+from mckibben.estimators.optimisers.tracker import Tracker
 
 STATIC_SHARE = 0.1
 """A run below this share of the fastest run's frequency is static: it bounds low and high pressure,
@@ -59,20 +57,12 @@ class ActivationPressureEstimator(SearchingEstimator):
     pso_c2: Annotated[float, Ge(0)] = 1.5
 
     made_for: ClassVar[tuple[str, str] | None] = ("contraction", "pressure")
+    told: ClassVar[tuple[str, ...]] = ("force",)
     rises: ClassVar[bool] = False
-
-    @property
-    def scheduling(self) -> tuple[str, ...]:
-        """Force."""
-        return (self.force,)
 
     def identify(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
         """Return the model found, set to the first moving run's frequency, and the data."""
-        if data.sample_time is None:
-            raise DataError(
-                "the recordings have no time, and this model depends on rate",
-                remedy="read them with a time column or --rate",
-            )
+        step = data.timed()
         frequencies = np.array(
             [
                 dominant_frequency(run) if self.frequency is None else self.frequency
@@ -90,7 +80,7 @@ class ActivationPressureEstimator(SearchingEstimator):
             (0.0, 0.0, 0.0, 1.0),
             (0.0, 1.0),
             1.0,
-            3 * data.sample_time if tau is None else tau,
+            3 * step if tau is None else tau,
             self.starting_rule,
             **self.channels(data),
         )
@@ -128,7 +118,6 @@ class ActivationPressureEstimator(SearchingEstimator):
         def errors(point: Array) -> Array:
             return (powers @ point[:4]) * (1 + point[4] * rise) * rate - rest
 
-        tracker.budget = self.pso_particles * (self.pso_iterations + 1)
         if self.method == "ls":
             from scipy.optimize import least_squares
 
@@ -143,11 +132,6 @@ class ActivationPressureEstimator(SearchingEstimator):
         phi = found[:4] / largest ** np.array([3, 2, 1, 0])
         slope = float(found[4]) / max(middle, 1e-9)
         return phi, (slope, 1.0 - slope * middle)
-
-    def channels(self, data: TrainingData) -> dict[str, Channel]:
-        """Return contraction, force and pressure."""
-        force = Channel(data.scheduling[0], data.scheduling_units[0])
-        return super().channels(data) | {"force": force}
 
 
 def dominant_frequency(run: Run) -> float:

@@ -17,12 +17,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mckibben.arrays import Array
 from mckibben.errors import DataError
-from mckibben.estimators.data import Run
-
-Array = NDArray[np.float64]
+from mckibben.estimators.core.data import Run
 
 FORCE_STEP = 5.0
 """Runs whose mean forces differ by less belong to one force [N]."""

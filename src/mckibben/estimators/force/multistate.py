@@ -9,11 +9,10 @@ from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 from annotated_types import Ge, Interval
-from numpy.typing import NDArray
 
-from mckibben.blocks.base import Block
+from mckibben.arrays import Array
 from mckibben.blocks.compose import Parallel
-from mckibben.blocks.fields import Channel
+from mckibben.blocks.core.block import Block
 from mckibben.blocks.force.law import ForceLaw
 from mckibben.blocks.force.multistate_friction import (
     EACH_WAY,
@@ -23,14 +22,12 @@ from mckibben.blocks.force.multistate_friction import (
     Direction,
     MultistateFriction,
 )
-from mckibben.errors import DataError
-from mckibben.estimators.data import Run, TrainingData
-from mckibben.estimators.force.static import force_columns, force_law
-from mckibben.estimators.search import Choice, Tracker
-from mckibben.estimators.separable import SeparableEstimator
+from mckibben.estimators.core.data import Run, TrainingData
+from mckibben.estimators.core.separable import SeparableEstimator
+from mckibben.estimators.force.static import ORDERS, Law, force_columns, force_law
+from mckibben.estimators.optimisers.multi_start import Choice
+from mckibben.estimators.optimisers.tracker import Tracker
 from mckibben.recording import Recording
-
-Array = NDArray[np.float64]
 
 Structure = Literal["eleven", "each-way", "eighteen"]
 STRUCTURES = {"eleven": ELEVEN, "each-way": EACH_WAY, "eighteen": EIGHTEEN}
@@ -40,8 +37,6 @@ LEAST_SHARE = 1e-5
 LENGTHS = np.geomspace(0.02, 1.0, 8)
 TIMES = (0.1, 10.0)
 """Break-away lengths that elements are tried with, relative to the range, and times, in samples."""
-
-ORDERS = {"bilinear": (1, 2), "petrovic": (2, 2), "minh": (3, 3), "schindele": (3, 4)}
 
 
 def extract_hysteresis(
@@ -105,7 +100,7 @@ class MultistateEstimator(SeparableEstimator):
     output: str = "force"
     initial: Literal["first_sample", "virgin", "fitted"] = "virgin"
     pressure: str = "pressure"
-    static: Literal["bilinear", "petrovic", "minh", "schindele"] | None = "bilinear"
+    static: Law | None = "bilinear"
     elements: Structure | tuple[Direction, ...] = "eleven"
     fit_pressure_gain: bool = False
     nonnegative: bool = False
@@ -113,16 +108,13 @@ class MultistateEstimator(SeparableEstimator):
     n_refined: Annotated[int, Interval(ge=1)] = 8
 
     made_for: ClassVar[tuple[str, str] | None] = ("length", "force")
+    told: ClassVar[tuple[str, ...]] = ("pressure",)
     rises: ClassVar[bool] = False
     searches_condensed: ClassVar[bool] = False
+    reach: ClassVar[tuple[float, float]] = (1.0, 1e-3)
     # where elements begin to slip makes corners in the cost, which take many short steps
     search_evaluations: ClassVar[int] = 20
     polish_evaluations: ClassVar[int] = 20
-
-    @property
-    def scheduling(self) -> tuple[str, ...]:
-        """Pressure."""
-        return (self.pressure,)
 
     @property
     def directions(self) -> tuple[Direction, ...]:
@@ -132,12 +124,7 @@ class MultistateEstimator(SeparableEstimator):
         return tuple(self.elements)
 
     def identify(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
-        """Return the block found, and the data with the memories at the start that belong to it."""
-        if data.sample_time is None:
-            raise DataError(
-                "the recordings have no time, and friction depends on rate",
-                remedy="read them with a time column or --rate",
-            )
+        data.timed("friction depends on rate")
         return super().identify(data, tracker)
 
     # An element's deflection follows from how far it goes before it slips, F_c / k, and from the time
@@ -254,11 +241,6 @@ class MultistateEstimator(SeparableEstimator):
             **self.channels(data),
         )
 
-    def channels(self, data: TrainingData) -> dict[str, Channel]:
-        """Return length, pressure and force."""
-        pressure = Channel(data.scheduling[0], data.scheduling_units[0])
-        return super().channels(data) | {"pressure": pressure}
-
     def basis(self, theta: Array, run: Run, data: TrainingData) -> Array:
         """Return the forces of the elements, then what the static law's coefficients multiply."""
         friction = self._forces(theta, run, data)
@@ -340,13 +322,9 @@ class MultistateEstimator(SeparableEstimator):
         return tuple(sorted({*super().undetermined(), *vague.tolist()}))
 
     def parameter_bounds(self, data: TrainingData) -> tuple[Block, Array, Array]:
-        """Return the block of the first guess, and bounds about it that keep it valid."""
-        theta = self.guesses(data)[0]
-        template = self.build(theta, *self._solve(theta, data), data)
-        n = sum(SIZES[element] for element in self.directions)
-        values = template.pack()
-        span = np.maximum(np.abs(values), 1e-3 * np.abs(values).max())
-        below, above = values - span, values + span
+        """Return the block solved for, and bounds that keep its friction valid."""
+        template, below, above = super().parameter_bounds(data)
+        n, values = sum(SIZES[element] for element in self.directions), template.pack()
         start = values.size - n - self.fit_pressure_gain
         friction = slice(start, start + n)
         largest = np.abs(values[friction]).max()
@@ -355,19 +333,3 @@ class MultistateEstimator(SeparableEstimator):
         if self.fit_pressure_gain:
             below[-1], above[-1] = -0.5, 1.0
         return template, below, above
-
-
-@dataclass(kw_only=True, repr=False, eq=False)
-class MultistateEighteenEstimator(MultistateEstimator):
-    """Multistate friction with three elements in both directions: eighteen parameters."""
-
-    elements: Structure | tuple[Direction, ...] = "eighteen"
-
-
-@dataclass(kw_only=True, repr=False, eq=False)
-class MultistateEachWayEstimator(MultistateEstimator):
-    """Multistate friction with one shared element and one for each direction: eleven parameters."""
-
-    effort: ClassVar[float] = 3.0
-
-    elements: Structure | tuple[Direction, ...] = "each-way"

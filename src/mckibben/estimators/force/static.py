@@ -2,24 +2,30 @@
 
 from __future__ import annotations
 
-from abc import abstractmethod
 from dataclasses import dataclass
-from typing import Annotated, ClassVar
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 from annotated_types import Gt
-from numpy.typing import NDArray
 
-from mckibben.blocks.base import Block
-from mckibben.blocks.braid_equilibrium import NEWTONS_PER_BAR
-from mckibben.blocks.fields import Channel, vector
+from mckibben.arrays import Array
+from mckibben.blocks.core.block import Block
+from mckibben.blocks.core.fields import Channel, vector
+from mckibben.blocks.force.braid_equilibrium import NEWTONS_PER_BAR
 from mckibben.blocks.force.chou_hannaford import ChouHannaford
 from mckibben.blocks.force.polynomial_force import PolynomialForce
 from mckibben.blocks.force.tondu_lopez import MU_DECAY, TonduLopez
-from mckibben.estimators.data import Run, TrainingData
-from mckibben.estimators.separable import SeparableEstimator
+from mckibben.estimators.core.data import Run, TrainingData
+from mckibben.estimators.core.separable import SeparableEstimator
 
-Array = NDArray[np.float64]
+Law = Literal["bilinear", "petrovic", "minh", "schindele"]
+ORDERS: dict[Law, tuple[int, int]] = {
+    "bilinear": (1, 2),
+    "petrovic": (2, 2),
+    "minh": (3, 3),
+    "schindele": (3, 4),
+}
+"""Orders in length of what multiplies pressure, and of what does not."""
 
 
 @dataclass(kw_only=True, repr=False, eq=False)
@@ -38,57 +44,34 @@ class ForceLawEstimator(SeparableEstimator):
     nonnegative: bool = False
 
     made_for: ClassVar[tuple[str, str] | None] = ("length", "force")
+    told: ClassVar[tuple[str, ...]] = ("pressure",)
     rises: ClassVar[bool] = False
     searches_condensed: ClassVar[bool] = False
-
-    @property
-    def scheduling(self) -> tuple[str, ...]:
-        """Pressure."""
-        return (self.pressure,)
-
-    def bounds(self, data: TrainingData) -> tuple[Array, Array]:
-        """Return nothing: every parameter is linear."""
-        del data
-        return np.empty(0), np.empty(0)
-
-    def guesses(self, data: TrainingData) -> list[Array]:
-        """Return nothing to guess."""
-        del data
-        return []
-
-    def channels(self, data: TrainingData) -> dict[str, Channel]:
-        """Return length, pressure and force."""
-        pressure = Channel(data.scheduling[0], data.scheduling_units[0])
-        return super().channels(data) | {"pressure": pressure}
-
-    def parameter_bounds(self, data: TrainingData) -> tuple[Block, Array, Array]:
-        """Return the law solved for at the first guess, and bounds twice as far as it goes."""
-        theta = self.guesses(data)[0] if self.guesses(data) else np.empty(0)
-        template = self.build(theta, *self._solve(theta, data), data)
-        values = template.pack()
-        span = 0.9 * np.maximum(np.abs(values), 1e-3 * np.abs(values).max())
-        return template, values - span, values + span
+    reach: ClassVar[tuple[float, float]] = (0.9, 1e-3)
 
 
 @dataclass(kw_only=True, repr=False, eq=False)
 class PolynomialForceEstimator(ForceLawEstimator):
-    """Force linear in pressure and polynomial in length, by least squares."""
+    """Force linear in pressure and polynomial in length, by least squares.
 
-    @property
-    @abstractmethod
-    def orders(self) -> tuple[int, int]:
-        """Orders in length of what multiplies pressure, and of what does not."""
+    Source of the bilinear-quadratic law: "A Multistate Friction Model for the Compensation of the
+    Asymmetric Hysteresis in the Mechanical Response of Pneumatic Artificial Muscles", Eq. (3).
+
+    Parameters
+    ----------
+    law : {"bilinear", "petrovic", "minh", "schindele"}
+        Whose orders in length.
+    """
+
+    law: Law = "bilinear"
 
     def basis(self, theta: Array, run: Run, data: TrainingData) -> Array:
         """Return the powers of the scaled length with pressure, then without, but the constant."""
-        del theta
         length, pressure = run.inputs.T
-        return force_columns(length, pressure, self.orders, data.input_range)
+        return force_columns(length, pressure, ORDERS[self.law], data.input_range)
 
     def build(self, theta: Array, linear: Array, offset: float, data: TrainingData) -> Block:
-        """Return the law."""
-        del theta
-        return force_law(linear, offset, self.orders, data.input_range, self.channels(data))
+        return force_law(linear, offset, ORDERS[self.law], data.input_range, self.channels(data))
 
 
 def force_columns(
@@ -119,50 +102,6 @@ def force_law(
 
 
 @dataclass(kw_only=True, repr=False, eq=False)
-class BilinearForceEstimator(PolynomialForceEstimator):
-    """The bilinear-quadratic law.
-
-    Source: "A Multistate Friction Model for the Compensation of the Asymmetric Hysteresis in the
-    Mechanical Response of Pneumatic Artificial Muscles", Eq. (3).
-    """
-
-    @property
-    def orders(self) -> tuple[int, int]:
-        """(1, 2)."""
-        return (1, 2)
-
-
-@dataclass(kw_only=True, repr=False, eq=False)
-class PetrovicForceEstimator(PolynomialForceEstimator):
-    """Petrovic's polynomial: quadratic in length with pressure, and without."""
-
-    @property
-    def orders(self) -> tuple[int, int]:
-        """(2, 2)."""
-        return (2, 2)
-
-
-@dataclass(kw_only=True, repr=False, eq=False)
-class MinhForceEstimator(PolynomialForceEstimator):
-    """Minh's law: cubic in length, with coefficients linear in pressure."""
-
-    @property
-    def orders(self) -> tuple[int, int]:
-        """(3, 3)."""
-        return (3, 3)
-
-
-@dataclass(kw_only=True, repr=False, eq=False)
-class SchindeleForceEstimator(PolynomialForceEstimator):
-    """Schindele and Aschemann's polynomials: cubic with pressure, of fourth order without."""
-
-    @property
-    def orders(self) -> tuple[int, int]:
-        """(3, 4)."""
-        return (3, 4)
-
-
-@dataclass(kw_only=True, repr=False, eq=False)
 class ChouHannafordEstimator(ForceLawEstimator):
     """Chou and Hannaford's law: thread length, turns and a constant, by least squares."""
 
@@ -174,7 +113,6 @@ class ChouHannafordEstimator(ForceLawEstimator):
         The law crosses zero at b / sqrt(3): weights of at least 0 keep that between no length at all
         and the shortest seen.
         """
-        del theta
         length, pressure = run.inputs.T
         shortest = data.input_range[0]
         return np.column_stack([pressure * (length**2 - shortest**2), pressure * length**2])
@@ -186,8 +124,6 @@ class ChouHannafordEstimator(ForceLawEstimator):
         return np.array([1e-3 * (high - low) / reach, 0.0])
 
     def build(self, theta: Array, linear: Array, offset: float, data: TrainingData) -> Block:
-        """Return the law."""
-        del theta
         per_bar = float(linear.sum())
         turns = float(np.sqrt(3 * NEWTONS_PER_BAR / (4 * np.pi * per_bar)))
         thread = data.input_range[0] * float(np.sqrt(3 * linear[0] / per_bar))
@@ -211,12 +147,10 @@ class TonduLopezEstimator(ForceLawEstimator):
 
     def bounds(self, data: TrainingData) -> tuple[Array, Array]:
         """Return bounds of [angle, kappa_1, kappa_0]."""
-        del data
         return np.array([0.2, -2.0, 0.3]), np.array([0.9, 5.0, 3.0])
 
     def guesses(self, data: TrainingData) -> list[Array]:
         """Return usual angles without corrections."""
-        del data
         return [np.array([angle, 0.0, 1.0]) for angle in (0.35, 0.45, 0.55)]
 
     def unit(self, theta: Array, data: TrainingData, mu: tuple[float, float]) -> TonduLopez:
@@ -235,7 +169,6 @@ class TonduLopezEstimator(ForceLawEstimator):
         return np.column_stack([ideal * np.exp(-MU_DECAY * e), ideal])
 
     def build(self, theta: Array, linear: Array, offset: float, data: TrainingData) -> Block:
-        """Return the law."""
         from dataclasses import replace
 
         mu = (float(linear[0]), float(linear[1]))

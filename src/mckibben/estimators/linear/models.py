@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-from abc import abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Annotated, ClassVar
 
 import numpy as np
 from annotated_types import Interval, Len
-from numpy.typing import NDArray
 
-from mckibben.blocks.base import Block
+from mckibben.arrays import Array
+from mckibben.blocks.core.block import Block
+from mckibben.blocks.core.fields import vector
 from mckibben.blocks.dynamic.transfer_function import TransferFunction
-from mckibben.blocks.fields import vector
 from mckibben.errors import DataError, ModelError
-from mckibben.estimators.base import inverted
-from mckibben.estimators.data import Run, TrainingData
+from mckibben.estimators.core.data import Run, TrainingData
+from mckibben.estimators.core.uncertainty import inverted
 from mckibben.estimators.linear.polynomials import Orders, Polynomials
 from mckibben.estimators.linear.prediction_error import (
     arx,
@@ -25,9 +24,7 @@ from mckibben.estimators.linear.prediction_error import (
     starting_points,
 )
 from mckibben.estimators.linear.starts import LinearEstimator, meat
-from mckibben.estimators.search import Tracker
-
-Array = NDArray[np.float64]
+from mckibben.estimators.optimisers.tracker import Tracker
 
 Order = Annotated[int, Interval(ge=0, le=20)]
 Lag = Annotated[int, Interval(ge=0, le=120)]
@@ -49,25 +46,6 @@ class Noise:
         return vector(np.sqrt(np.diag(self.covariance)))
 
 
-def stretches(run: Run, shortest: int) -> list[Run]:
-    """Return the stretches of a run whose samples all count, each to be started on its own.
-
-    Predictions feed on outputs before them, which may not be looked at where they do not count.
-    """
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], run.counts, [False]])))
-    return [
-        Run(
-            run.u[start:stop],
-            run.y[start:stop],
-            run.counts[start:stop],
-            run.sample_time,
-            run.scheduled[start:stop],
-        )
-        for start, stop in edges.reshape(-1, 2)
-        if stop - start > shortest
-    ]
-
-
 @dataclass(kw_only=True, repr=False, eq=False)
 class PredictionErrorEstimator(LinearEstimator):
     """An estimator of a linear model by one-step prediction errors, run free ever after.
@@ -80,31 +58,61 @@ class PredictionErrorEstimator(LinearEstimator):
     ----------
     n_zeros : int
         Coefficients of B, at least 1.
+    n_poles : int
+        Order of A or F.
+    shared_poles : bool
+        Whether the poles are the noise's too, A y = B u + C e, of which ARX is solved for at once; or of
+        the way from the input alone, y = B / F u + C / D e.
+    n_noise, n_noise_poles : int
+        Orders of C and D.
     delay : int
         Samples before B's first coefficient.
+    lags : sequence of int, optional
+        Samples by which the input of each coefficient of B lies back, instead of n_zeros from the delay
+        on. The Box-Jenkins model of "Analysis and modeling of a pneumatic artificial muscle system",
+        Eq. (5), has terms in q^0 and q^-2 only in its printed B, Eq. (6): ``lags=(0, 2)``.
     n_starts : int
         Starting points.
     """
 
     n_zeros: Annotated[int, Interval(ge=1, le=20)] = 2
+    n_poles: Order = 2
+    shared_poles: bool = True
+    n_noise: Order = 0
+    n_noise_poles: Order = 0
     delay: Annotated[int, Interval(ge=0, le=100)] = 0
+    lags: Annotated[Sequence[Lag], Len(1)] | None = None
     n_starts: Annotated[int, Interval(ge=1, le=1000)] = 12
 
     rises: ClassVar[bool] = False
+    effort: ClassVar[float] = 0.02
 
     @property
-    @abstractmethod
     def orders(self) -> Orders:
         """How many coefficients each polynomial has."""
+        lags = None if self.lags is None else tuple(sorted(set(self.lags)))
+        poles = {"a" if self.shared_poles else "f": self.n_poles}
+        return Orders(
+            b=len(lags) if lags else self.n_zeros,
+            c=self.n_noise,
+            d=self.n_noise_poles,
+            delay=self.delay,
+            lags=lags,
+            **poles,
+        )
+
+    def check_settings(self) -> None:
+        """Refuse settings that are not as they are declared, and poles of the noise in two places."""
+        super().check_settings()
+        if self.shared_poles and self.n_noise_poles:
+            raise ModelError(
+                f"the noise shares the model's poles, and has {self.n_noise_poles} of its own. "
+                "Remedy: use n_noise_poles=0, or shared_poles=false."
+            )
 
     def identify(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
         """Return the transfer function found, and the data."""
-        step = data.sample_time
-        if step is None:
-            raise DataError(
-                "the recordings have no time, and this model depends on rate",
-                remedy="read them with a time column or --rate, or use gpi",
-            )
+        step = data.timed(instead=", or use gpi")
         orders = self.orders
         if data.target.size <= orders.size + orders.poles * len(data.runs):
             raise DataError(
@@ -113,18 +121,22 @@ class PredictionErrorEstimator(LinearEstimator):
             )
         centre = float(np.mean(np.concatenate([run.u for run in data.runs])))
         middle = float(np.mean(data.target))
-        # a free run needs no outputs, so it goes on where they do not count
-        pieces = (
-            data.runs
-            if not (orders.a or orders.c or orders.d)
-            else tuple(piece for run in data.runs for piece in stretches(run, orders.size))
+        known, runs = (
+            [run.carrying(run.u - centre, run.y - middle) for run in pieces]
+            for pieces in (data.stretches(orders.size).runs, data.runs)
         )
-        runs = [replace(piece, u=piece.u - centre, y=piece.y - middle) for piece in pieces]
+        if orders.a or orders.c or orders.d:
+            if not known:
+                raise DataError(
+                    f"no {orders.size + 1} samples in a row count, which {orders.size} parameters take",
+                    remedy="give longer recordings, or lower orders",
+                )
+            runs = known  # a free run needs no outputs, so it alone goes on where they do not count
         if orders.c == orders.d == orders.f == 0:
             theta = arx(runs, orders)
             tracker.saw(theta, evaluate(theta, orders, runs, self.initial)[2])
         else:
-            starts = starting_points(runs, orders, self.n_starts, self.seed)
+            starts = starting_points(runs, known, orders, self.n_starts, self.seed)
             theta = minimise(runs, orders, starts, tracker, self.initial)
         p = Polynomials.of(theta, orders)
         self._constant = p.constant
@@ -191,7 +203,6 @@ class PredictionErrorEstimator(LinearEstimator):
         self, block: Block, data: TrainingData, residual: Array, at_bounds: Sequence[int]
     ) -> tuple[float, Array]:
         """Return the condition and covariance from the prediction errors; the input's offset is set."""
-        del data, residual, at_bounds
         orders = self.orders
         n, poles = block.n_parameters, orders.poles
         turned = np.zeros((n, orders.size))
@@ -208,99 +219,3 @@ class PredictionErrorEstimator(LinearEstimator):
         covariance = np.full((n, n), np.nan)
         covariance[np.ix_(used, used)] = (turned @ self._covariance @ turned.T)[np.ix_(used, used)]
         return self._condition, covariance
-
-
-@dataclass(kw_only=True, repr=False, eq=False)
-class ARXEstimator(PredictionErrorEstimator):
-    """ARX model, A y = B u + e, by linear least squares.
-
-    Parameters
-    ----------
-    n_poles : int
-        Order of A.
-    """
-
-    effort: ClassVar[float] = 0.02
-
-    n_poles: Order = 2
-
-    @property
-    def orders(self) -> Orders:
-        """A and B."""
-        return Orders(b=self.n_zeros, a=self.n_poles, delay=self.delay)
-
-
-@dataclass(kw_only=True, repr=False, eq=False)
-class ARMAXEstimator(ARXEstimator):
-    """ARMAX model, A y = B u + C e.
-
-    Parameters
-    ----------
-    n_noise : int
-        Order of C.
-    """
-
-    effort: ClassVar[float] = 1.0
-
-    n_noise: Order = 2
-
-    @property
-    def orders(self) -> Orders:
-        """A, B and C."""
-        return Orders(b=self.n_zeros, a=self.n_poles, c=self.n_noise, delay=self.delay)
-
-
-@dataclass(kw_only=True, repr=False, eq=False)
-class OutputErrorEstimator(PredictionErrorEstimator):
-    """Output-error model, y = B / F u + e: the best free run of its orders.
-
-    Parameters
-    ----------
-    n_poles : int
-        Order of F.
-    """
-
-    effort: ClassVar[float] = 0.8
-
-    n_poles: Order = 2
-
-    @property
-    def orders(self) -> Orders:
-        """B and F."""
-        return Orders(b=self.n_zeros, f=self.n_poles, delay=self.delay)
-
-
-@dataclass(kw_only=True, repr=False, eq=False)
-class BoxJenkinsEstimator(OutputErrorEstimator):
-    """Box-Jenkins model, y = B / F u + C / D e; second order each by default.
-
-    Source: "Analysis and modeling of a pneumatic artificial muscle system", Eq. (5). Its printed B has
-    terms in q^0 and q^-2 only, Eq. (6): ``lags=(0, 2)``.
-
-    Parameters
-    ----------
-    lags : sequence of int, optional
-        Samples by which the input of each coefficient of B lies back, instead of n_zeros from the delay
-        on.
-    n_noise, n_noise_poles : int
-        Orders of C and D.
-    """
-
-    effort: ClassVar[float] = 1.0
-
-    lags: Annotated[Sequence[Lag], Len(1)] | None = None
-    n_noise: Order = 2
-    n_noise_poles: Order = 2
-
-    @property
-    def orders(self) -> Orders:
-        """B, F, C and D."""
-        lags = None if self.lags is None else tuple(sorted(set(self.lags)))
-        return Orders(
-            b=len(lags) if lags else self.n_zeros,
-            f=self.n_poles,
-            c=self.n_noise,
-            d=self.n_noise_poles,
-            delay=self.delay,
-            lags=lags,
-        )

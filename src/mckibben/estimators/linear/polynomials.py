@@ -15,11 +15,9 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mckibben.estimators.data import Run
-
-Array = NDArray[np.float64]
+from mckibben.arrays import Array
+from mckibben.estimators.core.data import Run
 
 Start = Literal["fitted", "first_sample", "virgin"]
 """State before the first sample: estimated; at rest at the first input; at rest at an input of zero.

@@ -11,13 +11,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from itertools import combinations_with_replacement
+from functools import partial
+from itertools import combinations_with_replacement, islice
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mckibben.estimators.data import Run
-from mckibben.estimators.descent import reduced
+from mckibben.arrays import Array
+from mckibben.estimators.core.data import Run
 from mckibben.estimators.linear.polynomials import Orders, Polynomials, Start, errors
 from mckibben.estimators.linear.stability import (
     free_coordinates,
@@ -25,9 +25,9 @@ from mckibben.estimators.linear.stability import (
     polynomial,
     spectral_radius,
 )
-from mckibben.estimators.search import Tracker
-
-Array = NDArray[np.float64]
+from mckibben.estimators.optimisers.descent import Damping, damped, descend
+from mckibben.estimators.optimisers.multi_start import follow_best
+from mckibben.estimators.optimisers.tracker import Tracker
 
 STABLE = 1.0 - 1e-7
 """Largest pole."""
@@ -51,8 +51,10 @@ REPLANTED = 4
 """Starts, the best, whose noise model is used to find the plant anew."""
 
 SAME = 1e-6
-SHORTEST = 1e-9
-"""Relative improvement at which a descent has arrived."""
+"""Relative difference of errors that is none."""
+
+LEAST_GAIN = 2e-9
+"""Share of the squared error that a step gains, or the descent has arrived."""
 
 
 def admissible(theta: Array, orders: Orders) -> bool:
@@ -117,72 +119,59 @@ def minimise(
 ) -> Array:
     """Return the best parameters found from all starts."""
     tracker.budget = len(starts) * FIRST_STEPS + FOLLOWED * STEPS
-    begun = [
-        _descend(theta, orders, runs, tracker, FIRST_STEPS, start)
-        for theta in starts
-        if admissible(theta, orders)
-    ]
-    begun.sort(key=lambda found: found[1])
-    followed: list[tuple[Array, float]] = []
-    for theta, cost in begun:
-        # starts that have come to the same place need to be followed only once
-        if all(abs(cost - other) > SAME * cost for _, other in followed):
-            followed.append((theta, cost))
-    ended = [
-        _descend(theta, orders, runs, tracker, STEPS, start) for theta, _ in followed[:FOLLOWED]
-    ]
-    return min(ended, key=lambda found: found[1])[0]
+
+    def followed(theta: Array, steps: int) -> tuple[Array, float]:
+        here = At(orders, runs, start, tracker)
+        trust = Damping(1e-4, HEAVIEST, steps=partial(_steps, orders))
+        path = descend(here.errors, here.slopes, theta, trust, least_gain=LEAST_GAIN)
+        *_, (found, squares) = islice(path, steps + 1)
+        return found, float(np.sqrt(squares))
+
+    with tracker.searching():
+        follow_best(
+            (theta for theta in starts if admissible(theta, orders)),
+            partial(followed, steps=FIRST_STEPS),
+            partial(followed, steps=STEPS),
+            FOLLOWED,
+            SAME,
+        )
+    assert tracker.best is not None
+    return tracker.best
 
 
-def _descend(
-    theta: Array, orders: Orders, runs: Sequence[Run], tracker: Tracker, steps: int, start: Start
-) -> tuple[Array, float]:
-    e, jacobian, cost = evaluate(theta, orders, runs, start)
-    tracker.saw(theta, cost)
-    damping = 1e-4
-    for _ in range(steps):
-        found, growth = None, 4.0
-        while damping < HEAVIEST:
-            for tried in _steps(theta, orders, jacobian, e, damping):
-                if not admissible(tried, orders):
-                    continue
-                there = evaluate(tried, orders, runs, start)
-                tracker.saw(tried, there[2])
-                if np.isfinite(there[2]) and there[2] < cost:
-                    found = tried
-                    break
-            if found is not None:
-                break
-            damping, growth = damping * growth, 2.0 * growth
-        if found is None:
-            break
-        gained = (cost - there[2]) / cost if cost > 0 else 0.0
-        theta, (e, jacobian, cost) = found, there
-        damping = max(damping / 10.0, 1e-12)
-        if gained < SHORTEST:
-            break
-    return theta, cost
+class At:
+    """Errors at parameters, and their derivatives, which are computed with them."""
+
+    def __init__(self, orders: Orders, runs: Sequence[Run], start: Start, tracker: Tracker) -> None:
+        self.orders, self.runs, self.start, self.tracker = orders, runs, start, tracker
+
+    def errors(self, theta: Array) -> Array:
+        """Return the errors."""
+        e, self._slopes, cost = evaluate(theta, self.orders, self.runs, self.start)
+        self.tracker.saw(theta, cost)
+        return e
+
+    def slopes(self, theta: Array) -> Array:
+        """Return the derivatives where errors were last asked for."""
+        return self._slopes
 
 
 def _steps(
-    theta: Array, orders: Orders, jacobian: Array, e: Array, damping: float
+    orders: Orders, theta: Array, jacobian: Array, e: Array, damping: float
 ) -> Iterator[Array]:
     """Yield where a damped step leads: in the coefficients, then in coordinates without bounds.
 
     In the coefficients the valley of a root held near the unit circle is straight; they have bounds,
     at which the others would stop too.
     """
-    yield theta + _damped(jacobian, e, damping)
+    tried = theta + damped(jacobian, e, damping)
+    if admissible(tried, orders):
+        yield tried
     here = loosened(theta, orders)
-    yield tightened(here + _damped(jacobian @ tightened(here, orders)[1], e, damping), orders)[0]
-
-
-def _damped(jacobian: Array, e: Array, damping: float) -> Array:
-    size = np.maximum(np.linalg.norm(jacobian, axis=0), 1e-300)
-    triangle, right = reduced(jacobian / size, e)
-    system = np.vstack([triangle, np.sqrt(damping) * np.eye(size.size)])
-    rest = np.append(-right, np.zeros(size.size))
-    return np.asarray(np.linalg.lstsq(system, rest, rcond=None)[0] / size)
+    moved = here + damped(jacobian @ tightened(here, orders)[1], e, damping)
+    tried = tightened(moved, orders)[0]
+    if admissible(tried, orders):
+        yield tried
 
 
 def arx(runs: Sequence[Run], orders: Orders) -> Array:
@@ -192,8 +181,12 @@ def arx(runs: Sequence[Run], orders: Orders) -> Array:
     return np.asarray(theta - np.linalg.lstsq(jacobian, e, rcond=1e-12)[0])
 
 
-def starting_points(runs: Sequence[Run], orders: Orders, n_starts: int, seed: int) -> list[Array]:
+def starting_points(
+    runs: Sequence[Run], known: Sequence[Run], orders: Orders, n_starts: int, seed: int
+) -> list[Array]:
     """Return parameters to start from: reduced ARX, lags of a few speeds, random stable poles.
+
+    ARX looks at past outputs, so it is found on what is known: stretches whose samples all count.
 
     Under coloured noise poles are also found on data whitened by ARX models of high order, which
     give plant and noise alike without bias, and once more on data whitened by the noise models that
@@ -205,14 +198,15 @@ def starting_points(runs: Sequence[Run], orders: Orders, n_starts: int, seed: in
     white = _whitened(runs, orders) if coloured else []
     candidates: list[tuple[Array, Sequence[Run]]]
     candidates = [(_steiglitz_mcbride(data, orders, k), data) for data in white for k in (1, 10)]
-    candidates += [(_steiglitz_mcbride(runs, orders, k), runs) for k in (0, 1, 3, 10)]
-    known = white[0] if white else runs
+    if known:
+        candidates += [(_steiglitz_mcbride(known, orders, k), runs) for k in (0, 1, 3, 10)]
+    plain = white[0] if white else runs
     for speed in ([0.2], [0.9], [0.99, 0.9], [0.9995, 0.97]):
         spread = np.resize(np.array(speed), n) * (1 - 1e-3 * np.arange(n))
-        candidates.append((np.asarray(np.poly(spread)[1:], dtype=np.float64), known))
+        candidates.append((np.asarray(np.poly(spread)[1:], dtype=np.float64), plain))
     while len(candidates) < n_starts:
         poles = 1 - 10 ** rng.uniform(-4, 0, n)
-        candidates.append((np.asarray(np.poly(poles)[1:], dtype=np.float64), known))
+        candidates.append((np.asarray(np.poly(poles)[1:], dtype=np.float64), plain))
     stable = [(poles, data) for poles, data in candidates if spectral_radius(poles) < STABLE]
     found = [_complete(poles, data, runs, orders) for poles, data in stable]
     if not coloured:
@@ -228,10 +222,9 @@ def _with_plant(theta: Array, runs: Sequence[Run], orders: Orders) -> Array:
     p = Polynomials.of(theta, orders)
     top, below = ([1.0, *p.d], [1.0, *p.c]) if not orders.a else ([1.0], [1.0, *p.c])
     white = [
-        replace(
-            run,
-            u=np.asarray(lfilter(top, below, run.u - run.u[0])),
-            y=np.asarray(lfilter(top, below, run.y - run.y[0])),
+        run.carrying(
+            np.asarray(lfilter(top, below, run.u - run.u[0])),
+            np.asarray(lfilter(top, below, run.y - run.y[0])),
         )
         for run in runs
     ]
@@ -364,13 +357,9 @@ def _whitened(runs: Sequence[Run], orders: Orders) -> list[list[Run]]:
         # the first samples, which have too few before them, are left out
         found.append(
             [
-                Run(
-                    np.asarray(lfilter(a, [1.0], run.u))[order:],
-                    np.asarray(lfilter(a, [1.0], run.y))[order:],
-                    run.counts[order:],
-                    run.sample_time,
-                    run.scheduled[order:],
-                )
+                run.carrying(
+                    np.asarray(lfilter(a, [1.0], run.u)), np.asarray(lfilter(a, [1.0], run.y))
+                ).cut(order)
                 for run in enough
             ]
         )
@@ -385,12 +374,9 @@ def _steiglitz_mcbride(runs: Sequence[Run], orders: Orders, rounds: int) -> Arra
     poles = np.zeros(orders.poles)
     for _ in range(rounds + 1):
         filtered = [
-            Run(
+            run.carrying(
                 np.asarray(lfilter([1.0], [1.0, *poles], run.u)),
                 np.asarray(lfilter([1.0], [1.0, *poles], run.y)),
-                run.counts,
-                run.sample_time,
-                run.scheduled,
             )
             for run in runs
         ]

@@ -2,24 +2,20 @@
 
 from __future__ import annotations
 
-from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 from annotated_types import Ge
-from numpy.typing import NDArray
 
-from mckibben.blocks.base import Block
+from mckibben.arrays import Array
+from mckibben.blocks.core.block import Block
 from mckibben.blocks.dynamic.process_model import LONGEST_DELAY, ProcessModel
-from mckibben.errors import DataError
-from mckibben.estimators.data import Run, TrainingData
+from mckibben.estimators.core.data import Run, TrainingData
+from mckibben.estimators.core.separable import SeparableEstimator
 from mckibben.estimators.linear.starts import LinearEstimator
-from mckibben.estimators.search import Tracker
-from mckibben.estimators.separable import SeparableEstimator
-
-Array = NDArray[np.float64]
+from mckibben.estimators.optimisers.tracker import Tracker
 
 Structure = Literal["P1", "P1Z", "P2", "P2Z", "P2U", "P2UZ", "P3"]
 
@@ -28,8 +24,12 @@ Structure = Literal["P1", "P1Z", "P2", "P2Z", "P2U", "P2UZ", "P3"]
 class ProcessModelEstimator(LinearEstimator, SeparableEstimator):
     """Process model by variable projection: gain and zero are solved for, the poles searched.
 
+    P2UZ is Eq. (11) of "Analysis and modeling of a pneumatic artificial muscle system".
+
     Parameters
     ----------
+    structure : {"P1", "P1Z", "P2", "P2Z", "P2U", "P2UZ", "P3"}
+        MATLAB's name: how many poles, whether two of them may oscillate (U), and a zero (Z).
     fit_delay : bool
         Whether a delay of up to a quarter of the longest run is searched too.
     hold : {"first", "zero"}
@@ -38,6 +38,7 @@ class ProcessModelEstimator(LinearEstimator, SeparableEstimator):
 
     effort: ClassVar[float] = 0.3
 
+    structure: Structure = "P1"
     fit_delay: bool = False
     hold: Literal["first", "zero"] = "first"
     nonnegative: bool = False
@@ -46,27 +47,17 @@ class ProcessModelEstimator(LinearEstimator, SeparableEstimator):
 
     rises: ClassVar[bool] = False
     searches_condensed: ClassVar[bool] = False
+    typical: ClassVar[int] = 1
     fits_peaks: ClassVar[bool] = False
 
-    @property
-    @abstractmethod
-    def structure(self) -> Structure:
-        """MATLAB's name."""
-
     def identify(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
-        """Return the block found, and the data with the memories at the start that belong to it."""
-        if data.sample_time is None:
-            raise DataError(
-                "the recordings have no time, and this model depends on rate",
-                remedy="read them with a time column or --rate, or use gpi",
-            )
+        data.timed(instead=", or use gpi")
         return super().identify(data, tracker)
 
     def uncertainty(
         self, block: Block, data: TrainingData, residual: Array, at_bounds: Sequence[int]
     ) -> tuple[float, Array]:
         """Return the condition and covariance from free-run errors; the input's offset is set."""
-        del residual
         return self.free_run_covariance(block, data, [*at_bounds, block.n_parameters - 2])
 
     def undetermined(self) -> tuple[int, ...]:
@@ -151,7 +142,6 @@ class ProcessModelEstimator(LinearEstimator, SeparableEstimator):
         return np.column_stack([columns, block_diag(*starts)])
 
     def build(self, theta: Array, linear: Array, offset: float, data: TrainingData) -> ProcessModel:
-        """Return the model."""
         gain = float(linear[0])
         zero = float(linear[1] / gain) if "Z" in self.structure and gain != 0 else None
         if "Z" in self.structure and zero is None:
@@ -159,88 +149,14 @@ class ProcessModelEstimator(LinearEstimator, SeparableEstimator):
         return replace(self.unit(theta, data, gain), zero_time=zero, output_offset=offset)
 
     def parameter_bounds(self, data: TrainingData) -> tuple[Block, Array, Array]:
-        """Return the model solved for at a guess, and bounds by factors of ten about it."""
-        theta = self.guesses(data)[1]
-        template = self.build(theta, *self._solve(theta, data), data)
+        """Return the model solved for, and bounds by factors of ten or more about its times."""
+        template, *_ = super().parameter_bounds(data)
         values = template.pack()
         span = 2 * np.maximum(np.abs(values), 1.0)
         lower, upper = values - span, values + span
         n = self.n_times + ("U" in self.structure)
         lower[1 : 1 + n], upper[1 : 1 + n] = 0.05 * values[1 : 1 + n], 20 * values[1 : 1 + n]
-        if template.delay > 0:
+        if self.fit_delay:
             place = 1 + n + ("Z" in self.structure)
             lower[place], upper[place] = 1e-6, self.bounds(data)[1][-1]
         return template, lower, upper
-
-
-@dataclass(kw_only=True, repr=False, eq=False)
-class P1Estimator(ProcessModelEstimator):
-    """One lag."""
-
-    @property
-    def structure(self) -> Structure:
-        """MATLAB's name."""
-        return "P1"
-
-
-@dataclass(kw_only=True, repr=False, eq=False)
-class P1ZEstimator(ProcessModelEstimator):
-    """One lag and a zero."""
-
-    @property
-    def structure(self) -> Structure:
-        """MATLAB's name."""
-        return "P1Z"
-
-
-@dataclass(kw_only=True, repr=False, eq=False)
-class P2Estimator(ProcessModelEstimator):
-    """Two lags."""
-
-    @property
-    def structure(self) -> Structure:
-        """MATLAB's name."""
-        return "P2"
-
-
-@dataclass(kw_only=True, repr=False, eq=False)
-class P2ZEstimator(ProcessModelEstimator):
-    """Two lags and a zero."""
-
-    @property
-    def structure(self) -> Structure:
-        """MATLAB's name."""
-        return "P2Z"
-
-
-@dataclass(kw_only=True, repr=False, eq=False)
-class P2UEstimator(ProcessModelEstimator):
-    """Two poles that may oscillate."""
-
-    @property
-    def structure(self) -> Structure:
-        """MATLAB's name."""
-        return "P2U"
-
-
-@dataclass(kw_only=True, repr=False, eq=False)
-class P2UZEstimator(ProcessModelEstimator):
-    """Two poles that may oscillate, and a zero.
-
-    Source: "Analysis and modeling of a pneumatic artificial muscle system", Eq. (11).
-    """
-
-    @property
-    def structure(self) -> Structure:
-        """MATLAB's name."""
-        return "P2UZ"
-
-
-@dataclass(kw_only=True, repr=False, eq=False)
-class P3Estimator(ProcessModelEstimator):
-    """Three lags."""
-
-    @property
-    def structure(self) -> Structure:
-        """MATLAB's name."""
-        return "P3"

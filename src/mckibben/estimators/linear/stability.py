@@ -10,9 +10,8 @@ Source: Monahan, "A note on enforcing stationarity in autoregressive-moving aver
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from mckibben.arrays import Array
 
 LARGEST = 1.0 - 1e-7
 """Reflection coefficient."""

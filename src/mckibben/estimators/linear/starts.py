@@ -3,34 +3,32 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Literal, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mckibben.blocks.base import Block
+from mckibben.arrays import Array
+from mckibben.blocks.core.block import Block
 from mckibben.blocks.dynamic.linear_start import LinearStart
-from mckibben.estimators.base import (
-    Estimator,
+from mckibben.estimators.core.data import Mask, Run, TrainingData
+from mckibben.estimators.core.single import SingleEstimator
+from mckibben.estimators.core.uncertainty import (
     inverted,
     relative_sizes,
     sensitivities,
     simulate_all,
 )
-from mckibben.estimators.data import Mask, Run, TrainingData, training_data
-from mckibben.estimators.search import Progress
+from mckibben.estimators.optimisers.tracker import Progress
 from mckibben.recording import Recording
-
-Array = NDArray[np.float64]
 
 LONGEST = 30
 """Order of the autoregression that describes coloured residuals, at most."""
 
 
 @dataclass(kw_only=True, repr=False, eq=False)
-class LinearEstimator(Estimator):
+class LinearEstimator(SingleEstimator):
     """An estimator of a linear dynamic model.
 
     Parameters
@@ -49,18 +47,19 @@ class LinearEstimator(Estimator):
         self,
         recordings: Recording | Sequence[Recording],
         rows: Sequence[Mask] | None,
+        validation: Sequence[Recording],
         progress: Progress | None,
     ) -> Self:
-        super()._fit(recordings, rows, progress)
+        super()._fit(recordings, rows, validation, progress)
         found = self.diagnostics_
         if self.initial != "fitted" or found.interrupted:
             return self
-        target = training_data(recordings, self.input, self.output, rows, self.scheduling).target
+        target = self.data(recordings, rows).target
         if found.rmse_from_rest <= np.ptp(target):
             return self
         settings = self.get_params()
         at_rest = type(self)(**settings | {"initial": "first_sample"})
-        at_rest._fit(recordings, rows, progress)
+        at_rest._fit(recordings, rows, validation, progress)
         for name, value in vars(at_rest).items():
             if name not in settings:
                 setattr(self, name, value)
@@ -96,7 +95,7 @@ class LinearEstimator(Estimator):
         sizes = relative_sizes(values)
         moves, residuals = [], []
         for run in data.runs:
-            one = TrainingData((run,), data.input, data.output, data.input_unit, data.output_unit)
+            one = replace(data, runs=(run,))
             slopes = np.zeros((run.u.size, len(free)))
             slopes[run.counts] = sensitivities(
                 block, free, sizes[free], partial(self.free_runs, data=one)

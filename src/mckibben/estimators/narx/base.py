@@ -11,19 +11,18 @@ from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from annotated_types import Interval
-from numpy.typing import NDArray
 
-from mckibben.blocks.base import Block
+from mckibben.arrays import Array
+from mckibben.blocks.core.block import Block
 from mckibben.blocks.dynamic.narx import Narx
 from mckibben.errors import DataError, ModelError, ModelWarning
-from mckibben.estimators.base import Estimator
-from mckibben.estimators.data import TrainingData
-from mckibben.estimators.descent import descend
+from mckibben.estimators.core.data import TrainingData
+from mckibben.estimators.core.single import SingleEstimator
+from mckibben.estimators.core.uncertainty import relative_sizes
 from mckibben.estimators.narx.free_run import FreeRuns, Segment, free_run_errors, segments
 from mckibben.estimators.narx.regressors import Lags
-from mckibben.estimators.search import Interrupted, Tracker
-
-Array = NDArray[np.float64]
+from mckibben.estimators.optimisers.descent import Radius, descend
+from mckibben.estimators.optimisers.tracker import Tracker
 
 BOUND = 1.0
 """How far beyond the data's range a stable model's output may go, relative to the range."""
@@ -48,7 +47,7 @@ HOLD = 1000
 
 
 @dataclass(kw_only=True, repr=False, eq=False)
-class NarxEstimator(Estimator):
+class NarxEstimator(SingleEstimator):
     """An estimator of a NARX model.
 
     Parameters
@@ -87,35 +86,40 @@ class NarxEstimator(Estimator):
 
     def identify(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
         """Return the best model that stays within bounds, and the data."""
-        if data.sample_time is None:
-            raise DataError(
-                "the recordings have no time, and this model depends on rate",
-                remedy="read them with a time column or --rate, or use gpi",
-            )
+        data.timed(instead=", or use gpi")
         if self.initial == "fitted":
             raise ModelError(
                 "a NARX model starts from the first measured output. Remedy: leave initial out."
             )
         lags = Lags.of(data, self.output_lags, self.input_lags, self.delay, self.n_play)
+        started: list[list[Narx]] = []
         tried: list[tuple[float, Narx]] = []
-        try:
-            started = []
+
+        def settle(found: list[Narx]) -> None:
+            # what is refined last is best, if it stays within bounds
+            options = (m for m in reversed(found) if self.allow_unstable or stable(m, data))
+            best = next(options, None)
+            if best is not None:
+                tried.append((rms(free_run_errors(best, data)), best))
+
+        with tracker.searching():
             for model in self.candidates(lags, data, tracker):
-                found = [model]
+                if data.target.size <= model.n_parameters:
+                    raise DataError(
+                        f"{data.target.size} samples are too few for {model.n_parameters} parameters",
+                        remedy="give longer recordings, or use fewer lags, terms or units",
+                    )
+                started.append(found := [model])
                 for horizon in HORIZONS if self.refine else ():
                     found += self._refined(found[-1], horizon, data, tracker)[-1:]
-                started.append((rms(free_run_errors(found[-1], data)), found))
-            started.sort(key=lambda item: item[0])
-            for _, found in started:
+            started.sort(key=lambda found: rms(free_run_errors(found[-1], data)))
+            for found in started:
                 if self.refine and len(tried) < MOST_REFINED:
                     found += self._refined(found[-1], None, data, tracker)[1:]
-                # what is refined last is best, if it stays within bounds
-                options = (m for m in reversed(found) if self.allow_unstable or stable(m, data))
-                best = next(options, None)
-                if best is not None:
-                    tried.append((rms(free_run_errors(best, data)), best))
-        except Interrupted:
-            tracker.interrupted = True
+                settle(found)
+        if tracker.interrupted and not tried:
+            for found in started:
+                settle(found)
         if not tried:
             raise ModelError(
                 "every NARX model found leaves all bounds when it runs free. Remedy: use fewer terms "
@@ -140,28 +144,26 @@ class NarxEstimator(Estimator):
         each started from what was measured, it has.
         """
         pieces = some(segments(model, data, horizon), horizon)
-        if not pieces:  # nowhere are the samples before a stretch measured
+        start = model.pack()
+        # the samples before a stretch may be measured nowhere, or seldom
+        if sum(int(piece.counts.sum()) for piece in pieces) < start.size:
             return []
         runs = FreeRuns(model, data.sample_time, pieces)
-        start = model.pack()
         path = descend(
             partial(_errors, model, runs, tracker),
             partial(_slopes, model, runs),
             start,
-            np.maximum(np.abs(start), 1e-3 * np.abs(start).max(initial=1e-3)),
+            Radius(start, relative_sizes(start)),
             most_evaluations=self.max_evaluations,
             least_gain=LEAST_GAIN,
         )
-        return [model.unpack(parameters) for parameters in path]
+        return [model.unpack(parameters) for parameters, _ in path]
 
 
 def _errors(model: Narx, runs: FreeRuns, tracker: Tracker, parameters: Array) -> Array:
     """Return errors relative to half the output's range, none counted as larger than `FAR`."""
     half = model.output_scale[1]
-    try:
-        errors = runs.errors(model.unpack(parameters)) / half
-    except KeyboardInterrupt:
-        raise Interrupted from None
+    errors = runs.errors(model.unpack(parameters)) / half
     errors = np.clip(np.nan_to_num(errors, nan=FAR, posinf=FAR, neginf=-FAR), -FAR, FAR)
     tracker.saw(parameters, rms(errors) * half)
     return errors

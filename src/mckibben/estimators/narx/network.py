@@ -7,18 +7,16 @@ from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 from annotated_types import Interval
-from numpy.typing import NDArray
 
+from mckibben.arrays import Array
+from mckibben.blocks.core.fields import vector
 from mckibben.blocks.dynamic.narx import Narx
 from mckibben.blocks.dynamic.narx_network import NarxNetwork, activated
-from mckibben.blocks.fields import vector
-from mckibben.estimators.data import TrainingData
-from mckibben.estimators.descent import descend
+from mckibben.estimators.core.data import TrainingData
 from mckibben.estimators.narx.base import LEAST_GAIN, NarxEstimator
 from mckibben.estimators.narx.regressors import Lags
-from mckibben.estimators.search import Tracker
-
-Array = NDArray[np.float64]
+from mckibben.estimators.optimisers.descent import Radius, descend
+from mckibben.estimators.optimisers.tracker import Tracker
 
 ONE_STEP_SAMPLES = 3000
 """Samples on which one-step errors are minimised."""
@@ -59,11 +57,11 @@ class NarxNetworkEstimator(NarxEstimator):
         models: list[Narx] = []
         for _ in range(self.n_starts):
             first = rng.normal(0.0, 1.0, units * (n + 1))
-            *_, found = descend(
+            *_, (found, _) = descend(
                 one_step.errors,
                 one_step.slopes,
                 first,
-                np.ones(first.size),
+                Radius(first, np.ones(first.size)),
                 most_evaluations=ONE_STEP_EVALUATIONS,
                 least_gain=LEAST_GAIN,
             )

@@ -8,15 +8,15 @@ from typing import Annotated, ClassVar
 import numpy as np
 from annotated_types import Interval
 
+from mckibben.blocks.core.fields import vector
 from mckibben.blocks.dynamic.narx import Narx
 from mckibben.blocks.dynamic.narx_polynomial import NarxPolynomial, products
-from mckibben.blocks.fields import vector
 from mckibben.errors import ModelError
-from mckibben.estimators.data import TrainingData
+from mckibben.estimators.core.data import TrainingData
 from mckibben.estimators.narx.base import NarxEstimator
 from mckibben.estimators.narx.regressors import Lags
 from mckibben.estimators.narx.selection import candidate_terms, select
-from mckibben.estimators.search import Tracker
+from mckibben.estimators.optimisers.tracker import Tracker
 
 MOST_CANDIDATES = 2000
 
@@ -43,7 +43,6 @@ class NarxPolynomialEstimator(NarxEstimator):
 
     def candidates(self, lags: Lags, data: TrainingData, tracker: Tracker) -> list[Narx]:
         """Return models of the most telling terms: all that are allowed, half, and a quarter."""
-        del tracker
         terms = candidate_terms(lags.size, self.degree)
         if len(terms) > MOST_CANDIDATES:
             raise ModelError(
@@ -70,14 +69,3 @@ class NarxPolynomialEstimator(NarxEstimator):
                 )
             )
         return models
-
-
-@dataclass(kw_only=True, repr=False, eq=False)
-class NarxPlayEstimator(NarxPolynomialEstimator):
-    """Polynomial NARX model with play operators among its regressors, so that it keeps its branch."""
-
-    effort: ClassVar[float] = 0.2
-
-    output_lags: Annotated[int, Interval(ge=1, le=20)] = 1
-    input_lags: Annotated[int, Interval(ge=1, le=20)] = 1
-    n_play: Annotated[int, Interval(ge=0, le=20)] = 6

@@ -6,12 +6,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mckibben.estimators.data import Run, TrainingData
-from mckibben.estimators.pi import play_operators
-
-Array = NDArray[np.float64]
+from mckibben.arrays import Array
+from mckibben.estimators.core.data import Run, TrainingData
+from mckibben.estimators.play_type.pi import play_operators
 
 
 @dataclass(frozen=True)

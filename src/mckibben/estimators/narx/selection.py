@@ -9,9 +9,9 @@ from __future__ import annotations
 from itertools import combinations_with_replacement
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from mckibben.arrays import Array
+
 Terms = tuple[tuple[int, ...], ...]
 
 DEPENDENT = 1e-10

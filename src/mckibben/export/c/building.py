@@ -10,10 +10,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from mckibben.arrays import Array
 from mckibben.errors import ModelError
 from mckibben.export.programs import own_compiler, run
-
-Array = NDArray[np.float64]
 
 FLAGS = (
     "-std=c99",

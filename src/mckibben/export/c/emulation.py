@@ -11,16 +11,14 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mckibben.atomic import written
-from mckibben.blocks.base import Block
+from mckibben.arrays import Array
+from mckibben.blocks.core.block import Block
 from mckibben.errors import ModelError
 from mckibben.export.c.project import described, render, source_files, test_content
 from mckibben.export.c.vectors import Vectors, vectors
 from mckibben.export.programs import run
-
-Array = NDArray[np.float64]
+from mckibben.system.atomic import written
 
 BOARD = Path(__file__).parent / "cortex_m4f"
 COMPILER, SIZE, EMULATOR = "arm-none-eabi-gcc", "arm-none-eabi-size", "qemu-system-arm"

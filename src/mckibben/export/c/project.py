@@ -7,12 +7,10 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from mckibben.blocks.base import Block
-from mckibben.blocks.fields import Channel
-from mckibben.blocks.saving import to_text
+from mckibben.blocks.core.block import Block
+from mckibben.blocks.core.fields import Channel
+from mckibben.blocks.core.saving import to_text
 from mckibben.errors import ModelError
-from mckibben.export import templating
-from mckibben.export.c.costs import cost_of
 from mckibben.export.c.literals import literal, rows
 from mckibben.export.c.parts import PRIMITIVES, check_single
 from mckibben.export.c.rounding import warn_of_rounding
@@ -20,6 +18,7 @@ from mckibben.export.c.vectors import Vectors, vectors
 from mckibben.export.c.wiring import Call, Wiring
 from mckibben.export.folders import refuse_folder, write_folder
 from mckibben.export.naming import identifier, macros, said
+from mckibben.export.templating import render as rendered
 
 TOLERANCES = {False: "1e-9", True: "1e-4"}
 """Of the self-test, relative to the range: in double and in single precision."""
@@ -142,7 +141,7 @@ def described(
             f"{name!r} is what a part of the model is called. Remedy: give another --name."
         )
     inputs, outputs = _told(block.inputs), _told(block.outputs)
-    cost, size = cost_of(wiring), 4 if single else 8
+    cost, size = wiring.cost, 4 if single else 8
     n_numbers = max(wiring.n_numbers, 1)
     calls = [_call(call, index, single) for index, call in enumerate(wiring.calls)]
     order = {id(call): told for call, told in zip(wiring.calls, calls, strict=True)}
@@ -239,8 +238,8 @@ def _call(call: Call, index: int, single: bool) -> dict[str, Any]:
     gives = ", ".join(said(channel.name) for channel in block.outputs)
     return {
         "index": index,
-        "kind": block.kind,
-        "words": f"{block.kind}: {given} to {gives}",
+        "kind": block.title,
+        "words": f"{block.title}: {given} to {gives}",
         "function": part.function,
         "inputs": call.inputs,
         "first_state": call.first_state,
@@ -281,4 +280,4 @@ def _row(values: Any, single: bool) -> str:
 
 def render(template: str, content: Mapping[str, Any]) -> str:
     """Return a template of this folder filled in."""
-    return templating.render("mckibben.export.c", template, content)
+    return rendered("mckibben.export.c", template, content)

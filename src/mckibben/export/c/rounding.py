@@ -6,10 +6,8 @@ import warnings
 
 import numpy as np
 
-from mckibben.blocks.base import Block, Primitive
-from mckibben.blocks.dynamic.process_model import ProcessModel
-from mckibben.blocks.dynamic.transfer_function import TransferFunction
-from mckibben.blocks.trial import input_limits, wander
+from mckibben.blocks.core.block import Block, Primitive
+from mckibben.blocks.laws.trial import input_limits, wander
 from mckibben.errors import ModelWarning
 
 NOTICED = 5e-5
@@ -24,7 +22,7 @@ def warn_of_rounding(block: Block, sample_time: float | None) -> None:
 
     The same kernel is run on single and on double precision numbers.
     """
-    if not isinstance(block, TransferFunction | ProcessModel):
+    if not (block.filters and isinstance(block, Primitive)):
         return
     rng = np.random.default_rng(0)
     samples = min(SAMPLES, MOST_PRODUCTS // max(block.n_states, 1))

@@ -6,13 +6,11 @@ import warnings
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mckibben.blocks.base import Block
-from mckibben.blocks.trial import input_limits, wander
+from mckibben.arrays import Array
+from mckibben.blocks.core.block import Block
+from mckibben.blocks.laws.trial import input_limits, wander
 from mckibben.errors import ModelError, ModelWarning
-
-Array = NDArray[np.float64]
 
 PACE, TURNS = 9, 24
 """Samples from one turning point to the next, and how many of those."""

@@ -18,17 +18,18 @@ from typing import Any, Literal
 
 import numpy as np
 
-from mckibben import ordinary
-from mckibben.atomic import replacing, written
-from mckibben.blocks.base import Block
-from mckibben.blocks.saving import to_dict, to_text
-from mckibben.blocks.trial import input_limits
+from mckibben.blocks.core.block import Block
+from mckibben.blocks.core.saving import to_dict, to_text
+from mckibben.blocks.laws.trial import input_limits
 from mckibben.errors import DataError, ModelError
-from mckibben.export import templating
 from mckibben.export.c.literals import literal
 from mckibben.export.c.project import described, source_files
+from mckibben.export.fmu.refusals import refusals
 from mckibben.export.fmu.toolchains import PLATFORMS, build_library, buildable
 from mckibben.export.folders import zipped
+from mckibben.export.templating import render as rendered
+from mckibben.system import ordinary
+from mckibben.system.atomic import replacing, written
 
 Version = Literal["2.0", "3.0"]
 
@@ -178,11 +179,10 @@ def fmu_files(
     sources = {Path(path).name: text for path, text in source_files(content).items()}
     sources["unit_model.h"] = _render("unit_model.h.j2", content)
     ours = [HERE / "c" / f"{stem}" for stem in ("unit.h", "unit.c", f"fmi{digit}.c")]
-    ours += [
-        HERE / "c" / f"fmi{digit}_refused.c",
-        *sorted((HERE / "headers").glob(f"fmi{digit}*.h")),
-    ]
+    ours += sorted((HERE / "headers").glob(f"fmi{digit}*.h"))
     sources |= {path.name: path.read_text(encoding="utf-8") for path in ours}
+    own, types = sources[f"fmi{digit}.c"], sources[f"fmi{digit}FunctionTypes.h"]
+    sources[f"fmi{digit}_refused.c"] = refusals(types, own)
     content["unit_sources"] = sorted(source for source in sources if source.endswith(".c"))
     texts = {f"sources/{source}": text for source, text in sources.items()}
     texts["modelDescription.xml"] = _render(f"fmi{digit}.xml.j2", content)
@@ -251,4 +251,4 @@ def _libraries(
 
 
 def _render(template: str, content: Mapping[str, Any]) -> str:
-    return templating.render("mckibben.export.fmu", template, content)
+    return rendered("mckibben.export.fmu", template, content)

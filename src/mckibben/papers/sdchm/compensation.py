@@ -7,28 +7,19 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mckibben.blocks.base import Block
 from mckibben.blocks.compose import Series
-from mckibben.blocks.fuzzy_network import FuzzyNetwork
+from mckibben.blocks.core.block import Block
+from mckibben.blocks.coupled.fuzzy_network import FuzzyNetwork
+from mckibben.blocks.feedback.pid import PIDFeedback
 from mckibben.comparison.kept import Kept
-from mckibben.control import (
-    PID,
-    Controller,
-    DisturbanceObserver,
-    Feedforward,
-    FeedforwardPID,
-    Tracked,
-    track,
-    tune_pid,
-)
+from mckibben.control import Controller, Tracked, control_law, track, tune_pid
 from mckibben.errors import ModelWarning
-from mckibben.estimators.coupled.data import coupled_data
 from mckibben.estimators.coupled.fuzzy import Consequents
 from mckibben.estimators.coupled.fuzzy_fit import Search, fit_network
-from mckibben.estimators.coupled.fuzzy_swarm import Swarm
-from mckibben.estimators.coupled.sdchm import as_block, stacked_inputs
+from mckibben.estimators.coupled.fuzzy_swarm import printed_swarm
+from mckibben.estimators.coupled.sdchm import SDCHMEstimator, as_block, stacked_inputs
+from mckibben.estimators.optimisers.tracker import Tracker
 from mckibben.papers.reproduction import Cell, Figure, Table, thinned
 from mckibben.papers.sdchm import printed
 from mckibben.papers.sdchm.models import (
@@ -40,13 +31,11 @@ from mckibben.papers.sdchm.models import (
     QUICK_SWARM,
     Models,
 )
+from mckibben.papers.sdchm.protocol import PERIOD
 from mckibben.papers.sdchm.recordings import EXTENSOR, OUTPUTS
 from mckibben.recording import Recording
 from mckibben.rigs import load_rig
-from mckibben.signals.protocols.sdchm import PERIOD
-from mckibben.workers import Tell, all_of
-
-Array = NDArray[np.float64]
+from mckibben.system.workers import Tell, all_of
 
 MOVES = ((1, 0.7), (2, 1.5), (3, 2.3))
 """Muscle that moves, and pressure of the extensor [bar], for every three groups of Table 5."""
@@ -172,17 +161,22 @@ def run_loops(
     step = QUICK_CONTROL_TIME if quick else CONTROL_TIME
     pid = tune_pid(load_rig("soft-arm"), sample_time=step, scheduled={EXTENSOR: 1.0}, seed=seed)
     inverses = compensators(models, train, quick, seed, kept)
-    controllers: dict[str, Controller] = {
-        **{name: Feedforward(block) for name, block in inverses.items()},
-        "PID": pid,
-    }
     if quick:
-        del controllers[SINGLE]
-        return _tracked(controllers, references(1.5, 1, step), jobs, seed), None
-    controllers[WITH_PID] = FeedforwardPID(inverses[BALANCE], pid)
-    controllers["disturbance observer"] = DisturbanceObserver(inverses[BALANCE])
-    found = _tracked(controllers, references(3, len(MOVES), step), jobs, seed)
-    return found, _beyond(inverses[BALANCE], pid, jobs, seed)
+        del inverses[SINGLE]
+        return _tracked(inverses | {"PID": pid}, references(1.5, 1, step), jobs, seed), None
+    laws = _laws(inverses[BALANCE], pid)
+    found = _tracked(inverses | laws, references(3, len(MOVES), step), jobs, seed)
+    return found, _beyond(laws, jobs, seed)
+
+
+def _laws(compensator: Block, pid: PIDFeedback) -> dict[str, Block | Controller]:
+    names = {
+        BALANCE: "feedforward",
+        "PID": "pid",
+        WITH_PID: "feedforward-pid",
+        "disturbance observer": "observer",
+    }
+    return {said: control_law(name, compensator, lambda: pid) for said, name in names.items()}
 
 
 def compensators(
@@ -193,21 +187,19 @@ def compensators(
     assert isinstance(published, Series)
     assert isinstance(individual, Series)
     hysteresis, coupling, network = published.parts
-    data = coupled_data(train)
+    data = SDCHMEstimator().data(train)
     rest = [run for run in data.runs if "gpi" not in run.name] or list(data.runs)
     x = stacked_inputs(Series((hysteresis, coupling)), rest)
-    y = np.concatenate([np.column_stack([r.displacements, r.scheduled]) for r in rest])
+    y = np.concatenate([np.column_stack([r.outputs, r.scheduled]) for r in rest])
     limits = np.column_stack([y[:, :3].min(axis=0), y[:, :3].max(axis=0)])
 
     size = QUICK_SWARM if quick else {}
     samples = QUICK_SEARCH["search_samples"] if quick else SEARCH_SAMPLES
 
     def swapped() -> FuzzyNetwork:
-        search = Search("pso", samples, Swarm(**size), seed)
-        learned = fit_network(y, x[:, :3], 3, Consequents(False, 1e-9), search)
-        return as_block(
-            learned, data.displacements, network.inputs[:3], data.scheduled, limits, False
-        )
+        search = Search("pso", samples, printed_swarm(**size), seed)
+        learned = fit_network(y, x[:, :3], 3, Consequents(False, 1e-9), search, tracker=Tracker())
+        return as_block(learned, data.outputs, network.inputs[:3], data.scheduled, limits, False)
 
     inverse_network = kept.once("learned inverse", FuzzyNetwork, swapped, x, y)
     return {
@@ -234,45 +226,37 @@ def references(cycles: float, muscles: int, step: float) -> dict[str, Recording]
     return found
 
 
-def _try(
-    controller: Controller, reference: Recording, seed: int, load: float, noise: float
-) -> Tracked:
+def _try(law: Block | Controller, reference: Recording, seed: int, load: float) -> Tracked:
     rig = load_rig("soft-arm")
     if load:
         rig = rig.changed({"disc_mass": rig.model_dump()["disc_mass"] + load})
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ModelWarning)
-        return track(controller, rig, reference, settle=settle(reference), seed=seed, noise=noise)
+        return track(law, rig, reference, settle=settle(reference), seed=seed)
 
 
 def _tried(
-    common: None, trial: tuple[Controller, Recording, int, float, float], _: Tell
+    common: None, trial: tuple[Block | Controller, Recording, int, float], _: Tell
 ) -> Tracked:
     return _try(*trial)
 
 
 def _tracked(
-    controllers: Mapping[str, Controller],
+    laws: Mapping[str, Block | Controller],
     tasks: Mapping[str, Recording],
     jobs: int | None,
     seed: int,
 ) -> Loops:
-    keys = [(name, task) for name in controllers for task in tasks]
-    trials = [(controllers[name], tasks[task], seed, 0.0, 0.0) for name, task in keys]
+    keys = [(name, task) for name in laws for task in tasks]
+    trials = [(laws[name], tasks[task], seed, 0.0) for name, task in keys]
     results = all_of(_tried, trials, jobs)
     return Loops(dict(zip(keys, results, strict=True)))
 
 
-def _beyond(compensator: Block, pid: PID, jobs: int | None, seed: int) -> Table:
+def _beyond(laws: Mapping[str, Block | Controller], jobs: int | None, seed: int) -> Table:
     """Return what higher frequencies and unmodelled loads do to every controller."""
-    kinds: dict[str, Controller] = {
-        BALANCE: Feedforward(compensator),
-        "PID": pid,
-        WITH_PID: FeedforwardPID(compensator, pid),
-        "disturbance observer": DisturbanceObserver(compensator),
-    }
     trials = [(frequency, 0.0) for frequency in FREQUENCIES] + [(0.02, load) for load in LOADS[1:]]
-    keys = [(name, trial) for name in kinds for trial in trials]
+    keys = [(name, trial) for name in laws for trial in trials]
 
     def reference(frequency: float) -> Recording:
         time = np.arange(round(max(40.0, 2 / frequency) / CONTROL_TIME)) * CONTROL_TIME
@@ -282,11 +266,11 @@ def _beyond(compensator: Block, pid: PID, jobs: int | None, seed: int) -> Table:
 
     results = all_of(
         _tried,
-        [(kinds[name], reference(frequency), seed, load, 0.0) for name, (frequency, load) in keys],
+        [(laws[name], reference(frequency), seed, load) for name, (frequency, load) in keys],
         jobs,
     )
     errors = {key: max(found.rmse.values()) for key, found in zip(keys, results, strict=True)}
-    rows = tuple((name, *(errors[name, trial] for trial in trials)) for name in kinds)
+    rows = tuple((name, *(errors[name, trial] for trial in trials)) for name in laws)
     headings = [f"{f:g} Hz" if not load else f"0.02 Hz, {load:g} kg" for f, load in trials]
     return Table(
         "Beyond the paper: worst muscle's RMSE at higher frequencies and under loads [mm]",

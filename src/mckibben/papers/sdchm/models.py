@@ -10,17 +10,15 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mckibben import registry
-from mckibben.blocks.base import Block
+from mckibben.arrays import Array
+from mckibben.blocks.core.block import Block
 from mckibben.comparison.kept import Kept
 from mckibben.papers.keeping import fitted
 from mckibben.papers.reproduction import Progress
 from mckibben.papers.sdchm.recordings import OUTPUTS, Recordings
 from mckibben.recording import Recording
-
-Array = NDArray[np.float64]
 
 LINEAR = "linear function of the pressures"
 RAW = "raw fuzzy network, the paper's"
@@ -70,7 +68,7 @@ def fit_models(runs: Recordings, quick: bool, seed: int, tell: Progress, kept: K
         LINEAR: ("tsfnn", {"n_sets": 1, "constants": True, "method": "ls"}),
         RAW: ("tsfnn", {"method": "pso", "ridge": 1e-9} | swarm),
         DAMPED: ("tsfnn", search),
-        PUBLISHED: ("sdchm-published", {"memory_settings": starts} | swarm),
+        PUBLISHED: ("sdchm-published", {"memory_settings": paper | starts} | swarm),
         INDIVIDUAL: ("coupled-pi", {"memory_settings": paper | starts}),
         OURS: ("sdchm", ours),
         MEMORY: ("coupled-memory", {}),
@@ -83,7 +81,7 @@ def fit_models(runs: Recordings, quick: bool, seed: int, tell: Progress, kept: K
     blocks, seconds = {}, {}
     for place, (name, (model, settings)) in enumerate(chosen.items()):
         tell(place / len(chosen), name)
-        estimator = registry.load("coupled", model)(seed=seed, **settings)
+        estimator = registry.load("estimators", model)(seed=seed, **settings)
         train = runs.patterns + (joint if name in (OURS_JOINT, BALANCE_JOINT) else [])
         found = fitted(kept, name, estimator, train, validation=validation)
         blocks[name], seconds[name] = found.block, found.seconds

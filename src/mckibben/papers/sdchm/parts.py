@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from mckibben import registry
-from mckibben.blocks.base import Block
 from mckibben.blocks.compose import Series
-from mckibben.blocks.coupling import Coupling
-from mckibben.blocks.published.coupling import coupling as printed_coupling
+from mckibben.blocks.core.block import Block
+from mckibben.blocks.coupled.coupling import Coupling
 from mckibben.metrics import err
 from mckibben.papers.reproduction import Cell, Table
 from mckibben.papers.sdchm import printed
+from mckibben.papers.sdchm.published import coupling as printed_coupling
 from mckibben.recording import Recording
 
 

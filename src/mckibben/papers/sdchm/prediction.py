@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mckibben.arrays import Array
 from mckibben.metrics import err
 from mckibben.papers.free_runs import FreeRuns
 from mckibben.papers.reproduction import Cell, Figure, Table, rms, thinned
@@ -25,11 +25,9 @@ from mckibben.papers.sdchm.models import (
     Models,
     measured,
 )
+from mckibben.papers.sdchm.protocol import PATTERNS, PREDICTION
 from mckibben.papers.sdchm.recordings import EXTENSOR, OUTPUTS, Recordings
 from mckibben.recording import Recording
-from mckibben.signals.protocols.sdchm import PATTERNS, PREDICTION
-
-Array = NDArray[np.float64]
 
 TABLE_4 = 0.1
 """Pressure of the extensor in all groups of Table 4 [bar]."""

@@ -9,10 +9,9 @@ from typing import Any
 from mckibben.comparison.kept import Kept
 from mckibben.papers.keeping import recorded
 from mckibben.papers.reproduction import Progress
+from mckibben.papers.sdchm.protocol import PERIOD
 from mckibben.recording import Recording
-from mckibben.signals.protocols import protocol
-from mckibben.signals.protocols.protocol import Protocol, Role, Run
-from mckibben.signals.protocols.sdchm import PERIOD
+from mckibben.signals.protocol import Protocol, Role, Run, protocol
 
 OUTPUTS = ("displacement_1", "displacement_2", "displacement_3")
 EXTENSOR = "pressure_extensor"

@@ -36,13 +36,3 @@ def bladder_force(
         -2.0 * axial / length * change,
         (2.0 * change + 4.0 * s * change_slope) / (length * length),
     )
-
-
-@compiled
-def bladder_energy(
-    c10: float, c01: float, cos2: float, sin2: float, length: float, x: float
-) -> float:
-    """Return the energy stored since rest [N mm]; `bladder_force` is its slope."""
-    s = (1.0 - x / length) ** 2
-    q = (1.0 - s * cos2) / sin2
-    return c10 * (s + q + 1.0 / (s * q) - 3.0) + c01 * (1.0 / s + 1.0 / q + s * q - 3.0)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, TypeVar
 
-from mckibben.compiling import deferred
+from mckibben.system.compiling import deferred
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 

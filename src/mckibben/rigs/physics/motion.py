@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mckibben.arrays import Array
 from mckibben.rigs.physics.air import MM3_PER_LITRE, SUBSTEPS, through, valve_target
 from mckibben.rigs.physics.compiled import ATMOSPHERE, compiled
 from mckibben.rigs.physics.friction import slip
@@ -27,7 +28,6 @@ from mckibben.rigs.physics.muscle import (
     taut_or_slack,
 )
 
-Array = NDArray[np.float64]
 Records = NDArray[np.void]
 
 ALPHA = -0.1

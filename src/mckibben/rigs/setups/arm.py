@@ -16,16 +16,14 @@ from collections.abc import Mapping
 from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import model_validator
 
+from mckibben.arrays import Array
 from mckibben.rigs.parameters import EachPositive, Muscle, Section, parameter
 from mckibben.rigs.physics.compiled import GRAVITY
 from mckibben.rigs.physics.motion import MECHANISM
 from mckibben.rigs.rig import Rig
 from mckibben.rigs.system import Demands, System, Traces
-
-Array = NDArray[np.float64]
 
 
 class Spread(Section):
@@ -86,7 +84,6 @@ class Arm(Rig):
         return tuple(name for kind in self.sensor for name in names[kind])
 
     def build(self) -> System:
-        """Return the muscles, each with its lever arms, and the disc."""
         angles = np.radians(self.angle)
         made = [
             self.muscle.model_copy(
@@ -129,7 +126,6 @@ class Arm(Rig):
         return System(muscles, self.air.record(), mechanism)
 
     def demands(self, inputs: Array) -> Demands:
-        """Return the pressures asked for."""
         return Demands(inputs, np.zeros((len(inputs), 3)), np.zeros(len(inputs)))
 
     def readings(self, traces: Traces, inputs: Array, zero: Array) -> Mapping[str, Array]:
@@ -143,5 +139,4 @@ class Arm(Rig):
         }
 
     def known(self) -> Mapping[str, Any]:
-        """Return the muscles' length, and the load on the disc."""
         return {"rest_length": self.muscle.length, "payload_kg": self.payload}

@@ -6,15 +6,13 @@ from collections.abc import Mapping
 from typing import Any, ClassVar, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mckibben.arrays import Array
 from mckibben.rigs.parameters import Muscle, parameter
 from mckibben.rigs.physics.compiled import GRAVITY
 from mckibben.rigs.physics.motion import MECHANISM, NO_MUSCLE
 from mckibben.rigs.rig import Rig
 from mckibben.rigs.system import Demands, System, Traces
-
-Array = NDArray[np.float64]
 
 
 class MovingEnd(Rig):
@@ -47,11 +45,6 @@ class MovingEnd(Rig):
         """Pressure or voltage, and force where it may be pulled."""
         return (self.command, "force") if "force" in self.range else (self.command,)
 
-    @property
-    def outputs(self) -> tuple[str, ...]:
-        """What there are sensors for."""
-        return tuple(name for name in self.measurable if name in self.sensor)
-
     def build(self) -> System:
         """Return one muscle on one coordinate: the shortening of the muscle."""
         muscles = self.muscle.record()
@@ -68,13 +61,11 @@ class MovingEnd(Rig):
         return System(muscles, self.air.record(), made)
 
     def demands(self, inputs: Array) -> Demands:
-        """Return the pressure asked for, and the force that pulls."""
         bars = inputs[:, :1] * (self.bar_per_volt if self.command == "voltage" else 1.0)
         pulls = inputs[:, 1:] if inputs.shape[1] > 1 else np.zeros_like(bars)
         return Demands(bars, pulls, np.zeros(len(inputs)))
 
     def readings(self, traces: Traces, inputs: Array, zero: Array) -> Mapping[str, Array]:
-        """Return pressure, shortening, and the force between muscle and load."""
         pulled = inputs[:, 1] if inputs.shape[1] > 1 else 0.0
         carried = self.payload * (GRAVITY + 1e-3 * traces.acceleration[:, 0])
         return {
@@ -84,7 +75,6 @@ class MovingEnd(Rig):
         }
 
     def known(self) -> Mapping[str, Any]:
-        """Return the muscle's size and what hangs from it."""
         return {
             "rest_length": self.muscle.length,
             "diameter": self.muscle.diameter,

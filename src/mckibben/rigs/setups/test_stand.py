@@ -6,14 +6,12 @@ from collections.abc import Mapping
 from typing import Any, ClassVar, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mckibben.arrays import Array
 from mckibben.rigs.parameters import Muscle, parameter
 from mckibben.rigs.physics.motion import MECHANISM, NO_MUSCLE
 from mckibben.rigs.rig import Rig
 from mckibben.rigs.system import Demands, System, Traces
-
-Array = NDArray[np.float64]
 
 
 class TestStand(Rig):
@@ -32,11 +30,6 @@ class TestStand(Rig):
         """Pressure, and the length to hold or to go to."""
         return ("pressure", "length")
 
-    @property
-    def outputs(self) -> tuple[str, ...]:
-        """What there are sensors for."""
-        return tuple(name for name in self.measurable if name in self.sensor)
-
     def build(self) -> System:
         """Return one muscle on one driven coordinate: the shortening of the muscle."""
         muscles = self.muscle.record()
@@ -50,11 +43,9 @@ class TestStand(Rig):
         return System(muscles, self.air.record(), made)
 
     def demands(self, inputs: Array) -> Demands:
-        """Return the pressure asked for, and the shortening that the length asks for."""
         return Demands(inputs[:, :1], np.zeros((len(inputs), 1)), self.muscle.length - inputs[:, 1])
 
     def readings(self, traces: Traces, inputs: Array, zero: Array) -> Mapping[str, Array]:
-        """Return pressure, length between the ends, and the muscle's pull."""
         del inputs, zero
         return {
             "pressure": traces.pressure[:, 0],
@@ -63,5 +54,4 @@ class TestStand(Rig):
         }
 
     def known(self) -> Mapping[str, Any]:
-        """Return the muscle's size."""
         return {"rest_length": self.muscle.length, "diameter": self.muscle.diameter}

@@ -1,0 +1,1 @@
+"""What a block is, and what blocks are made with: channels, kernels, parameters, inverses, files."""

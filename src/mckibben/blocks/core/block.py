@@ -1,0 +1,323 @@
+"""What a block is: an immutable parameter set with dynamics.
+
+A concrete block is either a `Primitive`, which is one compiled kernel with its coefficients, or
+composes other blocks. Both kinds say how they *bind*: given state, input and output arrays they
+return a function without arguments that runs them, and everything else here is built on that.
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, ClassVar, overload
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from mckibben.arrays import Array
+from mckibben.blocks.core import saving
+from mckibben.blocks.core.exportable import Exportable
+from mckibben.blocks.core.fields import Channel, Initial
+from mckibben.blocks.core.parametrised import Parametrised
+from mckibben.blocks.core.running import Stream, run_many
+from mckibben.errors import DataError, ModelError
+from mckibben.recording import Recording
+from mckibben.system.compiling import bound
+
+Run = Callable[[], None]
+Kernel = Callable[..., None]
+
+
+class Block(Exportable, Parametrised):
+    """An immutable parameter set with dynamics.
+
+    Concrete blocks are frozen dataclasses, registered under `kind`. They know their inputs and
+    outputs, their state, how to run, and where it exists their exact inverse. They know nothing of
+    data or fitting.
+    """
+
+    rate_dependent: ClassVar[bool] = False
+    """Whether the sample time matters to any block of this class."""
+
+    path_dependent: ClassVar[bool] = False
+    """Whether it matters how an input goes from one turning point to the next, as where several
+    muscles find their equilibrium together."""
+
+    sample_time: float | None = None
+    """Time between samples that a discrete block is bound to [s]; None for any."""
+
+    @property
+    @abstractmethod
+    def inputs(self) -> tuple[Channel, ...]:
+        """Driven inputs, then scheduling inputs."""
+
+    @property
+    @abstractmethod
+    def outputs(self) -> tuple[Channel, ...]:
+        """Outputs."""
+
+    @property
+    def scheduling(self) -> tuple[str, ...]:
+        """Names of the inputs that schedule the block but are not driven through it."""
+        return ()
+
+    @abstractmethod
+    def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
+        """Return the state before the first sample, shape (n_states,), a new array.
+
+        Parameters
+        ----------
+        first : array, shape (n_inputs,)
+            The first input sample.
+        initial : {"first_sample", "virgin"} or sequence of float, optional
+            As if the input had only risen to the first sample; as if nothing had ever happened; or
+            the state itself. Default is the block's own.
+        """
+
+    @abstractmethod
+    def bind(self, sample_time: float | None, state: Array, inputs: Array, outputs: Array) -> Run:
+        """Return a function that runs the block over ``inputs`` into ``outputs``, changing ``state``.
+
+        ``inputs`` has shape (n, n_inputs) and ``outputs`` (n, n_outputs), both C-contiguous; all
+        arrays are used in place at every call, so the caller may refill ``inputs`` between calls.
+        """
+
+    @classmethod
+    @abstractmethod
+    def example(cls) -> Block:
+        """Return a small, typical block of this class, for documentation and contract tests."""
+
+    def inverse(self) -> Block:
+        """Return the block that undoes this one.
+
+        Raises
+        ------
+        ModelError
+            If this block has no inverse; the text says which condition fails and what to do.
+        """
+        raise ModelError(
+            f"{self.kind!r} has no exact inverse. Remedy: use an invertible model (pi, gpi, mpi)."
+        )
+
+    def reachable(self) -> tuple[Array, Array]:
+        """Return the outputs that can be reached whatever happened before, lowest and highest.
+
+        Each has shape (n_outputs,). Bounded by the block's own input range where it has one;
+        infinite where it has none.
+        """
+        n = len(self.outputs)
+        return np.full(n, -np.inf), np.full(n, np.inf)
+
+    def state_at(self, first: Array, output: Array) -> Array | None:
+        """Return the state at rest at a first input where the output is known, for models of it.
+
+        None, by default, where past outputs are no part of the state.
+        """
+        del first, output
+        return None
+
+    def start_on(self, recording: Recording, initial: Initial | None = None) -> Initial | None:
+        """Return the start to use on a recording, which some rules look at; by default as given."""
+        del recording
+        return initial
+
+    def passes(self, low: Array, high: Array) -> tuple[Array, Array]:
+        """Return the outputs that can be reached where the inputs between two ends can be.
+
+        A block without memory must be monotone; one with memory answers with its own `reachable`.
+        """
+        if self.n_states == 0 and not self.scheduling and np.isfinite([*low, *high]).all():
+            first, second = np.sort(self.simulate(np.array([low, high])), axis=0)
+            return first, second
+        return self.reachable()
+
+    # -- running -----------------------------------------------------------------------------
+
+    @overload
+    def simulate(
+        self, data: Recording, *, initial: Initial | None = None, sample_time: float | None = None
+    ) -> Recording: ...
+
+    @overload
+    def simulate(
+        self, data: ArrayLike, *, initial: Initial | None = None, sample_time: float | None = None
+    ) -> Array: ...
+
+    def simulate(
+        self,
+        data: Recording | ArrayLike,
+        *,
+        initial: Initial | None = None,
+        sample_time: float | None = None,
+    ) -> Recording | Array:
+        """Run free over a recording or an array of inputs.
+
+        Parameters
+        ----------
+        data : Recording or array_like, shape (n,) or (n, n_inputs)
+            A recording needs a channel for every input.
+        initial : {"first_sample", "virgin"} or sequence of float, optional
+            Memory before the first sample; default is the block's own.
+        sample_time : float, optional
+            Time between samples [s]; for arrays of a rate-dependent block only.
+
+        Returns
+        -------
+        Recording or array
+            The same kind: a recording of the inputs and the modelled outputs, or an array of shape
+            (n, n_outputs), or (n,) for one output from a one-dimensional input.
+
+        Raises
+        ------
+        DataError
+            On absent channels, wrong units or shapes, or values that are not finite.
+        ModelError
+            If the block is rate-dependent and the data have no time.
+        """
+        if isinstance(data, Recording):
+            inputs = self._inputs_from(data)
+            outputs = self._run(inputs, data.sample_time, self.start_on(data, initial))
+            if not np.isfinite(outputs).all():
+                raise ModelError(
+                    f"the output of {self.kind!r} is not finite on {data.name}. "
+                    "Remedy: this model does not suit these data; identify it again."
+                )
+            names = [channel.name for channel in self.outputs]
+            modelled = dict(zip(names, outputs.T, strict=True))
+            units = {channel.name: channel.unit for channel in self.outputs}
+            kept = data.select([channel.name for channel in self.inputs])
+            return kept.with_channels(units, **modelled)
+        array = np.asarray(data, dtype=np.float64)
+        outputs = self._run(self._inputs_from_array(array), sample_time, initial)
+        return outputs[:, 0] if array.ndim == 1 and outputs.shape[1] == 1 else outputs
+
+    def stream(self, sample_time: float | None = None, *, initial: Initial | None = None) -> Stream:
+        """Return a stepper for use sample by sample, in the state before the first sample.
+
+        Parameters
+        ----------
+        sample_time : float, optional
+            Time between steps [s]; needed by rate-dependent blocks.
+        initial : {"first_sample", "virgin"} or sequence of float, optional
+            Memory before the first step; default is the block's own.
+        """
+        return Stream(self, sample_time, initial)
+
+    def simulate_many(
+        self,
+        parameters: ArrayLike,
+        data: ArrayLike,
+        *,
+        initial: Initial | None = None,
+        sample_time: float | None = None,
+    ) -> Array:
+        """Run many parameter sets of this structure over the same inputs, on all cores.
+
+        Parameters
+        ----------
+        parameters : array_like, shape (k, n_parameters)
+            One set a row, as `pack` gives them.
+        data : array_like, shape (n,) or (n, n_inputs)
+            Inputs.
+        initial, sample_time
+            As for `simulate`.
+
+        Returns
+        -------
+        array, shape (k, n), or (k, n, n_outputs) for several outputs
+        """
+        sets = np.atleast_2d(np.asarray(parameters, dtype=np.float64))
+        blocks = [self.unpack(row) for row in sets]
+        inputs = self._inputs_from_array(np.asarray(data, dtype=np.float64))
+        outputs = run_many(blocks, inputs, sample_time=sample_time, initial=initial)
+        return outputs[:, :, 0] if outputs.shape[2] == 1 else outputs
+
+    def final_state(self, data: Recording, *, initial: Initial | None = None) -> Array:
+        """Return the state after a recording, shape (n_states,): its memory, to start another with."""
+        inputs = self._inputs_from(data)
+        state = self.initial_state(inputs[0], self.start_on(data, initial))
+        self.bind(data.sample_time, state, inputs, np.empty((len(inputs), len(self.outputs))))()
+        return state
+
+    def _run(self, inputs: Array, sample_time: float | None, initial: Initial | None) -> Array:
+        state = self.initial_state(inputs[0], initial)
+        outputs = np.empty((inputs.shape[0], len(self.outputs)))
+        self.bind(sample_time, state, inputs, outputs)()
+        self.report(state)
+        return outputs
+
+    def report(self, state: Array) -> None:
+        """Warn of what happened during a run that its user should know, read off the final state."""
+        del state
+
+    def _inputs_from(self, recording: Recording) -> Array:
+        for channel in self.inputs:
+            if channel.name in recording and recording.units[channel.name] != channel.unit:
+                raise DataError(
+                    f"the model wants this input in {channel.unit or 'no unit'}, "
+                    f"the recording has {recording.units[channel.name] or 'no unit'}",
+                    file=recording.source,
+                    channel=channel.name,
+                    remedy="convert the recording, or name its unit when reading it",
+                )
+        return np.ascontiguousarray(recording.matrix(channel.name for channel in self.inputs))
+
+    def _inputs_from_array(self, array: Array) -> Array:
+        n_inputs = len(self.inputs)
+        table = array[:, np.newaxis] if array.ndim == 1 else array
+        if table.ndim != 2 or table.shape[1] != n_inputs or table.shape[0] == 0:
+            raise DataError(
+                f"inputs have shape {array.shape}, but {self.kind!r} has {n_inputs} input(s)",
+                remedy=f"give an array of shape (n, {n_inputs})"
+                + (" or (n,)" if n_inputs == 1 else ""),
+            )
+        finite = np.isfinite(table)
+        if not finite.all():
+            row, column = np.argwhere(~finite)[0]
+            raise DataError(
+                f"the input is {table[row, column]}",
+                channel=self.inputs[column].name,
+                row=int(row) + 1,
+                remedy="remove or interpolate samples that are not finite",
+            )
+        return np.ascontiguousarray(table)
+
+    # -- saving ------------------------------------------------------------------------------
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the block as a JSON-ready dict, exact to the last bit."""
+        return saving.to_dict(self)
+
+    def save(self, path: str | Path) -> None:
+        """Write the block as JSON that a person can read; see `mckibben.load`."""
+        saving.save(self, path)
+
+
+class Primitive(Block):
+    """A block that is one kernel, ``kernel(coefficients, state, inputs, outputs)``.
+
+    Where it is `in_scratch`, `n_scratch` numbers to compute in stand behind the coefficients.
+    """
+
+    kernel: ClassVar[Kernel]
+
+    in_scratch: ClassVar[bool] = False
+    """Whether kernels of this class want scratch."""
+
+    def coefficients(self, sample_time: float | None) -> Array:
+        """Return the numbers that the kernel reads, one-dimensional; by default the parameters."""
+        del sample_time
+        return self.pack()
+
+    def c_numbers(self, sample_time: float | None) -> Array:
+        """Return what the kernel reads."""
+        return self.coefficients(sample_time)
+
+    def bind(self, sample_time: float | None, state: Array, inputs: Array, outputs: Array) -> Run:
+        """Return a function that runs the kernel in place."""
+        numbers = self._with_scratch(self.coefficients(sample_time), self.n_scratch)
+        return bound(type(self).kernel, numbers, state, inputs, outputs)
+
+    def _with_scratch(self, numbers: Array, size: int) -> Array:
+        return np.concatenate([numbers, np.zeros(size)]) if self.in_scratch else numbers

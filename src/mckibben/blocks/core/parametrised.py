@@ -1,0 +1,117 @@
+"""Parameters as a vector: those of some fields, one after another, in a fixed structure."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from itertools import islice
+from typing import Any, ClassVar, Self
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from mckibben.arrays import Array
+from mckibben.blocks.core.checked import Checked
+from mckibben.errors import ModelError
+
+
+class Parametrised(metaclass=Checked):
+    """What has a parameter vector, by default made of fields.
+
+    A field may be a number, a vector, rows, a part that has parameters itself, several of those, or
+    None.
+    """
+
+    kind: ClassVar[str]
+    """Name in the registry and in saved files."""
+
+    parameters: ClassVar[tuple[str, ...]] = ()
+    """Names of the fields, in the order of the vector."""
+
+    @property
+    def n_parameters(self) -> int:
+        """Length of the parameter vector, `pack`."""
+        return sum(_size(getattr(self, name)) for name in self.parameters)
+
+    @property
+    def parameter_names(self) -> tuple[str, ...]:
+        """What each number of `pack` is, for people: its field's name, numbered in a vector."""
+        names = [
+            text
+            for name in self.parameters
+            for text in _names(getattr(self, name), name.replace("_", " "))
+        ]
+        return tuple(names or (f"{self.kind} {place + 1}" for place in range(self.n_parameters)))
+
+    def pack(self) -> Array:
+        """Return the parameters as a vector, shape (n_parameters,); structure stays outside."""
+        numbers: list[float] = []
+        for name in self.parameters:
+            _gather(getattr(self, name), numbers)
+        return np.array(numbers, dtype=np.float64)
+
+    def unpack(self, parameters: ArrayLike) -> Self:
+        """Return the same structure with other parameters, shape (n_parameters,).
+
+        Raises
+        ------
+        ModelError
+            If they are more or fewer.
+        """
+        values = iter(parameter_vector(self, parameters).tolist())
+        fields = {name: _refilled(getattr(self, name), values) for name in self.parameters}
+        return replace(self, **fields)  # type: ignore[type-var]
+
+
+def parameter_vector(part: Parametrised, parameters: ArrayLike) -> Array:
+    """Return a parameter vector after checking its length."""
+    vector = np.asarray(parameters, dtype=np.float64)
+    if vector.shape != (part.n_parameters,):
+        raise ModelError(
+            f"{part.kind!r} of this structure has {part.n_parameters} parameters, got shape "
+            f"{vector.shape}. Remedy: give a vector as pack() returns it."
+        )
+    return vector
+
+
+def _size(value: Any) -> int:
+    if type(value) is float:
+        return 1
+    if type(value) is not tuple:
+        return 0 if value is None else value.n_parameters
+    return len(value) if _is_flat(value) else sum(map(_size, value))
+
+
+def _gather(value: Any, numbers: list[float]) -> None:
+    if type(value) is float:
+        numbers.append(value)
+    elif type(value) is not tuple:
+        numbers.extend(() if value is None else value.pack().tolist())
+    elif _is_flat(value):
+        numbers.extend(value)
+    else:
+        for item in value:
+            _gather(item, numbers)
+
+
+def _refilled(value: Any, numbers: Iterator[float]) -> Any:
+    if type(value) is float:
+        return next(numbers)
+    if type(value) is not tuple:
+        return value and value.unpack(tuple(islice(numbers, value.n_parameters)))
+    if _is_flat(value):
+        return tuple(islice(numbers, len(value)))
+    return tuple(_refilled(item, numbers) for item in value)
+
+
+def _is_flat(values: tuple[Any, ...]) -> bool:
+    return not values or type(values[0]) is float
+
+
+def _names(value: Any, said: str) -> list[str]:
+    if isinstance(value, Parametrised):
+        return list(value.parameter_names)
+    if isinstance(value, tuple):
+        numbered = enumerate(value, start=1)
+        return [name for place, item in numbered for name in _names(item, f"{said} {place}")]
+    return [] if value is None else [said]

@@ -1,0 +1,1 @@
+"""Blocks of several muscles, or of a muscle and its load."""

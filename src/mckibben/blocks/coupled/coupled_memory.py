@@ -1,0 +1,183 @@
+"""Lags and play operators of several inputs, read out by a polynomial: many inputs to many outputs.
+
+Every input passes first-order lags, every lagged input play operators; outputs are linear in those, and
+in products of the first lag's inputs up to a degree. Made for arms whose displacements are not one to a
+muscle, such as the place of a tip, and whose motion is dynamic.
+
+The form is this package's own; it is linear in its parameters but for lags and thresholds.
+"""
+
+from __future__ import annotations
+
+from itertools import combinations_with_replacement
+from typing import Annotated, ClassVar, Self
+
+import numpy as np
+from annotated_types import Interval
+from pydantic.dataclasses import dataclass
+
+from mckibben.arrays import Array
+from mckibben.blocks.core.block import Block, Kernel, Primitive
+from mckibben.blocks.core.fields import STRICT, Channel, Channels, Initial, Rows, Vector
+from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.core.many_channels import ManyChannels
+from mckibben.blocks.core.refusals import explicit_state, needs_sample_time
+from mckibben.errors import ModelError
+
+
+@kernel
+def coupled_memory_kernel(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
+    """Run lags, then plays, then the readout.
+
+    Coefficients are [lags, thresholds, degree, decays, thresholds (inputs by thresholds), readout].
+    """
+    n, n_out = inputs.shape[1], outputs.shape[1]
+    n_lags, m, degree = int(coefficients[0]), int(coefficients[1]), int(coefficients[2])
+    decays = coefficients[3 : 3 + n_lags]
+    radii = coefficients[3 + n_lags : 3 + n_lags + n * m]
+    readout = coefficients[3 + n_lags + n * m :]
+    width = readout.size // n_out
+    for t in range(inputs.shape[0]):
+        for lag in range(n_lags):
+            for i in range(n):
+                place = lag * n + i
+                state[place] += (1.0 - decays[lag]) * (inputs[t, i] - state[place])
+                x = state[place]
+                for k in range(m):
+                    own = n_lags * n + place * m + k
+                    r = radii[i * m + k]
+                    state[own] = min(max(state[own], x - r), x + r)
+        for j in range(n_out):
+            at = j * width
+            total = readout[at]
+            at += 1
+            for place in range(n_lags * n * (1 + m)):
+                total += readout[at] * state[place]
+                at += 1
+            if degree >= 2:
+                for i in range(n):
+                    for k in range(i, n):
+                        total += readout[at] * state[i] * state[k]
+                        at += 1
+            if degree >= 3:
+                for i in range(n):
+                    for k in range(i, n):
+                        for q in range(k, n):
+                            total += readout[at] * state[i] * state[k] * state[q]
+                            at += 1
+            outputs[t, j] = total
+
+
+@dataclass(frozen=True, config=STRICT)
+class CoupledMemory(ManyChannels, Primitive):
+    """Lags, play operators and a polynomial readout.
+
+    Parameters
+    ----------
+    lags : sequence of float
+        Time constants [s], positive; at least one. Products are of the first.
+    thresholds : sequence of n sequences of float
+        Of the play operators of every input, in its unit; as many for each, maybe none.
+    readout : sequence of sequences of float
+        For every output: the constant, every lag of every input, the plays of each of those in the same
+        order, then products of two and of three inputs, in order.
+    degree : int
+        Highest degree of products, 1 for none.
+    driven, scheduled, given : sequence of Channel
+        Inputs driven, those that schedule (treated alike), and outputs.
+    """
+
+    kind: ClassVar[str] = "coupled-memory"
+    kernel: ClassVar[Kernel] = coupled_memory_kernel
+    rate_dependent: ClassVar[bool] = True
+    parameters: ClassVar[tuple[str, ...]] = ("readout",)
+
+    lags: Vector
+    thresholds: Rows
+    readout: Rows
+    degree: Annotated[int, Interval(ge=1, le=3)]
+    driven: Channels
+    scheduled: Channels
+    given: Channels
+
+    def __post_init__(self) -> None:
+        self.check_channels()
+        n = len(self.inputs)
+        if not self.lags or any(not tau > 0 for tau in self.lags):
+            raise ModelError(
+                f"lags of {self.kind!r} are {self.lags}. Remedy: give positive time constants."
+            )
+        if len(self.thresholds) != n or len({len(row) for row in self.thresholds}) > 1:
+            raise ModelError(
+                f"{self.kind!r} of {n} inputs has thresholds of "
+                f"{[len(row) for row in self.thresholds]}. Remedy: give as many for each input."
+            )
+        if any(not r > 0 for row in self.thresholds for r in row):
+            raise ModelError(f"thresholds of {self.kind!r} are not positive. Remedy: correct them.")
+        width = readout_width(n, len(self.lags), len(self.thresholds[0]), self.degree)
+        if len(self.readout) != len(self.given) or any(len(row) != width for row in self.readout):
+            raise ModelError(
+                f"readout of {self.kind!r} has rows of {[len(row) for row in self.readout]}. "
+                f"Remedy: give {len(self.given)} rows of {width}."
+            )
+
+    @property
+    def n_states(self) -> int:
+        """Every lag of every input, and the plays of each."""
+        return len(self.lags) * len(self.inputs) * (1 + len(self.thresholds[0]))
+
+    def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
+        """Return the state at rest at the first inputs, reached from zero.
+
+        ``virgin`` starts lags and plays at zero.
+        """
+        if initial is not None and not isinstance(initial, str):
+            return explicit_state(self, initial)
+        x = np.zeros(len(self.inputs)) if initial == "virgin" else np.asarray(first, np.float64)
+        r = np.array(self.thresholds)
+        plays = np.clip(0.0, x[:, np.newaxis] - r, x[:, np.newaxis] + r)
+        n = len(self.lags)
+        return np.concatenate([np.tile(x, n), np.tile(plays.ravel(), n)])
+
+    def coefficients(self, sample_time: float | None) -> Array:
+        """Return sizes, decays over a sample, thresholds and readout."""
+        step = needs_sample_time(self.kind, sample_time)
+        head = [len(self.lags), len(self.thresholds[0]), self.degree]
+        radii = np.array(self.thresholds).ravel()
+        return np.concatenate([head, np.exp(-step / np.array(self.lags)), radii, self.pack()])
+
+    def inverse(self) -> Block:
+        """Refuse: lags cannot be undone at once, and outputs need not be as many as inputs.
+
+        Raises
+        ------
+        ModelError
+            Always.
+        """
+        raise ModelError(
+            f"{self.kind!r} has no inverse: its lags cannot be undone within a sample. "
+            "Remedy: invert force-balance or sdchm, or close a loop."
+        )
+
+    @classmethod
+    def example(cls) -> Self:
+        """Return two inputs that move one tip."""
+        width = readout_width(2, 2, 1, 2)
+        readout = 0.5 / (1.0 + np.arange(width))
+        return cls(
+            (0.05, 0.5),
+            ((0.3,), (0.4,)),
+            (tuple(readout.tolist()),),
+            2,
+            tuple(Channel(f"pressure_{k}", "bar") for k in (1, 2)),
+            (),
+            (Channel("displacement_1", "mm"),),
+        )
+
+
+def readout_width(n: int, n_lags: int, n_thresholds: int, degree: int) -> int:
+    """Return how many numbers the readout of one output has."""
+    products = sum(
+        len(list(combinations_with_replacement(range(n), power))) for power in range(2, degree + 1)
+    )
+    return 1 + n * n_lags * (1 + n_thresholds) + products

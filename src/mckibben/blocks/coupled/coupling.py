@@ -1,0 +1,159 @@
+"""Linear coupling of muscles: what each gives is felt by all, h = G^T v.
+
+Source: "Modeling and Compensation of Stiffness-Dependent Hysteresis Coupling Behavior for Parallel
+Pneumatic Artificial Muscle-Driven Soft Manipulator", Eqs. (8) and (14).
+"""
+
+from __future__ import annotations
+
+from typing import ClassVar, Self
+
+import numpy as np
+from numpy.typing import ArrayLike
+from pydantic.dataclasses import dataclass
+
+from mckibben.arrays import Array
+from mckibben.blocks.core.block import Block, Kernel, Primitive
+from mckibben.blocks.core.fields import STRICT, Channel, Channels, Rows, rows
+from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.core.stateless import Stateless
+from mckibben.errors import ModelError
+
+WORST_CONDITION = 1e8
+"""Beyond this condition number a coupling is taken for singular."""
+
+
+@kernel
+def coupling_kernel(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
+    """Multiply by a matrix; coefficients are the matrix, row after row, one row an output."""
+    n = inputs.shape[1]
+    for t in range(inputs.shape[0]):
+        for j in range(n):
+            total = 0.0
+            for i in range(n):
+                total += coefficients[j * n + i] * inputs[t, i]
+            outputs[t, j] = total
+
+
+@dataclass(frozen=True, config=STRICT)
+class Coupling(Stateless, Primitive):
+    """Coupling of n muscles, h_j = sum_i G_ij v_i.
+
+    Parameters
+    ----------
+    gains : sequence of n sequences of n floats
+        G: row i is what muscle i gives to every muscle; 1 on the diagonal where each gives itself
+        what it gives. Finite; invertible where an inverse is wanted.
+    driven, given : sequence of n Channel
+        Channels driven and channels given.
+    """
+
+    kind: ClassVar[str] = "coupling"
+    kernel: ClassVar[Kernel] = coupling_kernel
+    parameters: ClassVar[tuple[str, ...]] = ("gains",)
+
+    gains: Rows
+    driven: Channels
+    given: Channels
+
+    def __post_init__(self) -> None:
+        n = len(self.gains)
+        if n == 0 or any(len(row) != n for row in self.gains):
+            raise ModelError(
+                f"gains of {self.kind!r} have rows of {[len(row) for row in self.gains]}. "
+                "Remedy: give as many rows as columns."
+            )
+        if len(self.driven) != n or len(self.given) != n:
+            raise ModelError(
+                f"{self.kind!r} of {n} muscles has {len(self.driven)} inputs and {len(self.given)} "
+                f"outputs. Remedy: give {n} of each."
+            )
+
+    @property
+    def inputs(self) -> tuple[Channel, ...]:
+        """Channels driven."""
+        return self.driven
+
+    @property
+    def outputs(self) -> tuple[Channel, ...]:
+        """Channels given."""
+        return self.given
+
+    @property
+    def matrix(self) -> Array:
+        """G, shape (n, n)."""
+        return np.array(self.gains)
+
+    def coefficients(self, sample_time: float | None) -> Array:
+        """Return G^T, row after row."""
+        del sample_time
+        return np.ascontiguousarray(self.matrix.T).ravel()
+
+    @property
+    def radius(self) -> float:
+        """Spectral radius of I - G^T: `jacobi` converges where it is below 1."""
+        n = len(self.gains)
+        return float(np.abs(np.linalg.eigvals(np.eye(n) - self.matrix.T)).max())
+
+    def inverse(self) -> Block:
+        """Return the decoupling v = G^-T h, by direct solution.
+
+        Raises
+        ------
+        ModelError
+            If the gains are singular, or nearly.
+        """
+        condition = float(np.linalg.cond(self.matrix))
+        if not condition < WORST_CONDITION:
+            raise ModelError(
+                f"the coupling cannot be undone: its gains are singular (condition {condition:.1e}). "
+                "Remedy: identify it from runs in which each muscle is driven alone."
+            )
+        return Coupling(rows(np.linalg.inv(self.matrix)), self.given, self.driven)
+
+    def jacobi(
+        self, coupled: ArrayLike, *, tolerance: float = 0.01, max_iterations: int = 1000
+    ) -> Array:
+        """Return v for h = G^T v by the paper's Jacobi iteration, Eqs. (28), (29).
+
+        Parameters
+        ----------
+        coupled : array_like, shape (n,) or (samples, n)
+            h.
+        tolerance : float
+            Iteration stops when no value changes by more; the paper's is 0.01.
+        max_iterations : int
+            Most steps.
+
+        Raises
+        ------
+        ModelError
+            If the iteration diverges: its spectral radius is not below 1.
+        """
+        if not self.radius < 1:
+            raise ModelError(
+                f"Jacobi iteration diverges: its spectral radius is {self.radius:.3g}. "
+                "Remedy: use inverse(), which solves directly."
+            )
+        h = np.asarray(coupled, dtype=np.float64)
+        transposed = self.matrix.T
+        diagonal = np.diag(transposed)
+        off = transposed - np.diag(diagonal)
+        v = h / diagonal
+        for _ in range(max_iterations):
+            before, v = v, (h - v @ off.T) / diagonal
+            if np.abs(v - before).max() <= tolerance:
+                break
+        return np.asarray(v)
+
+    def passes(self, low: Array, high: Array) -> tuple[Array, Array]:
+        """Return the outputs reached over a box of inputs, each by itself."""
+        at_low, at_high = self.matrix.T * low, self.matrix.T * high
+        return np.minimum(at_low, at_high).sum(axis=1), np.maximum(at_low, at_high).sum(axis=1)
+
+    @classmethod
+    def example(cls) -> Self:
+        """Return the paper's Table 3."""
+        drives = tuple(Channel(f"displacement_{k}", "mm") for k in (1, 2, 3))
+        gains = ((1.0, 0.1124, 0.0356), (0.1521, 1.0, 0.2153), (0.5368, 0.6321, 1.0))
+        return cls(gains, drives, drives)

@@ -1,0 +1,322 @@
+"""First-order Takagi-Sugeno fuzzy network, and its inverse.
+
+Every input has Gaussian sets; a rule is one set of each input, fires by their product, and answers
+with a linear function of all inputs; answers are weighted by normalised firing. Since there is a rule
+for every combination, the normalised firing of a rule is the product of memberships normalised input
+by input, which is how it is computed: in the log domain, where nothing underflows far from all centres.
+
+Source: "Modeling and Compensation of Stiffness-Dependent Hysteresis Coupling Behavior for Parallel
+Pneumatic Artificial Muscle-Driven Soft Manipulator", Eqs. (9) to (13).
+"""
+
+from __future__ import annotations
+
+from itertools import product
+from typing import ClassVar, Self
+
+import numpy as np
+from pydantic.dataclasses import dataclass
+
+from mckibben.arrays import Array
+from mckibben.blocks.core.block import Kernel
+from mckibben.blocks.core.exportable import Cost
+from mckibben.blocks.core.fields import (
+    STRICT,
+    Channel,
+    Channels,
+    Rows,
+    Rule,
+    Vector,
+)
+from mckibben.blocks.core.inverse import Invertible
+from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.core.linear_system import eliminate, newton_cost
+from mckibben.blocks.core.many_channels import ManyChannels
+from mckibben.blocks.core.stateless import Stateless
+from mckibben.errors import ModelError
+
+MOST_STEPS = 40
+"""Of Newton's method in a sample."""
+
+
+@kernel
+def answer(c: Array, x: Array, memberships: Array, y: Array) -> None:
+    """Fill the outputs at one input sample.
+
+    ``c`` is [inputs, outputs, driven, constants, most sets, sets of every input, centres, widths,
+    consequents]; a rule's consequents are one row an output: a coefficient for every input, and the
+    constant if there are constants.
+    """
+    n, n_out, constant, most = int(c[0]), int(c[1]), int(c[3]), int(c[4])
+    at, n_rules, n_sets = 5 + n, 1, 0
+    for i in range(n):
+        n_rules *= int(c[5 + i])
+        n_sets += int(c[5 + i])
+    for i in range(n):
+        sets = int(c[5 + i])
+        largest = -np.inf
+        for s in range(sets):
+            z = (x[i] - c[at + s]) / c[at + n_sets + s]
+            memberships[i * most + s] = -0.5 * z * z
+            largest = max(largest, memberships[i * most + s])
+        total = 0.0
+        for s in range(sets):
+            memberships[i * most + s] = np.exp(memberships[i * most + s] - largest)
+            total += memberships[i * most + s]
+        for s in range(sets):
+            memberships[i * most + s] /= total
+        at += sets
+    at += n_sets
+    width = n + constant
+    for j in range(n_out):
+        y[j] = 0.0
+    for rule in range(n_rules):
+        firing, rest = 1.0, rule
+        for i in range(n - 1, -1, -1):
+            sets = int(c[5 + i])
+            firing *= memberships[i * most + rest % sets]
+            rest //= sets
+        if firing > 1e-300:
+            for j in range(n_out):
+                total = c[at + n] if constant else 0.0
+                for i in range(n):
+                    total += c[at + i] * x[i]
+                y[j] += firing * total
+                at += width
+        else:
+            at += n_out * width
+
+
+@kernel
+def fuzzy_network_kernel(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
+    """Answer sample by sample; scratch are the memberships."""
+    memberships = coefficients[coefficients.size - int(coefficients[0] * coefficients[4]) :]
+    for t in range(inputs.shape[0]):
+        answer(coefficients, inputs[t], memberships, outputs[t])
+
+
+@kernel
+def fuzzy_network_inverse_kernel(
+    coefficients: Array, state: Array, inputs: Array, outputs: Array
+) -> None:
+    """Solve for the driven inputs by Newton's method within their limits, from the last ones.
+
+    Coefficients are the limits, lowest then highest, then the network's; the state is [last driven
+    inputs, samples clipped].
+    """
+    m = state.size - 1
+    low, high, c = coefficients[:m], coefficients[m : 2 * m], coefficients[2 * m :]
+    n = int(c[0])
+    used = int(c[0] * c[4])
+    scratch = c[c.size - (used + n + m * (m + 4)) :]
+    memberships, x, rest = scratch[:used], scratch[used : used + n], scratch[used + n :]
+    y, shifted, best, residual = rest[:m], rest[m : 2 * m], rest[2 * m : 3 * m], rest[3 * m : 4 * m]
+    matrix = rest[4 * m : m * (m + 4)].reshape((m, m))
+    for t in range(inputs.shape[0]):
+        for i in range(m):
+            x[i] = state[i]
+        for i in range(m, n):
+            x[i] = inputs[t, i]
+        size = 1.0
+        for j in range(m):
+            size = max(size, abs(inputs[t, j]))
+        least, share = np.inf, 1.0
+        for _ in range(MOST_STEPS):
+            answer(c, x, memberships, y)
+            worst = 0.0
+            for j in range(m):
+                residual[j] = y[j] - inputs[t, j]
+                worst = max(worst, abs(residual[j]))
+            if worst < least:
+                # once at rounding, a step that gains nothing ends the search
+                stuck = worst > 0.5 * least and worst < 1e-11 * size
+                least = worst
+                for i in range(m):
+                    best[i] = x[i]
+                if stuck or worst == 0.0:
+                    break
+                share = 1.0
+            elif least < 1e-11 * size:
+                break
+            else:
+                share *= 0.5
+                for i in range(m):
+                    x[i] = best[i]
+                if share < 1e-3:
+                    break
+                answer(c, x, memberships, y)
+                for j in range(m):
+                    residual[j] = y[j] - inputs[t, j]
+            for i in range(m):
+                kept = x[i]
+                span = high[i] - low[i]
+                h = 1e-6 * span if kept + 1e-6 * span <= high[i] else -1e-6 * span
+                x[i] = kept + h
+                answer(c, x, memberships, shifted)
+                x[i] = kept
+                for j in range(m):
+                    matrix[j, i] = (shifted[j] - y[j]) / h
+            eliminate(matrix, residual)
+            for i in range(m):
+                x[i] = min(max(x[i] - share * residual[i], low[i]), high[i])
+        for i in range(m):
+            state[i] = best[i]
+            outputs[t, i] = best[i]
+        if least > 1e-9 * size:
+            state[m] += 1.0
+
+
+@dataclass(frozen=True, config=STRICT)
+class FuzzyNetwork(Stateless, ManyChannels, Invertible):
+    """Takagi-Sugeno network with a rule for every combination of sets.
+
+    Parameters
+    ----------
+    centres, widths : sequence of sequence of float
+        Of the Gaussian sets of every input; widths are positive.
+    consequents : sequence of float
+        Rule after rule (the last input's set running fastest), output after output: one coefficient
+        for every input, then the constant if there is one.
+    constants : bool
+        Whether consequents have a constant term.
+    driven, scheduled, given : sequence of Channel
+        Inputs driven, those that schedule, and outputs.
+    limits : sequence of (float, float), optional
+        Lowest and highest value of every driven input; needed for an inverse.
+    """
+
+    kind: ClassVar[str] = "fuzzy-network"
+    kernel: ClassVar[Kernel] = fuzzy_network_kernel
+    inverse_kernel: ClassVar[Kernel] = fuzzy_network_inverse_kernel
+    inverse_path_dependent: ClassVar[bool] = True
+    in_scratch: ClassVar[bool] = True
+    parameters: ClassVar[tuple[str, ...]] = ("centres", "widths", "consequents")
+
+    centres: Rows
+    widths: Rows
+    consequents: Vector
+    driven: Channels
+    given: Channels
+    scheduled: Channels = ()
+    constants: bool = False
+    limits: Rows | None = None
+
+    def __post_init__(self) -> None:
+        self.check_channels()
+        sets = [len(row) for row in self.centres]
+        if len(sets) != len(self.inputs) or sets != [len(row) for row in self.widths] or 0 in sets:
+            raise ModelError(
+                f"{self.kind!r} of {len(self.inputs)} inputs has centres of {sets} and widths of "
+                f"{[len(row) for row in self.widths]} sets. Remedy: give each input as many of both."
+            )
+        if any(not width > 0 for row in self.widths for width in row):
+            raise ModelError(
+                f"widths of {self.kind!r} are not positive. Remedy: give positive ones."
+            )
+        wanted = int(np.prod(sets)) * len(self.given) * (len(sets) + self.constants)
+        if len(self.consequents) != wanted:
+            raise ModelError(
+                f"{self.kind!r} of this structure has {wanted} consequents, got "
+                f"{len(self.consequents)}. Remedy: give {wanted}."
+            )
+        if self.limits is not None and (
+            len(self.limits) != len(self.driven)
+            or any(len(pair) != 2 or not pair[0] < pair[1] for pair in self.limits)
+        ):
+            raise ModelError(
+                f"limits of {self.kind!r} are {self.limits}. "
+                "Remedy: give the lowest and highest of every driven input."
+            )
+
+    @property
+    def n_scratch(self) -> int:
+        """Memberships."""
+        return len(self.centres) * max(map(len, self.centres))
+
+    def coefficients(self, sample_time: float | None) -> Array:
+        """Return sizes, then `pack`."""
+        del sample_time
+        sets = [len(row) for row in self.centres]
+        sizes = [len(sets), len(self.given), len(self.driven), int(self.constants), max(sets)]
+        return np.concatenate([[*sizes, *sets], self.pack()])
+
+    def cost(self, sample_time: float | None) -> Cost:
+        """Return what memberships and all rules cost."""
+        del sample_time
+        n, rules = len(self.centres), int(np.prod([len(row) for row in self.centres]))
+        each = n + len(self.given) * (2 * n + 2)
+        operations = rules * each + 10 * sum(map(len, self.centres))
+        return Cost(operations, operations)
+
+    def inverse_cost(self, sample_time: float | None) -> Cost:
+        """Return what steps of Newton's method cost, with slopes by differences."""
+        m = len(self.driven)
+        return newton_cost(self.cost(sample_time).usual * (1 + m) + m**3)
+
+    def check_invertible(self) -> None:
+        """Demand as many outputs as driven inputs, and limits."""
+        if len(self.given) != len(self.driven) or self.limits is None:
+            raise ModelError(
+                f"{self.kind!r} with {len(self.driven)} driven inputs, {len(self.given)} outputs and "
+                f"limits {self.limits} has no inverse. Remedy: give as many of both, and limits."
+            )
+
+    @property
+    def n_inverse_states(self) -> int:
+        """The last solution, and the count of samples clipped."""
+        return len(self.driven) + 1
+
+    @property
+    def n_inverse_scratch(self) -> int:
+        """Memberships, all inputs, five vectors of driven inputs, and a matrix."""
+        m = len(self.driven)
+        return self.n_scratch + len(self.inputs) + m * (m + 5)
+
+    def inverse_numbers(self, own: Array) -> Array:
+        """Return the limits, lowest then highest, and the network's."""
+        return np.concatenate([*np.array(self.limits).T, own])
+
+    def inverse_start(self, first: Array, start: Rule) -> Array:
+        """Return the solution for the first sample, the best that is found from several starts."""
+        del start
+        low, high = np.array(self.limits).T
+        given = np.asarray(first, dtype=np.float64)[np.newaxis]
+        found, least = np.append(0.5 * (low + high), 0.0), np.inf
+        for share in (0.02, 0.25, 0.5, 0.75, 0.98):
+            state = np.append(low + share * (high - low), 0.0)
+            driven = np.empty((1, low.size))
+            self.bind_inverse(None, state, given, driven)()
+            reached = self.simulate(np.column_stack([driven, given[:, low.size :]]))
+            error = float(np.abs(reached - given[:, : low.size]).max())
+            if error < least:
+                found, least = state, error
+        return np.append(found[:-1], 0.0)
+
+    def inverse_complaint(self, state: Array) -> str:
+        """Tell of references that the network cannot give."""
+        if not state[-1] > 0:
+            return ""
+        return (
+            f"{int(state[-1])} samples of the reference are out of reach of the network and were "
+            "clipped to the nearest that is"
+        )
+
+    @classmethod
+    def example(cls) -> Self:
+        """Return a small network of two muscles, scheduled by an extensor."""
+        centres, widths = (0.0, 30.0), (20.0, 20.0)
+        consequents = []
+        for a, b, p in product((0, 1), repeat=3):
+            gain = 1.0 - 0.2 * p
+            consequents += [gain + 0.1 * a, 0.1 - 0.05 * b, 0.2 * p]
+            consequents += [0.15 - 0.05 * a, gain + 0.05 * b, -0.1 * p]
+        return cls(
+            (centres, centres, (0.0, 2.5)),
+            (widths, widths, (1.0, 1.2)),
+            tuple(consequents),
+            tuple(Channel(f"displacement_{k}", "mm") for k in (1, 2)),
+            tuple(Channel(f"displacement_{k}", "mm") for k in (1, 2)),
+            (Channel("pressure_extensor", "bar"),),
+            False,
+            ((-50.0, 80.0), (-50.0, 80.0)),
+        )

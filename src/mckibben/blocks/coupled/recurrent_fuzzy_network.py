@@ -1,0 +1,252 @@
+"""Recurrent fuzzy network in a NARMAX loop: its own past output, a driven input and what schedules it.
+
+Memberships remember: what a set answered one sample ago shifts its centre,
+
+    O_ij(t) = exp(-[x_i(t) - m_ij + theta_ij O_ij(t - T)]^2 / (2 sigma_ij^2)),
+
+with one rule for every combination of sets, normalised firing and linear consequents. The inputs x are
+the last n_a outputs, the driven input now and n_b samples back, and every scheduling input now and n_c
+samples back; the output is fed back, so the network always runs free.
+
+The paper's fourth layer multiplies the firing by sum_i p_ki x_i alone; here a consequent has a constant
+too, 0 where it is to be the paper's. The paper's "3N" rules are read as 3^N, one for every combination
+of sets, and its N as the number of x that its NARMAX equation lists.
+
+Source: "High-Precision Displacement and Force Hybrid Modeling of Pneumatic Artificial Muscle Using 3D
+PI-NARMAX Model", Section 3.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, ClassVar, Self
+
+import numpy as np
+from annotated_types import Gt, Interval
+from pydantic import FiniteFloat
+from pydantic.dataclasses import dataclass
+
+from mckibben.arrays import Array
+from mckibben.blocks.core.block import Block, Kernel, Primitive
+from mckibben.blocks.core.exportable import Cost
+from mckibben.blocks.core.fields import STRICT, Channel, Channels, Initial, Rows, Vector
+from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.core.many_channels import ManyChannels
+from mckibben.blocks.core.refusals import explicit_state, own_sample_time
+from mckibben.errors import ModelError
+
+
+@kernel
+def recurrent_fuzzy_network_kernel(
+    coefficients: Array, state: Array, inputs: Array, outputs: Array
+) -> None:
+    """Run free.
+
+    Coefficients are [n_a, n_b, n_c, sets, centres, widths, feedbacks (each inputs by sets),
+    consequents (rule by rule, each a coefficient for every x and a constant), scratch]; the state is
+    [past outputs, past driven inputs, past scheduling inputs (one after another), memberships].
+    """
+    n_a, n_b, n_c = int(coefficients[0]), int(coefficients[1]), int(coefficients[2])
+    sets, n_scheduled = int(coefficients[3]), inputs.shape[1] - 1
+    n = n_a + 1 + n_b + n_scheduled * (1 + n_c)
+    centres = coefficients[4 : 4 + n * sets]
+    widths = coefficients[4 + n * sets : 4 + 2 * n * sets]
+    feedbacks = coefficients[4 + 2 * n * sets : 4 + 3 * n * sets]
+    consequents = coefficients[4 + 3 * n * sets :]
+    x = coefficients[coefficients.size - n :]
+    n_past = n_a + n_b + n_scheduled * n_c
+    n_rules = 1
+    for _ in range(n):
+        n_rules *= sets
+    for t in range(inputs.shape[0]):
+        for k in range(n_a):
+            x[k] = state[k]
+        x[n_a] = inputs[t, 0]
+        for k in range(n_b):
+            x[n_a + 1 + k] = state[n_a + k]
+        for s in range(n_scheduled):
+            at = n_a + 1 + n_b + s * (1 + n_c)
+            x[at] = inputs[t, 1 + s]
+            for k in range(n_c):
+                x[at + 1 + k] = state[n_a + n_b + s * n_c + k]
+        memberships = state[n_past:]
+        for place in range(n * sets):
+            z = x[place // sets] - centres[place] + feedbacks[place] * memberships[place]
+            z /= widths[place]
+            memberships[place] = np.exp(-0.5 * z * z)
+        total, y = 0.0, 0.0
+        for rule in range(n_rules):
+            firing, rest = 1.0, rule
+            for i in range(n - 1, -1, -1):
+                firing *= memberships[i * sets + rest % sets]
+                rest //= sets
+            answer = consequents[rule * (n + 1) + n]
+            for i in range(n):
+                answer += consequents[rule * (n + 1) + i] * x[i]
+            total += firing
+            y += firing * answer
+        y = y / total if total > 1e-290 else (state[0] if n_a > 0 else 0.0)
+        outputs[t, 0] = y
+        for k in range(n_a - 1, 0, -1):
+            state[k] = state[k - 1]
+        if n_a > 0:
+            state[0] = y
+        for k in range(n_b - 1, 0, -1):
+            state[n_a + k] = state[n_a + k - 1]
+        if n_b > 0:
+            state[n_a] = inputs[t, 0]
+        for s in range(n_scheduled):
+            at = n_a + n_b + s * n_c
+            for k in range(n_c - 1, 0, -1):
+                state[at + k] = state[at + k - 1]
+            if n_c > 0:
+                state[at] = inputs[t, 1 + s]
+
+
+Lag = Annotated[int, Interval(ge=0, le=10)]
+
+
+@dataclass(frozen=True, config=STRICT)
+class RecurrentFuzzyNetwork(ManyChannels, Primitive):
+    """Recurrent Takagi-Sugeno network in a NARMAX loop.
+
+    Parameters
+    ----------
+    centres, widths, feedbacks : sequence of sequence of float
+        m, sigma (positive) and theta of the sets of every x; as many sets for each.
+    consequents : sequence of float
+        Rule after rule (the last x's set running fastest): a coefficient for every x, and a constant.
+    own_time : float
+        Sample time that the network holds for [s], positive.
+    output_lags, input_lags, scheduling_lags : int
+        n_a (at least 1), n_b and n_c.
+    driven, scheduled, given : sequence of Channel
+        One driven input, those that schedule, one output.
+    """
+
+    kind: ClassVar[str] = "recurrent-fuzzy-network"
+    kernel: ClassVar[Kernel] = recurrent_fuzzy_network_kernel
+    rate_dependent: ClassVar[bool] = True
+    in_scratch: ClassVar[bool] = True
+    parameters: ClassVar[tuple[str, ...]] = ("centres", "widths", "feedbacks", "consequents")
+
+    centres: Rows
+    widths: Rows
+    feedbacks: Rows
+    consequents: Vector
+    own_time: Annotated[FiniteFloat, Gt(0)]
+    driven: Channels
+    scheduled: Channels
+    given: Channels
+    output_lags: Annotated[int, Interval(ge=1, le=10)] = 1
+    input_lags: Lag = 0
+    scheduling_lags: Lag = 0
+
+    def __post_init__(self) -> None:
+        self.check_channels()
+        if len(self.driven) != 1 or len(self.given) != 1:
+            raise ModelError(
+                f"{self.kind!r} has {len(self.driven)} driven inputs and {len(self.given)} outputs. "
+                "Remedy: give one of each."
+            )
+        sets = {len(row) for rows in (self.centres, self.widths, self.feedbacks) for row in rows}
+        rows = {len(self.centres), len(self.widths), len(self.feedbacks)}
+        if rows != {self.n_regressors} or len(sets) != 1 or sets == {0}:
+            raise ModelError(
+                f"{self.kind!r} wants centres, widths and feedbacks of {self.n_regressors} inputs, as "
+                "many sets for each. Remedy: give them."
+            )
+        if any(not width > 0 for row in self.widths for width in row):
+            raise ModelError(f"widths of {self.kind!r} are not positive. Remedy: correct them.")
+        wanted = self.n_sets**self.n_regressors * (self.n_regressors + 1)
+        if len(self.consequents) != wanted:
+            raise ModelError(
+                f"{self.kind!r} of this structure has {wanted} consequents, got "
+                f"{len(self.consequents)}. Remedy: give {wanted}."
+            )
+
+    @property
+    def sample_time(self) -> float:  # type: ignore[override]
+        """What the network holds for [s]."""
+        return self.own_time
+
+    @property
+    def n_sets(self) -> int:
+        """Sets of every x."""
+        return len(self.centres[0])
+
+    @property
+    def n_regressors(self) -> int:
+        """N: how many x there are."""
+        scheduled = len(self.scheduled) * (1 + self.scheduling_lags)
+        return self.output_lags + 1 + self.input_lags + scheduled
+
+    @property
+    def n_states(self) -> int:
+        """Past outputs and inputs, and the last memberships."""
+        past = self.n_regressors - 1 - len(self.scheduled)
+        return past + self.n_regressors * self.n_sets
+
+    @property
+    def n_scratch(self) -> int:
+        """The regressors."""
+        return self.n_regressors
+
+    def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
+        """Return the state of inputs that always were the first ones, and outputs at the driven one."""
+        if initial is not None and not isinstance(initial, str):
+            return explicit_state(self, initial)
+        return self._resting(first, float(first[0]))
+
+    def state_at(self, first: Array, output: Array) -> Array:
+        """Return the state at rest at the first inputs, where the output is known."""
+        return self._resting(first, float(output[0]))
+
+    def _resting(self, first: Array, output: float) -> Array:
+        scheduled = np.repeat(np.asarray(first[1:], np.float64), self.scheduling_lags)
+        past = [[output] * self.output_lags, [float(first[0])] * self.input_lags, scheduled]
+        return np.concatenate([*past, np.zeros(self.n_regressors * self.n_sets)])
+
+    def coefficients(self, sample_time: float | None) -> Array:
+        """Return lags, sets and `pack`."""
+        own_sample_time(self.kind, self.own_time, sample_time)
+        head = [self.output_lags, self.input_lags, self.scheduling_lags, self.n_sets]
+        return np.concatenate([head, self.pack()])
+
+    def cost(self, sample_time: float | None) -> Cost:
+        """Return what memberships and all rules cost."""
+        del sample_time
+        n, sets = self.n_regressors, self.n_sets
+        operations = sets**n * (3 * n + 3) + 10 * n * sets
+        return Cost(operations, operations)
+
+    def inverse(self) -> Block:
+        """Refuse: what the output is now depends mostly on what it was.
+
+        Raises
+        ------
+        ModelError
+            Always.
+        """
+        raise ModelError(
+            f"{self.kind!r} has no inverse: a sample of its input moves its output by next to nothing. "
+            "Remedy: invert force-balance, or close a loop."
+        )
+
+    @classmethod
+    def example(cls) -> Self:
+        """Return a small, stable network of a muscle under a load."""
+        centres, widths = (0.0, 40.0), (30.0, 30.0)
+        loads, spans = (0.0, 150.0), (100.0, 100.0)
+        consequents = []
+        for rule in range(8):
+            consequents += [0.6 + 0.02 * (rule & 1), 0.3 - 0.02 * (rule >> 2), -0.01, 0.5]
+        return cls(
+            (centres, centres, loads),
+            (widths, widths, spans),
+            ((0.5, -0.5), (0.3, 0.2), (2.0, -1.0)),
+            tuple(consequents),
+            0.01,
+            (Channel("displacement_free", "mm"),),
+            (Channel("force", "N"),),
+            (Channel("displacement", "mm"),),
+        )

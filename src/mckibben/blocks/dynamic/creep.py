@@ -1,0 +1,131 @@
+"""Creep: a visco-elastic follow-up of what goes in, and its exact inverse.
+
+y = u + sum_k c_k x_k,  tau_k x_k' = u - x_k: a spring in series with Kelvin-Voigt elements. Behind a
+hysteresis model it adds the lag (short time constants) and creep (long ones) of a muscle's braid and
+rubber. The input is held from sample to sample, x_k <- a_k x_k + (1 - a_k) u with
+a_k = exp(-T / tau_k), so the output answers at once and the inverse is in closed form.
+"""
+
+from __future__ import annotations
+
+from typing import ClassVar, Self
+
+import numpy as np
+from pydantic.dataclasses import dataclass
+
+from mckibben.arrays import Array
+from mckibben.blocks.core.block import Kernel
+from mckibben.blocks.core.fields import DISPLACEMENT, STRICT, ChannelField, Initial, Rule, Vector
+from mckibben.blocks.core.inverse import Invertible
+from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.core.refusals import explicit_state, needs_sample_time
+from mckibben.blocks.core.single_channel import SingleChannel
+from mckibben.errors import ModelError
+
+
+@kernel
+def creep_kernel(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
+    """Run the model; coefficients are [a, c], the state is x."""
+    n = state.size
+    for t in range(inputs.shape[0]):
+        u = inputs[t, 0]
+        y = u
+        for k in range(n):
+            state[k] = coefficients[k] * state[k] + (1.0 - coefficients[k]) * u
+            y += coefficients[n + k] * state[k]
+        outputs[t, 0] = y
+
+
+@kernel
+def creep_inverse_kernel(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
+    """Undo the model; coefficients and state as forward."""
+    n = state.size
+    gain = 1.0
+    for k in range(n):
+        gain += coefficients[n + k] * (1.0 - coefficients[k])
+    for t in range(inputs.shape[0]):
+        rest = inputs[t, 0]
+        for k in range(n):
+            rest -= coefficients[n + k] * coefficients[k] * state[k]
+        u = rest / gain
+        for k in range(n):
+            state[k] = coefficients[k] * state[k] + (1.0 - coefficients[k]) * u
+        outputs[t, 0] = u
+
+
+@dataclass(frozen=True, config=STRICT)
+class Creep(SingleChannel, Invertible):
+    """Visco-elastic creep behind a model of the immediate response.
+
+    Parameters
+    ----------
+    compliances : sequence of float, length K
+        c_k: creep once it has ended, relative to the immediate response; not negative.
+    time_constants : sequence of float, length K
+        tau_k [s], positive.
+    input, output : Channel
+        Channel driven and channel given.
+    """
+
+    kind: ClassVar[str] = "creep"
+    kernel: ClassVar[Kernel] = creep_kernel
+    inverse_kernel: ClassVar[Kernel] = creep_inverse_kernel
+    rate_dependent: ClassVar[bool] = True
+    parameters: ClassVar[tuple[str, ...]] = ("compliances", "time_constants")
+    initial: ClassVar[Initial] = "first_sample"
+
+    compliances: Vector
+    time_constants: Vector
+    input: ChannelField = DISPLACEMENT
+    output: ChannelField = DISPLACEMENT
+
+    def __post_init__(self) -> None:
+        if len(self.compliances) != len(self.time_constants):
+            raise ModelError(
+                f"{self.kind!r} has {len(self.compliances)} compliances and "
+                f"{len(self.time_constants)} time constants. Remedy: give one to each."
+            )
+        if min(self.compliances, default=0.0) < 0 or min(self.time_constants, default=1.0) <= 0:
+            raise ModelError(
+                f"{self.kind!r} has a negative compliance, or a time constant that is not positive. "
+                "Remedy: give compliances of 0 or more, and positive times in seconds."
+            )
+
+    @property
+    def n_states(self) -> int:
+        """One to every Kelvin-Voigt element."""
+        return len(self.compliances)
+
+    def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
+        """Return the elements at rest: at the first input, or, virgin, at 0."""
+        start = self.initial if initial is None else initial
+        if start == "first_sample":
+            return np.full(self.n_states, first[0])
+        if start == "virgin":
+            return np.zeros(self.n_states)
+        return explicit_state(self, start)
+
+    def coefficients(self, sample_time: float | None) -> Array:
+        """Return [decays over a sample, compliances].
+
+        Raises
+        ------
+        ModelError
+            Without a sample time.
+        """
+        step = needs_sample_time(self.kind, sample_time)
+        return np.array([*np.exp(-step / np.array(self.time_constants)), *self.compliances])
+
+    def passes(self, low: Array, high: Array) -> tuple[Array, Array]:
+        """Return the outputs that can be reached at once, however far the elements have crept."""
+        crept = float(np.sum(self.compliances))
+        return low + crept * high, high + crept * low
+
+    def inverse_start(self, first: Array, start: Rule) -> Array:
+        """Return the elements at rest: where the first output is held, or, virgin, at 0."""
+        return self.initial_state(first / (1.0 + np.sum(self.compliances)), start)
+
+    @classmethod
+    def example(cls) -> Self:
+        """Return a fast and a slow element."""
+        return cls((0.08, 0.05), (1.5, 40.0))

@@ -1,0 +1,185 @@
+"""PID feedback as a block, so that it is saved, streamed and exported like a compensator.
+
+u = base + kp e + integral - kd rate,  e = reference - measured,
+
+one loop a muscle: the derivative is of the measurement, through a first-order filter; the integral
+stops where the output is at a limit and would be driven further (Åström and Hägglund, "Advanced PID
+Control", ch. 3).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Annotated, ClassVar, Self
+
+import numpy as np
+from annotated_types import Ge
+from pydantic import FiniteFloat
+from pydantic.dataclasses import dataclass
+
+from mckibben.arrays import Array
+from mckibben.blocks.core.block import Block, Kernel, Primitive
+from mckibben.blocks.core.fields import STRICT, Channel, Channels, Initial, Vector
+from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.core.many_channels import ManyChannels
+from mckibben.blocks.core.refusals import explicit_state, needs_sample_time
+from mckibben.errors import ModelError
+
+MEASURED = "_measured"
+"""What the name of a reference ends with where it is measured."""
+
+
+@kernel
+def pid_kernel(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
+    """Run the loops; the state is [integrals, rates, last measurements, last references].
+
+    Coefficients are [sample time, share of the filter, lowest, highest, whether there is a base,
+    whether references are late, kp, ki, kd]; inputs are references, measurements, bases.
+    """
+    n = outputs.shape[1]
+    step, share = coefficients[0], coefficients[1]
+    lowest, highest = coefficients[2], coefficients[3]
+    based, late = coefficients[4] > 0.0, coefficients[5] > 0.0
+    kp, ki, kd = coefficients[6 : 6 + n], coefficients[6 + n : 6 + 2 * n], coefficients[6 + 2 * n :]
+    for t in range(inputs.shape[0]):
+        for k in range(n):
+            reference, measured = inputs[t, k], inputs[t, n + k]
+            error = (state[3 * n + k] if late else reference) - measured
+            state[n + k] += share * ((measured - state[2 * n + k]) / step - state[n + k])
+            state[2 * n + k], state[3 * n + k] = measured, reference
+            base = inputs[t, 2 * n + k] if based else 0.0
+            wanted = base + kp[k] * error + state[k] - kd[k] * state[n + k]
+            further = (wanted > highest and error > 0.0) or (wanted < lowest and error < 0.0)
+            if not further:
+                state[k] += ki[k] * step * error
+            outputs[t, k] = min(max(wanted, lowest), highest)
+
+
+@dataclass(frozen=True, config=STRICT)
+class PIDFeedback(ManyChannels, Primitive):
+    """Independent PID loops of n muscles.
+
+    Parameters
+    ----------
+    kp, ki, kd : sequence of n floats
+        Gains [bar/mm], [bar/(mm s)], [bar s/mm].
+    limits : (float, float)
+        Of the output [bar], lowest first.
+    filter_time : float
+        Of the derivative [s]; not negative.
+    driven : sequence of n Channel
+        References.
+    scheduled : sequence of n or 2 n Channel
+        Measurements, then, if any, what feedback is added to.
+    given : sequence of n Channel
+        Outputs.
+    late : bool
+        Whether the measurement answers the reference of the step before, as behind a compensator.
+    """
+
+    kind: ClassVar[str] = "pid"
+    kernel: ClassVar[Kernel] = pid_kernel
+    rate_dependent: ClassVar[bool] = True
+    parameters: ClassVar[tuple[str, ...]] = ("kp", "ki", "kd")
+
+    kp: Vector
+    ki: Vector
+    kd: Vector
+    limits: tuple[FiniteFloat, FiniteFloat]
+    filter_time: Annotated[FiniteFloat, Ge(0)]
+    driven: Channels
+    scheduled: Channels
+    given: Channels
+    late: bool = False
+
+    def __post_init__(self) -> None:
+        self.check_channels()
+        n = len(self.driven)
+        sizes = (len(self.kp), len(self.ki), len(self.kd), len(self.given))
+        if set(sizes) != {n} or len(self.scheduled) not in (n, 2 * n):
+            raise ModelError(
+                f"{self.kind!r} of {n} references has {sizes} kp, ki, kd and outputs, and "
+                f"{len(self.scheduled)} measurements and bases. Remedy: give {n} of each."
+            )
+        if not self.limits[0] < self.limits[1]:
+            raise ModelError(
+                f"limits of {self.kind!r} are {self.limits}. Remedy: give lowest, then highest."
+            )
+
+    @property
+    def n_states(self) -> int:
+        """Integrals, filtered rates, last measurements, last references."""
+        return 4 * len(self.driven)
+
+    @property
+    def n_scratch(self) -> int:
+        """What single precision loses of the integrals."""
+        return len(self.driven)
+
+    def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
+        """Return empty integrals and rates, at the first measurement."""
+        if initial is not None and not isinstance(initial, str):
+            return explicit_state(self, initial)
+        n = len(self.driven)
+        measured = np.asarray(first, dtype=np.float64)[n : 2 * n]
+        return np.concatenate([np.zeros(2 * n), measured, measured])
+
+    def coefficients(self, sample_time: float | None) -> Array:
+        step = needs_sample_time(self.kind, sample_time)
+        share = step / (self.filter_time + step)
+        based = len(self.scheduled) > len(self.driven)
+        head = [step, share, *self.limits, float(based), float(self.late)]
+        return np.array([*head, *self.kp, *self.ki, *self.kd])
+
+    def inverse(self) -> Block:
+        """Refuse: feedback is undone by nothing but the plant."""
+        raise ModelError(f"{self.kind!r} has no inverse. Remedy: invert the model of the muscle.")
+
+    @classmethod
+    def of(
+        cls,
+        references: Channels,
+        outputs: Channels,
+        kp: Sequence[float],
+        ki: Sequence[float],
+        kd: Sequence[float] | None = None,
+        *,
+        limits: tuple[float, float],
+        filter_time: float = 0.1,
+    ) -> Self:
+        """Return feedback by itself, from references and what is measured of them to outputs.
+
+        Parameters are those of the class; without kd the derivative is left out.
+        """
+        kd = [0.0] * len(kp) if kd is None else kd
+        measured = tuple(Channel(f"{c.name}{MEASURED}", c.unit) for c in references)
+        gains = (tuple(kp), tuple(ki), tuple(kd))
+        return cls(*gains, limits, filter_time, references, measured, outputs)
+
+    def behind(self, compensator: Block) -> Self:
+        """Return the same feedback on top of what a compensator gives."""
+        n = len(compensator.inputs) - len(compensator.scheduling)
+        references, outputs = compensator.inputs[:n], compensator.outputs
+        measured = tuple(Channel(f"{c.name}{MEASURED}", c.unit) for c in references)
+        bases = tuple(Channel(f"{c.name}_base", c.unit) for c in outputs)
+        return replace(
+            self, driven=references, scheduled=(*measured, *bases), given=outputs, late=True
+        )
+
+    @classmethod
+    def example(cls) -> Self:
+        return cls(
+            (0.05, 0.04),
+            (0.2, 0.3),
+            (0.002, 0.0),
+            (0.0, 5.0),
+            0.1,
+            tuple(Channel(f"displacement_{k}", "mm") for k in (1, 2)),
+            (
+                *(Channel(f"displacement_{k}_measured", "mm") for k in (1, 2)),
+                *(Channel(f"pressure_{k}_base", "bar") for k in (1, 2)),
+            ),
+            tuple(Channel(f"pressure_{k}", "bar") for k in (1, 2)),
+            late=True,
+        )

@@ -1,0 +1,204 @@
+"""Where a braided muscle comes to rest: pressure against load and elasticity; and its inverse.
+
+p A g(e) = load + stiffness e + hardening e^3,  g(e) = a (1 - e)^2 - b,
+a = 3 / tan(angle)^2,  b = 1 / sin(angle)^2,  displacement = rest_length e + offset,
+
+with A the muscle's cross-section at rest. Sources: Chou and Hannaford 1996; Tondu and Lopez 2000
+(braid geometry). The balance gives the pressure of a contraction in closed form, so it is the
+inverse that is explicit; forward it is solved for every sample by Newton's method inside a
+shrinking bracket.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, ClassVar, Self
+
+import numpy as np
+from annotated_types import Gt, Interval
+from pydantic import FiniteFloat
+from pydantic.dataclasses import dataclass
+
+from mckibben.arrays import Array
+from mckibben.blocks.core.block import Kernel
+from mckibben.blocks.core.fields import DISPLACEMENT, PRESSURE, STRICT, ChannelField, Initial
+from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.core.single_channel import Memoryless, Ranged
+
+NEWTONS_PER_BAR = 0.1
+"""Force of one bar on one square millimetre [N]."""
+
+SHARE = 0.995
+"""Of the contraction at which the braid pulls no more: the furthest that the muscle goes."""
+
+LEAST = -0.1
+"""Contraction below which no muscle is modelled."""
+
+
+@kernel
+def balance(e: float, c: Array) -> float:
+    """Return the pressure at which the muscle rests at a contraction."""
+    return (c[0] + e * (c[1] + c[2] * e * e)) / (c[3] * (c[4] * (1.0 - e) ** 2 - c[5]))
+
+
+@kernel
+def braid_equilibrium_kernel(
+    coefficients: Array, state: Array, inputs: Array, outputs: Array
+) -> None:
+    """Find the displacement.
+
+    Coefficients are [load, stiffness, hardening, force per bar, a, b, least and largest
+    contraction, rest length, offset].
+    """
+    c = coefficients
+    guess = 0.0
+    for t in range(inputs.shape[0]):
+        p = inputs[t, 0]
+        low, high = c[6], c[7]
+        e = min(max(guess, low), high)
+        if p <= balance(low, c):
+            e = low
+        elif p >= balance(high, c):
+            e = high
+        else:
+            for _ in range(200):
+                error = balance(e, c) - p
+                if error == 0.0:
+                    break
+                if error > 0.0:
+                    high = e
+                else:
+                    low = e
+                pull = c[3] * (c[4] * (1.0 - e) ** 2 - c[5])
+                slope = (
+                    c[1] + 3.0 * c[2] * e * e + (error + p) * 2.0 * c[3] * c[4] * (1.0 - e)
+                ) / pull
+                candidate = e - error / slope if slope > 0.0 else low
+                if not low < candidate < high:
+                    candidate = 0.5 * (low + high)
+                if abs(candidate - e) <= 1e-16 or candidate in (low, high):
+                    break
+                e = candidate
+        outputs[t, 0] = c[8] * e + c[9]
+
+
+@kernel
+def braid_equilibrium_inverse_kernel(
+    coefficients: Array, state: Array, inputs: Array, outputs: Array
+) -> None:
+    """Give the pressure of a displacement; the state is the count of samples clipped."""
+    c = coefficients
+    for t in range(inputs.shape[0]):
+        e = (inputs[t, 0] - c[9]) / c[8]
+        inside = min(max(e, c[6]), c[7])
+        if abs(e - inside) > 1e-9:
+            state[0] += 1.0
+        outputs[t, 0] = balance(inside, c)
+
+
+@dataclass(frozen=True, config=STRICT)
+class BraidEquilibrium(Memoryless, Ranged):
+    """Displacement at which a loaded, braided muscle rests under a pressure.
+
+    Parameters
+    ----------
+    load : float
+        Force that stretches the muscle [N]; positive.
+    stiffness : float
+        Of the bladder and braid, per contraction [N]; not negative.
+    hardening : float
+        Cubic part of it [N]; not negative.
+    braid_angle : float
+        Between braid and axis at rest [rad], between 0.1 and 0.95 (54.7 degrees pull no more).
+    rest_length : float
+        Displacement per contraction [mm]; positive.
+    offset : float
+        Displacement at contraction 0 [mm].
+    diameter : float
+        Of the muscle at rest [mm]; positive. It only scales the forces.
+    input, output : Channel
+        Channel driven and channel given.
+    """
+
+    kind: ClassVar[str] = "braid-equilibrium"
+    kernel: ClassVar[Kernel] = braid_equilibrium_kernel
+    inverse_kernel: ClassVar[Kernel] = braid_equilibrium_inverse_kernel
+    parameters: ClassVar[tuple[str, ...]] = (
+        "load",
+        "stiffness",
+        "hardening",
+        "braid_angle",
+        "rest_length",
+        "offset",
+    )
+    initial: ClassVar[Initial] = "first_sample"
+
+    load: Annotated[FiniteFloat, Gt(0)]
+    stiffness: Annotated[FiniteFloat, Interval(ge=0)]
+    hardening: Annotated[FiniteFloat, Interval(ge=0)]
+    braid_angle: Annotated[FiniteFloat, Interval(ge=0.1, le=0.95)]
+    rest_length: Annotated[FiniteFloat, Gt(0)]
+    offset: FiniteFloat = 0.0
+    diameter: Annotated[FiniteFloat, Gt(0)] = 20.0
+    input: ChannelField = PRESSURE
+    output: ChannelField = DISPLACEMENT
+
+    @property
+    def input_range(self) -> tuple[float, float]:  # type: ignore[override]
+        """Least and greatest pressure that the balance is solved for [bar]."""
+        c = self.coefficients(None)
+        return float(balance(c[6], c)), float(balance(c[7], c))
+
+    def coefficients(self, sample_time: float | None) -> Array:
+        """Return what the kernel reads."""
+        del sample_time
+        a, b = 3.0 / math.tan(self.braid_angle) ** 2, 1.0 / math.sin(self.braid_angle) ** 2
+        area = 0.25 * math.pi * self.diameter**2 * NEWTONS_PER_BAR
+        largest = SHARE * (1.0 - math.sqrt(b / a))
+        # below, the bladder would have to pull harder than the load
+        least = LEAST
+        if self.stiffness > 0:
+            least = max(least, -0.9 * self.load / (self.stiffness + 0.01 * self.hardening))
+        head = [self.load, self.stiffness, self.hardening, area, a, b, least, largest]
+        return np.array([*head, self.rest_length, self.offset])
+
+    def slopes(self, displacement: Array) -> tuple[Array, Array]:
+        """Return how displacements of equilibrium move, shapes (n,) and (n, 4).
+
+        By pressure; and by load, stiffness, hardening and braid angle. Where the muscle goes no
+        further, it moves with its limits.
+        """
+        c = self.coefficients(None)
+        e = (displacement - self.offset) / self.rest_length
+        sine, cosine = math.sin(self.braid_angle), math.cos(self.braid_angle)
+        pull = c[3] * (c[4] * (1.0 - e) ** 2 - c[5])
+        pressure = (c[0] + e * (c[1] + c[2] * e * e)) / pull
+        by_contraction = c[1] + 3.0 * c[2] * e * e + 2.0 * pressure * c[3] * c[4] * (1.0 - e)
+        by_angle = c[3] * (2.0 * cosine - 6.0 * cosine * (1.0 - e) ** 2) / sine**3
+        loads = np.column_stack([np.ones_like(e), e, e**3, -pressure * by_angle])
+        by_pressure = self.rest_length * pull / by_contraction
+        by_parameters = -self.rest_length * loads / by_contraction[:, np.newaxis]
+        lowest, highest = e <= c[6], e >= c[7]
+        by_pressure[lowest | highest] = 0.0
+        by_least = np.zeros(4)
+        if c[6] > LEAST:
+            stiffness = self.stiffness + 0.01 * self.hardening
+            by_least[:3] = c[6] / self.load, -c[6] / stiffness, -0.01 * c[6] / stiffness
+        by_largest = np.array([0.0, 0.0, 0.0, -SHARE * sine / (math.sqrt(3.0) * cosine**2)])
+        by_parameters[lowest] = self.rest_length * by_least
+        by_parameters[highest] = self.rest_length * by_largest
+        return by_pressure, by_parameters
+
+    def reachable(self) -> tuple[Array, Array]:
+        """Return the displacements at the least and largest contraction, each of shape (1,)."""
+        c = self.coefficients(None)
+        return np.array([c[8] * c[6] + c[9]]), np.array([c[8] * c[7] + c[9]])
+
+    def inverse_numbers(self, own: Array) -> Array:
+        """Return those of this model."""
+        return own
+
+    @classmethod
+    def example(cls) -> Self:
+        """Return a 20 mm muscle of 200 mm under 20 kg."""
+        return cls(196.0, 150.0, 900.0, 0.45, 200.0)

@@ -1,0 +1,1 @@
+"""The contract of a block as laws, to which every block is put."""

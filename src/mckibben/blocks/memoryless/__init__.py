@@ -1,0 +1,1 @@
+"""Blocks without memory: polynomials, straight pieces, scale and sign."""

@@ -1,0 +1,68 @@
+"""Affine block: y = gain u + offset, the match that scales a unit-free model to a muscle.
+
+Source: "Analysis and modeling of a pneumatic artificial muscle system", Eq. (1).
+"""
+
+from __future__ import annotations
+
+from typing import ClassVar, Self
+
+from pydantic import FiniteFloat
+from pydantic.dataclasses import dataclass
+
+from mckibben.arrays import Array
+from mckibben.blocks.core.block import Kernel, Primitive
+from mckibben.blocks.core.fields import DISPLACEMENT, STRICT, ChannelField
+from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.core.single_channel import Memoryless
+from mckibben.errors import ModelError
+
+
+@kernel
+def affine_kernel(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
+    """Scale and shift; coefficients are [gain, offset]."""
+    for t in range(inputs.shape[0]):
+        outputs[t, 0] = coefficients[0] * inputs[t, 0] + coefficients[1]
+
+
+@dataclass(frozen=True, config=STRICT)
+class Affine(Memoryless, Primitive):
+    """Gain and offset.
+
+    Parameters
+    ----------
+    gain : float
+        Output per input; not zero where an inverse is wanted.
+    offset : float
+        Output at zero input.
+    input, output : Channel
+        Channel driven and channel given.
+    """
+
+    kind: ClassVar[str] = "affine"
+    kernel: ClassVar[Kernel] = affine_kernel
+    parameters: ClassVar[tuple[str, ...]] = ("gain", "offset")
+
+    gain: FiniteFloat
+    offset: FiniteFloat = 0.0
+    input: ChannelField = DISPLACEMENT
+    output: ChannelField = DISPLACEMENT
+
+    def inverse(self) -> Affine:
+        """Return the affine block that undoes this one.
+
+        Raises
+        ------
+        ModelError
+            If the gain is zero.
+        """
+        if self.gain == 0:
+            raise ModelError(
+                "'affine' of gain 0 has no inverse. Remedy: give a gain that is not 0."
+            )
+        return Affine(1 / self.gain, -self.offset / self.gain, self.output, self.input)
+
+    @classmethod
+    def example(cls) -> Self:
+        """Return a gain of 6.8 mm and an offset."""
+        return cls(6.8, -1.5)

@@ -1,0 +1,46 @@
+"""Change of sign, for outputs that fall while the input rises, such as a muscle's length."""
+
+from __future__ import annotations
+
+from typing import ClassVar, Self
+
+from pydantic.dataclasses import dataclass
+
+from mckibben.arrays import Array
+from mckibben.blocks.core.block import Kernel, Primitive
+from mckibben.blocks.core.fields import DISPLACEMENT, STRICT, ChannelField
+from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.core.single_channel import Memoryless
+
+
+@kernel
+def negative_kernel(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
+    """Change the sign; there are no coefficients."""
+    for t in range(inputs.shape[0]):
+        outputs[t, 0] = -inputs[t, 0]
+
+
+@dataclass(frozen=True, config=STRICT)
+class Negative(Memoryless, Primitive):
+    """y = -u.
+
+    Parameters
+    ----------
+    input, output : Channel
+        Channel driven and channel given.
+    """
+
+    kind: ClassVar[str] = "negative"
+    kernel: ClassVar[Kernel] = negative_kernel
+
+    input: ChannelField = DISPLACEMENT
+    output: ChannelField = DISPLACEMENT
+
+    def inverse(self) -> Negative:
+        """Return the block from output to input."""
+        return Negative(self.output, self.input)
+
+    @classmethod
+    def example(cls) -> Self:
+        """Return a change of sign."""
+        return cls()

@@ -1,0 +1,71 @@
+"""Memoryless monotone piecewise-linear block: a superposition of dead zones, and its exact inverse.
+
+Straight between knots, continued straight beyond the first and the last. After a Prandtl-Ishlinskii
+model it makes the modified Prandtl-Ishlinskii (MPI) model with an inverse of the same form.
+"""
+
+from __future__ import annotations
+
+from typing import ClassVar, Self
+
+import numpy as np
+from pydantic.dataclasses import dataclass
+
+from mckibben.arrays import Array
+from mckibben.blocks.core.block import Kernel, Primitive
+from mckibben.blocks.core.fields import DISPLACEMENT, STRICT, ChannelField, Vector
+from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.core.single_channel import Memoryless
+from mckibben.blocks.memoryless.interpolation import check_increasing, interpolate
+
+
+@kernel
+def piecewise_linear_kernel(
+    coefficients: Array, state: Array, inputs: Array, outputs: Array
+) -> None:
+    """Interpolate; coefficients are [knots, values]."""
+    n = coefficients.size // 2
+    for t in range(inputs.shape[0]):
+        outputs[t, 0] = interpolate(inputs[t, 0], coefficients[:n], coefficients[n:])
+
+
+@dataclass(frozen=True, config=STRICT)
+class PiecewiseLinear(Memoryless, Primitive):
+    """Straight lines between knots.
+
+    Parameters
+    ----------
+    knots : sequence of float, length K >= 2
+        Inputs where lines meet, increasing.
+    values : sequence of float, length K
+        Outputs there, increasing.
+    input, output : Channel
+        Channel driven and channel given.
+    """
+
+    kind: ClassVar[str] = "piecewise-linear"
+    kernel: ClassVar[Kernel] = piecewise_linear_kernel
+    increasing = ("knots", "values")
+    parameters: ClassVar[tuple[str, ...]] = ("values",)
+
+    knots: Vector
+    values: Vector
+    input: ChannelField = DISPLACEMENT
+    output: ChannelField = DISPLACEMENT
+
+    def __post_init__(self) -> None:
+        check_increasing(f"{self.kind} block", self.knots, self.values)
+
+    def coefficients(self, sample_time: float | None) -> Array:
+        """Return [knots, values]."""
+        del sample_time
+        return np.array([*self.knots, *self.values])
+
+    def inverse(self) -> PiecewiseLinear:
+        """Return the block with knots and values exchanged."""
+        return PiecewiseLinear(self.values, self.knots, self.output, self.input)
+
+    @classmethod
+    def example(cls) -> Self:
+        """Return a saturating curve."""
+        return cls((0.0, 5.0, 15.0, 25.0), (0.0, 8.0, 20.0, 24.0))

@@ -1,0 +1,66 @@
+"""What an envelope is."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Callable
+from typing import Any, ClassVar, Self
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from mckibben.arrays import Array
+from mckibben.blocks.core.parametrised import Parametrised
+from mckibben.blocks.core.saving import part_from_dict
+
+EnvelopeKernel = Callable[[Array, Array, Array], None]
+
+
+class Envelope(Parametrised):
+    """A strictly increasing function of the input, with its inverse.
+
+    The kernels have the signature ``kernel(coefficients, arguments, values)`` on one-dimensional
+    arrays and write into ``values``.
+    """
+
+    number: ClassVar[int]
+    """What C tells it by."""
+
+    increasing: ClassVar[tuple[str, ...]] = ()
+    """Fields of numbers in increasing order, which single precision must not make one."""
+
+    value: ClassVar[EnvelopeKernel]
+    inverse: ClassVar[EnvelopeKernel]
+
+    def coefficients(self) -> Array:
+        """Return the numbers that the kernels read; by default the parameters."""
+        return self.pack()
+
+    @abstractmethod
+    def shifted(self, offset: float) -> Self:
+        """Return this envelope raised by a constant."""
+
+    @classmethod
+    @abstractmethod
+    def examples(cls) -> tuple[Self, Self]:
+        """Return a pair for rising and falling input over 0 to 5 bar, the second never lower."""
+
+    def __call__(self, inputs: ArrayLike) -> Array:
+        """Return the envelope at the inputs, any shape."""
+        return self._evaluate(type(self).value, inputs)
+
+    def solve(self, values: ArrayLike) -> Array:
+        """Return the inputs at which the envelope has these values, any shape; NaN beyond its range."""
+        return self._evaluate(type(self).inverse, values)
+
+    def _evaluate(self, kernel: EnvelopeKernel, arguments: ArrayLike) -> Array:
+        given = np.asarray(arguments, dtype=np.float64)
+        flat = np.ascontiguousarray(given.reshape(-1))
+        values = np.empty_like(flat)
+        kernel(self.coefficients(), flat, values)
+        return values.reshape(given.shape)
+
+
+def nested_envelope(content: Any) -> Any:
+    """Turn the dict of an envelope inside a block into that envelope."""
+    return part_from_dict(content, "envelopes") if isinstance(content, dict) else content

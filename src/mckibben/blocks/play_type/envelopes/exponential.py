@@ -1,0 +1,76 @@
+"""Shifted-exponential envelope, for loops that bend one way only.
+
+gamma(u) = offset + sign(rate) (1 - exp(shift - rate u)): concave and saturating for a positive rate,
+convex for a negative one, and strictly increasing for both.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import ClassVar, Self
+
+from pydantic import FiniteFloat
+from pydantic.dataclasses import dataclass
+
+from mckibben.arrays import Array
+from mckibben.blocks.core.fields import STRICT
+from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.play_type.envelopes.base import Envelope, EnvelopeKernel
+from mckibben.errors import ModelError
+
+
+@kernel
+def _value(coefficients: Array, inputs: Array, values: Array) -> None:
+    rate, shift, offset = coefficients[0], coefficients[1], coefficients[2]
+    sign = math.copysign(1.0, rate)
+    for t in range(inputs.size):
+        values[t] = offset + sign * (1.0 - math.exp(shift - rate * inputs[t]))
+
+
+@kernel
+def _inverse(coefficients: Array, values: Array, inputs: Array) -> None:
+    rate, shift, offset = coefficients[0], coefficients[1], coefficients[2]
+    sign = math.copysign(1.0, rate)
+    for t in range(values.size):
+        inputs[t] = (shift - math.log(1.0 - sign * (values[t] - offset))) / rate
+
+
+@dataclass(frozen=True, config=STRICT)
+class Exponential(Envelope):
+    """Shifted exponential.
+
+    Parameters
+    ----------
+    rate : float
+        Curvature per unit of the input; not zero.
+    shift : float
+        Exponent at zero input; the slope there is abs(rate) exp(shift).
+    offset : float
+        Added to the exponential.
+    """
+
+    kind: ClassVar[str] = "exponential"
+    number: ClassVar[int] = 1
+    value: ClassVar[EnvelopeKernel] = _value
+    inverse: ClassVar[EnvelopeKernel] = _inverse
+    parameters: ClassVar[tuple[str, ...]] = ("rate", "shift", "offset")
+
+    rate: FiniteFloat
+    shift: FiniteFloat
+    offset: FiniteFloat = 0.0
+
+    def __post_init__(self) -> None:
+        if self.rate == 0:
+            raise ModelError(
+                "an exponential envelope of rate 0 is flat. Remedy: give a rate that is not zero."
+            )
+
+    def shifted(self, offset: float) -> Self:
+        """Return this exponential raised by a constant."""
+        return replace(self, offset=self.offset + offset)
+
+    @classmethod
+    def examples(cls) -> tuple[Self, Self]:
+        """Return a pair for rising and falling input over 0 to 5 bar."""
+        return cls(0.3, 0.2, 0.0), cls(0.4, 0.2, 0.2)

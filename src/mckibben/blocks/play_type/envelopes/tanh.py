@@ -1,0 +1,70 @@
+"""Hyperbolic-tangent envelope, for loops that saturate at both ends.
+
+gamma(u) = tanh(slope u + shift) + offset.
+
+Source: "Modeling and Compensation of Stiffness-Dependent Hysteresis Coupling Behavior for Parallel
+Pneumatic Artificial Muscle-Driven Soft Manipulator", Eq. (4).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Annotated, ClassVar, Self
+
+from annotated_types import Gt
+from pydantic import FiniteFloat
+from pydantic.dataclasses import dataclass
+
+from mckibben.arrays import Array
+from mckibben.blocks.core.fields import STRICT
+from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.play_type.envelopes.base import Envelope, EnvelopeKernel
+
+
+@kernel
+def _value(coefficients: Array, inputs: Array, values: Array) -> None:
+    slope, shift, offset = coefficients[0], coefficients[1], coefficients[2]
+    for t in range(inputs.size):
+        values[t] = math.tanh(slope * inputs[t] + shift) + offset
+
+
+@kernel
+def _inverse(coefficients: Array, values: Array, inputs: Array) -> None:
+    slope, shift, offset = coefficients[0], coefficients[1], coefficients[2]
+    for t in range(values.size):
+        inputs[t] = (math.atanh(values[t] - offset) - shift) / slope
+
+
+@dataclass(frozen=True, config=STRICT)
+class Tanh(Envelope):
+    """Hyperbolic tangent.
+
+    Parameters
+    ----------
+    slope : float
+        Steepness per unit of the input; positive.
+    shift : float
+        Argument at zero input.
+    offset : float
+        Added to the tangent.
+    """
+
+    kind: ClassVar[str] = "tanh"
+    number: ClassVar[int] = 0
+    value: ClassVar[EnvelopeKernel] = _value
+    inverse: ClassVar[EnvelopeKernel] = _inverse
+    parameters: ClassVar[tuple[str, ...]] = ("slope", "shift", "offset")
+
+    slope: Annotated[FiniteFloat, Gt(0)]
+    shift: FiniteFloat
+    offset: FiniteFloat = 0.0
+
+    def shifted(self, offset: float) -> Self:
+        """Return this tangent raised by a constant."""
+        return replace(self, offset=self.offset + offset)
+
+    @classmethod
+    def examples(cls) -> tuple[Self, Self]:
+        """Return a pair for rising and falling input over 0 to 5 bar."""
+        return cls(0.5, -1.3, 0.0), cls(0.45, -0.9, 0.1)

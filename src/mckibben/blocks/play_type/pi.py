@@ -1,0 +1,160 @@
+"""The classical Prandtl-Ishlinskii (PI) model: a weighted sum of play operators, and its inverse.
+
+y_t = y_0 + sum_i w_i F_{r_i}[u]_t, with r_0 = 0 so that the first term is the reversible part.
+
+Source: "Analysis and modeling of a pneumatic artificial muscle system", Eqs. (12), (13). The inverse
+is known to be a PI model too; here it is found by walking the same piecewise-linear relation from
+the operators' states, which is as exact, touches only the operators that move, and stays consistent
+when a reference has to be clipped.
+"""
+
+from __future__ import annotations
+
+from typing import ClassVar, Self
+
+import numpy as np
+from pydantic import FiniteFloat
+from pydantic.dataclasses import dataclass
+
+from mckibben.arrays import Array
+from mckibben.blocks.core.block import Kernel
+from mckibben.blocks.core.fields import (
+    DISPLACEMENT,
+    PRESSURE,
+    STRICT,
+    ChannelField,
+    Initial,
+    Rule,
+    StoredInitial,
+    Vector,
+)
+from mckibben.blocks.core.kernels import kernel, summing_kernel
+from mckibben.blocks.core.single_channel import Ranged, check_input_range
+from mckibben.blocks.play_type.memory import (
+    check_invertible_sum,
+    check_thresholds,
+    follow,
+    play_state,
+    solve_from_rest,
+)
+
+
+@summing_kernel
+def pi_kernel(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
+    """Run a PI model; coefficients are [offset, thresholds, weights]."""
+    n = state.size
+    offset = coefficients[0]
+    r = coefficients[1 : n + 1]
+    w = coefficients[n + 1 :]
+    for t in range(inputs.shape[0]):
+        u = inputs[t, 0]
+        y = 0.0
+        for i in range(n):
+            s = min(max(state[i], u - r[i]), u + r[i])
+            state[i] = s
+            y += w[i] * s
+        outputs[t, 0] = offset + y
+
+
+@kernel
+def pi_inverse_kernel(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
+    """Invert a PI model; coefficients are [lowest, highest input, offset, thresholds, weights].
+
+    The state is [forward operators, previous reference, samples clipped].
+    """
+    n = state.size - 2
+    lowest, highest, offset = coefficients[0], coefficients[1], coefficients[2]
+    r = coefficients[3 : n + 3]
+    w = coefficients[n + 3 :]
+    s = state[:n]
+    for t in range(inputs.shape[0]):
+        y = inputs[t, 0]
+        _, clipped = follow(y - offset, state[n] - offset, lowest, highest, r, w, s)
+        if clipped:
+            state[n + 1] += 1.0
+        state[n] = y
+        outputs[t, 0] = s[0]
+
+
+@dataclass(frozen=True, config=STRICT)
+class PI(Ranged):
+    """Classical Prandtl-Ishlinskii model.
+
+    Parameters
+    ----------
+    thresholds : sequence of float, length N
+        Thresholds of the play operators, in the unit of the input: 0 <= r_0 < r_1 < ...
+    weights : sequence of float, length N
+        Weights, output per input. The exact inverse wants r_0 = 0 and positive partial sums.
+    offset : float
+        Constant of the output.
+    input_range : (float, float), optional
+        Lowest and highest input that may be asked for; the inverse clips there. Default none.
+    initial : {"first_sample", "virgin"} or sequence of float
+        Default memory before the first sample.
+    input, output : Channel
+        Channel driven and channel given.
+    """
+
+    kind: ClassVar[str] = "pi"
+    kernel: ClassVar[Kernel] = pi_kernel
+    inverse_kernel: ClassVar[Kernel] = pi_inverse_kernel
+    inverse_remembers = "output"
+    increasing = ("thresholds",)
+    parameters: ClassVar[tuple[str, ...]] = ("weights", "offset")
+
+    thresholds: Vector
+    weights: Vector
+    offset: FiniteFloat = 0.0
+    input_range: tuple[FiniteFloat, FiniteFloat] | None = None
+    initial: StoredInitial = "first_sample"
+    input: ChannelField = PRESSURE
+    output: ChannelField = DISPLACEMENT
+
+    def __post_init__(self) -> None:
+        check_thresholds(self.kind, self.thresholds, self.weights)
+        check_input_range(self.kind, self.input_range)
+
+    @property
+    def n_states(self) -> int:
+        """One a play operator."""
+        return len(self.thresholds)
+
+    def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
+        """Return the operators' outputs before the first sample, shape (N,)."""
+        start = self.initial if initial is None else initial
+        return play_state(self, np.array(self.thresholds), first[0], first[0], start)
+
+    def coefficients(self, sample_time: float | None) -> Array:
+        """Return [offset, thresholds, weights]."""
+        del sample_time
+        return np.array([self.offset, *self.thresholds, *self.weights])
+
+    def peaks(self) -> Array:
+        """Return the peaks from which the operators just come back to the lowest input."""
+        return self.limits[0] + 2 * np.array(self.thresholds)
+
+    def check_invertible(self) -> None:
+        """Demand a first threshold of 0, and partial sums of the weights that are positive."""
+        check_invertible_sum(self.kind, self.thresholds, self.weights)
+
+    def inverse_numbers(self, own: Array) -> Array:
+        """Return [lowest, highest input, offset, thresholds, weights]."""
+        return np.array([*self.limits, *own])
+
+    def input_giving(self, output: float, start: Rule) -> float:
+        """Return the first input, within the limits, that gives an output after a named start."""
+        r, w = np.array(self.thresholds), np.array(self.weights)
+        lowest, highest = self.limits
+        if start == "virgin":
+            return float(solve_from_rest(output - self.offset, lowest, highest, r, w)[0])
+        return min(max((output - self.offset + w @ r) / w.sum(), lowest), highest)
+
+    def remembered(self, state: Array) -> tuple[float, ...]:
+        """Return the output."""
+        return (self.offset + np.dot(self.weights, state),)
+
+    @classmethod
+    def example(cls) -> Self:
+        """Return the shape of a small muscle's loop over 0 to 5 bar."""
+        return cls((0.0, 0.3, 0.8, 1.5), (3.0, 1.5, 1.0, 0.5), 2.0, (0.0, 5.0))

@@ -1,0 +1,96 @@
+"""The play (backlash) operator, the unit from which Prandtl-Ishlinskii models are built.
+
+With threshold r and input u: w_t = min(max(w_{t-1}, u_t - r), u_t + r). Its output follows the
+input through a dead zone of width 2 r, and remembers where it was left.
+
+Source: "Modeling and Compensation of Stiffness-Dependent Hysteresis Coupling Behavior for Parallel
+Pneumatic Artificial Muscle-Driven Soft Manipulator", Eq. (3) with both envelopes the identity.
+"""
+
+from __future__ import annotations
+
+from typing import ClassVar, Self
+
+import numpy as np
+from pydantic import FiniteFloat
+from pydantic.dataclasses import dataclass
+
+from mckibben.arrays import Array
+from mckibben.blocks.core.block import Kernel, Primitive
+from mckibben.blocks.core.fields import (
+    DISPLACEMENT,
+    PRESSURE,
+    STRICT,
+    ChannelField,
+    Initial,
+    StoredInitial,
+)
+from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.core.single_channel import SingleChannel
+from mckibben.blocks.play_type.memory import check_thresholds, play_state
+
+
+@kernel
+def play_kernel(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
+    """Run one play operator; coefficients are [r]."""
+    r = coefficients[0]
+    s = state[0]
+    for t in range(inputs.shape[0]):
+        u = inputs[t, 0]
+        s = min(max(s, u - r), u + r)
+        outputs[t, 0] = s
+    state[0] = s
+
+
+@kernel
+def play_matrix(u: Array, r: Array, s: Array, operators: Array) -> None:
+    """Run play operators side by side: ``operators[t, i]`` is operator i after sample t.
+
+    Shapes: u (n,), r and s (N,), operators (n, N). Changes the states ``s``.
+    """
+    for t in range(u.size):
+        for i in range(r.size):
+            s[i] = min(max(s[i], u[t] - r[i]), u[t] + r[i])
+            operators[t, i] = s[i]
+
+
+@dataclass(frozen=True, config=STRICT)
+class Play(SingleChannel, Primitive):
+    """One play operator.
+
+    Parameters
+    ----------
+    threshold : float
+        Half the dead zone, in the unit of the input; at least 0.
+    initial : {"first_sample", "virgin"} or sequence of float
+        Default memory before the first sample.
+    input, output : Channel
+        Channel driven and channel given.
+    """
+
+    kind: ClassVar[str] = "play"
+    kernel: ClassVar[Kernel] = play_kernel
+    parameters: ClassVar[tuple[str, ...]] = ("threshold",)
+
+    threshold: FiniteFloat
+    initial: StoredInitial = "first_sample"
+    input: ChannelField = PRESSURE
+    output: ChannelField = DISPLACEMENT
+
+    def __post_init__(self) -> None:
+        check_thresholds(self.kind, (self.threshold,), (1.0,))
+
+    @property
+    def n_states(self) -> int:
+        """The operator's own output."""
+        return 1
+
+    def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
+        """Return the operator's output before the first sample, shape (1,)."""
+        start = self.initial if initial is None else initial
+        return play_state(self, np.array([self.threshold]), first[0], first[0], start)
+
+    @classmethod
+    def example(cls) -> Self:
+        """Return a play operator with a dead zone of 1 bar."""
+        return cls(0.5)

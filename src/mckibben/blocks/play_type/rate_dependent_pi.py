@@ -1,0 +1,218 @@
+"""Rate-dependent Prandtl-Ishlinskii model: weights that follow the rate of the input.
+
+y_t = y_0 + sum_i (k_i v_t + d_i) F_{r_i}[u]_t, where v is the rate of u, optionally through a
+first-order filter for inputs that are measured and noisy. With a polynomial behind it, this is the
+MPI model of "High-Precision Displacement and Force Hybrid Modeling of Pneumatic Artificial Muscle
+Using 3D PI-NARMAX Model", Eqs. (2) to (4).
+
+The rate depends on the input looked for, so the inverse is solved for every sample, until the bracket
+closes: within 1e-10 of the output's range. Where the output falls at first when the input jumps up
+(strongly negative weights by rate and a short filter), a model has solutions that swing ever wider;
+the inverse then runs into the input limits and says so. A longer `rate_time_constant` mends it.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, ClassVar, Self
+
+import numpy as np
+from annotated_types import Ge
+from pydantic import FiniteFloat
+from pydantic.dataclasses import dataclass
+
+from mckibben.arrays import Array
+from mckibben.blocks.core.block import Kernel
+from mckibben.blocks.core.exportable import Cost
+from mckibben.blocks.core.fields import (
+    DISPLACEMENT,
+    PRESSURE,
+    STRICT,
+    ChannelField,
+    Initial,
+    Rule,
+    StoredInitial,
+    Vector,
+)
+from mckibben.blocks.core.kernels import kernel, summing_kernel
+from mckibben.blocks.core.refusals import explicit_state, needs_sample_time
+from mckibben.blocks.core.root import solve_near
+from mckibben.blocks.core.single_channel import Ranged, check_input_range
+from mckibben.blocks.core.solved_inverse import solved_cost
+from mckibben.blocks.play_type.memory import check_invertible_sum, check_thresholds, play_state
+from mckibben.blocks.play_type.pi import PI
+from mckibben.errors import ModelError
+
+
+@summing_kernel
+def rate_dependent_pi_kernel(
+    coefficients: Array, state: Array, inputs: Array, outputs: Array
+) -> None:
+    """Run the model; coefficients are [smoothing, gain of the rate, offset, thresholds, k, d].
+
+    The state is [operators, previous input, filtered rate].
+    """
+    n = state.size - 2
+    smoothing, gain, offset = coefficients[0], coefficients[1], coefficients[2]
+    r = coefficients[3 : n + 3]
+    k = coefficients[n + 3 : 2 * n + 3]
+    d = coefficients[2 * n + 3 :]
+    for t in range(inputs.shape[0]):
+        u = inputs[t, 0]
+        rate = smoothing * state[n + 1] + gain * (u - state[n])
+        static = 0.0
+        dynamic = 0.0
+        for i in range(n):
+            s = min(max(state[i], u - r[i]), u + r[i])
+            state[i] = s
+            static += d[i] * s
+            dynamic += k[i] * s
+        outputs[t, 0] = offset + static + rate * dynamic
+        state[n] = u
+        state[n + 1] = rate
+
+
+@kernel
+def _trial(u: float, memory: tuple[Array, Array]) -> float:
+    coefficients, state = memory
+    n = state.size - 3
+    r = coefficients[3 : n + 3]
+    rate = coefficients[0] * state[n + 1] + coefficients[1] * (u - state[n])
+    y = coefficients[2]
+    for i in range(n):
+        s = min(max(state[i], u - r[i]), u + r[i])
+        y += (coefficients[2 * n + 3 + i] + rate * coefficients[n + 3 + i]) * s
+    return y
+
+
+@kernel
+def rate_dependent_pi_inverse_kernel(
+    coefficients: Array, state: Array, inputs: Array, outputs: Array
+) -> None:
+    """Solve for the input; coefficients are [forward ones, lowest, highest input].
+
+    The state is [operators, previous input, filtered rate, samples clipped].
+    """
+    n = state.size - 3
+    lowest, highest = coefficients[-2], coefficients[-1]
+    for t in range(inputs.shape[0]):
+        u, clipped = solve_near(
+            _trial, inputs[t, 0], state[n], lowest, highest, (coefficients, state)
+        )
+        rate = coefficients[0] * state[n + 1] + coefficients[1] * (u - state[n])
+        for i in range(n):
+            r = coefficients[3 + i]
+            state[i] = min(max(state[i], u - r), u + r)
+        state[n] = u
+        state[n + 1] = rate
+        if clipped:
+            state[n + 2] += 1.0
+        outputs[t, 0] = u
+
+
+@dataclass(frozen=True, config=STRICT)
+class RateDependentPI(Ranged):
+    """Prandtl-Ishlinskii model whose weights are linear in the input's rate.
+
+    Parameters
+    ----------
+    thresholds : sequence of float, length N
+        Thresholds, in the unit of the input: 0 <= r_0 < r_1 < ...
+    rate_weights : sequence of float, length N
+        k_i, output per input per rate.
+    weights : sequence of float, length N
+        d_i, output per input at rest. The inverse wants r_0 = 0 and positive partial sums.
+    offset : float
+        Constant of the output.
+    rate_time_constant : float
+        Time constant of the filter of the rate [s]; 0, as in the paper, for none.
+    input_range : (float, float), optional
+        Lowest and highest input; the inverse needs it and clips there.
+    initial : {"first_sample", "virgin"} or sequence of float
+        Default memory before the first sample.
+    input, output : Channel
+        Channel driven and channel given.
+    """
+
+    kind: ClassVar[str] = "rate-dependent-pi"
+    kernel: ClassVar[Kernel] = rate_dependent_pi_kernel
+    inverse_kernel: ClassVar[Kernel] = rate_dependent_pi_inverse_kernel
+    rate_dependent: ClassVar[bool] = True
+    increasing = ("thresholds",)
+    parameters: ClassVar[tuple[str, ...]] = ("rate_weights", "weights", "offset")
+
+    thresholds: Vector
+    rate_weights: Vector
+    weights: Vector
+    offset: FiniteFloat = 0.0
+    rate_time_constant: Annotated[FiniteFloat, Ge(0)] = 0.0
+    input_range: tuple[FiniteFloat, FiniteFloat] | None = None
+    initial: StoredInitial = "first_sample"
+    input: ChannelField = PRESSURE
+    output: ChannelField = DISPLACEMENT
+
+    def __post_init__(self) -> None:
+        check_thresholds(self.kind, self.thresholds, self.weights)
+        check_thresholds(self.kind, self.thresholds, self.rate_weights)
+        check_input_range(self.kind, self.input_range)
+
+    @property
+    def n_states(self) -> int:
+        """Operators, previous input and filtered rate."""
+        return len(self.thresholds) + 2
+
+    def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
+        """Return the operators' outputs, the first input and a rate of 0, shape (N + 2,)."""
+        start = self.initial if initial is None else initial
+        if not isinstance(start, str) and len(start) == self.n_states:
+            return explicit_state(self, start)
+        r = np.array(self.thresholds)
+        return np.array([*play_state(self, r, first[0], first[0], start), first[0], 0.0])
+
+    def coefficients(self, sample_time: float | None) -> Array:
+        """Return [smoothing, gain of the rate, offset, thresholds, k, d].
+
+        Raises
+        ------
+        ModelError
+            Without a sample time.
+        """
+        step = needs_sample_time(self.kind, sample_time)
+        tau = self.rate_time_constant
+        smoothing = math.exp(-step / tau) if tau > 0 else 0.0
+        head = [smoothing, (1 - smoothing) / step, self.offset]
+        return np.array([*head, *self.thresholds, *self.rate_weights, *self.weights])
+
+    def check_invertible(self) -> None:
+        """Demand an input range, a first threshold of 0, and an output that rises at rest."""
+        check_invertible_sum(self.kind, self.thresholds, self.weights)
+        if self.input_range is None:
+            raise ModelError(
+                f"{self.kind!r} has no inverse without an input range. Remedy: give input_range."
+            )
+
+    def inverse_cost(self, sample_time: float | None) -> Cost:
+        """Return what trials cost, of which there are few on smooth references."""
+        return solved_cost(self.cost(sample_time))
+
+    def input_giving(self, output: float, start: Rule) -> float:
+        """Return the first input, within the limits, that gives an output at rest."""
+        if start == "virgin":
+            raise ModelError(
+                f"the inverse of {self.kind!r} cannot start virgin. "
+                "Remedy: start it from 'first_sample' or a state."
+            )
+        r, w = np.array(self.thresholds), np.array(self.weights)
+        low, high = self.limits
+        return min(max((output - self.offset + w @ r) / w.sum(), low), high)
+
+    def reachable(self) -> tuple[Array, Array]:
+        """Return the outputs that can be reached at rest whatever happened before."""
+        at_rest = PI(self.thresholds, self.weights, self.offset, self.input_range)
+        return at_rest.reachable()
+
+    @classmethod
+    def example(cls) -> Self:
+        """Return a mildly rate-dependent loop over 0 to 5 bar."""
+        weights, rate_weights = (3.0, 1.5, 1.0, 0.5), (-0.05, 0.02, 0.04, 0.01)
+        return cls((0.0, 0.3, 0.8, 1.5), rate_weights, weights, 2.0, 0.1, (0.0, 5.0))

@@ -1,0 +1,164 @@
+"""Krasnosel'skii-Pokrovskii model on a grid of thresholds, and its inverse.
+
+y = offset + sum_ij w_ij s_ij, where operator ij is a play operator with bounded ridges: while the input
+rises, s is at least the ramp from 0 at level i to 1 at level i + 1; while it falls, s is at most the
+ramp from level j to level j + 1, j <= i. On the diagonal both ramps are one, and the operator is
+reversible.
+
+Source: Krasnosel'skii and Pokrovskii, "Systems with Hysteresis", 1989; as an approximation of the
+Preisach model by Banks, Kurdila and Webb, 1997.
+"""
+
+from __future__ import annotations
+
+from typing import ClassVar, Self
+
+import numpy as np
+from pydantic import FiniteFloat
+from pydantic.dataclasses import dataclass
+
+from mckibben.arrays import Array
+from mckibben.blocks.core.block import Kernel
+from mckibben.blocks.core.fields import (
+    DISPLACEMENT,
+    PRESSURE,
+    STRICT,
+    ChannelField,
+    Initial,
+    StoredInitial,
+    Vector,
+)
+from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.core.refusals import explicit_state
+from mckibben.blocks.core.solved_inverse import Solved, solve_samples
+from mckibben.blocks.preisach_type.grid import TriangularGrid
+
+
+@kernel
+def _ramp(u: float, levels: Array, i: int) -> float:
+    return min(max((u - levels[i]) / (levels[i + 1] - levels[i]), 0.0), 1.0)
+
+
+@kernel
+def _advance(u: float, c: Array, state: Array) -> None:
+    n = int(c[0])
+    levels = c[2 : 3 + n]
+    place = 0
+    for i in range(n):
+        least = _ramp(u, levels, i)
+        for j in range(i + 1):
+            state[place] = max(least, min(_ramp(u, levels, j), state[place]))
+            place += 1
+    state[place] = u
+
+
+@kernel
+def _trial(u: float, memory: tuple[Array, Array]) -> float:
+    c, state = memory
+    n = int(c[0])
+    levels = c[2 : 3 + n]
+    y = c[1]
+    place = 0
+    for i in range(n):
+        least = _ramp(u, levels, i)
+        for j in range(i + 1):
+            y += c[3 + n + place] * max(least, min(_ramp(u, levels, j), state[place]))
+            place += 1
+    return y
+
+
+@kernel
+def krasnoselskii_pokrovskii_kernel(
+    coefficients: Array, state: Array, inputs: Array, outputs: Array
+) -> None:
+    """Run the model; coefficients are [number of intervals, offset, levels, weights].
+
+    The state is [operators, previous input].
+    """
+    n = int(coefficients[0])
+    weights = coefficients[3 + n :]
+    for t in range(inputs.shape[0]):
+        _advance(inputs[t, 0], coefficients, state)
+        y = coefficients[1]
+        for k in range(weights.size):
+            y += weights[k] * state[k]
+        outputs[t, 0] = y
+
+
+@kernel
+def krasnoselskii_pokrovskii_inverse_kernel(
+    coefficients: Array, state: Array, inputs: Array, outputs: Array
+) -> None:
+    """Solve for the input; see `mckibben.blocks.core.solved_inverse`."""
+    solve_samples(_trial, _advance, coefficients, state, inputs, outputs)
+
+
+@dataclass(frozen=True, config=STRICT)
+class KrasnoselskiiPokrovskii(TriangularGrid, Solved):
+    """Krasnosel'skii-Pokrovskii model on a triangular grid.
+
+    Parameters
+    ----------
+    levels : sequence of float, length L + 1
+        Increasing inputs between which the ridges rise; the output is constant beyond them.
+    weights : sequence of float, length L (L + 1) / 2
+        Output of the operators, for rising ridges interval by interval, each from the lowest
+        falling ridge to the diagonal: w_00, w_10, w_11, w_20, ...
+    offset : float
+        Output with all operators at 0.
+    initial : {"first_sample", "virgin"} or sequence of float
+        Default memory before the first sample: the input has risen from the lowest level, or every
+        operator is half-way between its ridges.
+    input, output : Channel
+        Channel driven and channel given.
+    """
+
+    kind: ClassVar[str] = "krasnoselskii-pokrovskii"
+    kernel: ClassVar[Kernel] = krasnoselskii_pokrovskii_kernel
+    inverse_kernel: ClassVar[Kernel] = krasnoselskii_pokrovskii_inverse_kernel
+    parameters: ClassVar[tuple[str, ...]] = ("weights", "offset")
+
+    levels: Vector
+    weights: Vector
+    offset: FiniteFloat = 0.0
+    initial: StoredInitial = "first_sample"
+    input: ChannelField = PRESSURE
+    output: ChannelField = DISPLACEMENT
+
+    @property
+    def n_states(self) -> int:
+        """Operators and the previous input."""
+        return len(self.weights) + 1
+
+    def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
+        """Return [operators, first input]."""
+        start = self.initial if initial is None else initial
+        if not isinstance(start, str):
+            return explicit_state(self, start)
+        rising, falling = np.tril_indices(len(self.levels) - 1)
+        ramps = np.clip((first[0] - np.array(self.levels[:-1])) / np.diff(self.levels), 0.0, 1.0)
+        high = ramps[rising] if start == "first_sample" else ramps[falling]
+        return np.array([*(0.5 * (ramps[rising] + high)), first[0]])
+
+    def coefficients(self, sample_time: float | None) -> Array:
+        """Return [number of intervals, offset, levels, weights]."""
+        del sample_time
+        return np.array([len(self.levels) - 1, self.offset, *self.levels, *self.weights])
+
+    def least_slope(self) -> float:
+        """Return the least slope by the input: that of the reversible operators, or less."""
+        least = min(self.weights)
+        if least < 0:
+            return float(least / np.diff(self.levels).min())
+        return float(np.min(self.diagonal / np.diff(self.levels)))
+
+    def remembered(self, state: Array) -> tuple[float, ...]:
+        """Return the input last seen, within the levels."""
+        return (float(np.clip(state[-1], *self.input_range)),)
+
+    @classmethod
+    def example(cls) -> Self:
+        """Return a loop over 0 to 5 bar with more weight near the diagonal."""
+        n = 5
+        weights = [4.0 / (1 + i - j) ** 2 for i in range(n) for j in range(i + 1)]
+        return cls(tuple(np.linspace(0.0, 5.0, n + 1).tolist()), tuple(weights), 1.0)

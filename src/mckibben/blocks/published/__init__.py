@@ -1,1 +1,0 @@
-"""Models with the parameters that papers print, one file a paper; the registry names them."""

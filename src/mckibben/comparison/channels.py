@@ -1,0 +1,99 @@
+"""Which channels of recordings a comparison is about."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from mckibben.errors import DataError
+from mckibben.estimators.coupled.base import driving, numbered, schedules
+from mckibben.recording import Recording
+
+Names = str | Sequence[str] | None
+"""One channel, several, or None for what the recordings' names say."""
+
+
+@dataclass(frozen=True)
+class Channels:
+    """What drives, what is to be modelled, and what schedules.
+
+    Parameters
+    ----------
+    inputs, outputs : tuple of str
+        Of every model.
+    scheduling : tuple of str or None
+        Of models that can be told more; None for what they find by name.
+    """
+
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+    scheduling: tuple[str, ...] | None = None
+
+    @property
+    def single(self) -> bool:
+        """Whether this is one muscle whose load does not matter."""
+        return len(self.inputs) == len(self.outputs) == 1 and self.scheduling is None
+
+    def scheduled(self, recordings: Sequence[Recording]) -> tuple[str, ...]:
+        """Return the channels that schedule models of recordings."""
+        if self.scheduling is not None:
+            return self.scheduling
+        return () if self.single else schedules(recordings, (*self.inputs, *self.outputs))
+
+    def pairs(self) -> tuple[tuple[str, str], ...]:
+        """Return every output with the input that is its own, or the first."""
+        own = self.inputs if len(self.inputs) == len(self.outputs) else self.inputs[:1]
+        return tuple((own[place % len(own)], output) for place, output in enumerate(self.outputs))
+
+
+def channels_of(
+    recordings: Sequence[Recording],
+    inputs: Names,
+    outputs: Names,
+    load: str | None,
+) -> Channels:
+    """Return the channels that a comparison is about.
+
+    Raises
+    ------
+    DataError
+        If a recording lacks the load, or a channel is named twice.
+    """
+    driven = {
+        name: None
+        for r in recordings
+        for name in (driving(r) if load is not None else numbered(r, "pressure"))
+    }
+    moved = {name: None for r in recordings for name in numbered(r, "displacement")}
+    given = _named(recordings, inputs, tuple(driven) or ("pressure",))
+    wanted = _named(recordings, outputs, tuple(moved) or ("displacement",))
+    named = (*given, *wanted, *((load,) if load else ()))
+    if twice := [name for name in named if named.count(name) > 1]:
+        raise DataError(
+            "the channel is named twice among inputs, outputs and load",
+            channel=twice[0],
+            remedy="a model is not told what it is to give: name each channel once",
+        )
+    if load is None:
+        return Channels(given, wanted)
+    for recording in recordings:
+        if load not in recording:
+            raise DataError(
+                "there is no such channel to tell the load",
+                file=recording.source,
+                channel=load,
+                remedy="name it with --column, or leave --load out",
+            )
+    return Channels(given, wanted, (load,))
+
+
+def _named(
+    recordings: Sequence[Recording], given: Names, by_name: tuple[str, ...]
+) -> tuple[str, ...]:
+    if given is None:
+        return by_name
+    if isinstance(given, str):  # of several muscles, all that are called so
+        if any(given in recording for recording in recordings):
+            return (given,)
+        return tuple(name for name in by_name if name.startswith(f"{given}_")) or (given,)
+    return tuple(given)

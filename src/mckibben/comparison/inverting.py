@@ -1,0 +1,160 @@
+"""The inverse of a model, tried on the model itself."""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from mckibben.arrays import Array
+from mckibben.blocks.core.block import Block
+from mckibben.comparison.recommending import acceptable
+from mckibben.comparison.results import Leaderboard
+from mckibben.errors import ModelError, ModelWarning
+from mckibben.recording import Recording
+
+CHECK_SAMPLES = 2000
+
+FOLLOWED = 1e-6
+"""Largest error of an inverse that counts as one, relative to the reachable range."""
+
+
+@dataclass(frozen=True)
+class InverseCheck:
+    """The inverse of a model, tried on the model itself.
+
+    Of one muscle, on a reference it can reach; of several, on a measured motion, which it may not.
+
+    Parameters
+    ----------
+    model : str
+        Short name of the model inverted.
+    inverse : Block
+        The compensator.
+    reference, pressure, output : array, shape (n,), or (n, k) of several
+        Wished-for output, input the inverse gives, and what the model makes of it.
+    time : array, shape (n,)
+        Time [s], or sample numbers.
+    reachable : (float, float) or None
+        Outputs reachable whatever happened before; None where nothing is known of that.
+    error : float
+        Largest difference between reference and output, relative to that range, or to the reference's.
+    """
+
+    model: str
+    inverse: Block
+    reference: Array
+    pressure: Array
+    output: Array
+    time: Array
+    reachable: tuple[float, float] | None
+    error: float
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return which model is inverted, and how well."""
+        reachable = None if self.reachable is None else list(self.reachable)
+        return {"model": self.model, "error": self.error, "reachable": reachable}
+
+
+def invert_best(board: Leaderboard, recording: Recording) -> InverseCheck | None:
+    """Invert the first model of a leaderboard that has an inverse, and check it.
+
+    None where no model is recommended, for an inverse is as good as its model.
+    """
+    if board.best is None:
+        return None
+    for row in board.rows:
+        if row.block is None or not acceptable(row, board.constant):
+            continue
+        try:
+            return check_inverse(row.model, row.block, recording)
+        except ModelError:
+            continue
+    return None
+
+
+def check_inverse(model: str, block: Block, recording: Recording) -> InverseCheck:
+    """Send a reference with minor loops through the inverse and back through the model.
+
+    Of a model of several inputs, the reference is the recording's own motion, which may be out of reach.
+
+    Parameters
+    ----------
+    model : str
+        Short name.
+    block : Block
+        The model.
+    recording : Recording
+        Gives the sample time and the pace of the reference.
+
+    Raises
+    ------
+    ModelError
+        If the model has no inverse, nothing can be reached whatever happened before, or the inverse
+        does not follow the reference.
+    """
+    inverse = block.inverse()
+    if len(block.inputs) > 1:
+        return _check_on_motion(model, block, inverse, recording)
+    lows, highs = block.reachable()
+    low, high = float(lows[0]), float(highs[0])
+    if not (np.isfinite([low, high]).all() and low < high):
+        raise ModelError(
+            f"{model!r} has no output that it can reach whatever happened before. "
+            "Remedy: identify it on a recording that covers the range of interest."
+        )
+    phase = np.linspace(0, 1, CHECK_SAMPLES)
+    slow = 1 - np.abs(2 * ((3 * phase) % 1) - 1)
+    wave = slow * (1 - 0.5 * phase) + 0.12 * np.sin(2 * np.pi * 11 * phase) * phase
+    share = (wave - wave.min()) / np.ptp(wave)
+    reference = low + (high - low) * (0.02 + 0.96 * share)
+    step = recording.sample_time
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ModelWarning)
+        pressure = inverse.simulate(reference, sample_time=step)
+    output = block.simulate(pressure, sample_time=step)
+    error = float(np.abs(output - reference).max() / (high - low))
+    if not error <= FOLLOWED:
+        raise ModelError(
+            f"the inverse of {model!r} misses a reachable reference by {error:.1e} of its range. "
+            "Remedy: invert another model."
+        )
+    return InverseCheck(
+        model=model,
+        inverse=inverse,
+        reference=reference,
+        pressure=pressure,
+        output=output,
+        time=np.arange(CHECK_SAMPLES, dtype=np.float64) * (1.0 if step is None else step),
+        reachable=(low, high),
+        error=error,
+    )
+
+
+def _check_on_motion(
+    model: str, block: Block, inverse: Block, recording: Recording
+) -> InverseCheck:
+    """Send a recording's motion through an inverse and back through the model."""
+    names = [channel.name for channel in block.outputs]
+    held = [name for name in block.scheduling if name in recording]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ModelWarning)
+        wanted = recording.select([channel.name for channel in inverse.inputs])
+        given = inverse.simulate(wanted)
+        scheduled = {name: recording[name] for name in held if name not in given}
+        driven = given.with_channels(**scheduled).select([c.name for c in block.inputs])
+        output = block.simulate(driven).matrix(names)
+    reference = recording.matrix(names)
+    span = np.maximum(np.ptp(reference, axis=0), np.finfo(float).tiny)
+    return InverseCheck(
+        model=model,
+        inverse=inverse,
+        reference=reference,
+        pressure=given.matrix([channel.name for channel in inverse.outputs]),
+        output=output,
+        time=recording.time,
+        reachable=None,
+        error=float((np.abs(output - reference) / span).max()),
+    )

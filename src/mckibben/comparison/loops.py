@@ -1,0 +1,79 @@
+"""Loops closed on a virtual rig with what a comparison found: every inverse, PID, and both."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import suppress
+
+import numpy as np
+
+from mckibben.comparison.results import Leaderboard
+from mckibben.control import Tracked, control_law, track, tune_pid
+from mckibben.errors import MckibbenError
+from mckibben.recording import Recording
+from mckibben.rigs import load_rig
+
+LONGEST = 200.0
+"""Of the motion that is followed [s]."""
+
+SMOOTHED = 0.5
+"""Half of the window that a measured motion is smoothed over before it is followed [s]."""
+
+
+def published_rig(recordings: Sequence[Recording]) -> str | None:
+    """Return the published rig that recordings say they come from."""
+    named = str(recordings[0].meta.get("rig", "")).partition(" ")[0]
+    try:
+        return load_rig(named).name if named else None
+    except MckibbenError:
+        return None
+
+
+def closed_loops(
+    board: Leaderboard, chosen: str, plant: str, tests: Sequence[Recording], seed: int
+) -> dict[str, Tracked]:
+    """Return what came of following a measured motion with every inverse, with PID, and with both.
+
+    Nothing is chosen by it. An inverse that fails is left out; its model is in the leaderboard.
+
+    Parameters
+    ----------
+    chosen : str
+        Model whose inverse is combined with PID.
+    plant : str
+        Name of the rig.
+    tests : sequence of Recording
+        Of which the one that moves most in its stillest output is followed.
+    """
+    rig = load_rig(plant)
+    inverses = {row.model: row.inverse for row in board.rows if row.inverse is not None}
+    wanted = {channel.name for inverse in inverses.values() for channel in inverse.inputs}
+    held = [name for name in rig.inputs if name in wanted]
+    reference = _followed(tests, board.outputs, held)
+    step = reference.sample_time or 0.05
+    scheduled = {name: float(reference[name][0]) for name in held}
+    pid = tune_pid(rig, sample_time=step, scheduled=scheduled, seed=seed)
+    laws = [(f"{model} inverse", "feedforward", model) for model in inverses]
+    laws += [("PID", "pid", chosen), (f"{chosen} inverse + PID", "feedforward-pid", chosen)]
+    found: dict[str, Tracked] = {}
+    for name, law, model in laws:
+        with suppress(MckibbenError):
+            controller = control_law(law, inverses[model], lambda: pid)
+            found[name] = track(controller, rig, reference, approach=5.0, seed=seed)
+    return found
+
+
+def _followed(tests: Sequence[Recording], outputs: Sequence[str], held: Sequence[str]) -> Recording:
+    """Return a measured motion, smoothed, with what schedules held at its mean."""
+    model = max(tests, key=lambda run: min(float(np.ptp(run[name])) for name in outputs))
+    step = model.sample_time or 0.05
+    n = min(len(model), round(LONGEST / step))
+    width = max(round(SMOOTHED / step), 1)
+    window = np.ones(width) / width
+    smooth = {
+        name: np.convolve(np.pad(model[name][:n], width, mode="edge"), window, "same")[
+            width : width + n
+        ]
+        for name in outputs
+    }
+    return Recording(smooth | {name: np.full(n, float(model[name].mean())) for name in held}, step)

@@ -1,0 +1,249 @@
+"""What is to be compared, on what: models that suit the recordings, channels, split and folds."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mckibben import registry
+from mckibben.comparison.channels import Channels, Names, channels_of
+from mckibben.comparison.constant import constant_of
+from mckibben.comparison.kept import Kept, source
+from mckibben.comparison.offered import objections
+from mckibben.comparison.results import Leaderboard, Row
+from mckibben.comparison.shared_stretches import TESTED, told
+from mckibben.comparison.splits import given_split, held_out, listed, validation_folds
+from mckibben.comparison.trying import Data, Item, Tried
+from mckibben.errors import DataError, ModelError
+from mckibben.estimators.coupled.base import schedules
+from mckibben.recording import Recording, reading_notes
+from mckibben.signals import made_manageable
+
+Settings = Mapping[str, Mapping[str, Any]]
+
+N_FOLDS = 4
+"""Parts of the cross-validation."""
+
+QUICK = (
+    *("bouc-wen", "cpi", "gpi", "kp", "maxwell-slip", "mpi", "p2uz", "pi"),
+    *("coupled-memory", "coupled-pi", "force-balance"),
+)
+"""Models that are good or well known, and fitted in seconds."""
+
+PER_LOAD = "mpi"
+"""Model that stands for those which do not know the load."""
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What is to be compared, on what.
+
+    Parameters
+    ----------
+    data : Data
+        What all models are given.
+    items : mapping of str to Item
+        What every row is called, and what is tried for it, cheapest first.
+    unit : str
+        Of the output.
+    described : str
+        How the data were split, in words.
+    seed : int
+        Of everything random.
+    chosen_by : {"cross-validation", "validation", "given", "fit"}
+        What the choice is by.
+    left_out : mapping of str to str
+        Models without a place on these channels, and why.
+    notes : tuple of str
+        What was done to the recordings.
+    shared : tuple of str
+        Where recordings are the same data.
+    """
+
+    data: Data
+    items: Mapping[str, Item]
+    unit: str
+    described: str
+    seed: int
+    chosen_by: str
+    left_out: Mapping[str, str]
+    notes: tuple[str, ...]
+    shared: tuple[str, ...] = ()
+
+    @cached_property
+    def constant(self) -> Tried:
+        """What comes of predicting the mean of the training output."""
+        return constant_of(self.data)
+
+    @cached_property
+    def sources(self) -> dict[str, str]:
+        """Digests of the files that define the estimators."""
+        models = {item.model for item in self.items.values()}
+        return {model: source(registry.load("estimators", model)) for model in models}
+
+    def kept(self, folder: str | Path | None) -> Kept:
+        """Return where finished models are kept."""
+        return Kept(folder, self.data)
+
+    @property
+    def n_scored(self) -> list[int]:
+        """Samples of every test recording that are scored."""
+        return [int(rows.sum()) for rows in self.data.split.test_rows]
+
+    def board(self, rows: Sequence[Row] = ()) -> Leaderboard:
+        """Return the leaderboard of the models that are finished."""
+        done = {row.model for row in rows}
+        return Leaderboard(
+            inputs=self.data.channels.inputs,
+            outputs=self.data.channels.outputs,
+            unit=self.unit,
+            rows=tuple(rows),
+            split=self.described,
+            seed=self.seed,
+            n_train=sum(len(recording) for recording in self.data.split.train),
+            n_test=sum(self.n_scored),
+            chosen_by=self.chosen_by,
+            left_out=self.left_out,
+            pending=tuple(name for name in self.items if name not in done),
+            notes=self.notes,
+            constant=self.constant.row,
+            shared=self.shared,
+        )
+
+
+def plan_of(
+    train: Recording | Sequence[Recording],
+    test: Recording | Sequence[Recording],
+    *,
+    inputs: Names = None,
+    outputs: Names = None,
+    load: str | None = None,
+    validation: Sequence[Recording] = (),
+    models: str | Sequence[str],
+    settings: Settings | None,
+    n_folds: int = N_FOLDS,
+    seed: int,
+    most_samples: int | None = None,
+    allow_shared: bool = False,
+) -> Plan:
+    """Return what a comparison is to do; see `compare`."""
+    recordings, tests, checks = listed(train), listed(test), listed(validation)
+    if not recordings:
+        raise DataError("there are no recordings to fit", remedy="give at least one")
+    channels = channels_of([*recordings, *tests, *checks], inputs, outputs, load)
+    unit = _checked(recordings, [*tests, *checks], channels)
+    roles = {"fit": recordings, "validate": checks, "test": tests}
+    shared = told(
+        {role: runs for role, runs in roles.items() if runs or role != "validate"},
+        [*channels.inputs, *channels.scheduled(recordings)],
+        channels.outputs,
+        allow=allow_shared,
+    )
+    notes: tuple[str, ...] = ()
+    if channels.single:
+        recordings, tests, notes = made_manageable(
+            recordings, tests, channels.inputs[0], most_samples
+        )
+    elif most_samples is not None:
+        raise DataError(
+            "recordings of several muscles, or under loads, are not thinned",
+            remedy="leave --samples out, or resample them to a longer sample time",
+        )
+    split = given_split(recordings, tests) if tests else held_out(recordings, channels)
+    parts, chosen_by = validation_folds(split.train, channels, n_folds, checks)
+    validated = ""
+    if chosen_by == "cross-validation":
+        validated = f", cross-validated on {len(parts)} part(s) within the range of the rest"
+    marked = f"; {TESTED}" if any(one.startswith(TESTED) for one in shared) else ""
+    every = [*recordings, *tests, *checks]
+    chosen, left_out = _chosen(models, every, channels)
+    if not chosen:
+        raise ModelError(
+            "there are no models to compare. "
+            f"Remedy: name some of {', '.join(registry.names('estimators'))}, or all."
+        )
+    efforts = {model: registry.load("estimators", model).effort for model in chosen}
+    given = settings or {}
+    items = {
+        model: Item(model, {"seed": seed} | dict(given.get(model, {})))
+        for model in sorted(chosen, key=efforts.__getitem__)
+    }
+    if load is not None and not objections([PER_LOAD], every, replace(channels, scheduling=None)):
+        own = {"seed": seed} | dict(given.get(PER_LOAD, {}))
+        items |= _one_for_each_load(split.train, load, own)
+    return Plan(
+        data=Data(split, parts, channels, tuple(checks)),
+        items=items,
+        unit=unit,
+        described=split.described + validated + marked,
+        seed=seed,
+        chosen_by=chosen_by,
+        left_out=left_out,
+        notes=(*notes, *_about_load(every, channels, load), *shared, *reading_notes(every)),
+        shared=shared,
+    )
+
+
+def _checked(
+    recordings: Sequence[Recording], others: Sequence[Recording], channels: Channels
+) -> str:
+    """Refuse recordings that no model could use; return the unit of the outputs."""
+    from mckibben.estimators.core.checking import training_data
+
+    names = channels.inputs, channels.outputs
+    training_data(recordings, *names, one_rate=channels.single)
+    if others:
+        training_data([recordings[0], *others], *names, one_rate=channels.single)
+    units = {name: recordings[0].units[name] for name in channels.outputs}
+    if len(set(units.values())) > 1:
+        raise DataError(
+            f"the outputs have different units: {units}, so that their errors have no mean",
+            remedy="compare models of each apart, with --output",
+        )
+    return next(iter(units.values()))
+
+
+def _one_for_each_load(
+    train: Sequence[Recording], load: str, settings: Mapping[str, Any]
+) -> dict[str, Item]:
+    """Return models that do not know the load, each fitted to one recording alone."""
+    items: dict[str, Item] = {}
+    for place, run in enumerate(train):
+        name = f"{PER_LOAD} at {run[load].mean():.3g} {run.units[load]} ({run.name})"
+        if name in items:
+            name += f", {place + 1}"
+        items[name] = Item(PER_LOAD, settings, place)
+    return items
+
+
+def _about_load(
+    recordings: Sequence[Recording], channels: Channels, load: str | None
+) -> Iterator[str]:
+    """Tell of a load that does not change, and of one that does and is not told to any model."""
+    named = (
+        schedules(recordings, (*channels.inputs, *channels.outputs)) if load is None else (load,)
+    )
+    for name in named:
+        values = [recording[name] for recording in recordings if name in recording]
+        moves = bool(np.ptp(np.concatenate(values)) > 0)
+        if load is not None and not moves:
+            yield f"{load} is {values[0][0]:g} throughout: what it does cannot be learned"
+        elif channels.single and moves:
+            yield f"{name} is there, and no model is told it: see --load {name}"
+
+
+def _chosen(
+    models: str | Sequence[str], recordings: Sequence[Recording], channels: Channels
+) -> tuple[tuple[str, ...], dict[str, str]]:
+    """Return the models to try, and why others of "all" have no place on these recordings."""
+    if models not in ("all", "quick"):
+        named = models.split(",") if isinstance(models, str) else models
+        return tuple(dict.fromkeys(name.strip() for name in named)), {}
+    names = registry.names("estimators") if models == "all" else QUICK
+    left_out = objections(names, recordings, channels)
+    return tuple(name for name in names if name not in left_out), left_out

@@ -1,0 +1,62 @@
+"""Control laws by name: each makes, of a compensator and feedback, what closes a loop.
+
+A law is a function of a compensator and of what tunes feedback, called where the law has any; the first
+line of its docstring is what it is called to a person. Laws are registered in the group ``controllers``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from mckibben import registry
+from mckibben.blocks.core.block import Block
+from mckibben.blocks.feedback.feedforward_feedback import FeedforwardFeedback
+from mckibben.blocks.feedback.pid import PIDFeedback
+from mckibben.control.controller import Controller
+from mckibben.control.observer import DisturbanceObserver
+
+Tuned = Callable[[], PIDFeedback]
+
+
+def control_law(name: str, compensator: Block, tuned: Tuned) -> Block | Controller:
+    """Return what closes a loop by a law: a block wherever it can be saved and exported.
+
+    Parameters
+    ----------
+    name : str
+        Of the law: ``feedforward``, ``feedforward-pid``, ``observer``, ``pid``.
+    compensator : Block
+        From displacements, and what schedules it, to pressures.
+    tuned : callable
+        Returns feedback; see `mckibben.control.tune_pid`.
+
+    Raises
+    ------
+    ModelError
+        If there is no law of that name.
+    """
+    made: Block | Controller = registry.load("controllers", name)(compensator, tuned)
+    return made
+
+
+def feedforward(compensator: Block, tuned: Tuned) -> Block:
+    """Compensator alone."""
+    del tuned
+    return compensator
+
+
+def feedforward_pid(compensator: Block, tuned: Tuned) -> Block:
+    """Compensator and PID."""
+    return FeedforwardFeedback.of(compensator, tuned())
+
+
+def observer(compensator: Block, tuned: Tuned) -> Controller:
+    """Compensator and disturbance observer."""
+    del tuned
+    return DisturbanceObserver(compensator)
+
+
+def pid(compensator: Block, tuned: Tuned) -> Block:
+    """PID alone."""
+    del compensator
+    return tuned()

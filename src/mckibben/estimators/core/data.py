@@ -1,0 +1,285 @@
+"""Recordings as identification sees them: what drives, what is driven, what schedules, what counts."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mckibben.arrays import Array
+from mckibben.blocks.core.fields import Channel
+from mckibben.errors import DataError
+
+Mask = NDArray[np.bool_]
+Made = TypeVar("Made")
+
+MOVES = 0.1
+"""An input moves in a run where it covers this share of the range it has over all runs."""
+
+RESTS = 0.03
+"""An input rests where it stays below this share of that range above its lowest value."""
+
+
+@dataclass(frozen=True)
+class Run:
+    """One recording: what drives (n, k), outputs (n, m), what schedules (n, s), and which samples count.
+
+    ``peak`` is the input from which the run is taken to have come before its first sample, where that
+    is not below: it makes the memory at the start.
+    """
+
+    name: str
+    driven: Array
+    outputs: Array
+    scheduled: Array
+    counts: Mask
+    sample_time: float | None
+    peak: float | None = None
+
+    @property
+    def u(self) -> Array:
+        """The first input, shape (n,)."""
+        return self.driven[:, 0]
+
+    @property
+    def y(self) -> Array:
+        """The first output, shape (n,)."""
+        return self.outputs[:, 0]
+
+    def cut(self, start: int, stop: int | None = None) -> Run:
+        """Return a part of the run, which begins with a memory of its own."""
+        part = slice(start, stop)
+        return replace(
+            self,
+            driven=self.driven[part],
+            outputs=self.outputs[part],
+            scheduled=self.scheduled[part],
+            counts=self.counts[part],
+            peak=None if start else self.peak,
+        )
+
+    def carrying(self, u: Array, y: Array) -> Run:
+        """Return the run with another input and output, each of shape (n,)."""
+        return replace(self, driven=u[:, np.newaxis], outputs=y[:, np.newaxis])
+
+    def stretches(self, shortest: int) -> list[Run]:
+        """Return the stretches whose samples all count, longer than so many, each a run of its own."""
+        edges = np.flatnonzero(np.diff(np.concatenate([[False], self.counts, [False]])))
+        return [
+            self.cut(start, stop)
+            for start, stop in edges.reshape(-1, 2).tolist()
+            if stop - start > shortest
+        ]
+
+    def condensed(self) -> Run:
+        """Return the run without samples that neither count nor are turning points of the input.
+
+        Play operators do not feel how the input went from one turning point to the next. Turns within
+        the noise go too, so this is for searching, not for the final word.
+        """
+        from mckibben.signals import reversals
+
+        kept = self.counts.copy()
+        kept[reversals(self.u)] = True
+        return replace(
+            self,
+            driven=self.driven[kept],
+            outputs=self.outputs[kept],
+            scheduled=self.scheduled[kept],
+            counts=self.counts[kept],
+        )
+
+    @property
+    def history(self) -> Array:
+        """The input with the peak before the first sample in front, if there is one."""
+        return self.u if self.peak is None else np.concatenate([[self.peak], self.u])
+
+    @property
+    def inputs(self) -> Array:
+        """What a block is given, shape (n, k + s): what drives, what schedules, the peak in front."""
+        whole = np.hstack([self.driven, self.scheduled])
+        if self.peak is not None:
+            whole = np.concatenate([whole[:1], whole])
+            whole[0, 0] = self.peak
+        return np.ascontiguousarray(whole)
+
+    def trim(self, samples: Array) -> Array:
+        """Drop what belongs to the peak from something computed over `history`."""
+        return samples if self.peak is None else samples[1:]
+
+
+@dataclass(frozen=True, eq=False)
+class TrainingData:
+    """All runs to identify from, and the channels that they share.
+
+    ``early`` are runs to stop a search early by, to which nothing is fitted.
+    """
+
+    runs: tuple[Run, ...]
+    inputs: tuple[Channel, ...]
+    outputs: tuple[Channel, ...]
+    scheduled: tuple[Channel, ...] = ()
+    early: TrainingData | None = None
+    _memo: dict[Hashable, Array] = field(default_factory=dict, init=False, repr=False)
+    _latest: dict[Hashable, tuple[Array, Any]] = field(default_factory=dict, init=False, repr=False)
+
+    def once(self, key: Hashable, compute: Callable[[], Array]) -> Array:
+        """Return what ``compute`` gives, computed at the first call with this key only."""
+        if key not in self._memo:
+            self._memo[key] = compute()
+        return self._memo[key]
+
+    def latest(self, key: Hashable, theta: Array, compute: Callable[[], Made]) -> Made:
+        """Return what ``compute`` gives, anew only where ``theta`` is not that of the last call.
+
+        For what all runs share at a point of a search.
+        """
+        known = self._latest.get(key)
+        if known is None or not np.array_equal(known[0], theta):
+            known = self._latest[key] = (theta.copy(), compute())
+        found: Made = known[1]
+        return found
+
+    @property
+    def input(self) -> str:
+        """Name of the first input."""
+        return self.inputs[0].name
+
+    @property
+    def input_unit(self) -> str:
+        """Its unit."""
+        return self.inputs[0].unit
+
+    @property
+    def output(self) -> str:
+        """Name of the first output."""
+        return self.outputs[0].name
+
+    @property
+    def output_unit(self) -> str:
+        """Its unit."""
+        return self.outputs[0].unit
+
+    @property
+    def lowest(self) -> Array:
+        """Lowest value of every input over all runs."""
+        return np.min([run.driven.min(axis=0) for run in self.runs], axis=0)
+
+    @property
+    def highest(self) -> Array:
+        """Highest value of every input over all runs."""
+        return np.max([run.driven.max(axis=0) for run in self.runs], axis=0)
+
+    @property
+    def input_range(self) -> tuple[float, float]:
+        """Lowest and highest input of all runs."""
+        low, high = self.once(
+            "input range",
+            lambda: np.array(
+                [min(run.u.min() for run in self.runs), max(run.u.max() for run in self.runs)]
+            ),
+        ).tolist()
+        return low, high
+
+    @property
+    def output_range(self) -> tuple[float, float]:
+        """Lowest and highest output of the samples that count."""
+        y = self.target
+        return float(y.min()), float(y.max())
+
+    @property
+    def target(self) -> Array:
+        """Outputs that count, of all runs, sample by sample, shape (samples that count × m,)."""
+        return self.once(
+            "target", lambda: np.concatenate([run.outputs[run.counts].ravel() for run in self.runs])
+        )
+
+    @property
+    def sample_time(self) -> float | None:
+        """Sample time of all runs, or None where one has none."""
+        return self.runs[0].sample_time
+
+    def timed(self, why: str = "this model depends on rate", instead: str = "") -> float:
+        """Return the sample time of all runs.
+
+        Parameters
+        ----------
+        why : str
+            What needs it.
+        instead : str
+            What could be done without.
+
+        Raises
+        ------
+        DataError
+            Where the recordings have no time.
+        """
+        if self.sample_time is None:
+            raise DataError(
+                f"the recordings have no time, and {why}",
+                remedy="read them with a time column or --rate" + instead,
+            )
+        return self.sample_time
+
+    @property
+    def falls(self) -> bool:
+        """Whether the output falls while the input rises, as a muscle's length does."""
+        inputs = np.concatenate([run.u[run.counts] for run in self.runs])
+        return float(np.dot(inputs - inputs.mean(), self.target)) < 0
+
+    def negated(self) -> TrainingData:
+        """Return the same data with the output's sign changed."""
+        return replace(self, runs=tuple(replace(run, outputs=-run.outputs) for run in self.runs))
+
+    def with_peaks(self, peaks: Sequence[float | None]) -> TrainingData:
+        """Return the same data with other memories at the start."""
+        runs = tuple(replace(run, peak=peak) for run, peak in zip(self.runs, peaks, strict=True))
+        return replace(self, runs=runs)
+
+    def unstarted(self) -> TrainingData:
+        """Return the same data with no memory fitted to any start."""
+        return self.with_peaks([None] * len(self.runs))
+
+    def condensed(self) -> TrainingData:
+        """Return the same data with every run condensed; see `Run.condensed`."""
+        return replace(self, runs=tuple(run.condensed() for run in self.runs))
+
+    def stretches(self, shortest: int) -> TrainingData:
+        """Return the same data as runs whose samples all count; see `Run.stretches`."""
+        return replace(
+            self, runs=tuple(part for run in self.runs for part in run.stretches(shortest))
+        )
+
+    def stacked(self, what: str) -> Array:
+        """Return a field of all runs, one under another."""
+        return np.concatenate([getattr(run, what) for run in self.runs])
+
+    def alone(self, place: int) -> list[Run]:
+        """Return the runs in which one input moves and all others rest."""
+        span = self.highest - self.lowest
+        found = []
+        for run in self.runs:
+            travel = np.ptp(run.driven, axis=0)
+            above = run.driven.max(axis=0) - self.lowest
+            others = np.delete(above <= RESTS * span, place)
+            if travel[place] > MOVES * span[place] and others.all():
+                found.append(run)
+        return found
+
+    def thinned(self, most: int) -> TrainingData:
+        """Return the same runs with fewer samples that count, spread evenly; inputs stay whole."""
+        total = sum(int(run.counts.sum()) for run in self.runs)
+        if total <= most:
+            return self
+        runs = []
+        for run in self.runs:
+            counting = np.flatnonzero(run.counts)
+            share = max(round(most * counting.size / total), min(2, counting.size))
+            chosen = counting[np.linspace(0, counting.size - 1, share).round().astype(int)]
+            counts = np.zeros_like(run.counts)
+            counts[chosen] = True
+            runs.append(replace(run, counts=counts))
+        return replace(self, runs=tuple(runs))

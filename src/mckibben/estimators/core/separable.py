@@ -1,0 +1,310 @@
+"""Models that are linear in most of their parameters: those are solved for, the few others searched.
+
+This is variable projection: for every trial of the non-linear parameters the weights and the offset
+are the exact (non-negative) least-squares solution, so the search runs in a handful of dimensions.
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Annotated, ClassVar
+
+import numpy as np
+from annotated_types import Ge
+
+from mckibben.arrays import Array
+from mckibben.blocks.core.block import Block
+from mckibben.errors import ModelError
+from mckibben.estimators.core.data import Run, TrainingData
+from mckibben.estimators.core.searching import SearchingEstimator
+from mckibben.estimators.optimisers.linear import solve_linear
+from mckibben.estimators.optimisers.multi_start import Choice, multi_start
+from mckibben.estimators.optimisers.swarm import particle_swarm
+from mckibben.estimators.optimisers.tracker import Tracker
+
+SEARCH_SAMPLES = 1500
+"""Samples that count while many starts are compared."""
+
+POLISH_SAMPLES = 20_000
+"""Samples that count while the best is polished; the linear parameters are then solved on all."""
+
+LEAST_REVERSIBLE = 1e-3
+"""Least share of the output's range that the operator without dead zone gives."""
+
+DIFFERENCE = 1.5e-8
+"""Step of finite differences, relative to parameters, of which none is counted as less than 1."""
+
+WORST = 1e150
+"""Cost of parameters whose output overflows; its square is still a number."""
+
+
+@dataclass(kw_only=True, repr=False, eq=False)
+class SeparableEstimator(SearchingEstimator):
+    """An estimator of a block that is linear in its weights and offset.
+
+    Parameters
+    ----------
+    nonnegative : bool
+        Whether weights must be at least 0, which guarantees an exact inverse.
+    n_starts : int
+        Starting points tried for the non-linear parameters.
+    n_refined : int
+        How many of them, the most promising, are refined.
+    """
+
+    nonnegative: bool = True
+    n_starts: Annotated[int, Ge(1)] = 48
+    n_refined: Annotated[int, Ge(1)] = 4
+
+    search_evaluations: ClassVar[int] = 15
+    polish_evaluations: ClassVar[int] = 10
+    """Most evaluations of a refinement, and of the final one on more samples."""
+
+    searches_condensed: ClassVar[bool] = True
+    """Whether the search may skip what lies between turning points of the input."""
+
+    fits_peaks: ClassVar[bool] = True
+    """Whether a fitted start is the input from which every run came down."""
+
+    typical: ClassVar[int] = 0
+    """Place of the guess about which a swarm over all parameters is bounded."""
+
+    reach: ClassVar[tuple[float, float]] = (2.0, 0.1)
+    """How far those bounds are, relative to a parameter; and the least that counts as its size, relative
+    to the largest."""
+
+    def bounds(self, data: TrainingData) -> tuple[Array, Array]:
+        """Return lowest and highest non-linear parameters, each of shape (m,); by default none."""
+        return np.empty(0), np.empty(0)
+
+    def guesses(self, data: TrainingData) -> list[Array]:
+        """Return sensible non-linear parameters to start from, each of shape (m,)."""
+        return []
+
+    @abstractmethod
+    def basis(self, theta: Array, run: Run, data: TrainingData) -> Array:
+        """Return what the linear parameters multiply, over the run's history, shape (n, k)."""
+
+    @abstractmethod
+    def build(self, theta: Array, linear: Array, offset: float, data: TrainingData) -> Block:
+        """Return the block with these parameters."""
+
+    def parameter_bounds(self, data: TrainingData) -> tuple[Block, Array, Array]:
+        """Return a block of the structure to identify, and bounds of its parameter vector.
+
+        For particle swarms over all parameters. By default the block solved for at the typical guess,
+        and bounds about its parameters, each as far as `reach` says.
+        """
+        guesses = self.guesses(data)
+        theta = guesses[self.typical] if guesses else np.empty(0)
+        template = self.build(theta, *self._solve(theta, data), data)
+        values = template.pack()
+        most, least = self.reach
+        span = most * np.maximum(np.abs(values), least * np.abs(values).max())
+        return template, values - span, values + span
+
+    def moves(self, theta: Array, linear: Array, data: TrainingData) -> Array:
+        """Return how the output moves with the non-linear parameters, the linear ones held.
+
+        Shape (samples that count, m); by finite differences of the basis.
+        """
+        here = self.matrix(theta, data) @ linear
+        _, upper = self.bounds(data)
+        columns = []
+        for index in range(theta.size):
+            moved = theta.copy()
+            moved[index] += difference(theta[index], upper[index])
+            there = self.matrix(moved, data) @ linear
+            columns.append((there - here) / (moved[index] - theta[index]))
+        return np.column_stack(columns)
+
+    def jacobian(self, theta: Array, data: TrainingData) -> Array:
+        """Return the derivatives of the residuals with the linear parameters solved for.
+
+        Shape (samples that count, m). Kaufman's form: how the output moves, less what the linear
+        parameters that are free would take up of it.
+        """
+        matrix = self.matrix(theta, data)
+        if not np.isfinite(matrix).all():
+            return np.zeros((len(matrix), theta.size))
+        linear, _ = self._solve_for(matrix, data)
+        moves = self.moves(theta, linear, data)
+        directions = np.linalg.qr(self.free(matrix, linear, data))[0]
+        return np.asarray(moves - directions @ (directions.T @ moves))
+
+    def free(self, matrix: Array, linear: Array, data: TrainingData) -> Array:
+        """Return the columns of what is solved for and at no bound, the offset's first if it is."""
+        free = linear > 1.01 * self.least(matrix, data) if self.solves_nonnegative else linear != 0
+        offset = [np.ones(len(matrix))] if self.solves_offset else []
+        return np.column_stack([*offset, matrix[:, free]])
+
+    def choices(self, data: TrainingData) -> list[Choice]:
+        """Return what groups of the non-linear parameters may be exchanged for; none as a rule."""
+        return []
+
+    def identify(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
+        if self.method == "pso":
+            if self.initial == "fitted" and self.fits_peaks:
+                raise ModelError(
+                    "a swarm over all parameters cannot fit the initial memory too. "
+                    "Remedy: use --set method=ls, or initial=first_sample."
+                )
+            return self._swarm_over_all(data, tracker), data
+        theta = self._search(data, tracker)
+        if self.initial == "fitted" and self.fits_peaks:
+            for _ in range(2):
+                data = self._fit_peaks(theta, data)
+                theta = self._polish(theta, data, tracker)
+        linear, offset = self._solve(theta, data)
+        return self.build(theta, linear, offset, data), data
+
+    def _search(self, data: TrainingData, tracker: Tracker) -> Array:
+        lower, upper = self.bounds(data)
+        if lower.size == 0:
+            return lower
+        thin = data.thinned(SEARCH_SAMPLES)
+        if self.searches_condensed:
+            thin = thin.condensed()
+        if self.method == "pso-ls":
+
+            def costs(points: Array) -> Array:
+                return np.array([_rms(self._residuals(point, thin)) for point in points])
+
+            theta = particle_swarm(costs, lower, upper, self.swarm, tracker, self.seed)
+        else:
+            tracker.budget = self.n_starts + self.n_refined * self.search_evaluations
+            theta = multi_start(
+                lambda point: self._residuals(point, thin),
+                self.guesses(data) + self._scattered(lower, upper),
+                lower,
+                upper,
+                tracker,
+                n_refined=self.n_refined,
+                max_evaluations=self.search_evaluations,
+                jacobian=lambda point: self.jacobian(point, thin),
+                choices=self.choices(data),
+            )
+        return theta if tracker.interrupted else self._polish(theta, data, tracker)
+
+    def _scattered(self, lower: Array, upper: Array) -> list[Array]:
+        from scipy.stats import qmc
+
+        exponent = int(np.ceil(np.log2(max(self.n_starts, 2))))
+        points = qmc.Sobol(lower.size, seed=self.seed).random_base2(exponent)[: self.n_starts]
+        return list(qmc.scale(points, lower, upper))
+
+    def _polish(self, theta: Array, data: TrainingData, tracker: Tracker) -> Array:
+        lower, upper = self.bounds(data)
+        if lower.size == 0:
+            return theta
+        thin = data.thinned(POLISH_SAMPLES)
+        own = tracker.part(0.9, 1.0)
+        best = multi_start(
+            lambda point: self._residuals(point, thin),
+            [theta],
+            lower,
+            upper,
+            own,
+            n_refined=1,
+            max_evaluations=self.polish_evaluations,
+            jacobian=lambda point: self.jacobian(point, thin),
+        )
+        tracker.saw_all(own)
+        return best
+
+    def _fit_peaks(self, theta: Array, data: TrainingData) -> TrainingData:
+        """Choose for every run the peak before its first sample that fits best, others held."""
+        from scipy.optimize import minimize_scalar
+
+        high = data.input_range[1]
+        peaks = [run.peak for run in data.runs]
+        for index, run in enumerate(data.runs):
+            first = float(run.u[0])
+            if high - first <= 0:
+                continue
+
+            def cost(peak: float, index: int = index) -> float:
+                tried = [*peaks[:index], peak, *peaks[index + 1 :]]
+                return _rms(self._residuals(theta, data.with_peaks(tried)))
+
+            grid = np.linspace(first, high, 17)
+            costs = [cost(peak) for peak in grid]
+            best = int(np.argmin(costs))
+            around = (grid[max(best - 1, 0)], grid[min(best + 1, 16)])
+            found = minimize_scalar(cost, bounds=around, method="bounded")
+            peak = float(found.x) if found.fun < costs[best] else float(grid[best])
+            peaks[index] = None if costs[0] <= cost(peak) * (1 + 1e-12) else peak
+        return data.with_peaks(peaks)
+
+    def matrix(self, theta: Array, data: TrainingData) -> Array:
+        """Return the basis at the samples that count, of all runs, shape (samples, k)."""
+        return counting(data, lambda run: self.basis(theta, run, data))
+
+    def _solve(self, theta: Array, data: TrainingData) -> tuple[Array, float]:
+        return self._solve_for(self.matrix(theta, data), data)
+
+    def _solve_for(self, matrix: Array, data: TrainingData) -> tuple[Array, float]:
+        least = self.least(matrix, data)
+        nonnegative = self.solves_nonnegative
+        return solve_linear(
+            matrix,
+            data.target,
+            nonnegative=nonnegative,
+            least=least,
+            with_offset=self.solves_offset,
+        )
+
+    @property
+    def solves_offset(self) -> bool:
+        """Whether an offset is solved for; else it is 0."""
+        return True
+
+    @property
+    def solves_nonnegative(self) -> bool:
+        """Whether the linear parameters may not be negative."""
+        return self.nonnegative
+
+    def least(self, matrix: Array, data: TrainingData) -> Array:
+        """Return the least that every linear parameter may be where none may be negative.
+
+        The first is kept off zero: it belongs to the operator without dead zone, and without it there
+        is no inverse.
+        """
+        floor = np.zeros(matrix.shape[1])
+        reach = float(np.ptp(matrix[:, 0]))
+        span = data.output_range[1] - data.output_range[0]
+        floor[0] = LEAST_REVERSIBLE * span / reach if reach > 0 else 0.0
+        return floor
+
+    def _residuals(self, theta: Array, data: TrainingData) -> Array:
+        matrix = self.matrix(theta, data)
+        if not np.isfinite(matrix).all():
+            return np.full(data.target.size, WORST)
+        linear, offset = self._solve_for(matrix, data)
+        return np.asarray(matrix @ linear + offset - data.target)
+
+    def _swarm_over_all(self, data: TrainingData, tracker: Tracker) -> Block:
+        template, lower, upper = self.parameter_bounds(data)
+
+        def costs(points: Array) -> Array:
+            outputs = self.free_runs([template.unpack(point) for point in points], data)
+            return np.sqrt(np.mean((outputs - data.target) ** 2, axis=1))
+
+        return template.unpack(particle_swarm(costs, lower, upper, self.swarm, tracker, self.seed))
+
+
+def counting(data: TrainingData, over_history: Callable[[Run], Array]) -> Array:
+    """Return what is computed over the runs' histories, at the samples that count, of all runs."""
+    return np.concatenate([run.trim(over_history(run))[run.counts] for run in data.runs])
+
+
+def difference(value: float, upper: float) -> float:
+    """Return a step for finite differences that stays within the upper bound."""
+    step = DIFFERENCE * max(1.0, abs(value))
+    return step if value + step <= upper else -step
+
+
+def _rms(residuals: Array) -> float:
+    return float(np.sqrt(np.mean(residuals**2)))

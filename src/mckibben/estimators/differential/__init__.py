@@ -1,0 +1,1 @@
+"""Identification of hysteresis as a differential equation in the input."""

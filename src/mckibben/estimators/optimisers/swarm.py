@@ -1,0 +1,103 @@
+"""Particle swarm optimisation."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from mckibben.arrays import Array
+from mckibben.estimators.optimisers.tracker import Tracker
+
+WORST = float(np.finfo(np.float64).max)
+"""Cost of points whose own is no number."""
+
+
+@dataclass(frozen=True)
+class Swarm:
+    """Settings of particle swarm optimisation.
+
+    Parameters
+    ----------
+    particles, iterations : int
+        Size of the swarm and number of moves.
+    inertia : (float, float)
+        At the first and last move, linear between; equal for a constant.
+    c1, c2 : float
+        Pull towards a particle's own best and the swarm's best.
+    fastest : float
+        How far a particle moves at a time, at most, relative to the bounds.
+    stops : bool
+        Whether a particle at a bound loses the speed that took it there.
+    """
+
+    particles: int = 20
+    iterations: int = 50
+    inertia: tuple[float, float] = (0.9, 0.4)
+    c1: float = 2.0
+    c2: float = 2.0
+    fastest: float = 0.2
+    stops: bool = True
+
+    @property
+    def budget(self) -> int:
+        """Evaluations: of all particles before the first move, and after every one."""
+        return self.particles * (self.iterations + 1)
+
+
+def particle_swarm(
+    costs: Callable[[Array], Array],
+    lower: Array,
+    upper: Array,
+    swarm: Swarm,
+    tracker: Tracker,
+    seed: int | np.random.Generator,
+    start: Array | None = None,
+) -> Array:
+    """Return the best point of a particle swarm within bounds, which may be infinite.
+
+    Source: "High-Precision Displacement and Force Hybrid Modeling of Pneumatic Artificial Muscle
+    Using 3D PI-NARMAX Model", Section 3.3: velocities from own and global best, inertia falling
+    linearly. Particles that leave the bounds stop at them.
+
+    Parameters
+    ----------
+    costs : callable
+        Maps points, shape (particles, m), to their costs, shape (particles,), all at once.
+    start : array, shape (particles, m), optional
+        Where the particles are at rest at first; default anywhere within the bounds, moving.
+    """
+    rng = np.random.default_rng(seed)
+    tracker.budget = swarm.budget
+    shape = (swarm.particles, lower.size)
+    span = upper - lower
+    if start is None:
+        position = rng.uniform(lower, upper, shape)
+        velocity = rng.uniform(-1, 1, shape) * 0.1 * span
+    else:
+        position, velocity = start, np.zeros(shape)
+    own, own_cost = position.copy(), np.full(swarm.particles, np.inf)
+    first, last = swarm.inertia
+    with tracker.searching():
+        for iteration in range(swarm.iterations + 1):
+            cost = np.nan_to_num(costs(position), nan=WORST, posinf=WORST)
+            better = cost < own_cost
+            own[better], own_cost[better] = position[better], cost[better]
+            for point, value in zip(position, cost, strict=True):
+                tracker.saw(point, float(value))
+            leader = own[np.argmin(own_cost)]
+            weight = first + (last - first) * iteration / max(swarm.iterations, 1)
+            pulls = rng.random((2, *shape))
+            velocity = (
+                weight * velocity
+                + swarm.c1 * pulls[0] * (own - position)
+                + swarm.c2 * pulls[1] * (leader - position)
+            )
+            velocity = np.clip(velocity, -swarm.fastest * span, swarm.fastest * span)
+            position = position + velocity
+            if swarm.stops:
+                velocity[(position < lower) | (position > upper)] = 0.0
+            position = np.clip(position, lower, upper)
+    assert tracker.best is not None
+    return tracker.best

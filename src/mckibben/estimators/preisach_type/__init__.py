@@ -1,0 +1,1 @@
+"""Identification of models made of relays."""

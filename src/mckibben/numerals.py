@@ -1,0 +1,33 @@
+"""Numbers as people read them: the same digits on a terminal, in a report, and in the workbench."""
+
+from __future__ import annotations
+
+import math
+
+
+def numeral(value: float | None, digits: int = 3) -> str:
+    """Return a number to so many significant digits, without an exponent where that is readable.
+
+    Counts are whole, and nothing is a dash.
+
+    >>> numeral(0.012345), numeral(-12345.6), numeral(1.5e-12), numeral(7), numeral(None)
+    ('0.0123', '-12346', '1.5e-12', '7', '-')
+    """
+    if isinstance(value, int):
+        return str(value)
+    if value is None or not math.isfinite(value):
+        return "-"
+    if value == 0:
+        return "0"
+    size = math.floor(math.log10(abs(value)))
+    form = f".{max(0, digits - 1 - size)}f" if -4 <= size <= 6 else f".{digits}g"
+    return f"{value:{form}}"
+
+
+def typeset(text: str) -> str:
+    """Return a number as it is printed: a minus for a hyphen, and a dash for nothing.
+
+    >>> typeset("-1.5e-12"), typeset("-")
+    ('−1.5e−12', '–')
+    """
+    return "–" if text == "-" else text.replace("-", "−")

@@ -1,0 +1,1 @@
+"""Paper E: the activation pressure of a muscle."""

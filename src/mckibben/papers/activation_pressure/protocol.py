@@ -1,0 +1,75 @@
+"""The experiments on a self-made McKibben muscle that lifts weights.
+
+Source: Inverse Modeling of Nonlinear Artificial Muscle Using Polynomial Parameterization and Particle
+Swarm Optimization, Section 4.1: forces of 0 to 300 N in steps of 50 N, sines of 0.5 to 2 Hz, then a
+random wave with minor loops; before them, a slow cycle at every force for the static pressure.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mckibben.recording import Recording
+from mckibben.signals.broadband import random_wave
+from mckibben.signals.excitations import sine
+from mckibben.signals.protocol import Protocol, Role, Run
+
+SAMPLE_TIME = 0.005
+FORCES = (0.0, 50.0, 100.0, 150.0, 200.0, 250.0, 300.0)
+"""Weights hung on the muscle [N]."""
+
+FREQUENCIES = (0.5, 1.0, 1.5, 2.0)
+"""Of the sines [Hz]."""
+
+LOWEST = (-2.85e-9, 1.19e-6, 3.86e-4, 6.48e-2)
+HIGHEST = (-4.89e-9, -1.41e-7, 1.30e-3, 9.46e-2)
+"""Pressures between which the sines go [MPa], as cubics of the force: y_1 and y_2 of Table 1."""
+
+STATIC_PERIOD = 60.0
+STATIC_HIGH = 4.0
+"""Of the slow cycle: its time [s], and its highest pressure [bar]."""
+
+CYCLES = 8
+RANDOM_TIME = 20.0
+
+
+def activation_pressure() -> Protocol:
+    """Return slow cycles, sines and random waves at every force."""
+    runs = []
+    for force in FORCES:
+        low, high = (10 * float(np.polyval(cubic, force)) for cubic in (LOWEST, HIGHEST))
+        time = np.arange(round(STATIC_PERIOD / SAMPLE_TIME) + 1) * SAMPLE_TIME
+        wave = sine(time, STATIC_PERIOD, STATIC_HIGH)
+        runs.append(_run(f"static-{force:.0f}N", "train", wave, force, 0.0, "static"))
+        for frequency in FREQUENCIES:
+            time = np.arange(round(CYCLES / frequency / SAMPLE_TIME) + 1) * SAMPLE_TIME
+            wave = sine(time, 1 / frequency, high, low)
+            name = f"sine-{force:.0f}N-{frequency:.1f}Hz"
+            runs.append(_run(name, "train", wave, force, frequency, "hysteresis"))
+        for i, frequency in enumerate(FREQUENCIES):
+            time = np.arange(round(RANDOM_TIME / SAMPLE_TIME) + 1) * SAMPLE_TIME
+            wave = random_wave(time, frequency, high, low, seed=i)
+            name = f"random-{force:.0f}N-{frequency:.1f}Hz"
+            runs.append(_run(name, "test", wave, force, frequency, "random"))
+    return Protocol(
+        name="activation-pressure",
+        rig="mckibben-530",
+        source="Inverse Modeling of Nonlinear Artificial Muscle Using Polynomial Parameterization and "
+        "Particle Swarm Optimization, Section 4.1",
+        runs=tuple(runs),
+        notes="Sines go between the pressures y_1 and y_2 of Table 1; the random waves' highest "
+        "frequency is that of the sine. Slow cycles are ours. Loads are forces: hanging weights "
+        "would resonate with the muscle (at 1.8 Hz with 300 N), which the paper does not show.",
+    )
+
+
+def _run(
+    name: str, role: Role, wave: np.ndarray, force: float, frequency: float, stage: str
+) -> Run:
+    return Run(
+        name=name,
+        role=role,
+        inputs=Recording({"pressure": wave, "force": np.full(wave.size, force)}, SAMPLE_TIME),
+        settings={"start.pressure": float(wave[0]), "start.force": force},
+        labels={"stage": stage, "force": force, "frequency": frequency},
+    )

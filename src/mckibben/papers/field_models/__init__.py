@@ -1,0 +1,1 @@
+"""Paper B: models of the field side by side."""

@@ -1,0 +1,40 @@
+"""The experiments on a fluidic muscle with a hanging mass.
+
+Source: Analysis and modeling of a pneumatic artificial muscle system, Sections 2.1 and 3.1: a 0.1 Hz
+triangle whose amplitude falls each cycle, from 5.5 bar over 1.0 bar, to calibrate; a triangle with
+irregular turning points to test.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mckibben.recording import Recording
+from mckibben.signals.excitations import irregular_triangle, triangle
+from mckibben.signals.protocol import Protocol, Run
+
+SAMPLE_TIME = 0.02
+PERIOD = 10.0
+LOW, HIGH = 1.0, 5.5
+PEAKS = tuple(np.linspace(HIGH, 1.5, 9).tolist())
+"""Of each cycle [bar]; the paper shows them in its Figure 2 only."""
+
+TURNS, SEED = 17, 5
+"""Turning points of the irregular triangle, and what they are drawn with."""
+
+
+def field_models() -> Protocol:
+    """Return both runs."""
+    time = np.arange(round(PERIOD * len(PEAKS) / SAMPLE_TIME) + 1) * SAMPLE_TIME
+    falling = triangle(time, PERIOD, (*PEAKS, LOW), LOW)
+    irregular = irregular_triangle(time, TURNS, HIGH, LOW, seed=SEED)
+    return Protocol(
+        name="field-models",
+        rig="mas20-hanging",
+        source="Analysis and modeling of a pneumatic artificial muscle system, Sections 2.1 and 3.1",
+        runs=(
+            Run("decaying-triangle", "train", Recording({"pressure": falling}, SAMPLE_TIME)),
+            Run("irregular-triangle", "test", Recording({"pressure": irregular}, SAMPLE_TIME)),
+        ),
+        notes="Peaks and turning points are ours: the paper shows them in a figure only.",
+    )

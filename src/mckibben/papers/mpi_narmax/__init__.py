@@ -1,0 +1,1 @@
+"""Paper D: hysteresis under a varying load."""

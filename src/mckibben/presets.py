@@ -1,0 +1,94 @@
+"""A class with some of its settings chosen, under a name of its own.
+
+A published variant, or a structure, is a choice of settings and no class: ``preset(...)`` stands for it
+in the registry, or in the module to which another package's entry point leads.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from copy import copy
+from dataclasses import dataclass, fields
+from functools import update_wrapper
+from importlib import import_module
+from types import MethodType
+from typing import Any
+
+
+@dataclass(frozen=True)
+class Preset:
+    """Where a class is, what it is with these settings, and the settings; see `preset`."""
+
+    location: str
+    about: str
+    chosen: Mapping[str, Any]
+
+
+def preset(location: str, about: str, **chosen: Any) -> Preset:
+    """Return a class with some of its settings chosen.
+
+    Parameters
+    ----------
+    location : str
+        ``"module:class"``; it is imported when the preset is first loaded.
+    about : str
+        What it is, in one line.
+    **chosen
+        Settings, the fields of the class, that others may override; or attributes of the class, such
+        as the ``effort`` of a fit, that are different with them.
+    """
+    return Preset(location, about, chosen)
+
+
+class Chosen:
+    """A preset with its class: called as the class is, it makes an object of the class.
+
+    What else it is asked for is the class's own; class methods see the preset for their class.
+
+    Parameters
+    ----------
+    name : str
+        Of the preset.
+    given : Preset
+    """
+
+    def __init__(self, name: str, given: Preset) -> None:
+        module, _, attribute = given.location.partition(":")
+        self.of = getattr(import_module(module), attribute)
+        update_wrapper(self, self.of, updated=())
+        documented = (self.of.__doc__ or "").partition("\n")
+        self.__doc__ = "".join((given.about, *documented[1:]))
+        known = {field.name: copy(field) for field in fields(self.of)}
+        self.settings = {key: value for key, value in given.chosen.items() if key in known}
+        for key, value in self.settings.items():
+            known[key].default = value
+        self.__dataclass_fields__ = known
+        self._name = name
+        self._attributes = {key: value for key, value in given.chosen.items() if key not in known}
+
+    def __call__(self, **settings: Any) -> Any:
+        """Return an object of the class with the preset's settings, or others.
+
+        Raises
+        ------
+        TypeError
+            On a name that is no setting.
+        """
+        unknown = sorted(settings.keys() - self.__dataclass_fields__.keys())
+        if unknown:
+            raise TypeError(
+                f"{self._name!r} has no setting {unknown[0]!r}. "
+                f"Remedy: use one of {', '.join(sorted(self.__dataclass_fields__))}."
+            )
+        return self.of(**self.settings | settings)
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("_"):  # asked for before there is anything, or by copying
+            raise AttributeError(name)
+        if name in self._attributes:
+            return self._attributes[name]
+        found = getattr(self.of, name)
+        return MethodType(found.__func__, self) if isinstance(found, MethodType) else found
+
+    def __repr__(self) -> str:
+        return f"{self._name}: {self.of.__name__} with {self.settings}"

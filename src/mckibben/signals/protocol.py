@@ -1,0 +1,102 @@
+"""A protocol: what a rig is to be driven with, run by run, and what each run is for."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+from mckibben import registry
+from mckibben.errors import DataError
+from mckibben.recording import Recording
+
+Role = Literal["train", "validation", "test"]
+
+
+@dataclass(frozen=True)
+class Run:
+    """One run of a protocol.
+
+    Parameters
+    ----------
+    name : str
+        Unique within the protocol; good as a file name.
+    role : {"train", "validation", "test"}
+        What it is for.
+    inputs : Recording
+        Commands, on the grid that is to be recorded.
+    settings : mapping
+        Parameters of the rig that differ in this run, as `mckibben.Rig.changed` takes them.
+    labels : mapping
+        What else tells it from the others: stage of the identification, load, frequency.
+    lead : float
+        Time at the beginning that is driven but not recorded [s].
+    """
+
+    name: str
+    role: Role
+    inputs: Recording
+    settings: Mapping[str, Any] = field(default_factory=dict)
+    labels: Mapping[str, Any] = field(default_factory=dict)
+    lead: float = 0.0
+
+
+@dataclass(frozen=True)
+class Protocol:
+    """A labelled set of runs on one rig.
+
+    Parameters
+    ----------
+    name : str
+        As registered.
+    rig : str
+        Name of the rig it was made for.
+    source : str
+        The paper and its sections.
+    runs : tuple of Run
+        In the order in which they are to be recorded.
+    notes : str
+        What the source leaves open, and what is done here.
+    """
+
+    name: str
+    rig: str
+    source: str
+    runs: tuple[Run, ...]
+    notes: str = ""
+
+    def select(self, role: Role | None = None, **labels: Any) -> tuple[Run, ...]:
+        """Return the runs of a role, and with all of the labels.
+
+        >>> from mckibben.signals.protocol import protocol
+        >>> [run.name for run in protocol("field-models").select("test")]
+        ['irregular-triangle']
+        """
+        return tuple(
+            run
+            for run in self.runs
+            if (role is None or run.role == role)
+            and all(run.labels.get(name) == value for name, value in labels.items())
+        )
+
+    def __getitem__(self, name: str) -> Run:
+        """Return the run of that name."""
+        for run in self.runs:
+            if run.name == name:
+                return run
+        raise DataError(
+            f"the protocol {self.name!r} has no run {name!r}",
+            remedy=f"use one of {', '.join(run.name for run in self.runs)}",
+        )
+
+
+def protocol(name: str) -> Protocol:
+    """Return a protocol by name.
+
+    Raises
+    ------
+    ModelError
+        If there is none of that name; the text lists those there are.
+    """
+    made: Protocol = registry.load("protocols", name)()
+    return made

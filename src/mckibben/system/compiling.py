@@ -1,0 +1,209 @@
+"""Functions that numba compiles when they are first run, so that importing them does not load it.
+
+What is compiled is kept for the next process. A compiled function holds those that it calls, wherever
+they stand, and the numbers that it reads by name; numba looks at its own file alone, so that all it is
+made of is kept beside it and compared.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from functools import cache, partial, update_wrapper
+from hashlib import sha256
+from pickle import UnpicklingError
+from types import CodeType, ModuleType
+from typing import Any, TypeVar, cast
+
+import numpy as np
+
+from mckibben.system.caches import place
+
+Function = TypeVar("Function", bound=Callable[..., Any])
+
+_OPTIONS = {"nogil": True, "error_model": "numpy"}
+_lock = threading.Lock()
+
+
+class Deferred:
+    """A function that becomes numba's when it is first called, from Python or from another one.
+
+    Parameters
+    ----------
+    function : callable
+        What to compile.
+    options : dict
+        Of `numba.njit`.
+    """
+
+    def __init__(self, function: Callable[..., Any], options: dict[str, Any]) -> None:
+        update_wrapper(self, function)
+        self.py_func = function
+        self.targetoptions = options  # under the name where numba looks for ``inline``
+        self._dispatcher: Callable[..., Any] | None = None
+
+    @property
+    def dispatcher(self) -> Callable[..., Any]:
+        """Numba's function, or the plain one where compiling is disabled."""
+        if self._dispatcher is None:
+            import numba
+
+            with _lock:  # one of them, however many threads ask
+                if self._dispatcher is None:
+                    compiled = numba.njit(**self.targetoptions)(self.py_func)
+                    _keep(compiled, self)
+                    self._dispatcher = compiled
+        return self._dispatcher
+
+    @property
+    def _numba_type_(self) -> Any:
+        """What numba asks for where a compiled function calls this one."""
+        return self.dispatcher._numba_type_  # type: ignore[attr-defined]
+
+    def __call__(self, *arguments: Any) -> Any:
+        """Run it, compiled."""
+        return self.dispatcher(*arguments)
+
+
+def deferred(function: Function, **options: Any) -> Function:
+    """Compile a function when it is first called, with exact arithmetic if not told otherwise.
+
+    Parameters
+    ----------
+    function : callable
+        Of what numba compiles without Python objects.
+    **options
+        Of `numba.njit`, beside freedom of other threads, and division as NumPy does it.
+    """
+    return cast("Function", Deferred(function, _OPTIONS | options))
+
+
+def _keep(compiled: Any, function: Deferred) -> None:
+    """Let numba keep a function compiled in a folder of this user's alone, if there is one."""
+    import numba
+
+    config: Any = numba.config
+    if config.DISABLE_JIT:
+        return
+    folder = place()
+    if folder is None:
+        return
+    before, config.CACHE_DIR = config.CACHE_DIR, str(folder)
+    try:
+        # as its own ``enable_caching`` does
+        compiled._cache = _cache_class()(function.py_func)
+        kept = compiled._cache._cache_file
+        kept._source_stamp = (kept._source_stamp, made_of(function))
+    except RuntimeError:  # it has no source that could be seen to change
+        pass
+    finally:
+        config.CACHE_DIR = before
+
+
+def made_of(function: Deferred) -> str:
+    """Return a digest of a function, of those that it calls, however far, and of what they name."""
+    digest = sha256()
+    for part in _parts(function, set()):
+        digest.update(part.encode() + b"\n")
+    return digest.hexdigest()
+
+
+def _parts(value: Any, seen: set[int]) -> Iterator[str]:
+    """Give what tells a value from another, to compiled code that holds it."""
+    if isinstance(value, Deferred):
+        if id(value) not in seen:
+            seen.add(id(value))
+            function = value.py_func
+            yield from _parts(tuple(value.targetoptions.items()), seen)
+            yield from _parts(function.__defaults__, seen)
+            yield from _parts(tuple((function.__kwdefaults__ or {}).items()), seen)
+            yield from _parts(
+                tuple(cell.cell_contents for cell in function.__closure__ or ()), seen
+            )
+            yield from _code_parts(function.__code__, function.__globals__, seen)
+    elif isinstance(value, np.ndarray):  # numba freezes what it holds
+        yield f"{value.dtype.str}{value.shape}"
+        yield value.tobytes().hex()
+    elif isinstance(value, np.generic):
+        yield repr(value)
+    elif isinstance(value, tuple):
+        for item in value:
+            yield from _parts(item, seen)
+    elif isinstance(value, set | frozenset):
+        yield repr(sorted(map(repr, value)))
+    elif isinstance(value, bool | int | float | complex | str | bytes):
+        yield repr(value)
+
+
+def _code_parts(code: CodeType, known: dict[str, Any], seen: set[int]) -> Iterator[str]:
+    yield code.co_code.hex()
+    for constant in code.co_consts:
+        if isinstance(constant, CodeType):
+            yield from _code_parts(constant, known, seen)
+        else:
+            yield from _parts(constant, seen)
+    modules: list[ModuleType] = []
+    reached = [known]
+    while reached:  # a.b.f: modules in modules
+        members = reached.pop()
+        deeper = [members[n] for n in code.co_names if isinstance(members.get(n), ModuleType)]
+        reached += [vars(module) for module in deeper if module not in modules]
+        modules += deeper
+    for name in code.co_names:
+        yield name
+        for members in (known, *map(vars, modules)):
+            yield from _parts(members.get(name), seen)
+
+
+@cache
+def _cache_class() -> Any:
+    """Return numba's cache, done without where it fails, as on a full disk."""
+    from numba.core.caching import FunctionCache
+
+    base: Any = FunctionCache
+
+    class Cache(base):  # type: ignore[misc]  # numba has no types
+        def save_overload(self, *what: Any) -> None:
+            with suppress(OSError):
+                base.save_overload(self, *what)
+
+        def load_overload(self, *what: Any) -> Any:
+            with suppress(OSError, EOFError, UnpicklingError):
+                return base.load_overload(self, *what)
+
+    return Cache
+
+
+def resolved(function: Function) -> Function:
+    """Return numba's own function, which is called without the detour, for calls sample by sample."""
+    return cast("Function", function.dispatcher) if isinstance(function, Deferred) else function
+
+
+_entries: dict[tuple[Any, ...], Callable[..., None]] = {}
+
+
+def bound(function: Callable[..., None], *arrays: Any) -> Callable[[], None]:
+    """Return a call with these arrays; of one sample, their types are looked at now, not every time.
+
+    The last array has a row, or number, for every sample.
+    """
+    run = resolved(function)
+    if len(arrays[-1]) > 1 or not hasattr(run, "compile"):  # which a plain function has not
+        return partial(run, *arrays)
+    key = (run, *[(a.dtype, a.ndim, a.flags.num) for a in arrays])
+    if key not in _entries:
+        import numba
+
+        _entries[key] = run.compile(tuple(map(numba.typeof, arrays)))
+    return partial(_entries[key], *arrays)
+
+
+def in_turn(*runs: Callable[[], None]) -> Callable[[], None]:
+    """Return one call of several."""
+
+    def run() -> None:
+        for each in runs:
+            each()
+
+    return run

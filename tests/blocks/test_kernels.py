@@ -1,0 +1,290 @@
+"""Corners of kernels, on data so small that they are run uncompiled too (`tests.uncompiled`)."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from mckibben import ModelWarning
+from mckibben.blocks.core.fields import vector
+from mckibben.blocks.core.linear_system import eliminate
+from mckibben.blocks.core.root import solve_near
+from mckibben.blocks.coupled.coupled_memory import CoupledMemory, readout_width
+from mckibben.blocks.coupled.force_balance import ForceBalance
+from mckibben.blocks.coupled.fuzzy_network import FuzzyNetwork
+from mckibben.blocks.coupled.recurrent_fuzzy_network import RecurrentFuzzyNetwork
+from mckibben.blocks.differential.flow import flow
+from mckibben.blocks.dynamic.narx_polynomial import NarxPolynomial
+from mckibben.blocks.force.braid_equilibrium import BraidEquilibrium
+from mckibben.blocks.force.multistate_friction import deflected
+from mckibben.blocks.laws.trial import wander
+from mckibben.blocks.play_type.gpi import GPI
+from mckibben.blocks.preisach_type.preisach import DEPTH, Preisach, _output, _solve, everett
+from mckibben.estimators.coupled.recurrent_fit import remembered
+from mckibben.registry import load
+from mckibben.system.compiling import Deferred
+from tests.twins import TWINS
+
+Array = NDArray[np.float64]
+
+
+def plain(kernel: Any) -> Any:
+    """Return what is compiled, as it was written."""
+    assert isinstance(kernel, Deferred)
+    return kernel.py_func
+
+
+def path(lowest: list[float], highest: list[float], n_turns: int = 6) -> Array:
+    rng = np.random.default_rng(0)
+    return wander(np.array(lowest), np.array(highest), rng, 8, n_turns)
+
+
+# -- solving ---------------------------------------------------------------------------------
+
+
+def test_elimination_exchanges_rows_and_ends_on_singular_ones() -> None:
+    matrix = np.array([[0.0, 2.0, 1.0], [1.0, -1.0, 0.0], [3.0, 0.0, 1.0]])
+    solved = np.array([1.0, 2.0, 3.0])
+    right = matrix @ solved
+    eliminate(matrix.copy(), right)
+    np.testing.assert_allclose(right, solved, atol=1e-14)
+    right = np.array([1.0, 1.0])
+    eliminate(np.zeros((2, 2)), right)
+    assert not np.isnan(right).any()
+
+
+@pytest.mark.parametrize(
+    ("evaluate", "target", "expected", "clipped"),
+    [
+        (lambda u, _: u, 1.0, 1.0, False),
+        (lambda u, _: u, 300.0, 256.0, True),
+        (lambda u, _: u, -300.0, 0.0, True),
+        (lambda u, _: u if u < 1.5 else np.inf, 1.2, 1.2, False),
+        (lambda u, _: -1.0 if u < 1.3 else 1.0, 0.0, 1.3, False),
+    ],
+    ids=["on a step", "above", "below", "infinite beyond", "jump"],
+)
+def test_roots(evaluate: Any, target: float, expected: float, clipped: bool) -> None:
+    u, out = plain(solve_near)(evaluate, target, 0.0, 0.0, 256.0, None)
+    assert u == pytest.approx(expected, rel=1e-13)
+    assert bool(out) == clipped
+
+
+def test_a_root_between_neighbouring_numbers_is_one_of_them() -> None:
+    jump, low, high = 1.0003, 1.0, 1.001
+    u, out = plain(solve_near)(lambda u, _: -1.0 if u < jump else 1.0, 0.0, low, low, high, None)
+    assert abs(u - jump) <= np.spacing(1.0)
+    assert not out
+
+
+RISING = (
+    "bouc-wen",
+    "braid-equilibrium",
+    "eupi",
+    "pi",
+    "polynomial",
+    "preisach",
+    "rate-dependent-pi",
+)
+
+
+@pytest.mark.parametrize("kind", [*RISING, "gpi"])
+def test_references_out_of_reach_are_clipped_told_and_forgotten(kind: str) -> None:
+    block = load("blocks", kind).example()
+    if isinstance(
+        block, GPI
+    ):  # whose usual envelopes have no value there, which plain Python refuses
+        rising, falling = load("envelopes", "piecewise-linear").examples()
+        block = replace(block, rising=rising, falling=falling)
+    (low,), (high,) = block.reachable()
+    middle, span = 0.5 * (low + high), high - low
+    turns = [middle, high + 0.3 * span, middle, low - 0.3 * span, middle, high - 0.1 * span]
+    references = np.interp(np.arange(51), np.arange(0, 51, 10), turns)
+    with pytest.warns(ModelWarning, match="clipped"):
+        given = block.inverse().simulate(references, sample_time=10.0)
+    outputs = block.simulate(given, sample_time=10.0)
+    inside = (references > low + 0.02 * span) & (references < high - 0.02 * span)
+    np.testing.assert_allclose(outputs[inside], references[inside], atol=1e-9 * span)
+
+
+def test_a_braid_beyond_its_pressures_is_at_its_ends() -> None:
+    block = BraidEquilibrium.example()
+    ends = block.simulate([-1e3, 1e3])
+    between = block.simulate(np.linspace(-5.0, 20.0, 26))
+    assert ends[0] <= between.min() < between.max() <= ends[1]
+
+
+# -- several muscles ---------------------------------------------------------------------------
+
+
+def test_a_network_far_from_all_sets_answers_by_the_nearest_rule() -> None:
+    example = FuzzyNetwork.example()
+    narrow = replace(example, widths=tuple((0.1,) * len(row) for row in example.widths))
+    consequents = np.array(example.consequents).reshape(8, 2, 3)
+    x = np.array([29.0, 31.0, 0.1])
+    np.testing.assert_allclose(narrow.simulate([x])[0], consequents[6] @ x, rtol=1e-12)
+
+
+def test_a_network_gives_the_nearest_that_it_can() -> None:
+    inverse = FuzzyNetwork.example().inverse()
+    wanted = np.array([[10.0, 10.0, 1.0], [500.0, -300.0, 1.0], [10.0, 10.0, 1.0]])
+    with pytest.warns(ModelWarning, match="out of reach"):
+        given = inverse.simulate(wanted)
+    (low, high) = np.array(FuzzyNetwork.example().limits).T
+    assert ((given >= low) & (given <= high)).all()
+    reached = inverse.inverse().simulate(np.column_stack([given, wanted[:, 2]]))
+    np.testing.assert_allclose(reached[[0, 2]], wanted[[0, 2], :2], atol=1e-7)
+    assert np.abs(reached[1] - wanted[1, :2]).max() > 100.0
+
+
+def test_pressures_are_clipped_to_their_range() -> None:
+    block = ForceBalance.example()
+    inputs = path([0.0, 0.0, 0.0], [30.0, 30.0, 2.0])
+    free = block.simulate(inputs)
+    low, high = np.quantile(free, [0.2, 0.8])
+    with pytest.warns(ModelWarning, match="clipped"):
+        limited = replace(block, pressure_range=(float(low), float(high))).simulate(inputs)
+    np.testing.assert_array_equal(limited, free.clip(low, high))
+
+
+def test_pressures_without_an_equilibrium_are_told() -> None:
+    pressures = np.array([[0.0, 0.0, 0.0], [500.0, -800.0, 3.0], [-1e4, 1e4, 0.0]])
+    with pytest.warns(ModelWarning, match="no equilibrium"):
+        ForceBalance.example().inverse().simulate(pressures)
+
+
+def test_memory_with_products_of_three_agrees_with_its_twin() -> None:
+    example = CoupledMemory.example()
+    readout = 0.3 / (1.0 + np.arange(readout_width(2, 2, 1, 3)))
+    block = replace(example, degree=3, readout=(vector(readout),))
+    inputs = path([0.0, 0.0], [5.0, 5.0])
+    expected = TWINS[block.kind](block, inputs.tolist(), 0.01)
+    np.testing.assert_allclose(block.simulate(inputs, sample_time=0.01), expected, rtol=1e-12)
+
+
+def test_a_recurrent_network_with_longer_pasts_agrees_with_its_twin() -> None:
+    rng = np.random.default_rng(1)
+    example = RecurrentFuzzyNetwork.example()
+    # two past outputs, the input and two past ones, the load and two past ones
+    centres = ((20.0,),) * 5 + ((100.0,),) * 3
+    widths = ((40.0,),) * 5 + ((150.0,),) * 3
+    block = replace(
+        example,
+        centres=centres,
+        widths=widths,
+        feedbacks=((0.3,),) * 8,
+        consequents=vector(0.1 * rng.uniform(-1, 1, 9)),
+        output_lags=2,
+        input_lags=2,
+        scheduling_lags=2,
+    )
+    inputs = path([0.0, 0.0], [40.0, 200.0])
+    expected = TWINS[block.kind](block, inputs.tolist(), block.own_time)
+    np.testing.assert_allclose(
+        block.simulate(inputs, sample_time=block.own_time), expected, rtol=1e-12, atol=1e-12
+    )
+
+
+def test_memberships_are_those_of_each_time_after_the_other() -> None:
+    rng = np.random.default_rng(0)
+    x, centres, widths = rng.normal(size=(5, 2)), rng.normal(size=(2, 3)), rng.uniform(1, 2, (2, 3))
+    feedbacks, found = rng.normal(size=(2, 3)), np.empty((5, 2, 3))
+    remembered(x, centres, widths, feedbacks, found)
+    last = np.zeros((2, 3))
+    for sample, memberships in zip(x, found, strict=True):
+        last = np.exp(-0.5 * ((sample[:, np.newaxis] - centres + feedbacks * last) / widths) ** 2)
+        np.testing.assert_allclose(memberships, last, rtol=1e-13)
+
+
+# -- one muscle --------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("unloading", [-0.7, 0.0, 0.4])
+@pytest.mark.parametrize("exponent", [1, 2])
+def test_flow_solves_its_equation(unloading: float, exponent: int) -> None:
+    """dv/dtau = 1 - psi |v|^n, psi unloading below zero and loading above, in steps of any length."""
+    loading, ways = 1.3, np.linspace(0.0, 3.0, 31)
+    v = np.array([plain(flow)(-1.1, tau, unloading, loading, exponent) for tau in ways])
+    assert v[0] == -1.1
+    assert v[-1] > 0
+    halves = [
+        plain(flow)(
+            plain(flow)(-1.1, tau / 2, unloading, loading, exponent),
+            tau / 2,
+            unloading,
+            loading,
+            exponent,
+        )
+        for tau in ways
+    ]
+    np.testing.assert_allclose(halves, v, atol=1e-12)
+    h = 1e-6
+    for tau, here in zip(ways[1:], v[1:], strict=True):
+        ahead, behind = (plain(flow)(-1.1, tau + d, unloading, loading, exponent) for d in (h, -h))
+        psi = unloading if here < 0 else loading
+        assert (ahead - behind) / (2 * h) == pytest.approx(
+            1 - psi * abs(here) ** exponent, abs=1e-5
+        )
+
+
+@pytest.mark.parametrize("v", [0.0, 0.01, 3.0])
+def test_an_element_goes_on_from_where_it_was(v: float) -> None:
+    """From far beyond its limit backwards, through relaxing and sticking to slipping."""
+    k, sigma, limit = 2.0, 0.5, 1.0
+    times = np.linspace(0.0, 4.0, 21)
+    x = [plain(deflected)(-3.0, v, time, k, sigma, limit) for time in times]
+    assert x[0] == pytest.approx(-3.0)
+    step = times[1]
+    for here, there in pairwise(x):
+        assert plain(deflected)(here, v, step, k, sigma, limit) == pytest.approx(there, abs=1e-12)
+    assert np.all(np.diff(x) >= 0)
+
+
+def test_a_polynomial_of_two_past_outputs_agrees_with_its_twin() -> None:
+    block = replace(
+        NarxPolynomial.example(),
+        output_lags=2,
+        terms=((), (0,), (1,), (2,), (4,), (0, 2)),
+        weights=(0.01, 0.8, 0.1, 0.05, 0.04, 0.01),
+    )
+    inputs = path([0.0], [5.0])
+    expected = TWINS[block.kind](block, inputs.tolist(), block.sample_time)
+    found = block.simulate(inputs, sample_time=block.sample_time)
+    np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-12)
+
+
+def test_relays_forget_the_smallest_of_too_many_loops_and_no_other() -> None:
+    """Ever smaller loops nest; when the input leaves them all, nothing of them is left."""
+    block = Preisach.example()
+    low, high = block.limits
+    shrinking = 0.5 * (low + high) + 0.45 * (high - low) * (-0.95) ** np.arange(DEPTH + 12)
+    around = np.array([low, high, *shrinking, high, low + 0.3 * (high - low)])
+    directly = np.array([low, high, high, low + 0.3 * (high - low)])
+    outputs = block.simulate(around)
+    assert outputs[-1] == pytest.approx(block.simulate(directly)[-1], rel=1e-12)
+    given = block.inverse().simulate(outputs)
+    np.testing.assert_allclose(block.simulate(given), outputs, atol=1e-9 * np.ptp(outputs))
+
+
+def test_relays_at_a_corner_and_at_the_ends() -> None:
+    block = Preisach.example()
+    numbers = block.coefficients(None)
+    n = int(numbers[0])
+    levels, table = numbers[1 : 1 + n], numbers[1 + n : 1 + n + n * n]
+    state = block.initial_state(np.array([levels[0]]))
+    assert plain(_output)(state[2], state, levels, table) == state[2 + DEPTH]
+    for other, rising in ((levels[-1], True), (levels[0], False)):
+        assert plain(_solve)(1.0, other, rising, levels, table) == other
+    middle = levels[n // 2]
+    for u in (middle + 0.3, levels[-1]):
+        wanted = plain(everett)(u, middle, levels, table)
+        assert plain(_solve)(wanted, middle, True, levels, table) == pytest.approx(u)
+    wanted = plain(everett)(middle, levels[0] + 0.1, levels, table)
+    assert plain(_solve)(wanted, middle, False, levels, table) == pytest.approx(levels[0] + 0.1)
+    plateau = np.zeros_like(table)
+    assert plain(_solve)(0.0, middle, True, levels, plateau) == levels[n // 2 + 1]

@@ -1,0 +1,36 @@
+"""Settings as they are written, and whose they are."""
+
+from __future__ import annotations
+
+import pytest
+
+from mckibben import ModelError
+from mckibben.comparison.offered import settings_of, settings_of_all
+
+
+def test_settings_are_read_as_json_or_words() -> None:
+    found = settings_of(
+        "pi",
+        [
+            "n_operators=7",
+            "nonnegative=false",
+            "spacing=dense",
+            "thresholds=[0, 0.5]",
+            "gpi.seed=3",
+        ],
+    )
+    assert found == {
+        "n_operators": 7,
+        "nonnegative": False,
+        "spacing": "dense",
+        "thresholds": (0, 0.5),
+    }
+    with pytest.raises(ModelError, match="Remedy"):
+        settings_of("pi", ["n_operators"])
+
+
+def test_a_bare_setting_goes_to_the_models_that_have_it() -> None:
+    found = settings_of_all(["pi", "bouc-wen"], ["n_operators=7", "bouc-wen.seed=3"])
+    assert found == {"pi": {"n_operators": 7}, "bouc-wen": {"seed": 3}}
+    with pytest.raises(ModelError, match="none of the models"):
+        settings_of_all(["bouc-wen"], ["n_operators=7"])

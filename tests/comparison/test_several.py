@@ -1,0 +1,186 @@
+"""What models of several muscles are chosen on, and that the test has no say."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from mckibben import GPI, DataError, Recording, compare
+from mckibben.comparison.channels import Channels, channels_of
+from mckibben.comparison.planning import plan_of
+from mckibben.comparison.splits import ENOUGH, held_out, validation_folds
+from mckibben.signals import triangle
+
+TIME = np.arange(0, 20, 0.05)
+INPUTS, OUTPUTS = ("pressure_1", "pressure_2"), ("displacement_1", "displacement_2")
+CHANNELS = Channels(INPUTS, OUTPUTS)
+
+
+def run(peak: float, seed: int = 0) -> Recording:
+    rng = np.random.default_rng(seed)
+    waves = {name: triangle(TIME + k, 4.0, peak) for k, name in enumerate(INPUTS, start=1)}
+    moved = [GPI.example().simulate(wave) for wave in waves.values()]
+    mixed = {
+        name: moved[k] - 0.2 * moved[1 - k] + 0.02 * rng.standard_normal(TIME.size)
+        for k, name in enumerate(OUTPUTS)
+    }
+    return Recording(waves | mixed, 0.05)
+
+
+def test_channels_are_found_by_name() -> None:
+    assert channels_of([run(3.0)], None, None, None) == CHANNELS
+    assert channels_of([run(3.0)], "pressure", "displacement_1", None).outputs == OUTPUTS[:1]
+    names = ("pressure", "voltage", "displacement", "force")
+    single = Recording(dict.fromkeys(names, TIME.astype(np.float64)))
+    assert channels_of([single], None, None, None).inputs == ("pressure",)
+    assert channels_of([single], None, None, "force").inputs == ("voltage",)
+    with pytest.raises(DataError, match="weight"):
+        channels_of([single], None, None, "weight")
+
+
+def test_the_order_of_recordings_does_not_decide_the_channels() -> None:
+    less = run(3.0).select(["pressure_1", "pressure_2", "displacement_1"])
+    for runs in ([less, run(3.0)], [run(3.0), less]):
+        assert channels_of(runs, None, None, None) == CHANNELS
+        with pytest.raises(DataError, match="displacement_2"):
+            compare(runs, models=["coupled-memory"], jobs=1)
+
+
+@pytest.mark.parametrize("load", [*INPUTS, *OUTPUTS])
+def test_no_model_is_told_what_it_is_to_give(load: str) -> None:
+    with pytest.raises(DataError, match="named twice"):
+        compare([run(3.0)], run(4.0), load=load, models=["coupled-memory"], jobs=1)
+
+
+def test_a_model_of_one_muscle_named_for_several_says_so() -> None:
+    (row,) = compare([run(3.0)], run(4.0), models=["gpi"], jobs=1).rows
+    assert row.reason == "it is of one input and one output"
+
+
+def test_what_is_fitted_to_one_recording_alone_is_not_chosen_among_the_others() -> None:
+    train, names = (
+        [run(peak, seed) for seed, peak in ((1, 5.0), (2, 3.0))],
+        ("pressure", "displacement"),
+    )
+    one = [
+        Recording(
+            dict(zip(names, (r["pressure_1"], r["displacement_1"]), strict=True))
+            | {"force": np.full(TIME.size, pull)},
+            0.05,
+            meta={"name": "x"},
+        )
+        for r, pull in zip(train, (20.0, 22.0), strict=True)
+    ]
+    given = {"mpi": {"n_operators": 2}}
+    plan = plan_of(
+        one, (), load="force", models=["coupled-memory"], settings=given, n_folds=2, seed=0
+    )
+    alone = [item for item in plan.items.values() if item.only is not None]
+    assert [item.only for item in alone] == [0, 1]
+    assert all(item.settings["n_operators"] == 2 for item in alone)
+    still = plan_of(one[0], (), load="force", models=["pi"], settings=None, n_folds=0, seed=0)
+    assert any("cannot be learned" in note for note in still.notes)
+    board = compare(one, load="force", models=["coupled-memory"], settings=given, n_folds=2, jobs=1)
+    assert [row.validation_rmse is None for row in board.rows] == [False, True, True]
+    assert any(
+        "--load force" in note
+        for note in compare(
+            [r.with_channels(force=TIME.astype(float)) for r in one],
+            models=["pi"],
+            n_folds=0,
+            jobs=1,
+        ).notes
+    )
+
+
+def test_given_runs_are_scored_and_nothing_is_fitted_to_them() -> None:
+    given = [run(3.0), run(4.0)]
+    train = (run(5.0),)
+    ((fold,), chosen_by) = validation_folds(train, CHANNELS, 4, given)
+    assert chosen_by == "given"
+    assert fold.train is train
+    assert fold.test == tuple(given)
+    assert all(rows.all() for rows in fold.test_rows)
+
+
+def test_many_runs_are_left_out_in_turn_but_for_those_beyond_the_rest() -> None:
+    runs = [run(peak) for peak in (*np.linspace(2.0, 4.0, ENOUGH - 1), 9.0)]
+    parts, chosen_by = validation_folds(runs, CHANNELS, 4)
+    assert chosen_by == "cross-validation"
+    scored = [one for part in parts for one in part.test]
+    assert len(scored) == ENOUGH - 1
+    assert not any(one is runs[-1] for one in scored)
+    for part in parts:
+        assert not {id(one) for one in part.train} & {id(one) for one in part.test}
+
+
+def test_of_few_runs_the_end_of_each_is_left_out() -> None:
+    ((part,), chosen_by) = validation_folds([run(3.0), run(4.0)], CHANNELS, 4)
+    assert chosen_by == "validation"
+    for fitted, scored in zip(part.train_rows, part.test_rows, strict=True):
+        assert not (fitted & scored).any()
+        assert fitted[: round(0.75 * fitted.size)].all()
+
+
+def test_levels_of_what_schedules_are_held_out() -> None:
+    levels = (0.0, 0.5, 1.0, 2.0)
+    runs = [
+        run(3.0, seed).with_channels(pressure_extensor=np.full(TIME.size, level))
+        for level in levels
+        for seed in (1, 2)
+    ]
+    split = held_out(runs, CHANNELS)
+    assert [one["pressure_extensor"][0] for one in split.test] == [0.5, 0.5]
+    assert "pressure_extensor 0.5 bar held out" in split.described
+    assert len(held_out([run(3.0, seed) for seed in range(6)], CHANNELS).test) == 2
+    few = held_out([run(3.0)], CHANNELS)
+    assert few.train[0].n_samples < few.test[0].n_samples
+
+
+def test_rows_hold_every_output_an_interval_and_a_memory() -> None:
+    board = compare([run(5.0, 1), run(4.0, 2)], run(4.5, 3), models=["coupled-memory"], jobs=1)
+    (row,) = board.rows
+    assert row.test is not None
+    assert tuple(row.outputs) == OUTPUTS == board.outputs
+    mean = np.mean([scores.rmse for scores in row.outputs.values()])
+    assert row.test.rmse == pytest.approx(mean)
+    assert row.rmse_interval is not None
+    assert row.rmse_interval[0] <= row.test.rmse <= row.rmse_interval[1]
+    assert row.memory is not None
+    assert row.memory.gap_ratio == pytest.approx(1.0, abs=0.1)
+    assert row.validation_rmse == pytest.approx(np.mean(list(row.validation_by_output.values())))
+    described = row.to_dict()
+    assert set(described["outputs"]) == set(OUTPUTS)
+    assert described["outputs"]["displacement_1"]["rmse"] == row.outputs["displacement_1"].rmse
+
+
+def test_the_choice_is_the_same_whatever_the_test() -> None:
+    train, test = [run(5.0, 1), run(4.0, 2)], run(4.5, 3)
+    spoilt = test.with_channels(**{name: test[name][::-1].copy() for name in OUTPUTS})
+    first, second = (
+        compare(train, one, models=["coupled-memory", "coupled-pi"], jobs=1)
+        for one in (test, spoilt)
+    )
+    chosen = [[(row.model, row.validation_by_output) for row in b.rows] for b in (first, second)]
+    assert chosen[0] == chosen[1]
+    assert first.rows[0].test != second.rows[0].test
+
+
+def test_models_without_a_place_are_left_out_and_said() -> None:
+    several = plan_of(
+        [run(5.0), run(4.0)], run(3.0, 4), models="all", settings=None, n_folds=0, seed=0
+    )
+    assert {"sdchm", "force-balance", "tsfnn"} <= set(several.items)
+    assert "gpi" in several.left_out
+    assert "mpi-narmax" in several.left_out
+    one = run(5.0).select(["pressure_1", "displacement_1"])
+    single = plan_of([one], (), models="all", settings=None, n_folds=0, seed=0)
+    assert "gpi" in single.items
+    assert "several muscles" in single.left_out["sdchm"]
+
+
+def test_outputs_of_different_units_have_no_mean() -> None:
+    one = run(3.0)
+    mixed = one.with_channels(force=one["displacement_2"])
+    with pytest.raises(DataError, match="different units"):
+        compare(mixed, outputs=["displacement_1", "force"], models=["coupled-memory"], jobs=1)

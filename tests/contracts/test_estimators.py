@@ -1,0 +1,183 @@
+"""What every estimator must do, whatever its inputs and outputs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from sklearn.base import clone
+from sklearn.exceptions import NotFittedError
+from sklearn.model_selection import GridSearchCV, cross_val_score
+
+from mckibben import DataError, ModelError, Recording, registry
+from mckibben import load as load_model
+from mckibben.estimators.optimisers.tracker import whole_searches
+from tests.estimators.examples import CASES, KINDS, quick, recorded
+
+pytestmark = [
+    pytest.mark.parametrize(("name", "kind"), CASES),
+    pytest.mark.filterwarnings("ignore::mckibben.errors.ModelWarning"),
+]
+
+
+@pytest.fixture(autouse=True, scope="module")
+def few_steps() -> Iterator[None]:
+    """Let linear models take few steps: what is asked here does not depend on how far they go."""
+    with pytest.MonkeyPatch.context() as patch:
+        for steps in ("FIRST_STEPS", "STEPS"):
+            patch.setattr(f"mckibben.estimators.linear.prediction_error.{steps}", 2)
+        yield
+
+
+@cache
+def fitted(name: str, kind: str) -> Any:
+    """Return an estimator fitted to what counts of its example, once for all that look at it."""
+    return quick(name, kind).fit(recorded(kind), rows=counts(kind))
+
+
+def counts(kind: str) -> list[np.ndarray]:
+    """Return which samples count: all but a stretch of the last run."""
+    found = [np.ones(len(run), dtype=bool) for run in recorded(kind)]
+    found[-1][100:160] = False
+    return found
+
+
+def test_it_says_what_it_learns_from(name: str, kind: str) -> None:
+    made = KINDS[kind]
+    estimator_class = registry.load("estimators", name)
+    settings = estimator_class.channel_settings(made.inputs, made.outputs)
+    assert estimator_class(**settings).get_params().items() >= settings.items()
+    assert estimator_class.objection(recorded(kind), (), made.outputs)
+
+
+def test_fit_repeats_and_leaves_settings_and_data_alone(name: str, kind: str) -> None:
+    runs, first = recorded(kind), fitted(name, kind)
+    before = [run.matrix(KINDS[kind].channels).copy() for run in runs]
+    again = clone(first)
+    settings = again.get_params()
+    assert settings == first.get_params()
+    assert again.fit(list(runs), rows=counts(kind)) is again
+    assert again.get_params() == settings
+    assert again.model_ == first.model_
+    found, known = (replace(e.diagnostics_, seconds=0.0) for e in (again, first))
+    np.testing.assert_equal(vars(found), vars(known))
+    for run, samples in zip(runs, before, strict=True):
+        np.testing.assert_array_equal(run.matrix(KINDS[kind].channels), samples)
+
+
+def test_the_model_is_a_block_that_saves_and_streams(name: str, kind: str, tmp_path: Path) -> None:
+    model, run = fitted(name, kind).model_, recorded(kind)[-1]
+    model.save(tmp_path / "model.json")
+    assert load_model(tmp_path / "model.json") == model
+    assert model.n_parameters == model.pack().size
+    # a stream knows no output to start from, so simulate is given none either
+    begun = run.slice(0, 100).select([channel.name for channel in model.inputs])
+    stream = model.stream(run.sample_time)
+    stepped = np.array(
+        [stream.step(row).copy() for row in begun.matrix(c.name for c in model.inputs)]
+    )
+    np.testing.assert_array_equal(stepped, model.simulate(begun).matrix(KINDS[kind].outputs))
+
+
+def test_predict_and_score_are_of_the_measured_outputs(name: str, kind: str) -> None:
+    estimator, runs, outputs = fitted(name, kind), recorded(kind), KINDS[kind].outputs
+    predicted = estimator.predict(runs)
+    measured = [run.matrix(outputs) for run in runs]
+    several = len(outputs) > 1
+    assert [part.shape for part in predicted] == [
+        y.shape if several else y.shape[:1] for y in measured
+    ]
+    np.testing.assert_array_equal(estimator.predict(runs[0])[0], predicted[0])
+    y, z = np.concatenate(measured), np.concatenate(predicted).reshape(-1, len(outputs))
+    assert estimator.score(runs) == pytest.approx(
+        np.mean(1 - ((y - z) ** 2).mean(axis=0) / y.var(axis=0))
+    )
+    assert estimator.score(runs) > 0.3
+    with pytest.raises(NotFittedError, match="fit first"):
+        clone(estimator).predict(runs)
+
+
+def test_diagnostics_say_how_good_the_fit_is(name: str, kind: str) -> None:
+    estimator, outputs = fitted(name, kind), KINDS[kind].outputs
+    found, n = estimator.diagnostics_, estimator.model_.n_parameters
+    assert len(found.rmse_by_output) == len(outputs)
+    assert found.rmse == pytest.approx(np.mean(found.rmse_by_output))
+    assert 0 < found.rmse_from_rest < np.inf
+    assert found.n_samples == sum(int(kept.sum()) for kept in counts(kind))
+    assert not found.interrupted
+    assert len(found.standard_errors) == n
+    assert found.covariance.shape == (n, n)
+    np.testing.assert_array_equal(found.standard_errors, np.sqrt(np.diag(found.covariance)))
+    assert set(estimator.undetermined()) <= set(range(n))
+
+
+def test_scikit_learn_validates_and_searches(name: str, kind: str) -> None:
+    runs, first = list(recorded(kind)), np.arange(len(recorded(kind))) < len(recorded(kind)) // 2
+    fold = [(np.flatnonzero(~first), np.flatnonzero(first))]
+    scores = cross_val_score(quick(name, kind), runs, cv=2, error_score="raise")
+    search = GridSearchCV(quick(name, kind), {"seed": [0]}, cv=fold, error_score="raise")
+    search.set_params(refit=False).fit(runs)
+    assert search.cv_results_["mean_test_score"] == pytest.approx([scores[0]])
+
+
+def test_an_interrupt_keeps_the_best_or_leaves_nothing(name: str, kind: str) -> None:
+    told: list[float] = []
+
+    def impatient(share: float, best: float) -> None:
+        told.append(share)
+        if len(told) == 2 or share == 1.0:
+            raise KeyboardInterrupt
+
+    estimator = quick(name, kind)
+    try:
+        estimator.fit(recorded(kind), progress=impatient)
+    except KeyboardInterrupt:
+        assert vars(estimator).keys() == estimator.get_params().keys()
+    else:
+        assert estimator.diagnostics_.interrupted
+        assert np.isfinite(estimator.score(recorded(kind)))
+    told.clear()
+    with whole_searches(), pytest.raises(KeyboardInterrupt):
+        quick(name, kind).fit(recorded(kind), progress=impatient)
+
+
+def test_absent_channels_are_named(name: str, kind: str) -> None:
+    made, first = KINDS[kind], recorded(kind)[0]
+    for channel in estimated_from(name, kind):
+        bare = first.select([other for other in made.channels if other != channel])
+        with pytest.raises(DataError, match=rf"'?{channel}'?.*Remedy"):
+            quick(name, kind).fit([*recorded(kind)[1:], bare])
+
+
+def estimated_from(name: str, kind: str) -> tuple[str, ...]:
+    """Return the channels that a model of a kind of recording is told, and those that it gives."""
+    model = fitted(name, kind).model_
+    return tuple(channel.name for channel in (*model.inputs, *model.outputs))
+
+
+def test_bad_recordings_and_settings_are_refused(name: str, kind: str) -> None:
+    runs, given = recorded(kind), KINDS[kind].inputs[0]
+    fit = quick(name, kind).fit
+    with pytest.raises(DataError, match=r"no recordings.*Remedy"):
+        fit([])
+    with pytest.raises(DataError, match=r"too few.*Remedy"):
+        fit([run.slice(0, 2) for run in runs])
+    with pytest.raises(DataError, match=rf"'{given}'.*constant.*Remedy"):
+        fit([run.with_channels(**{given: np.ones(len(run))}) for run in runs])
+    with pytest.raises(ModelError, match=r"seed is -1.*Remedy"):
+        quick(name, kind, seed=-1).fit(runs)
+    assert not hasattr(quick(name, kind), "model_")
+
+
+def test_outputs_that_do_not_count_are_never_looked_at(name: str, kind: str) -> None:
+    def spoilt(run: Recording, kept: np.ndarray) -> Recording:
+        return run.with_channels(**{c: np.where(kept, run[c], 1e3) for c in KINDS[kind].outputs})
+
+    runs = [spoilt(run, kept) for run, kept in zip(recorded(kind), counts(kind), strict=True)]
+    again = quick(name, kind).fit(runs, rows=counts(kind))
+    assert again.model_ == fitted(name, kind).model_

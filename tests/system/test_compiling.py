@@ -1,0 +1,202 @@
+"""Importing loads little; a kernel is compiled when it is first run, once, and found again."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from threading import Barrier
+
+import cloudpickle
+import numba
+import numpy as np
+import pytest
+
+from mckibben.blocks.play_type.pi import PI, pi_kernel
+from mckibben.system.compiling import Deferred, deferred, resolved
+
+HEAVY = {"sklearn", "numba", "scipy.optimize", "pandas", "joblib", "pint", "plotly"}
+"""Half a second to several, each."""
+
+WRITTEN = """
+from mckibben.system.compiling import deferred
+
+@deferred
+def half(x):
+    return 0.5 * x
+
+@deferred
+def quarter(x):
+    return half(half(x))
+
+@deferred
+def unused(x):
+    return x
+"""
+
+RUN = """
+import written
+assert written.quarter(8.0) == 2.0
+stats = getattr(written.quarter.dispatcher, "stats", None)
+print(stats and (sum(stats.cache_hits.values()), sum(stats.cache_misses.values())))
+print(written.unused._dispatcher)
+"""
+
+
+def printed(code: str, folder: Path, **environment: str) -> list[str]:
+    """Return the lines that a fresh process prints."""
+    run = subprocess.run(
+        [sys.executable, "-c", code],
+        cwd=folder,
+        env=os.environ | environment,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    return run.stdout.split("\n")[:-1]
+
+
+def double(x: float) -> float:
+    return 2.0 * x
+
+
+@pytest.mark.parametrize(
+    "first",
+    [
+        "import mckibben; mckibben.GPIEstimator",
+        "from mckibben import registry\n"
+        "for group, names in registry.PLUGINS.items():\n"
+        "    for name in names: registry.load(group, name)",
+        "from mckibben import PI, GPIEstimator\n"
+        "assert repr(GPIEstimator()) and PI((0.0,), (1.0,), 0.0, (0.0, 5.0)).inverse()",
+    ],
+    ids=["estimator", "every plug-in", "made"],
+)
+def test_importing_loads_nothing_heavy(first: str, tmp_path: Path) -> None:
+    tell = f"import sys; print(*sorted({HEAVY} & set(sys.modules)))"
+    assert printed(f"{first}\n{tell}", tmp_path) == [""]
+    assert "scipy.optimize" in printed(f"{first}\nimport scipy.optimize\n{tell}", tmp_path)[0]
+
+
+def test_kernels_that_call_kernels_are_found_compiled_by_the_next_process(tmp_path: Path) -> None:
+    (tmp_path / "written.py").write_text(WRITTEN)
+    here = str(tmp_path / "cache")
+    assert printed(RUN, tmp_path, NUMBA_CACHE_DIR=here) == ["(0, 1)", "None"]
+    assert printed(RUN, tmp_path, NUMBA_CACHE_DIR=here) == ["(1, 0)", "None"]
+
+
+CALLED = """
+import numpy as np
+from mckibben.system.compiling import deferred
+
+SIZE, UNREAD = 2.0, 1.0
+TABLE = np.array([1.0])
+
+@deferred
+def grown(x):
+    return 3.0 * x * TABLE[0]
+"""
+
+BETWEEN = """
+import called
+from mckibben.system.compiling import deferred
+
+@deferred
+def passed_on(x):
+    return called.grown(x)
+"""
+
+CALLING = """
+from between import passed_on
+from called import SIZE
+from mckibben.system.compiling import deferred
+
+@deferred
+def result(x):
+    return SIZE * passed_on(x)
+"""
+
+ASK = """
+from calling import result
+given = result(1.0)
+print(given, sum(result.dispatcher.stats.cache_hits.values()))
+"""
+
+
+@pytest.mark.parametrize(
+    ("was", "becomes", "expected"),
+    [
+        ("3.0 * x", "4.0 * x", "8.0 0"),
+        ("SIZE, UNREAD = 2.0, 1.0", "SIZE, UNREAD = 5.0, 1.0", "15.0 0"),
+        ("[1.0]", "[2.0]", "12.0 0"),
+        ("@deferred", "@__import__('functools').partial(deferred, fastmath=True)", "6.0 0"),
+        ("UNREAD = 2.0, 1.0", "UNREAD = 2.0, 3.0", "6.0 1"),
+    ],
+    ids=["code", "number", "table", "options", "what nothing reads"],
+)
+def test_a_kernel_kept_notices_what_changes_in_the_files_that_it_calls(
+    was: str, becomes: str, expected: str, tmp_path: Path
+) -> None:
+    texts = {"called": CALLED, "between": BETWEEN, "calling": CALLING}
+    for name, text in texts.items():
+        (tmp_path / f"{name}.py").write_text(text)
+    own = {"NUMBA_CACHE_DIR": str(tmp_path / "cache"), "PYTHONDONTWRITEBYTECODE": "1"}
+    assert printed(ASK, tmp_path, **own) == ["6.0 0"]
+    assert printed(ASK, tmp_path, **own) == ["6.0 1"]
+    assert was in CALLED
+    (tmp_path / "called.py").write_text(CALLED.replace(was, becomes))
+    assert printed(ASK, tmp_path, **own) == [expected]
+
+
+def test_kernels_run_uncompiled(tmp_path: Path) -> None:
+    (tmp_path / "written.py").write_text(WRITTEN)
+    assert printed(RUN, tmp_path, NUMBA_DISABLE_JIT="1") == ["None", "None"]
+    code = (
+        "from mckibben.registry import load\n"
+        "for kind in ('gpi', 'duhem'):\n"
+        "    block = load('blocks', kind).example()\n"
+        "    print(block.inverse().simulate(block.simulate([1.0, 3.0, 2.0])).round(9).tolist())"
+    )
+    assert printed(code, tmp_path, NUMBA_DISABLE_JIT="1") == 2 * ["[1.0, 3.0, 2.0]"]
+
+
+def test_threads_that_ask_at_once_share_one_function() -> None:
+    kernel, together = deferred(double), Barrier(8)
+
+    def ask() -> object:
+        together.wait()
+        return resolved(kernel)
+
+    with ThreadPoolExecutor(8) as pool:
+        found = [pool.submit(ask) for _ in range(8)]
+    assert len({id(one.result()) for one in found}) == 1
+
+
+def test_nothing_stands_between_a_stream_and_the_compiled_kernel() -> None:
+    assert isinstance(pi_kernel, Deferred)
+    assert PI.kernel is pi_kernel
+    assert resolved(PI.inverse_kernel) is resolved(resolved(PI.inverse_kernel))
+    assert not isinstance(resolved(pi_kernel), Deferred)
+
+
+def test_kernels_travel_to_other_processes() -> None:
+    kernel = deferred(double)
+    for _ in range(2):  # before it is compiled, and after
+        assert cloudpickle.loads(cloudpickle.dumps(kernel))(3.0) == 6.0
+        np.testing.assert_equal(kernel(3.0), 6.0)
+
+
+def test_without_a_place_for_caches_kernels_are_compiled_all_the_same(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    from numba.core import caching
+
+    def plain(x: float) -> float:
+        return 2.0 * x
+
+    monkeypatch.setattr(caching.CompileResultCacheImpl, "_locator_classes", [])
+    with pytest.raises(RuntimeError, match="no locator"):
+        numba.njit(cache=True)(plain)
+    assert deferred(plain)(3.0) == 6.0

@@ -1,0 +1,171 @@
+"""Processes that work for this one."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import pickle
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from mckibben.errors import DataError
+from mckibben.system.workers import WorkerError, Workers, all_of, in_turn, prepare
+
+
+def square(common: int, item: int, tell: Any) -> int:
+    tell("at it", item)
+    if item < 0:
+        raise DataError("too small", remedy="give more", channel="pressure")
+    if item == 13:
+        os.kill(os.getpid(), signal.SIGKILL)
+    if item > 100:
+        time.sleep(60)
+    return common + item**2
+
+
+class OddError(Exception):
+    """It can be pickled, but not made again."""
+
+    def __init__(self, a: int, *, b: int) -> None:
+        super().__init__(f"{a} {b}")
+
+
+def raise_odd(common: int, item: int, tell: Any) -> None:
+    raise OddError(item, b=2)
+
+
+def test_everything_comes_back_and_is_told() -> None:
+    told: list[Any] = []
+    with Workers(2, 1) as workers:
+        found = {
+            o.index: o.result()
+            for o in workers.results(square, [3, 4, 5], lambda *a: told.append(a))
+        }
+    assert found == {0: 10, 1: 17, 2: 26}
+    assert {item for item in told if len(item) > 1} == {(k, "at it", k + 3) for k in range(3)}
+    assert [item for item in told if len(item) == 1] == [(0,), (1,), (2,)]
+
+
+def test_processes_give_what_this_one_gives() -> None:
+    items = list(range(5))
+    assert all_of(square_of, items, 2) == [o.result() for o in in_turn(square_of, None, items)]
+
+
+def square_of(common: None, item: int, tell: Any) -> int:
+    return item**2
+
+
+def test_errors_arrive_whole() -> None:
+    with Workers(1, 0) as workers:
+        (outcome,) = workers.results(square, [-1])
+    with pytest.raises(DataError, match=r"channel 'pressure': too small\. Remedy: give more"):
+        outcome.result()
+    with Workers(1, 0) as workers:
+        (odd,) = workers.results(raise_odd, [1])
+    with pytest.raises(WorkerError, match="OddError: 1 2"):
+        odd.result()
+    error = DataError("odd", remedy="even", file="a.csv", row=3)
+    assert str(pickle.loads(pickle.dumps(error))) == str(error)
+
+
+def test_a_process_that_dies_takes_its_own_work_only() -> None:
+    with Workers(2, 0) as workers:
+        found = {o.index: o for o in workers.results(square, [1, 13, 2, 3, 4])}
+    assert isinstance(found[1].error, WorkerError)
+    assert [found[k].value for k in (0, 2, 3, 4)] == [1, 4, 9, 16]
+
+
+def test_leaving_ends_them_at_once() -> None:
+    before = set(multiprocessing.active_children())  # joblib's, of other tests
+    with Workers(2, 0) as workers:
+        results = workers.results(square, [2, 200, 300])
+        assert next(results).value == 4
+        started = time.monotonic()
+    assert time.monotonic() - started < 2
+    assert set(multiprocessing.active_children()) <= before
+
+
+def test_a_script_without_a_guard_is_not_run_again(tmp_path: Path) -> None:
+    script = tmp_path / "script.py"
+    script.write_text(
+        "print('run')\n"
+        "from mckibben.system.workers import all_of\n"
+        "from tests.system.test_workers import square_of\n"
+        "print(all_of(square_of, [1, 2, 3], 2))\n"
+    )
+    home = Path(__file__).parent.parent.parent
+    done = subprocess.run(
+        [sys.executable, script],
+        capture_output=True,
+        text=True,
+        check=True,
+        env=os.environ | {"PYTHONPATH": f"{home}:{home / 'src'}"},
+    )
+    assert done.stdout.split("\n") == ["run", "[1, 4, 9]", ""]
+
+
+@pytest.mark.parametrize("method", ["fork", "spawn"])
+def test_a_daemon_does_the_work_itself(method: Any) -> None:
+    prepare()  # a forked process must not take this one's server for its own
+    context = multiprocessing.get_context(method)
+    ours, theirs = context.Pipe()
+    for daemon in (True, False):
+        process = context.Process(target=in_a_child, args=(theirs,), daemon=daemon)
+        process.start()
+        assert ours.poll(60)
+        assert ours.recv() == [0, 1, 4]
+        process.join()
+    ours.close()
+    theirs.close()
+
+
+def in_a_child(link: Any) -> None:
+    link.send(all_of(square_of, [0, 1, 2], 2))
+
+
+def test_numbers_of_processes_are_checked() -> None:
+    with pytest.raises(DataError, match="jobs is 0"):
+        all_of(square_of, [1], 0)
+
+
+def test_they_end_with_the_process_they_work_for() -> None:
+    program = (
+        "from mckibben.system.workers import Workers\n"
+        "from tests.system.test_workers import square\n"
+        "import multiprocessing\n"
+        "with Workers(1, 0) as workers:\n"
+        "    def told(*what):\n"
+        "        if len(what) > 1:\n"
+        "            print(multiprocessing.active_children()[0].pid, flush=True)\n"
+        "    list(workers.results(square, [200], told))\n"
+    )
+    home = Path(__file__).parent.parent.parent
+    started = subprocess.Popen(
+        [sys.executable, "-c", program],
+        stdout=subprocess.PIPE,
+        text=True,
+        env=os.environ | {"PYTHONPATH": f"{home}:{home / 'src'}"},
+    )
+    assert started.stdout is not None
+    worker = int(started.stdout.readline())
+    started.kill()
+    started.wait()
+    started.stdout.close()
+    for _ in range(100):
+        if not alive(worker):
+            break
+        time.sleep(0.05)
+    assert not alive(worker)
+
+
+def alive(pid: int) -> bool:
+    try:
+        return "Z" not in Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0]
+    except OSError:
+        return False

@@ -1,0 +1,150 @@
+"""The templates for authors work as they stand: loaded from their path, registered, checked."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from importlib import import_module
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pytest
+from sklearn.base import clone
+from sklearn.model_selection import cross_val_score
+
+from mckibben import PI, ModelError, Recording, check_block, registry, write
+from mckibben import load as load_model
+from mckibben.cli.main import app
+from mckibben.errors import DataError
+from mckibben.export import export_c
+from mckibben.export.c.building import CompiledModel
+from tests.tools import needs
+
+TEMPLATES = Path(__file__).parents[2] / "docs" / "templates"
+README = (TEMPLATES / "README.md").read_text(encoding="utf-8")
+U = np.interp(np.arange(400), np.arange(0, 400, 37), [0, 4, 1, 3, 2, 5, 0, 2.5, 2, 4.5, 3])
+
+
+@pytest.fixture
+def my_block(monkeypatch: pytest.MonkeyPatch) -> Iterator[ModuleType]:
+    """Register the templates as their README says, from where they lie, and import the block."""
+    lines = re.findall(r'"([\w-]+)": "mckibben\.(\w+)\.[\w.]+:(\w+)"', README)
+    assert {group for _, group, _ in lines} == {"blocks", "estimators"}
+    for kind, group, name in lines:
+        monkeypatch.setitem(registry.PLUGINS[group], kind, f"my_{group[:-1]}:{name}")
+    monkeypatch.syspath_prepend(TEMPLATES)
+    registry._locations.cache_clear()
+    yield import_module("my_block")
+    registry._locations.cache_clear()
+
+
+@pytest.fixture
+def estimator(my_block: ModuleType) -> Any:
+    return registry.load("estimators", "elastic-plastic")
+
+
+def test_template_obeys_the_contract(my_block: ModuleType) -> None:
+    block = my_block.ElasticPlastic.example()
+    for seed in range(5):
+        check_block(block, seed=seed)
+        check_block(block.inverse(), seed=seed)
+
+
+@pytest.mark.parametrize("weight", [-1.5, 0.0, 2.0])
+def test_template_is_a_two_operator_prandtl_ishlinskii_model(
+    my_block: ModuleType, weight: float
+) -> None:
+    model = my_block.ElasticPlastic(4.0, weight, 0.4, (0.0, 5.0))
+    same = PI((0.0, 0.4), (4.0 + weight, -weight), 0.0, (0.0, 5.0))
+    np.testing.assert_allclose(model.simulate(U), same.simulate(U), atol=1e-12)
+    for ends, expected in zip(model.reachable(), same.reachable(), strict=True):
+        np.testing.assert_allclose(ends, expected, atol=1e-12)
+    check_block(model)
+
+
+def test_template_says_why_there_is_no_inverse(my_block: ModuleType) -> None:
+    with pytest.raises(ModelError, match=r"add up to -1.*Remedy:"):
+        my_block.ElasticPlastic(1.0, -2.0, 0.4).inverse()
+    with pytest.raises(ModelError, match=r"threshold.*Remedy:"):
+        my_block.ElasticPlastic(1.0, -2.0, -0.4)
+
+
+@pytest.mark.parametrize("method", ["ls", "pso-ls", "pso"])
+def test_the_estimator_finds_the_block(
+    my_block: ModuleType, estimator: Any, method: str, tmp_path: Path
+) -> None:
+    truth = my_block.ElasticPlastic(4.0, 2.5, 0.4, (0.0, 5.0))
+    recording = Recording({"pressure": U, "displacement": truth.simulate(U)}, 0.01)
+    found = estimator(method=method).fit(recording)
+    assert clone(found).fit(recording).model_ == found.model_
+    error = 1e-9 if method != "pso" else 0.05
+    np.testing.assert_allclose(found.model_.pack(), truth.pack(), atol=error)
+    found.model_.save(tmp_path / "model.json")
+    assert load_model(tmp_path / "model.json") == found.model_
+    check_block(found.model_.inverse())
+    assert cross_val_score(estimator(method="ls"), [recording] * 3, cv=3).min() > 1 - 1e-9
+    with pytest.raises(DataError, match="no channel 'force'"):
+        estimator(output="force").fit(recording)
+
+
+def test_the_estimator_leaves_an_inverse_whatever_the_data(estimator: Any) -> None:
+    rng = np.random.default_rng(0)
+    falling = -3.0 * np.sin(U) + 0.3 * rng.standard_normal(U.size)
+    model = estimator().fit(Recording({"pressure": U, "displacement": falling}, 0.01)).model_
+    model.inverse()
+
+
+def test_the_estimator_is_fitted_by_name(my_block: ModuleType, tmp_path: Path) -> None:
+    truth = my_block.ElasticPlastic.example()
+    recording = Recording({"pressure": U, "displacement": truth.simulate(U)}, 0.01)
+    write(recording, tmp_path / "loop.csv")
+    command = re.search(r"`mckibben (fit \S+) FILE`", README)
+    assert command
+    files = [str(tmp_path / "loop.csv"), "-o", str(tmp_path / "model.json")]
+    app([*command[1].split(), *files], standalone_mode=False)
+    assert type(load_model(tmp_path / "model.json")) is my_block.ElasticPlastic
+
+
+@needs("cc")
+@pytest.mark.parametrize("initial", ["first_sample", "virgin"])
+@pytest.mark.parametrize("inverse", [False, True])
+def test_the_c_is_the_block(
+    my_block: ModuleType, inverse: bool, initial: str, tmp_path: Path
+) -> None:
+    block = my_block.ElasticPlastic(4.0, -1.5, 0.4, (0.0, 5.0), initial)
+    given = U[:, np.newaxis]
+    if inverse:
+        block, given = block.inverse(), block.simulate(given)
+    export_c(block, tmp_path / "c")
+    outputs, statuses = CompiledModel(tmp_path / "c", "model", 1, 1).run(given)
+    assert not statuses.any()
+    np.testing.assert_allclose(outputs, block.simulate(given), rtol=0, atol=1e-12)
+
+
+@needs("cc")
+def test_the_command_finds_nothing_missing(
+    my_block: ModuleType, estimator: Any, capsys: pytest.CaptureFixture[str]
+) -> None:
+    command = re.search(r"mckibben (check-block \S+)$", README, re.M)
+    assert command
+    code = app(command[1].split(), standalone_mode=False)
+    told = capsys.readouterr()
+    absent = [line for line in told.out.splitlines() if line.startswith("missing")]
+    # what is not of the model, but of where the template lies
+    assert [line.split(":")[0].split(maxsplit=1)[1] for line in absent] == ["estimator", "tests"]
+    assert code == 3
+
+
+@pytest.mark.parametrize("name", ["my_block.py", "my_estimator.py"])
+def test_templates_are_short(name: str) -> None:
+    lines = (TEMPLATES / name).read_text(encoding="utf-8").splitlines()
+    taken_out = [line for line in lines if not line.strip().startswith(("# ---", "---"))]
+    assert len(taken_out) <= {"my_block.py": 180, "my_estimator.py": 70}[name]
+
+
+def test_readme_names_files_that_exist() -> None:
+    blocks = TEMPLATES.parents[1] / "src" / "mckibben" / "blocks"
+    for name in re.findall(r"`(\w+(?:\.(?:py|c|h)|/))`", README):
+        assert list(blocks.parent.rglob(name.strip("/"))) or (TEMPLATES / name).exists()

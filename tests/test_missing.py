@@ -1,0 +1,70 @@
+"""What a block lacks is said, all of it; those of the package lack nothing."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+import pytest
+from pydantic.dataclasses import dataclass
+
+import mckibben.missing
+from mckibben import ModelError
+from mckibben.blocks.core.fields import STRICT, Vector
+from mckibben.blocks.memoryless.negative import Negative
+from mckibben.missing import missing
+from mckibben.registry import names
+
+
+@dataclass(frozen=True, config=STRICT)
+class Forgetful(Negative):
+    kind: ClassVar[str] = "forgetful"
+
+    knots: Vector = (1.0, 2.0, 3.0)
+
+    def pack(self) -> Any:
+        return np.zeros(2)
+
+
+def test_all_that_is_missing_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(Path(__file__).parents[1])
+    absent = {
+        found.what: found.said
+        for found in missing("tests.test_missing:Forgetful")
+        if found.state == "missing"
+    }
+    assert '"forgetful": "tests.test_missing:Forgetful"' in absent.pop("registry line")
+    assert "pack" in absent.pop("law: it sizes agree")
+    assert "0 parameters" in absent.pop("law: it simulates many")
+    assert "forgetful.c" in absent.pop("C")
+    assert "forgetful.c" in absent.pop("operation counts")
+    assert "knots" in absent.pop("limits of single precision")
+    assert "knots" in absent.pop("documentation")
+    assert "twins" in absent.pop("tests")
+    assert not absent
+    assert "forgetful" not in names("blocks")
+
+
+@pytest.mark.parametrize("kind", names("blocks"))
+def test_blocks_of_the_package_lack_nothing(kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Laws and compiled C have tests of their own, on more data."""
+    monkeypatch.chdir(Path(__file__).parents[1])
+    monkeypatch.setattr(mckibben.missing, "LAWS", ())
+    monkeypatch.setattr(mckibben.missing, "own_compiler", lambda: None)
+    assert not [found for found in missing(kind) if found.state == "missing"]
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("ip", "no block named 'ip'"),
+        ("mckibben.nowhere:PI", "cannot be imported"),
+        ("mckibben:NoSuch", "cannot be imported"),
+        ("mckibben:load", "is no block"),
+        ("mckibben:Block", "has no .*kind"),
+    ],
+)
+def test_what_is_no_block_is_refused(name: str, words: str) -> None:
+    with pytest.raises(ModelError, match=rf"{words}.*Remedy"):
+        missing(name)

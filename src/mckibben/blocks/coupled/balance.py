@@ -1,0 +1,370 @@
+"""Muscles in parallel under load as a balance of forces that is the minimum of a convex energy.
+
+What a muscle's pressure gives over its effective area holds its load, springs (its own and those that
+couple muscles, which stiffen with whatever schedules them), its rubber's elasticity, friction of the
+braid, relaxation and damping; see `mckibben.blocks.coupled.balance_law` for the equation. A load enters
+once. Springs are symmetric, what rubs and relaxes is not negative, areas outweigh friction, and
+stiffness outweighs what areas lose (`Balance.breaches`): then pressures hold muscles in one place only,
+which is always found, and friction never makes energy.
+
+This block gives pressures for displacements, explicitly: the compensator. Its inverse gives
+displacements for pressures. `mckibben.blocks.coupled.load_estimate` gives loads for both.
+
+The form is this package's own. Friction that breaks away after a travel follows "A Multistate Friction
+Model for the Compensation of the Asymmetric Hysteresis in the Mechanical Response of Pneumatic
+Artificial Muscles"; areas and springs that couple follow what muscles in parallel do (paper A).
+"""
+
+from __future__ import annotations
+
+import warnings
+from typing import Annotated, ClassVar, Self
+
+import numpy as np
+from annotated_types import Gt, Interval
+from pydantic import FiniteFloat
+from pydantic.dataclasses import dataclass
+
+from mckibben.arrays import Array
+from mckibben.blocks.core.block import Kernel
+from mckibben.blocks.core.exportable import Cost
+from mckibben.blocks.core.fields import (
+    STRICT,
+    Channel,
+    Channels,
+    Initial,
+    Rows,
+    Rule,
+    Vector,
+)
+from mckibben.blocks.core.inverse import Invertible
+from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.core.linear_system import newton_cost
+from mckibben.blocks.core.many_channels import ManyChannels
+from mckibben.blocks.core.refusals import explicit_state, needs_sample_time
+from mckibben.blocks.coupled.balance_law import (
+    AT_REST,
+    FROM_REST,
+    IN_TIME,
+    NEARLY,
+    begin,
+    keep,
+    pressed,
+    settle,
+)
+from mckibben.errors import ModelError, ModelWarning
+
+
+@kernel
+def balance_kernel(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
+    """Give pressures; the last state counts samples beyond the range of pressures."""
+    c = coefficients
+    n, n_x = int(c[0]), int(c[1]) + int(c[3])
+    scratch = c[c.size - n * (n + 6) :]
+    y, p, gradient = scratch[:n], scratch[n : 2 * n], scratch[2 * n : 3 * n]
+    tare = state[state.size - 2 - n :]
+    for t in range(inputs.shape[0]):
+        x = inputs[t, n : n + n_x]
+        way = FROM_REST if state[state.size - 2] != 0.0 else IN_TIME
+        amiss = False
+        for j in range(n):
+            y[j] = inputs[t, j] + tare[j]
+        for k in range(n):
+            found = pressed(c, k, state, way, y, x, gradient)
+            p[k] = min(max(found, c[10]), c[11])
+            # a hair beyond is rounding
+            amiss = amiss or abs(p[k] - found) > 1e-9 * (1.0 + abs(found))
+            outputs[t, k] = p[k]
+        keep(c, state, way, y, p)
+        state[state.size - 2] = 0.0
+        if amiss:
+            state[state.size - 1] += 1.0
+
+
+@kernel
+def balance_inverse_kernel(
+    coefficients: Array, state: Array, inputs: Array, outputs: Array
+) -> None:
+    """Give displacements; the last state counts samples that were not solved."""
+    c = coefficients
+    n, n_x = int(c[0]), int(c[1]) + int(c[3])
+    scratch = c[c.size - n * (n + 6) :]
+    y, tare = scratch[:n], state[state.size - 2 - n :]
+    for t in range(inputs.shape[0]):
+        p, x = inputs[t, :n], inputs[t, n : n + n_x]
+        for k in range(n):
+            y[k] = state[k]
+        way = FROM_REST if state[state.size - 2] != 0.0 else IN_TIME
+        left = settle(c, state, way, y, x, p, scratch[2 * n :])
+        keep(c, state, way, y, p)
+        state[state.size - 2] = 0.0
+        for k in range(n):
+            outputs[t, k] = y[k] - tare[k]
+        if not left < NEARLY:
+            state[state.size - 1] += 1.0
+
+
+@dataclass(frozen=True, config=STRICT)
+class Balance(ManyChannels, Invertible):
+    """From displacements of n muscles, and what schedules and loads them, to their pressures.
+
+    Forces are in N, or, of a model that knows no force, in bar on muscle 1's area at rest.
+
+    Parameters
+    ----------
+    springs : sequence of n sequences of float
+        Of every muscle, for every power of what schedules: a constant [N] and the springs to all
+        displacements [N/mm].
+    elasticity : sequence of n sequences of float
+        Coefficients of (y / scale)^2 and up [N].
+    areas : sequence of n sequences of float
+        Coefficients of (y / scale)^0 and up [N/bar]; the first is positive.
+    friction : sequence of n sequences of float
+        Of every muscle, stiffness of its stops [N/mm], not negative.
+    relaxation : sequence of n sequences of float
+        Of every muscle, stiffness of what relaxes [N/mm], not negative.
+    loads : sequence of n sequences of float
+        How much of every load pulls at a muscle, usually 1.
+    damping : sequence of n float
+        Force by velocity [N s/mm], not negative.
+    walls : sequence of n float
+        Stretch of the wall by pressure, which friction feels at held length too [mm/bar].
+    limits : sequence of m float
+        Travel at which every stop breaks away, of pressure above that at which it holds nothing
+        [mm/bar], increasing.
+    grip : float
+        Pressure below zero at which stops hold nothing [bar]: they break away at ``limits (p + grip)``.
+    lags : sequence of float
+        Time constants of what relaxes [s].
+    hull : sequence of n pairs of float
+        Displacements known [mm]; beyond, elasticity and area go on straight.
+    scale : float
+        Of polynomials [mm].
+    degree : int
+        Highest power of what schedules.
+    driven, scheduled, given : sequence of Channel
+        Displacements; what schedules, then the loads; pressures.
+    tare : bool
+        Whether displacements count from where the muscles rested, without pressure, at the start.
+    pressure_range : (float, float), optional
+        Pressures are clipped to it, and said so.
+    """
+
+    kind: ClassVar[str] = "balance"
+    kernel: ClassVar[Kernel] = balance_kernel
+    inverse_kernel: ClassVar[Kernel] = balance_inverse_kernel
+    inverse_path_dependent: ClassVar[bool] = True
+    in_scratch: ClassVar[bool] = True
+    increasing = ("limits",)
+    parameters: ClassVar[tuple[str, ...]] = (
+        *("springs", "elasticity", "areas", "friction", "relaxation", "loads"),
+        *("damping", "walls", "grip"),
+    )
+
+    springs: Rows
+    elasticity: Rows
+    areas: Rows
+    friction: Rows
+    relaxation: Rows
+    loads: Rows
+    damping: Vector
+    walls: Vector
+    limits: Vector
+    grip: FiniteFloat
+    lags: Vector
+    hull: Rows
+    scale: Annotated[FiniteFloat, Gt(0)]
+    degree: Annotated[int, Interval(ge=1, le=4)]
+    driven: Channels
+    scheduled: Channels
+    given: Channels
+    tare: bool = False
+    pressure_range: tuple[FiniteFloat, FiniteFloat] | None = None
+
+    def __post_init__(self) -> None:
+        self.check_channels()
+        n = len(self.driven)
+        n_loads = len(self.loads[0]) if self.loads else 0
+        n_powers = 1 + (len(self.scheduled) - n_loads) * self.degree
+        widths = {
+            "springs": n_powers * (1 + n),
+            "elasticity": len(self.elasticity[0]) if self.elasticity else 0,
+            "areas": max(len(self.areas[0]) if self.areas else 0, 1),
+            "friction": len(self.limits),
+            "relaxation": len(self.lags),
+            "loads": n_loads,
+            "hull": 2,
+        }
+        for name, width in widths.items():
+            table = getattr(self, name)
+            if len(table) != n or any(len(row) != width for row in table):
+                raise ModelError(
+                    f"{name} of {self.kind!r} has rows of {[len(row) for row in table]}. "
+                    f"Remedy: give {n} rows of {width}."
+                )
+        lengths = {"damping": self.damping, "walls": self.walls, "given": self.given}
+        for name, values in lengths.items():
+            if len(values) != n:
+                raise ModelError(
+                    f"{name} of {self.kind!r} has {len(values)} entries. Remedy: give {n}."
+                )
+        for name, positive in (
+            ("limits", self.limits),
+            ("lags", self.lags),
+            ("areas at rest", [row[0] for row in self.areas]),
+        ):
+            if any(not value > 0 for value in positive):
+                raise ModelError(f"{name} of {self.kind!r} are {positive}. Remedy: positive ones.")
+        for name in ("friction", "relaxation"):
+            if any(value < 0 for row in getattr(self, name) for value in row):
+                raise ModelError(
+                    f"{name} of {self.kind!r} has a negative stiffness, which would make energy. "
+                    "Remedy: give none below 0."
+                )
+        if min(*self.damping, *self.walls, self.grip) < 0:
+            raise ModelError(
+                f"damping, walls or grip of {self.kind!r} is negative. Remedy: give none below 0."
+            )
+        if any(not low < high for low, high in self.hull):
+            raise ModelError(f"hull of {self.kind!r} is {self.hull}. Remedy: lower ends first.")
+
+    @property
+    def n_loads(self) -> int:
+        """How many of the scheduling inputs are loads: the last ones."""
+        return len(self.loads[0])
+
+    @property
+    def rate_dependent(self) -> bool:  # type: ignore[override]
+        """Whether anything relaxes or damps."""
+        return bool(self.lags) or any(self.damping)
+
+    @property
+    def n_states(self) -> int:
+        """Displacements, stretches, stops, lags and tare of every muscle; a start, samples amiss."""
+        return len(self.driven) * (3 + len(self.limits) + len(self.lags)) + 2
+
+    @property
+    def n_scratch(self) -> int:
+        """Displacements, pressures, four vectors and a matrix."""
+        n = len(self.driven)
+        return n * (n + 6)
+
+    def coefficients(self, sample_time: float | None) -> Array:
+        """Return what `mckibben.blocks.coupled.balance_law` says.
+
+        Raises
+        ------
+        ModelError
+            Of a model that depends on rate, without a sample time.
+        """
+        step = needs_sample_time(self.kind, sample_time) if self.rate_dependent else np.inf
+        low, high = self.pressure_range or (-np.inf, np.inf)
+        head = [
+            *(len(self.driven), len(self.scheduled) - self.n_loads, self.degree, self.n_loads),
+            *(len(self.limits), len(self.lags), len(self.elasticity[0]), len(self.areas[0])),
+            *(self.scale, self.grip, low, high, 1.0 / step, self.tare),
+        ]
+        lags = np.array(self.lags)
+        decays = np.exp(-step / lags)
+        gains = lags / step * -np.expm1(-step / lags)
+        tables = [self.springs, self.elasticity, self.areas]
+        tables += [self.friction, self.relaxation, self.loads]
+        own = [
+            np.concatenate(
+                [self.hull[k], [self.walls[k], self.damping[k]], *(t[k] for t in tables)]
+            )
+            for k in range(len(self.driven))
+        ]
+        return np.concatenate([head, self.limits, decays, gains, *own])
+
+    def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
+        """Return the state of muscles at rest without pressure, from which they come all at once.
+
+        ``virgin``: already at the first displacements, with friction and all that relaxes unloaded.
+        """
+        start = self.start if initial is None else initial
+        if not isinstance(start, str):
+            return explicit_state(self, start)
+        c, state, scratch = self._rested(first)
+        if start == "virgin":
+            n = len(self.driven)
+            y, p = first[:n] + state[-2 - n : -2], np.empty(n)
+            for k in range(n):
+                p[k] = pressed(c, k, state, AT_REST, y, first[n:], scratch[:n])
+            keep(c, state, AT_REST, y, np.clip(p, c[10], c[11]))
+            state[-2] = 0.0
+        return state
+
+    def inverse_start(self, first: Array, start: Rule) -> Array:
+        """Return the same for the first pressures."""
+        c, state, scratch = self._rested(first)
+        if start == "virgin":
+            n = len(self.driven)
+            y, p = state[:n].copy(), np.ascontiguousarray(first[:n])
+            settle(c, state, AT_REST, y, first[n:], p, scratch)
+            keep(c, state, AT_REST, y, p)
+            state[-2] = 0.0
+        return state
+
+    def _rested(self, first: Array) -> tuple[Array, Array, Array]:
+        """Return coefficients, the state without pressure, and scratch."""
+        n = len(self.driven)
+        c, state = self.coefficients(1.0), np.zeros(self.n_states)
+        scratch = np.zeros(self.n_scratch)
+        begin(c, state, first[n:], scratch[:n], scratch[n:])
+        return c, state, scratch
+
+    def report(self, state: Array) -> None:
+        """Warn of references that would need pressures out of range."""
+        if state[-1] > 0:
+            warnings.warn(
+                f"{int(state[-1])} samples need {self.given[0].name} beyond {self.pressure_range} "
+                f"{self.given[0].unit} and were clipped there",
+                ModelWarning,
+                stacklevel=4,
+            )
+
+    def inverse_complaint(self, state: Array) -> str:
+        """Tell of pressures for which no equilibrium was found."""
+        if not state[-1] > 0:
+            return ""
+        return (
+            f"{self.kind!r} found no equilibrium in {int(state[-1])} samples: the model was not made "
+            "for such pressures"
+        )
+
+    def cost(self, sample_time: float | None) -> Cost:
+        """Return about six operations a number, for friction is looked at again for its root."""
+        operations = 6 * self.c_numbers(sample_time).size
+        return Cost(operations, 20 * operations)
+
+    def inverse_cost(self, sample_time: float | None) -> Cost:
+        """Return what steps of Newton's method cost."""
+        return newton_cost(4 * self.c_numbers(sample_time).size + len(self.driven) ** 3)
+
+    def c_numbers(self, sample_time: float | None) -> Array:
+        """Return what the kernels read."""
+        return self.coefficients(sample_time)
+
+    @classmethod
+    def example(cls) -> Self:
+        """Return two muscles beside an extensor, one of them under a load."""
+        return cls(
+            springs=((0.0, 14.0, -2.0, -3.0, 1.0, 0.4), (0.0, -2.0, 16.0, -3.0, 0.4, 1.2)),
+            elasticity=((6.0, 4.0), (3.0, 8.0)),
+            areas=((60.0, -25.0, -6.0), (66.0, -20.0, -8.0)),
+            friction=((3.0, 1.5), (2.5, 2.0)),
+            relaxation=((1.0, 0.6), (0.8, 0.5)),
+            loads=((1.0,), (0.0,)),
+            damping=(0.1, 0.05),
+            walls=(0.05, 0.1),
+            limits=(0.5, 2.0),
+            grip=0.5,
+            lags=(0.8, 12.0),
+            hull=((-20.0, 50.0), (-20.0, 50.0)),
+            scale=50.0,
+            degree=1,
+            driven=tuple(Channel(f"displacement_{k}", "mm") for k in (1, 2)),
+            scheduled=(Channel("pressure_extensor", "bar"), Channel("force", "N")),
+            given=tuple(Channel(f"pressure_{k}", "bar") for k in (1, 2)),
+        )

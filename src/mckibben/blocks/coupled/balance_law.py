@@ -1,0 +1,309 @@
+"""What holds in every sample of a balance of forces: its terms, and its two solutions.
+
+    p_k A_k(y_k) = loads + S_k(x) (1, y) + E_k(y_k) + sum_m h_km s_km + sum_l kappa_kl q_kl + d_k y_k'
+
+Of muscle k: stops s_m follow the stretch z = y + w p of its wall up to r_m (p + p0) either way; q_l,
+what a lag is behind, relaxes with its time constant. Pressures follow from displacements muscle by
+muscle; displacements from pressures as the minimum of a convex energy, by Newton's method with a search
+along every step.
+
+Coefficients: the head, r (m), decays and gains of the lags (L each), then of every muscle: lowest and
+highest displacement known, w, d, springs (powers of what schedules by 1 + n), elasticity, area,
+friction (m), relaxation (L), loads. State: y (n), z (n), stops (n by m), lags (n by L), the tare (n),
+whether nothing came before, samples amiss.
+"""
+
+from __future__ import annotations
+
+from mckibben.arrays import Array
+from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.core.linear_system import eliminate
+
+HEAD = 14
+"""n, schedules, degree, loads, stops, lags, elastic terms, area's terms, scale, p0, lowest and highest
+pressure, samples a second, tare."""
+
+MOST_STEPS, MOST_SEARCHED = 60, 25
+"""Of Newton's method, and along each step."""
+
+BALANCED, NEARLY = 2e-15, 1e-9
+"""Residual, relative to the forces, that is an equilibrium, and that is one but for rounding."""
+
+LEAST_AREA = 0.01
+"""Smallest area, relative to that at rest: a muscle that is as short as it gets pulls no more."""
+
+AT_REST, FROM_REST, IN_TIME = 0, 1, 2
+"""Ways to a sample: without friction and lags; all at once, before anything relaxes or damps; in the
+sample time."""
+
+
+@kernel
+def elastic(c: Array, own: int, k: int, y: Array, x: Array, gradient: Array) -> float:
+    """Return springs, elasticity and loads of muscle k, and fill their gradient by y."""
+    n, n_x, degree, n_loads = int(c[0]), int(c[1]), int(c[2]), int(c[3])
+    n_e, scale = int(c[6]), c[8]
+    for j in range(n):
+        gradient[j] = 0.0
+    force = 0.0
+    place = own + 4
+    for q in range(1 + n_x * degree):
+        power = 1.0
+        if q > 0:
+            for _ in range((q - 1) % degree + 1):
+                power *= x[(q - 1) // degree]
+        force += power * c[place]
+        for j in range(n):
+            spring = power * c[place + 1 + j]
+            force += spring * y[j]
+            gradient[j] += spring
+        place += 1 + n
+    inside = min(max(y[k], c[own]), c[own + 1])
+    u = inside / scale
+    power = u
+    value, slope = 0.0, 0.0
+    for i in range(n_e):
+        slope += (i + 2) * c[place + i] * power
+        power *= u
+        value += c[place + i] * power
+    slope /= scale
+    force += value + slope * (y[k] - inside)
+    gradient[k] += slope
+    place = own + muscle_width(c) - n_loads
+    for i in range(n_loads):
+        force += c[place + i] * x[n_x + i]
+    return force
+
+
+@kernel
+def muscle_width(c: Array) -> int:
+    """Return how many coefficients a muscle has."""
+    springs = (1 + int(c[1]) * int(c[2])) * (1 + int(c[0]))
+    return 4 + springs + int(c[6]) + int(c[7]) + int(c[4]) + int(c[5]) + int(c[3])
+
+
+@kernel
+def muscles(c: Array) -> int:
+    """Return where the coefficients of the first muscle are."""
+    return HEAD + int(c[4]) + 2 * int(c[5])
+
+
+@kernel
+def area(c: Array, own: int, y: float) -> tuple[float, float]:
+    """Return a muscle's effective area at y, and its slope; beyond what is known it goes on straight."""
+    place = own + muscle_width(c) - int(c[3]) - int(c[5]) - int(c[4]) - int(c[7])
+    inside = min(max(y, c[own]), c[own + 1])
+    u = inside / c[8]
+    value, slope = 0.0, 0.0
+    for i in range(int(c[7]) - 1, -1, -1):
+        slope = slope * u + value
+        value = value * u + c[place + i]
+    slope /= c[8]
+    value += slope * (y - inside)
+    least = LEAST_AREA * c[place]
+    return (value, slope) if value > least else (least, 0.0)
+
+
+@kernel
+def rubbed(
+    c: Array, own: int, k: int, state: Array, way: int, y: float, p: float
+) -> tuple[float, float, float]:
+    """Return the friction of muscle k at a displacement and a pressure, and its slopes by both."""
+    n, m = int(c[0]), int(c[4])
+    if way == AT_REST:
+        return 0.0, 0.0, 0.0
+    place = own + muscle_width(c) - int(c[3]) - int(c[5]) - m
+    wall, grown = c[own + 2], max(p + c[9], 0.0)
+    moved = y + wall * p - state[n + k]
+    force, by_y, by_p = 0.0, 0.0, 0.0
+    for i in range(m):
+        h, limit = c[place + i], c[HEAD + i] * grown
+        s = state[2 * n + k * m + i] + moved
+        if s > limit:
+            force += h * limit
+            by_p += h * c[HEAD + i]
+        elif s < -limit:
+            force -= h * limit
+            by_p -= h * c[HEAD + i]
+        else:
+            force += h * s
+            by_y += h
+            by_p += h * wall
+    return force, by_y, by_p
+
+
+@kernel
+def lagging(c: Array, own: int, k: int, state: Array, way: int, y: float) -> tuple[float, float]:
+    """Return relaxation and damping of muscle k at a displacement, and their slope by it."""
+    if way == AT_REST:
+        return 0.0, 0.0
+    n, m, n_l = int(c[0]), int(c[4]), int(c[5])
+    place = own + muscle_width(c) - int(c[3]) - n_l
+    moved = y - state[k]
+    slope = c[own + 3] * c[12] if way == IN_TIME else 0.0
+    force = slope * moved
+    for i in range(n_l):
+        gain = c[HEAD + m + n_l + i] if way == IN_TIME else 1.0
+        q = c[HEAD + m + i] * state[2 * n + n * m + k * n_l + i] + gain * moved
+        force += c[place + i] * q
+        slope += c[place + i] * gain
+    return force, slope
+
+
+@kernel
+def keep(c: Array, state: Array, way: int, y: Array, p: Array) -> None:
+    """Bring the state to where the muscles are now."""
+    n, m, n_l = int(c[0]), int(c[4]), int(c[5])
+    for k in range(n):
+        own = muscles(c) + k * muscle_width(c)
+        z = y[k] + c[own + 2] * p[k]
+        grown = max(p[k] + c[9], 0.0) if way != AT_REST else 0.0
+        for i in range(m):
+            s = state[2 * n + k * m + i] + z - state[n + k]
+            limit = c[HEAD + i] * grown
+            state[2 * n + k * m + i] = min(max(s, -limit), limit)
+        for i in range(n_l):
+            place = 2 * n + n * m + k * n_l + i
+            gain = c[HEAD + m + n_l + i] if way == IN_TIME else 1.0
+            if way == AT_REST:
+                state[place] = 0.0
+            else:
+                state[place] = c[HEAD + m + i] * state[place] + gain * (y[k] - state[k])
+        state[k] = y[k]
+        state[n + k] = z
+
+
+@kernel
+def pressed(c: Array, k: int, state: Array, way: int, y: Array, x: Array, gradient: Array) -> float:
+    """Return the pressure of muscle k that balances it where all muscles are.
+
+    It is the one root of a function that rises piecewise straight, since areas are larger than what
+    friction grows with pressure.
+    """
+    own = muscles(c) + k * muscle_width(c)
+    held = elastic(c, own, k, y, x, gradient) + lagging(c, own, k, state, way, y[k])[0]
+    a = area(c, own, y[k])[0]
+    low, high = -1e300, 1e300
+    p = held / a
+    for _ in range(MOST_STEPS):
+        force, _, by_p = rubbed(c, own, k, state, way, y[k], p)
+        excess = p * a - held - force
+        if abs(excess) <= BALANCED * (abs(p * a) + abs(held) + abs(force)):
+            break
+        if excess > 0.0:
+            high = p
+        else:
+            low = p
+        slope = a - by_p
+        moved = p - excess / slope if slope > 0.0 else p - excess / a
+        if low < moved < high:
+            p = moved
+        elif low > -1e300 and high < 1e300:
+            middle = 0.5 * (low + high)
+            if middle in (low, high):
+                break
+            p = middle
+        else:
+            p -= excess / a
+    return p
+
+
+@kernel
+def unbalanced(
+    c: Array,
+    state: Array,
+    way: int,
+    y: Array,
+    x: Array,
+    p: Array,
+    residual: Array,
+    matrix: Array,
+    gradient: Array,
+) -> float:
+    """Fill what every muscle's forces lack to a balance, and its slopes; return the largest share."""
+    n = int(c[0])
+    worst = 0.0
+    for k in range(n):
+        own = muscles(c) + k * muscle_width(c)
+        force = elastic(c, own, k, y, x, gradient)
+        friction, by_y, _ = rubbed(c, own, k, state, way, y[k], p[k])
+        behind, by_moving = lagging(c, own, k, state, way, y[k])
+        a, a_slope = area(c, own, y[k])
+        residual[k] = force + friction + behind - p[k] * a
+        for j in range(n):
+            matrix[k, j] = gradient[j]
+        matrix[k, k] += by_y + by_moving - p[k] * a_slope
+        size = abs(force) + abs(friction) + abs(behind) + abs(p[k] * a)
+        for j in range(n):
+            size += abs(gradient[j] * y[j])
+        if size > 0.0:
+            worst = max(worst, abs(residual[k]) / size)
+    return worst
+
+
+@kernel
+def settle(c: Array, state: Array, way: int, y: Array, x: Array, p: Array, scratch: Array) -> float:
+    """Move the displacements to where pressures hold them; return what is left of the residual.
+
+    ``scratch`` has n n + 4 n numbers.
+    """
+    n = int(c[0])
+    vectors = scratch[: 4 * n].reshape((4, n))
+    residual, step, start, gradient = vectors[0], vectors[1], vectors[2], vectors[3]
+    matrix = scratch[4 * n : 4 * n + n * n].reshape((n, n))
+    left = unbalanced(c, state, way, y, x, p, residual, matrix, gradient)
+    before = 2.0 * left + 1.0
+    for _ in range(MOST_STEPS):
+        if left <= BALANCED or (left >= before and left < NEARLY):
+            break
+        before = left
+        for k in range(n):
+            step[k] = -residual[k]
+            start[k] = y[k]
+        eliminate(matrix, step)
+        down = 0.0
+        for k in range(n):
+            down += residual[k] * step[k]
+        if not down < 0.0:  # where the energy is not convex: straight down
+            down = 0.0
+            for k in range(n):
+                step[k] = -residual[k]
+                down -= residual[k] * residual[k]
+        low, high, share = 0.0, -1.0, 1.0
+        low_rate, high_rate = down, 0.0
+        for _ in range(MOST_SEARCHED):
+            for k in range(n):
+                y[k] = start[k] + share * step[k]
+            left = unbalanced(c, state, way, y, x, p, residual, matrix, gradient)
+            rate = 0.0
+            for k in range(n):
+                rate += residual[k] * step[k]
+            if left <= BALANCED or abs(rate) <= 0.7 * abs(down):
+                break
+            if rate > 0.0:
+                high, high_rate = share, rate
+            else:
+                low, low_rate = share, rate
+            if high < 0.0:
+                share *= 2.0
+            else:  # where the rate would vanish were it straight, but well inside
+                width = high - low
+                share = low + width * min(max(-low_rate / (high_rate - low_rate), 0.1), 0.9)
+    return left
+
+
+@kernel
+def begin(c: Array, state: Array, x: Array, p: Array, scratch: Array) -> None:
+    """Rest without pressure, and take the tare there; nothing has come before the first sample."""
+    n, m, n_l = int(c[0]), int(c[4]), int(c[5])
+    for i in range(state.size):
+        state[i] = 0.0
+    y = scratch[:n]
+    for k in range(n):
+        y[k] = 0.0
+        p[k] = 0.0
+    settle(c, state, AT_REST, y, x, p, scratch[n:])
+    keep(c, state, AT_REST, y, p)
+    if c[13] != 0.0:
+        for k in range(n):
+            state[2 * n + n * m + n * n_l + k] = y[k]
+    state[state.size - 2] = 1.0

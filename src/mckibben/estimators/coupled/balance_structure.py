@@ -1,0 +1,290 @@
+"""What of a balance of forces is fixed, what is free, and what physics asks of it.
+
+Coefficients are those of the block, muscle by muscle, then the grip and the lags' logarithms. What is
+free is fewer numbers, of which they are an affine function: springs between two muscles are one number,
+and for every muscle one more says how much of its springs makes up for elasticity and area that soften.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mckibben.arrays import Array
+from mckibben.blocks.core.fields import Channel, rows, vector
+from mckibben.blocks.coupled.balance import Balance
+
+GRID = 13
+"""Places along what is known of every muscle's displacement where conditions are asked for."""
+
+LEAST_LEFT = 0.05
+"""Area that friction has to leave, relative to that at rest."""
+
+LEAST_STIFF = 1e-3
+"""Stiffness that has to be left, relative to the force of the highest pressure over the stroke."""
+
+
+@dataclass(frozen=True)
+class Structure:
+    """Sizes and settings of a balance.
+
+    Parameters
+    ----------
+    driven, scheduled, loaded, given : tuple of Channel
+        Displacements, what schedules, loads, and pressures.
+    degree, n_elastic, n_area : int
+        Highest power of what schedules; elastic terms; area's terms.
+    limits, lags : arrays
+        [mm/bar], [s].
+    hull : array, shape (n, 2)
+        Displacements known [mm].
+    scheduled_hull : array, shape (s, 2)
+        What schedules, lowest and highest.
+    highest : float
+        Pressure [bar].
+    tare : bool
+        Whether displacements count from rest at the start.
+    lag_range : (float, float)
+        Shortest and longest time constant that the recordings can tell [s].
+    """
+
+    driven: tuple[Channel, ...]
+    scheduled: tuple[Channel, ...]
+    loaded: tuple[Channel, ...]
+    given: tuple[Channel, ...]
+    degree: int
+    n_elastic: int
+    n_area: int
+    limits: Array
+    lags: Array
+    hull: Array
+    scheduled_hull: Array
+    highest: float
+    tare: bool
+    lag_range: tuple[float, float]
+
+    @property
+    def n(self) -> int:
+        """Muscles."""
+        return len(self.driven)
+
+    @property
+    def scale(self) -> float:
+        """Largest displacement known [mm]."""
+        return float(np.abs(self.hull).max())
+
+    @cached_property
+    def slices(self) -> dict[str, slice]:
+        """Where the coefficients of a muscle are."""
+        widths = {
+            "hull": 2,
+            "wall": 1,
+            "damping": 1,
+            "springs": (1 + len(self.scheduled) * self.degree) * (1 + self.n),
+            "elasticity": self.n_elastic,
+            "areas": self.n_area,
+            "friction": self.limits.size,
+            "relaxation": self.lags.size,
+            "loads": len(self.loaded),
+        }
+        ends = np.cumsum([0, *widths.values()]).tolist()
+        return {
+            name: slice(first, last)
+            for name, first, last in zip(widths, ends[:-1], ends[1:], strict=True)
+        }
+
+    @property
+    def width(self) -> int:
+        """Coefficients of a muscle."""
+        return self.slices["loads"].stop
+
+    def places(self, name: str, k: int) -> NDArray[np.intp]:
+        """Return where coefficients of a muscle are among all."""
+        part = self.slices[name]
+        return np.arange(part.start, part.stop) + k * self.width
+
+    @property
+    def grip(self) -> int:
+        """Place of the grip among coefficients; those of the lags follow."""
+        return self.n * self.width
+
+    @property
+    def timing(self) -> slice:
+        """Places of the lags' logarithms."""
+        return slice(self.grip + 1, self.grip + 1 + self.lags.size)
+
+    @property
+    def size(self) -> int:
+        """How many coefficients there are."""
+        return self.grip + 1 + self.lags.size
+
+    @property
+    def start(self) -> Array:
+        """Coefficients that are not found by least squares: areas at rest or loads 1, all others 0."""
+        values = np.zeros(self.size)
+        values[self.timing] = np.log(self.lags)
+        for k in range(self.n):
+            values[self.places("hull", k)] = self.hull[k]
+            values[self.places("areas", k)[0]] = 1.0
+            values[self.places("loads", k)] = 1.0
+        return values
+
+    def block(self, values: Array, pressure_range: tuple[float, float] | None = None) -> Balance:
+        """Return the balance of some coefficients."""
+        table = values[: self.grip].reshape(self.n, self.width)
+        part = {name: table[:, place] for name, place in self.slices.items()}
+        return Balance(
+            springs=rows(part["springs"]),
+            elasticity=rows(part["elasticity"]),
+            areas=rows(part["areas"]),
+            friction=rows(np.maximum(part["friction"], 0.0)),
+            relaxation=rows(np.maximum(part["relaxation"], 0.0)),
+            loads=rows(part["loads"]),
+            damping=vector(np.maximum(part["damping"][:, 0], 0.0)),
+            walls=vector(np.maximum(part["wall"][:, 0], 0.0)),
+            limits=vector(self.limits),
+            grip=float(max(values[self.grip], 0.0)),
+            lags=vector(np.exp(values[self.timing])),
+            hull=rows(part["hull"]),
+            scale=self.scale,
+            degree=self.degree,
+            driven=self.driven,
+            scheduled=(*self.scheduled, *self.loaded),
+            given=self.given,
+            tare=self.tare,
+            pressure_range=pressure_range,
+        )
+
+    def free(self, *, moving: bool) -> Array:
+        """Return how coefficients follow from what is free, shape (coefficients, free).
+
+        ``moving`` frees walls, grip, and the areas at rest of muscles after the first, or of all where
+        a load is measured, too.
+        """
+        n_all = self.size
+        columns: list[list[int]] = []
+        for k in range(self.n):
+            for name in ("elasticity", "friction", "relaxation", "damping"):
+                columns += [[place] for place in self.places(name, k).tolist()]
+            areas = self.places("areas", k).tolist()
+            at_rest = bool(self.loaded) or (moving and k > 0)
+            columns += [[place] for place in (areas if at_rest else areas[1:])]
+            if moving:
+                columns += [[place] for place in self.places("wall", k).tolist()]
+        for q in range(1 + len(self.scheduled) * self.degree):
+            for k in range(self.n):
+                columns.append([self._spring(q, k, -1)])
+                columns += [
+                    sorted({self._spring(q, k, j), self._spring(q, j, k)}) for j in range(k, self.n)
+                ]
+        if moving:
+            columns += [[place] for place in range(self.grip, self.size)]
+        mix = np.zeros((n_all, len(columns)))
+        for number, places in enumerate(columns):
+            mix[places, number] = 1.0
+        return mix
+
+    def _spring(self, q: int, k: int, j: int) -> int:
+        """Return the place of a spring between two muscles, or, of j = -1, of muscle k's constant."""
+        return int(self.places("springs", k)[q * (1 + self.n) + 1 + j])
+
+    def conditions(self, values: Array) -> tuple[Array, Array]:
+        """Return what is asked of coefficients and of the springs that make up, as sides and least.
+
+        Shapes (m, coefficients + n) and (m,): sides @ [coefficients, springs] >= least. What friction
+        at held length takes of an area is taken where the walls are now.
+        """
+        n_all = self.size
+        sides: list[Array] = []
+        least: list[float] = []
+        unit = float(np.max([values[self.places("areas", k)[0]] for k in range(self.n)]))
+        stiff = LEAST_STIFF * unit * self.highest / self.scale
+
+        def ask(entries: dict[int, float], bound: float) -> None:
+            row = np.zeros(n_all + self.n)
+            row[list(entries)] = list(entries.values())
+            sides.append(row)
+            least.append(bound)
+
+        ask({self.grip: 1.0}, 0.0)
+        ask({self.grip: -1.0}, -4.0 * self.highest)
+        for place in range(self.timing.start, self.timing.stop):
+            ask({place: 1.0}, float(np.log(self.lag_range[0])))
+            ask({place: -1.0}, -float(np.log(self.lag_range[1])))
+        for k in range(self.n):
+            for name in ("friction", "relaxation", "damping", "wall"):
+                for place in self.places(name, k).tolist():
+                    ask({place: 1.0}, 0.0)
+            ask({int(self.places("wall", k)[0]): -1.0}, -0.1 * self.scale / self.highest)
+            areas, friction = self.places("areas", k), self.places("friction", k)
+            ask({int(areas[0]): 1.0}, 0.1 * unit)
+            ask({n_all + k: 1.0}, 0.0)
+            wall = float(values[self.places("wall", k)[0]])
+            taken = dict(zip(friction.tolist(), (-(self.limits + wall)).tolist(), strict=True))
+            for u in np.linspace(self.hull[k, 0], self.hull[k, 1], GRID) / self.scale:
+                area = dict(
+                    zip(areas.tolist(), (u ** np.arange(self.n_area)).tolist(), strict=True)
+                )
+                area[int(areas[0])] -= LEAST_LEFT
+                ask(area | taken, 0.0)
+                powers = np.arange(2, 2 + self.n_elastic)
+                stiffness = powers * u ** (powers - 1) / self.scale
+                places = self.places("elasticity", k).tolist()
+                elastic = dict(zip(places, stiffness.tolist(), strict=True))
+                order = np.arange(1, self.n_area)
+                softening = order * u ** (order - 1) / self.scale
+                for p in (0.0, self.highest):
+                    lost = dict(zip(areas[1:].tolist(), (-p * softening).tolist(), strict=True))
+                    ask(elastic | lost | {n_all + k: 1.0}, stiff)
+            for j in range(k):  # a first idea of what makes springs positive
+                for sign in (1.0, -1.0):
+                    direction = np.zeros(self.n)
+                    direction[[k, j]] = 1.0, sign
+                    for x in self.levels():
+                        row, bound = self.spring_condition(x, direction, stiff)
+                        sides.append(row)
+                        least.append(bound)
+            for x in self.levels():
+                row, bound = self.spring_condition(x, np.eye(self.n)[k], stiff)
+                sides.append(row)
+                least.append(bound)
+        return np.array(sides), np.array(least)
+
+    def levels(self) -> list[Array]:
+        """Return what schedules, at all its ends, and between where its powers bend."""
+        share = (0.0, 1.0) if self.degree == 1 else (0.0, 0.25, 0.5, 0.75, 1.0)
+        low, high = self.scheduled_hull.T if len(self.scheduled) else (np.zeros(0), np.zeros(0))
+        return [low + np.array(s) * (high - low) for s in product(share, repeat=len(low))]
+
+    def powers(self, x: Array) -> Array:
+        """Return the powers of what schedules, as springs are multiplied by."""
+        return np.array([1.0, *(v**d for v in x for d in range(1, self.degree + 1))])
+
+    def spring_condition(self, x: Array, direction: Array, stiff: float) -> tuple[Array, float]:
+        """Return that springs less what makes up are stiff along a direction: a side and its least."""
+        n_all = self.size
+        row = np.zeros(n_all + self.n)
+        for q, power in enumerate(self.powers(x)):
+            for k in range(self.n):
+                for j in range(self.n):
+                    row[self._spring(q, k, j)] += power * direction[k] * direction[j]
+        row[n_all:] -= direction**2
+        return row, stiff * float(direction @ direction)
+
+    def softest(self, values: Array, made_up: Array) -> tuple[Array, Array, float]:
+        """Return where springs, less what makes up, are softest: level, direction and stiffness."""
+        found: list[tuple[float, Array, Array]] = []
+        for x in self.levels():
+            matrix = -np.diag(made_up)
+            for q, power in enumerate(self.powers(x)):
+                for k in range(self.n):
+                    for j in range(self.n):
+                        matrix[k, j] += power * values[self._spring(q, k, j)]
+            sizes, directions = np.linalg.eigh(0.5 * (matrix + matrix.T))
+            found.append((float(sizes[0]), x, directions[:, 0]))
+        stiffness, x, direction = min(found, key=lambda one: one[0])
+        return x, direction, stiffness

@@ -132,6 +132,7 @@ class FuzzyNetwork(Stateless, ManyChannels, Invertible):
     inverse_kernel: ClassVar[Kernel] = fuzzy_network_inverse_kernel
     inverse_path_dependent: ClassVar[bool] = True
     in_scratch: ClassVar[bool] = True
+    of_local_rules: ClassVar[bool] = True
     parameters: ClassVar[tuple[str, ...]] = ("centres", "widths", "consequents")
 
     centres: Rows

@@ -112,23 +112,29 @@ def test_errors_inside_and_outside_are_told_apart() -> None:
     assert found is not None
     far = found.outside[0]
     errors = np.where(far, 6.0, 2.0)[:, np.newaxis] * np.ones(2)
-    told = found.of(errors, [np.ones(TIME.size, dtype=bool)], "mm")
+    told = found.of(errors, [np.ones(TIME.size, dtype=bool)], 4.0, "mm")
     assert told.share == pytest.approx(far.mean())
     assert (told.inside, told.outside, told.ratio) == pytest.approx((2.0, 6.0, 3.0))
+    assert told.ratio_to_fitted == pytest.approx(1.5)
     assert told.trusted is False
-    alone = found.of(errors[far], [far], "mm")
+    alone = found.of(errors[far], [far])
     assert (alone.share, alone.inside, alone.ratio, alone.trusted) == (1.0, None, None, None)
 
 
 @pytest.mark.parametrize(
     ("given", "trusted", "said"),
     [
-        (OffTraining("4 patterns", 0.1, 0.8, 1.0, 9.0, "mm"), False, "9.0 times that inside"),
-        (OffTraining("4 patterns", 0.1, 0.8, 1.0, 1.2, "mm"), True, "it holds there too"),
-        (OffTraining("4 patterns", 0.1, 0.0, 1.0, None, "mm"), None, "nothing here tells"),
-        (OffTraining("1 run", 0.9, 0.0, 1.0, None, "mm"), True, "1 run that covers 90 %"),
-        (OffTraining("9 runs", 0.9, 0.001, 1.0, None, "mm"), True, "0.10 % of the test samples"),
-        (OffTraining("9 runs", 0.2, 1.0, None, 7.0, "mm"), None, "off by 7.00 mm RMSE"),
+        (OffTraining("4 patterns", 0.1, 0.8, 1.0, 9.0), False, "9.0 times its error inside (1.00)"),
+        (OffTraining("4 patterns", 0.1, 0.8, 1.0, 1.2, 1.1), True, "it holds there too"),
+        (
+            OffTraining("4 patterns", 0.1, 0.8, 1.0, 1.2, 0.1),
+            False,
+            "12 times its error on the data fitted",
+        ),
+        (OffTraining("4 patterns", 0.1, 0.0, 1.0, None), None, "nothing here tells"),
+        (OffTraining("1 run", 0.9, 0.0, 1.0, None), True, "1 run that covers 90 %"),
+        (OffTraining("9 runs", 0.9, 0.001, 1.0, None), True, "0.10 % of the test samples"),
+        (OffTraining("9 runs", 0.2, 1.0, None, 7.0, None, "mm"), None, "off by 7.00 mm RMSE"),
     ],
 )
 def test_what_is_said_follows_from_the_figures(

@@ -52,7 +52,7 @@ FEWEST = 20
 """Samples that an error is told of."""
 
 LARGER = 1.5
-"""Error outside over error inside from which a model is not to be trusted outside."""
+"""Error outside over error inside, or on the data fitted, from which a model is not to be trusted."""
 
 
 @dataclass(frozen=True)
@@ -70,6 +70,9 @@ class OffTraining:
     inside, outside : float or None
         RMSE on the test samples there, of several outputs the mean of theirs; None of fewer than
         `FEWEST`.
+    fitted : float or None
+        The same on the data fitted. A memory that came to a sample from elsewhere is wrong inside too,
+        which this tells.
     unit : str
         Of the outputs.
     """
@@ -79,14 +82,21 @@ class OffTraining:
     share: float
     inside: float | None
     outside: float | None
+    fitted: float | None = None
     unit: str = ""
 
     @property
     def ratio(self) -> float | None:
         """Error outside over error inside, or None where one of them is not known."""
-        if self.inside is None or self.outside is None or not self.inside > 0:
-            return None
-        return self.outside / self.inside
+        return self._times(self.inside)
+
+    @property
+    def ratio_to_fitted(self) -> float | None:
+        """Error outside over that on the data fitted, or None where one of them is not known."""
+        return self._times(self.fitted)
+
+    def _times(self, other: float | None) -> float | None:
+        return None if self.outside is None or not other else self.outside / other
 
     @property
     def trusted(self) -> bool | None:
@@ -96,7 +106,8 @@ class OffTraining:
         """
         if self.outside is None:
             return True if self.covered >= COVERED else None
-        return None if self.ratio is None else self.ratio < LARGER
+        ratios = [ratio for ratio in (self.ratio, self.ratio_to_fitted) if ratio is not None]
+        return max(ratios) < LARGER if ratios else None
 
     def __str__(self) -> str:
         """Return it as a sentence without its end.
@@ -118,20 +129,32 @@ class OffTraining:
             )
             return f"{begin}{where} outside of them, so {end}"
         begin += f"on {share} % of the test samples it is outside of them, "
-        off = numeral(self.outside, 3)
-        if self.ratio is None:
-            return f"{begin}where it is off by {off} {self.unit}".rstrip() + " RMSE"
-        against = f"{off} against {numeral(self.inside, 3)} {self.unit}".rstrip()
-        begin += f"where its error is {numeral(self.ratio, 2)} times that inside ({against} RMSE): "
-        return begin + (
+        begin += f"where it is off by {numeral(self.outside, 3)} {self.unit}".rstrip() + " RMSE"
+        sides = (
+            (self.ratio, "inside", self.inside),
+            (self.ratio_to_fitted, "on the data fitted", self.fitted),
+        )
+        times = [
+            f"{numeral(ratio, 2)} times its error {where} ({numeral(error, 3)})"
+            for ratio, where, error in sides
+            if ratio is not None
+        ]
+        if not times:
+            return begin
+        return f"{begin}, {' and '.join(times)}: " + (
             "it holds there too"
             if self.trusted
-            else "do not trust it there, or train on recordings in which inputs move so together"
+            else "do not trust it there beyond that, or train on recordings in which inputs move so "
+            "together"
         )
 
     def to_dict(self) -> dict[str, Any]:
         """Return it for JSON."""
-        return asdict(self) | {"ratio": self.ratio, "trusted": self.trusted}
+        return asdict(self) | {
+            "ratio": self.ratio,
+            "ratio_to_fitted": self.ratio_to_fitted,
+            "trusted": self.trusted,
+        }
 
 
 @dataclass(frozen=True)
@@ -168,7 +191,13 @@ class Coverage:
         n, what = (self.n_runs, "run") if self.n_patterns is None else (self.n_patterns, "pattern")
         return f"{n} {what}{'' if n == 1 else 's'}"
 
-    def of(self, errors: Array, rows: Sequence[Mask], unit: str = "") -> OffTraining:
+    def of(
+        self,
+        errors: Array,
+        rows: Sequence[Mask],
+        fitted: float | None = None,
+        unit: str = "",
+    ) -> OffTraining:
         """Return how a model does inside and outside.
 
         Parameters
@@ -177,6 +206,8 @@ class Coverage:
             At all scored samples of the test recordings, one after another.
         rows : sequence of bool arrays
             Which samples of these are scored.
+        fitted : float, optional
+            The model's error on the data fitted.
         unit : str
             Of the errors.
         """
@@ -188,6 +219,7 @@ class Coverage:
             share=float(far.mean()),
             inside=_rmse(errors[~far]),
             outside=_rmse(errors[far]),
+            fitted=fitted,
             unit=unit,
         )
 

@@ -305,7 +305,8 @@ def _off_training(row: Row, outputs: Sequence[Array], plan: Plan) -> OffTraining
     if row.block is None or not row.block.of_local_rules or plan.coverage is None:
         return None
     errors = errors_on_test(outputs, plan.data)
-    return plan.coverage.of(errors, plan.data.split.test_rows, plan.unit)
+    fitted = None if row.train is None else row.train.rmse
+    return plan.coverage.of(errors, plan.data.split.test_rows, fitted, plan.unit)
 
 
 def _best(plan: Plan, finished: Mapping[str, Tried]) -> str:

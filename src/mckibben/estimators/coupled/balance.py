@@ -39,6 +39,9 @@ FOLLOWED, FIRST_STEPS = 2, 5
 FAR = 0.5
 """Displacements that all are further from zero than this share of their range count from elsewhere."""
 
+LAST_STEPS = 5
+"""On all recordings, after those on a few of them."""
+
 AT_START = 0.02
 """Displacement at the start of a run that is none, relative to the range."""
 
@@ -92,21 +95,22 @@ class BalanceEstimator(CoupledEstimator):
         ways = directions(data)
         data = turned(data, ways)
         search = Search(data, self.structure(data, tracker), self.ridge)
+        few = search.of_few()
         with tracker.searching():
             starts = []
             for grip in GRIPS if self.n_stops else GRIPS[:1]:
-                values = search.begun(grip * search.structure.highest)
-                cost = search.cost(values)
-                tracker.saw(values, cost)
-                starts.append((cost, values))
+                values = few.begun(grip * few.structure.highest)
+                starts.append((few.cost(values), values))
+                tracker.saw(values, starts[-1][0])
             starts.sort(key=lambda start: start[0])
             for _, start in starts[:FOLLOWED]:
-                for values, cost in search.descend(start, FIRST_STEPS):
-                    tracker.saw(values, cost)
+                few.descend(start, FIRST_STEPS, tracker)
             assert tracker.best is not None
-            for number, (values, cost) in enumerate(search.descend(tracker.best, self.steps)):
-                tracker.saw(values, cost)
-                tracker.reached(min(0.95, (number + 1) / (self.steps + 1)))
+            few.descend(tracker.best, self.steps, tracker)
+            tracker.reached(0.7)
+            if few is not search:
+                tracker.best_cost = search.cost(tracker.best)
+                search.descend(tracker.best, LAST_STEPS, tracker)
         if tracker.best is None or not np.isfinite(tracker.best_cost):
             raise ModelError(
                 "no balance of forces runs free over these recordings. Remedy: check that displacements "

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -13,9 +12,13 @@ from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.coupled.balance_slopes import run as follow
 from mckibben.estimators.coupled.balance_structure import Structure
 from mckibben.estimators.optimisers.constrained import constrained_least_squares
+from mckibben.estimators.optimisers.tracker import Tracker
 
 MOST_ROWS = 12_000
 """Errors to learn from; more are thinned evenly."""
+
+MOST_SAMPLES = 30_000
+"""To find the way by; the last steps look at all."""
 
 MOST_TRIES = 9
 """Dampings tried for a step, each ten times the last."""
@@ -54,6 +57,18 @@ class Search:
         n_rows = sum(len(run.outputs) for run in self.runs) * structure.n
         self.every = max(1, n_rows // MOST_ROWS)
         self.cuts: list[tuple[Array, Array]] = []
+
+    def of_few(self) -> Search:
+        """Return the same search over evenly chosen recordings, where there are very many samples."""
+        total = sum(len(run.outputs) for run in self.runs)
+        if total <= MOST_SAMPLES:
+            return self
+        count = max(MOST_SAMPLES * len(self.runs) // total, 1)
+        chosen = np.unique(np.linspace(0, len(self.runs) - 1, count).round().astype(int))
+        few = replace(self.data, runs=tuple(self.data.runs[i] for i in chosen.tolist()))
+        found = Search(few, self.structure, self.ridge)
+        found.span, found.cuts = self.span, self.cuts
+        return found
 
     def held(self, run: Run) -> bool:
         """Tell whether nothing moves in a run, so that its forces are what is compared."""
@@ -198,8 +213,8 @@ class Search:
         errors = self.errors(values)[0]
         return float(np.sqrt(np.mean(errors**2))) if np.isfinite(errors).all() else np.inf
 
-    def descend(self, values: Array, steps: int) -> Iterator[tuple[Array, float]]:
-        """Yield ever better coefficients, and the root mean square of their errors."""
+    def descend(self, values: Array, steps: int, tracker: Tracker) -> None:
+        """Show a tracker ever better coefficients."""
         mix = self.structure.free(moving=True)
         damping = 1e-3
         errors, slopes = self.errors(values)
@@ -226,7 +241,7 @@ class Search:
                 return
             gained = (cost - found) / cost
             values, errors, slopes, cost = tried, tried_errors, tried_slopes, found
-            yield values, cost
+            tracker.saw(values, cost)
             damping = max(damping / 5.0, LIGHTEST**2)
             slow = slow + 1 if gained < 1e-3 else 0
             if slow >= 3:

@@ -28,6 +28,7 @@ PLUGINS: dict[str, dict[str, str | Preset]] = {
         "activation-memory": "mckibben.blocks.force.activation_memory:ActivationMemory",
         "activation-pressure": "mckibben.blocks.force.activation_pressure:ActivationPressure",
         "affine": "mckibben.blocks.memoryless.affine:Affine",
+        "air": "mckibben.blocks.dynamic.air:Air",
         "bouc-wen": "mckibben.blocks.differential.bouc_wen:BoucWen",
         "braid-equilibrium": "mckibben.blocks.force.braid_equilibrium:BraidEquilibrium",
         "chou-hannaford": "mckibben.blocks.force.chou_hannaford:ChouHannaford",

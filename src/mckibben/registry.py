@@ -92,6 +92,7 @@ PLUGINS: dict[str, dict[str, str | Preset]] = {
         "activation-pressure": (
             "mckibben.estimators.force.activation_pressure:ActivationPressureEstimator"
         ),
+        "air": "mckibben.estimators.dynamic.air:AirEstimator",
         "armax": preset(LINEAR, "ARMAX model, A y = B u + C e.", n_noise=2, effort=1.0),
         "arx": preset(LINEAR, "ARX model, A y = B u + e, by linear least squares."),
         "bj": preset(

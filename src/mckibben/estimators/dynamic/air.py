@@ -153,14 +153,16 @@ class AirEstimator(SeparableEstimator):
         """Return the error and the block found with a dead time in samples."""
         moved = delayed(data, late)
         found, _ = super().identify(moved, tracker)
-        block, cost = self._refined(cast(Air, found), moved, tracker, ())
-        for limit, share in (("ambient", 0.005), ("supply", 0.995)):
-            if getattr(self, limit) is None and not tracker.interrupted:
-                tight: dict[str, Any] = {limit: float(np.quantile(data.target, share))}
+        limits: tuple[str, ...] = ()
+        block, cost = self._refined(cast(Air, found), moved, tracker, limits)
+        shares = {"ambient": 0.005, "supply": 0.995}
+        for limit in ("ambient", "supply", "ambient"):  # which one alone may not have shown
+            if getattr(self, limit) is None and limit not in limits and not tracker.interrupted:
+                tight: dict[str, Any] = {limit: float(np.quantile(data.target, shares[limit]))}
                 limited = replace(block, **tight)
-                limited, least = self._refined(limited, moved, tracker, (limit,))
+                limited, least = self._refined(limited, moved, tracker, (*limits, limit))
                 if least < (1 - LIMIT_GAIN) * cost:
-                    block, cost = limited, least
+                    block, cost, limits = limited, least, (*limits, limit)
         if block.ambient is None and self.ambient is None:
             low = block.goal(data.input_range[0], -1)
             block = replace(block, ambient=0.0 if low >= 0 else None)

@@ -77,7 +77,9 @@ def test_variants_keep_the_laws(air: Air) -> None:
 def test_equal_lags_are_scipys(tau: float, late: int, u: Array) -> None:
     air = Air(0.6, 0.1, 0.0, tau, tau, late * STEP, None)
     (top,), bottom, _ = cont2discrete((np.array([0.6]), np.array([tau, 1.0])), STEP)[:3]
-    expected = lfilter(np.ravel(top), bottom, np.append(u - u[0], 0.0))  # of the hold, one sample later
+    expected = lfilter(
+        np.ravel(top), bottom, np.append(u - u[0], 0.0)
+    )  # of the hold, one sample later
     expected = np.append(np.zeros(late), expected[1:])[: len(u)] + 0.6 * (u[0] - 0.1)
     np.testing.assert_allclose(air.simulate(u, sample_time=STEP), expected, atol=1e-12)
 

@@ -92,12 +92,11 @@ def air_kernel(coefficients: Array, state: Array, inputs: Array, outputs: Array)
 def air_inverse_kernel(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
     """Undo the model; coefficients are [forward ones, lowest, highest command].
 
-    The state is [pressure, past pressures, which stay as they are, samples clipped].
+    The state is [pressure, samples clipped].
     """
     c = coefficients
     lowest, highest = c[c.size - 2], c[c.size - 1]
     middle = 0.5 * (c[1] + c[2])
-    last = state.size - 1
     for t in range(inputs.shape[0]):
         wanted, x = inputs[t, 0], state[0]
         held = ROUNDING * (abs(wanted) + c[0] * abs(middle))
@@ -111,7 +110,7 @@ def air_inverse_kernel(coefficients: Array, state: Array, inputs: Array, outputs
         u = min(max(u, lowest), highest)
         reached = _moved(c, x, u)
         if abs(reached - wanted) > SLACK * (abs(wanted) + c[0] * abs(u)):
-            state[last] += 1.0
+            state[1] += 1.0
             state[0] = reached
         else:
             state[0] = wanted
@@ -255,6 +254,20 @@ class Air(Ranged):
         times = (self.filling_time, self.venting_time)
         shares = [-math.expm1(-sample_time / time) if time > 0 else 1.0 for time in times]
         return np.array([self.gain, *self.offsets, *shares, *self.pressures, late])
+
+    @property
+    def n_inverse_states(self) -> int:
+        """The pressure, and the count of samples clipped; past pressures do not matter."""
+        return 2
+
+    def inverse_start(self, first: Array, start: Rule) -> Array:
+        """Return the pressure where the first command leads, and no samples clipped."""
+        command = self.input_giving(float(first[0]), start)
+        return self.inverse_state(self.initial_state(np.array([command]), start))
+
+    def inverse_state(self, state: Array) -> Array:
+        """Return the pressure, and no samples clipped."""
+        return np.array([state[0], 0.0])
 
     def input_giving(self, output: float, start: Rule) -> float:
         """Return the command, within the limits, that holds a pressure."""

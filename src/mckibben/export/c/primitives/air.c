@@ -18,13 +18,6 @@ static mck_real moved(const mck_real *c, mck_real x, mck_real u)
     return next;
 }
 
-static void fill(mck_real *state, int n, mck_real pressure)
-{
-    for (int k = 0; k < n; k++) {
-        state[k] = pressure;
-    }
-}
-
 static mck_real middle(const mck_real *c) { return MCK_R(0.5) * (c[1] + c[2]); }
 
 /* At the ambient pressure, or 0 where that is no limit. */
@@ -36,7 +29,10 @@ static mck_real empty(const mck_real *c)
 void mck_air_start(const mck_part *part, mck_real *state, const mck_real *in)
 {
     const mck_real *c = part->coefficients;
-    fill(state, part->n_states, part->start == MCK_VIRGIN ? empty(c) : goal(c, in[0], middle(c)));
+    const mck_real x = part->start == MCK_VIRGIN ? empty(c) : goal(c, in[0], middle(c));
+    for (int k = 0; k < part->n_states; k++) {
+        state[k] = x;
+    }
 }
 
 void mck_air_step(const mck_part *part, mck_real *state, const mck_real *in, mck_real *out)
@@ -53,9 +49,8 @@ void mck_air_inverse_start(const mck_part *part, mck_real *state, const mck_real
 {
     const mck_real *c = part->coefficients;
     const mck_real u = mck_clip(in[0] / c[0] + middle(c), c[8], c[9]);
-    const int n = part->n_states - 1;
-    fill(state, n, part->start == MCK_VIRGIN ? empty(c) : goal(c, u, middle(c)));
-    state[n] = MCK_R(0.0);
+    state[0] = part->start == MCK_VIRGIN ? empty(c) : goal(c, u, middle(c));
+    state[1] = MCK_R(0.0);
 }
 
 void mck_air_inverse_step(const mck_part *part, mck_real *state, const mck_real *in, mck_real *out)
@@ -75,7 +70,7 @@ void mck_air_inverse_step(const mck_part *part, mck_real *state, const mck_real 
     u = mck_clip(u, c[8], c[9]);
     const mck_real reached = moved(c, x, u);
     if (mck_abs(reached - wanted) > MCK_SLACK * (mck_abs(wanted) + c[0] * mck_abs(u))) {
-        state[part->n_states - 1] += MCK_R(1.0);
+        state[1] += MCK_R(1.0);
         state[0] = reached;
     } else {
         state[0] = wanted;

@@ -3,7 +3,7 @@
  *
  * Coefficients: gain, offset while filling, while venting, share of the way that a sample fills, that it
  * vents, lowest, highest pressure, dead time in samples. State: pressure, past pressures.
- * Inverse: lowest, highest command behind; state: as forward, count of samples clipped. */
+ * Inverse: lowest, highest command behind; state: pressure, count of samples clipped. */
 #ifndef MCK_AIR_H
 #define MCK_AIR_H
 

@@ -106,11 +106,13 @@ class BalanceEstimator(CoupledEstimator):
             for _, start in starts[:FOLLOWED]:
                 few.descend(start, FIRST_STEPS, tracker)
             assert tracker.best is not None
+            few.weigh(tracker.best)
+            tracker.best_cost = few.cost(tracker.best)
             few.descend(tracker.best, self.steps, tracker)
             tracker.reached(0.7)
-            if few is not search:
-                tracker.best_cost = search.cost(tracker.best)
-                search.descend(tracker.best, LAST_STEPS, tracker)
+            search.weigh(tracker.best)
+            tracker.best_cost = search.cost(tracker.best)
+            search.descend(tracker.best, LAST_STEPS, tracker)
         if tracker.best is None or not np.isfinite(tracker.best_cost):
             raise ModelError(
                 "no balance of forces runs free over these recordings. Remedy: check that displacements "

@@ -57,6 +57,7 @@ class Search:
         n_rows = sum(len(run.outputs) for run in self.runs) * structure.n
         self.every = max(1, n_rows // MOST_ROWS)
         self.cuts: list[tuple[Array, Array]] = []
+        self.weights = np.ones(len(self.runs))
 
     def of_few(self) -> Search:
         """Return the same search over evenly chosen recordings, where there are very many samples."""
@@ -192,33 +193,42 @@ class Search:
             self.cuts.append((x, way))
         return values
 
+    def missed(self, values: Array, run: Run) -> tuple[Array, Array]:
+        """Return the errors over a run relative to the ranges, and their slopes by coefficients."""
+        if self.held(run):
+            found, by = self.followed(values, run, held=True)
+            areas = [values[self.structure.places("areas", k)[0]] for k in range(self.structure.n)]
+            scale = 1.0 / (np.array(areas) * self.structure.highest)
+        else:
+            found, by = self.followed(values, run, held=False)
+            found = found - self.measured(run)
+            scale = 1.0 / self.span
+        return (found * scale).ravel(), (by * scale[:, np.newaxis]).reshape(-1, by.shape[2])
+
     def errors(self, values: Array) -> tuple[Array, Array]:
-        """Return errors of the free run relative to the ranges, and their slopes by coefficients."""
-        errors, slopes = [], []
-        for run in self.runs:
-            if self.held(run):
-                lacking, by = self.followed(values, run, held=True)
-                block_area = values[self.structure.places("areas", 0)[0]] * self.structure.highest
-                scale = np.full(self.structure.n, 1.0 / block_area)
-                errors.append((lacking * scale).ravel())
-            else:
-                found, by = self.followed(values, run, held=False)
-                scale = 1.0 / self.span
-                errors.append(((found - self.measured(run)) * scale).ravel())
-            slopes.append((by * scale[:, np.newaxis]).reshape(-1, by.shape[2]))
+        """Return the errors over all runs, by how much these count, and their slopes."""
+        pairs = [self.missed(values, run) for run in self.runs]
+        errors = [weight * e for weight, (e, _) in zip(self.weights, pairs, strict=True)]
+        slopes = [weight * by for weight, (_, by) in zip(self.weights, pairs, strict=True)]
         return np.concatenate(errors), np.concatenate(slopes)
+
+    def weigh(self, values: Array) -> Array:
+        """Let runs that are followed worse than most count less; return how well each is."""
+        found = np.array([_size(self.missed(values, run)[0]) for run in self.runs])
+        self.weights = np.minimum(1.0, np.median(found) / np.maximum(found, 1e-12))
+        return found
 
     def cost(self, values: Array) -> float:
         """Return the root mean square of the errors."""
-        errors = self.errors(values)[0]
-        return float(np.sqrt(np.mean(errors**2))) if np.isfinite(errors).all() else np.inf
+        found = _size(self.errors(values)[0])
+        return found if np.isfinite(found) else np.inf
 
     def descend(self, values: Array, steps: int, tracker: Tracker) -> None:
         """Show a tracker ever better coefficients."""
         mix = self.structure.free(moving=True)
         damping = 1e-3
         errors, slopes = self.errors(values)
-        cost = float(np.sqrt(np.mean(errors**2)))
+        cost = _size(errors)
         slow = 0
         for _ in range(steps):
             moving = slopes @ mix
@@ -233,7 +243,7 @@ class Search:
                     damping = max(10.0 * damping, 1e-9)
                     continue
                 tried_errors, tried_slopes = self.errors(tried)
-                found = float(np.sqrt(np.mean(tried_errors**2)))
+                found = _size(tried_errors)
                 if found < cost:
                     break
                 damping = max(10.0 * damping, 1e-9)
@@ -246,3 +256,8 @@ class Search:
             slow = slow + 1 if gained < 1e-3 else 0
             if slow >= 3:
                 return
+
+
+def _size(errors: Array) -> float:
+    """Return the root mean square."""
+    return float(np.sqrt(np.mean(errors**2)))

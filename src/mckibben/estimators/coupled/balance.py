@@ -106,13 +106,11 @@ class BalanceEstimator(CoupledEstimator):
             for _, start in starts[:FOLLOWED]:
                 few.descend(start, FIRST_STEPS, tracker)
             assert tracker.best is not None
-            few.weigh(tracker.best)
-            tracker.best_cost = few.cost(tracker.best)
             few.descend(tracker.best, self.steps, tracker)
             tracker.reached(0.7)
-            search.weigh(tracker.best)
-            tracker.best_cost = search.cost(tracker.best)
-            search.descend(tracker.best, LAST_STEPS, tracker)
+            if few is not search:
+                tracker.best_cost = search.cost(tracker.best)
+                search.descend(tracker.best, LAST_STEPS, tracker)
         if tracker.best is None or not np.isfinite(tracker.best_cost):
             raise ModelError(
                 "no balance of forces runs free over these recordings. Remedy: check that displacements "
@@ -169,7 +167,7 @@ class BalanceEstimator(CoupledEstimator):
             n_area=self.area + 1,
             limits=np.geomspace(self.finest, 0.5, self.n_stops) * float(span.max()) / highest,
             lags=self._lags(data) if timed else np.zeros(0),
-            lag_range=(2.0 * (data.sample_time or 1.0), max(self._longest(data), 1.0)),
+            lag_range=(2.0 * (data.sample_time or 1.0), max(0.5 * self._longest(data), 1.0)),
             hull=np.column_stack([y.min(axis=0) - margin, y.max(axis=0) + margin]),
             scheduled_hull=np.column_stack([x.min(axis=0), x.max(axis=0)]),
             highest=highest,

@@ -57,7 +57,6 @@ class Search:
         n_rows = sum(len(run.outputs) for run in self.runs) * structure.n
         self.every = max(1, n_rows // MOST_ROWS)
         self.cuts: list[tuple[Array, Array]] = []
-        self.weights = np.ones(len(self.runs))
 
     def of_few(self) -> Search:
         """Return the same search over evenly chosen recordings, where there are very many samples."""
@@ -206,17 +205,9 @@ class Search:
         return (found * scale).ravel(), (by * scale[:, np.newaxis]).reshape(-1, by.shape[2])
 
     def errors(self, values: Array) -> tuple[Array, Array]:
-        """Return the errors over all runs, by how much these count, and their slopes."""
-        pairs = [self.missed(values, run) for run in self.runs]
-        errors = [weight * e for weight, (e, _) in zip(self.weights, pairs, strict=True)]
-        slopes = [weight * by for weight, (_, by) in zip(self.weights, pairs, strict=True)]
+        """Return the errors over all runs, and their slopes."""
+        errors, slopes = zip(*(self.missed(values, run) for run in self.runs), strict=True)
         return np.concatenate(errors), np.concatenate(slopes)
-
-    def weigh(self, values: Array) -> Array:
-        """Let runs that are followed worse than most count less; return how well each is."""
-        found = np.array([_size(self.missed(values, run)[0]) for run in self.runs])
-        self.weights = np.minimum(1.0, np.median(found) / np.maximum(found, 1e-12))
-        return found
 
     def cost(self, values: Array) -> float:
         """Return the root mean square of the errors."""

@@ -7,6 +7,7 @@ exact derivatives. Both keep to what physics asks (`mckibben.estimators.coupled.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Annotated, ClassVar
 
@@ -16,11 +17,14 @@ from annotated_types import Ge, Gt, Interval
 from mckibben.arrays import Array
 from mckibben.blocks.compose import PerChannel, Series
 from mckibben.blocks.core.block import Block
+from mckibben.blocks.coupled.balance import Balance
 from mckibben.blocks.memoryless.affine import Affine
 from mckibben.errors import ModelError
 from mckibben.estimators.core.data import TrainingData
+from mckibben.estimators.core.uncertainty import unknown
 from mckibben.estimators.coupled.balance_search import Search
 from mckibben.estimators.coupled.balance_structure import Structure
+from mckibben.estimators.coupled.balance_words import held_back, sentences
 from mckibben.estimators.coupled.base import CoupledEstimator
 from mckibben.estimators.optimisers.tracker import Tracker
 
@@ -119,7 +123,11 @@ class BalanceEstimator(CoupledEstimator):
         low, high = float(data.lowest.min()), float(data.highest.max())
         limited = data.inputs[0].unit in LIMITED
         bounds = (min(low, 0.0), high) if limited else None
-        solved = search.structure.block(tracker.best, bounds).inverse()
+        structure = search.structure
+        balance = structure.block(tracker.best, bounds)
+        tracker.notes += [*held_back(balance, structure), *sentences(balance, structure)]
+        tracker.notes += search.apart(tracker.best)
+        solved = balance.inverse()
         if all(way == (1.0, 0.0) for way in ways):
             return solved
         sensors = [
@@ -127,6 +135,24 @@ class BalanceEstimator(CoupledEstimator):
             for (gain, offset), channel in zip(ways, data.outputs, strict=True)
         ]
         return Series((solved, sensors[0] if len(sensors) == 1 else PerChannel(tuple(sensors))))
+
+    def uncertainty(
+        self, block: Block, data: TrainingData, residual: Array, at_bounds: Sequence[int]
+    ) -> tuple[float, Array]:
+        """Return condition and covariance of what is free, from the exact slopes of the free run."""
+        solved = block.parts[0] if isinstance(block, Series) else block
+        balance = solved.inverse()
+        assert isinstance(balance, Balance)
+        shortened = turned(data, directions(data))
+        structure = self.structure(shortened, Tracker())
+        search = Search(shortened, structure, self.ridge)
+        condition, found = search.covariance(structure.values(balance))
+        packed = structure.packed()
+        covariance = unknown(block)
+        n = len(packed)  # a sensor's gain and offset follow, which are not fitted
+        covariance[:n, :n] = found[np.ix_(packed, packed)]
+        covariance[list(at_bounds)] = covariance[:, list(at_bounds)] = np.nan
+        return condition, covariance
 
     def structure(self, data: TrainingData, tracker: Tracker) -> Structure:
         """Return sizes and settings that suit the recordings.

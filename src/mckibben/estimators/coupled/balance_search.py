@@ -9,6 +9,7 @@ import numpy as np
 from mckibben.arrays import Array
 from mckibben.errors import ModelError
 from mckibben.estimators.core.data import Run, TrainingData
+from mckibben.estimators.core.uncertainty import inverted
 from mckibben.estimators.coupled.balance_slopes import run as follow
 from mckibben.estimators.coupled.balance_structure import Structure
 from mckibben.estimators.optimisers.constrained import constrained_least_squares
@@ -208,6 +209,43 @@ class Search:
         """Return the errors over all runs, and their slopes."""
         errors, slopes = zip(*(self.missed(values, run) for run in self.runs), strict=True)
         return np.concatenate(errors), np.concatenate(slopes)
+
+    def covariance(self, values: Array) -> tuple[float, Array]:
+        """Return the condition of what is free, and the covariance of all coefficients.
+
+        As if errors were independent; NaN of what is fixed, or what the runs do not determine.
+        """
+        mix = self.structure.free(moving=True)
+        errors, slopes = self.errors(values)
+        moving = slopes @ mix
+        size = np.maximum(np.sqrt((moving**2).sum(axis=0)), 1e-12)
+        condition, own = inverted(moving / size)
+        n_free = errors.size * self.every - mix.shape[1]
+        variance = float(errors @ errors) / max(
+            n_free, 1
+        )  # of all samples, of which some are looked at
+        scaled = mix / size
+        told = np.isfinite(np.diag(own))
+        covariance = variance * scaled[:, told] @ own[np.ix_(told, told)] @ scaled[:, told].T
+        lost = ~mix.any(axis=1) | mix[:, ~told].any(axis=1)
+        covariance[lost] = covariance[:, lost] = np.nan
+        return condition, covariance
+
+    def apart(self, values: Array) -> list[str]:
+        """Return which runs are off throughout, as where a sensor had another zero."""
+        found = []
+        for run in self.runs:
+            if self.held(run) or len(self.runs) < 2:
+                continue
+            errors = self.missed(values, run)[0].reshape(-1, self.structure.n)
+            off, rest = errors.mean(axis=0), errors.std(axis=0)
+            for k in np.flatnonzero(np.abs(off) > np.maximum(3.0 * rest, 0.03)).tolist():
+                channel = self.structure.driven[k]
+                found.append(
+                    f"{run.name}: {channel.name} is off by {-off[k] * self.span[k]:.3g} {channel.unit} "
+                    "throughout. Remedy: let it count from where the others' does"
+                )
+        return found
 
     def cost(self, values: Array) -> float:
         """Return the root mean square of the errors."""

@@ -10,7 +10,7 @@ import os
 import platform
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -36,6 +36,7 @@ from mckibben.papers.multistate_friction.published import multistate_friction
 from mckibben.rigs import record
 from mckibben.signals import decaying_triangle
 from mckibben.signals.protocol import protocol
+from microcontroller import compositions
 from references import Compiled, numpy_gpi, numpy_pi
 
 Array = NDArray[np.float64]
@@ -181,6 +182,16 @@ def field() -> None:
     print(f"  {'multistate-11':>14}: {1e3 * seconds:.1f}")
 
 
+def three_muscles() -> Iterator[tuple[str, Block, Array]]:
+    """Give SDCHM of three muscles, and its inverse whose network is solved by Newton's method."""
+    sdchm = dict(compositions())["SDCHM: three muscles, 81 rules"]
+    t = 0.05 * np.arange(8000)
+    pressures = [2.6 + 1.2 * np.sin(0.13 * (k + 1) * t + k) for k in range(3)]
+    inputs = np.column_stack([*pressures, 1.2 + 0.8 * np.sin(0.05 * t)])
+    yield "sdchm", sdchm, inputs
+    yield "sdihc", sdchm.inverse(), np.column_stack([sdchm.simulate(inputs), inputs[:, 3]])
+
+
 def streams() -> None:
     """Latency of one step from Python."""
     print("\nstream.step from Python [µs]")
@@ -191,9 +202,10 @@ def streams() -> None:
         ("pi inverse", pi.inverse(), pi.simulate(u)),
         ("gpi", gpi, u),
         ("gpi inverse", gpi.inverse(), gpi.simulate(u)),
+        *three_muscles(),
     ):
         stream = block.stream()
-        times = np.empty(u.size)
+        times = np.empty(len(inputs))
         for t, value in enumerate(inputs.tolist()):
             started = time.perf_counter_ns()
             stream.step(value)

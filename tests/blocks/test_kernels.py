@@ -130,6 +130,16 @@ def test_a_network_far_from_all_sets_answers_by_the_nearest_rule() -> None:
     np.testing.assert_allclose(narrow.simulate([x])[0], consequents[6] @ x, rtol=1e-12)
 
 
+def test_a_network_of_sets_far_apart_is_solved_rule_by_rule() -> None:
+    example = FuzzyNetwork.example()
+    narrow = replace(example, widths=tuple((0.1,) * len(row) for row in example.widths))
+    ones = np.ones(40)
+    wave = 5.0 * np.sin(0.7 * np.arange(40))
+    x = np.column_stack([29.0 + 0.4 * wave, 31.0 - 0.3 * wave, 0.1 * ones])
+    given = narrow.inverse().simulate(np.column_stack([narrow.simulate(x), x[:, 2]]))
+    np.testing.assert_allclose(given, x[:, :2], rtol=1e-12)
+
+
 def test_a_network_gives_the_nearest_that_it_can() -> None:
     inverse = FuzzyNetwork.example().inverse()
     wanted = np.array([[10.0, 10.0, 1.0], [500.0, -300.0, 1.0], [10.0, 10.0, 1.0]])

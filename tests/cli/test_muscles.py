@@ -96,6 +96,33 @@ def test_study_of_a_folder_closes_the_loop(cli: Cli, arm: Path, tmp_path: Path) 
         assert (out / name).is_file()
 
 
+def test_a_study_says_whether_a_network_is_to_be_trusted_off_its_patterns(
+    cli: Cli, arm: Path, tmp_path: Path
+) -> None:
+    ((run, joint),) = record("sdchm", runs=["joint-test-p0-1.1"])
+    test = tmp_path / f"{run.name}.csv"
+    write(joint, test)
+    asked = ["study", arm, "--test", test, "--models", "tsfnn,force-balance", "--jobs", 1]
+    asked += ["--set", "tsfnn.search_samples=400"]
+    damped = cli(*asked, "-o", tmp_path / "damped")
+    assert damped.code == 0, damped.err
+    begin = "tsfnn: trained on 4 patterns that cover "
+    (spoken,) = [line for line in damped.out.splitlines() if f"Note: {begin}" in line]
+    assert " % of the test samples it is outside of them" in spoken
+    out = tmp_path / "raw"
+    raw = cli(*asked, "--set", "tsfnn.ridge=1e-9", "-o", out, "--json")
+    assert raw.code == 0, raw.err
+    board = json.loads(raw.out)["leaderboard"]
+    (said,) = [note for note in board["notes"] if note.startswith(begin)]
+    assert "do not trust it there" in said
+    assert said in json.loads((out / "leaderboard.json").read_text())["notes"]
+    assert said in (out / "report.html").read_text()
+    found = {row["model"]: row.get("off_training") for row in board["rows"]}
+    assert found["force-balance"] is None
+    assert found["tsfnn"]["covered"] < 0.3 < found["tsfnn"]["share"]
+    assert found["tsfnn"]["trusted"] is False
+
+
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [

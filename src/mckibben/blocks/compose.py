@@ -49,6 +49,11 @@ class Composition(Block):
         return any(part.rate_dependent for part in self.parts)
 
     @property
+    def of_local_rules(self) -> bool:  # type: ignore[override]
+        """Whether any part is."""
+        return any(part.of_local_rules for part in self.parts)
+
+    @property
     def depth(self) -> int:
         """How many compositions are in each other, this one included."""
         return 1 + max(getattr(part, "depth", 0) for part in self.parts)

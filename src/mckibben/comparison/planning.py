@@ -13,6 +13,7 @@ import numpy as np
 from mckibben import registry
 from mckibben.comparison.channels import Channels, Names, channels_of
 from mckibben.comparison.constant import constant_of
+from mckibben.comparison.coverage import Coverage, coverage_of
 from mckibben.comparison.kept import Kept, source
 from mckibben.comparison.offered import objections
 from mckibben.comparison.results import Leaderboard, Row
@@ -79,6 +80,13 @@ class Plan:
     def constant(self) -> Tried:
         """What comes of predicting the mean of the training output."""
         return constant_of(self.data)
+
+    @cached_property
+    def coverage(self) -> Coverage | None:
+        """What training covers of the joint range of what models are told; None of one input."""
+        split, channels = self.data.split, self.data.channels
+        told = (*channels.inputs, *channels.scheduled([*split.train, *split.test]))
+        return coverage_of(split.train, split.test, told)
 
     @cached_property
     def sources(self) -> dict[str, str]:

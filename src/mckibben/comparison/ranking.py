@@ -11,6 +11,7 @@ from pathlib import Path
 from mckibben.arrays import Array
 from mckibben.comparison.bootstrap import BlockBootstrap, interval, skill_of
 from mckibben.comparison.channels import Names
+from mckibben.comparison.coverage import OffTraining
 from mckibben.comparison.kept import Kept
 from mckibben.comparison.planning import N_FOLDS, Plan, Settings, plan_of
 from mckibben.comparison.recommending import CONSTANT
@@ -280,6 +281,7 @@ def _ranking(
             test_rank=1 + by_test.index(_rmse(row)),
             rmse_interval=interval(samples),
             difference_interval=interval(samples - done[0][1]),
+            off_training=_off_training(row, finished[row.model].outputs, plan),
         )
         for row, samples in done
     ]
@@ -296,6 +298,15 @@ def _ranking(
         )
         board = replace(board, constant=constant)
     return Ranking(board, outputs)
+
+
+def _off_training(row: Row, outputs: Sequence[Array], plan: Plan) -> OffTraining | None:
+    """Return how a model of local rules does off its training, if there are several inputs."""
+    if row.block is None or not row.block.of_local_rules or plan.coverage is None:
+        return None
+    errors = errors_on_test(outputs, plan.data)
+    fitted = None if row.train is None else row.train.rmse
+    return plan.coverage.of(errors, plan.data.split.test_rows, fitted, plan.unit)
 
 
 def _best(plan: Plan, finished: Mapping[str, Tried]) -> str:

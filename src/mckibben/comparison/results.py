@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from mckibben.blocks.core.block import Block
+from mckibben.comparison.coverage import OffTraining
 from mckibben.comparison.limits import caution
 from mckibben.comparison.recommending import CONSTANT, order, recommended
 from mckibben.errors import MckibbenError
@@ -92,6 +93,8 @@ class Row:
         The same of its difference to the chosen model's test RMSE, paired on the same blocks.
     memory : Memory or None
         The memory test, on the test set.
+    off_training : OffTraining or None
+        How a model of local rules does where training has been on the test set, and where it has not.
     block : Block or None
         The model identified.
     diagnostics : mapping
@@ -116,6 +119,7 @@ class Row:
     rmse_interval: tuple[float, float] | None = None
     difference_interval: tuple[float, float] | None = None
     memory: Memory | None = None
+    off_training: OffTraining | None = None
     block: Block | None = field(default=None, repr=False)
     diagnostics: Mapping[str, Any] = field(default_factory=dict, repr=False)
 
@@ -191,6 +195,7 @@ class Row:
             "skill": _finite(self.skill),
             "skill_least": _finite(self.skill_least),
             "memory": None if self.memory is None else asdict(self.memory),
+            "off_training": None if self.off_training is None else self.off_training.to_dict(),
             "rate_dependent": self.block is not None and bool(self.block.rate_dependent),
             "invertible": self.inverse is not None,
             "caution": self.caution,
@@ -274,6 +279,11 @@ class Leaderboard:
         return recommended(self.rows, self.constant, self.unit)[1]
 
     @property
+    def off_training(self) -> tuple[str, ...]:
+        """Why each model of local rules is to be trusted off its training, or is not."""
+        return tuple(f"{r.model}: {r.off_training}" for r in self.rows if r.off_training)
+
+    @property
     def ranking(self) -> tuple[Row, ...]:
         """The rows with the constant in its place."""
         if self.constant is None or not self.rows:
@@ -332,7 +342,7 @@ class Leaderboard:
             "lowest_on_test": None if lowest is None else lowest.model,
             "left_out": dict(self.left_out),
             "pending": list(self.pending),
-            "notes": list(self.notes),
+            "notes": [*self.notes, *self.off_training],
             "shared": list(self.shared),
             "rows": [row.to_dict() for row in self.ranking],
         }

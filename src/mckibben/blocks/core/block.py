@@ -44,6 +44,10 @@ class Block(Exportable, Parametrised):
     """Whether it matters how an input goes from one turning point to the next, as where several
     muscles find their equilibrium together."""
 
+    of_local_rules: ClassVar[bool] = False
+    """Whether it is made of rules that each know a part of the inputs' joint range, so that nothing says
+    what it gives where none was shown any data."""
+
     sample_time: float | None = None
     """Time between samples that a discrete block is bound to [s]; None for any."""
 

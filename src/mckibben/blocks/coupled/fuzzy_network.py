@@ -33,58 +33,11 @@ from mckibben.blocks.core.kernels import kernel
 from mckibben.blocks.core.linear_system import eliminate, newton_cost
 from mckibben.blocks.core.many_channels import ManyChannels
 from mckibben.blocks.core.stateless import Stateless
+from mckibben.blocks.coupled.fuzzy_rules import answer, contract, sloped_answer
 from mckibben.errors import ModelError
 
 MOST_STEPS = 40
 """Of Newton's method in a sample."""
-
-
-@kernel
-def answer(c: Array, x: Array, memberships: Array, y: Array) -> None:
-    """Fill the outputs at one input sample.
-
-    ``c`` is [inputs, outputs, driven, constants, most sets, sets of every input, centres, widths,
-    consequents]; a rule's consequents are one row an output: a coefficient for every input, and the
-    constant if there are constants.
-    """
-    n, n_out, constant, most = int(c[0]), int(c[1]), int(c[3]), int(c[4])
-    at, n_rules, n_sets = 5 + n, 1, 0
-    for i in range(n):
-        n_rules *= int(c[5 + i])
-        n_sets += int(c[5 + i])
-    for i in range(n):
-        sets = int(c[5 + i])
-        largest = -np.inf
-        for s in range(sets):
-            z = (x[i] - c[at + s]) / c[at + n_sets + s]
-            memberships[i * most + s] = -0.5 * z * z
-            largest = max(largest, memberships[i * most + s])
-        total = 0.0
-        for s in range(sets):
-            memberships[i * most + s] = np.exp(memberships[i * most + s] - largest)
-            total += memberships[i * most + s]
-        for s in range(sets):
-            memberships[i * most + s] /= total
-        at += sets
-    at += n_sets
-    width = n + constant
-    for j in range(n_out):
-        y[j] = 0.0
-    for rule in range(n_rules):
-        firing, rest = 1.0, rule
-        for i in range(n - 1, -1, -1):
-            sets = int(c[5 + i])
-            firing *= memberships[i * most + rest % sets]
-            rest //= sets
-        if firing > 1e-300:
-            for j in range(n_out):
-                total = c[at + n] if constant else 0.0
-                for i in range(n):
-                    total += c[at + i] * x[i]
-                y[j] += firing * total
-                at += width
-        else:
-            at += n_out * width
 
 
 @kernel
@@ -106,59 +59,48 @@ def fuzzy_network_inverse_kernel(
     """
     m = state.size - 1
     low, high, c = coefficients[:m], coefficients[m : 2 * m], coefficients[2 * m :]
-    n = int(c[0])
-    used = int(c[0] * c[4])
-    scratch = c[c.size - (used + n + m * (m + 4)) :]
-    memberships, x, rest = scratch[:used], scratch[used : used + n], scratch[used + n :]
-    y, shifted, best, residual = rest[:m], rest[m : 2 * m], rest[2 * m : 3 * m], rest[3 * m : 4 * m]
-    matrix = rest[4 * m : m * (m + 4)].reshape((m, m))
+    n, most, n_rules = int(c[0]), int(c[4]), 1
+    for i in range(m):
+        n_rules *= int(c[5 + i])
+    n_left = n_rules * m * (m + 1)
+    scratch = c[c.size - (n * most + m * most + n_left + m * (m + 6)) :]
+    memberships, tilts = scratch[: n * most], scratch[n * most : n * most + m * most + m]
+    rest = scratch[n * most + m * most + m :]
+    left, rest = rest[:n_left], rest[n_left:]
+    x, y, best, step = rest[:m], rest[m : 2 * m], rest[2 * m : 3 * m], rest[3 * m : 4 * m]
+    slopes = rest[4 * m : m * (m + 4)].reshape((m, m))
     for t in range(inputs.shape[0]):
-        for i in range(m):
-            x[i] = state[i]
-        for i in range(m, n):
-            x[i] = inputs[t, i]
+        contract(c, m, inputs[t, m:], memberships, left)
         size = 1.0
         for j in range(m):
+            x[j] = state[j]
             size = max(size, abs(inputs[t, j]))
         least, share = np.inf, 1.0
         for _ in range(MOST_STEPS):
-            answer(c, x, memberships, y)
+            sloped_answer(c, left, x, memberships, tilts, y, slopes)
             worst = 0.0
             for j in range(m):
-                residual[j] = y[j] - inputs[t, j]
-                worst = max(worst, abs(residual[j]))
+                y[j] -= inputs[t, j]
+                worst = max(worst, abs(y[j]))
             if worst < least:
                 # once at rounding, a step that gains nothing ends the search
                 stuck = worst > 0.5 * least and worst < 1e-11 * size
                 least = worst
                 for i in range(m):
                     best[i] = x[i]
+                    step[i] = y[i]
                 if stuck or worst == 0.0:
                     break
+                eliminate(slopes, step)
                 share = 1.0
             elif least < 1e-11 * size:
                 break
-            else:
+            else:  # a shorter step from the best
                 share *= 0.5
-                for i in range(m):
-                    x[i] = best[i]
                 if share < 1e-3:
                     break
-                answer(c, x, memberships, y)
-                for j in range(m):
-                    residual[j] = y[j] - inputs[t, j]
             for i in range(m):
-                kept = x[i]
-                span = high[i] - low[i]
-                h = 1e-6 * span if kept + 1e-6 * span <= high[i] else -1e-6 * span
-                x[i] = kept + h
-                answer(c, x, memberships, shifted)
-                x[i] = kept
-                for j in range(m):
-                    matrix[j, i] = (shifted[j] - y[j]) / h
-            eliminate(matrix, residual)
-            for i in range(m):
-                x[i] = min(max(x[i] - share * residual[i], low[i]), high[i])
+                x[i] = min(max(best[i] - share * step[i], low[i]), high[i])
         for i in range(m):
             state[i] = best[i]
             outputs[t, i] = best[i]
@@ -190,6 +132,7 @@ class FuzzyNetwork(Stateless, ManyChannels, Invertible):
     inverse_kernel: ClassVar[Kernel] = fuzzy_network_inverse_kernel
     inverse_path_dependent: ClassVar[bool] = True
     in_scratch: ClassVar[bool] = True
+    of_local_rules: ClassVar[bool] = True
     parameters: ClassVar[tuple[str, ...]] = ("centres", "widths", "consequents")
 
     centres: Rows
@@ -249,9 +192,20 @@ class FuzzyNetwork(Stateless, ManyChannels, Invertible):
         return Cost(operations, operations)
 
     def inverse_cost(self, sample_time: float | None) -> Cost:
-        """Return what steps of Newton's method cost, with slopes by differences."""
-        m = len(self.driven)
-        return newton_cost(self.cost(sample_time).usual * (1 + m) + m**3)
+        """Return what contracting what schedules costs, then steps of Newton's method with slopes."""
+        del sample_time
+        m, n = len(self.driven), len(self.centres)
+        rules = int(np.prod([len(row) for row in self.centres]))
+        once = rules * m * (2 * n + 2) + 10 * sum(map(len, self.centres[m:]))
+        step = self._n_rules_driven * (2 * m + m * (6 * m + 2)) + 16 * sum(
+            map(len, self.centres[:m])
+        )
+        return Cost(once, once) + newton_cost(step + m**3)
+
+    @property
+    def _n_rules_driven(self) -> int:
+        """Combinations of the driven inputs' sets."""
+        return int(np.prod([len(row) for row in self.centres[: len(self.driven)]]))
 
     def check_invertible(self) -> None:
         """Demand as many outputs as driven inputs, and limits."""
@@ -268,9 +222,9 @@ class FuzzyNetwork(Stateless, ManyChannels, Invertible):
 
     @property
     def n_inverse_scratch(self) -> int:
-        """Memberships, all inputs, five vectors of driven inputs, and a matrix."""
-        m = len(self.driven)
-        return self.n_scratch + len(self.inputs) + m * (m + 5)
+        """Memberships, their slopes, contracted rules, six vectors of driven inputs, and a matrix."""
+        m, most = len(self.driven), max(map(len, self.centres))
+        return self.n_scratch + m * most + self._n_rules_driven * m * (m + 1) + m * (m + 6)
 
     def inverse_numbers(self, own: Array) -> Array:
         """Return the limits, lowest then highest, and the network's."""

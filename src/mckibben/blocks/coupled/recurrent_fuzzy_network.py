@@ -127,6 +127,7 @@ class RecurrentFuzzyNetwork(ManyChannels, Primitive):
     kernel: ClassVar[Kernel] = recurrent_fuzzy_network_kernel
     rate_dependent: ClassVar[bool] = True
     in_scratch: ClassVar[bool] = True
+    of_local_rules: ClassVar[bool] = True
     parameters: ClassVar[tuple[str, ...]] = ("centres", "widths", "feedbacks", "consequents")
 
     centres: Rows

@@ -24,6 +24,9 @@ GRID = 13
 LEAST_LEFT = 0.05
 """Area that friction has to leave, relative to that at rest."""
 
+MOST_LONGER, APART = 0.5, 0.7
+"""Logarithms by which a lag may become longer or shorter at once, and by which lags differ."""
+
 LEAST_STIFF = 1e-3
 """Stiffness that has to be left, relative to the force of the highest pressure over the stroke."""
 
@@ -148,7 +151,7 @@ class Structure:
             walls=vector(np.maximum(part["wall"][:, 0], 0.0)),
             limits=vector(self.limits),
             grip=float(max(values[self.grip], 0.0)),
-            lags=vector(np.exp(values[self.timing])),
+            lags=vector(np.clip(np.exp(values[self.timing]), *self.lag_range)),
             hull=rows(part["hull"]),
             scale=self.scale,
             degree=self.degree,
@@ -159,11 +162,16 @@ class Structure:
             pressure_range=pressure_range,
         )
 
+    @property
+    def in_newtons(self) -> bool:
+        """Whether forces are in newtons: those of a muscle alone under one load."""
+        return self.n == len(self.loaded) == 1
+
     def free(self, *, moving: bool) -> Array:
         """Return how coefficients follow from what is free, shape (coefficients, free).
 
-        ``moving`` frees walls, grip, and the areas at rest of muscles after the first, or of all where
-        a load is measured, too.
+        ``moving`` frees walls, grip, lags, and areas at rest too. One number sets the unit of force: of
+        a muscle alone its load's, while moving; else the first area at rest.
         """
         n_all = self.size
         columns: list[list[int]] = []
@@ -171,8 +179,9 @@ class Structure:
             for name in ("elasticity", "friction", "relaxation", "damping"):
                 columns += [[place] for place in self.places(name, k).tolist()]
             areas = self.places("areas", k).tolist()
-            at_rest = bool(self.loaded) or (moving and k > 0)
-            columns += [[place] for place in (areas if at_rest else areas[1:])]
+            newtons = moving and self.in_newtons
+            columns += [[place] for place in (areas if moving and (newtons or k) else areas[1:])]
+            columns += [[place] for place in self.places("loads", k).tolist() if not newtons]
             if moving:
                 columns += [[place] for place in self.places("wall", k).tolist()]
         for q in range(1 + len(self.scheduled) * self.degree):
@@ -212,13 +221,19 @@ class Structure:
 
         ask({self.grip: 1.0}, 0.0)
         ask({self.grip: -1.0}, -4.0 * self.highest)
+        shortest, longest = np.log(self.lag_range).tolist()
         for place in range(self.timing.start, self.timing.stop):
-            ask({place: 1.0}, float(np.log(self.lag_range[0])))
-            ask({place: -1.0}, -float(np.log(self.lag_range[1])))
+            now = float(values[place])
+            ask({place: 1.0}, max(shortest, now - MOST_LONGER))
+            ask({place: -1.0}, -min(longest, now + MOST_LONGER))
+            if place > self.timing.start:
+                ask({place: 1.0, place - 1: -1.0}, APART)
         for k in range(self.n):
             for name in ("friction", "relaxation", "damping", "wall"):
                 for place in self.places(name, k).tolist():
                     ask({place: 1.0}, 0.0)
+            for place in self.places("loads", k).tolist():
+                ask({place: 1.0}, 1e-3 * unit / self.highest if self.in_newtons else 0.0)
             ask({int(self.places("wall", k)[0]): -1.0}, -0.1 * self.scale / self.highest)
             areas, friction = self.places("areas", k), self.places("friction", k)
             ask({int(areas[0]): 1.0}, 0.1 * unit)

@@ -50,6 +50,9 @@ class CoupledEstimator(Estimator):
     paired: ClassVar[bool] = True
     """Whether there must be an output to every input."""
 
+    alone: ClassVar[bool] = False
+    """Whether it is a model of one muscle under no measured load, too."""
+
     fewest_inputs: ClassVar[int] = 1
     most_inputs: ClassVar[float] = np.inf
     """How many muscles there may be."""
@@ -69,9 +72,13 @@ class CoupledEstimator(Estimator):
         scheduled = scheduling
         if scheduled is None:
             scheduled = schedules(recordings, (*inputs, *outputs))
-        if len(inputs) == len(outputs) == 1 and not any(
-            np.ptp(np.concatenate([recording[name] for recording in recordings]))
-            for name in scheduled
+        if (
+            not cls.alone
+            and len(inputs) == len(outputs) == 1
+            and not any(
+                np.ptp(np.concatenate([recording[name] for recording in recordings]))
+                for name in scheduled
+            )
         ):
             return "it is of several muscles, or of one under a measured load that changes"
         if cls.paired and len(inputs) != len(outputs):

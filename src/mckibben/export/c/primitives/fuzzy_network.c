@@ -3,8 +3,7 @@
 #include "linear_system.h"
 
 #define MOST_STEPS 40
-#define DIFFERENCE MCK_EITHER(1e-6, 1e-2) /* of a range, for slopes */
-#define REACHED MCK_EITHER(1e-9, 1e-4)    /* residuals below are not clipped samples */
+#define REACHED MCK_EITHER(1e-9, 1e-4) /* residuals below are not clipped samples */
 
 /* Log memberships of one input, then normalised; in the log domain nothing underflows. */
 static void memberships_of(mck_real x, int sets, const mck_real *centres, const mck_real *widths,
@@ -26,50 +25,90 @@ static void memberships_of(mck_real x, int sets, const mck_real *centres, const 
     }
 }
 
-/* The outputs at one input sample; `scratch` has room for inputs times most sets. */
-static void answer(const mck_real *c, const mck_real *x, mck_real *scratch, mck_real *y)
+/* What the coefficients hold. */
+typedef struct {
+    int n;     /* all inputs */
+    int n_out; /* outputs */
+    int constant;
+    int most; /* sets of an input, at most */
+    const mck_real *sets;
+    const mck_real *centres;
+    const mck_real *widths;
+    const mck_real *consequents;
+} network;
+
+static network read_network(const mck_real *c)
 {
-    const int n = (int)c[0];
-    const int n_out = (int)c[1];
-    const int constant = c[3] > MCK_R(0.0);
-    const int most = (int)c[4];
-    const mck_real *sets = c + 5;
-    const mck_real *centres = sets + n;
-    int n_rules = 1;
+    network net;
     int n_sets = 0;
-    for (int i = 0; i < n; i++) {
-        n_rules *= (int)sets[i];
-        n_sets += (int)sets[i];
+    net.n = (int)c[0];
+    net.n_out = (int)c[1];
+    net.constant = c[3] > MCK_R(0.0);
+    net.most = (int)c[4];
+    net.sets = c + 5;
+    for (int i = 0; i < net.n; i++) {
+        n_sets += (int)net.sets[i];
     }
-    const mck_real *widths = centres + n_sets;
-    const mck_real *consequents = widths + n_sets;
+    net.centres = net.sets + net.n;
+    net.widths = net.centres + n_sets;
+    net.consequents = net.widths + n_sets;
+    return net;
+}
+
+/* The memberships of inputs `first` to `last` alone, where x begins at the first of these; returns
+ * how many combinations of their sets there are. */
+static int memberships_between(const network *net, int first, int last, const mck_real *x,
+                               mck_real *memberships)
+{
     int at = 0;
-    for (int i = 0; i < n; i++) {
-        memberships_of(x[i], (int)sets[i], centres + at, widths + at, scratch + i * most);
-        at += (int)sets[i];
+    int combinations = 1;
+    for (int i = 0; i < last; i++) {
+        const int own = (int)net->sets[i];
+        if (i >= first) {
+            memberships_of(x[i - first], own, net->centres + at, net->widths + at,
+                           memberships + i * net->most);
+            combinations *= own;
+        }
+        at += own;
     }
-    for (int j = 0; j < n_out; j++) {
+    return combinations;
+}
+
+/* The product of memberships of inputs `first` to `last` in one combination of their sets. */
+static mck_real firing_of(const network *net, int first, int last, int combination,
+                          const mck_real *memberships)
+{
+    mck_real firing = MCK_R(1.0);
+    for (int i = last - 1; i >= first; i--) {
+        const int own = (int)net->sets[i];
+        firing *= memberships[i * net->most + combination % own];
+        combination /= own;
+    }
+    return firing;
+}
+
+/* The outputs at one input sample; `memberships` has room for inputs times most sets. */
+static void answer(const mck_real *c, const mck_real *x, mck_real *memberships, mck_real *y)
+{
+    const network net = read_network(c);
+    const int n_rules = memberships_between(&net, 0, net.n, x, memberships);
+    const mck_real *row = net.consequents;
+    for (int j = 0; j < net.n_out; j++) {
         y[j] = MCK_R(0.0);
     }
     for (int rule = 0; rule < n_rules; rule++) {
-        mck_real firing = MCK_R(1.0);
-        int rest = rule;
-        for (int i = n - 1; i >= 0; i--) {
-            const int own = (int)sets[i];
-            firing *= scratch[i * most + rest % own];
-            rest /= own;
-        }
+        const mck_real firing = firing_of(&net, 0, net.n, rule, memberships);
         if (firing > MCK_NOTHING) {
-            for (int j = 0; j < n_out; j++) {
-                mck_real total = constant ? consequents[n] : MCK_R(0.0);
-                for (int i = 0; i < n; i++) {
-                    total += consequents[i] * x[i];
+            for (int j = 0; j < net.n_out; j++) {
+                mck_real total = net.constant ? row[net.n] : MCK_R(0.0);
+                for (int i = 0; i < net.n; i++) {
+                    total += row[i] * x[i];
                 }
                 y[j] += firing * total;
-                consequents += n + constant;
+                row += net.n + net.constant;
             }
         } else {
-            consequents += n_out * (n + constant);
+            row += net.n_out * (net.n + net.constant);
         }
     }
 }
@@ -82,19 +121,21 @@ void mck_fuzzy_network_step(const mck_part *part, mck_real *state, const mck_rea
 
 /* What the inverse computes in, behind its state. */
 typedef struct {
-    int m; /* driven inputs */
-    int n; /* all inputs */
+    int m;       /* driven inputs */
+    int n_rules; /* of the driven inputs */
     const mck_real *low;
     const mck_real *high;
-    const mck_real *network;
+    network net;
     mck_real *memberships;
+    mck_real *tilts; /* their slopes, relative to them */
+    mck_real *tilt;  /* those of one rule */
+    mck_real *left;  /* rules of the driven inputs that are left in this sample */
     mck_real *x;
     mck_real *y;
-    mck_real *shifted;
     mck_real *best;
-    mck_real *residual;
+    mck_real *direction;
     mck_real *kept;
-    mck_real *matrix;
+    mck_real *slopes;
 } workspace;
 
 static workspace work_in(const mck_part *part, mck_real *state)
@@ -103,47 +144,126 @@ static workspace work_in(const mck_part *part, mck_real *state)
     w.m = part->n_states - 1;
     w.low = part->coefficients;
     w.high = w.low + w.m;
-    w.network = w.high + w.m;
-    w.n = (int)w.network[0];
+    w.net = read_network(w.high + w.m);
+    w.n_rules = 1;
+    for (int i = 0; i < w.m; i++) {
+        w.n_rules *= (int)w.net.sets[i];
+    }
     w.memberships = state + part->n_states;
-    w.x = w.memberships + w.n * (int)w.network[4];
-    w.y = w.x + w.n;
-    w.shifted = w.y + w.m;
-    w.best = w.shifted + w.m;
-    w.residual = w.best + w.m;
-    w.kept = w.residual + w.m;
-    w.matrix = w.kept + w.m;
+    w.tilts = w.memberships + w.net.n * w.net.most;
+    w.tilt = w.tilts + w.m * w.net.most;
+    w.left = w.tilt + w.m;
+    w.x = w.left + w.n_rules * w.m * (w.m + 1);
+    w.y = w.x + w.m;
+    w.best = w.y + w.m;
+    w.direction = w.best + w.m;
+    w.kept = w.direction + w.m;
+    w.slopes = w.kept + w.m;
     return w;
 }
 
-/* Outputs at x, and what they miss; returns the largest miss. */
-static mck_real miss(const workspace *w, const mck_real *wanted)
+/* The rules that are left where what schedules is known: every one is the mean of those it stands
+ * for, weighted by their firing. A row an output: coefficients of the driven inputs, and a constant. */
+static void contract(const workspace *w, const mck_real *scheduling)
 {
-    mck_real worst = MCK_R(0.0);
-    answer(w->network, w->x, w->memberships, w->y);
-    for (int j = 0; j < w->m; j++) {
-        w->residual[j] = w->y[j] - wanted[j];
-        worst = mck_max(worst, mck_abs(w->residual[j]));
-    }
-    return worst;
-}
-
-/* Newton's direction, into the residual; slopes by differences. */
-static void newton(const workspace *w)
-{
+    const network *net = &w->net;
     const int m = w->m;
-    for (int i = 0; i < m; i++) {
-        const mck_real kept = w->x[i];
-        const mck_real span = DIFFERENCE * (w->high[i] - w->low[i]);
-        const mck_real h = kept + span <= w->high[i] ? span : -span;
-        w->x[i] = kept + h;
-        answer(w->network, w->x, w->memberships, w->shifted);
-        w->x[i] = kept;
-        for (int j = 0; j < m; j++) {
-            w->matrix[j * m + i] = (w->shifted[j] - w->y[j]) / h;
+    const int n_known = memberships_between(net, m, net->n, scheduling, w->memberships);
+    for (int place = 0; place < w->n_rules * m * (m + 1); place++) {
+        w->left[place] = MCK_R(0.0);
+    }
+    for (int known = 0; known < n_known; known++) {
+        const mck_real firing = firing_of(net, m, net->n, known, w->memberships);
+        mck_real *left = w->left;
+        for (int rule = 0; rule < w->n_rules; rule++) {
+            const mck_real *row = net->consequents +
+                                  (rule * n_known + known) * m * (net->n + net->constant);
+            for (int j = 0; j < m; j++) {
+                mck_real total = net->constant ? row[net->n] : MCK_R(0.0);
+                for (int i = m; i < net->n; i++) {
+                    total += row[i] * scheduling[i - m];
+                }
+                for (int i = 0; i < m; i++) {
+                    left[i] += firing * row[i];
+                }
+                left[m] += firing * total;
+                left += m + 1;
+                row += net->n + net->constant;
+            }
         }
     }
-    mck_eliminate(m, w->matrix, w->residual);
+}
+
+/* Slopes of the logarithms of memberships at x. */
+static void fill_tilts(const workspace *w)
+{
+    int at = 0;
+    for (int i = 0; i < w->m; i++) {
+        const int own = (int)w->net.sets[i];
+        const mck_real *memberships = w->memberships + i * w->net.most;
+        mck_real *tilts = w->tilts + i * w->net.most;
+        mck_real mean = MCK_R(0.0);
+        for (int s = 0; s < own; s++) {
+            const mck_real width = w->net.widths[at + s];
+            tilts[s] = (w->x[i] - w->net.centres[at + s]) / (width * width);
+            mean += memberships[s] * tilts[s];
+        }
+        for (int s = 0; s < own; s++) {
+            tilts[s] = mean - tilts[s];
+        }
+        at += own;
+    }
+}
+
+/* What one rule of the driven inputs adds to the outputs, and to their slopes. */
+static void add_rule(const workspace *w, mck_real firing, const mck_real *left)
+{
+    const int m = w->m;
+    for (int j = 0; j < m; j++) {
+        mck_real total = left[m];
+        for (int i = 0; i < m; i++) {
+            total += left[i] * w->x[i];
+        }
+        w->y[j] += firing * total;
+        for (int i = 0; i < m; i++) {
+            w->slopes[j * m + i] += firing * (left[i] + w->tilt[i] * total);
+        }
+        left += m + 1;
+    }
+}
+
+/* What the outputs at x miss, in y, and their slopes by the driven inputs; returns the largest. */
+static mck_real miss(const workspace *w, const mck_real *wanted)
+{
+    const int m = w->m;
+    mck_real worst = MCK_R(0.0);
+    (void)memberships_between(&w->net, 0, m, w->x, w->memberships);
+    fill_tilts(w);
+    for (int j = 0; j < m; j++) {
+        w->y[j] = MCK_R(0.0);
+    }
+    for (int place = 0; place < m * m; place++) {
+        w->slopes[place] = MCK_R(0.0);
+    }
+    for (int rule = 0; rule < w->n_rules; rule++) {
+        mck_real firing = MCK_R(1.0);
+        int rest = rule;
+        for (int i = m - 1; i >= 0; i--) {
+            const int own = (int)w->net.sets[i];
+            const int place = i * w->net.most + rest % own;
+            firing *= w->memberships[place];
+            w->tilt[i] = w->tilts[place];
+            rest /= own;
+        }
+        if (firing > MCK_NOTHING) {
+            add_rule(w, firing, w->left + rule * m * (m + 1));
+        }
+    }
+    for (int j = 0; j < m; j++) {
+        w->y[j] -= wanted[j];
+        worst = mck_max(worst, mck_abs(w->y[j]));
+    }
+    return worst;
 }
 
 static mck_real size_of(const mck_real *wanted, int m)
@@ -162,8 +282,9 @@ static mck_real search(const workspace *w, mck_real *state, const mck_real *in)
     const mck_real solved = MCK_SOLVED * size_of(in, m);
     mck_real least = MCK_INFINITY;
     mck_real share = MCK_R(1.0);
-    for (int i = 0; i < w->n; i++) {
-        w->x[i] = i < m ? state[i] : in[i];
+    contract(w, in + m);
+    for (int i = 0; i < m; i++) {
+        w->x[i] = state[i];
     }
     for (int step = 0; step < MOST_STEPS; step++) {
         const mck_real worst = miss(w, in);
@@ -173,26 +294,23 @@ static mck_real search(const workspace *w, mck_real *state, const mck_real *in)
             least = worst;
             for (int i = 0; i < m; i++) {
                 w->best[i] = w->x[i];
+                w->direction[i] = w->y[i];
             }
             if (stuck || !(worst > MCK_R(0.0))) {
                 break;
             }
+            mck_eliminate(m, w->slopes, w->direction);
             share = MCK_R(1.0);
         } else if (least < solved) {
             break;
-        } else {
+        } else { /* a shorter step from the best */
             share *= MCK_R(0.5);
-            for (int i = 0; i < m; i++) {
-                w->x[i] = w->best[i];
-            }
             if (share < MCK_R(1e-3)) {
                 break;
             }
-            (void)miss(w, in);
         }
-        newton(w);
         for (int i = 0; i < m; i++) {
-            w->x[i] = mck_clip(w->x[i] - share * w->residual[i], w->low[i], w->high[i]);
+            w->x[i] = mck_clip(w->best[i] - share * w->direction[i], w->low[i], w->high[i]);
         }
     }
     for (int i = 0; i < m; i++) {

@@ -1,0 +1,233 @@
+"""The search for a balance of forces: least squares of its forces, then descent of its free run."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from mckibben.arrays import Array
+from mckibben.errors import ModelError
+from mckibben.estimators.core.data import Run, TrainingData
+from mckibben.estimators.coupled.balance_slopes import run as follow
+from mckibben.estimators.coupled.balance_structure import Structure
+from mckibben.estimators.optimisers.constrained import constrained_least_squares
+
+MOST_ROWS = 12_000
+"""Errors to learn from; more are thinned evenly."""
+
+MOST_TRIES = 9
+"""Dampings tried for a step, each ten times the last."""
+
+MOST_CUTS = 8
+"""Times that springs are made stiff where they were found soft."""
+
+HELD = 0.02
+"""A muscle is held where it moves less than this share of what it moves in all runs."""
+
+LIGHTEST = 1e-7
+"""Root of the damping of a step that is hardly damped."""
+
+UNKNOWN = 1e-10
+"""Effect, relative to the largest of any number, that is none."""
+
+
+class Search:
+    """Coefficients that make the free run follow the recordings.
+
+    Parameters
+    ----------
+    data : TrainingData
+    structure : Structure
+    ridge : float
+        Damping.
+    """
+
+    def __init__(self, data: TrainingData, structure: Structure, ridge: float) -> None:
+        self.data, self.structure, self.ridge = data, structure, ridge
+        loads = {channel.name for channel in structure.loaded}
+        order = [i for i, c in enumerate(data.scheduled) if c.name not in loads]
+        order += [i for i, c in enumerate(data.scheduled) if c.name in loads]
+        self.runs = [replace(run, scheduled=run.scheduled[:, order]) for run in data.runs]
+        self.span = np.ptp(data.stacked("outputs"), axis=0)
+        n_rows = sum(len(run.outputs) for run in self.runs) * structure.n
+        self.every = max(1, n_rows // MOST_ROWS)
+        self.cuts: list[tuple[Array, Array]] = []
+
+    def held(self, run: Run) -> bool:
+        """Tell whether nothing moves in a run, so that its forces are what is compared."""
+        return bool((np.ptp(run.outputs, axis=0) < HELD * self.span).all()) and bool(
+            self.structure.loaded
+        )
+
+    def followed(self, values: Array, run: Run, *, held: bool) -> tuple[Array, Array]:
+        """Return displacements, or forces that are lacking, and their slopes."""
+        block = self.structure.block(values)
+        return follow(
+            block.coefficients(run.sample_time or 1.0),
+            np.ascontiguousarray(run.driven),
+            np.ascontiguousarray(run.outputs),
+            np.ascontiguousarray(run.scheduled),
+            held=held,
+            every=self.every,
+        )
+
+    def measured(self, run: Run) -> Array:
+        """Return the displacements that are compared."""
+        kept = np.arange(-(-len(run.outputs) // self.every)) * self.every + self.every - 1
+        return run.outputs[np.minimum(kept, len(run.outputs) - 1)]
+
+    def begun(self, grip: float) -> Array:
+        """Return coefficients that balance the forces where the muscles were."""
+        structure = self.structure
+        values = structure.start
+        values[structure.grip] = grip
+        found = [self.followed(values, run, held=True)[1] for run in self.runs]
+        slopes = np.concatenate(found)
+        slopes[:, :, structure.grip :] = 0.0
+        for k in range(structure.n):
+            slopes[:, :, structure.places("wall", k)] = 0.0
+        mix = structure.free(moving=False)
+        base = values.copy()
+        for k in range(structure.n):  # on areas at rest of 1, loads are found instead
+            base[structure.places("loads", k)] = 0.0
+        weights = np.ones((1, structure.n))
+        for _ in range(2):
+            rows = slopes * weights[..., np.newaxis]
+            flat = rows.reshape(-1, rows.shape[2])
+            values = self.solved(
+                flat @ mix, -(flat @ base), base, mix, np.zeros(mix.shape[1]), self.ridge
+            )
+            weights = 1.0 / self.stiffness(values)
+        if structure.in_newtons:
+            forces = slice(structure.slices["damping"].start, structure.slices["loads"].stop)
+            values[forces] /= values[structure.places("loads", 0)[0]]
+        return values
+
+    def stiffness(self, values: Array) -> Array:
+        """Return how stiff every muscle is at every sample kept, shape (samples, n)."""
+        structure, found = self.structure, []
+        for run in self.runs:
+            y = self.measured(run)
+            columns = []
+            for k in range(structure.n):
+                u = y[:, k] / structure.scale
+                own = np.zeros(len(u))
+                springs = values[structure.places("springs", k)].reshape(-1, 1 + structure.n)
+                x = run.scheduled[:: self.every][: len(u)]
+                for i in range(len(u)):
+                    own[i] = structure.powers(x[i, : len(structure.scheduled)]) @ springs[:, 1 + k]
+                elastic = values[structure.places("elasticity", k)]
+                for i, e in enumerate(elastic, start=2):
+                    own += e * i * u ** (i - 1) / structure.scale
+                area = values[structure.places("areas", k)]
+                p = run.driven[:: self.every][: len(u), k]
+                for i, a in enumerate(area[1:], start=1):
+                    own -= p * a * i * u ** (i - 1) / structure.scale
+                columns.append(own + 0.3 * values[structure.places("friction", k)].sum())
+            found.append(np.column_stack(columns))
+        table = np.concatenate(found)
+        return np.maximum(table, 0.1 * np.median(np.abs(table), axis=0))
+
+    def solved(
+        self,
+        slopes: Array,
+        target: Array,
+        base: Array,
+        mix: Array,
+        prior: Array,
+        damping: float,
+    ) -> Array:
+        """Return coefficients base + mix free with the least |slopes free - target| physics allows.
+
+        Damped towards ``prior``, by every number's own effect, so that units do not matter; where it
+        has none it stays. Springs are made stiff where they were found soft.
+        """
+        structure = self.structure
+        size = np.sqrt((slopes**2).sum(axis=0))
+        known = size > UNKNOWN * size.max()
+        base = base + mix[:, ~known] @ prior[~known]
+        slopes, mix, prior, size = slopes[:, known], mix[:, known], prior[known], size[known]
+        triangle: Array = np.linalg.qr(np.column_stack([slopes, target]), mode="r")  # type: ignore[assignment]
+        n_free, n = len(prior), structure.n
+        held = np.maximum(np.sqrt(damping), LIGHTEST) * size
+        system = np.zeros((len(triangle) + n_free + n, n_free + n))
+        system[: len(triangle), :n_free] = triangle[:, :-1]
+        system[len(triangle) :, :] = np.diag([*held, *np.full(n, 1e-6 * float(size.max()))])
+        right = np.concatenate([triangle[:, -1], held * prior, np.zeros(n)])
+        whole = np.zeros((len(base) + n, n_free + n))
+        whole[: len(base), :n_free] = mix
+        whole[len(base) :, n_free:] = np.eye(n)
+        origin = np.append(base, np.zeros(n))
+        sides, least = structure.conditions(base + mix @ prior)
+        stiff = float(least[-1])
+        for _ in range(MOST_CUTS):
+            softened = [structure.spring_condition(x, way, stiff) for x, way in self.cuts]
+            all_sides = np.vstack([sides, *(row for row, _ in softened)])
+            all_least = np.append(least, [bound for _, bound in softened])
+            on_free, missing = all_sides @ whole, all_least - all_sides @ origin
+            asks = (on_free != 0).any(axis=1)  # not only of what stays
+            free, _ = constrained_least_squares(system, right, on_free[asks], missing[asks])
+            found = origin + whole @ free
+            values, made_up = found[: len(base)], found[len(base) :]
+            x, way, softest = structure.softest(values, made_up)
+            if softest >= 0.5 * stiff:
+                break
+            self.cuts.append((x, way))
+        return values
+
+    def errors(self, values: Array) -> tuple[Array, Array]:
+        """Return errors of the free run relative to the ranges, and their slopes by coefficients."""
+        errors, slopes = [], []
+        for run in self.runs:
+            if self.held(run):
+                lacking, by = self.followed(values, run, held=True)
+                block_area = values[self.structure.places("areas", 0)[0]] * self.structure.highest
+                scale = np.full(self.structure.n, 1.0 / block_area)
+                errors.append((lacking * scale).ravel())
+            else:
+                found, by = self.followed(values, run, held=False)
+                scale = 1.0 / self.span
+                errors.append(((found - self.measured(run)) * scale).ravel())
+            slopes.append((by * scale[:, np.newaxis]).reshape(-1, by.shape[2]))
+        return np.concatenate(errors), np.concatenate(slopes)
+
+    def cost(self, values: Array) -> float:
+        """Return the root mean square of the errors."""
+        errors = self.errors(values)[0]
+        return float(np.sqrt(np.mean(errors**2))) if np.isfinite(errors).all() else np.inf
+
+    def descend(self, values: Array, steps: int) -> Iterator[tuple[Array, float]]:
+        """Yield ever better coefficients, and the root mean square of their errors."""
+        mix = self.structure.free(moving=True)
+        damping = 1e-3
+        errors, slopes = self.errors(values)
+        cost = float(np.sqrt(np.mean(errors**2)))
+        slow = 0
+        for _ in range(steps):
+            moving = slopes @ mix
+            usable = np.isfinite(moving).all(axis=1)
+            now: Array = np.asarray(np.linalg.lstsq(mix, values, rcond=None)[0], np.float64)
+            base = values - mix @ now
+            target = moving[usable] @ now - errors[usable]
+            for _ in range(MOST_TRIES):
+                try:
+                    tried = self.solved(moving[usable], target, base, mix, now, damping)
+                except ModelError:
+                    damping = max(10.0 * damping, 1e-9)
+                    continue
+                tried_errors, tried_slopes = self.errors(tried)
+                found = float(np.sqrt(np.mean(tried_errors**2)))
+                if found < cost:
+                    break
+                damping = max(10.0 * damping, 1e-9)
+            else:
+                return
+            gained = (cost - found) / cost
+            values, errors, slopes, cost = tried, tried_errors, tried_slopes, found
+            yield values, cost
+            damping = max(damping / 5.0, LIGHTEST**2)
+            slow = slow + 1 if gained < 1e-3 else 0
+            if slow >= 3:
+                return

@@ -1004,6 +1004,133 @@ def force_balance_inverse(block: Any, inputs: Rows, sample_time: float) -> Rows:
     return out[len(ramp) :]
 
 
+class _Parallel:
+    """Muscles in parallel at one place of their history, all as tables of numbers by muscle."""
+
+    def __init__(self, block: Any, scheduled: list[float], sample_time: float) -> None:
+        self.block, self.n, self.step = block, len(block.driven), sample_time
+        n = self.n
+        self.y, self.z = [0.0] * n, [0.0] * n
+        self.stops = [[0.0] * len(block.limits) for _ in range(n)]
+        self.behind = [[0.0] * len(block.lags) for _ in range(n)]
+        self.way = "rest"
+        self.keep(self.found([0.0] * n, scheduled), [0.0] * n)
+        self.tare = list(self.y) if block.tare else [0.0] * n
+        self.way = "first"
+
+    def springs(self, k: int, y: list[float], x: list[float]) -> float:
+        """Return loads, springs and elasticity of a muscle."""
+        block, n = self.block, self.n
+        scheduling, loads = x[: len(x) - len(block.loads[k])], x[len(x) - len(block.loads[k]) :]
+        force = sum(c * load for c, load in zip(block.loads[k], loads, strict=True))
+        for q, x_q in enumerate([1.0] + [v**d for v in scheduling for d in _degrees(block)]):
+            row = block.springs[k][q * (1 + n) : (q + 1) * (1 + n)]
+            force += x_q * (row[0] + sum(s * v for s, v in zip(row[1:], y, strict=True)))
+        return force + _beyond(
+            lambda u: sum(e * u**i for i, e in enumerate(block.elasticity[k], start=2)),
+            y[k],
+            block.hull[k],
+            block.scale,
+        )
+
+    def area(self, k: int, y: float) -> float:
+        terms = self.block.areas[k]
+        value = _beyond(
+            lambda u: sum(a * u**i for i, a in enumerate(terms)),
+            y,
+            self.block.hull[k],
+            self.block.scale,
+        )
+        return max(value, 0.01 * terms[0])
+
+    def moved(self, k: int, y: float, p: float) -> list[float]:
+        """Return where a muscle's stops would be."""
+        if self.way == "rest":
+            return [0.0] * len(self.stops[k])
+        dz = y + self.block.walls[k] * p - self.z[k]
+        widths = [limit * max(p + self.block.grip, 0.0) for limit in self.block.limits]
+        return [
+            min(max(s + dz, -width), width) for s, width in zip(self.stops[k], widths, strict=True)
+        ]
+
+    def relaxing(self, k: int, y: float) -> list[float]:
+        """Return what a muscle's lags would be behind: on a ramp in time, by a step at once."""
+        dy, out = y - self.y[k], []
+        for q, tau in zip(self.behind[k], self.block.lags, strict=True):
+            keep = math.exp(-self.step / tau)
+            ramp = tau / self.step * (1.0 - keep)
+            out.append({"rest": 0.0, "first": dy, "time": keep * q + ramp * dy}[self.way])
+        return out
+
+    def excess(self, k: int, y: list[float], x: list[float], p: float) -> float:
+        """Return how much more a muscle pulls than it holds."""
+        block = self.block
+        force = self.springs(k, y, x) + _sum(block.friction[k], self.moved(k, y[k], p))
+        force += _sum(block.relaxation[k], self.relaxing(k, y[k]))
+        if self.way == "time":
+            force += block.damping[k] * (y[k] - self.y[k]) / self.step
+        return p * self.area(k, y[k]) - force
+
+    def pressures(self, y: list[float], x: list[float]) -> list[float]:
+        low, high = self.block.pressure_range or (-math.inf, math.inf)
+        found = [bisect(partial(self.excess, k, y, x), 0.0, -1000.0, 1000.0) for k in range(self.n)]
+        return [min(max(p, low), high) for p in found]
+
+    def found(self, p: list[float], x: list[float]) -> list[float]:
+        from scipy.optimize import root
+
+        def missed(y: Any) -> list[float]:
+            return [self.excess(k, list(y), x, p[k]) for k in range(self.n)]
+
+        return [float(y) for y in root(missed, self.y, tol=1e-14).x]
+
+    def keep(self, y: list[float], p: list[float]) -> None:
+        muscles = list(enumerate(zip(y, p, strict=True)))
+        self.stops = [self.moved(k, *place) for k, place in muscles]
+        self.behind = [self.relaxing(k, here) for k, (here, _) in muscles]
+        self.z = [here + self.block.walls[k] * pressure for k, (here, pressure) in muscles]
+        self.y, self.way = y, "time"
+
+
+def _degrees(block: Any) -> range:
+    return range(1, block.degree + 1)
+
+
+def _beyond(
+    formula: Callable[[float], float], y: float, hull: tuple[float, float], scale: float
+) -> float:
+    """Return a polynomial of y / scale, and beyond what is known its tangent there.
+
+    Differences of polynomials of the fourth order and below are exact, of steps of any length.
+    """
+    inside, h = min(max(y, hull[0]), hull[1]), 1.0
+    u = inside / scale
+    if y == inside:
+        return formula(u)
+    near, far = (formula(u + d * h) - formula(u - d * h) for d in (1, 2))
+    return formula(u) + (8.0 * near - far) / (12.0 * h) * (y - inside) / scale
+
+
+def balance(block: Any, inputs: Rows, sample_time: float) -> Rows:
+    n, out = len(block.driven), []
+    arm = _Parallel(block, inputs[0][n:], sample_time)
+    for row in inputs:
+        y = [here + tare for here, tare in zip(row[:n], arm.tare, strict=True)]
+        out.append(arm.pressures(y, row[n:]))
+        arm.keep(y, out[-1])
+    return out
+
+
+def balance_inverse(block: Any, inputs: Rows, sample_time: float) -> Rows:
+    n, out = len(block.outputs), []
+    arm = _Parallel(block.forward, inputs[0][n:], sample_time)
+    for row in inputs:
+        y = arm.found(row[:n], row[n:])
+        arm.keep(y, row[:n])
+        out.append([here - tare for here, tare in zip(y, arm.tare, strict=True)])
+    return out
+
+
 def pid(block: Any, inputs: Rows, sample_time: float) -> Rows:
     n = len(block.driven)
     lowest, highest = block.limits
@@ -1032,6 +1159,8 @@ TWINS: dict[str, Twin] = {
     "affine": affine,
     "air": air,
     "air-inverse": air_inverse,
+    "balance": balance,
+    "balance-inverse": balance_inverse,
     "bouc-wen": stepping(_BoucWen),
     "bouc-wen-inverse": _solved(_BoucWen),
     "braid-equilibrium": braid_equilibrium,

@@ -1,0 +1,376 @@
+#include "balance_law.h"
+
+#include "linear_system.h"
+
+#define HEAD 14
+#define MOST_STEPS 60
+#define MOST_SEARCHED 25
+#define BALANCED MCK_EITHER(2e-15, 1e-6)
+#define LEAST_AREA MCK_R(0.01)
+
+/* Coefficients of one muscle. */
+typedef struct {
+    mck_real low;
+    mck_real high;
+    mck_real wall;
+    mck_real damping;
+    const mck_real *springs;
+    const mck_real *elasticity;
+    const mck_real *areas;
+    const mck_real *friction;
+    const mck_real *relaxation;
+    const mck_real *loads;
+} muscle;
+
+mck_balance mck_balance_of(const mck_part *part, mck_real *state)
+{
+    const mck_real *c = part->coefficients;
+    mck_balance f;
+    f.n = (int)c[0];
+    f.n_x = (int)c[1];
+    f.degree = (int)c[2];
+    f.n_loads = (int)c[3];
+    f.m = (int)c[4];
+    f.n_l = (int)c[5];
+    f.n_e = (int)c[6];
+    f.n_a = (int)c[7];
+    f.scale = c[8];
+    f.grip = c[9];
+    f.lowest = c[10];
+    f.highest = c[11];
+    f.rate = c[12];
+    f.limits = c + HEAD;
+    f.decays = f.limits + f.m;
+    f.gains = f.decays + f.n_l;
+    f.muscles = f.gains + f.n_l;
+    f.y = state;
+    f.z = f.y + f.n;
+    f.stops = f.z + f.n;
+    f.lags = f.stops + f.n * f.m;
+    f.tare = f.lags + f.n * f.n_l;
+    f.first = f.tare + f.n;
+    f.amiss = f.first + 1;
+    f.scratch = state + part->n_states;
+    return f;
+}
+
+static muscle read_muscle(const mck_balance *f, int k)
+{
+    const int springs = (1 + f->n_x * f->degree) * (1 + f->n);
+    const int width = 4 + springs + f->n_e + f->n_a + f->m + f->n_l + f->n_loads;
+    const mck_real *own = f->muscles + k * width;
+    muscle one;
+    one.low = own[0];
+    one.high = own[1];
+    one.wall = own[2];
+    one.damping = own[3];
+    one.springs = own + 4;
+    one.elasticity = one.springs + springs;
+    one.areas = one.elasticity + f->n_e;
+    one.friction = one.areas + f->n_a;
+    one.relaxation = one.friction + f->m;
+    one.loads = one.relaxation + f->n_l;
+    return one;
+}
+
+/* Springs, elasticity and loads of muscle k, and their gradient by y. */
+static mck_real elastic(const mck_balance *f, const muscle *one, int k, const mck_real *y,
+                        const mck_real *x, mck_real *gradient)
+{
+    mck_real force = MCK_R(0.0);
+    for (int j = 0; j < f->n; j++) {
+        gradient[j] = MCK_R(0.0);
+    }
+    for (int q = 0; q < 1 + f->n_x * f->degree; q++) {
+        const mck_real *row = one->springs + q * (1 + f->n);
+        mck_real power = MCK_R(1.0);
+        for (int repeat = 0; q > 0 && repeat < (q - 1) % f->degree + 1; repeat++) {
+            power *= x[(q - 1) / f->degree];
+        }
+        force += power * row[0];
+        for (int j = 0; j < f->n; j++) {
+            const mck_real spring = power * row[1 + j];
+            force += spring * y[j];
+            gradient[j] += spring;
+        }
+    }
+    const mck_real inside = mck_clip(y[k], one->low, one->high);
+    const mck_real u = inside / f->scale;
+    mck_real power = u;
+    mck_real value = MCK_R(0.0);
+    mck_real slope = MCK_R(0.0);
+    for (int i = 0; i < f->n_e; i++) {
+        slope += (mck_real)(i + 2) * one->elasticity[i] * power;
+        power *= u;
+        value += one->elasticity[i] * power;
+    }
+    slope /= f->scale;
+    force += value + slope * (y[k] - inside);
+    gradient[k] += slope;
+    for (int i = 0; i < f->n_loads; i++) {
+        force += one->loads[i] * x[f->n_x + i];
+    }
+    return force;
+}
+
+/* Effective area of a muscle, and its slope; beyond what is known it goes on straight. */
+static mck_real area(const mck_balance *f, const muscle *one, mck_real y, mck_real *slope)
+{
+    const mck_real inside = mck_clip(y, one->low, one->high);
+    const mck_real u = inside / f->scale;
+    const mck_real least = LEAST_AREA * one->areas[0];
+    mck_real value = MCK_R(0.0);
+    *slope = MCK_R(0.0);
+    for (int i = f->n_a - 1; i >= 0; i--) {
+        *slope = *slope * u + value;
+        value = value * u + one->areas[i];
+    }
+    *slope /= f->scale;
+    value += *slope * (y - inside);
+    if (!(value > least)) {
+        value = least;
+        *slope = MCK_R(0.0);
+    }
+    return value;
+}
+
+/* Friction of muscle k at a displacement and a pressure, and its slopes by both. */
+static mck_real rubbed(const mck_balance *f, const muscle *one, int k, int way,
+                       mck_real y, mck_real p, mck_real *by_y, mck_real *by_p)
+{
+    const mck_real grown = mck_max(p + f->grip, MCK_R(0.0));
+    const mck_real moved = y + one->wall * p - f->z[k];
+    mck_real force = MCK_R(0.0);
+    *by_y = MCK_R(0.0);
+    *by_p = MCK_R(0.0);
+    for (int i = 0; way != MCK_AT_REST && i < f->m; i++) {
+        const mck_real h = one->friction[i];
+        const mck_real limit = f->limits[i] * grown;
+        const mck_real s = f->stops[k * f->m + i] + moved;
+        if (s > limit) {
+            force += h * limit;
+            *by_p += h * f->limits[i];
+        } else if (s < -limit) {
+            force -= h * limit;
+            *by_p -= h * f->limits[i];
+        } else {
+            force += h * s;
+            *by_y += h;
+            *by_p += h * one->wall;
+        }
+    }
+    return force;
+}
+
+/* Relaxation and damping of muscle k at a displacement, and their slope by it. */
+static mck_real lagging(const mck_balance *f, const muscle *one, int k, int way,
+                        mck_real y, mck_real *slope)
+{
+    const mck_real moved = y - f->y[k];
+    *slope = way == MCK_IN_TIME ? one->damping * f->rate : MCK_R(0.0);
+    mck_real force = *slope * moved;
+    for (int i = 0; way != MCK_AT_REST && i < f->n_l; i++) {
+        const mck_real gain = way == MCK_IN_TIME ? f->gains[i] : MCK_R(1.0);
+        const mck_real q = f->decays[i] * f->lags[k * f->n_l + i] + gain * moved;
+        force += one->relaxation[i] * q;
+        *slope += one->relaxation[i] * gain;
+    }
+    return force;
+}
+
+void mck_balance_keep(const mck_balance *f, int way, const mck_real *y, const mck_real *p)
+{
+    for (int k = 0; k < f->n; k++) {
+        const muscle one = read_muscle(f, k);
+        const mck_real z = y[k] + one.wall * p[k];
+        const mck_real grown =
+            way != MCK_AT_REST ? mck_max(p[k] + f->grip, MCK_R(0.0)) : MCK_R(0.0);
+        for (int i = 0; i < f->m; i++) {
+            mck_real *stop = f->stops + k * f->m + i;
+            const mck_real limit = f->limits[i] * grown;
+            *stop = mck_clip(*stop + z - f->z[k], -limit, limit);
+        }
+        for (int i = 0; i < f->n_l; i++) {
+            mck_real *lag = f->lags + k * f->n_l + i;
+            const mck_real gain = way == MCK_IN_TIME ? f->gains[i] : MCK_R(1.0);
+            const mck_real behind = f->decays[i] * *lag + gain * (y[k] - f->y[k]);
+            *lag = way == MCK_AT_REST ? MCK_R(0.0) : behind;
+        }
+        f->y[k] = y[k];
+        f->z[k] = z;
+    }
+    *f->first = MCK_R(0.0);
+}
+
+int mck_balance_way(const mck_balance *f)
+{
+    return *f->first > MCK_R(0.0) ? MCK_FROM_REST : MCK_IN_TIME;
+}
+
+/* The one root of a function that rises piecewise straight. */
+mck_real mck_balance_pressed(const mck_balance *f, int k, int way, const mck_real *y,
+                             const mck_real *x, mck_real *gradient)
+{
+    const muscle one = read_muscle(f, k);
+    mck_real unused;
+    mck_real held = elastic(f, &one, k, y, x, gradient);
+    held += lagging(f, &one, k, way, y[k], &unused);
+    const mck_real a = area(f, &one, y[k], &unused);
+    mck_real low = -MCK_INFINITY;
+    mck_real high = MCK_INFINITY;
+    mck_real p = held / a;
+    int found = 0;
+    for (int step = 0; step < MOST_STEPS && !found; step++) {
+        mck_real by_y;
+        mck_real by_p;
+        const mck_real force = rubbed(f, &one, k, way, y[k], p, &by_y, &by_p);
+        const mck_real excess = p * a - held - force;
+        found = mck_abs(excess) <= BALANCED * (mck_abs(p * a) + mck_abs(held) + mck_abs(force));
+        if (!found) {
+            const mck_real slope = a - by_p;
+            mck_real next = slope > MCK_R(0.0) ? p - excess / slope : p - excess / a;
+            if (excess > MCK_R(0.0)) {
+                high = p;
+            } else {
+                low = p;
+            }
+            if (!(low < next && next < high)) {
+                if (low > -MCK_INFINITY && high < MCK_INFINITY) {
+                    next = MCK_R(0.5) * (low + high);
+                    found = !(low < next && next < high);
+                } else {
+                    next = p - excess / a;
+                }
+            }
+            p = found ? p : next;
+        }
+    }
+    return p;
+}
+
+mck_real mck_balance_lack(const mck_balance *f, int way, const mck_real *y, const mck_real *x,
+                          const mck_real *p, mck_real *residual, mck_real *matrix)
+{
+    mck_real worst = MCK_R(0.0);
+    for (int k = 0; k < f->n; k++) {
+        const muscle one = read_muscle(f, k);
+        mck_real *row = matrix + k * f->n;
+        mck_real by_y;
+        mck_real by_p;
+        mck_real by_moving;
+        mck_real a_slope;
+        const mck_real force = elastic(f, &one, k, y, x, row);
+        const mck_real friction = rubbed(f, &one, k, way, y[k], p[k], &by_y, &by_p);
+        const mck_real behind = lagging(f, &one, k, way, y[k], &by_moving);
+        const mck_real pull = p[k] * area(f, &one, y[k], &a_slope);
+        mck_real size = mck_abs(force) + mck_abs(friction) + mck_abs(behind) + mck_abs(pull);
+        for (int j = 0; j < f->n; j++) {
+            size += mck_abs(row[j] * y[j]);
+        }
+        row[k] += by_y + by_moving - p[k] * a_slope;
+        residual[k] = force + friction + behind - pull;
+        if (size > MCK_R(0.0)) {
+            worst = mck_max(worst, mck_abs(residual[k]) / size);
+        }
+    }
+    return worst;
+}
+
+static mck_real product(int n, const mck_real *a, const mck_real *b)
+{
+    mck_real sum = MCK_R(0.0);
+    for (int k = 0; k < n; k++) {
+        sum += a[k] * b[k];
+    }
+    return sum;
+}
+
+/* Go along `step` from where the muscles are, until the energy falls much slower than at the start, at
+ * the rate `down`; returns what is left of the residual. */
+static mck_real search(const mck_balance *f, int way, mck_real *y, const mck_real *x,
+                       const mck_real *p, mck_real *residual, mck_real *matrix,
+                       const mck_real *step, mck_real *start, mck_real down)
+{
+    mck_real low = MCK_R(0.0);
+    mck_real high = MCK_R(-1.0);
+    mck_real share = MCK_R(1.0);
+    mck_real low_rate = down;
+    mck_real high_rate = MCK_R(0.0);
+    mck_real left = MCK_R(0.0);
+    int done = 0;
+    for (int k = 0; k < f->n; k++) {
+        start[k] = y[k];
+    }
+    for (int tried = 0; tried < MOST_SEARCHED && !done; tried++) {
+        for (int k = 0; k < f->n; k++) {
+            y[k] = start[k] + share * step[k];
+        }
+        left = mck_balance_lack(f, way, y, x, p, residual, matrix);
+        const mck_real rate = product(f->n, residual, step);
+        done = left <= BALANCED || mck_abs(rate) <= MCK_R(0.7) * mck_abs(down);
+        if (rate > MCK_R(0.0)) {
+            high = share;
+            high_rate = rate;
+        } else {
+            low = share;
+            low_rate = rate;
+        }
+        if (high < MCK_R(0.0)) {
+            share *= MCK_R(2.0);
+        } else { /* where the rate would vanish were it straight, but well inside */
+            const mck_real straight = -low_rate / (high_rate - low_rate);
+            share = low + (high - low) * mck_clip(straight, MCK_R(0.1), MCK_R(0.9));
+        }
+    }
+    return left;
+}
+
+mck_real mck_balance_settle(const mck_balance *f, int way, mck_real *y, const mck_real *x,
+                            const mck_real *p, mck_real *scratch)
+{
+    mck_real *residual = scratch;
+    mck_real *step = residual + f->n;
+    mck_real *start = step + f->n;
+    mck_real *matrix = start + f->n;
+    mck_real left = mck_balance_lack(f, way, y, x, p, residual, matrix);
+    mck_real before = MCK_R(2.0) * left + MCK_R(1.0);
+    for (int tried = 0; tried < MOST_STEPS; tried++) {
+        if (left <= BALANCED || (left >= before && left < MCK_NEARLY)) {
+            break;
+        }
+        before = left;
+        for (int k = 0; k < f->n; k++) {
+            step[k] = -residual[k];
+        }
+        mck_eliminate(f->n, matrix, step);
+        mck_real down = product(f->n, residual, step);
+        if (!(down < MCK_R(0.0))) { /* where the energy is not convex: straight down */
+            for (int k = 0; k < f->n; k++) {
+                step[k] = -residual[k];
+            }
+            down = product(f->n, residual, step);
+        }
+        left = search(f, way, y, x, p, residual, matrix, step, start, down);
+    }
+    return left;
+}
+
+void mck_balance_begin(const mck_part *part, const mck_balance *f, const mck_real *x)
+{
+    mck_real *y = f->scratch;
+    mck_real *p = y + f->n;
+    for (int i = 0; i < part->n_states; i++) {
+        f->y[i] = MCK_R(0.0);
+    }
+    for (int k = 0; k < f->n; k++) {
+        y[k] = MCK_R(0.0);
+        p[k] = MCK_R(0.0);
+    }
+    (void)mck_balance_settle(f, MCK_AT_REST, y, x, p, p + f->n);
+    mck_balance_keep(f, MCK_AT_REST, y, p);
+    for (int k = 0; k < f->n; k++) {
+        f->tare[k] = part->coefficients[HEAD - 1] > MCK_R(0.0) ? y[k] : MCK_R(0.0);
+    }
+    *f->first = MCK_R(1.0);
+}
+

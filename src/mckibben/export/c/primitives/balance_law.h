@@ -1,0 +1,78 @@
+/* What holds in every sample of a balance of forces: its terms, and its two solutions.
+ *
+ * Coefficients: n, scheduling inputs, degree, loads, stops m, lags l, elastic terms, area's terms,
+ * scale, pressure below zero at which stops hold nothing, lowest and highest pressure, samples a second,
+ * tare; m limits, l decays, l gains; then of every muscle: lowest and highest displacement known, wall,
+ * damping, springs (powers of what schedules by 1 + n), elasticity, area, friction, relaxation, loads.
+ * State: n displacements, n stretches, n by m stops, n by l lags, n tares, whether nothing came before,
+ * count of samples amiss; scratch: n n + 6 n. */
+#ifndef MCK_BALANCE_LAW_H
+#define MCK_BALANCE_LAW_H
+
+#include "mck.h"
+
+/* Relative: a residual below is an equilibrium, but for rounding. */
+#define MCK_NEARLY MCK_EITHER(1e-9, 1e-4)
+
+/* Ways to a sample: without friction and lags; all at once, before anything relaxes or damps; in the
+ * sample time. */
+#define MCK_AT_REST 0
+#define MCK_FROM_REST 1
+#define MCK_IN_TIME 2
+
+/* Coefficients, state and scratch; stops are n by m, lags n by n_l. */
+typedef struct {
+    int n;
+    int n_x;
+    int degree;
+    int n_loads;
+    int m;
+    int n_l;
+    int n_e;
+    int n_a;
+    mck_real scale;
+    mck_real grip;
+    mck_real lowest;
+    mck_real highest;
+    mck_real rate;
+    const mck_real *limits;
+    const mck_real *decays;
+    const mck_real *gains;
+    const mck_real *muscles;
+    mck_real *y;
+    mck_real *z;
+    mck_real *stops;
+    mck_real *lags;
+    mck_real *tare;
+    mck_real *first;
+    mck_real *amiss;
+    mck_real *scratch;
+} mck_balance;
+
+mck_balance mck_balance_of(const mck_part *part, mck_real *state);
+
+/* Rest without pressure, and take the tare there; nothing has come before the first sample. `x` is what
+ * schedules, then the loads, here and below. The first n numbers of scratch are then the displacements. */
+void mck_balance_begin(const mck_part *part, const mck_balance *f, const mck_real *x);
+
+/* Way to the next sample. */
+int mck_balance_way(const mck_balance *f);
+
+/* Bring the state to where the muscles are now; something has come. */
+void mck_balance_keep(const mck_balance *f, int way, const mck_real *y, const mck_real *p);
+
+/* The pressure of muscle k that balances it where all muscles are; `gradient` has n numbers. */
+mck_real mck_balance_pressed(const mck_balance *f, int k, int way, const mck_real *y,
+                             const mck_real *x, mck_real *gradient);
+
+/* What every muscle's forces exceed its pull by, n numbers, and its slopes by displacements, n by n;
+ * returns the largest share. */
+mck_real mck_balance_lack(const mck_balance *f, int way, const mck_real *y, const mck_real *x,
+                          const mck_real *p, mck_real *residual, mck_real *matrix);
+
+/* Move the displacements to where pressures hold them; returns what is left of the residual. `scratch`
+ * has n n + 3 n numbers. */
+mck_real mck_balance_settle(const mck_balance *f, int way, mck_real *y, const mck_real *x,
+                            const mck_real *p, mck_real *scratch);
+
+#endif

@@ -28,8 +28,8 @@ PLUGINS: dict[str, dict[str, str | Preset]] = {
         "activation-memory": "mckibben.blocks.force.activation_memory:ActivationMemory",
         "activation-pressure": "mckibben.blocks.force.activation_pressure:ActivationPressure",
         "affine": "mckibben.blocks.memoryless.affine:Affine",
-        "balance": "mckibben.blocks.coupled.balance:Balance",
         "air": "mckibben.blocks.dynamic.air:Air",
+        "balance": "mckibben.blocks.coupled.balance:Balance",
         "bouc-wen": "mckibben.blocks.differential.bouc_wen:BoucWen",
         "braid-equilibrium": "mckibben.blocks.force.braid_equilibrium:BraidEquilibrium",
         "chou-hannaford": "mckibben.blocks.force.chou_hannaford:ChouHannaford",
@@ -96,6 +96,7 @@ PLUGINS: dict[str, dict[str, str | Preset]] = {
         "air": "mckibben.estimators.dynamic.air:AirEstimator",
         "armax": preset(LINEAR, "ARMAX model, A y = B u + C e.", n_noise=2, effort=1.0),
         "arx": preset(LINEAR, "ARX model, A y = B u + e, by linear least squares."),
+        "balance": "mckibben.estimators.coupled.balance:BalanceEstimator",
         "bj": preset(
             LINEAR,
             "Box-Jenkins model, y = B / F u + C / D e; second order each by default.",
@@ -116,7 +117,6 @@ PLUGINS: dict[str, dict[str, str | Preset]] = {
         "cpi": "mckibben.estimators.play_type.creep_pi:CreepPIEstimator",
         "duhem": "mckibben.estimators.differential.duhem:DuhemEstimator",
         "eupi": "mckibben.estimators.play_type.eupi:EUPIEstimator",
-        "balance": "mckibben.estimators.coupled.balance:BalanceEstimator",
         "force-balance": "mckibben.estimators.coupled.force_balance:ForceBalanceEstimator",
         "force-bilinear": preset(FORCE_LAW, "The bilinear-quadratic law.", law="bilinear"),
         "force-chou": "mckibben.estimators.force.static:ChouHannafordEstimator",
@@ -138,7 +138,6 @@ PLUGINS: dict[str, dict[str, str | Preset]] = {
         "force-tondu": "mckibben.estimators.force.static:TonduLopezEstimator",
         "gbw": "mckibben.estimators.differential.generalized_bouc_wen:GeneralizedBoucWenEstimator",
         "gpi": "mckibben.estimators.play_type.gpi:GPIEstimator",
-        "grey-box": "mckibben.estimators.force.grey_box:GreyBoxEstimator",
         "kp": preset(
             GRID,
             "Krasnosel'skii-Pokrovskii model by (non-negative) least squares on its operators.",
@@ -264,6 +263,11 @@ PLUGINS: dict[str, dict[str, str | Preset]] = {
 }
 """Group -> name -> ``"module:attribute"``, or a preset. Adding a plug-in is one line here."""
 
+REPLACED: dict[str, dict[str, str]] = {
+    "estimators": {"grey-box": "balance"},
+}
+"""Group -> name that is gone -> name of what does its work."""
+
 
 def names(group: str) -> tuple[str, ...]:
     """Return the names of all plug-ins of a group, in alphabetical order.
@@ -280,14 +284,17 @@ def load(group: str, name: str) -> Any:
     Raises
     ------
     ModelError
-        If the group has no plug-in of that name, where the text lists those it has, or it cannot be
-        imported.
+        If the group has no plug-in of that name, where the text names what replaced it or lists
+        those that there are, or it cannot be imported.
     """
     locations = _locations(group)
     if name not in locations:
+        kind = group.removesuffix("s")
+        successor = REPLACED.get(group, {}).get(name)
+        if successor is not None:
+            raise ModelError(f"the {kind} {name!r} is gone. Remedy: use {successor!r} instead.")
         raise ModelError(
-            f"there is no {group[:-1] if group.endswith('s') else group} named {name!r}. "
-            f"Remedy: use one of {', '.join(sorted(locations))}."
+            f"there is no {kind} named {name!r}. Remedy: use one of {', '.join(sorted(locations))}."
         )
     found: Any = locations[name]
     if isinstance(found, str):

@@ -14,7 +14,7 @@ import pytest
 import mckibben
 from mckibben import Block, ModelError
 from mckibben.blocks.play_type.envelopes import Envelope
-from mckibben.registry import PLUGINS, load, names
+from mckibben.registry import PLUGINS, REPLACED, load, names
 
 SOURCE = Path(mckibben.__file__).parent
 EVERYTHING = [(group, name) for group in PLUGINS for name in PLUGINS[group]]
@@ -127,6 +127,17 @@ def test_unknown_name_lists_the_known_ones() -> None:
         ModelError, match=r"no block named .ip.*Remedy: use one of activation-memory"
     ):
         load("blocks", "ip")
+
+
+@pytest.mark.parametrize(
+    ("group", "name"), [(group, name) for group in REPLACED for name in REPLACED[group]]
+)
+def test_a_name_that_is_gone_leads_to_what_does_its_work(group: str, name: str) -> None:
+    successor = REPLACED[group][name]
+    assert name not in names(group)
+    with pytest.raises(ModelError, match=rf"{name}.*is gone. Remedy: use '{successor}'"):
+        load(group, name)
+    assert callable(load(group, successor))
 
 
 def test_names_are_in_order() -> None:

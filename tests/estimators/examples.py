@@ -31,6 +31,9 @@ QUICK: dict[str, Any] = {
     "pso_particles": 6,
     "pso_iterations": 4,
     "n_play": 3,
+    "n_stops": 3,
+    "n_lags": 1,
+    "steps": 3,
     "ridge": 1e-3,
     "n_sets": 2,
     "elements": ("both",),
@@ -151,7 +154,7 @@ def recorded(kind: str) -> tuple[Recording, ...]:
 def kinds_for(name: str) -> tuple[str, ...]:
     """Return the kinds of recording that an estimator learns from, by its own word.
 
-    Of any input and output, the one with pressure and displacement stands for all.
+    Of any one input and output, those of pressure and displacement stand for all.
     """
     estimator_class = load("estimators", name)
     fits = tuple(
@@ -159,7 +162,8 @@ def kinds_for(name: str) -> tuple[str, ...]:
         for kind, made in KINDS.items()
         if estimator_class.objection(recorded(kind), made.inputs, made.outputs) is None
     )
-    return fits[:1] if "muscle" in fits else fits
+    several = tuple(kind for kind in fits if len(KINDS[kind].inputs) > 1)
+    return ("muscle", *several) if "muscle" in fits else fits
 
 
 def example_for(name: str) -> tuple[Recording, ...]:

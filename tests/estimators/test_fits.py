@@ -30,7 +30,7 @@ PRESSURE = 2.5 * (1 - 0.7 * np.floor(6 * TIME).clip(0, 5) / 5) * (1 - np.cos(12 
 OPERATORS = ("eupi", "gpi", "mpi", "pi", "rdpi")
 INVERTIBLE = (
     *OPERATORS,
-    *("bouc-wen", "cpi", "gbw", "grey-box", "kp", "maxwell-slip", "mms", "preisach"),
+    *("bouc-wen", "cpi", "gbw", "kp", "maxwell-slip", "mms", "preisach"),
 )
 SWARMS = tuple(
     n for n in names("estimators") if isinstance(load("estimators", n)(), SearchingEstimator)

@@ -162,33 +162,6 @@ class BraidEquilibrium(Memoryless, Ranged):
         head = [self.load, self.stiffness, self.hardening, area, a, b, least, largest]
         return np.array([*head, self.rest_length, self.offset])
 
-    def slopes(self, displacement: Array) -> tuple[Array, Array]:
-        """Return how displacements of equilibrium move, shapes (n,) and (n, 4).
-
-        By pressure; and by load, stiffness, hardening and braid angle. Where the muscle goes no
-        further, it moves with its limits.
-        """
-        c = self.coefficients(None)
-        e = (displacement - self.offset) / self.rest_length
-        sine, cosine = math.sin(self.braid_angle), math.cos(self.braid_angle)
-        pull = c[3] * (c[4] * (1.0 - e) ** 2 - c[5])
-        pressure = (c[0] + e * (c[1] + c[2] * e * e)) / pull
-        by_contraction = c[1] + 3.0 * c[2] * e * e + 2.0 * pressure * c[3] * c[4] * (1.0 - e)
-        by_angle = c[3] * (2.0 * cosine - 6.0 * cosine * (1.0 - e) ** 2) / sine**3
-        loads = np.column_stack([np.ones_like(e), e, e**3, -pressure * by_angle])
-        by_pressure = self.rest_length * pull / by_contraction
-        by_parameters = -self.rest_length * loads / by_contraction[:, np.newaxis]
-        lowest, highest = e <= c[6], e >= c[7]
-        by_pressure[lowest | highest] = 0.0
-        by_least = np.zeros(4)
-        if c[6] > LEAST:
-            stiffness = self.stiffness + 0.01 * self.hardening
-            by_least[:3] = c[6] / self.load, -c[6] / stiffness, -0.01 * c[6] / stiffness
-        by_largest = np.array([0.0, 0.0, 0.0, -SHARE * sine / (math.sqrt(3.0) * cosine**2)])
-        by_parameters[lowest] = self.rest_length * by_least
-        by_parameters[highest] = self.rest_length * by_largest
-        return by_pressure, by_parameters
-
     def reachable(self) -> tuple[Array, Array]:
         """Return the displacements at the least and largest contraction, each of shape (1,)."""
         c = self.coefficients(None)

@@ -45,7 +45,7 @@ LEAST_SQUARES = "PI by least squares, ours"
 SEEDS, QUICK_SEEDS = 10, 3
 """Seeds that each of the paper's methods is identified with."""
 
-QUICK = ("bj", "cpi", "duhem", "gpi", "grey-box", "mpi", "oe", "p2uz", "pi", "preisach")
+QUICK = ("balance", "bj", "cpi", "duhem", "gpi", "mpi", "oe", "p2uz", "pi", "preisach")
 """Models of the quick run."""
 
 REPORTED = ("chosen", "train", "test", "r2", "gap", "hold", "parameters")

@@ -22,6 +22,7 @@ from mckibben.blocks.memoryless.affine import Affine
 from mckibben.errors import ModelError
 from mckibben.estimators.core.data import TrainingData
 from mckibben.estimators.core.uncertainty import unknown
+from mckibben.estimators.coupled.balance_checks import one_speed, telling
 from mckibben.estimators.coupled.balance_search import Search
 from mckibben.estimators.coupled.balance_structure import Structure
 from mckibben.estimators.coupled.balance_words import held_back, sentences
@@ -96,6 +97,8 @@ class BalanceEstimator(CoupledEstimator):
 
     def identify(self, data: TrainingData, tracker: Tracker) -> Block:
         """Return the balance, solved for displacements."""
+        data, notes = telling(data)
+        tracker.notes += notes
         ways = directions(data)
         data = turned(data, ways)
         search = Search(data, self.structure(data, tracker), self.ridge)
@@ -107,6 +110,7 @@ class BalanceEstimator(CoupledEstimator):
                 starts.append((few.cost(values), values))
                 tracker.saw(values, starts[-1][0])
             starts.sort(key=lambda start: start[0])
+            few.check_loads(starts[0][1])
             for _, start in starts[:FOLLOWED]:
                 few.descend(start, FIRST_STEPS, tracker)
             assert tracker.best is not None
@@ -143,7 +147,8 @@ class BalanceEstimator(CoupledEstimator):
         solved = block.parts[0] if isinstance(block, Series) else block
         balance = solved.inverse()
         assert isinstance(balance, Balance)
-        shortened = turned(data, directions(data))
+        told, _ = telling(data)
+        shortened = turned(told, directions(told))
         structure = self.structure(shortened, Tracker())
         search = Search(shortened, structure, self.ridge)
         condition, found = search.covariance(structure.values(balance))
@@ -182,7 +187,12 @@ class BalanceEstimator(CoupledEstimator):
             tare = bool(scheduled) and bool((np.abs(first) <= AT_START * span).all())
         if tare:
             margin = 0.15 * span
-        timed = data.sample_time is not None
+        still = one_speed(data)
+        if still and self.n_lags and self.lags is None:
+            tracker.notes.append(
+                "all moves at about one speed, so that relaxation cannot be told from friction, and is "
+                "left out. Remedy: record at other speeds too, or give lags"
+            )
         return Structure(
             driven=data.outputs,
             scheduled=tuple(data.scheduled[i] for i in scheduled),
@@ -192,7 +202,7 @@ class BalanceEstimator(CoupledEstimator):
             n_elastic=self.elasticity - 1,
             n_area=self.area + 1,
             limits=np.geomspace(self.finest, 0.5, self.n_stops) * float(span.max()) / highest,
-            lags=self._lags(data) if timed else np.zeros(0),
+            lags=self._lags(data) if self.lags or not still else np.zeros(0),
             lag_range=(2.0 * (data.sample_time or 1.0), max(0.5 * self._longest(data), 1.0)),
             hull=np.column_stack([y.min(axis=0) - margin, y.max(axis=0) + margin]),
             scheduled_hull=np.column_stack([x.min(axis=0), x.max(axis=0)]),

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.errors import ModelError
+from mckibben.errors import DataError, ModelError
 from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.core.uncertainty import inverted
 from mckibben.estimators.coupled.balance_slopes import run as follow
@@ -20,6 +20,12 @@ MOST_ROWS = 12_000
 
 MOST_SAMPLES = 30_000
 """To find the way by; the last steps look at all."""
+
+NO_LOAD = 50.0
+"""Pull of the highest pressure over the strongest load, where a load hardly matters."""
+
+SIGN = 0.8
+"""Error with the load's sign turned, over that without, which says that it was wrong."""
 
 MOST_TRIES = 9
 """Dampings tried for a step, each ten times the last."""
@@ -120,6 +126,35 @@ class Search:
             forces = slice(structure.slices["damping"].start, structure.slices["loads"].stop)
             values[forces] /= values[structure.places("loads", 0)[0]]
         return values
+
+    def check_loads(self, values: Array) -> None:
+        """Refuse loads that seem to push where they should pull.
+
+        Raises
+        ------
+        DataError
+            Naming the channel.
+        """
+        structure = self.structure
+        if not structure.in_newtons:
+            return
+        areas = values[structure.places("areas", 0)[0]] * structure.highest
+        strongest = max(float(np.abs(run.scheduled[:, -1]).max()) for run in self.runs)
+        if areas < NO_LOAD * strongest:
+            return
+        against = [
+            replace(run, scheduled=run.scheduled * [*[1.0] * (run.scheduled.shape[1] - 1), -1.0])
+            for run in self.runs
+        ]
+        other = replace(self.data, runs=tuple(against))
+        turned = Search(other, structure, self.ridge)
+        if turned.cost(turned.begun(float(values[structure.grip]))) < SIGN * self.cost(values):
+            raise DataError(
+                "the more it pulls, the shorter the muscle, as if its sign were wrong",
+                file=self.runs[0].name,
+                channel=structure.loaded[0].name,
+                remedy="give forces that pull the muscle longer as positive",
+            )
 
     def stiffness(self, values: Array) -> Array:
         """Return how stiff every muscle is at every sample kept, shape (samples, n)."""

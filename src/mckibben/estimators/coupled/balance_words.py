@@ -15,6 +15,7 @@ NEAR = 1.2
 def sentences(block: Balance, structure: Structure) -> list[str]:
     """Return how much of every muscle is area, spring, friction and relaxation."""
     unit = "N" if structure.in_newtons else "bar"
+    per = " N/bar" if structure.in_newtons else " of muscle 1's at rest"
     p = 0.5 * structure.highest
     found = []
     for k, channel in enumerate(block.driven):
@@ -28,7 +29,7 @@ def sentences(block: Balance, structure: Structure) -> list[str]:
         fading = sum(block.relaxation[k])
         times = " and ".join(f"{lag:.3g} s" for lag in block.lags)
         found.append(
-            f"{channel.name} at {y:.3g} mm and {p:.3g} bar: area {middle:.3g} {unit}/bar ({rest:.3g} at "
+            f"{channel.name} at {y:.3g} mm and {p:.3g} bar: area {middle:.3g}{per} ({rest:.3g} at "
             f"rest); springs and rubber {stiff:.3g} {unit}/mm; friction up to {rubbing:.3g} {unit} "
             f"either way, {100 * rubbing / max(middle * p, 1e-12):.2g} % of the pull"
             + (f"; {fading:.3g} {unit}/mm more that fades within {times}" if block.lags else "")

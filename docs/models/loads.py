@@ -29,7 +29,7 @@ FITTED = 2 / 3
 
 MODELS: dict[str, dict[str, Any]] = {
     "coupled-memory": {"lags": (0.3, 1.5), "degree": 2},
-    "force-balance": {"degree": 1},
+    "balance": {},
 }
 
 HEAD = """# One model for two loads, on measured coiled muscles

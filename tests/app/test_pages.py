@@ -100,7 +100,7 @@ def test_recordings_of_two_muscles_get_models_that_couple_them(tmp_path: Path) -
     desk.settle_channels()
     assert desk.inputs == ("pressure_1", "pressure_2")
     assert desk.channels["output"] == ["displacement_1", "displacement_2"]
-    models = {"coupled-memory", "coupled-pi", "force-balance"}
+    models = {"balance", "coupled-memory", "coupled-pi"}
     for seed, name in enumerate(("first", "second")):
         given = {"model": "coupled-memory", "name": name, "seed": seed}
         fit(workspace, given | desk.channels, lambda share, cost: None)

@@ -37,7 +37,7 @@ def arm(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_from_recordings_to_a_closed_loop(cli: Cli, arm: Path, tmp_path: Path) -> None:
     model, inverse, run = (tmp_path / name for name in ("model.json", "inverse.json", "run.csv"))
-    result = cli("fit", "force-balance", *sorted(arm.glob("*.csv")), "-o", model, "--json")
+    result = cli("fit", "balance", *sorted(arm.glob("*.csv")), "-o", model, "--json")
     assert result.code == 0, result.err
     assert max(json.loads(result.out)["rmse_by_output"].values()) < 2.0
     first = next(iter(sorted(arm.glob("*drive-1.csv"))))
@@ -77,11 +77,11 @@ def test_one_output_of_several_muscles_is_compared(cli: Cli, arm: Path, tmp_path
 
 def test_study_of_a_folder_closes_the_loop(cli: Cli, arm: Path, tmp_path: Path) -> None:
     out = tmp_path / "study"
-    result = cli("study", arm, "-o", out, "--models", "force-balance,coupled-pi", "--json")
+    result = cli("study", arm, "-o", out, "--models", "balance,coupled-pi", "--json")
     assert result.code == 0, result.err
     found = json.loads(result.out)
     board = found["leaderboard"]
-    assert found["inverse"]["model"] == board["chosen"] == "force-balance"
+    assert found["inverse"]["model"] == board["chosen"] == "balance"
     first, second, constant = board["rows"]
     assert constant["model"] == "constant"
     assert first["validation_rmse"] < second["validation_rmse"]
@@ -91,7 +91,7 @@ def test_study_of_a_folder_closes_the_loop(cli: Cli, arm: Path, tmp_path: Path) 
     assert len(noted) == len(list(arm.glob("*.csv")))
     assert "its clock was mended" in (out / "report.html").read_text()
     errors = {name: max(rmse.values()) for name, rmse in found["tracking"].items()}
-    assert errors["force-balance inverse + PID"] < errors["force-balance inverse"]
+    assert errors["balance inverse + PID"] < errors["balance inverse"]
     for name in ("report.html", "leaderboard.csv", "leaderboard.json", "inverse.json"):
         assert (out / name).is_file()
 
@@ -102,7 +102,7 @@ def test_a_study_says_whether_a_network_is_to_be_trusted_off_its_patterns(
     ((run, joint),) = record("sdchm", runs=["joint-test-p0-1.1"])
     test = tmp_path / f"{run.name}.csv"
     write(joint, test)
-    asked = ["study", arm, "--test", test, "--models", "tsfnn,force-balance", "--jobs", 1]
+    asked = ["study", arm, "--test", test, "--models", "tsfnn,balance", "--jobs", 1]
     asked += ["--set", "tsfnn.search_samples=400"]
     damped = cli(*asked, "-o", tmp_path / "damped")
     assert damped.code == 0, damped.err
@@ -118,7 +118,7 @@ def test_a_study_says_whether_a_network_is_to_be_trusted_off_its_patterns(
     assert said in json.loads((out / "leaderboard.json").read_text())["notes"]
     assert said in (out / "report.html").read_text()
     found = {row["model"]: row.get("off_training") for row in board["rows"]}
-    assert found["force-balance"] is None
+    assert found["balance"] is None
     assert found["tsfnn"]["covered"] < 0.3 < found["tsfnn"]["share"]
     assert found["tsfnn"]["trusted"] is False
 
@@ -157,7 +157,7 @@ def test_bad_calls_leave_with_a_remedy(
 
 def test_a_model_in_place_of_its_inverse_is_refused(cli: Cli, arm: Path, tmp_path: Path) -> None:
     model = tmp_path / "model.json"
-    assert cli("fit", "force-balance", *sorted(arm.glob("*.csv")), "-o", model).code == 0
+    assert cli("fit", "balance", *sorted(arm.glob("*.csv")), "-o", model).code == 0
     reference = arm / "more" / "reference.csv"
     result = cli("track", model, "--rig", "soft-arm", "--reference", reference)
     assert result.code == 2
@@ -180,11 +180,11 @@ def test_study_under_loads_ranks_one_model_for_all(cli: Cli, tmp_path: Path) -> 
             }
         )
     )
-    given = ["--models", "force-balance", "--load", "force", "-o", tmp_path / "out", "--json"]
+    given = ["--models", "balance", "--load", "force", "-o", tmp_path / "out", "--json"]
     result = cli("study", folder, *given)
     assert result.code == 0, result.err
     rows = json.loads(result.out)["leaderboard"]["rows"]
-    assert rows[0]["model"] == "force-balance"
+    assert rows[0]["model"] == "balance"
     assert any("98.5 N" in row["model"] for row in rows[1:])
     result = cli("study", folder, "--load", "weight", "-o", tmp_path / "out")
     assert result.code == 2

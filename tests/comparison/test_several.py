@@ -170,7 +170,7 @@ def test_models_without_a_place_are_left_out_and_said() -> None:
     several = plan_of(
         [run(5.0), run(4.0)], run(3.0, 4), models="all", settings=None, n_folds=0, seed=0
     )
-    assert {"sdchm", "force-balance", "tsfnn"} <= set(several.items)
+    assert {"sdchm", "balance", "tsfnn"} <= set(several.items)
     assert "gpi" in several.left_out
     assert "mpi-narmax" in several.left_out
     one = run(5.0).select(["pressure_1", "displacement_1"])

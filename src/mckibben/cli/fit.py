@@ -56,7 +56,7 @@ def fit(
 ) -> None:
     """Identify one model from recordings and save it as JSON.
 
-    Models of several muscles (coupled-memory, coupled-pi, force-balance, sdchm, tsfnn) find their
+    Models of several muscles (balance, coupled-memory, coupled-pi, sdchm, tsfnn) find their
     channels by name: pressure_1 ..., displacement_1 ..., and pressure_extensor where there is one.
     """
     from mckibben import registry

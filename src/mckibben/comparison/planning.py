@@ -32,7 +32,7 @@ N_FOLDS = 4
 
 QUICK = (
     *("bouc-wen", "cpi", "gpi", "kp", "maxwell-slip", "mpi", "p2uz", "pi"),
-    *("coupled-memory", "coupled-pi", "force-balance"),
+    *("balance", "coupled-memory", "coupled-pi"),
 )
 """Models that are good or well known, and fitted in seconds."""
 

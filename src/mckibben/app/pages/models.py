@@ -29,7 +29,7 @@ LONGEST = 200_000
 
 SENSIBLE = (
     *("pi", "gpi", "mpi", "cpi", "preisach"),
-    *("coupled-memory", "coupled-pi", "force-balance"),
+    *("balance", "coupled-memory", "coupled-pi"),
 )
 """Models to start with, of those that have a place."""
 

@@ -156,7 +156,7 @@ class CoupledMemory(ManyChannels, Primitive):
         """
         raise ModelError(
             f"{self.kind!r} has no inverse: its lags cannot be undone within a sample. "
-            "Remedy: invert force-balance or sdchm, or close a loop."
+            "Remedy: invert balance or sdchm, or close a loop."
         )
 
     @classmethod

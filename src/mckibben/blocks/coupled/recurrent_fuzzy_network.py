@@ -230,7 +230,7 @@ class RecurrentFuzzyNetwork(ManyChannels, Primitive):
         """
         raise ModelError(
             f"{self.kind!r} has no inverse: a sample of its input moves its output by next to nothing. "
-            "Remedy: invert force-balance, or close a loop."
+            "Remedy: invert balance, or close a loop."
         )
 
     @classmethod

@@ -135,6 +135,6 @@ class FeedforwardFeedback(Composition):
 
     @classmethod
     def example(cls) -> Self:
-        from mckibben.blocks.coupled.force_balance import ForceBalance
+        from mckibben.blocks.coupled.balance import Balance
 
-        return cls(ForceBalance.example(), PIDFeedback.example())
+        return cls(Balance.example(), PIDFeedback.example())

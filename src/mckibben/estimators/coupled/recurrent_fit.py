@@ -191,7 +191,7 @@ class RecurrentProblem:
         if found is None:
             raise ModelError(
                 "the network leaves all bounds when it runs free. Remedy: raise ridge, lower n_sets, or "
-                "fit force-balance."
+                "fit balance."
             )
         if not self.settles(found):
             warnings.warn(

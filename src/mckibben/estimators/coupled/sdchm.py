@@ -319,7 +319,7 @@ def softest(data: TrainingData, muscle: int) -> Run:
         raise DataError(
             "no run moves this muscle alone, so its hysteresis cannot be told from the coupling",
             channel=data.inputs[muscle].name,
-            remedy="add a run in which the other pressures rest, or fit force-balance",
+            remedy="add a run in which the other pressures rest, or fit balance",
         )
     if not data.scheduled:
         return max(runs, key=lambda run: len(run.driven))

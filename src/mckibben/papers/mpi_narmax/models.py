@@ -31,10 +31,10 @@ AS_PRINTED = "MPI-NARMAX"
 THREE_RATES = "MPI-NARMAX, front end of three rates"
 MORE_RECORDS = "MPI-NARMAX, more records"
 PLAIN = "MPI-NARMAX, ours"
-ONE_RECORD = "force balance, one record"
-OURS = "force balance"
+ONE_RECORD = "balance, one record"
+OURS = "balance"
 MEMORY = "coupled-memory"
-PRESSURE = "force balance, on measured pressure"
+PRESSURE = "balance, on measured pressure"
 
 
 @dataclass(frozen=True)
@@ -54,10 +54,10 @@ TOLD = {
     THREE_RATES: Told("mpi-narmax", _PAPERS, (*FREE, PULLS), "three rates; pulls of 100 N"),
     MORE_RECORDS: Told("mpi-narmax", _PAPERS | {"learns_from": "all"}, MORE, "more records"),
     PLAIN: Told("mpi-narmax", _OURS, MORE, "more records"),
-    ONE_RECORD: Told("force-balance", {"degree": 1}, (*FREE, PULLS), "three rates; pulls of 100 N"),
-    OURS: Told("force-balance", {}, MORE, "more records"),
+    ONE_RECORD: Told("balance", {}, (*FREE, PULLS), "three rates; pulls of 100 N"),
+    OURS: Told("balance", {}, MORE, "more records"),
     MEMORY: Told("coupled-memory", {}, MORE, "more records"),
-    PRESSURE: Told("force-balance", {"input": ("pressure",)}, MORE, "more records"),
+    PRESSURE: Told("balance", {"input": ("pressure",)}, MORE, "more records"),
 }
 
 

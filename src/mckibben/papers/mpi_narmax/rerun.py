@@ -102,7 +102,7 @@ def _loops(
     reference = Recording(
         {"displacement": 22.0 + 14.0 * np.sin(0.2 * np.pi * time), "force": force}, SAMPLE_TIME
     )
-    unloaded = registry.load("estimators", "force-balance")(scheduling=(), seed=seed)
+    unloaded = registry.load("estimators", "balance")(scheduling=(), seed=seed)
     blind = unloaded.fit(recordings["status-1"]).model_
     pid = tune_pid(rig, sample_time=SAMPLE_TIME, scheduled={"force": 0.0}, seed=seed)
     inverse = model.inverse()

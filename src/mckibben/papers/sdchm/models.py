@@ -27,9 +27,9 @@ INDIVIDUAL = "individual hysteresis"
 PUBLISHED = "SDCHM, the paper's"
 OURS = "SDCHM, ours"
 MEMORY = "coupled memory"
-BALANCE = "force balance"
+BALANCE = "balance"
 OURS_JOINT = "SDCHM, ours, joint runs too"
-BALANCE_JOINT = "force balance, joint runs too"
+BALANCE_JOINT = "balance, joint runs too"
 
 PREDICTING = (LINEAR, RAW, DAMPED, PUBLISHED, OURS, MEMORY, BALANCE)
 """Trained on the paper's patterns alone."""
@@ -72,7 +72,7 @@ def fit_models(runs: Recordings, quick: bool, seed: int, tell: Progress, kept: K
         INDIVIDUAL: ("coupled-pi", {"memory_settings": paper | starts}),
         OURS: ("sdchm", ours),
         MEMORY: ("coupled-memory", {}),
-        BALANCE: ("force-balance", {}),
+        BALANCE: ("balance", {}),
     }
     joint = runs.select("train", stage="joint")
     if joint:

@@ -36,7 +36,12 @@ DOUBLE, SINGLE = 1e-12, 1e-4
 """Largest difference allowed, relative to the range."""
 
 STEPS = 100_000
-SLOW = {"balance-inverse", "force-balance-inverse", "fuzzy-network-inverse", "recurrent-fuzzy-network"}
+SLOW = {
+    "balance-inverse",
+    "force-balance-inverse",
+    "fuzzy-network-inverse",
+    "recurrent-fuzzy-network",
+}
 """Solved by Newton's method, or slow in Python: fewer steps."""
 
 

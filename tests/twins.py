@@ -1131,6 +1131,20 @@ def balance_inverse(block: Any, inputs: Rows, sample_time: float) -> Rows:
     return out
 
 
+def load_estimate(block: Any, inputs: Rows, sample_time: float) -> Rows:
+    import numpy as np
+
+    n, shares, out = len(block.forward.driven), np.array(block.forward.loads), []
+    resting, none = list(block.at_rest) or [0.0] * shares.shape[1], [0.0] * shares.shape[1]
+    arm = _Parallel(block.forward, [*inputs[0][2 * n :], *resting], sample_time)
+    for row in inputs:
+        y, p = [here + tare for here, tare in zip(row[:n], arm.tare, strict=True)], row[n : 2 * n]
+        left = [arm.excess(k, y, [*row[2 * n :], *none], p[k]) for k in range(n)]
+        out.append(np.linalg.lstsq(shares, np.array(left), rcond=None)[0].tolist())
+        arm.keep(y, p)
+    return out
+
+
 def pid(block: Any, inputs: Rows, sample_time: float) -> Rows:
     n = len(block.driven)
     lowest, highest = block.limits
@@ -1185,6 +1199,7 @@ TWINS: dict[str, Twin] = {
     "gpi-inverse": gpi_inverse,
     "krasnoselskii-pokrovskii": stepping(_Ramps),
     "krasnoselskii-pokrovskii-inverse": _solved(_Ramps),
+    "load-estimate": load_estimate,
     "logarithm": logarithm,
     "maxwell-slip": stepping(_Springs),
     "maxwell-slip-inverse": _solved(_Springs),

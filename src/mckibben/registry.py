@@ -51,6 +51,7 @@ PLUGINS: dict[str, dict[str, str | Preset]] = {
         "krasnoselskii-pokrovskii": (
             "mckibben.blocks.preisach_type.krasnoselskii_pokrovskii:KrasnoselskiiPokrovskii"
         ),
+        "load-estimate": "mckibben.blocks.coupled.load_estimate:LoadEstimate",
         "logarithm": "mckibben.blocks.memoryless.logarithm:Logarithm",
         "maxwell-slip": "mckibben.blocks.play_type.maxwell_slip:MaxwellSlip",
         "multistate-friction": "mckibben.blocks.force.multistate_friction:MultistateFriction",

@@ -14,9 +14,11 @@ from mckibben import ModelWarning
 from mckibben.blocks.core.fields import vector
 from mckibben.blocks.core.linear_system import eliminate
 from mckibben.blocks.core.root import solve_near
+from mckibben.blocks.coupled.balance import Balance
 from mckibben.blocks.coupled.coupled_memory import CoupledMemory, readout_width
 from mckibben.blocks.coupled.force_balance import ForceBalance
 from mckibben.blocks.coupled.fuzzy_network import FuzzyNetwork
+from mckibben.blocks.coupled.load_estimate import LoadEstimate
 from mckibben.blocks.coupled.recurrent_fuzzy_network import RecurrentFuzzyNetwork
 from mckibben.blocks.differential.flow import flow
 from mckibben.blocks.dynamic.narx_polynomial import NarxPolynomial
@@ -166,6 +168,68 @@ def test_pressures_without_an_equilibrium_are_told() -> None:
     pressures = np.array([[0.0, 0.0, 0.0], [500.0, -800.0, 3.0], [-1e4, 1e4, 0.0]])
     with pytest.warns(ModelWarning, match="no equilibrium"):
         ForceBalance.example().inverse().simulate(pressures)
+
+
+ALONE = replace(
+    Balance.example(),
+    springs=((0.0, 10.0),),
+    elasticity=((0.0,),),
+    areas=((60.0,),),
+    friction=((3.0, 1.5),),
+    relaxation=((),),
+    loads=((1.0,),),
+    damping=(0.0,),
+    walls=(0.05,),
+    lags=(),
+    hull=((-20.0, 50.0),),
+    driven=Balance.example().driven[:1],
+    scheduled=Balance.example().scheduled[1:],
+    given=Balance.example().given[:1],
+)
+"""A balance of one muscle under a load."""
+
+
+def test_pressures_of_a_balance_are_clipped_to_their_range() -> None:
+    frictionless = replace(ALONE, limits=(), friction=((),), tare=True)
+    inputs = path([0.0, 0.0], [30.0, 40.0])
+    free = frictionless.simulate(inputs)
+    with pytest.warns(ModelWarning, match="clipped"):
+        limited = replace(frictionless, pressure_range=(1.0, 2.0)).simulate(inputs)
+    np.testing.assert_array_equal(limited, free.clip(1.0, 2.0))
+
+
+def test_a_balance_that_softens_is_settled_by_searching() -> None:
+    """The area grows faster than the spring holds, up to where it is known."""
+    block = replace(
+        ALONE, areas=((60.0, 100.0, -200.0),), hull=((-5.0, 20.0),), springs=((0.0, 4.0),)
+    )
+    pressures = np.array(
+        [[0.0, 0.0], [2.0, 0.0], [4.0, 10.0], [-1.0, 0.0], [4.0, 0.0], [0.5, 30.0]]
+    )
+    expected = TWINS["balance-inverse"](block.inverse(), pressures.tolist(), 1.0)
+    np.testing.assert_allclose(block.inverse().simulate(pressures), expected, atol=1e-9)
+
+
+@pytest.mark.filterwarnings("ignore:overflow", "ignore:invalid")
+def test_muscles_that_no_place_holds_stay_and_go_on_when_one_does() -> None:
+    """A muscle that pulls the more the shorter it is runs away, but for little pressure."""
+    block = replace(ALONE, areas=((60.0, 300.0),))
+    pressures = np.array([[0.0, 0.0], [0.5, 0.0], [6.0, 0.0], [1e9, 0.0], [0.5, 0.0], [0.4, 0.0]])
+    with pytest.warns(ModelWarning, match="no equilibrium in 2 samples"):
+        moved = block.inverse().simulate(pressures)[:, 0]
+    np.testing.assert_array_equal(moved[2:4], moved[1])
+    kept = block.inverse().simulate(pressures[[0, 1, 4, 5]])[:, 0]
+    assert np.isfinite(moved).all()
+    np.testing.assert_allclose(moved[[0, 1, 4, 5]], kept, atol=2.0 * block.limits[-1])
+
+
+def test_friction_beyond_the_area_still_finds_pressures_that_balance() -> None:
+    """Where a stop holds more by the wall's stretch than the area gives, roots are bracketed."""
+    block = replace(ALONE, friction=((250.0, 0.0),), limits=(0.2, 0.3), walls=(0.3,))
+    inputs = np.column_stack([[2.0, 23.0, -4.0, 20.0, 14.0, 14.5, 13.0, 9.0], np.zeros(8)])
+    pressures = block.simulate(inputs)
+    loads = LoadEstimate(block).simulate(np.column_stack([inputs[:, 0], pressures]))
+    np.testing.assert_allclose(loads, 0.0, atol=1e-10)
 
 
 def test_memory_with_products_of_three_agrees_with_its_twin() -> None:

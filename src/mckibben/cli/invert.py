@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -11,25 +13,54 @@ from mckibben.cli.options import Force, Json
 from mckibben.cli.output import print_json, say
 from mckibben.numerals import numeral
 
+if TYPE_CHECKING:
+    from mckibben.blocks.core.fields import Channel
+
+
+class Wanted(StrEnum):
+    """What is to be given."""
+
+    input = "input"
+    force = "force"
+
 
 def invert(
     model: Annotated[Path, typer.Argument(help="Model file (JSON).")],
     out: Annotated[Path, typer.Option("-o", "--out", help="Inverse to write (JSON).")],
+    wanted: Annotated[
+        Wanted,
+        typer.Option(
+            "--for",
+            help="What it gives: the model's input, or the force on muscles whose displacements and "
+            "pressures are measured (of a balance).",
+        ),
+    ] = Wanted.input,
     force: Force = False,
     as_json: Json = False,
 ) -> None:
     """Write the inverse of a saved model: wished-for output in, input out.
 
-    Of a model of force, what is written gives the pressure by wished-for force and length.
+    Of a model of force, what is written gives the pressure by wished-for force and length. With
+    --for force, what is written gives the force by measured displacements and pressures: simulate it.
     """
     import numpy as np
 
     from mckibben.blocks.core.saving import load
+    from mckibben.blocks.coupled.load_estimate import LoadEstimate
     from mckibben.blocks.force.feedforward import ForceFeedforward
     from mckibben.outputs import claim_model
 
     claim_model(out, inputs=[model], force=force)
     block = load(model)
+    if wanted is Wanted.force:
+        estimate = LoadEstimate.of(block)
+        estimate.save(out)
+        if as_json:
+            print_json({"file": str(out), "inputs": [channel.name for channel in estimate.inputs]})
+            return
+        say(f"{_listed(estimate.outputs)} by {_listed(estimate.inputs)}, all measured.")
+        say(f"Written: {out}")
+        return
     feedforward = ForceFeedforward.of(block)
     if feedforward is not None:
         feedforward.save(out)
@@ -60,3 +91,7 @@ def invert(
             f"{channel.unit}; references beyond are clipped."
         )
     say(f"Written: {out}")
+
+
+def _listed(channels: Sequence[Channel]) -> str:
+    return ", ".join(f"{channel.name} [{channel.unit}]" for channel in channels)

@@ -15,6 +15,8 @@ whether nothing came before, samples amiss.
 
 from __future__ import annotations
 
+import numpy as np
+
 from mckibben.arrays import Array
 from mckibben.blocks.core.kernels import kernel
 from mckibben.blocks.core.linear_system import eliminate
@@ -194,16 +196,9 @@ def pressed(c: Array, k: int, state: Array, way: int, y: Array, x: Array, gradie
         else:
             low = p
         slope = a - by_p
-        moved = p - excess / slope if slope > 0.0 else p - excess / a
-        if low < moved < high:
-            p = moved
-        elif low > -1e300 and high < 1e300:
-            middle = 0.5 * (low + high)
-            if middle in (low, high):
-                break
-            p = middle
-        else:
-            p -= excess / a
+        p -= excess / slope if slope > 0.0 else excess / a
+        if not low < p < high:  # only where friction outgrows the area
+            p = 0.5 * (low + high)
     return p
 
 
@@ -219,7 +214,10 @@ def unbalanced(
     matrix: Array,
     gradient: Array,
 ) -> float:
-    """Fill what every muscle's forces lack to a balance, and its slopes; return the largest share."""
+    """Fill what every muscle's forces lack to a balance, and its slopes; return the largest share.
+
+    That is infinite where forces are.
+    """
     n = int(c[0])
     worst = 0.0
     for k in range(n):
@@ -235,6 +233,8 @@ def unbalanced(
         size = abs(force) + abs(friction) + abs(behind) + abs(p[k] * a)
         for j in range(n):
             size += abs(gradient[j] * y[j])
+        if not size < np.inf:
+            return np.inf
         if size > 0.0:
             worst = max(worst, abs(residual[k]) / size)
     return worst
@@ -244,7 +244,7 @@ def unbalanced(
 def settle(c: Array, state: Array, way: int, y: Array, x: Array, p: Array, scratch: Array) -> float:
     """Move the displacements to where pressures hold them; return what is left of the residual.
 
-    ``scratch`` has n n + 4 n numbers.
+    Where no place is found, they stay where they were. ``scratch`` has n n + 4 n numbers.
     """
     n = int(c[0])
     vectors = scratch[: 4 * n].reshape((4, n))
@@ -253,7 +253,7 @@ def settle(c: Array, state: Array, way: int, y: Array, x: Array, p: Array, scrat
     left = unbalanced(c, state, way, y, x, p, residual, matrix, gradient)
     before = 2.0 * left + 1.0
     for _ in range(MOST_STEPS):
-        if left <= BALANCED or (left >= before and left < NEARLY):
+        if left <= BALANCED or (left >= before and left < NEARLY) or left == np.inf:
             break
         before = left
         for k in range(n):
@@ -277,7 +277,7 @@ def settle(c: Array, state: Array, way: int, y: Array, x: Array, p: Array, scrat
             rate = 0.0
             for k in range(n):
                 rate += residual[k] * step[k]
-            if left <= BALANCED or abs(rate) <= 0.7 * abs(down):
+            if left <= BALANCED or abs(rate) <= 0.7 * abs(down) or left == np.inf:
                 break
             if rate > 0.0:
                 high, high_rate = share, rate
@@ -288,6 +288,9 @@ def settle(c: Array, state: Array, way: int, y: Array, x: Array, p: Array, scrat
             else:  # where the rate would vanish were it straight, but well inside
                 width = high - low
                 share = low + width * min(max(-low_rate / (high_rate - low_rate), 0.1), 0.9)
+    if not left < NEARLY:
+        for k in range(n):
+            y[k] = state[k]
     return left
 
 

@@ -22,7 +22,7 @@ from mckibben.blocks.memoryless.affine import Affine
 from mckibben.errors import ModelError
 from mckibben.estimators.core.data import TrainingData
 from mckibben.estimators.core.uncertainty import unknown
-from mckibben.estimators.coupled.balance_checks import one_speed, telling
+from mckibben.estimators.coupled.balance_checks import one_speed, other_zeros, telling
 from mckibben.estimators.coupled.balance_search import Search
 from mckibben.estimators.coupled.balance_structure import Structure
 from mckibben.estimators.coupled.balance_words import held_back, sentences
@@ -98,7 +98,7 @@ class BalanceEstimator(CoupledEstimator):
     def identify(self, data: TrainingData, tracker: Tracker) -> Block:
         """Return the balance, solved for displacements."""
         data, notes = telling(data)
-        tracker.notes += notes
+        tracker.notes += [*notes, *other_zeros(data)]
         ways = directions(data)
         data = turned(data, ways)
         search = Search(data, self.structure(data, tracker), self.ridge)
@@ -130,7 +130,6 @@ class BalanceEstimator(CoupledEstimator):
         structure = search.structure
         balance = structure.block(tracker.best, bounds)
         tracker.notes += [*held_back(balance, structure), *sentences(balance, structure)]
-        tracker.notes += search.apart(tracker.best)
         solved = balance.inverse()
         if all(way == (1.0, 0.0) for way in ways):
             return solved

@@ -20,6 +20,9 @@ ONE_SPEED = 2.0
 RESTING = 0.05
 """Share of the fastest speed below which an input rests; share of samples that may."""
 
+SAME, OFF = 0.05, 0.1
+"""Shares of their ranges within which inputs are the same, and beyond which an output is another."""
+
 
 def telling(data: TrainingData) -> tuple[TrainingData, list[str]]:
     """Return the data without loads and schedules that never change, and what is said of them."""
@@ -60,3 +63,22 @@ def one_speed(data: TrainingData) -> bool:
         return False
     slow, fast = np.quantile(found[~rests], [0.1, 0.9])
     return bool(fast <= ONE_SPEED * slow)
+
+
+def other_zeros(data: TrainingData) -> list[str]:
+    """Return which runs begin where others with the same inputs do not, as with another zero."""
+    first = np.array([[*run.driven[0], *run.scheduled[0]] for run in data.runs])
+    began = np.array([run.outputs[0] for run in data.runs])
+    whole = np.hstack([data.stacked("driven"), data.stacked("scheduled")])
+    spans, travel = np.ptp(whole, axis=0), np.ptp(data.stacked("outputs"), axis=0)
+    notes = []
+    for place, run in enumerate(data.runs):
+        same = (np.abs(first - first[place]) <= SAME * spans).all(axis=1)
+        off = began[place] - np.median(began[same], axis=0)
+        for k in np.flatnonzero(np.abs(off) > OFF * travel).tolist():
+            channel = data.outputs[k]
+            notes.append(
+                f"{run.name} begins {off[k]:.3g} {channel.unit} of {channel.name} from where recordings "
+                "with the same inputs do, as if it had another zero. Remedy: let all count from the same"
+            )
+    return notes

@@ -266,22 +266,6 @@ class Search:
         covariance[lost] = covariance[:, lost] = np.nan
         return condition, covariance
 
-    def apart(self, values: Array) -> list[str]:
-        """Return which runs are off throughout, as where a sensor had another zero."""
-        found = []
-        for run in self.runs:
-            if self.held(run) or len(self.runs) < 2:
-                continue
-            errors = self.missed(values, run)[0].reshape(-1, self.structure.n)
-            off, rest = errors.mean(axis=0), errors.std(axis=0)
-            for k in np.flatnonzero(np.abs(off) > np.maximum(3.0 * rest, 0.03)).tolist():
-                channel = self.structure.driven[k]
-                found.append(
-                    f"{run.name}: {channel.name} is off by {-off[k] * self.span[k]:.3g} {channel.unit} "
-                    "throughout. Remedy: let it count from where the others' does"
-                )
-        return found
-
     def cost(self, values: Array) -> float:
         """Return the root mean square of the errors."""
         found = _size(self.errors(values)[0])

@@ -228,21 +228,15 @@ mck_real mck_balance_pressed(const mck_balance *f, int k, int way, const mck_rea
         found = mck_abs(excess) <= BALANCED * (mck_abs(p * a) + mck_abs(held) + mck_abs(force));
         if (!found) {
             const mck_real slope = a - by_p;
-            mck_real next = slope > MCK_R(0.0) ? p - excess / slope : p - excess / a;
             if (excess > MCK_R(0.0)) {
                 high = p;
             } else {
                 low = p;
             }
-            if (!(low < next && next < high)) {
-                if (low > -MCK_INFINITY && high < MCK_INFINITY) {
-                    next = MCK_R(0.5) * (low + high);
-                    found = !(low < next && next < high);
-                } else {
-                    next = p - excess / a;
-                }
+            p -= excess / (slope > MCK_R(0.0) ? slope : a);
+            if (!(low < p && p < high)) { /* only where friction outgrows the area */
+                p = MCK_R(0.5) * (low + high);
             }
-            p = found ? p : next;
         }
     }
     return p;
@@ -269,7 +263,9 @@ mck_real mck_balance_lack(const mck_balance *f, int way, const mck_real *y, cons
         }
         row[k] += by_y + by_moving - p[k] * a_slope;
         residual[k] = force + friction + behind - pull;
-        if (size > MCK_R(0.0)) {
+        if (!(size < MCK_INFINITY)) {
+            worst = MCK_INFINITY;
+        } else if (size > MCK_R(0.0)) {
             worst = mck_max(worst, mck_abs(residual[k]) / size);
         }
     }
@@ -307,7 +303,8 @@ static mck_real search(const mck_balance *f, int way, mck_real *y, const mck_rea
         }
         left = mck_balance_lack(f, way, y, x, p, residual, matrix);
         const mck_real rate = product(f->n, residual, step);
-        done = left <= BALANCED || mck_abs(rate) <= MCK_R(0.7) * mck_abs(down);
+        done = left <= BALANCED || mck_abs(rate) <= MCK_R(0.7) * mck_abs(down) ||
+               !(left < MCK_INFINITY);
         if (rate > MCK_R(0.0)) {
             high = share;
             high_rate = rate;
@@ -335,7 +332,7 @@ mck_real mck_balance_settle(const mck_balance *f, int way, mck_real *y, const mc
     mck_real left = mck_balance_lack(f, way, y, x, p, residual, matrix);
     mck_real before = MCK_R(2.0) * left + MCK_R(1.0);
     for (int tried = 0; tried < MOST_STEPS; tried++) {
-        if (left <= BALANCED || (left >= before && left < MCK_NEARLY)) {
+        if (left <= BALANCED || (left >= before && left < MCK_NEARLY) || !(left < MCK_INFINITY)) {
             break;
         }
         before = left;
@@ -351,6 +348,9 @@ mck_real mck_balance_settle(const mck_balance *f, int way, mck_real *y, const mc
             down = product(f->n, residual, step);
         }
         left = search(f, way, y, x, p, residual, matrix, step, start, down);
+    }
+    for (int k = 0; k < f->n && !(left < MCK_NEARLY); k++) {
+        y[k] = f->y[k];
     }
     return left;
 }

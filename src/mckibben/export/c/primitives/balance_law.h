@@ -70,8 +70,8 @@ mck_real mck_balance_pressed(const mck_balance *f, int k, int way, const mck_rea
 mck_real mck_balance_lack(const mck_balance *f, int way, const mck_real *y, const mck_real *x,
                           const mck_real *p, mck_real *residual, mck_real *matrix);
 
-/* Move the displacements to where pressures hold them; returns what is left of the residual. `scratch`
- * has n n + 3 n numbers. */
+/* Move the displacements to where pressures hold them; returns what is left of the residual.
+ * Where no place is found, they stay where they were. `scratch` has n n + 3 n numbers. */
 mck_real mck_balance_settle(const mck_balance *f, int way, mck_real *y, const mck_real *x,
                             const mck_real *p, mck_real *scratch);
 

@@ -1,0 +1,192 @@
+"""Loads of muscles in parallel by their displacements and pressures: a balance of forces read for loads.
+
+Where displacements and pressures are known, all in the equation of
+`mckibben.blocks.coupled.balance_law` is known but the loads:
+
+    C F = p A(y) - springs - elasticity - friction - relaxation - damping,
+
+n equations of as many loads or fewer, solved by least squares with the pseudo-inverse of C. Pressures
+must be measured, not those that a compensator asks for.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Annotated, ClassVar, Self
+
+import numpy as np
+from pydantic import BeforeValidator, InstanceOf
+from pydantic.dataclasses import dataclass
+
+from mckibben.arrays import Array
+from mckibben.blocks.core.block import Block, Kernel, Primitive
+from mckibben.blocks.core.fields import STRICT, Channel, Initial, Vector
+from mckibben.blocks.core.inverse import Inverse
+from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.core.refusals import explicit_state
+from mckibben.blocks.core.saving import nested
+from mckibben.blocks.coupled.balance import Balance
+from mckibben.blocks.coupled.balance_law import AT_REST, FROM_REST, IN_TIME, keep, unbalanced
+from mckibben.errors import ModelError
+
+
+@kernel
+def load_estimate_kernel(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
+    """Give loads; behind the balance's coefficients stand the pseudo-inverse and loads at rest."""
+    c = coefficients
+    n, n_x, n_loads = int(c[0]), int(c[1]), int(c[3])
+    scratch = c[c.size - n * (n + 6) - n_x - n_loads :]
+    solving = c[c.size - scratch.size - n_loads * (n + 1) :]
+    y, residual, gradient = scratch[:n], scratch[n : 2 * n], scratch[2 * n : 3 * n]
+    matrix, x = scratch[3 * n : n * (n + 3)].reshape((n, n)), scratch[n * (n + 6) :]
+    tare = state[state.size - 2 - n :]
+    for t in range(inputs.shape[0]):
+        p = inputs[t, n : 2 * n]
+        for k in range(n):
+            y[k] = inputs[t, k] + tare[k]
+        for i in range(n_x):
+            x[i] = inputs[t, 2 * n + i]
+        for i in range(n_loads):
+            x[n_x + i] = 0.0
+        way = FROM_REST if state[state.size - 2] != 0.0 else IN_TIME
+        unbalanced(c, state, way, y, x, p, residual, matrix, gradient)
+        keep(c, state, way, y, p)
+        state[state.size - 2] = 0.0
+        for i in range(n_loads):
+            load = 0.0
+            for k in range(n):
+                load -= solving[i * n + k] * residual[k]
+            outputs[t, i] = load
+
+
+@dataclass(frozen=True, config=STRICT)
+class LoadEstimate(Primitive):
+    """From displacements and pressures of muscles, and what schedules them, to their loads.
+
+    Its memory begins where the balance's does: at rest without pressure, under loads that nothing
+    tells yet. Of a balance with a tare, other loads there displace what is estimated for good;
+    otherwise friction forgets them, and what relaxes does in time.
+
+    Parameters
+    ----------
+    forward : Balance
+        The muscles.
+    at_rest : sequence of float
+        Loads under which they rest before the first sample [N]; none by default.
+    """
+
+    kind: ClassVar[str] = "load-estimate"
+    kernel: ClassVar[Kernel] = load_estimate_kernel
+    in_scratch: ClassVar[bool] = True
+    parameters: ClassVar[tuple[str, ...]] = ("forward",)
+
+    forward: Annotated[InstanceOf[Balance], BeforeValidator(nested)]
+    at_rest: Vector = ()
+
+    def __post_init__(self) -> None:
+        loads = np.array(self.forward.loads)
+        n, n_loads = loads.shape
+        if n_loads == 0:
+            raise ModelError(
+                "a balance that knows no load tells none. Remedy: identify it on recordings with a "
+                "measured force."
+            )
+        if np.linalg.matrix_rank(loads) < n_loads:
+            raise ModelError(
+                f"{n_loads} load(s) pull at {n} muscle(s) in the shares {self.forward.loads}, which "
+                "do not tell them apart. Remedy: identify a balance with fewer loads."
+            )
+        if len(self.at_rest) not in (0, n_loads):
+            raise ModelError(
+                f"at_rest of {self.kind!r} has {len(self.at_rest)} entries. Remedy: give {n_loads}, "
+                "or none."
+            )
+
+    @classmethod
+    def of(cls, model: Block) -> Self:
+        """Return the estimate of a balance of forces, or of its inverse.
+
+        Raises
+        ------
+        ModelError
+            If the model is another, or its loads cannot be told.
+        """
+        match model:
+            case Balance():
+                return cls(model)
+            case Inverse(forward=Balance() as balance):
+                return cls(balance)
+        raise ModelError(
+            f"{model.title!r} does not tell loads by displacements and pressures. Remedy: identify "
+            "'balance', on recordings with a measured force."
+        )
+
+    @property
+    def rate_dependent(self) -> bool:  # type: ignore[override]
+        """Whether the balance is."""
+        return self.forward.rate_dependent
+
+    @property
+    def inputs(self) -> tuple[Channel, ...]:
+        """Displacements, pressures, then what schedules but the loads."""
+        return (*self.forward.driven, *self.forward.given, *self._scheduled)
+
+    @property
+    def scheduling(self) -> tuple[str, ...]:
+        """What schedules, but the loads."""
+        return tuple(channel.name for channel in self._scheduled)
+
+    @property
+    def outputs(self) -> tuple[Channel, ...]:
+        """Loads."""
+        return self.forward.scheduled[len(self._scheduled) :]
+
+    @property
+    def _scheduled(self) -> tuple[Channel, ...]:
+        return self.forward.scheduled[: len(self.forward.scheduled) - self.forward.n_loads]
+
+    @property
+    def n_states(self) -> int:
+        """The balance's."""
+        return self.forward.n_states
+
+    @property
+    def n_scratch(self) -> int:
+        """The balance's, and what schedules."""
+        return self.forward.n_scratch + len(self.forward.scheduled)
+
+    def kept_apart(self) -> Iterator[tuple[str, tuple[float, ...]]]:
+        """Give the balance's."""
+        return self.forward.kept_apart()
+
+    def coefficients(self, sample_time: float | None) -> Array:
+        """Return the balance's, the pseudo-inverse of its shares of loads, and the loads at rest."""
+        solving = np.linalg.pinv(np.array(self.forward.loads))
+        own = self.forward.coefficients(sample_time)
+        return np.concatenate([own, solving.ravel(), self._resting])
+
+    @property
+    def _resting(self) -> Array:
+        return np.array(self.at_rest or (0.0,) * self.forward.n_loads)
+
+    def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
+        """Return the state at rest without pressure, from which the muscles come all at once.
+
+        ``virgin``: already at the first sample, with friction and all that relaxes unloaded.
+        """
+        start = self.start if initial is None else initial
+        if not isinstance(start, str):
+            return explicit_state(self, start)
+        n = len(self.forward.driven)
+        y, p = first[:n], np.ascontiguousarray(first[n : 2 * n])
+        came = np.concatenate([y, first[2 * n :], self._resting])
+        state = self.forward.initial_state(came, "first_sample")
+        if start == "virgin":
+            keep(self.forward.coefficients(1.0), state, AT_REST, y + state[-2 - n : -2], p)
+            state[-2] = 0.0
+        return state
+
+    @classmethod
+    def example(cls) -> Self:
+        """Return the load of the example of a balance."""
+        return cls(Balance.example())

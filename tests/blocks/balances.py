@@ -1,0 +1,122 @@
+"""What tests of balances of forces share: balances to draw, motions, and runs without complaint."""
+
+from __future__ import annotations
+
+import warnings
+from typing import Any
+
+import numpy as np
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from mckibben.blocks.core.block import Block
+from mckibben.blocks.core.fields import Channel, rows, vector
+from mckibben.blocks.coupled.balance import Balance
+from mckibben.blocks.laws.trial import wander
+from tests.blocks.strategies import numbers
+
+Array = NDArray[np.float64]
+
+STEP = 0.05
+"""Sample time [s]."""
+
+SEEDS = st.integers(0, 1000)
+
+HIGHEST, LOADED, FURTHEST = 4.0, 40.0, 30.0
+"""Pressure [bar], load [N] and displacement [mm] to try, over which `balances` are convex."""
+
+
+@st.composite
+def balances(
+    draw: st.DrawFn,
+    /,
+    n: int | None = None,
+    n_loads: int | None = None,
+    m: int | None = None,
+    n_lags: int | None = None,
+) -> Balance:
+    """Draw a balance whose energy is convex: stiffness of 14 N/mm and more outweighs what is lost."""
+    n = draw(st.integers(1, 3)) if n is None else n
+    n_loads = draw(st.integers(0, 1)) if n_loads is None else n_loads
+    m = draw(st.integers(0, 3)) if m is None else m
+    n_lags = draw(st.integers(0, 2)) if n_lags is None else n_lags
+    n_x, degree = draw(st.integers(0, 1)), draw(st.integers(1, 2))
+    rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
+
+    def stiff(least: float) -> Array:
+        mix = rng.normal(size=(n, n))
+        return mix @ mix.T + least * np.eye(n)
+
+    matrices = [stiff(14.0), *(0.3 * stiff(0.0) for _ in range(n_x * degree))]
+    constants = rng.uniform(-4.0, 4.0, (n, len(matrices), 1))
+    springs = np.concatenate([constants, np.array(matrices).transpose(1, 0, 2)], axis=2)
+    return Balance(
+        springs=rows(springs.reshape(n, -1)),
+        elasticity=rows(rng.uniform(0.0, 6.0, (n, 2))),
+        areas=rows(rng.uniform((50.0, -25.0, -8.0), (80.0, -5.0, 0.0), (n, 3))),
+        friction=rows(rng.uniform(0.0, 1.5, (n, m))),
+        relaxation=rows(rng.uniform(0.0, 2.0, (n, n_lags))),
+        loads=rows(np.eye(n) if n_loads == n else rng.uniform(0.5, 1.0, (n, n_loads))),
+        damping=vector(rng.uniform(0.0, 0.2, n) if n_lags else np.zeros(n)),
+        walls=vector(rng.uniform(0.0, 0.1, n)),
+        limits=vector(np.cumsum(rng.uniform(0.05, 0.3, m))),
+        grip=draw(numbers(0.0, 2.0)),
+        lags=vector(rng.uniform(0.05, 5.0, n_lags)),
+        hull=((-20.0, 50.0),) * n,
+        scale=50.0,
+        degree=degree,
+        driven=channels("displacement", "mm", n),
+        scheduled=(*channels("extensor", "bar", n_x), *channels("force", "N", n_loads)),
+        given=channels("pressure", "bar", n),
+        tare=draw(st.booleans()),
+    )
+
+
+def channels(stem: str, unit: str, n: int) -> tuple[Channel, ...]:
+    return tuple(Channel(f"{stem}_{k}", unit) for k in range(1, n + 1))
+
+
+def motion(block: Balance, driven: tuple[float, float], seed: int, n_turns: int = 10) -> Array:
+    """Return joint motion with minor loops of a balance, or, by its pressures, of its inverse."""
+    n, n_loads = len(block.driven), block.n_loads
+    n_x = len(block.scheduled) - n_loads
+    low = [driven[0]] * n + [0.0] * n_x + [-LOADED] * n_loads
+    high = [driven[1]] * n + [2.0] * n_x + [LOADED] * n_loads
+    return wander(np.array(low), np.array(high), np.random.default_rng(seed), 8, n_turns)
+
+
+def run(block: Block, inputs: Array, sample_time: float = STEP, **start: Any) -> Array:
+    """Simulate, and allow no complaint."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        return block.simulate(inputs, sample_time=sample_time, **start)
+
+
+def measured(block: Balance, inputs: Array) -> Array:
+    """Return what is measured of pressures, what schedules and loads: all but the loads."""
+    n, n_loads = len(block.driven), block.n_loads
+    displacements = run(block.inverse(), inputs)
+    known = inputs[:, n : inputs.shape[1] - n_loads]
+    return np.column_stack([displacements, inputs[:, :n], known])
+
+
+ALONE = Balance(
+    springs=((0.0, 14.0),),
+    elasticity=((6.0, 4.0),),
+    areas=((60.0, -25.0, -6.0),),
+    friction=((3.0, 1.5),),
+    relaxation=((1.0,),),
+    loads=((1.0,),),
+    damping=(0.1,),
+    walls=(0.05,),
+    limits=(0.2, 0.8),
+    grip=0.5,
+    lags=(0.8,),
+    hull=((-20.0, 50.0),),
+    scale=50.0,
+    degree=1,
+    driven=channels("displacement", "mm", 1),
+    scheduled=channels("force", "N", 1),
+    given=channels("pressure", "bar", 1),
+)
+"""One muscle under a load."""

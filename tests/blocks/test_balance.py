@@ -1,0 +1,283 @@
+"""Laws of the balance of forces: exact both ways, passive, and the minimum of a convex energy."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from mckibben import ModelError, ModelWarning, check_block
+from mckibben.blocks.core.block import Block
+from mckibben.blocks.core.fields import Channel, rows, vector
+from mckibben.blocks.coupled.balance import Balance
+from mckibben.blocks.coupled.load_estimate import LoadEstimate
+from mckibben.blocks.laws.trial import wander
+from tests.blocks.balances import FURTHEST, HIGHEST, SEEDS, STEP, balances, measured, motion, run
+from tests.blocks.strategies import numbers
+
+Array = NDArray[np.float64]
+
+
+def beside(driven: Array, inputs: Array) -> Array:
+    """Return other driven values with the same scheduling."""
+    return np.column_stack([driven, inputs[:, driven.shape[1] :]])
+
+
+# -- exact both ways -----------------------------------------------------------------------------
+
+
+@given(balances(), SEEDS)
+def test_pressures_for_a_motion_give_the_motion(block: Balance, seed: int) -> None:
+    inputs = motion(block, (-5.0, FURTHEST), seed)
+    pressures = run(block, inputs)
+    found = run(block.inverse(), beside(pressures, inputs))
+    np.testing.assert_allclose(found, inputs[:, : len(block.driven)], atol=1e-9 * FURTHEST)
+
+
+@given(balances(), SEEDS)
+def test_the_motion_of_pressures_needs_these_pressures(block: Balance, seed: int) -> None:
+    inputs = motion(block, (0.0, HIGHEST), seed)
+    displacements = run(block.inverse(), inputs)
+    found = run(block, beside(displacements, inputs))
+    np.testing.assert_allclose(found, inputs[:, : len(block.driven)], atol=1e-9 * HIGHEST)
+
+
+@given(balances(), SEEDS)
+def test_pressures_that_are_clipped_move_muscles_that_need_them(block: Balance, seed: int) -> None:
+    inputs = motion(block, (-5.0, 2.0 * FURTHEST), seed)
+    free = run(block, inputs)
+    low, high = (float(q) for q in np.quantile(free, [0.2, 0.8]))
+    limited = replace(block, pressure_range=(low, high))
+    with pytest.warns(ModelWarning, match="clipped"):
+        pressures = limited.simulate(inputs, sample_time=STEP)
+    assert pressures.min() >= low
+    assert pressures.max() <= high
+    reached = run(block.inverse(), beside(pressures, inputs))
+    np.testing.assert_allclose(run(block, beside(reached, inputs)), pressures, atol=1e-9 * high)
+
+
+@given(balances(m=0, n_lags=0), SEEDS)
+def test_without_memory_what_is_clipped_is_forgotten(block: Balance, seed: int) -> None:
+    inputs = motion(block, (-5.0, FURTHEST), seed)
+    free = run(block, inputs)
+    low, high = (float(q) for q in np.quantile(free, [0.2, 0.8]))
+    with pytest.warns(ModelWarning, match="clipped"):
+        pressures = replace(block, pressure_range=(low, high)).simulate(inputs)
+    np.testing.assert_array_equal(pressures, free.clip(low, high))
+
+
+@given(balances(n_loads=2, n=2), SEEDS)
+def test_sample_by_sample_is_all_at_once(block: Balance, seed: int) -> None:
+    pressures = motion(block, (0.0, HIGHEST), seed)
+    for each, inputs in (
+        (block, motion(block, (-5.0, FURTHEST), seed)),
+        (block.inverse(), pressures),
+        (LoadEstimate(block), measured(block, pressures)),
+    ):
+        step = each.stream(STEP).step
+        np.testing.assert_array_equal([step(row).copy() for row in inputs], run(each, inputs))
+
+
+# -- memory --------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("n_loads", [0, 1])
+@pytest.mark.parametrize("tare", [False, True])
+def test_without_lags_it_obeys_the_contract_of_the_rate_independent(
+    n_loads: int, tare: bool
+) -> None:
+    example = Balance.example()
+    block = replace(
+        example,
+        relaxation=((), ()),
+        lags=(),
+        damping=(0.0, 0.0),
+        tare=tare,
+        loads=rows(np.array(example.loads)[:, :n_loads]),
+        scheduled=example.scheduled[: 1 + n_loads],
+    )
+    assert not block.rate_dependent
+    check_block(block)
+    check_block(block.inverse())
+    if n_loads:
+        assert not LoadEstimate(block).rate_dependent
+        check_block(LoadEstimate(block))
+
+
+def state_after(block: Block, inputs: Array) -> Array:
+    state = block.initial_state(inputs[0])
+    block.bind(STEP, state, inputs, np.empty((len(inputs), len(block.outputs))))()
+    return state
+
+
+@given(balances(n=1, n_lags=0, n_loads=1), st.lists(numbers(0.05, 0.95), min_size=2, max_size=2))
+def test_a_closed_minor_loop_of_one_muscle_is_wiped_out(block: Balance, inner: list[float]) -> None:
+    """Return-point memory, of pressures under a load held and of displacements."""
+    for each, furthest in ((block.inverse(), HIGHEST), (block, FURTHEST)):
+        low, high = sorted(inner)
+        turns = furthest * np.array([0.0, 1.0, low, high, low])
+        path = np.interp(np.arange(121), np.arange(0, 121, 30), turns)
+        inputs = np.tile([0.0] * (len(each.inputs) - 1) + [10.0], (path.size, 1))
+        inputs[:, 0] = path
+        before, after = state_after(each, inputs[:61]), state_after(each, inputs)
+        np.testing.assert_allclose(after, before, atol=1e-8)
+
+
+# -- energy --------------------------------------------------------------------------------------
+
+
+@given(balances(), SEEDS)
+def test_any_pressures_find_their_equilibrium(block: Balance, seed: int) -> None:
+    """Jumps from anywhere to anywhere, also beyond what is known."""
+    rng, n = np.random.default_rng(seed), len(block.driven)
+    inputs = motion(block, (0.0, HIGHEST), seed)
+    inputs[:, :n] = rng.uniform(-0.5, 3.0 * HIGHEST, (len(inputs), n))
+    inputs[:, n:] = rng.permuted(inputs[:, n:], axis=0)
+    assert state_after(block.inverse(), inputs)[-1] == 0.0
+
+
+def incremental_energy(block: Balance, before: Array, y: Array, x: Array, p: Array) -> float:
+    """Return what the equilibrium of the next sample makes least, of two muscles and one extensor."""
+    n, m, n_lags = 2, len(block.limits), len(block.lags)
+    y0, z0 = before[:n], before[n : 2 * n]
+    stops = before[2 * n :][: n * m].reshape(n, m)
+    behind = before[2 * n + n * m :][: n * n_lags].reshape(n, n_lags)
+    springs = np.array(block.springs).reshape(n, 2, 1 + n)
+    now = springs[:, 0] + x[0] * springs[:, 1]
+    energy = now[:, 0] @ y + 0.5 * y @ now[:, 1:] @ y + x[1] * (np.array(block.loads)[:, 0] @ y)
+    for k in range(n):
+        u, scale = y[k] / block.scale, block.scale
+        energy += sum(
+            e * scale * u ** (i + 1) / (i + 1) for i, e in enumerate(block.elasticity[k], start=2)
+        )
+        energy -= p[k] * sum(
+            a * scale * u ** (i + 1) / (i + 1) for i, a in enumerate(block.areas[k])
+        )
+        moved = y[k] + block.walls[k] * p[k] - z0[k]
+        for h, limit, stop in zip(block.friction[k], block.limits, stops[k], strict=True):
+            width, s = limit * (p[k] + block.grip), abs(stop + moved)
+            energy += h * (0.5 * s * s if s < width else width * s - 0.5 * width * width)
+        dy = y[k] - y0[k]
+        energy += 0.5 * block.damping[k] / STEP * dy * dy
+        for kappa, tau, q in zip(block.relaxation[k], block.lags, behind[k], strict=True):
+            keep, ramp = np.exp(-STEP / tau), tau / STEP * (1.0 - np.exp(-STEP / tau))
+            energy += kappa * (keep * q * dy + 0.5 * ramp * dy * dy)
+    return float(energy)
+
+
+def test_the_equilibrium_has_the_least_incremental_energy() -> None:
+    from scipy.optimize import minimize
+
+    block = Balance.example()
+    low, high = np.array([0.0, 0.0, 0.0, 0.0]), np.array([2.5, 2.5, 2.0, 30.0])
+    inputs = wander(low, high, np.random.default_rng(3), 8, 6)
+    for end in range(5, len(inputs), 9):
+        before = state_after(block.inverse(), inputs[:end])
+        p, x = inputs[end, :2], inputs[end, 2:]
+        y = run(block.inverse(), inputs[: end + 1])[-1]
+
+        def energy(y: Array, before: Array = before, x: Array = x, p: Array = p) -> float:
+            return incremental_energy(block, before, y, x, p)
+
+        found = minimize(energy, before[:2], method="Nelder-Mead", options={"xatol": 1e-7})
+        assert energy(y) <= found.fun + 1e-9 * abs(found.fun)
+        np.testing.assert_allclose(y, found.x, atol=1e-3)
+
+
+# -- loads ---------------------------------------------------------------------------------------
+
+
+@given(balances(n_loads=1), SEEDS)
+def test_a_load_enters_once(block: Balance, seed: int) -> None:
+    """Where friction sticks, another load is held by its share over the area, whatever came before."""
+    stuck = replace(block, walls=(0.0,) * len(block.walls), grip=100.0)
+    if stuck.limits:
+        stuck = replace(stuck, limits=vector(1e3 * np.arange(1, 1 + len(stuck.limits))))
+    n, inputs = len(block.driven), motion(block, (-5.0, FURTHEST), seed)
+    other = inputs.copy()
+    other[1:, -1] += 17.0
+    stuck = replace(stuck, tare=False)
+    areas = [
+        np.polyval(terms[::-1], y / block.scale)
+        for terms, y in zip(block.areas, inputs[:, :n].T, strict=True)
+    ]
+    expected = np.array(block.loads)[:, 0] * 17.0 / np.array(areas).T
+    expected[0] = 0.0
+    shift = run(stuck, other) - run(stuck, inputs)
+    np.testing.assert_allclose(shift, expected, atol=1e-9)
+
+
+def test_a_tare_is_where_muscles_rest_under_the_first_load() -> None:
+    block = replace(Balance.example(), tare=True).inverse()
+    inputs = np.array([[0.0, 0.0, 1.0, 25.0], [0.0, 0.0, 1.0, 25.0], [0.0, 0.0, 1.0, 0.0]])
+    moved = run(block, inputs)
+    np.testing.assert_allclose(moved[:2], 0.0, atol=1e-12)
+    assert moved[2, 0] > 0.5
+
+
+# -- time ----------------------------------------------------------------------------------------
+
+
+def ramps(block: Block, highest: float, steps: int) -> Array:
+    """Return ramps between turning points, so many steps each."""
+    rng = np.random.default_rng(4)
+    turns = rng.uniform(0.0, highest, (9, len(block.inputs)))
+    grid = np.arange(8 * steps + 1) / steps
+    return np.column_stack([np.interp(grid, range(9), column) for column in turns.T])
+
+
+@given(balances(m=0, n_lags=2))
+def test_on_ramps_lags_are_exact_in_steps_of_any_length(block: Balance) -> None:
+    coarse = run(block, ramps(block, FURTHEST, 5), 0.2)
+    fine = run(block, ramps(block, FURTHEST, 40), 0.025)
+    np.testing.assert_allclose(fine[::8], coarse, atol=1e-9 * np.abs(coarse).max())
+
+
+@pytest.mark.parametrize(
+    ("damping", "steps", "share"),
+    [((0.0, 0.0), (10, 20, 40), 0.3), ((0.1, 0.05), (160, 320, 640), 0.6)],
+)
+def test_shorter_steps_converge(
+    damping: tuple[float, float], steps: tuple[int, ...], share: float
+) -> None:
+    """Without damping with the square of the step; with it straight, once steps are below its 7 ms."""
+    block = replace(Balance.example(), damping=damping).inverse()
+    *found, last = (run(block, ramps(block, 2.5, n), 1.0 / n)[::n] for n in (*steps, 8 * steps[-1]))
+    errors = [np.abs(each - last).max() for each in found]
+    assert errors[1] < share * errors[0]
+    assert errors[2] < share * errors[1]
+
+
+# -- refusals ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("change", "about"),
+    [
+        ({"friction": ((3.0, -1.5), (2.5, 2.0))}, "friction.*make energy"),
+        ({"relaxation": ((1.0, -0.6), (0.8, 0.5))}, "relaxation.*make energy"),
+        ({"damping": (-0.1, 0.0)}, "damping, walls or grip"),
+        ({"walls": (0.0, -0.1)}, "damping, walls or grip"),
+        ({"grip": -0.5}, "damping, walls or grip"),
+        ({"limits": (0.0, 2.0)}, "limits.*positive"),
+        ({"lags": (0.8, -1.0)}, "lags.*positive"),
+        ({"areas": ((0.0, 1.0, 0.0), (1.0, 0.0, 0.0))}, "areas at rest.*positive"),
+        ({"springs": ((1.0,), (1.0,))}, "springs.*2 rows of 6"),
+        ({"friction": ((1.0,), (1.0,))}, "friction.*2 rows of 2"),
+        ({"elasticity": ((1.0,), (1.0, 2.0))}, "elasticity.*2 rows of 1"),
+        ({"areas": ((), ())}, "areas.*2 rows of 1"),
+        ({"loads": ((1.0,),)}, "loads.*2 rows of 1"),
+        ({"damping": (0.1,)}, "damping.*give 2"),
+        ({"given": (Channel("pressure", "bar"),)}, "given.*give 2"),
+        ({"hull": ((0.0, 50.0), (50.0, 0.0))}, "hull.*lower ends first"),
+        ({"driven": (Channel("force", "N"),) * 2}, "a name of its own"),
+    ],
+)
+def test_what_makes_no_balance_is_refused(change: dict[str, Any], about: str) -> None:
+    with pytest.raises(ModelError, match=rf"(?s){about}"):
+        replace(Balance.example(), **change)

@@ -118,7 +118,6 @@ PLUGINS: dict[str, dict[str, str | Preset]] = {
         "cpi": "mckibben.estimators.play_type.creep_pi:CreepPIEstimator",
         "duhem": "mckibben.estimators.differential.duhem:DuhemEstimator",
         "eupi": "mckibben.estimators.play_type.eupi:EUPIEstimator",
-        "force-balance": "mckibben.estimators.coupled.force_balance:ForceBalanceEstimator",
         "force-bilinear": preset(FORCE_LAW, "The bilinear-quadratic law.", law="bilinear"),
         "force-chou": "mckibben.estimators.force.static:ChouHannafordEstimator",
         "force-minh": preset(
@@ -265,7 +264,7 @@ PLUGINS: dict[str, dict[str, str | Preset]] = {
 """Group -> name -> ``"module:attribute"``, or a preset. Adding a plug-in is one line here."""
 
 REPLACED: dict[str, dict[str, str]] = {
-    "estimators": {"grey-box": "balance"},
+    "estimators": {"force-balance": "balance", "grey-box": "balance"},
 }
 """Group -> name that is gone -> name of what does its work."""
 

@@ -14,6 +14,8 @@ from mckibben.signals import resample
 from tests.cli.conftest import Cli
 
 LEVELS = ("0.0", "1.2", "2.5")
+SHORT = ("steps=2", "n_stops=2", "n_lags=0")
+"""Settings that make a balance quick."""
 
 
 @pytest.fixture(scope="module")
@@ -37,7 +39,8 @@ def arm(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_from_recordings_to_a_closed_loop(cli: Cli, arm: Path, tmp_path: Path) -> None:
     model, inverse, run = (tmp_path / name for name in ("model.json", "inverse.json", "run.csv"))
-    result = cli("fit", "balance", *sorted(arm.glob("*.csv")), "-o", model, "--json")
+    short = [word for setting in SHORT for word in ("--set", setting)]
+    result = cli("fit", "balance", *sorted(arm.glob("*.csv")), "-o", model, *short, "--json")
     assert result.code == 0, result.err
     assert max(json.loads(result.out)["rmse_by_output"].values()) < 2.0
     first = next(iter(sorted(arm.glob("*drive-1.csv"))))
@@ -77,7 +80,8 @@ def test_one_output_of_several_muscles_is_compared(cli: Cli, arm: Path, tmp_path
 
 def test_study_of_a_folder_closes_the_loop(cli: Cli, arm: Path, tmp_path: Path) -> None:
     out = tmp_path / "study"
-    result = cli("study", arm, "-o", out, "--models", "balance,coupled-pi", "--json")
+    short = [word for setting in SHORT for word in ("--set", f"balance.{setting}")]
+    result = cli("study", arm, "-o", out, "--models", "balance,coupled-pi", *short, "--json")
     assert result.code == 0, result.err
     found = json.loads(result.out)
     board = found["leaderboard"]
@@ -103,7 +107,8 @@ def test_a_study_says_whether_a_network_is_to_be_trusted_off_its_patterns(
     test = tmp_path / f"{run.name}.csv"
     write(joint, test)
     asked = ["study", arm, "--test", test, "--models", "tsfnn,balance", "--jobs", 1]
-    asked += ["--set", "tsfnn.search_samples=400"]
+    for setting in ("tsfnn.search_samples=400", *(f"balance.{one}" for one in SHORT)):
+        asked += ["--set", setting]
     damped = cli(*asked, "-o", tmp_path / "damped")
     assert damped.code == 0, damped.err
     begin = "tsfnn: trained on 4 patterns that cover "
@@ -157,7 +162,8 @@ def test_bad_calls_leave_with_a_remedy(
 
 def test_a_model_in_place_of_its_inverse_is_refused(cli: Cli, arm: Path, tmp_path: Path) -> None:
     model = tmp_path / "model.json"
-    assert cli("fit", "balance", *sorted(arm.glob("*.csv")), "-o", model).code == 0
+    short = [word for setting in SHORT for word in ("--set", setting)]
+    assert cli("fit", "balance", *sorted(arm.glob("*.csv")), "-o", model, *short).code == 0
     reference = arm / "more" / "reference.csv"
     result = cli("track", model, "--rig", "soft-arm", "--reference", reference)
     assert result.code == 2

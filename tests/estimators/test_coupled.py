@@ -56,8 +56,8 @@ def rmse(estimator: Any) -> float:
     return float(max(estimator.diagnostics_.rmse_by_output))
 
 
-def test_force_balance_recovers_an_arm_of_its_own_kind(balance_runs: list[Recording]) -> None:
-    estimator = registry.load("estimators", "force-balance")().fit(balance_runs)
+def test_a_balance_follows_an_arm_of_another_form(balance_runs: list[Recording]) -> None:
+    estimator = registry.load("estimators", "balance")(n_lags=0, steps=4).fit(balance_runs)
     assert rmse(estimator) < 0.35
     model = estimator.model_
     low, high = model.inverse().pressure_range
@@ -124,13 +124,13 @@ def test_coupling_is_found_by_least_squares() -> None:
 
 def test_muscles_that_never_move_alone_are_said() -> None:
     both = runs(ForceBalance.example().inverse())[2::3]
-    with pytest.raises(DataError, match=r"pressure_1.*alone.*force-balance"):
+    with pytest.raises(DataError, match=r"pressure_1.*alone.*fit balance"):
         registry.load("estimators", "sdchm")().fit(both)
-    registry.load("estimators", "force-balance")().fit(both)
+    registry.load("estimators", "balance")(n_lags=0, steps=2).fit(both)
 
 
 def test_bad_recordings_are_named(balance_runs: list[Recording]) -> None:
-    fit = registry.load("estimators", "force-balance")().fit
+    fit = registry.load("estimators", "balance")().fit
     with pytest.raises(DataError, match="displacement_1"):
         fit(Recording({"pressure_1": waves(), "pressure_2": waves()}, STEP))
     stiff = balance_runs[0]
@@ -140,7 +140,7 @@ def test_bad_recordings_are_named(balance_runs: list[Recording]) -> None:
     with pytest.raises(DataError, match="too few"):
         fit(balance_runs[0].slice(0, 20))
     with pytest.raises(ModelError, match="degree"):
-        registry.load("estimators", "force-balance")(degree=9).fit(balance_runs)
+        registry.load("estimators", "balance")(degree=9).fit(balance_runs)
 
 
 def test_projected_derivatives_agree_with_differences() -> None:

@@ -7,7 +7,7 @@ import pytest
 
 from mckibben import DataError, ModelError, Recording, compare, load_rig, registry
 from mckibben.control import BlockController, EstimatedLoad, track
-from mckibben.estimators.coupled.force_estimate import fit_force_estimate
+from mckibben.estimators.coupled.force_estimate import ForceEstimate, fit_force_estimate, load_of
 from mckibben.rigs import record
 from mckibben.signals import resample
 
@@ -28,12 +28,17 @@ def train(runs: dict[str, Recording]) -> list[Recording]:
     return [runs[name] for name in NAMES[:4]]
 
 
+@pytest.fixture(scope="module")
+def estimate(train: list[Recording]) -> ForceEstimate:
+    return fit_force_estimate(train)
+
+
 def test_one_model_for_all_loads_beats_one_for_each(
     runs: dict[str, Recording], train: list[Recording]
 ) -> None:
     test = [runs["status-4"]]
-    board = compare(train, test, models=["force-balance"], load="force")
-    told = next(row for row in board.rows if row.model == "force-balance")
+    board = compare(train, test, models=["balance"], load="force")
+    told = next(row for row in board.rows if row.model == "balance")
     single = [row for row in board.rows if row is not told]
     assert len(single) == len(train)
     assert told.test_error < 0.4 * min(row.test_error for row in single)
@@ -74,14 +79,24 @@ def test_hysteresis_is_identified_on_all_runs_without_load(runs: dict[str, Recor
 
 
 def test_force_is_estimated_from_pressure_and_displacement(
+    runs: dict[str, Recording], estimate: ForceEstimate
+) -> None:
+    run = runs["status-4"]
+    estimated = estimate.block.simulate(run)["force"]
+    assert np.sqrt(np.mean((estimated - run["force"]) ** 2)) < 0.04 * np.ptp(run["force"])
+
+
+def test_force_is_estimated_from_a_length_as_from_its_shortening(
     runs: dict[str, Recording], train: list[Recording]
 ) -> None:
-    model = registry.load("estimators", "force-balance")(
-        input=("force",), scheduling=("pressure",), ridge=1e-7
-    ).fit(train)
-    run = runs["status-4"]
-    estimated = model.model_.inverse().simulate(run)["force"]
-    assert np.sqrt(np.mean((estimated - run["force"]) ** 2)) < 0.08 * np.ptp(run["force"])
+    long = [run.with_channels(displacement=300.0 - run["displacement"]) for run in train]
+    by_shortening, by_length = (
+        load_of(
+            registry.load("estimators", "balance")(input="pressure", steps=4).fit(some).model_
+        ).simulate(some[-1])["force"]
+        for some in (train, long)
+    )
+    np.testing.assert_allclose(by_length, by_shortening, atol=0.05 * np.ptp(train[-1]["force"]))
 
 
 def test_a_load_is_asked_for(runs: dict[str, Recording]) -> None:
@@ -104,10 +119,9 @@ def test_a_trust_region_finds_what_even_sets_do_not(train: list[Recording]) -> N
 
 
 def test_force_comes_with_an_interval_from_runs_left_out(
-    runs: dict[str, Recording], train: list[Recording]
+    runs: dict[str, Recording], train: list[Recording], estimate: ForceEstimate
 ) -> None:
-    found = fit_force_estimate(train)
-    run = found.estimate(runs["status-4"])
+    run = estimate.estimate(runs["status-4"])
     inside = (run["force_low"] <= run["force"]) & (run["force"] <= run["force_high"])
     assert inside.mean() >= 0.9
     with pytest.raises(DataError, match="at least three"):
@@ -116,8 +130,10 @@ def test_force_comes_with_an_interval_from_runs_left_out(
         fit_force_estimate(train, level=1.5)
 
 
-def test_an_estimated_load_serves_as_well_as_a_measured_one(train: list[Recording]) -> None:
-    model = registry.load("estimators", "force-balance")().fit(train).model_
+def test_an_estimated_load_serves_as_well_as_a_measured_one(
+    train: list[Recording], estimate: ForceEstimate
+) -> None:
+    model = registry.load("estimators", "balance")().fit(train).model_
     rig = load_rig("rail")
     t = np.arange(600) * 0.05
     reference = Recording(
@@ -128,7 +144,7 @@ def test_an_estimated_load_serves_as_well_as_a_measured_one(train: list[Recordin
         0.05,
     )
     told = BlockController(model.inverse())
-    guessed = EstimatedLoad(told, fit_force_estimate(train).block)
+    guessed = EstimatedLoad(told, estimate.block)
     errors = [
         track(c, rig, reference, approach=5.0, settle=5.0).rmse["displacement"]
         for c in (told, guessed)

@@ -15,6 +15,8 @@ by Newton's method in every sample (its inverse).
 The form is this package's own; friction that depends on travel rather than on pressure follows "A
 Multistate Friction Model for the Compensation of the Asymmetric Hysteresis in the Mechanical Response
 of Pneumatic Artificial Muscles".
+
+No estimator gives it any more, `mckibben.blocks.coupled.balance` does its work: it is here for files.
 """
 
 from __future__ import annotations

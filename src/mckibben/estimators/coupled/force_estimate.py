@@ -1,7 +1,7 @@
 """Force on a muscle from its measured pressure and displacement: a load cell without a load cell.
 
-The balance of forces asked the other way round: what the displacement and its past, and the pressure,
-say of the force. The interval comes from runs that the estimate was not fitted to, each left out in
+A balance of forces is asked for its load: what the displacement and its past, and the pressure, leave
+for it. The interval comes from runs that the estimate was not fitted to, each left out in
 turn (Vovk and others' conformal prediction, run by run), and so holds for loads like those recorded.
 """
 
@@ -12,13 +12,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from mckibben.blocks.compose import PerChannel, Series
 from mckibben.blocks.core.block import Block
+from mckibben.blocks.coupled.load_estimate import LoadEstimate
+from mckibben.blocks.memoryless.affine import Affine
 from mckibben.errors import DataError
-from mckibben.estimators.coupled.force_balance import ForceBalanceEstimator
+from mckibben.estimators.coupled.balance import BalanceEstimator
 from mckibben.recording import Recording
-
-RIDGE = 1e-7
-"""Damping: forces are hundreds of newtons, so their squares outweigh the default's."""
 
 
 @dataclass(frozen=True)
@@ -81,14 +81,10 @@ def fit_force_estimate(
         raise DataError(f"level is {level}", remedy="give a share between 0.5 and 1")
 
     def fitted(runs: Sequence[Recording]) -> Block:
-        estimator = ForceBalanceEstimator(
-            input=("force",),
-            output=(displacement,),
-            scheduling=(pressure,),
-            ridge=RIDGE,
+        estimator = BalanceEstimator(
+            input=(pressure,), output=(displacement,), scheduling=("force",)
         )
-        found: Block = estimator.fit(runs).model_.inverse()
-        return found
+        return load_of(estimator.fit(runs).fitted)
 
     missed = []
     for place, left_out in enumerate(recordings):
@@ -96,3 +92,19 @@ def fit_force_estimate(
         missed.append(np.abs(fitted(others).simulate(left_out)["force"] - left_out["force"]))
     half = float(np.quantile(np.concatenate(missed), level))
     return ForceEstimate(fitted(recordings), half, level)
+
+
+def load_of(model: Block) -> Block:
+    """Return what tells the load of a muscle by its balance, whose sensor may count otherwise.
+
+    Raises
+    ------
+    ModelError
+        If the model knows no load.
+    """
+    if not isinstance(model, Series):
+        return LoadEstimate.of(model)
+    solved, sensor = model.parts
+    (pressure,) = solved.inverse().outputs
+    shortened = PerChannel((sensor.inverse(), Affine(1.0, 0.0, pressure, pressure)))
+    return Series((shortened, LoadEstimate.of(solved)))

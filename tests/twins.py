@@ -607,6 +607,53 @@ def creep_inverse(block: Any, inputs: Rows, sample_time: float) -> Rows:
     return _rows(outputs)
 
 
+def _air_moved(block: Any, sample_time: float, x: float, u: float) -> float:
+    lowest = -math.inf if block.ambient is None else block.ambient
+    highest = math.inf if block.supply is None else block.supply
+
+    def goal(way: float) -> float:
+        aimed = block.gain * (u - block.offset - 0.5 * way * block.hysteresis)
+        return min(max(aimed, lowest), highest)
+
+    def towards(aim: float, tau: float) -> float:
+        return aim + (x - aim) * (math.exp(-sample_time / tau) if tau > 0 else 0.0)
+
+    if goal(1.0) > x:
+        return towards(goal(1.0), block.filling_time)
+    if goal(-1.0) < x:
+        return towards(goal(-1.0), block.venting_time)
+    return x
+
+
+def _air_at_rest(block: Any, u: float) -> float:
+    aimed = block.gain * (u - block.offset)
+    return min(max(aimed, block.ambient), block.supply)
+
+
+def air(block: Any, inputs: Rows, sample_time: float) -> Rows:
+    x = _air_at_rest(block, inputs[0][0])
+    pressures = [x] * round(block.dead_time / sample_time)
+    for u in _column(inputs):
+        x = _air_moved(block, sample_time, x, u)
+        pressures.append(x)
+    return _rows(pressures[: len(inputs)])
+
+
+def air_inverse(block: Any, inputs: Rows, sample_time: float) -> Rows:
+    forward = block.forward
+    low, high = forward.input_range
+    x = _air_at_rest(forward, bisect(partial(_air_at_rest, forward), inputs[0][0], low, high))
+    outputs = []
+    for y in _column(inputs):
+        if abs(y - x) < 1e-12:  # held in the middle of the commands that do
+            u = x / forward.gain + forward.offset
+        else:
+            u = bisect(partial(_air_moved, forward, sample_time, x), y, low, high)
+            x = _air_moved(forward, sample_time, x, u)
+        outputs.append(u)
+    return _rows(outputs)
+
+
 # -- maps, and forces ------------------------------------------------------------------------
 
 
@@ -1124,6 +1171,8 @@ TWINS: dict[str, Twin] = {
     "activation-memory": activation_memory,
     "activation-pressure": activation_pressure,
     "affine": affine,
+    "air": air,
+    "air-inverse": air_inverse,
     "balance": balance,
     "balance-inverse": balance_inverse,
     "bouc-wen": stepping(_BoucWen),

@@ -29,6 +29,7 @@ PLUGINS: dict[str, dict[str, str | Preset]] = {
         "activation-pressure": "mckibben.blocks.force.activation_pressure:ActivationPressure",
         "affine": "mckibben.blocks.memoryless.affine:Affine",
         "balance": "mckibben.blocks.coupled.balance:Balance",
+        "air": "mckibben.blocks.dynamic.air:Air",
         "bouc-wen": "mckibben.blocks.differential.bouc_wen:BoucWen",
         "braid-equilibrium": "mckibben.blocks.force.braid_equilibrium:BraidEquilibrium",
         "chou-hannaford": "mckibben.blocks.force.chou_hannaford:ChouHannaford",
@@ -93,6 +94,7 @@ PLUGINS: dict[str, dict[str, str | Preset]] = {
         "activation-pressure": (
             "mckibben.estimators.force.activation_pressure:ActivationPressureEstimator"
         ),
+        "air": "mckibben.estimators.dynamic.air:AirEstimator",
         "armax": preset(LINEAR, "ARMAX model, A y = B u + C e.", n_noise=2, effort=1.0),
         "arx": preset(LINEAR, "ARX model, A y = B u + e, by linear least squares."),
         "bj": preset(

@@ -362,3 +362,19 @@ def test_relays_at_a_corner_and_at_the_ends() -> None:
     assert plain(_solve)(wanted, middle, False, levels, table) == pytest.approx(levels[0] + 0.1)
     plateau = np.zeros_like(table)
     assert plain(_solve)(0.0, middle, True, levels, plateau) == levels[n // 2 + 1]
+
+
+# -- air -------------------------------------------------------------------------------------
+
+
+def test_air_holds_between_its_goals_and_goes_as_far_as_it_can() -> None:
+    air = load("blocks", "air").example()
+    reference = np.repeat([1.0, 5.0, 5.0, 0.0, 0.5], 12)
+    with pytest.warns(ModelWarning, match="clipped"):
+        command = air.inverse().simulate(reference, sample_time=0.01)
+    assert set(command[12:15]) == {air.limits[1]}
+    assert set(command[36:39]) == {air.offsets[1]}  # below, no command vents faster
+    pressure = air.simulate(command, sample_time=0.01)
+    assert pressure[:14].tolist() == [pressure[0]] * 14  # held, then late
+    expected = TWINS["air"](air, command[:, np.newaxis].tolist(), 0.01)
+    np.testing.assert_allclose(pressure[:, np.newaxis], expected, atol=1e-12)

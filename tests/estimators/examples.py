@@ -11,6 +11,7 @@ import numpy as np
 
 from mckibben import GPI, PI, Recording
 from mckibben.blocks.coupled.force_balance import ForceBalance
+from mckibben.blocks.dynamic.air import Air
 from mckibben.blocks.force.multistate_friction import MultistateFriction
 from mckibben.blocks.force.polynomial_force import PolynomialForce
 from mckibben.registry import load, names
@@ -117,10 +118,18 @@ def two_muscles(seed: int) -> Recording:
     return Recording(channels, STEP)
 
 
+def commanded(seed: int) -> Recording:
+    """Pressure behind a regulator that is driven by a voltage."""
+    volts = cycles(first=5.0 - 0.2 * seed)
+    p = Air(0.6, 0.1, 0.06, 0.2, 0.3, 0.1).simulate(volts, sample_time=STEP) + noise(seed, 0.005)
+    return Recording({"voltage": volts, "pressure": p}, STEP)
+
+
 KINDS = {
     "muscle": Kind(("pressure",), ("displacement",), muscle),
     "isobaric": Kind(("length",), ("force",), isobaric, ("pressure",)),
     "activated": Kind(("contraction",), ("pressure",), activated, ("force",)),
+    "commanded": Kind(("voltage",), ("pressure",), commanded),
     "loaded": Kind(("voltage",), ("displacement",), loaded, ("force",), n_runs=4),
     "two muscles": Kind(
         ("pressure_1", "pressure_2"),

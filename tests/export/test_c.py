@@ -102,11 +102,14 @@ MODELS: dict[str, Block] = {
     "explicit start": replace(load("blocks", "pi").example(), initial=(0.1, 0.2, 0.3, 0.4)),
     **{
         f"virgin {kind}": virgin(kind)
-        for kind in ("pi", "gpi", "preisach", "duhem", "krasnoselskii-pokrovskii", "maxwell-slip")
+        for kind in (
+            *("air", "pi", "gpi", "preisach", "duhem"),
+            *("krasnoselskii-pokrovskii", "maxwell-slip"),
+        )
     },
     **{
         f"virgin {kind} inverse": virgin(kind).inverse()
-        for kind in ("pi", "gpi", "preisach", "duhem", "bouc-wen", "eupi")
+        for kind in ("air", "pi", "gpi", "preisach", "duhem", "bouc-wen", "eupi")
     },
     "virgin narx": virgin("narx-network"),
     "force after virgin friction": feedforward("virgin"),

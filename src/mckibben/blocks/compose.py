@@ -6,7 +6,7 @@ series of the inverses.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from functools import cached_property
 from itertools import pairwise
@@ -40,6 +40,7 @@ class Composition(Block):
     """What all compositions share: states and parameters are those of the parts, one after another."""
 
     parameters: ClassVar[tuple[str, ...]] = ("parts",)
+    together: ClassVar[Callable[[Iterable[float]], float]] = max  # of dead times side by side
 
     parts: tuple[Block, ...]
 
@@ -83,6 +84,11 @@ class Composition(Block):
         """The scratch of all parts."""
         return sum(part.n_scratch for part in self.parts)
 
+    @property
+    def dead_time(self) -> float:  # type: ignore[override]
+        """That of the parts together."""
+        return type(self).together(part.dead_time for part in self.parts)
+
     def _states(self, state: Array) -> list[Array]:
         return np.split(state, np.cumsum([part.n_states for part in self.parts])[:-1])
 
@@ -111,6 +117,7 @@ class Series(Composition):
     """
 
     kind: ClassVar[str] = "series"
+    together: ClassVar[Callable[[Iterable[float]], float]] = sum
 
     parts: Parts
 

@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from mckibben.recording import Recording
     from mckibben.rigs import Rig
 
+COMMAND = "command_"
+
 
 def track(
     compensator: Annotated[Path, typer.Argument(help="Inverse, from mckibben invert (JSON).")],
@@ -46,6 +48,12 @@ def track(
     noise: Annotated[float, typer.Option(help="Added to what is followed [mm or N].")] = 0.0,
     delay: Annotated[int, typer.Option(help="Steps by which measurements come late.")] = 0,
     slew: Annotated[float | None, typer.Option(help="Fastest pressure change [bar/s].")] = None,
+    preview: Annotated[
+        float | None,
+        typer.Option(
+            help="How far ahead compensators know the reference [s]; default their dead time."
+        ),
+    ] = None,
     pressure_loop: Annotated[
         bool, typer.Option(help="Feed measured pressures back inside, as regulators do.")
     ] = True,
@@ -59,7 +67,8 @@ def track(
     """Let a compensator, or a controller with it, follow a reference on a virtual rig."""
     from mckibben.blocks.core.block import Block
     from mckibben.blocks.core.saving import load
-    from mckibben.control import control_law, tune_pid
+    from mckibben.blocks.feedback.feedforward_feedback import FeedforwardFeedback
+    from mckibben.control import control_law, dead_time_undone, tune_pid
     from mckibben.control import track as close
     from mckibben.files import write
     from mckibben.outputs import claim_model, claim_recording
@@ -77,10 +86,11 @@ def track(
     wanted = runs[0]
     _fits(block, plant, wanted)
     # pressures recorded with the reference are not what the compensator will give
-    given = {channel.name for channel in block.outputs}
+    given = {channel.name for channel in block.outputs} | set(_driven(block))
     wanted = wanted.select([name for name in wanted.channels if name not in given])
     held = {name: float(wanted[name][0]) for name in plant.inputs if name in wanted}
     step = wanted.sample_time or 0.02
+    commanded = any(channel.name.startswith(COMMAND) for channel in block.outputs)
     with progress_bar(f"{controller} on {plant.name}") as tell:
         chosen = control_law(
             controller, block, lambda: tune_pid(plant, sample_time=step, scheduled=held)
@@ -90,16 +100,24 @@ def track(
                 f"{controller!r} is no block that could be saved or exported. "
                 "Remedy: leave out --controller-out, or use a compensator, PID, or both together."
             )
+        ahead = dead_time_undone(block) if preview is None else preview
+        if controller_out is not None and isinstance(chosen, FeedforwardFeedback) and ahead > step:
+            raise ModelError(
+                f"a block has one reference, but compensator and feedback get it {ahead:g} s apart. "
+                "Remedy: leave out --controller-out, or say --preview 0."
+            )
         found = close(
             chosen,
             plant,
             wanted,
             approach=approach,
             settle=settle,
-            pressure_loop=pressure_loop,
+            # commands are no pressures to be compared with what is measured
+            pressure_loop=pressure_loop and not commanded,
             noise=noise,
             delay=delay,
             slew=slew,
+            preview=preview,
             seed=seed,
             progress=lambda share: tell(share, ""),
         )
@@ -141,12 +159,17 @@ def track(
         say(f"Written: {out}")
 
 
+def _driven(block: Block) -> list[str]:
+    """Return the inputs of a plant that a compensator drives; commands are recorded under such names."""
+    return [channel.name.removeprefix(COMMAND) for channel in block.outputs]
+
+
 def _fits(block: Block, plant: Rig, reference: Recording) -> None:
     """Refuse a model in place of an inverse, and references without what the inverse needs."""
-    for channel in block.outputs:
-        if channel.name not in plant.inputs:
+    for name in _driven(block):
+        if name not in plant.inputs:
             raise DataError(
-                f"the compensator gives {channel.name!r}, which does not drive {plant.name!r}",
+                f"the compensator gives {name!r}, which does not drive {plant.name!r}",
                 remedy="give what mckibben invert wrote, and the rig that the model is of",
             )
     for channel in block.inputs:

@@ -40,6 +40,10 @@ PER_LOAD = "mpi"
 """Model that stands for those which do not know the load."""
 
 
+BEYOND = 0.1
+"""Share of the range in training by which a test may go beyond it unsaid."""
+
+
 @dataclass(frozen=True)
 class Plan:
     """What is to be compared, on what.
@@ -192,7 +196,13 @@ def plan_of(
         seed=seed,
         chosen_by=chosen_by,
         left_out=left_out,
-        notes=(*notes, *_about_load(every, channels, load), *shared, *reading_notes(every)),
+        notes=(
+            *notes,
+            *_about_load(every, channels, load),
+            *_beyond_training(split.train, tests, channels),
+            *shared,
+            *reading_notes(every),
+        ),
         shared=shared,
     )
 
@@ -243,6 +253,26 @@ def _about_load(
             yield f"{load} is {values[0][0]:g} throughout: what it does cannot be learned"
         elif channels.single and moves:
             yield f"{name} is there, and no model is told it: see --load {name}"
+
+
+def _beyond_training(
+    train: Sequence[Recording], tests: Sequence[Recording], channels: Channels
+) -> Iterator[str]:
+    """Tell of tests whose inputs go where those of no training recording do."""
+    for name in (*channels.inputs, *channels.scheduled(train)):
+        trained = np.concatenate([recording[name] for recording in train if name in recording])
+        low, high = float(trained.min()), float(trained.max())
+        margin = BEYOND * (high - low)
+        for recording in tests:
+            if name not in recording:
+                continue
+            least, most = float(recording[name].min()), float(recording[name].max())
+            if least < low - margin or most > high + margin:
+                yield (
+                    f"{recording.name}: {name} goes from {least:.3g} to {most:.3g} "
+                    f"{recording.units[name]}, in training from {low:.3g} to {high:.3g}: models "
+                    "extrapolate there. Remedy: record more for training"
+                )
 
 
 def _chosen(

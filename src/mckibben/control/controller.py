@@ -10,7 +10,10 @@ import numpy as np
 
 from mckibben.arrays import Array
 from mckibben.blocks.core.block import Block
+from mckibben.blocks.core.running import Stream
+from mckibben.blocks.feedback.feedforward_feedback import FeedforwardFeedback
 from mckibben.blocks.feedback.pid import MEASURED
+from mckibben.control.preview import dead_time_undone
 
 
 class Controller(ABC):
@@ -34,6 +37,18 @@ class Controller(ABC):
             What schedules the model: an extensor's pressure, a load.
         """
 
+    @property
+    def preview(self) -> float:
+        """How far ahead its compensator wants the reference, to make up for dead time [s]."""
+        return 0.0
+
+    def foresees(self, reference: Array, scheduled: Array) -> None:
+        """Learn reference and schedule as they will be then, before `step`, where they are known.
+
+        The compensator goes by these, feedback by those of `step`.
+        """
+        del reference, scheduled
+
     def reads(self, readings: Mapping[str, float]) -> None:
         """Learn all that was just measured, by channel, before `step`."""
         del readings
@@ -56,12 +71,30 @@ class BlockController(Controller):
 
     block: Block
 
+    @property
+    def preview(self) -> float:
+        """The dead time of what the block undoes."""
+        return dead_time_undone(self.block)
+
     def reset(self, sample_time: float) -> None:
-        self._stream = self.block.stream(sample_time)
-        self._taken = len(self.block.inputs)
-        self._feels = any(channel.name.endswith(MEASURED) for channel in self.block.inputs)
+        whole = self.block
+        self._ahead: Array | None = None
+        self._feedback: Stream | None = None
+        if isinstance(whole, FeedforwardFeedback):  # which may be given references of two times
+            self._feedback = whole.feedback.stream(sample_time)
+            whole = whole.compensator
+        self._stream = whole.stream(sample_time)
+        self._taken = len(whole.inputs)
+        self._feels = any(channel.name.endswith(MEASURED) for channel in whole.inputs)
+
+    def foresees(self, reference: Array, scheduled: Array) -> None:
+        self._ahead = np.concatenate([reference, scheduled])
 
     def step(self, reference: Array, displacement: Array, scheduled: Array) -> Array:
-        measured = (displacement,) if self._feels else ()
-        given = np.concatenate([reference, *measured, scheduled])
-        return self._stream.step(given[: self._taken]).copy()
+        given = np.concatenate([reference, scheduled]) if self._ahead is None else self._ahead
+        if self._feels:
+            given = np.concatenate([reference, displacement, scheduled])
+        found = self._stream.step(given[: self._taken])
+        if self._feedback is not None:
+            found = self._feedback.step(np.concatenate([reference, displacement, found]))
+        return found.copy()

@@ -38,6 +38,16 @@ class EstimatedLoad(Controller):
             )
         self._names = [channel.name for channel in self.estimate.inputs]
 
+    @property
+    def preview(self) -> float:
+        """The controller's."""
+        return self.controller.preview
+
+    def foresees(self, reference: Array, scheduled: Array) -> None:
+        """Pass on the reference; the load to come is taken to be that of now."""
+        del scheduled
+        self.controller.foresees(reference, self._load)
+
     def reset(self, sample_time: float) -> None:
         self.controller.reset(sample_time)
         self._stream = self.estimate.stream(sample_time)

@@ -14,8 +14,9 @@ from mckibben.arrays import Array
 from mckibben.blocks.core.block import Block
 from mckibben.control.controller import BlockController, Controller
 from mckibben.control.pressure_loop import PressureLoop
+from mckibben.control.preview import samples_ahead
 from mckibben.errors import DataError, ModelError
-from mckibben.recording import Recording
+from mckibben.recording import Recording, standard_unit
 from mckibben.signals.checking import generator
 
 
@@ -94,6 +95,7 @@ def track(
     noise: float = 0.0,
     delay: int = 0,
     slew: float | None = None,
+    preview: float | None = None,
     seed: int = 0,
     progress: Callable[[float], None] | None = None,
 ) -> Tracked:
@@ -121,6 +123,9 @@ def track(
         Control steps by which measurements come late.
     slew : float, optional
         Fastest change of a pressure [bar/s].
+    preview : float, optional
+        How far ahead compensators are given the reference [s], in whole steps, and never less than the
+        next step's; the end is held. Default the dead time of what they undo.
     seed : int
         Of all noise.
     progress : callable, optional
@@ -145,6 +150,8 @@ def track(
     _check(approach, settle, noise, delay, slew, step)
     if isinstance(controller, Block):
         controller = BlockController(controller)
+    preview = controller.preview if preview is None else preview
+    further = samples_ahead(preview, step) - 1  # than the next step's, which is given anyway
     rng = generator(seed)
     measured_too = [name for name in plant.outputs if name in reference]
     followed = [name for name in measured_too if name.startswith("displ")]
@@ -192,6 +199,9 @@ def track(
         readings |= dict(zip(followed, felt.tolist(), strict=True))
         started = time.perf_counter()
         controller.reads(readings)
+        if further > 0:
+            then = min(t + further, n - 1)
+            controller.foresees(path[then], scheduled[then])
         wanted = controller.step(path[t], felt, scheduled[t])
         times[t] = time.perf_counter() - started
         if wanted.shape != low.shape or not np.isfinite(wanted).all():
@@ -285,6 +295,6 @@ def _recorded(
     for k, name in enumerate(held):
         channels.setdefault(name, scheduled[:, k])
     units = {f"reference_{name}": reference.units[name] for name in followed}
-    units |= {f"command_{name}": "bar" for name in driven}
+    units |= {f"command_{name}": standard_unit(name) or "" for name in driven}
     step = reference.sample_time or 1.0
     return Recording(channels, step, units, start_time=-lead * step, meta={"plant": plant.name})

@@ -40,7 +40,13 @@ class DisturbanceObserver(Controller):
             )
         self._model = self.compensator.inverse()
 
+    @property
+    def preview(self) -> float:
+        """The dead time of the model."""
+        return self._model.dead_time
+
     def reset(self, sample_time: float) -> None:
+        self._coming: tuple[Array, Array] | None = None
         self._ahead = self.compensator.stream(sample_time)
         self._beside = self._model.stream(sample_time)
         self._share = 1.0 - np.exp(-sample_time / self.filter_time)
@@ -48,6 +54,9 @@ class DisturbanceObserver(Controller):
         self._expected: Array | None = None
         self._n_ahead, self._n_beside = len(self.compensator.inputs), len(self._model.inputs)
         self._scheduled = np.empty(0)
+
+    def foresees(self, reference: Array, scheduled: Array) -> None:
+        self._coming = (reference, scheduled)
 
     def step(self, reference: Array, displacement: Array, scheduled: Array) -> Array:
         """Return the compensator's pressures for the reference without the disturbance."""
@@ -57,6 +66,8 @@ class DisturbanceObserver(Controller):
             surprise = displacement - self._expected
             self._disturbance += self._share * (surprise - self._disturbance)
         self._scheduled = scheduled
+        if self._coming is not None:
+            reference, scheduled = self._coming
         wanted = np.concatenate([reference - self._disturbance, scheduled])
         return self._ahead.step(wanted[: self._n_ahead]).copy()
 

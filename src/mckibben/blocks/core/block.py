@@ -51,6 +51,9 @@ class Block(Exportable, Parametrised):
     sample_time: float | None = None
     """Time between samples that a discrete block is bound to [s]; None for any."""
 
+    dead_time: float = 0.0
+    """By how long outputs come late, which its inverse leaves as it is [s]."""
+
     @property
     @abstractmethod
     def inputs(self) -> tuple[Channel, ...]:
@@ -247,9 +250,15 @@ class Block(Exportable, Parametrised):
     def _run(self, inputs: Array, sample_time: float | None, initial: Initial | None) -> Array:
         state = self.initial_state(inputs[0], initial)
         outputs = np.empty((inputs.shape[0], len(self.outputs)))
+        self.check_time(sample_time)
         self.bind(sample_time, state, inputs, outputs)()
         self.report(state)
         return outputs
+
+    def check_time(self, sample_time: float | None) -> None:
+        """Warn where a sample time changes what the block is, or a part of it."""
+        for part in getattr(self, "parts", ()):
+            part.check_time(sample_time)
 
     def report(self, state: Array) -> None:
         """Warn of what happened during a run that its user should know, read off the final state."""

@@ -1,7 +1,7 @@
 """Blocks that undo others: one class for all, which runs what the block undone declares.
 
 An inverse takes the outputs of its field ``forward``, then what schedules that one, and gives its
-driven inputs. Its state begins with the forward block's.
+driven inputs. Its state begins with the forward block's, unless it is shorter.
 """
 
 from __future__ import annotations
@@ -178,10 +178,11 @@ class Inverse(Block):
         if isinstance(start, str):
             return self.forward.inverse_start(first, start)
         n = self.forward.n_states
-        if len(start) == n < self.n_states:
+        if len(start) == n != self.n_states:
             return self.forward.inverse_state(self.forward.initial_state(first, start))
         state = explicit_state(self, start)
-        self.forward.initial_state(first, state[:n].tolist())  # which knows what states can be
+        if n <= self.n_states:
+            self.forward.initial_state(first, state[:n].tolist())  # which knows what states can be
         return state
 
     def bind(self, sample_time: float | None, state: Array, inputs: Array, outputs: Array) -> Run:

@@ -52,6 +52,7 @@ class Stream:
         self.block, self.sample_time, self.initial = block, sample_time, initial
         inputs, outputs = np.zeros((1, len(block.inputs))), np.zeros((1, len(block.outputs)))
         self.state = np.zeros(block.n_states)
+        block.check_time(sample_time)
         self._run = block.bind(sample_time, self.state, inputs, outputs)
         self._input, self._output = inputs[0], outputs[0]
         # Python's own numbers are faster than arrays so small

@@ -7,6 +7,7 @@ exact derivatives. Both keep to what physics asks (`mckibben.estimators.coupled.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Annotated, ClassVar
 
@@ -16,11 +17,15 @@ from annotated_types import Ge, Gt, Interval
 from mckibben.arrays import Array
 from mckibben.blocks.compose import PerChannel, Series
 from mckibben.blocks.core.block import Block
+from mckibben.blocks.coupled.balance import Balance
 from mckibben.blocks.memoryless.affine import Affine
 from mckibben.errors import ModelError
 from mckibben.estimators.core.data import TrainingData
+from mckibben.estimators.core.uncertainty import unknown
+from mckibben.estimators.coupled.balance_checks import one_speed, other_zeros, telling
 from mckibben.estimators.coupled.balance_search import Search
 from mckibben.estimators.coupled.balance_structure import Structure
+from mckibben.estimators.coupled.balance_words import held_back, sentences
 from mckibben.estimators.coupled.base import CoupledEstimator
 from mckibben.estimators.optimisers.tracker import Tracker
 
@@ -38,6 +43,9 @@ FOLLOWED, FIRST_STEPS = 2, 5
 
 FAR = 0.5
 """Displacements that all are further from zero than this share of their range count from elsewhere."""
+
+LAST_STEPS = 5
+"""On all recordings, after those on a few of them."""
 
 AT_START = 0.02
 """Displacement at the start of a run that is none, relative to the range."""
@@ -89,24 +97,28 @@ class BalanceEstimator(CoupledEstimator):
 
     def identify(self, data: TrainingData, tracker: Tracker) -> Block:
         """Return the balance, solved for displacements."""
+        data, notes = telling(data)
+        tracker.notes += [*notes, *other_zeros(data)]
         ways = directions(data)
         data = turned(data, ways)
         search = Search(data, self.structure(data, tracker), self.ridge)
+        few = search.of_few()
         with tracker.searching():
             starts = []
             for grip in GRIPS if self.n_stops else GRIPS[:1]:
-                values = search.begun(grip * search.structure.highest)
-                cost = search.cost(values)
-                tracker.saw(values, cost)
-                starts.append((cost, values))
+                values = few.begun(grip * few.structure.highest)
+                starts.append((few.cost(values), values))
+                tracker.saw(values, starts[-1][0])
             starts.sort(key=lambda start: start[0])
+            few.check_loads(starts[0][1])
             for _, start in starts[:FOLLOWED]:
-                for values, cost in search.descend(start, FIRST_STEPS):
-                    tracker.saw(values, cost)
+                few.descend(start, FIRST_STEPS, tracker)
             assert tracker.best is not None
-            for number, (values, cost) in enumerate(search.descend(tracker.best, self.steps)):
-                tracker.saw(values, cost)
-                tracker.reached(min(0.95, (number + 1) / (self.steps + 1)))
+            few.descend(tracker.best, self.steps, tracker)
+            tracker.reached(0.7)
+            if few is not search:
+                tracker.best_cost = search.cost(tracker.best)
+                search.descend(tracker.best, LAST_STEPS, tracker)
         if tracker.best is None or not np.isfinite(tracker.best_cost):
             raise ModelError(
                 "no balance of forces runs free over these recordings. Remedy: check that displacements "
@@ -115,7 +127,10 @@ class BalanceEstimator(CoupledEstimator):
         low, high = float(data.lowest.min()), float(data.highest.max())
         limited = data.inputs[0].unit in LIMITED
         bounds = (min(low, 0.0), high) if limited else None
-        solved = search.structure.block(tracker.best, bounds).inverse()
+        structure = search.structure
+        balance = structure.block(tracker.best, bounds)
+        tracker.notes += [*held_back(balance, structure), *sentences(balance, structure)]
+        solved = balance.inverse()
         if all(way == (1.0, 0.0) for way in ways):
             return solved
         sensors = [
@@ -123,6 +138,25 @@ class BalanceEstimator(CoupledEstimator):
             for (gain, offset), channel in zip(ways, data.outputs, strict=True)
         ]
         return Series((solved, sensors[0] if len(sensors) == 1 else PerChannel(tuple(sensors))))
+
+    def uncertainty(
+        self, block: Block, data: TrainingData, residual: Array, at_bounds: Sequence[int]
+    ) -> tuple[float, Array]:
+        """Return condition and covariance of what is free, from the exact slopes of the free run."""
+        solved = block.parts[0] if isinstance(block, Series) else block
+        balance = solved.inverse()
+        assert isinstance(balance, Balance)
+        told, _ = telling(data)
+        shortened = turned(told, directions(told))
+        structure = self.structure(shortened, Tracker())
+        search = Search(shortened, structure, self.ridge)
+        condition, found = search.covariance(structure.values(balance))
+        packed = structure.packed()
+        covariance = unknown(block)
+        n = len(packed)  # a sensor's gain and offset follow, which are not fitted
+        covariance[:n, :n] = found[np.ix_(packed, packed)]
+        covariance[list(at_bounds)] = covariance[:, list(at_bounds)] = np.nan
+        return condition, covariance
 
     def structure(self, data: TrainingData, tracker: Tracker) -> Structure:
         """Return sizes and settings that suit the recordings.
@@ -152,7 +186,12 @@ class BalanceEstimator(CoupledEstimator):
             tare = bool(scheduled) and bool((np.abs(first) <= AT_START * span).all())
         if tare:
             margin = 0.15 * span
-        timed = data.sample_time is not None
+        still = one_speed(data)
+        if still and self.n_lags and self.lags is None:
+            tracker.notes.append(
+                "all moves at about one speed, so that relaxation cannot be told from friction, and is "
+                "left out. Remedy: record at other speeds too, or give lags"
+            )
         return Structure(
             driven=data.outputs,
             scheduled=tuple(data.scheduled[i] for i in scheduled),
@@ -162,8 +201,8 @@ class BalanceEstimator(CoupledEstimator):
             n_elastic=self.elasticity - 1,
             n_area=self.area + 1,
             limits=np.geomspace(self.finest, 0.5, self.n_stops) * float(span.max()) / highest,
-            lags=self._lags(data) if timed else np.zeros(0),
-            lag_range=(2.0 * (data.sample_time or 1.0), max(self._longest(data), 1.0)),
+            lags=self._lags(data) if self.lags or not still else np.zeros(0),
+            lag_range=(2.0 * (data.sample_time or 1.0), max(0.5 * self._longest(data), 1.0)),
             hull=np.column_stack([y.min(axis=0) - margin, y.max(axis=0) + margin]),
             scheduled_hull=np.column_stack([x.min(axis=0), x.max(axis=0)]),
             highest=highest,

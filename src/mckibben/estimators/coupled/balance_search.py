@@ -2,20 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.errors import ModelError
+from mckibben.errors import DataError, ModelError
 from mckibben.estimators.core.data import Run, TrainingData
+from mckibben.estimators.core.uncertainty import inverted
 from mckibben.estimators.coupled.balance_slopes import run as follow
 from mckibben.estimators.coupled.balance_structure import Structure
 from mckibben.estimators.optimisers.constrained import constrained_least_squares
+from mckibben.estimators.optimisers.tracker import Tracker
 
 MOST_ROWS = 12_000
 """Errors to learn from; more are thinned evenly."""
+
+MOST_SAMPLES = 30_000
+"""To find the way by; the last steps look at all."""
+
+NO_LOAD = 50.0
+"""Pull of the highest pressure over the strongest load, where a load hardly matters."""
+
+SIGN = 0.8
+"""Error with the load's sign turned, over that without, which says that it was wrong."""
 
 MOST_TRIES = 9
 """Dampings tried for a step, each ten times the last."""
@@ -54,6 +64,18 @@ class Search:
         n_rows = sum(len(run.outputs) for run in self.runs) * structure.n
         self.every = max(1, n_rows // MOST_ROWS)
         self.cuts: list[tuple[Array, Array]] = []
+
+    def of_few(self) -> Search:
+        """Return the same search over evenly chosen recordings, where there are very many samples."""
+        total = sum(len(run.outputs) for run in self.runs)
+        if total <= MOST_SAMPLES:
+            return self
+        count = max(MOST_SAMPLES * len(self.runs) // total, 1)
+        chosen = np.unique(np.linspace(0, len(self.runs) - 1, count).round().astype(int))
+        few = replace(self.data, runs=tuple(self.data.runs[i] for i in chosen.tolist()))
+        found = Search(few, self.structure, self.ridge)
+        found.span, found.cuts = self.span, self.cuts
+        return found
 
     def held(self, run: Run) -> bool:
         """Tell whether nothing moves in a run, so that its forces are what is compared."""
@@ -104,6 +126,35 @@ class Search:
             forces = slice(structure.slices["damping"].start, structure.slices["loads"].stop)
             values[forces] /= values[structure.places("loads", 0)[0]]
         return values
+
+    def check_loads(self, values: Array) -> None:
+        """Refuse loads that seem to push where they should pull.
+
+        Raises
+        ------
+        DataError
+            Naming the channel.
+        """
+        structure = self.structure
+        if not structure.in_newtons:
+            return
+        areas = values[structure.places("areas", 0)[0]] * structure.highest
+        strongest = max(float(np.abs(run.scheduled[:, -1]).max()) for run in self.runs)
+        if areas < NO_LOAD * strongest:
+            return
+        against = [
+            replace(run, scheduled=run.scheduled * [*[1.0] * (run.scheduled.shape[1] - 1), -1.0])
+            for run in self.runs
+        ]
+        other = replace(self.data, runs=tuple(against))
+        turned = Search(other, structure, self.ridge)
+        if turned.cost(turned.begun(float(values[structure.grip]))) < SIGN * self.cost(values):
+            raise DataError(
+                "the more it pulls, the shorter the muscle, as if its sign were wrong",
+                file=self.runs[0].name,
+                channel=structure.loaded[0].name,
+                remedy="give forces that pull the muscle longer as positive",
+            )
 
     def stiffness(self, values: Array) -> Array:
         """Return how stiff every muscle is at every sample kept, shape (samples, n)."""
@@ -177,33 +228,55 @@ class Search:
             self.cuts.append((x, way))
         return values
 
+    def missed(self, values: Array, run: Run) -> tuple[Array, Array]:
+        """Return the errors over a run relative to the ranges, and their slopes by coefficients."""
+        if self.held(run):
+            found, by = self.followed(values, run, held=True)
+            areas = [values[self.structure.places("areas", k)[0]] for k in range(self.structure.n)]
+            scale = 1.0 / (np.array(areas) * self.structure.highest)
+        else:
+            found, by = self.followed(values, run, held=False)
+            found = found - self.measured(run)
+            scale = 1.0 / self.span
+        return (found * scale).ravel(), (by * scale[:, np.newaxis]).reshape(-1, by.shape[2])
+
     def errors(self, values: Array) -> tuple[Array, Array]:
-        """Return errors of the free run relative to the ranges, and their slopes by coefficients."""
-        errors, slopes = [], []
-        for run in self.runs:
-            if self.held(run):
-                lacking, by = self.followed(values, run, held=True)
-                block_area = values[self.structure.places("areas", 0)[0]] * self.structure.highest
-                scale = np.full(self.structure.n, 1.0 / block_area)
-                errors.append((lacking * scale).ravel())
-            else:
-                found, by = self.followed(values, run, held=False)
-                scale = 1.0 / self.span
-                errors.append(((found - self.measured(run)) * scale).ravel())
-            slopes.append((by * scale[:, np.newaxis]).reshape(-1, by.shape[2]))
+        """Return the errors over all runs, and their slopes."""
+        errors, slopes = zip(*(self.missed(values, run) for run in self.runs), strict=True)
         return np.concatenate(errors), np.concatenate(slopes)
+
+    def covariance(self, values: Array) -> tuple[float, Array]:
+        """Return the condition of what is free, and the covariance of all coefficients.
+
+        As if errors were independent; NaN of what is fixed, or what the runs do not determine.
+        """
+        mix = self.structure.free(moving=True)
+        errors, slopes = self.errors(values)
+        moving = slopes @ mix
+        size = np.maximum(np.sqrt((moving**2).sum(axis=0)), 1e-12)
+        condition, own = inverted(moving / size)
+        n_free = errors.size * self.every - mix.shape[1]
+        variance = float(errors @ errors) / max(
+            n_free, 1
+        )  # of all samples, of which some are looked at
+        scaled = mix / size
+        told = np.isfinite(np.diag(own))
+        covariance = variance * scaled[:, told] @ own[np.ix_(told, told)] @ scaled[:, told].T
+        lost = ~mix.any(axis=1) | mix[:, ~told].any(axis=1)
+        covariance[lost] = covariance[:, lost] = np.nan
+        return condition, covariance
 
     def cost(self, values: Array) -> float:
         """Return the root mean square of the errors."""
-        errors = self.errors(values)[0]
-        return float(np.sqrt(np.mean(errors**2))) if np.isfinite(errors).all() else np.inf
+        found = _size(self.errors(values)[0])
+        return found if np.isfinite(found) else np.inf
 
-    def descend(self, values: Array, steps: int) -> Iterator[tuple[Array, float]]:
-        """Yield ever better coefficients, and the root mean square of their errors."""
+    def descend(self, values: Array, steps: int, tracker: Tracker) -> None:
+        """Show a tracker ever better coefficients."""
         mix = self.structure.free(moving=True)
         damping = 1e-3
         errors, slopes = self.errors(values)
-        cost = float(np.sqrt(np.mean(errors**2)))
+        cost = _size(errors)
         slow = 0
         for _ in range(steps):
             moving = slopes @ mix
@@ -218,7 +291,7 @@ class Search:
                     damping = max(10.0 * damping, 1e-9)
                     continue
                 tried_errors, tried_slopes = self.errors(tried)
-                found = float(np.sqrt(np.mean(tried_errors**2)))
+                found = _size(tried_errors)
                 if found < cost:
                     break
                 damping = max(10.0 * damping, 1e-9)
@@ -226,8 +299,13 @@ class Search:
                 return
             gained = (cost - found) / cost
             values, errors, slopes, cost = tried, tried_errors, tried_slopes, found
-            yield values, cost
+            tracker.saw(values, cost)
             damping = max(damping / 5.0, LIGHTEST**2)
             slow = slow + 1 if gained < 1e-3 else 0
             if slow >= 3:
                 return
+
+
+def _size(errors: Array) -> float:
+    """Return the root mean square."""
+    return float(np.sqrt(np.mean(errors**2)))

@@ -162,6 +162,21 @@ class Structure:
             pressure_range=pressure_range,
         )
 
+    def values(self, block: Balance) -> Array:
+        """Return the coefficients of a balance of this structure."""
+        tables = [block.hull, np.transpose([block.walls]), np.transpose([block.damping])]
+        tables += [block.springs, block.elasticity, block.areas]
+        tables += [block.friction, block.relaxation, block.loads]
+        table = np.hstack([np.asarray(part, dtype=np.float64) for part in tables])
+        return np.concatenate([table.ravel(), [block.grip], np.log(block.lags)])
+
+    def packed(self) -> NDArray[np.intp]:
+        """Return, for every parameter that a balance packs, its place among coefficients."""
+        names = ("springs", "elasticity", "areas", "friction", "relaxation", "loads")
+        by_name = [self.places(name, k) for name in names for k in range(self.n)]
+        single = [self.places(name, k) for name in ("damping", "wall") for k in range(self.n)]
+        return np.concatenate([*by_name, *single, [self.grip]]).astype(np.intp)
+
     @property
     def in_newtons(self) -> bool:
         """Whether forces are in newtons: those of a muscle alone under one load."""

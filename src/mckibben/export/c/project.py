@@ -197,6 +197,7 @@ def checked_sample_time(block: Block, sample_time: float | None) -> float | None
             f"{block.kind!r} depends on the rate. Remedy: give the time between steps, "
             "--sample-time SECONDS."
         )
+    block.check_time(step)
     return step
 
 

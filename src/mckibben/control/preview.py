@@ -1,0 +1,78 @@
+"""References known ahead, so that dead time vanishes.
+
+What a compensator gives cannot act before the dead time of the air has passed. Where it is given its
+reference that much ahead, as a robot knows that plans its motion, what comes of it is on time: offline
+the reference is shifted by `previewed`; sample by sample `Stream.step` is given the reference of
+`dead_time_undone` later; loops hand it over so (`mckibben.control.track`).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mckibben.blocks.core.block import Block
+from mckibben.blocks.feedback.feedforward_feedback import FeedforwardFeedback
+from mckibben.errors import DataError, ModelError
+from mckibben.recording import Recording
+
+MOST_PREVIEW = 1e4
+"""Seconds."""
+
+
+def dead_time_undone(compensator: Block) -> float:
+    """Return the dead time of what a compensator undoes [s]: how far ahead it wants its reference.
+
+    That of a compensator alone where there is feedback on top; 0 where nothing is known to be undone.
+
+    Examples
+    --------
+    >>> from mckibben.blocks.dynamic.air import Air
+    >>> dead_time_undone(Air.example().inverse())
+    0.02
+    """
+    if isinstance(compensator, FeedforwardFeedback):
+        return dead_time_undone(compensator.compensator)
+    try:
+        return compensator.inverse().dead_time
+    except ModelError:
+        return 0.0
+
+
+def samples_ahead(preview: float, sample_time: float) -> int:
+    """Return a preview in whole samples, rounded.
+
+    Raises
+    ------
+    ModelError
+        Where it is negative, longer than 10⁴ s, or no number.
+    """
+    if not 0 <= preview <= MOST_PREVIEW:
+        raise ModelError(f"preview is {preview}. Remedy: give 0 to {MOST_PREVIEW:g} s.")
+    return round(preview / sample_time)
+
+
+def previewed(reference: Recording, preview: float) -> Recording:
+    """Return a reference as a compensator is given it ahead: every sample has what comes later.
+
+    Parameters
+    ----------
+    reference : Recording
+        With time.
+    preview : float
+        How much later [s], not negative, in whole samples; see `dead_time_undone`. The end is held.
+
+    Raises
+    ------
+    DataError
+        Where the reference has no time.
+    ModelError
+        Where the preview is out of range.
+    """
+    if reference.sample_time is None:
+        raise DataError(
+            "the reference has no time", file=reference.source, remedy="add a time column or --rate"
+        )
+    ahead = samples_ahead(preview, reference.sample_time)
+    n = len(reference)
+    places = np.minimum(np.arange(n) + ahead, n - 1)
+    return reference.with_channels(**{name: reference[name][places] for name in reference.channels})

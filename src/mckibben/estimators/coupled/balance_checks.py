@@ -1,0 +1,84 @@
+"""What recordings cannot tell a balance of forces, said before it is fitted."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from mckibben.estimators.core.data import TrainingData
+
+ALIKE = 0.02
+"""Share of its largest value by which a load has to change to be one."""
+
+BLOCK, NOISE = 25, 0.4
+"""Samples whose means are compared, and the share of the range over which noise has no means."""
+
+ONE_SPEED = 2.0
+"""Ratio of the fastest to the slowest speeds up to which there is one."""
+
+RESTING = 0.05
+"""Share of the fastest speed below which an input rests; share of samples that may."""
+
+SAME, OFF = 0.05, 0.1
+"""Shares of their ranges within which inputs are the same, and beyond which an output is another."""
+
+
+def telling(data: TrainingData) -> tuple[TrainingData, list[str]]:
+    """Return the data without loads and schedules that never change, and what is said of them."""
+    kept, notes = [], []
+    whole = data.stacked("scheduled")
+    for place, channel in enumerate(data.scheduled):
+        values = whole[:, place]
+        means = [
+            np.add.reduceat(column, starts) / np.diff([*starts, column.size])
+            for column in (run.scheduled[:, place] for run in data.runs)
+            for starts in [np.arange(0, column.size, BLOCK)]
+        ]
+        moves = float(np.ptp(np.concatenate(means)))
+        least = max(ALIKE * float(np.abs(values).max()), NOISE * float(np.ptp(values)))
+        if moves > least:
+            kept.append(place)
+        else:
+            notes.append(
+                f"{channel.name} is about {values.mean():.3g} {channel.unit} in all recordings: what "
+                "it does cannot be told, and it is left out. Remedy: record at other values too"
+            )
+    runs = tuple(replace(run, scheduled=run.scheduled[:, kept]) for run in data.runs)
+    scheduled = tuple(data.scheduled[place] for place in kept)
+    return replace(data, runs=runs, scheduled=scheduled), notes
+
+
+def one_speed(data: TrainingData) -> bool:
+    """Tell whether all inputs always move at about one speed, which tells nothing of rate."""
+    speeds = []
+    for run in data.runs:
+        if run.sample_time is None:
+            return True
+        moved = np.abs(np.diff(run.driven, axis=0)) / run.sample_time
+        speeds.append(moved.max(axis=1))
+    found = np.concatenate(speeds)
+    rests = found <= RESTING * float(np.quantile(found, 0.99))
+    if rests.mean() > RESTING:
+        return False
+    slow, fast = np.quantile(found[~rests], [0.1, 0.9])
+    return bool(fast <= ONE_SPEED * slow)
+
+
+def other_zeros(data: TrainingData) -> list[str]:
+    """Return which runs begin where others with the same inputs do not, as with another zero."""
+    first = np.array([[*run.driven[0], *run.scheduled[0]] for run in data.runs])
+    began = np.array([run.outputs[0] for run in data.runs])
+    whole = np.hstack([data.stacked("driven"), data.stacked("scheduled")])
+    spans, travel = np.ptp(whole, axis=0), np.ptp(data.stacked("outputs"), axis=0)
+    notes = []
+    for place, run in enumerate(data.runs):
+        same = (np.abs(first - first[place]) <= SAME * spans).all(axis=1)
+        off = began[place] - np.median(began[same], axis=0)
+        for k in np.flatnonzero(np.abs(off) > OFF * travel).tolist():
+            channel = data.outputs[k]
+            notes.append(
+                f"{run.name} begins {off[k]:.3g} {channel.unit} of {channel.name} from where recordings "
+                "with the same inputs do, as if it had another zero. Remedy: let all count from the same"
+            )
+    return notes

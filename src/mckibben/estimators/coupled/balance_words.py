@@ -1,0 +1,68 @@
+"""What a balance of forces says of muscles, in sentences with units."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mckibben.arrays import Array
+from mckibben.blocks.coupled.balance import Balance
+from mckibben.estimators.coupled.balance_structure import GRID, LEAST_LEFT, Structure
+
+NEAR = 1.2
+"""Times a bound up to which it is said to hold something back."""
+
+
+def sentences(block: Balance, structure: Structure) -> list[str]:
+    """Return how much of every muscle is area, spring, friction and relaxation."""
+    unit = "N" if structure.in_newtons else "bar"
+    per = " N/bar" if structure.in_newtons else " of muscle 1's at rest"
+    p = 0.5 * structure.highest
+    found = []
+    for k, channel in enumerate(block.driven):
+        y = float(np.mean(block.hull[k]))
+        rest, middle = (_area(block, k, at) for at in (0.0, y))
+        spring = block.springs[k][1 + k]
+        stiff = spring + _slope(block.elasticity[k], y / block.scale) / block.scale
+        rubbing = sum(
+            h * r * (p + block.grip) for h, r in zip(block.friction[k], block.limits, strict=True)
+        )
+        fading = sum(block.relaxation[k])
+        times = " and ".join(f"{lag:.3g} s" for lag in block.lags)
+        found.append(
+            f"{channel.name} at {y:.3g} mm and {p:.3g} bar: area {middle:.3g}{per} ({rest:.3g} at "
+            f"rest); springs and rubber {stiff:.3g} {unit}/mm; friction up to {rubbing:.3g} {unit} "
+            f"either way, {100 * rubbing / max(middle * p, 1e-12):.2g} % of the pull"
+            + (f"; {fading:.3g} {unit}/mm more that fades within {times}" if block.lags else "")
+        )
+    return found
+
+
+def held_back(block: Balance, structure: Structure) -> list[str]:
+    """Return which conditions of physics hold the fit back."""
+    found = []
+    for k, channel in enumerate(block.driven):
+        places = np.linspace(block.hull[k][0], block.hull[k][1], GRID)
+        taken = sum(
+            h * (r + block.walls[k]) for h, r in zip(block.friction[k], block.limits, strict=True)
+        )
+        left = np.array([_area(block, k, y) for y in places]) - taken
+        worst = int(np.argmin(left))
+        if left[worst] < NEAR * LEAST_LEFT * block.areas[k][0]:
+            found.append(
+                f"{channel.name}: friction would outweigh the area at {places[worst]:.3g} mm, and "
+                "is kept from it; beware of pressures there"
+            )
+        if block.walls[k] > 0.099 * structure.scale / structure.highest / NEAR:
+            found.append(f"{channel.name}: its wall's stretch is at its bound")
+    return found
+
+
+def _area(block: Balance, k: int, y: float) -> float:
+    powers = (y / block.scale) ** np.arange(len(block.areas[k]))
+    return float(np.array(block.areas[k]) @ powers)
+
+
+def _slope(elasticity: tuple[float, ...], u: float) -> float:
+    """Return the slope of the elastic force by u."""
+    orders: Array = np.arange(2, 2 + len(elasticity), dtype=np.float64)
+    return float(np.array(elasticity) @ (orders * u ** (orders - 1)))

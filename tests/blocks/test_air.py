@@ -1,0 +1,193 @@
+"""Valve and air: exact lags, an exact inverse, and dead time that a preview takes away."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+from scipy.signal import cont2discrete, lfilter
+
+from mckibben import PI, DataError, ModelError, ModelWarning, Recording, Series, check_block
+from mckibben.blocks.compose import Parallel, PerChannel
+from mckibben.blocks.core.fields import Channel
+from mckibben.blocks.dynamic.air import LONGEST_DEAD_TIME, Air
+from mckibben.blocks.memoryless.affine import Affine
+from mckibben.control import dead_time_undone, previewed
+from mckibben.export import export_c
+from tests.blocks.strategies import numbers, paths
+
+Array = NDArray[np.float64]
+
+STEP = 0.01
+EXAMPLE = Air.example()
+RIGHT_AWAY = replace(EXAMPLE, dead_time=0.0)
+
+
+@st.composite
+def airs(draw: st.DrawFn) -> Air:
+    """Draw a regulator, with or without hysteresis, lags, dead time and limits."""
+    lag = st.one_of(st.just(0.0), numbers(0.002, 0.3))
+    return Air(
+        draw(numbers(0.1, 2.0)),
+        draw(numbers(-1.0, 1.0)),
+        draw(st.one_of(st.just(0.0), numbers(0.0, 0.3))),
+        draw(lag),
+        draw(lag),
+        STEP * draw(st.integers(0, 12)),
+        draw(st.sampled_from([None, 0.0, 0.3])),
+        draw(st.sampled_from([None, 5.0, 2.0])),
+        (0.0, 10.0),
+    )
+
+
+@given(airs(), paths(0.0, 10.0))
+def test_what_comes_of_the_inverse_is_the_reference_after_the_dead_time(air: Air, u: Array) -> None:
+    reference = replace(air, dead_time=0.0).simulate(u, sample_time=STEP)
+    command = air.inverse().simulate(reference, sample_time=STEP)
+    low, high = air.limits
+    assert low <= command.min()
+    assert command.max() <= high
+    late = round(air.dead_time / STEP)
+    pressure = air.simulate(command, sample_time=STEP)
+    np.testing.assert_allclose(pressure[late:], reference[: len(u) - late], rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    "air",
+    [
+        RIGHT_AWAY,
+        replace(EXAMPLE, hysteresis=0.0, filling_time=0.04, venting_time=0.04),
+        replace(EXAMPLE, filling_time=0.0, venting_time=0.0),
+        replace(EXAMPLE, ambient=None, supply=None),
+        replace(EXAMPLE, dead_time=STEP * LONGEST_DEAD_TIME),
+    ],
+    ids=["right away", "linear", "no lags", "no limits", "very late"],
+)
+def test_variants_keep_the_laws(air: Air) -> None:
+    check_block(air)
+    check_block(air.inverse())
+
+
+@given(numbers(0.01, 1.0), st.integers(0, 5), paths(0.5, 9.5))
+def test_equal_lags_are_scipys(tau: float, late: int, u: Array) -> None:
+    air = Air(0.6, 0.1, 0.0, tau, tau, late * STEP, None)
+    (top,), bottom, _ = cont2discrete((np.array([0.6]), np.array([tau, 1.0])), STEP)[:3]
+    expected = lfilter(
+        np.ravel(top), bottom, np.append(u - u[0], 0.0)
+    )  # of the hold, one sample later
+    expected = np.append(np.zeros(late), expected[1:])[: len(u)] + 0.6 * (u[0] - 0.1)
+    np.testing.assert_allclose(air.simulate(u, sample_time=STEP), expected, atol=1e-12)
+
+
+@given(airs(), paths(0.0, 10.0), st.integers(2, 7))
+def test_a_finer_grid_gives_the_same_pressures(air: Air, u: Array, times: int) -> None:
+    coarse = air.simulate(u, sample_time=STEP)
+    fine = air.simulate(np.repeat(u, times), sample_time=STEP / times)
+    np.testing.assert_allclose(fine[times - 1 :: times], coarse, atol=1e-11)
+
+
+def test_a_slow_loop_is_as_wide_as_the_hysteresis() -> None:
+    up = np.linspace(1.0, 9.0, 4001)
+    pressure = EXAMPLE.simulate(np.concatenate([up, up[::-1], up]), sample_time=STEP)
+    falling, rising = pressure[4001:8002][::-1], pressure[8002:]
+    middle = slice(1000, 3001)
+    # each branch lags by its own time and the dead time, less the sample at whose end it is
+    rate = EXAMPLE.gain * 8.0 / 4000 / STEP
+    lagging = rate * (EXAMPLE.filling_time + EXAMPLE.venting_time + 2 * EXAMPLE.dead_time)
+    width = EXAMPLE.gain * EXAMPLE.hysteresis + lagging
+    np.testing.assert_allclose((falling - rising)[middle], width, atol=2 * rate * STEP)
+
+
+def test_pressure_stays_between_surroundings_and_supply() -> None:
+    u = np.repeat([-5.0, 20.0, -5.0], 300)
+    pressure = EXAMPLE.simulate(u, sample_time=STEP)
+    assert pressure.min() == 0.0
+    assert pressure.max() == pytest.approx(6.0, abs=1e-12)
+
+
+def test_a_reference_too_fast_is_told_and_followed_as_fast_as_the_air_flows() -> None:
+    reference = np.repeat([1.0, 4.0, 4.0], 20)
+    with pytest.warns(ModelWarning, match=r"sample\(s\) of the reference 'pressure' were clipped"):
+        command = EXAMPLE.inverse().simulate(reference, sample_time=STEP)
+    assert command.max() == 10.0
+    pressure = RIGHT_AWAY.simulate(command, sample_time=STEP)
+    full = RIGHT_AWAY.simulate(np.concatenate([command[:20], np.full(40, 10.0)]), sample_time=STEP)
+    np.testing.assert_allclose(pressure[20:], np.minimum(full[20:], 4.0), atol=1e-12)
+
+
+def test_dead_time_between_samples_is_rounded_and_said() -> None:
+    u = np.linspace(0.0, 9.0, 50)
+    between = replace(EXAMPLE, dead_time=0.023)
+    with pytest.warns(ModelWarning, match=r"0\.023 s, is no whole number.*0\.02 s is taken"):
+        pressure = between.simulate(u, sample_time=STEP)
+    np.testing.assert_array_equal(pressure, EXAMPLE.simulate(u, sample_time=STEP))
+    with pytest.warns(ModelWarning, match="no whole number"):
+        Series((between, Affine(2.0, 0.0))).stream(STEP)
+    between.inverse().stream(STEP)  # which has no use for it
+
+
+def test_a_rounded_dead_time_is_said_where_it_is_exported(tmp_path: Path) -> None:
+    with pytest.warns(ModelWarning, match="no whole number"):
+        export_c(replace(EXAMPLE, dead_time=0.023), tmp_path, sample_time=STEP)
+
+
+def test_what_makes_no_sense_is_refused() -> None:
+    with pytest.raises(ModelError, match=r"255 samples\. Remedy"):
+        replace(EXAMPLE, dead_time=2.55).simulate([1.0], sample_time=STEP)
+    with pytest.raises(ModelError, match=r"ambient pressure of 7.*Remedy"):
+        replace(EXAMPLE, ambient=7.0)
+    with pytest.raises(ModelError, match=r"gain of 'air'.*Remedy"):
+        replace(EXAMPLE, gain=-1.0)
+
+
+# -- preview ---------------------------------------------------------------------------------
+
+
+def muscle() -> tuple[Series, Recording]:
+    """Return air before a muscle, and a motion that both reach."""
+    model = Series((replace(EXAMPLE, supply=5.0), PI.example()))
+    t = np.arange(1600) * STEP
+    low, high = (float(end[0]) for end in model.reachable())
+    motion = 0.5 * (low + high) - 0.35 * (high - low) * np.cos(2 * np.pi * t / 8)
+    return model, Recording({"displacement": motion}, STEP)
+
+
+def test_a_previewed_reference_comes_on_time() -> None:
+    model, wanted = muscle()
+    compensator = model.inverse()
+    assert dead_time_undone(compensator) == EXAMPLE.dead_time
+    ahead = previewed(wanted, dead_time_undone(compensator))
+    found = model.simulate(compensator.simulate(ahead))["displacement"]
+    late = model.simulate(compensator.simulate(wanted))["displacement"]
+    n = round(EXAMPLE.dead_time / STEP)
+    motion = wanted["displacement"]
+    np.testing.assert_allclose(found[n:], motion[n:], atol=1e-9 * np.ptp(motion))
+    np.testing.assert_allclose(late[n:], motion[:-n], atol=1e-9 * np.ptp(motion))
+    stream = compensator.stream(STEP)
+    stepped = [stream.step(y)[0] for y in ahead["displacement"].tolist()]
+    np.testing.assert_array_equal(stepped, compensator.simulate(ahead)["voltage"])
+
+
+def test_dead_times_add_up_in_series_and_are_shared_side_by_side() -> None:
+    p, q = Channel("pressure", "bar"), Channel("pressure_2", "bar")
+    slow = replace(EXAMPLE, dead_time=0.05, input=p)
+    assert Series((EXAMPLE, slow)).dead_time == pytest.approx(0.07)
+    apart = replace(EXAMPLE, input=Channel("voltage_2", "V"), output=q)
+    assert PerChannel((slow, apart)).dead_time == 0.05
+    assert Parallel((EXAMPLE, RIGHT_AWAY)).dead_time == 0.02
+    assert dead_time_undone(EXAMPLE) == 0.0
+    assert dead_time_undone(PI.example().inverse()) == 0.0
+
+
+def test_previews_out_of_range_are_refused() -> None:
+    wanted = muscle()[1]
+    for bad in (-0.1, float("nan"), 1e9):
+        with pytest.raises(ModelError, match=r"preview is .*Remedy"):
+            previewed(wanted, bad)
+    with pytest.raises(DataError, match=r"no time.*Remedy"):
+        previewed(Recording({"displacement": np.ones(5)}, None), 0.1)

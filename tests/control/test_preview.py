@@ -1,0 +1,144 @@
+"""Loops whose compensators know the reference ahead: dead time vanishes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from mckibben import PI, ModelError, Recording, Series, write
+from mckibben.blocks.core.fields import Channel
+from mckibben.blocks.dynamic.air import Air
+from mckibben.blocks.feedback.feedforward_feedback import FeedforwardFeedback
+from mckibben.blocks.feedback.pid import PIDFeedback
+from mckibben.blocks.memoryless.affine import Affine
+from mckibben.control import DisturbanceObserver, EstimatedLoad, track
+from mckibben.control.controller import BlockController
+from tests.cli.conftest import Cli
+from tests.cli.conftest import cli as cli  # a fixture
+
+STEP, LATE = 0.02, 5
+AIR = replace(Air.example(), dead_time=LATE * STEP, supply=5.0)
+PLANT = Series((AIR, PI.example()))
+KNOWN = Series((replace(AIR, dead_time=(LATE + 1) * STEP), PI.example()))
+"""As it is recorded: what is applied at a sample is held until the next, and seen there."""
+
+
+class Late:
+    """A plant that is air and a muscle."""
+
+    name = "late"
+    inputs = ("voltage",)
+    outputs = ("displacement",)
+
+    def __init__(self, load: float = 0.0) -> None:
+        self.load = load
+
+    def changed(self, settings: Mapping[str, Any]) -> Late:
+        return self
+
+    def limits(self, name: str) -> SimpleNamespace:
+        return SimpleNamespace(low=0.0, high=10.0)
+
+    def reset(self, seed: int = 0) -> np.ndarray:
+        self.stream = PLANT.stream(STEP)
+        return np.asarray(self.stream.step(0.1).copy() + self.load)
+
+    def step(self, action: Any) -> np.ndarray:
+        return np.asarray(self.stream.step(action["voltage"]).copy() + self.load)
+
+
+def wanted() -> Recording:
+    low, high = (float(end[0]) for end in PLANT.reachable())
+    t = np.arange(800) * STEP
+    return Recording(
+        {"displacement": 0.5 * (low + high) - 0.3 * (high - low) * np.cos(2 * np.pi * t / 4)}, STEP
+    )
+
+
+def error(controller: Any, preview: float | None = None, load: float = 0.0) -> float:
+    found = track(controller, Late(load), wanted(), settle=4.0, preview=preview)
+    return found.rmse["displacement"]
+
+
+SPAN = float(np.ptp(wanted()["displacement"]))
+
+
+def test_a_compensator_is_on_time_by_default_and_late_without_preview() -> None:
+    compensator = KNOWN.inverse()
+    # held for the last samples, the reference is nowhere to be known
+    assert error(compensator) < 1e-9 * SPAN
+    assert error(compensator, 0.0) > 0.05 * SPAN
+    assert error(compensator, (LATE + 2) * STEP) > 0.01 * SPAN
+
+
+def feedback() -> PIDFeedback:
+    channels = (Channel("displacement", "mm"),), (Channel("voltage", "V"),)
+    return PIDFeedback.of(*channels, (0.05,), (0.4,), (0.0,), limits=(0.0, 10.0))
+
+
+def test_feedback_goes_by_the_present_reference() -> None:
+    both = FeedforwardFeedback.of(KNOWN.inverse(), feedback())
+    # the next step's reference is what feedback has always compared with: a sample ahead
+    assert error(both) < 0.05 * SPAN
+    assert error(both) < 0.2 * error(both, 0.0)
+    assert error(both, load=-1.0) < 0.5 * error(KNOWN.inverse(), load=-1.0)
+
+
+def test_an_observer_and_an_estimated_load_pass_the_preview_on() -> None:
+    observer = DisturbanceObserver(KNOWN.inverse())
+    assert observer.preview == pytest.approx((LATE + 1) * STEP)
+    assert error(observer) < 0.02 * SPAN
+    assert error(observer) < 0.3 * error(observer, 0.0)
+    channel = Channel("displacement", "mm")
+    estimated = EstimatedLoad(
+        BlockController(KNOWN.inverse()), Affine(0.0, 0.0, channel, Channel("force", "N"))
+    )
+    assert estimated.preview == observer.preview
+    assert error(estimated) < 1e-9 * SPAN
+
+
+def test_feedback_alone_has_no_use_for_a_preview() -> None:
+    assert BlockController(feedback()).preview == 0.0
+    assert error(feedback(), 0.2) == error(feedback())
+
+
+def test_a_preview_out_of_range_is_refused() -> None:
+    with pytest.raises(ModelError, match=r"preview is -1.*Remedy"):
+        error(KNOWN.inverse(), -1.0)
+
+
+def test_the_command_line_previews(cli: Cli, tmp_path: Path) -> None:
+    air = Air(0.6, 0.0, 0.05, 0.03, 0.07, 0.06, 0.0, 6.0, (0.0, 10.0))
+    muscle = PI((0.0, 0.3, 0.8), (3.0, 1.5, 1.0), 0.0, (0.0, 6.0))
+    Series((air, muscle)).inverse().save(tmp_path / "inverse.json")
+    write(wanted(), tmp_path / "wished.csv")
+    given = ["--rig", "rail", "--reference", tmp_path / "wished.csv"]
+    out = tmp_path / "run.csv"
+    commands = []
+    for ahead in ([], ["--preview", 0.06], ["--preview", 0]):
+        result = cli("track", tmp_path / "inverse.json", *given, *ahead, "-o", out, "--force")
+        assert result.code == 0, result.err
+        commands.append(out.read_text())
+    assert commands[0] == commands[1] != commands[2]
+    kept = ["--controller", "feedforward-pid", "--controller-out", tmp_path / "robot.json"]
+    result = cli("track", tmp_path / "inverse.json", *given, *kept)
+    assert result.code == 2
+    assert "--preview 0" in " ".join(result.err.split())
+
+
+def test_commands_of_a_pressure_drive_the_rigs_pressure(cli: Cli, tmp_path: Path) -> None:
+    command = Channel("command_pressure", "bar")
+    air = Air(1.0, 0.0, 0.02, 0.03, 0.07, 0.04, 0.0, 6.0, (0.0, 6.0), input=command)
+    Series((air, PI.example())).inverse().save(tmp_path / "inverse.json")
+    write(wanted(), tmp_path / "wished.csv")
+    out = tmp_path / "run.csv"
+    given = ["--rig", "mas20-hanging", "--reference", tmp_path / "wished.csv", "-o", out]
+    result = cli("track", tmp_path / "inverse.json", *given)
+    assert result.code == 0, result.err
+    assert "command_pressure" in out.read_text().splitlines()[0]

@@ -1,0 +1,131 @@
+"""The estimator of valves and their air finds what made a recording."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mckibben import DataError, ModelError, Recording, load, write
+from mckibben.blocks.core.fields import Channel
+from mckibben.blocks.dynamic.air import Air
+from mckibben.estimators.dynamic.air import AirEstimator
+from tests.cli.conftest import Cli
+from tests.cli.conftest import cli as cli  # a fixture
+
+STEP, NOISE = 0.01, 0.005
+REGULATOR = Air(0.6, 0.3, 0.08, 0.05, 0.09, 0.03)
+
+
+def commands(seed: int = 0) -> np.ndarray:
+    rng = np.random.default_rng(seed)
+    levels = np.repeat(rng.uniform(1.0, 9.0, 60), rng.integers(5, 60, 60))
+    return np.concatenate([np.full(20, levels[0]), levels])
+
+
+def recorded(air: Air, seed: int = 0, volts: np.ndarray | None = None) -> Recording:
+    volts = commands(seed) if volts is None else volts
+    noise = NOISE * np.random.default_rng(seed + 100).standard_normal(volts.size)
+    pressure = air.simulate(volts, sample_time=STEP) + noise
+    return Recording({"voltage": volts, "pressure": pressure}, STEP)
+
+
+def fitted(air: Air, seed: int = 0) -> tuple[Air, AirEstimator]:
+    estimator = AirEstimator().fit(recorded(air, seed))
+    assert isinstance(estimator.model_, Air)
+    assert estimator.diagnostics_.rmse < 1.05 * NOISE
+    return estimator.model_, estimator
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2])
+@pytest.mark.parametrize(
+    "air",
+    [
+        REGULATOR,
+        replace(REGULATOR, dead_time=0.0, filling_time=0.2, venting_time=0.03),
+        replace(REGULATOR, supply=4.0, dead_time=0.12),
+    ],
+    ids=["regulator", "slow to fill", "short of supply"],
+)
+def test_parameters_are_found_within_three_standard_errors(air: Air, seed: int) -> None:
+    found, estimator = fitted(air, seed)
+    assert found.dead_time == pytest.approx(air.dead_time)
+    errors = np.array(estimator.diagnostics_.standard_errors)
+    assert np.isfinite(errors).all()
+    assert (np.abs(found.pack() - air.pack()) < 3 * errors).all()
+    assert (errors < 0.02 * np.maximum(air.pack(), 0.1)).all()
+
+
+def test_limits_are_found_where_they_show_and_kept_where_they_are_given() -> None:
+    short = replace(REGULATOR, supply=4.0, ambient=0.6)
+    found, _ = fitted(short)
+    assert found.supply == pytest.approx(4.0, abs=0.005)
+    assert found.ambient == pytest.approx(0.6, abs=0.005)
+    free, _ = fitted(REGULATOR)
+    assert free.supply is None
+    assert free.ambient == 0.0
+    told = AirEstimator(supply=7.0, ambient=-0.5).fit(recorded(REGULATOR)).model_
+    assert isinstance(told, Air)
+    assert (told.supply, told.ambient) == (7.0, -0.5)
+
+
+def test_no_hysteresis_is_found_to_be_none() -> None:
+    found, estimator = fitted(replace(REGULATOR, hysteresis=0.0), 3)
+    assert found.hysteresis < 0.005
+    if found.hysteresis == 0:
+        assert estimator.diagnostics_.at_bounds == (2,)
+
+
+def test_other_dead_times_are_told_to_be_worse() -> None:
+    _, estimator = fitted(REGULATOR)
+    (note,) = estimator.diagnostics_.notes
+    assert "dead time 0.03 s" in note
+    assert "at 0.02 s" in note
+    assert "at 0.04 s" in note
+
+
+def test_a_swarm_finds_it_too() -> None:
+    swarm = AirEstimator(method="pso-ls", pso_particles=12, pso_iterations=20)
+    found = swarm.fit(recorded(REGULATOR)).model_
+    np.testing.assert_allclose(found.pack(), REGULATOR.pack(), rtol=0.02, atol=0.005)
+
+
+def test_what_is_no_command_is_refused() -> None:
+    run = recorded(REGULATOR)
+    objects = AirEstimator.objection
+    assert objects([run], ("voltage",), ("pressure",)) is None
+    assert objects([run], ("displacement",), ("pressure",)) == "it maps a command to a pressure"
+    assert objects([run], ("pressure",), ("displacement",)) == "it maps a command to a pressure"
+    falling = run.with_channels(pressure=5.0 - run["pressure"])
+    with pytest.raises(DataError, match=r"does not rise with the command.*Remedy"):
+        AirEstimator(longest_dead_time=0.0).fit(falling)
+    with pytest.raises(ModelError, match=r"starts of air.*Remedy"):
+        AirEstimator(initial="fitted").fit(run)
+    with pytest.raises(DataError, match=r"no time.*Remedy"):
+        AirEstimator().fit(replace(run, sample_time=None))
+
+
+def test_the_command_line_fits_inverts_and_undoes(cli: Cli, tmp_path: Path) -> None:
+    named = replace(
+        REGULATOR, input=Channel("command_pressure", "bar"), gain=1.0, ambient=0.0, dead_time=0.02
+    )
+    volts = 0.5 * commands()
+    noisy = recorded(named, volts=volts)
+    run = Recording(
+        {"command_pressure": volts, "pressure": noisy["pressure"]},
+        STEP,
+        {"command_pressure": "bar"},
+    )
+    write(run, tmp_path / "run.csv")
+    model, inverse = tmp_path / "air.json", tmp_path / "inverse.json"
+    channels = ["--input", "command_pressure", "--output", "pressure"]
+    result = cli("fit", "air", tmp_path / "run.csv", *channels, "-o", model, "--json")
+    assert result.code == 0, result.err
+    assert json.loads(result.out)["rmse"] < 1.05 * NOISE
+    result = cli("invert", model, "-o", inverse)
+    assert result.code == 0, result.err
+    assert "Reachable" in result.out
+    assert load(inverse) == load(model).inverse()

@@ -1,0 +1,242 @@
+"""Identification of a balance of forces: it finds its own kind and keeps to physics."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from mckibben import DataError, ModelError, Recording
+from mckibben.arrays import Array
+from mckibben.blocks.compose import Series
+from mckibben.blocks.core.fields import DISPLACEMENT, FORCE, PRESSURE
+from mckibben.blocks.core.inverse import Inverse
+from mckibben.blocks.coupled.balance import Balance
+from mckibben.estimators.coupled.balance import BalanceEstimator
+from mckibben.estimators.coupled.balance_slopes import run
+from mckibben.estimators.optimisers.constrained import constrained_least_squares
+from mckibben.signals.broadband import random_wave
+
+STEP = 0.05
+NOISE = 0.02
+
+MUSCLE = Balance(
+    springs=((5.0, 8.0),),
+    elasticity=((40.0, 30.0),),
+    areas=((60.0, -35.0, -5.0),),
+    friction=((6.0, 4.0, 1.5),),
+    relaxation=((1.5, 1.0),),
+    loads=((1.0,),),
+    damping=(0.1,),
+    walls=(0.0,),
+    limits=(0.05, 0.3, 1.2),
+    grip=0.6,
+    lags=(1.0, 12.0),
+    hull=((-8.0, 40.0),),
+    scale=40.0,
+    degree=1,
+    driven=(DISPLACEMENT,),
+    scheduled=(FORCE,),
+    given=(PRESSURE,),
+)
+
+
+def recording(
+    seed: int, strongest: float = 60.0, n: int = 1200, *, noise: float = NOISE, sign: float = 1.0
+) -> Recording:
+    """Return a muscle under a load, both moving at random from rest."""
+    time = np.arange(n) * STEP
+    rises = np.minimum(time / 2.0, 1.0)
+    p = rises * random_wave(time, 0.3, 4.0, seed=seed)
+    force = rises * random_wave(time, 0.2, strongest, seed=100 + seed)
+    y = MUSCLE.inverse().simulate(np.column_stack([p, force]), sample_time=STEP)[:, 0]
+    y = y + noise * np.random.default_rng(seed).standard_normal(n)
+    channels = {"pressure": p, "displacement": y, "force": sign * force}
+    return Recording(channels, STEP, meta={"name": f"run-{seed}"})
+
+
+@pytest.fixture(scope="module")
+def found() -> BalanceEstimator:
+    return BalanceEstimator().fit([recording(seed) for seed in (1, 2)])
+
+
+def balance_of(estimator: BalanceEstimator) -> Balance:
+    block = estimator.fitted
+    solved = block.parts[0] if isinstance(block, Series) else block
+    assert isinstance(solved, Inverse)
+    forward = solved.forward
+    assert isinstance(forward, Balance)
+    return forward
+
+
+def error(estimator: BalanceEstimator, on: Recording) -> float:
+    return float(np.sqrt(np.mean((estimator.predict(on)[0] - on["displacement"]) ** 2)))
+
+
+def test_it_recovers_a_muscle_of_its_own_kind(found: BalanceEstimator) -> None:
+    # its stops break away at other travels than those of the muscle
+    assert found.diagnostics_.rmse < 2.5 * NOISE
+    assert error(found, recording(3)) < 3.0 * NOISE
+    balance = balance_of(found)
+    np.testing.assert_allclose(balance.lags, MUSCLE.lags, rtol=0.35)
+    np.testing.assert_allclose(balance.areas[0][0], 60.0, rtol=0.05)
+    assert balance.loads == ((1.0,),)
+
+
+def test_loads_beyond_those_trained_enter_as_they_are(found: BalanceEstimator) -> None:
+    assert error(found, recording(4, strongest=140.0)) < 0.15
+
+
+def test_its_inverse_gives_back_the_pressures(found: BalanceEstimator) -> None:
+    run_ = recording(5)
+    moved = found.fitted.simulate(run_)
+    back = found.fitted.inverse().simulate(moved.select(["displacement", "force"]))
+    np.testing.assert_allclose(back["pressure"], run_["pressure"], atol=1e-8)
+
+
+def test_it_keeps_to_physics(found: BalanceEstimator) -> None:
+    b = balance_of(found)
+    assert min(*b.friction[0], *b.relaxation[0], b.damping[0], b.walls[0], b.grip) >= 0
+    y = np.linspace(b.hull[0][0], b.hull[0][1], 200)
+    u = y / b.scale
+    area = sum(a * u**i for i, a in enumerate(b.areas[0]))
+    taken = sum(h * (r + b.walls[0]) for h, r in zip(b.friction[0], b.limits, strict=True))
+    assert float(np.min(area - taken)) > 0
+    elastic = sum(e * i * u ** (i - 1) for i, e in enumerate(b.elasticity[0], start=2)) / b.scale
+    for p in (0.0, 4.0):
+        narrows = sum(a * i * u ** (i - 1) for i, a in enumerate(b.areas[0]) if i) / b.scale
+        assert float(np.min(b.springs[0][1] + elastic - p * narrows)) > -1e-6
+
+
+def test_standard_errors_cover_what_is_true(found: BalanceEstimator) -> None:
+    names = found.fitted.parameter_names
+    errors = dict(zip(names, found.diagnostics_.standard_errors, strict=True))
+    values = dict(zip(names, found.fitted.pack(), strict=True))
+    area = next(name for name in names if name.startswith("areas"))
+    assert 0 < errors[area] < 3.0
+    assert abs(values[area] - 60.0) < 6.0 * errors[area] + 0.5
+    assert any("N/bar" in note for note in found.diagnostics_.notes)
+
+
+def test_lengths_that_fall_from_afar_are_the_same_to_it(found: BalanceEstimator) -> None:
+    runs = [
+        run_.with_channels({}, displacement=250.0 - run_["displacement"])
+        for run_ in map(recording, (1, 2))
+    ]
+    other = BalanceEstimator().fit(runs)
+    assert other.diagnostics_.rmse < 2.5 * NOISE
+    moved = other.fitted.simulate(runs[0])
+    back = other.fitted.inverse().simulate(moved.select(["displacement", "force"]))
+    np.testing.assert_allclose(back["pressure"], runs[0]["pressure"], atol=1e-8)
+
+
+def test_held_muscles_are_learned_from_by_their_force() -> None:
+    time = np.arange(600) * STEP
+    p = np.minimum(time / 2.0, 1.0) * random_wave(time, 0.3, 4.0, seed=8)
+    y = np.zeros((600, 1))
+    lacking, _ = run(MUSCLE.coefficients(STEP), p[:, np.newaxis], y, np.zeros((600, 1)), held=True)
+    channels = {"pressure": p, "displacement": y[:, 0], "force": -lacking[:, 0]}
+    estimator = BalanceEstimator().fit([recording(1), Recording(channels, STEP)])
+    assert estimator.diagnostics_.rmse < 0.2
+
+
+def test_two_muscles_and_an_extensor() -> None:
+    arm = replace(
+        Balance.example(),
+        loads=((), ()),
+        scheduled=(Balance.example().scheduled[0],),
+        tare=True,
+    )
+    runs = []
+    for seed in (1, 2, 3):
+        time = np.arange(800) * STEP
+        rises = np.minimum(time / 2.0, 1.0)
+        waves = [random_wave(time, 0.3, 4.0, seed=10 * seed + k) * rises for k in (1, 2)]
+        waves.append(random_wave(time, 0.1, 2.0, seed=10 * seed))
+        y = arm.inverse().simulate(np.column_stack(waves), sample_time=STEP)
+        y = y + NOISE * np.random.default_rng(seed).standard_normal(y.shape)
+        names = (
+            "pressure_1",
+            "pressure_2",
+            "pressure_extensor",
+            "displacement_1",
+            "displacement_2",
+        )
+        runs.append(Recording(dict(zip(names, [*waves, *y.T], strict=True)), STEP))
+    estimator = BalanceEstimator(degree=1).fit(runs[:2])
+    balance = balance_of(estimator)
+    assert balance.tare
+    springs = np.array([[balance.springs[k][1 + j] for j in (0, 1)] for k in (0, 1)])
+    np.testing.assert_allclose(springs, springs.T)
+    missed = estimator.predict(runs[2])[0] - runs[2].matrix(["displacement_1", "displacement_2"])
+    assert np.sqrt(np.mean(missed**2)) < 0.15
+
+
+def test_slopes_are_those_of_differences() -> None:
+    block = replace(MUSCLE, walls=(0.1,))
+    some = recording(6, n=300)
+    p, y, x = (
+        np.ascontiguousarray(some[name][:, np.newaxis])
+        for name in ("pressure", "displacement", "force")
+    )
+
+    def at(values: Array) -> Array:
+        changed = replace(
+            block.unpack(values[: block.n_parameters]),
+            lags=tuple(np.exp(values[block.n_parameters :])),
+        )
+        return run(changed.coefficients(STEP), p, y, x, held=False)[0][:, 0]
+
+    values = np.concatenate([block.pack(), np.log(block.lags)])
+    exact = run(block.coefficients(STEP), p, y, x, held=False)[1][:, 0]
+    width = exact.shape[1] - 1 - len(block.lags)
+    # the block packs tables first, then damping, walls and grip; coefficients hull, wall, damping first
+    places = [*range(4, width), 3, 2, *range(width, exact.shape[1])]
+    for place, column in enumerate(places):
+        step = np.zeros(values.size)
+        step[place] = 1e-6 * max(abs(values[place]), 0.1)
+        slope = (at(values + step) - at(values - step)) / (2 * step[place])
+        missed = np.abs(slope - exact[:, column])
+        # but for the samples at which a stop just breaks away
+        assert np.quantile(missed, 0.97) < 1e-4 * (np.abs(slope).max() + 1e-6), place
+
+
+def test_least_squares_within_inequalities_meet_the_conditions_of_optimality() -> None:
+    rng = np.random.default_rng(0)
+    slopes, target = rng.standard_normal((40, 6)), rng.standard_normal(40)
+    sides, least = rng.standard_normal((9, 6)), 0.3 * rng.standard_normal(9)
+    x, pressed = constrained_least_squares(slopes, target, sides, least)
+    assert (sides @ x - least > -1e-12).all()
+    assert (pressed >= 0).all()
+    np.testing.assert_allclose(pressed * (sides @ x - least), 0.0, atol=1e-9)
+    np.testing.assert_allclose(slopes.T @ (slopes @ x - target), sides.T @ pressed, atol=1e-9)
+    with pytest.raises(ModelError, match="no parameters"):
+        constrained_least_squares(slopes, target, np.eye(6)[[0, 0]] * [[1.0], [-1.0]], np.ones(2))
+
+
+def test_a_load_with_the_wrong_sign_is_refused() -> None:
+    with pytest.raises(DataError, match=r"force.*sign"):
+        BalanceEstimator().fit([recording(seed, sign=-1.0) for seed in (1, 2)])
+
+
+def test_what_recordings_cannot_tell_is_said() -> None:
+    steady = recording(1)
+    steady = steady.with_channels({}, force=np.full(len(steady), 20.0))
+    told = BalanceEstimator(steps=2).fit(steady)
+    assert any("force" in note and "cannot be told" in note for note in told.diagnostics_.notes)
+    assert [channel.name for channel in told.fitted.inputs] == ["pressure"]
+
+    time = np.arange(800) * STEP
+    p = 4.0 * np.abs(2.0 * (time / 8.0 % 1.0) - 1.0)[::-1]
+    y = MUSCLE.inverse().simulate(np.column_stack([p, 0 * p]), sample_time=STEP)[:, 0]
+    same = BalanceEstimator(steps=2).fit(Recording({"pressure": p, "displacement": y}, STEP))
+    assert any("one speed" in note for note in same.diagnostics_.notes)
+    assert not balance_of(same).lags
+
+
+def test_another_zero_is_told_with_its_recording() -> None:
+    runs = [recording(seed) for seed in (1, 2, 3)]
+    runs[1] = runs[1].with_channels({}, displacement=runs[1]["displacement"] + 6.0)
+    notes = BalanceEstimator().fit(runs).diagnostics_.notes
+    assert any("run-2" in note and "another zero" in note for note in notes), notes

@@ -17,8 +17,8 @@ from typing import Literal
 import numpy as np
 
 from mckibben import registry
-from mckibben.blocks.compose import Composition
 from mckibben.blocks.core.block import Block, Primitive
+from mckibben.blocks.core.composition import Composition
 from mckibben.blocks.core.inverse import Invertible
 from mckibben.blocks.laws.check import LAWS
 from mckibben.blocks.laws.trial import Trial

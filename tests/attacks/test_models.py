@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 
 from mckibben import Block, Channel, ModelError, Parallel, Series
-from mckibben.blocks.compose import DEEPEST, MOST_BLOCKS, PerChannel
+from mckibben.blocks.compose import PerChannel
 from mckibben.blocks.core import saving
+from mckibben.blocks.core.composition import DEEPEST, MOST_BLOCKS
 from mckibben.blocks.core.fields import MOST_COEFFICIENTS, MOST_NUMBERS
 from mckibben.blocks.laws.trial import input_limits, wander
 from mckibben.export.c.project import c_files

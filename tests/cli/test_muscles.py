@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mckibben import Recording, write
+from mckibben import PI, Recording, write
+from mckibben.blocks.coupled.balance import Balance
 from mckibben.rigs import record
 from mckibben.signals import resample
 from tests.cli.conftest import Cli
@@ -195,3 +196,35 @@ def test_study_under_loads_ranks_one_model_for_all(cli: Cli, tmp_path: Path) -> 
     result = cli("study", folder, "--load", "weight", "-o", tmp_path / "out")
     assert result.code == 2
     assert "weight" in result.err
+
+
+def test_loads_are_estimated_by_what_is_measured(cli: Cli, tmp_path: Path) -> None:
+    model, estimate, known, told = (
+        tmp_path / name for name in ("model.json", "estimate.json", "known.csv", "told.csv")
+    )
+    muscles = Balance.example()
+    muscles.save(model)
+    time = np.arange(400)
+    inputs = {
+        channel.name: 1.0 - np.cos(0.05 * rate * time)
+        for rate, channel in enumerate(muscles.inverse().inputs, start=1)
+    }
+    inputs["force"] *= 12.0  # from nothing, as an estimate takes it where it rests
+    run = muscles.inverse().simulate(Recording(inputs, 0.05))
+    units = {channel.name: channel.unit for channel in muscles.inputs + muscles.outputs}
+    write(Recording({name: run[name] for name in units}, 0.05, units=units), known)
+    result = cli("invert", model, "--for", "force", "-o", estimate, "--json")
+    assert result.code == 0, result.err
+    assert "force" not in json.loads(result.out)["inputs"]
+    result = cli("simulate", estimate, known, "-o", told, "--json")
+    assert result.code == 0, result.err
+    assert json.loads(result.out)["metrics"]["force"]["rmse"] < 1e-5  # numbers as text are rounded
+
+
+def test_a_model_that_tells_no_loads_says_so(cli: Cli, tmp_path: Path) -> None:
+    PI.example().save(tmp_path / "pi.json")
+    result = cli("invert", tmp_path / "pi.json", "--for", "force", "-o", tmp_path / "est.json")
+    assert result.code == 2
+    assert "'pi' does not tell loads" in result.err
+    assert "Remedy:" in result.err
+    assert not (tmp_path / "est.json").exists()

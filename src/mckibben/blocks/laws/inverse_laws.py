@@ -10,8 +10,8 @@ import warnings
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.blocks.compose import Composition
 from mckibben.blocks.core.block import Block
+from mckibben.blocks.core.composition import Composition
 from mckibben.blocks.core.inverse import Inverse
 from mckibben.blocks.core.single_channel import Ranged
 from mckibben.blocks.laws.trial import MARGIN, Trial, narrowed, through, wander

@@ -22,7 +22,7 @@ from mckibben.blocks.memoryless.affine import Affine
 from mckibben.errors import ModelError
 from mckibben.estimators.core.data import TrainingData
 from mckibben.estimators.core.uncertainty import unknown
-from mckibben.estimators.coupled.balance_checks import one_speed, other_zeros, telling
+from mckibben.estimators.coupled.balance_checks import moving, one_speed, other_zeros, telling
 from mckibben.estimators.coupled.balance_search import Search
 from mckibben.estimators.coupled.balance_structure import Structure
 from mckibben.estimators.coupled.balance_words import held_back, sentences
@@ -224,7 +224,8 @@ class BalanceEstimator(CoupledEstimator):
 def directions(data: TrainingData) -> list[tuple[float, float]]:
     """Return gain and offset of every measured output over a shortening from about zero."""
     y = data.stacked("outputs")
-    falls = len(data.outputs) == 1 and data.falls
+    free = moving(data)
+    falls = len(data.outputs) == 1 and bool(free.runs) and free.falls
     gain = -1.0 if falls else 1.0
     found = []
     for column in (gain * y).T:

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from mckibben.estimators.core.data import TrainingData
+from mckibben.estimators.core.data import Run, TrainingData
 
 ALIKE = 0.02
 """Share of its largest value by which a load has to change to be one."""
@@ -19,6 +19,9 @@ ONE_SPEED = 2.0
 
 RESTING = 0.05
 """Share of the fastest speed below which an input rests; share of samples that may."""
+
+HELD = 0.02
+"""A muscle is held where it moves less than this share of what it moves in all runs."""
 
 SAME, OFF = 0.05, 0.1
 """Shares of their ranges within which inputs are the same, and beyond which an output is another."""
@@ -65,8 +68,22 @@ def one_speed(data: TrainingData) -> bool:
     return bool(fast <= ONE_SPEED * slow)
 
 
+def held(data: TrainingData, run: Run) -> bool:
+    """Tell whether nothing moves in a run, so that its forces are what tells of the muscle."""
+    span = np.ptp(data.stacked("outputs"), axis=0)
+    return bool((np.ptp(run.outputs, axis=0) < HELD * span).all())
+
+
+def moving(data: TrainingData) -> TrainingData:
+    """Return the same data without runs in which nothing moves."""
+    return replace(data, runs=tuple(run for run in data.runs if not held(data, run)))
+
+
 def other_zeros(data: TrainingData) -> list[str]:
     """Return which runs begin where others with the same inputs do not, as with another zero."""
+    data = moving(data)
+    if not data.runs:
+        return []
     first = np.array([[*run.driven[0], *run.scheduled[0]] for run in data.runs])
     began = np.array([run.outputs[0] for run in data.runs])
     whole = np.hstack([data.stacked("driven"), data.stacked("scheduled")])

@@ -10,6 +10,7 @@ from mckibben.arrays import Array
 from mckibben.errors import DataError, ModelError
 from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.core.uncertainty import inverted
+from mckibben.estimators.coupled.balance_checks import held
 from mckibben.estimators.coupled.balance_slopes import run as follow
 from mckibben.estimators.coupled.balance_structure import Structure
 from mckibben.estimators.optimisers.constrained import constrained_least_squares
@@ -32,9 +33,6 @@ MOST_TRIES = 9
 
 MOST_CUTS = 8
 """Times that springs are made stiff where they were found soft."""
-
-HELD = 0.02
-"""A muscle is held where it moves less than this share of what it moves in all runs."""
 
 LIGHTEST = 1e-7
 """Root of the damping of a step that is hardly damped."""
@@ -79,9 +77,7 @@ class Search:
 
     def held(self, run: Run) -> bool:
         """Tell whether nothing moves in a run, so that its forces are what is compared."""
-        return bool((np.ptp(run.outputs, axis=0) < HELD * self.span).all()) and bool(
-            self.structure.loaded
-        )
+        return bool(self.structure.loaded) and held(self.data, run)
 
     def followed(self, values: Array, run: Run, *, held: bool) -> tuple[Array, Array]:
         """Return displacements, or forces that are lacking, and their slopes."""

@@ -256,13 +256,13 @@ mck_real mck_balance_lack(const mck_balance *f, int way, const mck_real *y, cons
         const mck_real force = elastic(f, &one, k, y, x, row);
         const mck_real friction = rubbed(f, &one, k, way, y[k], p[k], &by_y, &by_p);
         const mck_real behind = lagging(f, &one, k, way, y[k], &by_moving);
-        const mck_real pull = p[k] * area(f, &one, y[k], &a_slope);
-        mck_real size = mck_abs(force) + mck_abs(friction) + mck_abs(behind) + mck_abs(pull);
+        const mck_real given = p[k] * area(f, &one, y[k], &a_slope);
+        mck_real size = mck_abs(force) + mck_abs(friction) + mck_abs(behind) + mck_abs(given);
         for (int j = 0; j < f->n; j++) {
             size += mck_abs(row[j] * y[j]);
         }
         row[k] += by_y + by_moving - p[k] * a_slope;
-        residual[k] = force + friction + behind - pull;
+        residual[k] = force + friction + behind - given;
         if (!(size < MCK_INFINITY)) {
             worst = MCK_INFINITY;
         } else if (size > MCK_R(0.0)) {

@@ -64,7 +64,7 @@ class Row:
 
 @dataclass
 class Fits:
-    """Models fitted, each once; those that cannot be fitted are left out and say why."""
+    """Models fitted, each once."""
 
     found: dict[tuple[object, ...], Block] = field(default_factory=dict)
 
@@ -116,27 +116,19 @@ def table(rows: Iterable[Row]) -> str:
         "| section | what | unit | baselines | balance | target | met |",
         "|---|---|---|---|---:|---:|---|",
     ]
-    notes = []
+    notes: list[str] = []
     for row in rows:
         others = "; ".join(
             f"{name} {shown(values)}" for name, values in row.figures.items() if name != BALANCE
         )
         mark = ""
         if row.note:
-            notes.append(row.note)
-            mark = f" [{len(notes)}]"
+            if row.note not in notes:
+                notes.append(row.note)
+            mark = f" [{1 + notes.index(row.note)}]"
         own = shown(row.figures[BALANCE]) if row.figures.get(BALANCE) else "-"
         met = {None: "", True: "yes", False: "NO"}[row.met]
         cells = [row.section, row.what + mark, row.unit, others, own, row.wanted, met]
         lines.append(f"| {' | '.join(cells)} |")
     lines += ["", *(f"[{place}] {note}" for place, note in enumerate(notes, start=1))]
     return "\n".join(lines)
-
-
-def attempted(figures: dict[str, list[float]], name: str, value: object) -> None:
-    """Add what a callable gives to a model's figures; what refuses is left out."""
-    assert callable(value)
-    try:
-        figures.setdefault(name, []).append(float(value()))
-    except MckibbenError:
-        figures.pop(name, None)

@@ -2,18 +2,17 @@
 
     python benchmarks/balance.py [SECTION ...] [--data FOLDER] [--seeds N] [--json]
 
-Every figure is of runs that nothing learned from. Where there are several seeds or runs, a cell has their
-median and range; a target is met by the median. Seeds are those of sensor noise, and of random references.
-Forces are found from pressure and displacement by solving the balance for its load. FOLDER holds measured
+Every figure is of runs that nothing learned from. Of several seeds or runs, a cell has median and range,
+and a target is met by the median. Seeds are those of sensor noise and of random references. Forces are
+found from pressure and displacement by solving the balance for its load. FOLDER holds measured
 recordings, which do not come with the package (see docs/models/measured.py and loads.py); sections
-without their recordings are passed over. All sections take about ten minutes on one core.
+without theirs are passed over. All sections take about ten minutes on one core.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
-import statistics
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict
@@ -87,7 +86,9 @@ def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__)
     choices = ("rail", "arm", "coiled", "measured", "speed", "robust", "all")
-    parser.add_argument("sections", nargs="*", default=["all"], metavar="SECTION", help=f"{choices}")
+    parser.add_argument(
+        "sections", nargs="*", default=["all"], metavar="SECTION", help=f"{choices}"
+    )
     parser.add_argument("--data", type=Path, help="folder of measured recordings")
     parser.add_argument("--seeds", type=int, default=3)
     parser.add_argument("--json", action="store_true")

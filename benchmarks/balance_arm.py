@@ -93,9 +93,7 @@ def fast() -> Recording:
     """Return a fast sine of muscle 1, the others held."""
     time = np.arange(round(FAST_TIME / FAST_STEP)) * FAST_STEP
     still = held(FAST_STEP, np.full(time.size, 0.7))
-    return still.with_channels(
-        **{OUTPUTS[0]: MIDDLE + 6.0 * np.sin(2 * np.pi * FASTEST * time)}
-    )
+    return still.with_channels(**{OUTPUTS[0]: MIDDLE + 6.0 * np.sin(2 * np.pi * FASTEST * time)})
 
 
 def airs(rig: Rig, fits: Fits, seed: int) -> PerChannel:
@@ -171,7 +169,12 @@ def _groups(found: Mapping[str, Block], rig: Rig) -> Iterator[Row]:
             widths.setdefault(name, []).extend(width(came, moving, output) for output in OUTPUTS)
     said = ", ".join(f"{g} {e:.2f}" for g, e in zip("abcdefghi", errors[BALANCE], strict=True))
     yield Row(
-        "arm", "groups a to i open loop, worst", "mm", 0.5, _worst(errors), f"balance by group: {said}"
+        "arm",
+        "groups a to i open loop, worst",
+        "mm",
+        0.5,
+        _worst(errors),
+        f"balance by group: {said}",
     )
     said = ", ".join(f"{g} {e:.2f}" for g, e in zip("abcdefghi", widths[BALANCE], strict=True))
     yield Row("arm", "their e_w, worst", "%", 2.0, _worst(widths), f"balance by group: {said}")
@@ -222,7 +225,9 @@ def robust(seeds: int) -> Iterator[Row]:
     figures: dict[str, list[float]] = {}
     for name, model in found.items():
         figures[name] = [worst(followed(model, reference, other)) for other in arms]
-    nominal = ", ".join(f"{name} {worst(followed(m, reference, rig)):.2f}" for name, m in found.items())
+    nominal = ", ".join(
+        f"{name} {worst(followed(m, reference, rig)):.2f}" for name, m in found.items()
+    )
     note = (
         f"muscle 1 follows 33 + 6 sin(2 pi t / {PERIOD:g} s) mm, worst muscle; on the nominal arm: "
         f"{nominal} mm"

@@ -49,15 +49,15 @@ def lifting(seeds: int) -> Iterator[Row]:
     memory: Any = fits("E", "activation-memory", train)
     balance = fits("E", BALANCE, train).inverse()
     percent: dict[str, dict[float, list[float]]] = {}
-    for (force, frequency), run in tests.items():
-        measured = run["pressure"]
+    for (force, frequency), test in tests.items():
+        pressed = test["pressure"]
         found = {
-            "the paper's": modelled(theirs, run, frequency),
-            "activation-memory": modelled(memory, run, frequency),
-            BALANCE: free_run(balance, run, "pressure")[:, 0],
+            "the paper's": modelled(theirs, test, frequency),
+            "activation-memory": modelled(memory, test, frequency),
+            BALANCE: free_run(balance, test, "pressure")[:, 0],
         }
         for name, pressure in found.items():
-            error = 100 * rms(pressure - measured) / float(np.ptp(measured))
+            error = 100 * rms(pressure - pressed) / float(np.ptp(pressed))
             percent.setdefault(name, {}).setdefault(force, []).append(error)
     for force in FORCES:
         figures = {name: by[force] for name, by in percent.items()}
@@ -89,7 +89,9 @@ def coiled(folder: Path | None) -> Iterator[Row]:
         weights = np.array([len(run) for run in test])
         together = np.sqrt(np.sum(weights * errors**2) / weights.sum())
         figures["p2uz, one each"] = [float(100 * together / span)]
-        yield Row("coiled", f"sample {sample}, 200 and 400 g, one model", "% of range", 5.0, figures)
+        yield Row(
+            "coiled", f"sample {sample}, 200 and 400 g, one model", "% of range", 5.0, figures
+        )
 
 
 def measured(folder: Path | None) -> Iterator[Row]:

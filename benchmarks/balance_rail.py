@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterator
+from dataclasses import dataclass, field
 from functools import cache
+from typing import Any
 
 import numpy as np
 
@@ -50,7 +52,21 @@ LEVEL = 0.95
 LOOP_TIME, LOOP_FREQUENCY, STROKE = 60.0, 0.2, (8.0, 36.0)
 """Of the smooth random reference: time [s], highest frequency [Hz], range [mm]."""
 
+TESTS = ("status-4", "random-3")
+
 Runs = dict[str, Recording]
+
+
+@dataclass
+class Found:
+    """Figures by row and model, a figure a seed, and what is to be said of rows."""
+
+    figures: dict[str, dict[str, list[float]]] = field(default_factory=dict)
+    notes: dict[str, str] = field(default_factory=dict)
+
+    def add(self, row: str, name: str, value: float) -> None:
+        """Add a figure."""
+        self.figures.setdefault(row, {}).setdefault(name, []).append(value)
 
 
 @cache
@@ -68,7 +84,8 @@ def load_of(model: Block, recording: Recording) -> Array:
     Explicit: all that holds a pressure but the load is known from displacement, pressure and their past.
     """
     balance = model.inverse()
-    assert isinstance(balance, Balance) and len(balance.driven) == balance.n_loads == 1
+    assert isinstance(balance, Balance)
+    assert len(balance.driven) == balance.n_loads == 1
     c = balance.coefficients(recording.sample_time)
     own = muscles(c)
     share = c[own + muscle_width(c) - 1]
@@ -93,29 +110,44 @@ def load_of(model: Block, recording: Recording) -> Array:
     return found
 
 
-def forces(train: Runs, test: Runs, fits: Fits, seed: int) -> tuple[float, float, float, str]:
-    """Return error in per cent of range, coverage in per cent and half-width on status 4."""
+def forces(seed: int, fits: Fits, found: Found) -> None:
+    """Find errors of forces on status 4, and how good an interval is that runs left out in turn give.
+
+    Of these, loads beyond those of the other runs do not count.
+    """
+    train, test = rail_runs(seed)
     misses = {}
-    for name in train:
-        others = [run for other, run in train.items() if other != name]
-        model = fits(("rail without", name, seed), BALANCE, others, input=("pressure",))
-        force = train[name]["force"]
-        known = force <= max(run["force"].max() for run in others)
-        if known.mean() > 0.5:  # the hull of what was recorded
-            misses[name] = np.abs(load_of(model, train[name]) - force)[known]
-    half = float(np.quantile(np.concatenate(list(misses.values())), LEVEL))
-    worst = max(misses, key=lambda name: rms(misses[name]))
+    for name, run in train.items():
+        others = [other for place, other in train.items() if place != name]
+        known = run["force"] <= max(other["force"].max() for other in others)
+        if known.mean() > 0.5:
+            model = fits(("rail without", name, seed), BALANCE, others, input=("pressure",))
+            misses[name] = np.abs(load_of(model, run) - run["force"])[known]
     model = fits(("rail", seed), BALANCE, list(train.values()), input=("pressure",))
+    half = float(np.quantile(np.concatenate(list(misses.values())), LEVEL))
     off = {name: load_of(model, run) - run["force"] for name, run in test.items()}
-    status, span = off["status-4"], float(np.ptp(test["status-4"]["force"]))
-    within = {name: 100 * float(np.mean(np.abs(error) <= half)) for name, error in off.items()}
-    pressed = test["status-4"]["pressure"] > FIRM
-    said = (
-        f"{100 * rms(status[pressed]) / span:.2g} % of range above {FIRM:g} bar; held out in turn, worst {worst} ({rms(misses[worst]):.1f} N); coverage over all test runs "
-        f"{np.mean(list(within.values())):.1f} %, least {min(within.values()):.1f} % "
-        f"({min(within, key=lambda name: within[name])})"
+    plain = fit_force_estimate(list(train.values()))
+    status = test["status-4"]
+    span = float(np.ptp(status["force"]))
+    for name, width, missing in (
+        (
+            "force-balance",
+            plain.half_width,
+            plain.estimate(status)["force_model"] - status["force"],
+        ),
+        (BALANCE, half, off["status-4"]),
+    ):
+        found.add("force", name, 100 * rms(missing) / span)
+        found.add("coverage", name, 100 * float(np.mean(np.abs(missing) <= width)))
+        found.add("half", name, width)
+    firm = 100 * rms(off["status-4"][status["pressure"] > FIRM]) / span
+    held = {name: 100 * float(np.mean(np.abs(error) <= half)) for name, error in off.items()}
+    worst = max(misses, key=lambda name: rms(misses[name]))
+    found.notes["force"] = f"balance: {firm:.2g} % of range above {FIRM:g} bar"
+    found.notes["coverage"] = found.notes["half"] = (
+        f"of runs left out in turn the worst is {worst} ({rms(misses[worst]):.1f} N RMSE); over all "
+        f"test runs the interval holds {np.mean(list(held.values())):.1f} %, least {min(held.values()):.1f} %"
     )
-    return 100 * rms(status) / span, within["status-4"], half, said
 
 
 def swing(values: Array, step: float) -> float:
@@ -132,10 +164,11 @@ def swing_error(model: Block, run: Recording) -> float:
     return 100 * abs(swing(found, step) / swing(run["displacement"], step) - 1.0)
 
 
-def in_front(train: Runs, fits: Fits, key: object, name: str, **how: object) -> Block:
-    """Return a model from voltage: air, and behind it a model from measured pressure."""
-    air = fits((key, "air"), "air", list(train.values()), longest_dead_time=0.1)
-    return Series((air, fits(key, name, list(train.values()), input=("pressure",), **how)))
+def in_front(train: Runs, fits: Fits, key: object) -> Block:
+    """Return the balance from voltage: air, and behind it the balance of measured pressure."""
+    runs = list(train.values())
+    air = fits(key, "air", runs, longest_dead_time=0.1)
+    return Series((air, fits(key, BALANCE, runs, input=("pressure",))))
 
 
 def following(model: Block, pulls: Recording, seed: int) -> float:
@@ -152,86 +185,79 @@ def following(model: Block, pulls: Recording, seed: int) -> float:
     return found.rmse["displacement"]
 
 
+def from_pressure(seed: int, fits: Fits, found: Found) -> None:
+    """Find errors of models of measured pressure and force."""
+    train, test = rail_runs(seed)
+    runs = list(train.values())
+    light = [run for run in runs if run["force"].max() < LIGHT]
+    models: dict[str, dict[str, Any]] = {
+        "cpi": {},
+        "gpi": {},
+        "mpi-narmax": {"input": "pressure", **TOLD[PLAIN].settings},
+        "force-balance": {"input": ("pressure",)},
+        BALANCE: {"input": ("pressure",)},
+    }
+    for name, how in models.items():
+        model = fits(("rail", seed), name, runs, **how)
+        for run in TESTS:
+            found.add(run, name, missed(model, test[run], "displacement"))
+        loops = [swing_error(model, test[f"held-{volt:g}V"]) for volt in HELD]
+        found.add("held", name, max(loops))
+        found.notes["held"] = "balance: " + ", ".join(
+            f"{volt:g} V {error:.1f} %" for volt, error in zip(HELD, loops, strict=True)
+        )
+        if name not in ("cpi", "gpi"):  # which know no force
+            model = fits(("light", seed), name, light, **how)
+            found.add("213 N", name, missed(model, train["status-3"], "displacement"))
+            found.add("152 N", name, missed(model, test["status-4"], "displacement"))
+
+
+def from_voltage(seed: int, fits: Fits, found: Found) -> None:
+    """Find errors of models of voltage and force, and of the rig driven by their inverses."""
+    train, test = rail_runs(seed)
+    runs = list(train.values())
+    ways = {
+        "directly": fits(("rail", seed), BALANCE, runs, input=("voltage",)),
+        "air in front": in_front(train, fits, ("rail", seed)),
+    }
+    own = {
+        way: rms(np.array([missed(model, run, "displacement") for run in runs]))
+        for way, model in ways.items()
+    }
+    better = min(own, key=lambda way: own[way])  # by what was learned from
+    narmax = fits(("rail", seed), "mpi-narmax", runs, **TOLD[PLAIN].settings)
+    plain = fits(("rail", seed), "force-balance", runs, input=("voltage",))
+    models = {"mpi-narmax": narmax, "force-balance": plain, **ways, BALANCE: ways[better]}
+    for name, model in models.items():
+        for run in TESTS:
+            found.add(f"voltage, {run}", name, missed(model, test[run], "displacement"))
+        if name != "mpi-narmax":  # which has no inverse
+            found.add("loop", name, following(model, test["status-4"], seed))
+    for row in (*(f"voltage, {run}" for run in TESTS), "loop"):
+        found.notes[row] = f"balance: the way that is better where it learned, {better}"
+
+
 def rail(seeds: int) -> Iterator[Row]:
     """Yield the targets of the rail."""
-    figures: dict[str, dict[str, list[float]]] = {}
-    said = dict.fromkeys(("voltage", "force", "held", "loop"), "")
-
-    def note(row: str, name: str, value: float) -> None:
-        figures.setdefault(row, {}).setdefault(name, []).append(value)
-
-    narmax = {**TOLD[PLAIN].settings}
+    found = Found()
     for seed in range(seeds):
         fits = Fits()
-        train, test = rail_runs(seed)
-        runs = list(train.values())
-        light = [run for run in runs if run["force"].max() < LIGHT]
-        on_pressure: dict[str, dict[str, object]] = {
-            "cpi": {},
-            "gpi": {},
-            "mpi-narmax": {"input": "pressure", **narmax},
-            "force-balance": {"input": ("pressure",)},
-            BALANCE: {"input": ("pressure",)},
-        }
-        for name, how in on_pressure.items():
-            model = fits(("rail", seed), name, runs, **how)
-            for run in ("status-4", "random-3"):
-                note(run, name, missed(model, test[run], "displacement"))
-            loops = [swing_error(model, test[f"held-{volt:g}V"]) for volt in HELD]
-            note("held", name, max(loops))
-            if name == BALANCE:
-                said["held"] = ", ".join(
-                    f"{volt:g} V {error:.1f} %" for volt, error in zip(HELD, loops, strict=True)
-                )
-            if name in ("cpi", "gpi"):
-                continue
-            model = fits(("light", seed), name, light, **how)
-            note("213 N", name, missed(model, train["status-3"], "displacement"))
-            note("152 N", name, missed(model, test["status-4"], "displacement"))
-        ways = {
-            "directly": fits(("rail", seed), BALANCE, runs, input=("voltage",)),
-            "air in front": in_front(train, fits, ("rail", seed), BALANCE),
-        }
-        own = {
-            way: rms(np.array([missed(model, run, "displacement") for run in runs]))
-            for way, model in ways.items()
-        }
-        better = min(own, key=lambda way: own[way])  # by what was learned from
-        voltage: dict[str, Block] = {
-            "mpi-narmax": fits(("rail", seed), "mpi-narmax", runs, **narmax),
-            "force-balance": fits(("rail", seed), "force-balance", runs, input=("voltage",)),
-            BALANCE: ways[better],
-        }
-        for run in ("status-4", "random-3"):
-            for name, model in voltage.items():
-                note(f"voltage, {run}", name, missed(model, test[run], "displacement"))
-            for way, model in ways.items():
-                note(f"voltage, {run}", way, missed(model, test[run], "displacement"))
-        said["voltage"] = f"the way that is better where it learned: {better}"
-        del voltage["mpi-narmax"]  # which has no inverse
-        for name, model in (voltage | ways).items():
-            note("loop", name, following(model, test["status-4"], seed))
-        percent, coverage, half, said["force"] = forces(train, test, fits, seed)
-        other = fit_force_estimate(runs)
-        measured = test["status-4"]["force"]
-        off = other.estimate(test["status-4"])["force_model"] - measured
-        note("force", "force-balance", 100 * rms(off) / float(np.ptp(measured)))
-        note("coverage", "force-balance", 100 * float(np.mean(np.abs(off) <= other.half_width)))
-        note("half", "force-balance", other.half_width)
-        for row, value in (("force", percent), ("coverage", coverage), ("half", half)):
-            note(row, BALANCE, value)
-
-    def row(name: str, what: str, unit: str, target: float, note: str = "", least: float = -np.inf):
-        return Row("rail", what, unit, target, figures[name], note, least)
-
-    for run in ("status-4", "random-3"):
-        yield row(run, f"from pressure and force, {run}", "mm", 0.16)
-    for run in ("status-4", "random-3"):
-        yield row(f"voltage, {run}", f"from voltage and force, {run}", "mm", 0.40, said["voltage"])
-    yield row("213 N", "trained up to 100 N, at 213 N (status-3)", "mm", 0.5)
-    yield row("152 N", "trained up to 100 N, at up to 152 N (status-4)", "mm", 0.3)
-    yield row("held", "swing by force at held voltage, worst of five", "%", 10.0, said["held"])
-    yield row("force", "force from pressure and displacement, status-4", "% of range", 2.0)
-    yield row("coverage", "its 95 % interval holds", "%", 97.0, said["force"], 93.0)
-    yield row("half", "its half-width", "N", 8.0)
-    yield row("loop", "open loop on a random reference under pulls", "mm", 0.35)
+        from_pressure(seed, fits, found)
+        from_voltage(seed, fits, found)
+        forces(seed, fits, found)
+    for name, what, unit, target, least in (
+        *((run, f"from pressure and force, {run}", "mm", 0.16, -np.inf) for run in TESTS),
+        *(
+            (f"voltage, {run}", f"from voltage and force, {run}", "mm", 0.4, -np.inf)
+            for run in TESTS
+        ),
+        ("213 N", "learned up to 100 N, at 213 N (status-3)", "mm", 0.5, -np.inf),
+        ("152 N", "learned up to 100 N, up to 152 N (status-4)", "mm", 0.3, -np.inf),
+        ("held", "swing by force at held voltage, worst of five", "%", 10.0, -np.inf),
+        ("force", "force from pressure and displacement, status-4", "% of range", 2.0, -np.inf),
+        ("coverage", "its interval of 95 % holds", "%", 97.0, 93.0),
+        ("half", "its half-width", "N", 8.0, -np.inf),
+        ("loop", "open loop on a random reference under pulls", "mm", 0.35, -np.inf),
+    ):
+        note = found.notes.get(name, "")
+        yield Row("rail", what, unit, target, found.figures[name], note, least)

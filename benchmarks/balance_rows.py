@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from mckibben import Recording
 from mckibben.blocks.core.block import Block
-from mckibben.errors import MckibbenError
 from mckibben.registry import load
 
 Array = NDArray[np.float64]

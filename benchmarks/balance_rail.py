@@ -146,7 +146,8 @@ def forces(seed: int, fits: Fits, found: Found) -> None:
     found.notes["force"] = f"balance: {firm:.2g} % of range above {FIRM:g} bar"
     found.notes["coverage"] = found.notes["half"] = (
         f"of runs left out in turn the worst is {worst} ({rms(misses[worst]):.1f} N RMSE); over all "
-        f"test runs the interval holds {np.mean(list(held.values())):.1f} %, least {min(held.values()):.1f} %"
+        f"test runs the interval holds {np.mean(list(held.values())):.1f} %, least "
+        f"{min(held.values()):.1f} %"
     )
 
 

@@ -1117,7 +1117,8 @@ def balance(block: Any, inputs: Rows, sample_time: float) -> Rows:
     for row in inputs:
         y = [here + tare for here, tare in zip(row[:n], arm.tare, strict=True)]
         out.append(arm.pressures(y, row[n:]))
-        arm.keep(y, out[-1])
+        there = arm.found(out[-1], row[n:]) if block.pressure_range else y
+        arm.keep(there, out[-1])
     return out
 
 
@@ -1135,8 +1136,13 @@ def load_estimate(block: Any, inputs: Rows, sample_time: float) -> Rows:
     import numpy as np
 
     n, shares, out = len(block.forward.driven), np.array(block.forward.loads), []
-    resting, none = list(block.at_rest) or [0.0] * shares.shape[1], [0.0] * shares.shape[1]
-    arm = _Parallel(block.forward, [*inputs[0][2 * n :], *resting], sample_time)
+    none, first = [0.0] * shares.shape[1], inputs[0]
+    arm = _Parallel(block.forward, [*first[2 * n :], *none], sample_time)
+    if not block.forward.tare:
+        arm.way = "rest"
+        left = [arm.excess(k, first[:n], [*first[2 * n :], *none], first[n + k]) for k in range(n)]
+        resting = np.linalg.lstsq(shares, np.array(left), rcond=None)[0].tolist()
+        arm = _Parallel(block.forward, [*first[2 * n :], *resting], sample_time)
     for row in inputs:
         y, p = [here + tare for here, tare in zip(row[:n], arm.tare, strict=True)], row[n : 2 * n]
         left = [arm.excess(k, y, [*row[2 * n :], *none], p[k]) for k in range(n)]

@@ -75,6 +75,8 @@ def balance_kernel(coefficients: Array, state: Array, inputs: Array, outputs: Ar
             # a hair beyond is rounding
             amiss = amiss or abs(p[k] - found) > 1e-9 * (1.0 + abs(found))
             outputs[t, k] = p[k]
+        if amiss:  # where the muscles go instead is what friction will remember
+            settle(c, state, way, y, x, p, scratch[2 * n :])
         keep(c, state, way, y, p)
         state[state.size - 2] = 0.0
         if amiss:

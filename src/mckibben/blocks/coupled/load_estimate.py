@@ -20,7 +20,7 @@ from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
 from mckibben.blocks.core.block import Block, Kernel, Primitive
-from mckibben.blocks.core.fields import STRICT, Channel, Initial, Vector
+from mckibben.blocks.core.fields import STRICT, Channel, Initial
 from mckibben.blocks.core.inverse import Inverse
 from mckibben.blocks.core.kernels import kernel
 from mckibben.blocks.core.refusals import explicit_state
@@ -32,11 +32,11 @@ from mckibben.errors import ModelError
 
 @kernel
 def load_estimate_kernel(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
-    """Give loads; behind the balance's coefficients stand the pseudo-inverse and loads at rest."""
+    """Give loads; behind the balance's coefficients stands the pseudo-inverse."""
     c = coefficients
     n, n_x, n_loads = int(c[0]), int(c[1]), int(c[3])
     scratch = c[c.size - n * (n + 6) - n_x - n_loads :]
-    solving = c[c.size - scratch.size - n_loads * (n + 1) :]
+    solving = c[c.size - scratch.size - n_loads * n :]
     y, residual, gradient = scratch[:n], scratch[n : 2 * n], scratch[2 * n : 3 * n]
     matrix, x = scratch[3 * n : n * (n + 3)].reshape((n, n)), scratch[n * (n + 6) :]
     tare = state[state.size - 2 - n :]
@@ -63,16 +63,14 @@ def load_estimate_kernel(coefficients: Array, state: Array, inputs: Array, outpu
 class LoadEstimate(Primitive):
     """From displacements and pressures of muscles, and what schedules them, to their loads.
 
-    Its memory begins where the balance's does: at rest without pressure, under loads that nothing
-    tells yet. Of a balance with a tare, other loads there displace what is estimated for good;
-    otherwise friction forgets them, and what relaxes does in time.
+    Its memory begins where the balance's does: at rest without pressure, under the loads that the
+    first sample tells without friction. Of a balance with a tare it tells none: then muscles rest
+    without load, and loads there displace what is estimated for good.
 
     Parameters
     ----------
     forward : Balance
         The muscles.
-    at_rest : sequence of float
-        Loads under which they rest before the first sample [N]; none by default.
     """
 
     kind: ClassVar[str] = "load-estimate"
@@ -81,7 +79,6 @@ class LoadEstimate(Primitive):
     parameters: ClassVar[tuple[str, ...]] = ("forward",)
 
     forward: Annotated[InstanceOf[Balance], BeforeValidator(nested)]
-    at_rest: Vector = ()
 
     def __post_init__(self) -> None:
         loads = np.array(self.forward.loads)
@@ -95,11 +92,6 @@ class LoadEstimate(Primitive):
             raise ModelError(
                 f"{n_loads} load(s) pull at {n} muscle(s) in the shares {self.forward.loads}, which "
                 "do not tell them apart. Remedy: identify a balance with fewer loads."
-            )
-        if len(self.at_rest) not in (0, n_loads):
-            raise ModelError(
-                f"at_rest of {self.kind!r} has {len(self.at_rest)} entries. Remedy: give {n_loads}, "
-                "or none."
             )
 
     @classmethod
@@ -160,14 +152,9 @@ class LoadEstimate(Primitive):
         return self.forward.kept_apart()
 
     def coefficients(self, sample_time: float | None) -> Array:
-        """Return the balance's, the pseudo-inverse of its shares of loads, and the loads at rest."""
+        """Return the balance's, and the pseudo-inverse of its shares of loads."""
         solving = np.linalg.pinv(np.array(self.forward.loads))
-        own = self.forward.coefficients(sample_time)
-        return np.concatenate([own, solving.ravel(), self._resting])
-
-    @property
-    def _resting(self) -> Array:
-        return np.array(self.at_rest or (0.0,) * self.forward.n_loads)
+        return np.concatenate([self.forward.coefficients(sample_time), solving.ravel()])
 
     def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
         """Return the state at rest without pressure, from which the muscles come all at once.
@@ -178,8 +165,14 @@ class LoadEstimate(Primitive):
         if not isinstance(start, str):
             return explicit_state(self, start)
         n = len(self.forward.driven)
-        y, p = first[:n], np.ascontiguousarray(first[n : 2 * n])
-        came = np.concatenate([y, first[2 * n :], self._resting])
+        y, p = np.ascontiguousarray(first[:n]), np.ascontiguousarray(first[n : 2 * n])
+        resting = np.zeros(self.forward.n_loads)
+        if not self.forward.tare:
+            c, residual, matrix = self.forward.coefficients(1.0), np.empty(n), np.empty((n, n))
+            x, none = np.concatenate([first[2 * n :], resting]), np.zeros(self.n_states)
+            unbalanced(c, none, AT_REST, y, x, p, residual, matrix, np.empty(n))
+            resting = -np.linalg.pinv(np.array(self.forward.loads)) @ residual
+        came = np.concatenate([y, first[2 * n :], resting])
         state = self.forward.initial_state(came, "first_sample")
         if start == "virgin":
             keep(self.forward.coefficients(1.0), state, AT_REST, y + state[-2 - n : -2], p)

@@ -22,9 +22,15 @@ from mckibben.blocks.memoryless.affine import Affine
 from mckibben.errors import ModelError
 from mckibben.estimators.core.data import TrainingData
 from mckibben.estimators.core.uncertainty import unknown
-from mckibben.estimators.coupled.balance_checks import moving, one_speed, other_zeros, telling
+from mckibben.estimators.coupled.balance_checks import (
+    moving,
+    not_at_rest,
+    one_speed,
+    other_zeros,
+    telling,
+)
 from mckibben.estimators.coupled.balance_search import Search
-from mckibben.estimators.coupled.balance_structure import Structure
+from mckibben.estimators.coupled.balance_structure import APART, Structure
 from mckibben.estimators.coupled.balance_words import held_back, sentences
 from mckibben.estimators.coupled.base import CoupledEstimator
 from mckibben.estimators.optimisers.tracker import Tracker
@@ -35,16 +41,17 @@ LOADS = ("N",)
 LIMITED = ("bar", "V")
 """Units of what the hardware limits."""
 
-GRIPS = (0.05, 0.2, 0.8)
+GRIPS = (0.05, 0.2, 0.4, 0.8)
 """Where to begin, relative to the highest pressure."""
 
-FOLLOWED, FIRST_STEPS = 2, 5
-"""Starts that are followed for so many steps, before the best of them is followed to its end."""
+FOLLOWED, FIRST_STEPS, FEW_ROWS = 2, 5, 20_000
+"""Starts that are followed for so many steps before the best of them is followed to its end; all are
+where there are no more errors than that."""
 
 FAR = 0.5
 """Displacements that all are further from zero than this share of their range count from elsewhere."""
 
-LAST_STEPS = 5
+LAST_STEPS = 10
 """On all recordings, after those on a few of them."""
 
 AT_START = 0.02
@@ -62,8 +69,9 @@ class BalanceEstimator(CoupledEstimator):
     finest : float
         Shortest such travel, relative to the stroke.
     lags : sequence of float, optional
-        Time constants of what relaxes [s]; default ``n_lags`` from half a second to a third of the
-        longest recording.
+        Time constants of what relaxes [s], where to begin: in order, each twice the last or more, from
+        two samples to half the longest recording. Default ``n_lags`` from half a second to a third of
+        that recording.
     n_lags : int
         How many; 0 for muscles without time.
     elasticity : int
@@ -85,7 +93,7 @@ class BalanceEstimator(CoupledEstimator):
     alone: ClassVar[bool] = True
 
     n_stops: Annotated[int, Interval(ge=0, le=30)] = 6
-    finest: Annotated[float, Gt(0)] = 0.003
+    finest: Annotated[float, Interval(gt=0, lt=0.5)] = 0.003
     lags: tuple[Annotated[float, Gt(0)], ...] | None = None
     n_lags: Annotated[int, Interval(ge=0, le=10)] = 2
     elasticity: Annotated[int, Interval(ge=1, le=9)] = 6
@@ -98,7 +106,7 @@ class BalanceEstimator(CoupledEstimator):
     def identify(self, data: TrainingData, tracker: Tracker) -> Block:
         """Return the balance, solved for displacements."""
         data, notes = telling(data)
-        tracker.notes += [*notes, *other_zeros(data)]
+        tracker.notes += [*notes, *other_zeros(data), *not_at_rest(data)]
         ways = directions(data)
         data = turned(data, ways)
         search = Search(data, self.structure(data, tracker), self.ridge)
@@ -110,15 +118,15 @@ class BalanceEstimator(CoupledEstimator):
                 starts.append((few.cost(values), values))
                 tracker.saw(values, starts[-1][0])
             starts.sort(key=lambda start: start[0])
-            few.check_loads(starts[0][1])
-            for _, start in starts[:FOLLOWED]:
-                few.descend(start, FIRST_STEPS, tracker)
+            few.check_loads(starts[0][1], tracker)
+            for _, start in starts if few.n_rows <= FEW_ROWS else starts[:FOLLOWED]:
+                few.descend(start, min(self.steps, FIRST_STEPS), tracker)
             assert tracker.best is not None
             few.descend(tracker.best, self.steps, tracker)
             tracker.reached(0.7)
             if few is not search:
                 tracker.best_cost = search.cost(tracker.best)
-                search.descend(tracker.best, LAST_STEPS, tracker)
+                search.descend(tracker.best, min(self.steps, LAST_STEPS), tracker)
         if tracker.best is None or not np.isfinite(tracker.best_cost):
             raise ModelError(
                 "no balance of forces runs free over these recordings. Remedy: check that displacements "
@@ -211,10 +219,20 @@ class BalanceEstimator(CoupledEstimator):
 
     def _lags(self, data: TrainingData) -> Array:
         """Return time constants [s] that the recordings can tell."""
-        if self.lags is not None:
-            return np.array(self.lags)
-        last = min(max(self._longest(data) / 3.0, 1.0), 60.0)
-        return np.geomspace(min(0.5, last / 4.0), last, self.n_lags) if self.n_lags else np.zeros(0)
+        longest = self._longest(data)
+        last = min(max(longest / 3.0, 1.0), 60.0)
+        default = np.geomspace(min(0.5, last / 4.0), last, self.n_lags) if self.n_lags else ()
+        lags = np.array(default if self.lags is None else self.lags)
+        shortest, most = 2.0 * (data.sample_time or 1.0), max(0.5 * longest, 1.0)
+        if lags.size and (
+            lags[0] < shortest or lags[-1] > most or (np.diff(np.log(lags)) < APART).any()
+        ):
+            raise ModelError(
+                f"lags of {np.array2string(lags, precision=3)} s are not what recordings of "
+                f"{longest:.3g} s tell. Remedy: give fewer lags, in order, each twice the last or more, "
+                f"from {shortest:.3g} to {most:.3g} s"
+            )
+        return lags
 
     def _longest(self, data: TrainingData) -> float:
         """Return the duration of the longest run [s]."""

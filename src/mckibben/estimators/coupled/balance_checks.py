@@ -23,7 +23,10 @@ RESTING = 0.05
 HELD = 0.02
 """A muscle is held where it moves less than this share of what it moves in all runs."""
 
-SAME, OFF = 0.05, 0.1
+BEGUN = 0.1
+"""Share of the range of pressure up to which a run begins at rest."""
+
+SAME, OFF = 0.05, 0.06
 """Shares of their ranges within which inputs are the same, and beyond which an output is another."""
 
 
@@ -74,6 +77,12 @@ def held(data: TrainingData, run: Run) -> bool:
     return bool((np.ptp(run.outputs, axis=0) < HELD * span).all())
 
 
+def at_rest(data: TrainingData, run: Run) -> bool:
+    """Tell whether a run begins about where pressures are lowest, so that nothing came before it."""
+    low, high = data.lowest, data.highest
+    return bool((run.driven[0] - np.minimum(low, 0.0) <= BEGUN * (high - low)).all())
+
+
 def moving(data: TrainingData) -> TrainingData:
     """Return the same data without runs in which nothing moves."""
     return replace(data, runs=tuple(run for run in data.runs if not held(data, run)))
@@ -91,11 +100,24 @@ def other_zeros(data: TrainingData) -> list[str]:
     notes = []
     for place, run in enumerate(data.runs):
         same = (np.abs(first - first[place]) <= SAME * spans).all(axis=1)
-        off = began[place] - np.median(began[same], axis=0)
+        others = np.flatnonzero(same & (np.arange(len(same)) != place))
+        if not others.size or others.tolist() == [0]:  # told of the first, if of two
+            continue
+        off = began[place] - np.median(began[others], axis=0)
         for k in np.flatnonzero(np.abs(off) > OFF * travel).tolist():
             channel = data.outputs[k]
             notes.append(
-                f"{run.name} begins {off[k]:.3g} {channel.unit} of {channel.name} from where recordings "
+                f"{run.name} begins {off[k]:.3g} {channel.unit} of {channel.name} from where others "
                 "with the same inputs do, as if it had another zero. Remedy: let all count from the same"
             )
     return notes
+
+
+def not_at_rest(data: TrainingData) -> list[str]:
+    """Return which runs begin under pressure, so that what came before is not known."""
+    return [
+        f"{run.name} does not begin at rest: its first part does not count, and simulations of it begin "
+        "as if it did. Remedy: begin recordings without pressure"
+        for run in data.runs
+        if not held(data, run) and not at_rest(data, run)
+    ]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -10,9 +11,9 @@ from mckibben.arrays import Array
 from mckibben.errors import DataError, ModelError
 from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.core.uncertainty import inverted
-from mckibben.estimators.coupled.balance_checks import held
+from mckibben.estimators.coupled.balance_checks import at_rest, held
 from mckibben.estimators.coupled.balance_slopes import run as follow
-from mckibben.estimators.coupled.balance_structure import Structure
+from mckibben.estimators.coupled.balance_structure import LEAST_PULL, Structure
 from mckibben.estimators.optimisers.constrained import constrained_least_squares
 from mckibben.estimators.optimisers.tracker import Tracker
 
@@ -22,11 +23,8 @@ MOST_ROWS = 12_000
 MOST_SAMPLES = 30_000
 """To find the way by; the last steps look at all."""
 
-NO_LOAD = 50.0
-"""Pull of the highest pressure over the strongest load, where a load hardly matters."""
-
-SIGN = 0.8
-"""Error with the load's sign turned, over that without, which says that it was wrong."""
+WARMING = 0.2
+"""Share of a run that does not begin at rest before which its errors do not count."""
 
 MOST_TRIES = 9
 """Dampings tried for a step, each ten times the last."""
@@ -60,6 +58,7 @@ class Search:
         self.runs = [replace(run, scheduled=run.scheduled[:, order]) for run in data.runs]
         self.span = np.ptp(data.stacked("outputs"), axis=0)
         n_rows = sum(len(run.outputs) for run in self.runs) * structure.n
+        self.n_rows = n_rows
         self.every = max(1, n_rows // MOST_ROWS)
         self.cuts: list[tuple[Array, Array]] = []
 
@@ -89,6 +88,7 @@ class Search:
             np.ascontiguousarray(run.scheduled),
             held=held,
             every=self.every,
+            settled=self.held(run),
         )
 
     def measured(self, run: Run) -> Array:
@@ -102,6 +102,8 @@ class Search:
         values = structure.start
         values[structure.grip] = grip
         found = [self.followed(values, run, held=True)[1] for run in self.runs]
+        for run, of_run in zip(self.runs, found, strict=True):
+            of_run[: round(self.unsure(run) * len(of_run))] = 0.0
         slopes = np.concatenate(found)
         slopes[:, :, structure.grip :] = 0.0
         for k in range(structure.n):
@@ -123,34 +125,53 @@ class Search:
             values[forces] /= values[structure.places("loads", 0)[0]]
         return values
 
-    def check_loads(self, values: Array) -> None:
-        """Refuse loads that seem to push where they should pull.
+    def loads_told(self, values: Array) -> bool:
+        """Tell whether the linear stage found that a load pulls, and how much."""
+        structure = self.structure
+        area = float(values[structure.places("areas", 0)[0]])
+        return not structure.in_newtons or area < 0.99 * structure.highest / LEAST_PULL
+
+    def check_loads(self, values: Array, tracker: Tracker) -> None:
+        """Refuse loads that seem to push where they should pull; note one that tells nothing.
 
         Raises
         ------
         DataError
-            Naming the channel.
+            Naming the recording, or that it is all of them.
         """
-        structure = self.structure
-        if not structure.in_newtons:
+        if self.loads_told(values):
             return
-        areas = values[structure.places("areas", 0)[0]] * structure.highest
-        strongest = max(float(np.abs(run.scheduled[:, -1]).max()) for run in self.runs)
-        if areas < NO_LOAD * strongest:
-            return
-        against = [
-            replace(run, scheduled=run.scheduled * [*[1.0] * (run.scheduled.shape[1] - 1), -1.0])
-            for run in self.runs
-        ]
-        other = replace(self.data, runs=tuple(against))
-        turned = Search(other, structure, self.ridge)
-        if turned.cost(turned.begun(float(values[structure.grip]))) < SIGN * self.cost(values):
+        channel = self.structure.loaded[0].name
+        suspects = [tuple(range(len(self.runs))), *((place,) for place in range(len(self.runs)))]
+        costs = []
+        for suspect in suspects:
+            turned = self.turned(suspect)
+            found = turned.begun(float(values[self.structure.grip]))
+            costs.append(turned.cost(found) if turned.loads_told(found) else np.inf)
+        best = int(np.argmin(costs))
+        if costs[best] < self.cost(values):
+            names = [self.runs[place].name for place in suspects[best]]
             raise DataError(
                 "the more it pulls, the shorter the muscle, as if its sign were wrong",
-                file=self.runs[0].name,
-                channel=structure.loaded[0].name,
+                file=names[0] if len(set(names)) == 1 else f"all {len(names)} recordings",
+                channel=channel,
                 remedy="give forces that pull the muscle longer as positive",
             )
+        tracker.notes.append(
+            f"{channel} hardly tells area from springs: all forces may be wrong by a factor. Remedy: "
+            "record under loads that change while the pressure does not"
+        )
+
+    def turned(self, places: Sequence[int]) -> Search:
+        """Return the same search with the loads of some runs turned round."""
+        runs = list(self.runs)
+        for place in places:
+            scheduled = runs[place].scheduled.copy()
+            scheduled[:, -1] *= -1.0
+            runs[place] = replace(runs[place], scheduled=scheduled)
+        other = Search(replace(self.data, runs=tuple(runs)), self.structure, self.ridge)
+        other.span = self.span
+        return other
 
     def stiffness(self, values: Array) -> Array:
         """Return how stiff every muscle is at every sample kept, shape (samples, n)."""
@@ -225,7 +246,10 @@ class Search:
         return values
 
     def missed(self, values: Array, run: Run) -> tuple[Array, Array]:
-        """Return the errors over a run relative to the ranges, and their slopes by coefficients."""
+        """Return the errors over a run relative to the ranges, and their slopes by coefficients.
+
+        Of a run that does not begin at rest the first part does not count, until it has forgotten.
+        """
         if self.held(run):
             found, by = self.followed(values, run, held=True)
             areas = [values[self.structure.places("areas", k)[0]] for k in range(self.structure.n)]
@@ -234,7 +258,13 @@ class Search:
             found, by = self.followed(values, run, held=False)
             found = found - self.measured(run)
             scale = 1.0 / self.span
-        return (found * scale).ravel(), (by * scale[:, np.newaxis]).reshape(-1, by.shape[2])
+        counts = (np.arange(len(found)) >= self.unsure(run) * len(found))[:, np.newaxis]
+        by = by * (scale * counts)[..., np.newaxis]
+        return (found * scale * counts).ravel(), by.reshape(-1, by.shape[2])
+
+    def unsure(self, run: Run) -> float:
+        """Return the share of a run in which it still remembers what came before it, unknown."""
+        return 0.0 if self.held(run) or at_rest(self.data, run) else WARMING
 
     def errors(self, values: Array) -> tuple[Array, Array]:
         """Return the errors over all runs, and their slopes."""

@@ -241,6 +241,7 @@ def follow(
     measured: Array,
     x: Array,
     held: bool,
+    settled: bool,
     every: int,
     memory: Array,
     scratch: Array,
@@ -257,6 +258,8 @@ def follow(
         Pressures, displacements, what schedules and loads.
     held : bool
         Whether the muscles are where they were measured.
+    settled : bool
+        Whether they have long been there at the start.
     every : int
     memory : array, shape (states + 1, coefficients)
         To compute in; so is ``scratch``.
@@ -278,8 +281,10 @@ def follow(
     for i in range(n_states):
         state[i] = 0.0
     for k in range(n):
-        y[k] = 0.0
-        p[k] = 0.0
+        y[k] = measured[0, k] if settled else 0.0
+        p[k] = driven[0, k] if settled else 0.0
+    if settled:
+        keep(c, state, AT_REST, y, p)
     if not held:  # where they rest says nothing of forces where they were measured
         move(c, state, AT_REST, False, y, x[0], p, memory, now, row, work)
     offset = scratch[n_states - 2 - n : n_states - 2]
@@ -304,7 +309,14 @@ def follow(
 
 
 def run(
-    c: Array, driven: Array, measured: Array, x: Array, *, held: bool, every: int = 1
+    c: Array,
+    driven: Array,
+    measured: Array,
+    x: Array,
+    *,
+    held: bool,
+    every: int = 1,
+    settled: bool = False,
 ) -> tuple[Array, Array]:
     """Return what `follow` finds, of whose every so many samples the last is kept, and the slopes."""
     n, m, n_l = int(c[0]), int(c[4]), int(c[5])
@@ -312,8 +324,7 @@ def run(
     n_states, n_c = n * (3 + m + n_l) + 2, n * width + 1 + n_l
     kept = -(-len(driven) // every)
     found, slopes = np.empty((kept, n)), np.empty((kept, n, n_c))
-    scratch = np.zeros(n_states + 3 * n + 3 * n + 3 * n * n + 4 * n + n * n)
-    follow(
-        c, driven, measured, x, held, every, np.zeros((n_states + 1, n_c)), scratch, found, slopes
-    )
+    memory = np.zeros((n_states + 1, n_c))
+    scratch = np.zeros(n_states + 10 * n + 4 * n * n)
+    follow(c, driven, measured, x, held, settled, every, memory, scratch, found, slopes)
     return found, slopes

@@ -18,7 +18,7 @@ from mckibben.arrays import Array
 from mckibben.blocks.core.fields import Channel, rows, vector
 from mckibben.blocks.coupled.balance import Balance
 
-GRID = 13
+GRID = 21
 """Places along what is known of every muscle's displacement where conditions are asked for."""
 
 LEAST_LEFT = 0.05
@@ -26,6 +26,9 @@ LEAST_LEFT = 0.05
 
 MOST_LONGER, APART = 0.5, 0.7
 """Logarithms by which a lag may become longer or shorter at once, and by which lags differ."""
+
+LEAST_PULL = 1e-3
+"""Pull of a newton, over that of the highest pressure on the area at rest, that is none."""
 
 LEAST_STIFF = 1e-3
 """Stiffness that has to be left, relative to the force of the highest pressure over the stroke."""
@@ -201,7 +204,8 @@ class Structure:
                 columns += [[place] for place in self.places("wall", k).tolist()]
         for q in range(1 + len(self.scheduled) * self.degree):
             for k in range(self.n):
-                columns.append([self._spring(q, k, -1)])
+                if q or not self.tare:  # displacements from rest make a constant of their own
+                    columns.append([self._spring(q, k, -1)])
                 columns += [
                     sorted({self._spring(q, k, j), self._spring(q, j, k)}) for j in range(k, self.n)
                 ]
@@ -248,7 +252,7 @@ class Structure:
                 for place in self.places(name, k).tolist():
                     ask({place: 1.0}, 0.0)
             for place in self.places("loads", k).tolist():
-                ask({place: 1.0}, 1e-3 * unit / self.highest if self.in_newtons else 0.0)
+                ask({place: 1.0}, LEAST_PULL * unit / self.highest if self.in_newtons else 0.0)
             ask({int(self.places("wall", k)[0]): -1.0}, -0.1 * self.scale / self.highest)
             areas, friction = self.places("areas", k), self.places("friction", k)
             ask({int(areas[0]): 1.0}, 0.1 * unit)

@@ -6,7 +6,7 @@ import numpy as np
 
 from mckibben.arrays import Array
 from mckibben.blocks.coupled.balance import Balance
-from mckibben.estimators.coupled.balance_structure import GRID, LEAST_LEFT, Structure
+from mckibben.estimators.coupled.balance_structure import GRID, LEAST_LEFT, LEAST_STIFF, Structure
 
 NEAR = 1.2
 """Times a bound up to which it is said to hold something back."""
@@ -14,8 +14,9 @@ NEAR = 1.2
 
 def sentences(block: Balance, structure: Structure) -> list[str]:
     """Return how much of every muscle is area, spring, friction and relaxation."""
-    unit = "N" if structure.in_newtons else "bar"
-    per = " N/bar" if structure.in_newtons else " of muscle 1's at rest"
+    unit = "N" if structure.in_newtons else block.given[0].unit
+    driving = block.given[0].unit
+    per = f" N/{driving}" if structure.in_newtons else " of muscle 1's at rest"
     p = 0.5 * structure.highest
     found = []
     for k, channel in enumerate(block.driven):
@@ -29,7 +30,7 @@ def sentences(block: Balance, structure: Structure) -> list[str]:
         fading = sum(block.relaxation[k])
         times = " and ".join(f"{lag:.3g} s" for lag in block.lags)
         found.append(
-            f"{channel.name} at {y:.3g} mm and {p:.3g} bar: area {middle:.3g}{per} ({rest:.3g} at "
+            f"{channel.name} at {y:.3g} mm and {p:.3g} {driving}: area {middle:.3g}{per} ({rest:.3g} at "
             f"rest); springs and rubber {stiff:.3g} {unit}/mm; friction up to {rubbing:.3g} {unit} "
             f"either way, {100 * rubbing / max(middle * p, 1e-12):.2g} % of the pull"
             + (f"; {fading:.3g} {unit}/mm more that fades within {times}" if block.lags else "")
@@ -52,9 +53,31 @@ def held_back(block: Balance, structure: Structure) -> list[str]:
                 f"{channel.name}: friction would outweigh the area at {places[worst]:.3g} mm, and "
                 "is kept from it; beware of pressures there"
             )
+        stiff = [_stiffness(block, k, at, p) for at in places for p in (0.0, structure.highest)]
+        softest = int(np.argmin(stiff))
+        if (
+            stiff[softest]
+            < 2.0 * LEAST_STIFF * block.areas[k][0] * structure.highest / structure.scale
+        ):
+            found.append(
+                f"{channel.name}: it would have no stiffness left at {places[softest // 2]:.3g} mm, and "
+                "is kept from it"
+            )
         if block.walls[k] > 0.099 * structure.scale / structure.highest / NEAR:
             found.append(f"{channel.name}: its wall's stretch is at its bound")
+    shortest, longest = structure.lag_range
+    for lag in block.lags:
+        if not 1.01 * shortest < lag < 0.99 * longest:
+            found.append(f"a lag is at its bound, {lag:.3g} s")
     return found
+
+
+def _stiffness(block: Balance, k: int, y: float, p: float) -> float:
+    """Return a muscle's own stiffness without friction and what schedules."""
+    u = y / block.scale
+    narrows = sum(i * a * u ** (i - 1) for i, a in enumerate(block.areas[k]) if i)
+    own = block.springs[k][1 + k] + (_slope(block.elasticity[k], u) - p * narrows) / block.scale
+    return float(own)
 
 
 def _area(block: Balance, k: int, y: float) -> float:

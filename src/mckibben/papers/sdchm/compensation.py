@@ -85,8 +85,8 @@ class Loops:
                 cells: list[Cell] = []
                 for controller in self.controllers:
                     tracked = self.found[controller, f"muscle {muscle}"]
-                    width = width(tracked, OUTPUTS[muscle - 1], name)
-                    cells.append(tracked.rmse[name] if place else width)
+                    between = width(tracked, OUTPUTS[muscle - 1], name)
+                    cells.append(tracked.rmse[name] if place else between)
                 rows.append((group, *said[place::2], *cells))
             yield Table(
                 f"Tracking 33 + 6 sin(0.04 pi t) mm, {what} (its Table 5)",

@@ -34,10 +34,12 @@ void mck_balance_step(const mck_part *part, mck_real *state, const mck_real *in,
         out[k] = mck_clip(found, f.lowest, f.highest);
         clipped |= mck_abs(out[k] - found) > MCK_SLACK * (MCK_R(1.0) + mck_abs(found));
     }
-    mck_balance_keep(&f, way, y, out);
     if (clipped) {
+        /* where the muscles go instead is what friction will remember */
+        (void)mck_balance_settle(&f, way, y, in + f.n, out, y + f.n + f.n);
         *f.amiss += MCK_R(1.0);
     }
+    mck_balance_keep(&f, way, y, out);
 }
 
 void mck_balance_inverse_start(const mck_part *part, mck_real *state, const mck_real *in)

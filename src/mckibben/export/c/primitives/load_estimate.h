@@ -1,7 +1,6 @@
 /* From displacements and pressures of n muscles in parallel, and what schedules them, to their loads.
  *
- * Coefficients: the balance's, see balance_law.h; the pseudo-inverse of shares, loads by n; loads at
- * rest. State: the balance's; scratch: its, and what schedules with the loads. */
+ * Coefficients: the balance's, see balance_law.h; the pseudo-inverse of shares, loads by n. State: the balance's; scratch: its, and what schedules with the loads. */
 #ifndef MCK_LOAD_ESTIMATE_H
 #define MCK_LOAD_ESTIMATE_H
 

@@ -137,6 +137,8 @@ def test_a_study_says_whether_a_network_is_to_be_trusted_off_its_patterns(
         (["fit", "pi", "FILE", "-o", "x.json", "--validation", "FILE"], "does not stop early"),
         (["fit", "coupled-pi", "FILE", "-o", "x.json", "--set", "luck=1"], "no setting 'luck'"),
         (["fit", "sdchm", "REST", "-o", "x.json"], "no channel displacement_1"),
+        (["fit", "force-balance", "FILE", "-o", "x.json"], "Remedy: use 'balance'"),
+        (["compare", "FILE", "--models", "grey-box"], "Remedy: use 'balance'"),
         (["study", "ONE", "-o", "x", "--rig", "soft-arm"], "several muscles"),
     ],
 )

@@ -19,6 +19,17 @@ from mckibben.rigs import record
 PAGES = Path(__file__).resolve().parent.parent / "docs" / "models"
 """Where recordings are read and split for the documentation."""
 
+SMOOTHED = 5
+"""Samples of 5 ms over which displacement is averaged."""
+
+
+def smoothed(recording: Recording) -> Recording:
+    """Return a recording whose displacement is a running mean, its ends held."""
+    half = SMOOTHED // 2
+    padded = np.pad(recording["displacement"], half, mode="edge")
+    mean = np.convolve(padded, np.full(SMOOTHED, 1 / SMOOTHED), mode="valid")
+    return recording.with_channels(displacement=mean)
+
 
 def hanging(seeds: int) -> Iterator[Row]:
     """Yield the target of paper B's protocol."""
@@ -54,16 +65,21 @@ def lifting(seeds: int) -> Iterator[Row]:
         found = {
             "the paper's": modelled(theirs, test, frequency),
             "activation-memory": modelled(memory, test, frequency),
+            "balance, smoothed": free_run(balance, smoothed(test), "pressure")[:, 0],
             BALANCE: free_run(balance, test, "pressure")[:, 0],
         }
         for name, pressure in found.items():
             error = 100 * rms(pressure - pressed) / float(np.ptp(pressed))
             percent.setdefault(name, {}).setdefault(force, []).append(error)
+    note = (
+        f"smoothed: displacement averaged over {SMOOTHED} samples, for damping makes pressure of noise, "
+        "of which a reference has none"
+    )
     for force in FORCES:
         figures = {name: by[force] for name, by in percent.items()}
         target = 4.0 if force else 4.5
         what = f"pressure on random waves at {force:g} N, every frequency"
-        yield Row("E", what, "% of range", target, figures)
+        yield Row("E", what, "% of range", target, figures, note)
 
 
 def coiled(folder: Path | None) -> Iterator[Row]:

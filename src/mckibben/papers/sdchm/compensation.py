@@ -85,8 +85,8 @@ class Loops:
                 cells: list[Cell] = []
                 for controller in self.controllers:
                     tracked = self.found[controller, f"muscle {muscle}"]
-                    between = width(tracked, OUTPUTS[muscle - 1], name)
-                    cells.append(tracked.rmse[name] if place else between)
+                    width = loop_width(tracked, OUTPUTS[muscle - 1], name)
+                    cells.append(tracked.rmse[name] if place else width)
                 rows.append((group, *said[place::2], *cells))
             yield Table(
                 f"Tracking 33 + 6 sin(0.04 pi t) mm, {what} (its Table 5)",
@@ -280,7 +280,7 @@ def _beyond(laws: Mapping[str, Block | Controller], jobs: int | None, seed: int)
     )
 
 
-def width(tracked: Tracked, moving: str, name: str) -> float:
+def loop_width(tracked: Tracked, moving: str, name: str) -> float:
     """Return e_w [%]: rising less falling at the middle of the moving reference, over its range."""
     recording = tracked.recording
     reference, y = recording[f"reference_{moving}"], recording[name]

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 from typing import Annotated, ClassVar
 
 import numpy as np
@@ -113,8 +114,9 @@ class BalanceEstimator(CoupledEstimator):
         few = search.of_few()
         with tracker.searching():
             starts = []
-            for grip in GRIPS if self.n_stops else GRIPS[:1]:
-                values = few.begun(grip * few.structure.highest)
+            ways_to_begin = product(GRIPS if self.n_stops else GRIPS[:1], (False, True))
+            for grip, plain in ways_to_begin:
+                values = few.begun(grip * few.structure.highest, plain=plain)
                 starts.append((few.cost(values), values))
                 tracker.saw(values, starts[-1][0])
             starts.sort(key=lambda start: start[0])

@@ -96,8 +96,11 @@ class Search:
         kept = np.arange(-(-len(run.outputs) // self.every)) * self.every + self.every - 1
         return run.outputs[np.minimum(kept, len(run.outputs) - 1)]
 
-    def begun(self, grip: float) -> Array:
-        """Return coefficients that balance the forces where the muscles were."""
+    def begun(self, grip: float, *, plain: bool = False) -> Array:
+        """Return coefficients that balance the forces where the muscles were.
+
+        ``plain``: by areas that do not change.
+        """
         structure = self.structure
         values = structure.start
         values[structure.grip] = grip
@@ -108,7 +111,7 @@ class Search:
         slopes[:, :, structure.grip :] = 0.0
         for k in range(structure.n):
             slopes[:, :, structure.places("wall", k)] = 0.0
-        mix = structure.free(moving=False)
+        mix = structure.free(moving=False, plain=plain)
         base = values.copy()
         for k in range(structure.n):  # on areas at rest of 1, loads are found instead
             base[structure.places("loads", k)] = 0.0

@@ -185,11 +185,12 @@ class Structure:
         """Whether forces are in newtons: those of a muscle alone under one load."""
         return self.n == len(self.loaded) == 1
 
-    def free(self, *, moving: bool) -> Array:
+    def free(self, *, moving: bool, plain: bool = False) -> Array:
         """Return how coefficients follow from what is free, shape (coefficients, free).
 
         ``moving`` frees walls, grip, lags, and areas at rest too. One number sets the unit of force: of
-        a muscle alone its load's, while moving; else the first area at rest.
+        a muscle alone its load's, while moving; else the first area at rest. ``plain``: areas stay
+        what they are at rest.
         """
         n_all = self.size
         columns: list[list[int]] = []
@@ -198,7 +199,8 @@ class Structure:
                 columns += [[place] for place in self.places(name, k).tolist()]
             areas = self.places("areas", k).tolist()
             newtons = moving and self.in_newtons
-            columns += [[place] for place in (areas if moving and (newtons or k) else areas[1:])]
+            free_areas = areas if moving and (newtons or k) else areas[1:]
+            columns += [[place] for place in ([] if plain else free_areas)]
             columns += [[place] for place in self.places("loads", k).tolist() if not newtons]
             if moving:
                 columns += [[place] for place in self.places("wall", k).tolist()]

@@ -102,5 +102,5 @@ def test_what_tells_no_loads_is_refused() -> None:
     two = (*example.scheduled, Channel("force_2", "N"))
     with pytest.raises(ModelError, match=r"do not tell them apart\. Remedy:"):
         LoadEstimate(replace(example, loads=((1.0, 1.0), (0.5, 0.5)), scheduled=two))
-    with pytest.raises(ModelError, match=r"'load-estimate' does not tell loads .*Remedy:"):
+    with pytest.raises(ModelError, match=r"an estimate of loads already.*Remedy:"):
         LoadEstimate.of(LoadEstimate.example())

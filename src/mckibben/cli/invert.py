@@ -46,14 +46,14 @@ def invert(
     import numpy as np
 
     from mckibben.blocks.core.saving import load
-    from mckibben.blocks.coupled.load_estimate import LoadEstimate
+    from mckibben.blocks.coupled.load_estimate import load_of
     from mckibben.blocks.force.feedforward import ForceFeedforward
     from mckibben.outputs import claim_model
 
     claim_model(out, inputs=[model], force=force)
     block = load(model)
     if wanted is Wanted.force:
-        estimate = LoadEstimate.of(block)
+        estimate = load_of(block)
         estimate.save(out)
         if as_json:
             print_json({"file": str(out), "inputs": [channel.name for channel in estimate.inputs]})
@@ -83,7 +83,8 @@ def invert(
         print_json({"file": str(out), "reachable": reachable})
         return
     if not reachable:
-        say("What can be reached depends on the other muscles; track says what was clipped.")
+        others = "the other muscles" if len(block.outputs) > 1 else "its load and past"
+        say(f"What can be reached depends on {others}; track says what was clipped.")
     for channel in block.outputs if reachable else ():
         a, b = reachable[channel.name]
         say(

@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from mckibben.arrays import Array
 from mckibben.blocks.core.block import Block
+from mckibben.blocks.core.fields import Initial
 from mckibben.errors import ModelError
 
 
-def explicit_state(block: Block, initial: Sequence[float]) -> Array:
+def explicit_state(block: Block, initial: Initial) -> Array:
     """Return an explicit initial state after checking its length."""
+    if isinstance(initial, str):
+        raise ModelError(
+            f"{block.kind!r} knows no start {initial!r}. Remedy: give 'first_sample', 'virgin', or "
+            f"{block.n_states} numbers."
+        )
     state = np.array(initial, dtype=np.float64)
     if state.shape != (block.n_states,) or not np.isfinite(state).all():
         raise ModelError(

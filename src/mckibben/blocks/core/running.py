@@ -86,6 +86,8 @@ class Stream:
                 self._input[...] = inputs
             except (TypeError, ValueError, OverflowError) as error:
                 raise self._misfit(error) from None
+            if not self._one_given and np.size(inputs) != self._input.size:  # spread, not given
+                raise self._misfit(ValueError(f"{np.size(inputs)} number(s)"))
             total = given[0] if self._one_given else sum(given)
         if total - total and not all(map(isfinite, given)):
             return self._held(self.BAD_INPUT)

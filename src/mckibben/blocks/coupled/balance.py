@@ -18,6 +18,7 @@ Artificial Muscles"; areas and springs that couple follow what muscles in parall
 from __future__ import annotations
 
 import warnings
+from itertools import pairwise
 from typing import Annotated, ClassVar, Self
 
 import numpy as np
@@ -73,7 +74,7 @@ def balance_kernel(coefficients: Array, state: Array, inputs: Array, outputs: Ar
             found = pressed(c, k, state, way, y, x, gradient)
             p[k] = min(max(found, c[10]), c[11])
             # a hair beyond is rounding
-            amiss = amiss or abs(p[k] - found) > 1e-9 * (1.0 + abs(found))
+            amiss = amiss or not abs(p[k] - found) <= 1e-9 * (1.0 + abs(found))
             outputs[t, k] = p[k]
         if amiss:  # where the muscles go instead is what friction will remember
             settle(c, state, way, y, x, p, scratch[2 * n :])
@@ -187,6 +188,15 @@ class Balance(ManyChannels, Invertible):
         self.check_channels()
         n = len(self.driven)
         n_loads = len(self.loads[0]) if self.loads else 0
+        if n_loads > len(self.scheduled):
+            raise ModelError(
+                f"{self.kind!r} has {n_loads} loads, and {len(self.scheduled)} channels that schedule "
+                "or load it. Remedy: give every load a channel, behind what schedules."
+            )
+        if self.pressure_range is not None and not self.pressure_range[0] < self.pressure_range[1]:
+            raise ModelError(
+                f"pressure_range of {self.kind!r} is {self.pressure_range}. Remedy: the lower end first."
+            )
         n_powers = 1 + (len(self.scheduled) - n_loads) * self.degree
         widths = {
             "springs": n_powers * (1 + n),
@@ -215,8 +225,12 @@ class Balance(ManyChannels, Invertible):
             ("lags", self.lags),
             ("areas at rest", [row[0] for row in self.areas]),
         ):
-            if any(not value > 0 for value in positive):
-                raise ModelError(f"{name} of {self.kind!r} are {positive}. Remedy: positive ones.")
+            rises = name == "areas at rest" or all(a < b for a, b in pairwise(positive))
+            if any(not value > 0 for value in positive) or (name == "limits" and not rises):
+                raise ModelError(
+                    f"{name} of {self.kind!r} are {positive}. Remedy: give positive ones"
+                    f"{', in increasing order' if name == 'limits' else ''}."
+                )
         for name in ("friction", "relaxation"):
             if any(value < 0 for row in getattr(self, name) for value in row):
                 raise ModelError(
@@ -285,7 +299,7 @@ class Balance(ManyChannels, Invertible):
         ``virgin``: already at the first displacements, with friction and all that relaxes unloaded.
         """
         start = self.start if initial is None else initial
-        if not isinstance(start, str):
+        if start not in ("first_sample", "virgin"):
             return explicit_state(self, start)
         c, state, scratch = self._rested(first)
         if start == "virgin":

@@ -19,6 +19,7 @@ from pydantic import BeforeValidator, InstanceOf
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
+from mckibben.blocks.compose import PerChannel, Series
 from mckibben.blocks.core.block import Block, Kernel, Primitive
 from mckibben.blocks.core.fields import STRICT, Channel, Initial
 from mckibben.blocks.core.inverse import Inverse
@@ -27,6 +28,7 @@ from mckibben.blocks.core.refusals import explicit_state
 from mckibben.blocks.core.saving import nested
 from mckibben.blocks.coupled.balance import Balance
 from mckibben.blocks.coupled.balance_law import AT_REST, FROM_REST, IN_TIME, keep, unbalanced
+from mckibben.blocks.memoryless.affine import Affine
 from mckibben.errors import ModelError
 
 
@@ -88,6 +90,12 @@ class LoadEstimate(Primitive):
                 "a balance that knows no load tells none. Remedy: identify it on recordings with a "
                 "measured force."
             )
+        if any(channel.unit != "bar" for channel in self.forward.given):
+            raise ModelError(
+                "a load is told by measured pressures, and this balance knows "
+                f"{self.forward.given[0].name} in {self.forward.given[0].unit}. Remedy: identify it "
+                "from the pressure (--input pressure)."
+            )
         if np.linalg.matrix_rank(loads) < n_loads:
             raise ModelError(
                 f"{n_loads} load(s) pull at {n} muscle(s) in the shares {self.forward.loads}, which "
@@ -108,6 +116,8 @@ class LoadEstimate(Primitive):
                 return cls(model)
             case Inverse(forward=Balance() as balance):
                 return cls(balance)
+            case LoadEstimate():
+                raise ModelError("this is an estimate of loads already. Remedy: simulate it.")
         raise ModelError(
             f"{model.title!r} does not tell loads by displacements and pressures. Remedy: identify "
             "'balance', on recordings with a measured force."
@@ -162,7 +172,7 @@ class LoadEstimate(Primitive):
         ``virgin``: already at the first sample, with friction and all that relaxes unloaded.
         """
         start = self.start if initial is None else initial
-        if not isinstance(start, str):
+        if start not in ("first_sample", "virgin"):
             return explicit_state(self, start)
         n = len(self.forward.driven)
         y, p = np.ascontiguousarray(first[:n]), np.ascontiguousarray(first[n : 2 * n])
@@ -183,3 +193,20 @@ class LoadEstimate(Primitive):
     def example(cls) -> Self:
         """Return the load of the example of a balance."""
         return cls(Balance.example())
+
+
+def load_of(model: Block) -> Block:
+    """Return what tells the loads of a model by its balance, whose sensors may count otherwise.
+
+    Raises
+    ------
+    ModelError
+        If the model knows no load.
+    """
+    match model:
+        case Series(parts=(Inverse(forward=Balance() as balance), sensors)):
+            pressures = [Affine(1.0, 0.0, channel, channel) for channel in balance.given]
+            back = sensors.inverse()
+            own = back.parts if isinstance(back, PerChannel) else (back,)
+            return Series((PerChannel((*own, *pressures)), LoadEstimate.of(balance)))
+    return LoadEstimate.of(model)

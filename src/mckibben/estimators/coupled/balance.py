@@ -24,6 +24,7 @@ from mckibben.errors import ModelError
 from mckibben.estimators.core.data import TrainingData
 from mckibben.estimators.core.uncertainty import unknown
 from mckibben.estimators.coupled.balance_checks import (
+    check_directions,
     moving,
     not_at_rest,
     one_speed,
@@ -107,6 +108,7 @@ class BalanceEstimator(CoupledEstimator):
     def identify(self, data: TrainingData, tracker: Tracker) -> Block:
         """Return the balance, solved for displacements."""
         data, notes = telling(data)
+        check_directions(data)
         tracker.notes += [*notes, *other_zeros(data), *not_at_rest(data)]
         ways = directions(data)
         data = turned(data, ways)
@@ -117,11 +119,11 @@ class BalanceEstimator(CoupledEstimator):
             ways_to_begin = product(GRIPS if self.n_stops else GRIPS[:1], (False, True))
             for grip, plain in ways_to_begin:
                 values = few.begun(grip * few.structure.highest, plain=plain)
-                starts.append((few.cost(values), values))
+                starts.append((few.cost(values), plain, values))
                 tracker.saw(values, starts[-1][0])
             starts.sort(key=lambda start: start[0])
-            few.check_loads(starts[0][1], tracker)
-            for _, start in starts if few.n_rows <= FEW_ROWS else starts[:FOLLOWED]:
+            few.check_loads(next(values for _, plain, values in starts if not plain), tracker)
+            for _, _, start in starts if few.n_rows <= FEW_ROWS else starts[:FOLLOWED]:
                 few.descend(start, min(self.steps, FIRST_STEPS), tracker)
             assert tracker.best is not None
             few.descend(tracker.best, self.steps, tracker)
@@ -222,10 +224,11 @@ class BalanceEstimator(CoupledEstimator):
     def _lags(self, data: TrainingData) -> Array:
         """Return time constants [s] that the recordings can tell."""
         longest = self._longest(data)
-        last = min(max(longest / 3.0, 1.0), 60.0)
-        default = np.geomspace(min(0.5, last / 4.0), last, self.n_lags) if self.n_lags else ()
-        lags = np.array(default if self.lags is None else self.lags)
         shortest, most = 2.0 * (data.sample_time or 1.0), max(0.5 * longest, 1.0)
+        last = min(max(longest / 3.0, 1.0), max(60.0, 8.0 * shortest), most)
+        first = max(min(0.5, last / 4.0), shortest)
+        default = np.geomspace(first, last, self.n_lags) if self.n_lags else ()
+        lags = np.array(default if self.lags is None else self.lags)
         if lags.size and (
             lags[0] < shortest or lags[-1] > most or (np.diff(np.log(lags)) < APART).any()
         ):

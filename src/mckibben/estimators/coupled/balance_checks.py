@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from mckibben.errors import DataError
 from mckibben.estimators.core.data import Run, TrainingData
 
 ALIKE = 0.02
@@ -22,6 +23,9 @@ RESTING = 0.05
 
 HELD = 0.02
 """A muscle is held where it moves less than this share of what it moves in all runs."""
+
+LARGEST = 1e12
+"""Number that no muscle has."""
 
 BEGUN = 0.1
 """Share of the range of pressure up to which a run begins at rest."""
@@ -111,6 +115,39 @@ def other_zeros(data: TrainingData) -> list[str]:
                 "with the same inputs do, as if it had another zero. Remedy: let all count from the same"
             )
     return notes
+
+
+def check_directions(data: TrainingData) -> None:
+    """Refuse numbers that no muscle has, and displacements that fall as their own pressure rises.
+
+    Raises
+    ------
+    DataError
+        Naming the channel and the recording.
+    """
+    for run in data.runs:
+        for channels, table in ((data.inputs, run.driven), (data.outputs, run.outputs)):
+            for place in np.flatnonzero(np.abs(table).max(axis=0) > LARGEST).tolist():
+                raise DataError(
+                    f"it reaches {np.abs(table[:, place]).max():.3g} {channels[place].unit}",
+                    file=run.name,
+                    channel=channels[place].name,
+                    remedy="check its unit",
+                )
+    spans = data.highest - data.lowest
+    for run in data.runs:
+        moved = np.ptp(run.driven, axis=0) > 0.5 * spans
+        if len(spans) < 2 or held(data, run) or not moved.all():
+            continue
+        columns = np.column_stack([run.driven, run.scheduled, np.ones(len(run.driven))])
+        by = np.linalg.lstsq(columns, run.outputs, rcond=None)[0]
+        for k in np.flatnonzero(np.diag(by[: len(spans)]) < 0).tolist():
+            raise DataError(
+                f"it falls while {data.inputs[k].name} rises",
+                file=run.name,
+                channel=data.outputs[k].name,
+                remedy="give shortening, positive when a muscle contracts",
+            )
 
 
 def not_at_rest(data: TrainingData) -> list[str]:

@@ -12,10 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mckibben.blocks.compose import PerChannel, Series
 from mckibben.blocks.core.block import Block
-from mckibben.blocks.coupled.load_estimate import LoadEstimate
-from mckibben.blocks.memoryless.affine import Affine
+from mckibben.blocks.coupled.load_estimate import load_of
 from mckibben.errors import DataError
 from mckibben.estimators.coupled.balance import BalanceEstimator
 from mckibben.recording import Recording
@@ -92,19 +90,3 @@ def fit_force_estimate(
         missed.append(np.abs(fitted(others).simulate(left_out)["force"] - left_out["force"]))
     half = float(np.quantile(np.concatenate(missed), level))
     return ForceEstimate(fitted(recordings), half, level)
-
-
-def load_of(model: Block) -> Block:
-    """Return what tells the load of a muscle by its balance, whose sensor may count otherwise.
-
-    Raises
-    ------
-    ModelError
-        If the model knows no load.
-    """
-    if not isinstance(model, Series):
-        return LoadEstimate.of(model)
-    solved, sensor = model.parts
-    (pressure,) = solved.inverse().outputs
-    shortened = PerChannel((sensor.inverse(), Affine(1.0, 0.0, pressure, pressure)))
-    return Series((shortened, LoadEstimate.of(solved)))

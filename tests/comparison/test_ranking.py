@@ -133,6 +133,13 @@ def test_a_model_whose_cross_validation_failed_is_chosen_only_where_all_did(
     assert "for want of a validation that did not fail" in neither.chosen
 
 
+def test_what_the_chosen_fit_had_to_say_is_told(train: Recording, test_set: Recording) -> None:
+    board = compare(train, test_set, models=["pi", "mpi"], n_folds=0, jobs=1)
+    rows = [replace(row, diagnostics={"notes": (f"of {row.model}",)}) for row in board.rows]
+    told = replace(board, rows=tuple(rows)).to_dict()["notes"]
+    assert told == [*board.notes, f"{rows[0].model}: of {rows[0].model}"]
+
+
 def test_a_test_that_was_fitted_is_pointed_out(train: Recording, test_set: Recording) -> None:
     with pytest.raises(DataError, match="tested on data it was fitted to"):
         compare(train, [test_set, train], models=["pi"], n_folds=0, jobs=1)

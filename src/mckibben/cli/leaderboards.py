@@ -72,7 +72,7 @@ def print_leaderboard(board: Leaderboard) -> None:
     for row in board.rows:
         if row.reason is not None:
             say(f"{row.model}: failed, {row.reason}")
-    for note in (*board.notes, *board.off_training):
+    for note in (*board.notes, *board.of_models):
         say(f"Note: {note}")
     if board.left_out:
         say(f"Left out: {len(board.left_out)} models that are made for other channels.")

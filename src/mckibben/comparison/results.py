@@ -284,6 +284,16 @@ class Leaderboard:
         return tuple(f"{r.model}: {r.off_training}" for r in self.rows if r.off_training)
 
     @property
+    def of_models(self) -> tuple[str, ...]:
+        """What is to be said of models: `off_training`, and what the chosen one's fit had to say."""
+        best = self.best
+        noted = () if best is None else best.diagnostics.get("notes", ())
+        return (
+            *self.off_training,
+            *(f"{best.model}: {note}" for note in noted if best is not None),
+        )
+
+    @property
     def ranking(self) -> tuple[Row, ...]:
         """The rows with the constant in its place."""
         if self.constant is None or not self.rows:
@@ -342,7 +352,7 @@ class Leaderboard:
             "lowest_on_test": None if lowest is None else lowest.model,
             "left_out": dict(self.left_out),
             "pending": list(self.pending),
-            "notes": [*self.notes, *self.off_training],
+            "notes": [*self.notes, *self.of_models],
             "shared": list(self.shared),
             "rows": [row.to_dict() for row in self.ranking],
         }

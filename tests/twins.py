@@ -665,6 +665,26 @@ def exponential(block: Any, inputs: Rows, sample_time: float) -> Rows:
     return _rows([math.exp(u) - block.offset for u in _column(inputs)])
 
 
+def _acting(u: float, c: float) -> float:
+    return math.copysign(abs(u) - 0.95 * c * (1 - math.e ** (-abs(u) / c)), u)
+
+
+def contact(block: Any, inputs: Rows, sample_time: float) -> Rows:
+    return _rows([_acting(u, block.pressure) for u in _column(inputs)])
+
+
+def contact_inverse(block: Any, inputs: Rows, sample_time: float) -> Rows:
+    from scipy.optimize import brentq
+
+    c = block.forward.pressure
+    return _rows(
+        [
+            brentq(lambda u, y=y: _acting(u, c) - y, min(y, 0.0) - c, max(y, 0.0) + c, xtol=1e-15)
+            for y in _column(inputs)
+        ]
+    )
+
+
 def _braid_pressure(block: Any, displacement: float) -> float:
     e = (displacement - block.offset) / block.rest_length
     angle = block.braid_angle
@@ -1206,6 +1226,8 @@ TWINS: dict[str, Twin] = {
     "krasnoselskii-pokrovskii": stepping(_Ramps),
     "krasnoselskii-pokrovskii-inverse": _solved(_Ramps),
     "load-estimate": load_estimate,
+    "contact": contact,
+    "contact-inverse": contact_inverse,
     "logarithm": logarithm,
     "maxwell-slip": stepping(_Springs),
     "maxwell-slip-inverse": _solved(_Springs),

@@ -33,6 +33,7 @@ PLUGINS: dict[str, dict[str, str | Preset]] = {
         "bouc-wen": "mckibben.blocks.differential.bouc_wen:BoucWen",
         "braid-equilibrium": "mckibben.blocks.force.braid_equilibrium:BraidEquilibrium",
         "chou-hannaford": "mckibben.blocks.force.chou_hannaford:ChouHannaford",
+        "contact": "mckibben.blocks.memoryless.contact:Contact",
         "coupled-memory": "mckibben.blocks.coupled.coupled_memory:CoupledMemory",
         "coupling": "mckibben.blocks.coupled.coupling:Coupling",
         "creep": "mckibben.blocks.dynamic.creep:Creep",

@@ -11,7 +11,7 @@ must be measured, not those that a compensator asks for.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Annotated, ClassVar, Self
 
 import numpy as np
@@ -114,14 +114,15 @@ class LoadEstimate(Primitive):
         match model:
             case Balance():
                 return cls(model)
-            case Inverse(forward=Balance() as balance):
-                return cls(balance)
             case LoadEstimate():
                 raise ModelError("this is an estimate of loads already. Remedy: simulate it.")
-        raise ModelError(
-            f"{model.title!r} does not tell loads by displacements and pressures. Remedy: identify "
-            "'balance', on recordings with a measured force."
-        )
+        balance, acting, sensors = parts_of(model)
+        if acting or sensors:
+            raise ModelError(
+                "this model's sensors or pressures count otherwise than its balance's. Remedy: use "
+                "mckibben.blocks.coupled.load_estimate.load_of."
+            )
+        return cls(balance)
 
     @property
     def rate_dependent(self) -> bool:  # type: ignore[override]
@@ -195,6 +196,27 @@ class LoadEstimate(Primitive):
         return cls(Balance.example())
 
 
+def parts_of(model: Block) -> tuple[Balance, Block | None, Block | None]:
+    """Return the balance that a model solves, what acts of its pressures, and what its sensors make.
+
+    Raises
+    ------
+    ModelError
+        If the model solves none.
+    """
+    parts = model.parts if isinstance(model, Series) else (model,)
+    for place, part in enumerate(parts):
+        match part:
+            case Inverse(forward=Balance() as balance) if len(parts) <= 3:
+                before = parts[0] if place else None
+                behind = parts[-1] if place < len(parts) - 1 else None
+                return balance, before, behind
+    raise ModelError(
+        f"{model.title!r} does not tell loads by displacements and pressures. Remedy: identify "
+        "'balance', on recordings with a measured force."
+    )
+
+
 def load_of(model: Block) -> Block:
     """Return what tells the loads of a model by its balance, whose sensors may count otherwise.
 
@@ -203,10 +225,19 @@ def load_of(model: Block) -> Block:
     ModelError
         If the model knows no load.
     """
-    match model:
-        case Series(parts=(Inverse(forward=Balance() as balance), sensors)):
-            pressures = [Affine(1.0, 0.0, channel, channel) for channel in balance.given]
-            back = sensors.inverse()
-            own = back.parts if isinstance(back, PerChannel) else (back,)
-            return Series((PerChannel((*own, *pressures)), LoadEstimate.of(balance)))
-    return LoadEstimate.of(model)
+    if isinstance(model, Balance | LoadEstimate):
+        return LoadEstimate.of(model)
+    balance, acting, sensors = parts_of(model)
+    if acting is None and sensors is None:
+        return LoadEstimate.of(balance)
+    shortening = _each(sensors.inverse() if sensors else None, balance.driven)
+    return Series(
+        (PerChannel((*shortening, *_each(acting, balance.given))), LoadEstimate.of(balance))
+    )
+
+
+def _each(block: Block | None, channels: Sequence[Channel]) -> tuple[Block, ...]:
+    """Return what is done to every channel: a block's parts, or nothing."""
+    if block is None:
+        return tuple(Affine(1.0, 0.0, channel, channel) for channel in channels)
+    return block.parts if isinstance(block, PerChannel) else (block,)

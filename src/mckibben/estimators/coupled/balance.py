@@ -18,8 +18,9 @@ from annotated_types import Ge, Gt, Interval
 from mckibben.arrays import Array
 from mckibben.blocks.compose import PerChannel, Series
 from mckibben.blocks.core.block import Block
-from mckibben.blocks.coupled.balance import Balance
+from mckibben.blocks.coupled.load_estimate import parts_of
 from mckibben.blocks.memoryless.affine import Affine
+from mckibben.blocks.memoryless.contact import LOST, Contact
 from mckibben.errors import ModelError
 from mckibben.estimators.core.data import TrainingData
 from mckibben.estimators.core.uncertainty import unknown
@@ -46,12 +47,19 @@ LIMITED = ("bar", "V")
 GRIPS = (0.05, 0.2, 0.4, 0.8)
 """Where to begin, relative to the highest pressure."""
 
-FOLLOWED, FIRST_STEPS, FEW_ROWS = 2, 5, 20_000
+FOLLOWED, FIRST_STEPS, FEW_ROWS = 2, 5, 6_000
 """Starts that are followed for so many steps before the best of them is followed to its end; all are
 where there are no more errors than that."""
 
 FAR = 0.5
 """Displacements that all are further from zero than this share of their range count from elsewhere."""
+
+DEAD_ZONES, DEAD_STEPS, HELPS = (0.01, 0.02, 0.035, 0.06), 10, 0.03
+"""Pressures over which dead zones fade, relative to the highest; steps that each is followed for; and by
+how much one has to help."""
+
+DEAD_SAMPLES = 8_000
+"""By which they are compared."""
 
 LAST_STEPS = 10
 """On all recordings, after those on a few of them."""
@@ -85,6 +93,8 @@ class BalanceEstimator(CoupledEstimator):
     tare : bool, optional
         Whether displacements count from rest at the start of every recording. Default: where all of
         several scheduled muscles' recordings start there.
+    contact : bool, optional
+        Whether a dead zone of small pressures is looked for; default of a muscle alone.
     ridge : float
         Damping of the coefficients.
     steps : int
@@ -102,6 +112,7 @@ class BalanceEstimator(CoupledEstimator):
     area: Annotated[int, Interval(ge=0, le=6)] = 2
     degree: Annotated[int, Interval(ge=1, le=4)] = 2
     tare: bool | None = None
+    contact: bool | None = None
     ridge: Annotated[float, Ge(0)] = 1e-6
     steps: Annotated[int, Interval(ge=0, le=1000)] = 25
 
@@ -112,20 +123,17 @@ class BalanceEstimator(CoupledEstimator):
         tracker.notes += [*notes, *other_zeros(data), *not_at_rest(data)]
         ways = directions(data)
         data = turned(data, ways)
-        search = Search(data, self.structure(data, tracker), self.ridge)
-        few = search.of_few()
+        structure = self.structure(data, tracker)
+        dead = 0.0
         with tracker.searching():
-            starts = []
-            ways_to_begin = product(GRIPS if self.n_stops else GRIPS[:1], (False, True))
-            for grip, plain in ways_to_begin:
-                values = few.begun(grip * few.structure.highest, plain=plain)
-                starts.append((few.cost(values), plain, values))
-                tracker.saw(values, starts[-1][0])
-            starts.sort(key=lambda start: start[0])
-            few.check_loads(next(values for _, plain, values in starts if not plain), tracker)
-            for _, _, start in starts if few.n_rows <= FEW_ROWS else starts[:FOLLOWED]:
-                few.descend(start, min(self.steps, FIRST_STEPS), tracker)
+            few = Search(data, structure, self.ridge).of_few()
+            self._begin(few, tracker)
             assert tracker.best is not None
+            if len(data.inputs) == 1 if self.contact is None else self.contact:
+                few.descend(tracker.best, min(self.steps, DEAD_STEPS), tracker)
+                dead = self._dead_zone(data, structure, tracker)
+            search = Search(acting(data, dead), structure, self.ridge)
+            few = search.of_few()
             few.descend(tracker.best, self.steps, tracker)
             tracker.reached(0.7)
             if few is not search:
@@ -136,37 +144,70 @@ class BalanceEstimator(CoupledEstimator):
                 "no balance of forces runs free over these recordings. Remedy: check that displacements "
                 "count as shortening and loads as pulling the muscle longer"
             )
-        low, high = float(data.lowest.min()), float(data.highest.max())
         limited = data.inputs[0].unit in LIMITED
-        bounds = (min(low, 0.0), high) if limited else None
-        structure = search.structure
-        balance = structure.block(tracker.best, bounds)
+        ends = np.array([min(float(data.lowest.min()), 0.0), float(data.highest.max())])
+        low, high = acted(ends, dead).tolist()
+        balance = structure.block(tracker.best, (low, high) if limited else None)
         tracker.notes += [*held_back(balance, structure), *sentences(balance, structure)]
-        solved = balance.inverse()
-        if all(way == (1.0, 0.0) for way in ways):
-            return solved
+        if dead:
+            tracker.notes.append(
+                f"small pressures act little: as if {LOST * dead:.3g} {data.inputs[0].unit} were lost, "
+                "fully from about four times that"
+            )
+        contacts = [Contact(dead, channel, channel) for channel in data.inputs] if dead else []
         sensors = [
             Affine(gain, offset, channel, channel)
             for (gain, offset), channel in zip(ways, data.outputs, strict=True)
+            if any(way != (1.0, 0.0) for way in ways)
         ]
-        return Series((solved, sensors[0] if len(sensors) == 1 else PerChannel(tuple(sensors))))
+        parts = [*_side_by_side(contacts), balance.inverse(), *_side_by_side(sensors)]
+        return parts[0] if len(parts) == 1 else Series(tuple(parts))
+
+    def _begin(self, few: Search, tracker: Tracker) -> None:
+        """Show the tracker where the linear stage and first steps from several starts lead."""
+        starts = []
+        for grip, plain in product(GRIPS if self.n_stops else GRIPS[:1], (False, True)):
+            values = few.begun(grip * few.structure.highest, plain=plain)
+            starts.append((few.cost(values), plain, values))
+            tracker.saw(values, starts[-1][0])
+        starts.sort(key=lambda start: start[0])
+        few.check_loads(next(values for _, plain, values in starts if not plain), tracker)
+        for _, _, start in starts if few.n_rows <= FEW_ROWS else starts[:FOLLOWED]:
+            few.descend(start, min(self.steps, FIRST_STEPS), tracker)
+
+    def _dead_zone(self, data: TrainingData, structure: Structure, tracker: Tracker) -> float:
+        """Return the pressure over which a dead zone fades that helps most, or 0 where none does."""
+        best, start = 0.0, tracker.best
+        assert start is not None
+        few = Search(data, structure, self.ridge).of_few(DEAD_SAMPLES)
+        least = (1.0 - HELPS) * few.cost(start)
+        for share in DEAD_ZONES:
+            part = tracker.part(0.5, 0.6)
+            here = Search(acting(few.data, share * structure.highest), structure, self.ridge)
+            here.span = few.span
+            here.descend(start, min(self.steps, DEAD_STEPS), part)
+            if part.best is not None and part.best_cost < least:
+                best, least = share * structure.highest, part.best_cost
+                tracker.best, tracker.best_cost = part.best, part.best_cost
+        return best
 
     def uncertainty(
         self, block: Block, data: TrainingData, residual: Array, at_bounds: Sequence[int]
     ) -> tuple[float, Array]:
         """Return condition and covariance of what is free, from the exact slopes of the free run."""
-        solved = block.parts[0] if isinstance(block, Series) else block
-        balance = solved.inverse()
-        assert isinstance(balance, Balance)
+        balance, contacts, _ = parts_of(block)
         told, _ = telling(data)
         shortened = turned(told, directions(told))
         structure = self.structure(shortened, Tracker())
-        search = Search(shortened, structure, self.ridge)
+        dead = 0.0 if contacts is None else float(contacts.pack()[0])
+        search = Search(acting(shortened, dead), structure, self.ridge)
         condition, found = search.covariance(structure.values(balance))
         packed = structure.packed()
         covariance = unknown(block)
-        n = len(packed)  # a sensor's gain and offset follow, which are not fitted
-        covariance[:n, :n] = found[np.ix_(packed, packed)]
+        # dead zones come before; a sensor's gain and offset follow, which are not fitted
+        own = slice(0 if contacts is None else contacts.n_parameters, None)
+        own = slice(own.start, own.start + len(packed))
+        covariance[own, own] = found[np.ix_(packed, packed)]
         covariance[list(at_bounds)] = covariance[:, list(at_bounds)] = np.nan
         return condition, covariance
 
@@ -255,6 +296,26 @@ def directions(data: TrainingData) -> list[tuple[float, float]]:
         away = column.min() > FAR * np.ptp(column) or column.max() < 0.0
         found.append((gain, gain * float(column.min()) if away else 0.0))
     return found
+
+
+def acted(pressure: Array, dead: float) -> Array:
+    """Return what acts of pressures, of any shape, with a dead zone that fades over one."""
+    if not dead:
+        return pressure
+    return Contact(dead).simulate(pressure.ravel()).reshape(pressure.shape)
+
+
+def acting(data: TrainingData, dead: float) -> TrainingData:
+    """Return data driven by what acts of the pressures."""
+    runs = [replace(run, driven=acted(run.driven, dead)) for run in data.runs]
+    return replace(data, runs=tuple(runs)) if dead else data
+
+
+def _side_by_side(parts: Sequence[Block]) -> list[Block]:
+    """Return one block a channel as a part of a series, or none."""
+    if len(parts) < 2:
+        return list(parts)
+    return [PerChannel(tuple(parts))]
 
 
 def turned(data: TrainingData, ways: list[tuple[float, float]]) -> TrainingData:

@@ -62,12 +62,12 @@ class Search:
         self.every = max(1, n_rows // MOST_ROWS)
         self.cuts: list[tuple[Array, Array]] = []
 
-    def of_few(self) -> Search:
+    def of_few(self, most: int = MOST_SAMPLES) -> Search:
         """Return the same search over evenly chosen recordings, where there are very many samples."""
         total = sum(len(run.outputs) for run in self.runs)
-        if total <= MOST_SAMPLES:
+        if total <= most:
             return self
-        count = max(MOST_SAMPLES * len(self.runs) // total, 1)
+        count = max(most * len(self.runs) // total, 1)
         chosen = np.unique(np.linspace(0, len(self.runs) - 1, count).round().astype(int))
         few = replace(self.data, runs=tuple(self.data.runs[i] for i in chosen.tolist()))
         found = Search(few, self.structure, self.ridge)

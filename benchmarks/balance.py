@@ -62,22 +62,18 @@ def speed(seeds: int) -> Iterator[Row]:
         ("fit of the arm's joint runs", arms, {}, np.nan),
         ("fit of the arm's whole protocol", whole(0), {}, 15.0),
     ):
-        figures = {
-            name: [fit_seconds(runs, name, **how) for _ in range(seeds if name == BALANCE else 1)]
-            for name in ("force-balance", BALANCE)
-        }
-        yield Row("speed", what, "s", target, figures)
+        seconds = [fit_seconds(runs, BALANCE, **how) for _ in range(seeds)]
+        yield Row("speed", what, "s", target, {BALANCE: seconds})
     fits = Fits()
     for what, runs, how, target in (
         ("one muscle", four, {"input": ("pressure",)}, 3.0),
         ("three muscles", arms, {}, 10.0),
     ):
         steps: tuple[dict[str, list[float]], dict[str, list[float]]] = ({}, {})
-        for name in ("force-balance", BALANCE):
-            model, run = fits(what, name, runs, **how), runs[-1]
-            for figures, block in zip(steps, (model, model.inverse()), strict=True):
-                inputs = run.matrix([channel.name for channel in block.inputs])
-                figures[name] = [step_microseconds(block, inputs, run.sample_time or 1.0)]
+        model, run = fits(what, BALANCE, runs, **how), runs[-1]
+        for figures, block in zip(steps, (model, model.inverse()), strict=True):
+            inputs = run.matrix([channel.name for channel in block.inputs])
+            figures[BALANCE] = [step_microseconds(block, inputs, run.sample_time or 1.0)]
         for way, figures in zip(("displacements", "pressures"), steps, strict=True):
             yield Row("speed", f"step from Python, {what}, to {way}", "µs", target, figures)
 

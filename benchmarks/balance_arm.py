@@ -61,7 +61,6 @@ def models(fits: Fits, seed: int) -> dict[str, Block]:
     runs = list(joint(seed).values())
     return {
         "sdchm": fits(("arm", seed), "sdchm", whole(seed)),
-        "force-balance": fits(("joint", seed), "force-balance", runs),
         WITH_PATTERNS: fits(("arm", seed), BALANCE, whole(seed)),
         BALANCE: fits(("joint", seed), BALANCE, runs),
     }

@@ -13,22 +13,8 @@ import numpy as np
 from balance_rows import BALANCE, Array, Fits, Row, decimated, free_run, missed, rms
 from mckibben import Recording, Series, load_rig
 from mckibben.blocks.core.block import Block
-from mckibben.blocks.coupled.balance import Balance
-from mckibben.blocks.coupled.balance_law import (
-    AT_REST,
-    FROM_REST,
-    IN_TIME,
-    area,
-    begin,
-    elastic,
-    keep,
-    lagging,
-    muscle_width,
-    muscles,
-    rubbed,
-)
+from mckibben.blocks.coupled.load_estimate import load_of
 from mckibben.control import track
-from mckibben.estimators.coupled.force_estimate import fit_force_estimate
 from mckibben.papers.mpi_narmax.models import PLAIN, TOLD
 from mckibben.papers.mpi_narmax.protocol import HELD, HELD_CYCLE
 from mckibben.rigs import record
@@ -78,38 +64,6 @@ def rail_runs(seed: int) -> tuple[Runs, Runs]:
     return sides["train"], sides["test"]
 
 
-def load_of(model: Block, recording: Recording) -> Array:
-    """Return the load of a single muscle that balances what was measured [N].
-
-    Explicit: all that holds a pressure but the load is known from displacement, pressure and their past.
-    """
-    balance = model.inverse()
-    assert isinstance(balance, Balance)
-    assert len(balance.driven) == balance.n_loads == 1
-    c = balance.coefficients(recording.sample_time)
-    own = muscles(c)
-    share = c[own + muscle_width(c) - 1]
-    state, gradient, no_load = np.zeros(balance.n_states), np.zeros(1), np.zeros(1)
-    scratch = np.zeros(balance.n_scratch)
-    y = np.ascontiguousarray(recording["displacement"])
-    p = np.ascontiguousarray(recording[balance.given[0].name])
-    found = np.empty(len(y))
-
-    def left(t: int, way: int) -> float:
-        held = elastic(c, own, 0, y[t : t + 1], no_load, gradient)
-        held += rubbed(c, own, 0, state, way, y[t], p[t])[0]
-        held += lagging(c, own, 0, state, way, y[t])[0]
-        return float((p[t] * area(c, own, y[t])[0] - held) / share)
-
-    first = np.array([left(0, AT_REST)])
-    begin(c, state, first, np.zeros(1), scratch)
-    for t in range(len(y)):
-        way = IN_TIME if t else FROM_REST
-        found[t] = left(t, way)
-        keep(c, state, way, y[t : t + 1], p[t : t + 1])
-    return found
-
-
 def forces(seed: int, fits: Fits, found: Found) -> None:
     """Find errors of forces on status 4, and how good an interval is that runs left out in turn give.
 
@@ -122,24 +76,17 @@ def forces(seed: int, fits: Fits, found: Found) -> None:
         known = run["force"] <= max(other["force"].max() for other in others)
         if known.mean() > 0.5:
             model = fits(("rail without", name, seed), BALANCE, others, input=("pressure",))
-            misses[name] = np.abs(load_of(model, run) - run["force"])[known]
+            misses[name] = np.abs(load_of(model).simulate(run)["force"] - run["force"])[known]
     model = fits(("rail", seed), BALANCE, list(train.values()), input=("pressure",))
     half = float(np.quantile(np.concatenate(list(misses.values())), LEVEL))
-    off = {name: load_of(model, run) - run["force"] for name, run in test.items()}
-    plain = fit_force_estimate(list(train.values()))
+    estimate = load_of(model)
+    off = {name: estimate.simulate(run)["force"] - run["force"] for name, run in test.items()}
     status = test["status-4"]
     span = float(np.ptp(status["force"]))
-    for name, width, missing in (
-        (
-            "force-balance",
-            plain.half_width,
-            plain.estimate(status)["force_model"] - status["force"],
-        ),
-        (BALANCE, half, off["status-4"]),
-    ):
-        found.add("force", name, 100 * rms(missing) / span)
-        found.add("coverage", name, 100 * float(np.mean(np.abs(missing) <= width)))
-        found.add("half", name, width)
+    missing = off["status-4"]
+    found.add("force", BALANCE, 100 * rms(missing) / span)
+    found.add("coverage", BALANCE, 100 * float(np.mean(np.abs(missing) <= half)))
+    found.add("half", BALANCE, half)
     firm = 100 * rms(off["status-4"][status["pressure"] > FIRM]) / span
     held = {name: 100 * float(np.mean(np.abs(error) <= half)) for name, error in off.items()}
     worst = max(misses, key=lambda name: rms(misses[name]))
@@ -195,7 +142,6 @@ def from_pressure(seed: int, fits: Fits, found: Found) -> None:
         "cpi": {},
         "gpi": {},
         "mpi-narmax": {"input": "pressure", **TOLD[PLAIN].settings},
-        "force-balance": {"input": ("pressure",)},
         BALANCE: {"input": ("pressure",)},
     }
     for name, how in models.items():
@@ -227,8 +173,7 @@ def from_voltage(seed: int, fits: Fits, found: Found) -> None:
     }
     better = min(own, key=lambda way: own[way])  # by what was learned from
     narmax = fits(("rail", seed), "mpi-narmax", runs, **TOLD[PLAIN].settings)
-    plain = fits(("rail", seed), "force-balance", runs, input=("voltage",))
-    models = {"mpi-narmax": narmax, "force-balance": plain, **ways, BALANCE: ways[better]}
+    models = {"mpi-narmax": narmax, **ways, BALANCE: ways[better]}
     for name, model in models.items():
         for run in TESTS:
             found.add(f"voltage, {run}", name, missed(model, test[run], "displacement"))

@@ -225,7 +225,8 @@ def test_muscles_that_no_place_holds_stay_and_go_on_when_one_does() -> None:
 
 def test_friction_beyond_the_area_still_finds_pressures_that_balance() -> None:
     """Steps of Newton's method that would leave the bracket are halved."""
-    block = replace(ALONE, friction=((100.0, 80.0),), limits=(0.05, 0.8), walls=(0.1,), grip=0.5)
+    rubbing = {"friction": ((100.0, 80.0),), "limits": (0.05, 0.8), "walls": (0.1,), "grip": 0.5}
+    block = replace(ALONE, tare=True, **rubbing)  # type: ignore[arg-type]
     inputs = np.column_stack([[10.4, 3.4, 5.0, -1.9], np.zeros(4)])
     pressures = block.simulate(inputs)
     loads = LoadEstimate(block).simulate(np.column_stack([inputs[:, 0], pressures]))

@@ -177,6 +177,9 @@ def test_two_muscles_and_an_extensor() -> None:
     estimator = BalanceEstimator(degree=1).fit(runs[:2])
     balance = balance_of(estimator)
     assert balance.tare
+    wrong = runs[1].with_channels({}, displacement_2=-runs[1]["displacement_2"])
+    with pytest.raises(DataError, match=r"displacement_2.*falls while pressure_2 rises"):
+        BalanceEstimator(degree=1).fit([runs[0], wrong])
     springs = np.array([[balance.springs[k][1 + j] for j in (0, 1)] for k in (0, 1)])
     np.testing.assert_allclose(springs, springs.T)
     missed = estimator.predict(runs[2])[0] - runs[2].matrix(["displacement_1", "displacement_2"])

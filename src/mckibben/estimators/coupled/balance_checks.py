@@ -24,6 +24,9 @@ RESTING = 0.05
 HELD = 0.02
 """A muscle is held where it moves less than this share of what it moves in all runs."""
 
+APART = 0.1
+"""Least eigenvalue of the correlations of pressures that move apart."""
+
 LARGEST = 1e12
 """Number that no muscle has."""
 
@@ -139,6 +142,9 @@ def check_directions(data: TrainingData) -> None:
         moved = np.ptp(run.driven, axis=0) > 0.5 * spans
         if len(spans) < 2 or held(data, run) or not moved.all():
             continue
+        alike = np.corrcoef(run.driven.T)
+        if np.linalg.eigvalsh(alike)[0] < APART:
+            continue  # they move together, so that none tells of its own
         columns = np.column_stack([run.driven, run.scheduled, np.ones(len(run.driven))])
         by = np.linalg.lstsq(columns, run.outputs, rcond=None)[0]
         for k in np.flatnonzero(np.diag(by[: len(spans)]) < 0).tolist():

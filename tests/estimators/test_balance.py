@@ -13,6 +13,8 @@ from mckibben.blocks.compose import Series
 from mckibben.blocks.core.fields import DISPLACEMENT, FORCE, PRESSURE
 from mckibben.blocks.core.inverse import Inverse
 from mckibben.blocks.coupled.balance import Balance
+from mckibben.blocks.coupled.load_estimate import load_of
+from mckibben.blocks.memoryless.contact import Contact
 from mckibben.estimators.coupled.balance import BalanceEstimator
 from mckibben.estimators.coupled.balance_slopes import run
 from mckibben.estimators.optimisers.constrained import constrained_least_squares
@@ -93,6 +95,29 @@ def test_its_inverse_gives_back_the_pressures(found: BalanceEstimator) -> None:
     moved = found.fitted.simulate(run_)
     back = found.fitted.inverse().simulate(moved.select(["displacement", "force"]))
     np.testing.assert_allclose(back["pressure"], run_["pressure"], atol=1e-8)
+
+
+def test_a_dead_zone_is_found_where_there_is_one(found: BalanceEstimator) -> None:
+    assert isinstance(found.fitted, Inverse)
+    filled = Series((Contact(0.15), MUSCLE.inverse()))
+
+    def dead(seed: int) -> Recording:
+        plain = recording(seed)
+        moved = filled.simulate(plain.select(["pressure", "force"]))["displacement"]
+        noise = NOISE * np.random.default_rng(seed).standard_normal(len(plain))
+        return plain.with_channels({}, displacement=moved + noise)
+
+    estimator = BalanceEstimator().fit([dead(1), dead(2)])
+    (contact, _) = estimator.fitted.parts  # type: ignore[attr-defined]
+    assert 0.07 < contact.pressure < 0.3
+    assert error(estimator, dead(3)) < 0.1
+    assert any("small pressures act little" in note for note in estimator.diagnostics_.notes)
+    run_ = dead(4)
+    wished = estimator.fitted.simulate(run_)
+    back = estimator.fitted.inverse().simulate(wished.select(["displacement", "force"]))
+    np.testing.assert_allclose(back["pressure"], run_["pressure"], atol=1e-7)
+    told = load_of(estimator.fitted).simulate(wished.select(["displacement", "pressure"]))
+    np.testing.assert_allclose(told["force"], run_["force"], atol=1e-6)
 
 
 def test_it_keeps_to_physics(found: BalanceEstimator) -> None:

@@ -131,9 +131,10 @@ class BalanceEstimator(CoupledEstimator):
             assert tracker.best is not None
             if len(data.inputs) == 1 if self.contact is None else self.contact:
                 few.descend(tracker.best, min(self.steps, DEAD_STEPS), tracker)
-                dead = self._dead_zone(data, structure, tracker)
+                dead, tracker.best = self._dead_zone(few, tracker)
             search = Search(acting(data, dead), structure, self.ridge)
             few = search.of_few()
+            tracker.best_cost = few.cost(tracker.best)
             few.descend(tracker.best, self.steps, tracker)
             tracker.reached(0.7)
             if few is not search:
@@ -175,21 +176,23 @@ class BalanceEstimator(CoupledEstimator):
         for _, _, start in starts if few.n_rows <= FEW_ROWS else starts[:FOLLOWED]:
             few.descend(start, min(self.steps, FIRST_STEPS), tracker)
 
-    def _dead_zone(self, data: TrainingData, structure: Structure, tracker: Tracker) -> float:
-        """Return the pressure over which a dead zone fades that helps most, or 0 where none does."""
-        best, start = 0.0, tracker.best
-        assert start is not None
-        few = Search(data, structure, self.ridge).of_few(DEAD_SAMPLES)
-        least = (1.0 - HELPS) * few.cost(start)
-        for share in DEAD_ZONES:
+    def _dead_zone(self, few: Search, tracker: Tracker) -> tuple[float, Array]:
+        """Return over which pressure a dead zone fades that helps most, 0 if none does, and where.
+
+        Begins at what the tracker has found without one.
+        """
+        assert tracker.best is not None
+        fewer = few.of_few(DEAD_SAMPLES)
+        dead, best = 0.0, tracker.best
+        least = (1.0 - HELPS) * fewer.cost(best)
+        for pressure in np.array(DEAD_ZONES) * few.structure.highest:
             part = tracker.part(0.5, 0.6)
-            here = Search(acting(few.data, share * structure.highest), structure, self.ridge)
+            here = Search(acting(fewer.data, float(pressure)), few.structure, self.ridge)
             here.span = few.span
-            here.descend(start, min(self.steps, DEAD_STEPS), part)
+            here.descend(tracker.best, min(self.steps, DEAD_STEPS), part)
             if part.best is not None and part.best_cost < least:
-                best, least = share * structure.highest, part.best_cost
-                tracker.best, tracker.best_cost = part.best, part.best_cost
-        return best
+                dead, best, least = float(pressure), part.best, part.best_cost
+        return dead, best
 
     def uncertainty(
         self, block: Block, data: TrainingData, residual: Array, at_bounds: Sequence[int]

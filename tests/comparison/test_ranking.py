@@ -24,8 +24,9 @@ from mckibben import (
     registry,
 )
 from mckibben.comparison.channels import Channels
-from mckibben.comparison.results import CHOICES, Leaderboard, Standing
+from mckibben.comparison.results import CHOICES, Leaderboard
 from mckibben.comparison.splits import folds, given_split, held_out_tail, validation_folds
+from mckibben.comparison.standing import Standing
 from mckibben.comparison.trying import Data, Item, errors_on_test, joined, parts_of, try_part
 from mckibben.estimators.core.estimator import Estimator
 from mckibben.signals import irregular_triangle, triangle

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 from mckibben.cli.output import print_table, say
 
 if TYPE_CHECKING:
-    from mckibben.comparison.results import Leaderboard, Standing
+    from mckibben.comparison.results import Leaderboard
+    from mckibben.comparison.standing import Standing
 
 
 PRINTED = ("chosen", "test", "interval", "rank", "gap")

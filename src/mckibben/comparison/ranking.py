@@ -15,7 +15,8 @@ from mckibben.comparison.coverage import OffTraining
 from mckibben.comparison.kept import Kept
 from mckibben.comparison.planning import N_FOLDS, Plan, Settings, plan_of
 from mckibben.comparison.recommending import CONSTANT
-from mckibben.comparison.results import CHOICES, Leaderboard, Row, Standing
+from mckibben.comparison.results import CHOICES, Leaderboard, Row
+from mckibben.comparison.standing import Standing
 from mckibben.comparison.trying import (
     Tried,
     effort_of,

@@ -15,8 +15,9 @@ from mckibben.comparison.inverting import InverseCheck, invert_best
 from mckibben.comparison.loops import closed_loops, published_rig
 from mckibben.comparison.planning import Settings, plan_of
 from mckibben.comparison.ranking import ranked
-from mckibben.comparison.results import Leaderboard, Standing
+from mckibben.comparison.results import Leaderboard
 from mckibben.comparison.splits import listed
+from mckibben.comparison.standing import Standing
 from mckibben.control import Tracked
 from mckibben.errors import DataError
 from mckibben.recording import Recording

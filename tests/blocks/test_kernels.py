@@ -15,6 +15,7 @@ from mckibben.blocks.core.fields import vector
 from mckibben.blocks.core.linear_system import eliminate
 from mckibben.blocks.core.root import solve_near
 from mckibben.blocks.coupled.balance import Balance
+from mckibben.blocks.coupled.balance_law import HEAD
 from mckibben.blocks.coupled.coupled_memory import CoupledMemory, readout_width
 from mckibben.blocks.coupled.force_balance import ForceBalance
 from mckibben.blocks.coupled.fuzzy_network import FuzzyNetwork
@@ -27,6 +28,7 @@ from mckibben.blocks.force.multistate_friction import deflected
 from mckibben.blocks.laws.trial import wander
 from mckibben.blocks.play_type.gpi import GPI
 from mckibben.blocks.preisach_type.preisach import DEPTH, Preisach, _output, _solve, everett
+from mckibben.estimators.coupled.balance_slopes import run as follow
 from mckibben.estimators.coupled.recurrent_fit import remembered
 from mckibben.registry import load
 from mckibben.system.compiling import Deferred
@@ -231,6 +233,46 @@ def test_friction_beyond_the_area_still_finds_pressures_that_balance() -> None:
     pressures = block.simulate(inputs)
     loads = LoadEstimate(block).simulate(np.column_stack([inputs[:, 0], pressures]))
     np.testing.assert_allclose(loads, 0.0, atol=1e-10)
+
+
+def test_slopes_of_a_balance_are_those_of_differences() -> None:
+    """Free from rest, with a tare, through breaks of its stops and beyond its hull."""
+    block = replace(Balance.example(), tare=True, hull=((-2.0, 6.0), (-2.0, 8.0)), grip=0.1)
+    driven, x = path([0.0, 0.0], [4.0, 4.0]), path([0.0, 0.0], [1.0, 60.0])
+    driven, x = driven[:30], np.ascontiguousarray(x[:30])
+    start = block.coefficients(0.1)
+    first = HEAD + len(block.limits) + 2 * len(block.lags)
+
+    def moved(c: Array) -> tuple[Array, Array]:
+        return follow(c, driven, driven, x, held=False)
+
+    found, slopes = moved(start)
+    inputs = np.column_stack([driven, x])
+    np.testing.assert_array_equal(found, block.inverse().simulate(inputs, sample_time=0.1))
+    n_own = start.size - first
+    for place in (2, 3, 5, 7, 10, 12, 14, 15, 17, 18, 19, n_own - 1, n_own):
+        at = 9 if place == n_own else first + place
+        step = np.zeros(start.size)
+        step[at] = 1e-6 * max(abs(start[at]), 0.1)
+        slope = (moved(start + step)[0] - moved(start - step)[0]) / (2.0 * step[at])
+        missed = np.abs(slope - slopes[:, :, place])
+        assert np.quantile(missed, 0.9) < 1e-5 * (np.abs(slope).max() + 1e-6), place
+    longer = [replace(block, lags=(0.8 * f, 12.0)).coefficients(0.1) for f in (1 + 1e-6, 1 - 1e-6)]
+    slope = (moved(longer[0])[0] - moved(longer[1])[0]) / 2e-6
+    np.testing.assert_allclose(slope, slopes[:, :, n_own + 1], atol=1e-5)
+
+
+def test_forces_that_a_held_balance_lacks_are_linear_in_its_coefficients() -> None:
+    block = replace(Balance.example(), walls=(0.0, 0.0))
+    measured, x = path([-4.0, -4.0], [10.0, 10.0])[:20], np.full((20, 2), 1.0)
+    driven = np.ascontiguousarray(measured[::-1] + 4.0)
+    c = block.coefficients(0.1)
+    width = (c.size - HEAD - len(block.limits) - 2 * len(block.lags)) // 2
+    for settled in (False, True):
+        lacking, slopes = follow(c, driven, measured, x, held=True, settled=settled)
+        own = np.concatenate([c[-2 * width :].reshape(2, width).ravel()])
+        own[[0, 1, width, width + 1]] = 0.0  # hulls
+        np.testing.assert_allclose(slopes[:, :, : 2 * width] @ own, lacking, atol=1e-9)
 
 
 def test_memory_with_products_of_three_agrees_with_its_twin() -> None:

@@ -358,10 +358,6 @@ class Balance(ManyChannels, Invertible):
         """Return what steps of Newton's method cost."""
         return newton_cost(4 * self.c_numbers(sample_time).size + len(self.driven) ** 3)
 
-    def c_numbers(self, sample_time: float | None) -> Array:
-        """Return what the kernels read."""
-        return self.coefficients(sample_time)
-
     @classmethod
     def example(cls) -> Self:
         """Return two muscles beside an extensor, one of them under a load."""

@@ -16,10 +16,13 @@ from mckibben.blocks.coupled.balance_law import (
     FROM_REST,
     HEAD,
     IN_TIME,
+    OWN,
     keep,
     muscle_width,
     muscles,
+    resisted,
     settle,
+    shortened,
     unbalanced,
 )
 
@@ -31,17 +34,13 @@ def slower(decay: float, gain: float, before: float, moved: float) -> float:
 
 
 @kernel
-def direct(
-    c: Array, state: Array, way: int, k: int, y: Array, x: Array, p: Array, slopes: Array
-) -> None:
-    """Fill how the forces of muscle k move with the coefficients, where it and its past stay."""
+def by_springs(c: Array, k: int, y: Array, x: Array, slopes: Array) -> None:
+    """Fill how springs and loads of muscle k move with the coefficients."""
     n, n_x, degree, n_loads = int(c[0]), int(c[1]), int(c[2]), int(c[3])
-    m, n_l, n_e, n_a, scale = int(c[4]), int(c[5]), int(c[6]), int(c[7]), c[8]
     width = muscle_width(c)
-    own = muscles(c) + k * width
     for i in range(slopes.size):
         slopes[i] = 0.0
-    place = k * width + 4
+    place = k * width + OWN
     for q in range(1 + n_x * degree):
         power = 1.0
         if q > 0:
@@ -51,22 +50,35 @@ def direct(
         for j in range(n):
             slopes[place + 1 + j] = power * y[j]
         place += 1 + n
-    inside = min(max(y[k], c[own]), c[own + 1])
-    u, beyond = inside / scale, (y[k] - inside) / scale
-    power = u
+    place = (k + 1) * width - n_loads
+    for i in range(n_loads):
+        slopes[place + i] = x[n_x + i]
+
+
+@kernel
+def direct(c: Array, state: Array, way: int, k: int, u: float, p: float, slopes: Array) -> None:
+    """Add how what muscle k resists with moves with the coefficients, where it and its past stay."""
+    n, m, n_l, n_e, n_a = int(c[0]), int(c[4]), int(c[5]), int(c[6]), int(c[7])
+    width, scale = muscle_width(c), c[8]
+    own = muscles(c) + k * width
+    slopes[k * width + 5] = u
+    place = k * width + OWN + (1 + int(c[1]) * int(c[2])) * (1 + n)
+    inside = min(max(u, c[own]), c[own + 1])
+    v, beyond = inside / scale, (u - inside) / scale
+    power = v
     for i in range(n_e):
-        slopes[place + i] = power * u + (i + 2) * power * beyond
-        power *= u
+        slopes[place + i] = power * v + (i + 2) * power * beyond
+        power *= v
     place += n_e
     power = 1.0
     for i in range(n_a):
-        slopes[place + i] = -p[k] * power
+        slopes[place + i] = -p * power
         if i > 0:
-            slopes[place + i] -= p[k] * beyond * i * power / u if u != 0.0 else 0.0
-        power *= u
+            slopes[place + i] -= p * beyond * i * power / v if v != 0.0 else 0.0
+        power *= v
     place += n_a
-    wall, grown = c[own + 2], max(p[k] + c[9], 0.0)
-    moved = y[k] + wall * p[k] - state[n + k]
+    wall, grown = c[own + 2], max(p + c[9], 0.0)
+    moved = u + wall * p - state[n + k]
     for i in range(m):
         if way == AT_REST:
             break
@@ -74,24 +86,21 @@ def direct(
         s = state[2 * n + k * m + i] + moved
         slopes[place + i] = min(max(s, -limit), limit)
         if -limit <= s <= limit:
-            slopes[k * width + 2] += h * p[k]
+            slopes[k * width + 2] += h * p
         elif grown > 0.0:
             by_grip = h * c[HEAD + i] if s > 0.0 else -h * c[HEAD + i]
             slopes[n * width] += by_grip
     place += m
     if way != AT_REST:
-        slopes[k * width + 3] = c[12] * (y[k] - state[k]) if way == IN_TIME else 0.0
+        slopes[k * width + 4] = c[12] * (u - state[k]) if way == IN_TIME else 0.0
         for i in range(n_l):
             q_before = state[2 * n + n * m + k * n_l + i]
             gain = c[HEAD + m + n_l + i] if way == IN_TIME else 1.0
             decay = c[HEAD + m + i]
-            slopes[place + i] = decay * q_before + gain * (y[k] - state[k])
+            slopes[place + i] = decay * q_before + gain * (u - state[k])
             if way == IN_TIME:
                 kappa = c[own + place - k * width + i]
-                slopes[n * width + 1 + i] = kappa * slower(decay, gain, q_before, y[k] - state[k])
-    place += n_l
-    for i in range(n_loads):
-        slopes[place + i] = x[n_x + i]
+                slopes[n * width + 1 + i] = kappa * slower(decay, gain, q_before, u - state[k])
 
 
 @kernel
@@ -122,7 +131,7 @@ def remembered(
         if abs(state[row] + moved) <= c[HEAD + i] * grown:
             for j in range(slopes.size):
                 slopes[j] += c[place + i] * (memory[row, j] - memory[n + k, j])
-    carried = c[own + 3] * c[12] if way == IN_TIME else 0.0
+    carried = c[own + 4] * c[12] if way == IN_TIME else 0.0
     for i in range(n_l):
         kappa = c[own + width - n_loads - n_l + i]
         carried += kappa * (c[HEAD + m + n_l + i] if way == IN_TIME else 1.0)
@@ -197,7 +206,7 @@ def move(
     scratch: Array,
 ) -> None:
     """Make one move, free or held, with all slopes; found are displacements, or what forces lack."""
-    n = int(c[0])
+    n, width = int(c[0]), muscle_width(c)
     vectors = scratch[: 3 * n].reshape((3, n))
     residual, column, gradient = vectors[0], vectors[1], vectors[2]
     matrix = scratch[3 * n : 3 * n + n * n].reshape((n, n))
@@ -207,8 +216,12 @@ def move(
         settle(c, state, way, y, x, p, scratch[3 * n + 3 * n * n :])
     unbalanced(c, state, way, y, x, p, residual, matrix, gradient)
     for k in range(n):
-        direct(c, state, way, k, y, x, p, slopes[k])
-        remembered(c, state, way, k, y[k], p[k], memory, slopes[k])
+        by_springs(c, k, y, x, slopes[k])
+        if shortened(c, muscles(c) + k * width, k, state, way, y[k], p[k])[1]:
+            slopes[k, k * width + 3] = 1.0
+        else:
+            direct(c, state, way, k, y[k], p[k], slopes[k])
+            remembered(c, state, way, k, y[k], p[k], memory, slopes[k])
         found[k] = residual[k] if held else y[k]
     if not held:
         for i in range(n):
@@ -228,9 +241,18 @@ def move(
                 slopes[k, j] = column[k]
     moves = memory[memory.shape[0] - 1]
     for k in range(n):
+        own = muscles(c) + k * width
+        u, slack = shortened(c, own, k, state, way, y[k], p[k])
         for j in range(slopes.shape[1]):
-            moves[j] = 0.0 if held else slopes[k, j]
-        carry(c, state, way, k, y[k], p[k], memory, moves)
+            moves[j] = 0.0 if held or slack else slopes[k, j]
+        if slack:
+            direct(c, state, way, k, u, p[k], moves)
+            remembered(c, state, way, k, u, p[k], memory, moves)
+            moves[k * width + 3] -= 1.0
+            stiffness = resisted(c, own, k, state, way, u, p[k])[1]
+            for j in range(slopes.shape[1]):
+                moves[j] /= -stiffness
+        carry(c, state, way, k, u, p[k], memory, moves)
     keep(c, state, way, y, p)
 
 

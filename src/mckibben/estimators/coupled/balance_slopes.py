@@ -314,7 +314,7 @@ def follow(
         for k in range(n):
             offset[k] = y[k]
             for j in range(memory.shape[1]):
-                tare[k, j] = memory[k, j]
+                tare[k, j] = 0.0 if held else row[k, j]
     for t in range(driven.shape[0]):
         for k in range(n):
             p[k] = driven[t, k]

@@ -166,12 +166,21 @@ class TrainingData:
     @property
     def lowest(self) -> Array:
         """Lowest value of every input over all runs."""
-        return np.min([run.driven.min(axis=0) for run in self.runs], axis=0)
+        return self.once(
+            "lowest", lambda: np.min([run.driven.min(axis=0) for run in self.runs], axis=0)
+        )
 
     @property
     def highest(self) -> Array:
         """Highest value of every input over all runs."""
-        return np.max([run.driven.max(axis=0) for run in self.runs], axis=0)
+        return self.once(
+            "highest", lambda: np.max([run.driven.max(axis=0) for run in self.runs], axis=0)
+        )
+
+    @property
+    def travel(self) -> Array:
+        """Range of every output over all runs."""
+        return self.once("travel", lambda: np.ptp(self.stacked("outputs"), axis=0))
 
     @property
     def input_range(self) -> tuple[float, float]:

@@ -223,7 +223,7 @@ class BalanceEstimator(CoupledEstimator):
             If nothing ever moves.
         """
         y = data.stacked("outputs")
-        span = np.ptp(y, axis=0)
+        span = data.travel
         if not (span > 0).all():
             raise ModelError(
                 f"{data.outputs[int(np.argmin(span))].name} never changes. Remedy: record muscles that "

@@ -57,7 +57,7 @@ class Search:
         order = [i for i, c in enumerate(data.scheduled) if c.name not in loads]
         order += [i for i, c in enumerate(data.scheduled) if c.name in loads]
         self.runs = [replace(run, scheduled=run.scheduled[:, order]) for run in data.runs]
-        self.span = np.ptp(data.stacked("outputs"), axis=0)
+        self.span = data.travel
         n_rows = sum(len(run.outputs) for run in self.runs) * structure.n
         self.n_rows = n_rows
         self.every = max(1, n_rows // MOST_ROWS)

@@ -249,6 +249,9 @@ def test_slopes_of_a_balance_are_those_of_differences() -> None:
     found, slopes = moved(start)
     inputs = np.column_stack([driven, x])
     np.testing.assert_array_equal(found, block.inverse().simulate(inputs, sample_time=0.1))
+    alone, none = follow(start, driven, driven, x, held=False, sloped=False)
+    np.testing.assert_array_equal(alone, found)
+    assert none.shape == (30, 2, 0)
     n_own = start.size - first
     for place in (2, 3, 5, 7, 10, 12, 14, 15, 17, 18, 19, n_own - 1, n_own):
         at = 9 if place == n_own else first + place

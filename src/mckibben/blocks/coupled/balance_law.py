@@ -258,10 +258,6 @@ def settle(c: Array, state: Array, way: int, y: Array, x: Array, p: Array, scrat
             step[k] = -residual[k]
             start[k] = y[k]
         eliminate(matrix, step)
-        if left <= SURE:
-            for k in range(n):
-                y[k] += step[k]
-            break
         down = 0.0
         for k in range(n):
             down += residual[k] * step[k]
@@ -270,6 +266,10 @@ def settle(c: Array, state: Array, way: int, y: Array, x: Array, p: Array, scrat
             for k in range(n):
                 step[k] = -residual[k]
                 down -= residual[k] * residual[k]
+        if left <= SURE:
+            for k in range(n):
+                y[k] += step[k]
+            break
         low, high, share = 0.0, -1.0, 1.0
         low_rate, high_rate = down, 0.0
         for _ in range(MOST_SEARCHED):

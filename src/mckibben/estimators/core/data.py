@@ -49,6 +49,18 @@ class Run:
         """The first output, shape (n,)."""
         return self.outputs[:, 0]
 
+    def thinned(self, every: int) -> Run:
+        """Return every so manieth sample."""
+        part = slice(None, None, every)
+        return replace(
+            self,
+            driven=self.driven[part],
+            outputs=self.outputs[part],
+            scheduled=self.scheduled[part],
+            counts=self.counts[part],
+            sample_time=None if self.sample_time is None else every * self.sample_time,
+        )
+
     def cut(self, start: int, stop: int | None = None) -> Run:
         """Return a part of the run, which begins with a memory of its own."""
         part = slice(start, stop)

@@ -24,6 +24,9 @@ MOST_ROWS = 12_000
 MOST_SAMPLES = 30_000
 """To find the way by; the last steps look at all."""
 
+STRAIGHT = 0.01
+"""What pressures may be off a straight line, relative to the highest."""
+
 WARMING = 0.2
 """Share of a run that does not begin at rest before which its errors do not count."""
 
@@ -69,16 +72,31 @@ class Search:
         ]
 
     def of_few(self, most: int = MOST_SAMPLES) -> Search:
-        """Return the same search over evenly chosen recordings, where there are very many samples."""
+        """Return the same search over fewer samples, where there are very many.
+
+        Those are thinned where inputs go straight between them; else recordings are chosen evenly.
+        """
         total = sum(len(run.outputs) for run in self.runs)
         if total <= most:
             return self
-        count = max(most * len(self.runs) // total, 1)
+        every = -(-total // most)
+        while not self._straight(every):
+            every //= 2
+        count = max(min(most * every * len(self.runs) // total, len(self.runs)), 1)
         chosen = np.unique(np.linspace(0, len(self.runs) - 1, count).round().astype(int))
-        few = replace(self.data, runs=tuple(self.data.runs[i] for i in chosen.tolist()))
-        found = Search(few, self.structure, self.ridge)
+        runs = tuple(self.data.runs[i].thinned(every) for i in chosen.tolist())
+        found = Search(replace(self.data, runs=runs), self.structure, self.ridge)
         found.span, found.cuts = self.span, self.cuts
         return found
+
+    def _straight(self, every: int) -> bool:
+        """Tell whether pressures go straight between every so many samples."""
+        missed = []
+        for run in self.runs:
+            t = np.arange(len(run.driven))
+            for column in run.driven.T:
+                missed.append(np.interp(t, t[::every], column[::every]) - column)
+        return _size(np.concatenate(missed)) <= STRAIGHT * self.structure.highest
 
     def followed(
         self, values: Array, place: int, *, held: bool, sloped: bool = True
@@ -208,8 +226,9 @@ class Search:
     ) -> Array:
         """Return coefficients base + mix free with the least |slopes free - target| physics allows.
 
-        ``triangle`` is that of slopes and target. Damped towards ``prior``, by every number's own effect, so that units do not matter; where it
-        has none it stays. Springs are made stiff where they were found soft.
+        ``triangle`` is that of slopes and target. Damped towards ``prior``, by every number's own
+        effect, so that units do not matter; where it has none it stays. Springs are made stiff where
+        they were found soft.
         """
         structure = self.structure
         size = np.sqrt((triangle[:, :-1] ** 2).sum(axis=0))
@@ -244,9 +263,7 @@ class Search:
             self.cuts.append((x, way))
         return values
 
-    def missed(
-        self, values: Array, place: int, *, sloped: bool = True
-    ) -> tuple[Array, Array]:
+    def missed(self, values: Array, place: int, *, sloped: bool = True) -> tuple[Array, Array]:
         """Return the errors over a run relative to the ranges, and their slopes by coefficients.
 
         Of a run that does not begin at rest the first part does not count, until it has forgotten.

@@ -14,6 +14,7 @@ import numpy as np
 
 from mckibben import Block, Channel, Series
 from mckibben.blocks.compose import PerChannel
+from mckibben.blocks.coupled.balance import Balance
 from mckibben.blocks.coupled.coupling import Coupling
 from mckibben.blocks.coupled.fuzzy_network import FuzzyNetwork
 from mckibben.blocks.laws.examples import examples
@@ -91,9 +92,40 @@ def compositions() -> Iterator[tuple[str, Block]]:
     yield "SDIHC, network solved by Newton's method", sdchm.inverse()
 
 
+def balance() -> Balance:
+    """Return a balance of three muscles beside an extensor, as a fit gives it."""
+    springs = []
+    for k in range(3):
+        row = [-2.0] * 3
+        row[k] = 15.0
+        springs.append((0.0, *row, -2.0, *(0.1 * v for v in row), 0.1, *(0.01 * v for v in row)))
+    return Balance(
+        springs=tuple(springs),
+        elasticity=((6.0, 4.0, 2.0, 1.0, 0.5),) * 3,
+        areas=((60.0, -25.0, -6.0),) * 3,
+        friction=((1.0, 1.0, 0.8, 0.6, 0.4, 0.3),) * 3,
+        relaxation=((1.0, 0.6),) * 3,
+        loads=((),) * 3,
+        damping=(0.1,) * 3,
+        walls=(0.05,) * 3,
+        limits=(0.02, 0.06, 0.2, 0.6, 1.8, 5.0),
+        grip=0.5,
+        lags=(0.8, 12.0),
+        hull=((-20.0, 50.0),) * 3,
+        scale=50.0,
+        degree=2,
+        driven=channels("displacement", "mm"),
+        scheduled=(Channel("pressure_extensor", "bar"),),
+        given=channels("pressure", "bar"),
+    )
+
+
 def models() -> Iterator[tuple[str, Block]]:
     """Give all that is measured."""
     yield from compositions()
+    muscles_of = "balance: three muscles, extensor, six stops, two lags"
+    yield f"{muscles_of}; to pressures", balance()
+    yield f"{muscles_of}; to displacements", balance().inverse()
     for title, block in examples().items():
         yield f"`{title}`", block
 

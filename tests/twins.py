@@ -839,9 +839,9 @@ def _solved(model: Callable[[Any, float], Any]) -> Twin:
 
 
 def coupling(block: Any, inputs: Rows, sample_time: float) -> Rows:
-    n = len(block.gains)
+    n, m = len(block.driven), len(block.given)
     return [
-        [math.fsum(block.gains[i][j] * row[i] for i in range(n)) for j in range(n)]
+        [math.fsum(block.gains[i][j] * row[i] for i in range(n)) for j in range(m)]
         for row in inputs
     ]
 

@@ -29,6 +29,7 @@ MODELS: dict[str, tuple[str, dict[str, Any]]] = {
         "coupled-memory",
         {"lags": (0.01,), "degree": 1, "thresholds": (0.02, 0.05, 0.1, 0.2, 0.4)},
     ),
+    "balance of forces, each muscle along its direction": ("balance", {}),
     "raw fuzzy network": ("tsfnn", {"constants": True}),
 }
 
@@ -62,7 +63,7 @@ def main() -> None:
     found = []
     for title, (model, settings) in MODELS.items():
         board = compare(
-            train, test, input=inputs, models=[model], settings={model: settings}, n_folds=0
+            train, test, inputs=inputs, models=[model], settings={model: settings}, n_folds=0
         )
         (row,) = board.rows
         if row.test is None:

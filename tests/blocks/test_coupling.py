@@ -45,6 +45,18 @@ def test_singular_gains_are_refused() -> None:
         Coupling(((1.0, 1.0), (1.0, 1.0)), CHANNELS, CHANNELS).inverse()
 
 
+def test_more_muscles_than_coordinates_are_undone_by_the_least_of_them() -> None:
+    tip, muscles = CHANNELS, tuple(Channel(f"shortening_{k}", "mm") for k in (1, 2, 3))
+    block = Coupling(((1.0, 0.0), (-0.5, 0.9), (-0.5, -0.9)), muscles, tip)
+    h = np.array([[1.0, 2.0], [-3.0, 0.5]])
+    v = block.inverse().simulate(h)
+    np.testing.assert_allclose(block.simulate(v), h, atol=1e-14)
+    np.testing.assert_allclose(v @ [0.9, 0.9, 0.9], 0.0, atol=1e-14)  # they pull together at none
+    np.testing.assert_allclose(block.inverse().inverse().simulate(v), h, atol=1e-14)
+    with pytest.raises(ModelError, match=r"3 inputs and 2 outputs.*inverse"):
+        block.jacobi(h)
+
+
 @pytest.mark.parametrize("gains", [(), ((1.0,), (1.0,)), ((1.0, 2.0),)])
 def test_gains_that_are_not_square_are_refused(gains: tuple[tuple[float, ...], ...]) -> None:
     with pytest.raises(ModelError, match="Remedy"):

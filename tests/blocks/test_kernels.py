@@ -281,6 +281,9 @@ def test_slopes_of_a_balance_are_those_of_differences(pushes: tuple[float, float
     inputs = np.column_stack([driven, x])
     free = block.inverse().simulate(inputs, sample_time=0.1)
     np.testing.assert_allclose(found, free, rtol=1e-13)  # Newton's method begins elsewhere if slack
+    alone, none = follow(start, driven, driven, x, held=False, sloped=False)
+    np.testing.assert_array_equal(alone, found)
+    assert none.shape == (30, 2, 0)
     n_own = start.size - first
     for place in (2, 3, 4, 5, 7, 9, 12, 14, 16, 17, 19, 20, 21, n_own - 1, n_own):
         at = 9 if place == n_own else first + place

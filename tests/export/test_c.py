@@ -79,6 +79,13 @@ def sdchm() -> Block:
     return Series((load("blocks", "per-channel")(muscles), Coupling(gains, own, coupled), network))
 
 
+def joint() -> Block:
+    """Return two muscles in balance that move one coordinate."""
+    balance = load("blocks", "balance").example()
+    across = Coupling(((0.5,), (-0.5,)), balance.driven, (Channel("angle", "mm"),))
+    return Series((balance.inverse(), across))
+
+
 def mpi_narmax() -> Block:
     """Return a Prandtl-Ishlinskii model and a recurrent network behind it, under a load."""
     network = RecurrentFuzzyNetwork.example()
@@ -105,6 +112,8 @@ MODELS: dict[str, Block] = {
     "SDCHM": sdchm(),
     "SDIHC": sdchm().inverse(),
     "MPI-NARMAX": mpi_narmax(),
+    "joint": joint(),
+    "joint inverse": joint().inverse(),
     "explicit start": replace(load("blocks", "pi").example(), initial=(0.1, 0.2, 0.3, 0.4)),
     **{
         f"virgin {kind}": virgin(kind)

@@ -39,6 +39,9 @@ MOST_STEPS, MOST_SEARCHED = 60, 25
 BALANCED, NEARLY = 2e-15, 1e-9
 """Residual, relative to the forces, that is an equilibrium, and that is one but for rounding."""
 
+SURE = 1e-11
+"""Residual from which one step more, be it not looked at, ends at an equilibrium."""
+
 LEAST_AREA = 0.01
 """Smallest area, relative to that at rest: a muscle that is as short as it gets pulls no more."""
 
@@ -51,21 +54,21 @@ sample time."""
 def sprung(c: Array, own: int, k: int, y: Array, x: Array, gradient: Array) -> float:
     """Return springs and loads of muscle k, and fill their gradient by y."""
     n, n_x, degree, n_loads = int(c[0]), int(c[1]), int(c[2]), int(c[3])
-    for j in range(n):
-        gradient[j] = 0.0
-    force = 0.0
     place = own + OWN
-    for q in range(1 + n_x * degree):
+    force = c[place]
+    for j in range(n):
+        gradient[j] = c[place + 1 + j]
+        force += gradient[j] * y[j]
+    for i in range(n_x):
         power = 1.0
-        if q > 0:
-            for _ in range((q - 1) % degree + 1):
-                power *= x[(q - 1) // degree]
-        force += power * c[place]
-        for j in range(n):
-            spring = power * c[place + 1 + j]
-            force += spring * y[j]
-            gradient[j] += spring
-        place += 1 + n
+        for _ in range(degree):
+            power *= x[i]
+            place += 1 + n
+            force += power * c[place]
+            for j in range(n):
+                spring = power * c[place + 1 + j]
+                force += spring * y[j]
+                gradient[j] += spring
     place = own + muscle_width(c) - n_loads
     for i in range(n_loads):
         force += c[place + i] * x[n_x + i]
@@ -132,16 +135,10 @@ def rubbed(
     for i in range(m):
         h, limit = c[place + i], c[HEAD + i] * grown
         s = state[2 * n + k * m + i] + moved
-        if s > limit:
-            force += h * limit
-            by_p += h * c[HEAD + i]
-        elif s < -limit:
-            force -= h * limit
-            by_p -= h * c[HEAD + i]
-        else:
-            force += h * s
-            by_y += h
-            by_p += h * wall
+        held = min(max(s, -limit), limit)
+        force += h * held
+        by_y += h if s == held else 0.0
+        by_p += h * (wall if s == held else c[HEAD + i] if s > 0.0 else -c[HEAD + i])
     return force, by_y, by_p
 
 
@@ -334,6 +331,10 @@ def settle(c: Array, state: Array, way: int, y: Array, x: Array, p: Array, scrat
             for k in range(n):
                 step[k] = -residual[k]
                 down -= residual[k] * residual[k]
+        if left <= SURE:
+            for k in range(n):
+                y[k] += step[k]
+            break
         low, high, share = 0.0, -1.0, 1.0
         low_rate, high_rate = down, 0.0
         for _ in range(MOST_SEARCHED):

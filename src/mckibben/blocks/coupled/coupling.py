@@ -1,5 +1,7 @@
 """Linear coupling of muscles: what each gives is felt by all, h = G^T v.
 
+Muscles may be more than the coordinates that they move together, or the other way round.
+
 Source: "Modeling and Compensation of Stiffness-Dependent Hysteresis Coupling Behavior for Parallel
 Pneumatic Artificial Muscle-Driven Soft Manipulator", Eqs. (8) and (14).
 """
@@ -28,7 +30,7 @@ def coupling_kernel(coefficients: Array, state: Array, inputs: Array, outputs: A
     """Multiply by a matrix; coefficients are the matrix, row after row, one row an output."""
     n = inputs.shape[1]
     for t in range(inputs.shape[0]):
-        for j in range(n):
+        for j in range(outputs.shape[1]):
             total = 0.0
             for i in range(n):
                 total += coefficients[j * n + i] * inputs[t, i]
@@ -41,10 +43,10 @@ class Coupling(Stateless, Primitive):
 
     Parameters
     ----------
-    gains : sequence of n sequences of n floats
-        G: row i is what muscle i gives to every muscle; 1 on the diagonal where each gives itself
-        what it gives. Finite; invertible where an inverse is wanted.
-    driven, given : sequence of n Channel
+    gains : sequence of n sequences of m floats
+        G: row i is what muscle i gives to every muscle, or to every coordinate; 1 on the diagonal
+        where each gives itself what it gives. Finite; of full rank where an inverse is wanted.
+    driven, given : sequence of n and of m Channel
         Channels driven and channels given.
     """
 
@@ -57,16 +59,12 @@ class Coupling(Stateless, Primitive):
     given: Channels
 
     def __post_init__(self) -> None:
-        n = len(self.gains)
-        if n == 0 or any(len(row) != n for row in self.gains):
+        widths = [len(row) for row in self.gains]
+        n, m = len(self.driven), len(self.given)
+        if min(n, m) == 0 or widths != [m] * n:
             raise ModelError(
-                f"gains of {self.kind!r} have rows of {[len(row) for row in self.gains]}. "
-                "Remedy: give as many rows as columns."
-            )
-        if len(self.driven) != n or len(self.given) != n:
-            raise ModelError(
-                f"{self.kind!r} of {n} muscles has {len(self.driven)} inputs and {len(self.given)} "
-                f"outputs. Remedy: give {n} of each."
+                f"gains of {self.kind!r} have rows of {widths}, and it {n} inputs and {m} outputs. "
+                "Remedy: give a row an input, of one number an output."
             )
 
     @property
@@ -81,7 +79,7 @@ class Coupling(Stateless, Primitive):
 
     @property
     def matrix(self) -> Array:
-        """G, shape (n, n)."""
+        """G, shape (n, m)."""
         return np.array(self.gains)
 
     def coefficients(self, sample_time: float | None) -> Array:
@@ -92,11 +90,15 @@ class Coupling(Stateless, Primitive):
     @property
     def radius(self) -> float:
         """Spectral radius of I - G^T: `jacobi` converges where it is below 1."""
-        n = len(self.gains)
+        n, m = self.matrix.shape
+        if n != m:
+            raise ModelError(
+                f"{n} inputs and {m} outputs have no such radius. Remedy: use inverse()."
+            )
         return float(np.abs(np.linalg.eigvals(np.eye(n) - self.matrix.T)).max())
 
     def inverse(self) -> Block:
-        """Return the decoupling v = G^-T h, by direct solution.
+        """Return the decoupling v = G^-T h, by direct solution; of several v, the least.
 
         Raises
         ------
@@ -109,7 +111,8 @@ class Coupling(Stateless, Primitive):
                 f"the coupling cannot be undone: its gains are singular (condition {condition:.1e}). "
                 "Remedy: identify it from runs in which each muscle is driven alone."
             )
-        return Coupling(rows(np.linalg.inv(self.matrix)), self.given, self.driven)
+        undone = np.linalg.inv if len(self.driven) == len(self.given) else np.linalg.pinv
+        return Coupling(rows(undone(self.matrix)), self.given, self.driven)
 
     def jacobi(
         self, coupled: ArrayLike, *, tolerance: float = 0.01, max_iterations: int = 1000

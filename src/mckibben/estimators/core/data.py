@@ -49,6 +49,18 @@ class Run:
         """The first output, shape (n,)."""
         return self.outputs[:, 0]
 
+    def thinned(self, every: int) -> Run:
+        """Return every so manieth sample."""
+        part = slice(None, None, every)
+        return replace(
+            self,
+            driven=self.driven[part],
+            outputs=self.outputs[part],
+            scheduled=self.scheduled[part],
+            counts=self.counts[part],
+            sample_time=None if self.sample_time is None else every * self.sample_time,
+        )
+
     def cut(self, start: int, stop: int | None = None) -> Run:
         """Return a part of the run, which begins with a memory of its own."""
         part = slice(start, stop)
@@ -166,12 +178,21 @@ class TrainingData:
     @property
     def lowest(self) -> Array:
         """Lowest value of every input over all runs."""
-        return np.min([run.driven.min(axis=0) for run in self.runs], axis=0)
+        return self.once(
+            "lowest", lambda: np.min([run.driven.min(axis=0) for run in self.runs], axis=0)
+        )
 
     @property
     def highest(self) -> Array:
         """Highest value of every input over all runs."""
-        return np.max([run.driven.max(axis=0) for run in self.runs], axis=0)
+        return self.once(
+            "highest", lambda: np.max([run.driven.max(axis=0) for run in self.runs], axis=0)
+        )
+
+    @property
+    def travel(self) -> Array:
+        """Range of every output over all runs."""
+        return self.once("travel", lambda: np.ptp(self.stacked("outputs"), axis=0))
 
     @property
     def input_range(self) -> tuple[float, float]:

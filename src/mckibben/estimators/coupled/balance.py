@@ -3,6 +3,7 @@
 First the forces that the muscles lack where they were measured, linear in almost all coefficients, by
 least squares weighted by stiffness; then the displacements of the free run, by Gauss-Newton steps with
 exact derivatives. Both keep to what physics asks (`mckibben.estimators.coupled.balance_structure`).
+Muscles may be more than the coordinates (`mckibben.estimators.coupled.balance_coordinates`).
 """
 
 from __future__ import annotations
@@ -31,6 +32,12 @@ from mckibben.estimators.coupled.balance_checks import (
     one_speed,
     other_zeros,
     telling,
+)
+from mckibben.estimators.coupled.balance_coordinates import (
+    directions_of,
+    in_words,
+    shortened,
+    together,
 )
 from mckibben.estimators.coupled.balance_search import Search
 from mckibben.estimators.coupled.balance_structure import APART, Structure
@@ -108,6 +115,7 @@ class BalanceEstimator(CoupledEstimator):
 
     effort: ClassVar[float] = 1.0
     alone: ClassVar[bool] = True
+    fewer_outputs: ClassVar[bool] = True
 
     n_stops: Annotated[int, Interval(ge=0, le=30)] = 6
     finest: Annotated[float, Interval(gt=0, lt=0.5)] = 0.003
@@ -125,8 +133,14 @@ class BalanceEstimator(CoupledEstimator):
     def identify(self, data: TrainingData, tracker: Tracker) -> Block:
         """Return the balance, solved for displacements."""
         data, notes = telling(data)
-        check_directions(data)
         tracker.notes += [*notes, *other_zeros(data), *not_at_rest(data)]
+        behind = None
+        if len(data.inputs) > len(data.outputs):
+            along = directions_of(data)
+            tracker.notes.append(in_words(data, along))
+            coordinates, data = data.outputs, shortened(data, along)
+            behind = together(data, along, coordinates)
+        check_directions(data)
         ways = directions(data)
         data = turned(data, ways)
         structure = self.structure(data, tracker)
@@ -173,6 +187,7 @@ class BalanceEstimator(CoupledEstimator):
             if any(way != (1.0, 0.0) for way in ways)
         ]
         parts = [*_side_by_side(contacts), balance.inverse(), *_side_by_side(sensors)]
+        parts += [behind] if behind else []
         return parts[0] if len(parts) == 1 else Series(tuple(parts))
 
     def _begin(self, few: Search, tracker: Tracker) -> None:
@@ -223,6 +238,8 @@ class BalanceEstimator(CoupledEstimator):
         self, block: Block, data: TrainingData, residual: Array, at_bounds: Sequence[int]
     ) -> tuple[float, Array]:
         """Return condition and covariance of what is free, from the exact slopes of the free run."""
+        if len(data.inputs) > len(data.outputs):
+            return np.nan, unknown(block)  # directions are not among what is free
         balance, contacts, _ = parts_of(block)
         told, _ = telling(data)
         shortened = turned(told, directions(told))
@@ -248,7 +265,7 @@ class BalanceEstimator(CoupledEstimator):
             If nothing ever moves.
         """
         y = data.stacked("outputs")
-        span = np.ptp(y, axis=0)
+        span = data.travel
         if not (span > 0).all():
             raise ModelError(
                 f"{data.outputs[int(np.argmin(span))].name} never changes. Remedy: record muscles that "

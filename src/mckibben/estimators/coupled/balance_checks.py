@@ -80,8 +80,7 @@ def one_speed(data: TrainingData) -> bool:
 
 def held(data: TrainingData, run: Run) -> bool:
     """Tell whether nothing moves in a run, so that its forces are what tells of the muscle."""
-    span = np.ptp(data.stacked("outputs"), axis=0)
-    return bool((np.ptp(run.outputs, axis=0) < HELD * span).all())
+    return bool((np.ptp(run.outputs, axis=0) < HELD * data.travel).all())
 
 
 def at_rest(data: TrainingData, run: Run) -> bool:
@@ -103,7 +102,7 @@ def other_zeros(data: TrainingData) -> list[str]:
     first = np.array([[*run.driven[0], *run.scheduled[0]] for run in data.runs])
     began = np.array([run.outputs[0] for run in data.runs])
     whole = np.hstack([data.stacked("driven"), data.stacked("scheduled")])
-    spans, travel = np.ptp(whole, axis=0), np.ptp(data.stacked("outputs"), axis=0)
+    spans, travel = np.ptp(whole, axis=0), data.travel
     notes = []
     for place, run in enumerate(data.runs):
         same = (np.abs(first - first[place]) <= SAME * spans).all(axis=1)

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.polynomial import polynomial
 
 from mckibben.arrays import Array
 from mckibben.errors import DataError, ModelError
@@ -22,6 +23,9 @@ MOST_ROWS = 12_000
 
 MOST_SAMPLES = 30_000
 """To find the way by; the last steps look at all."""
+
+STRAIGHT = 0.01
+"""What pressures may be off a straight line, relative to the highest."""
 
 WARMING = 0.2
 """Share of a run that does not begin at rest before which its errors do not count."""
@@ -56,31 +60,49 @@ class Search:
         order = [i for i, c in enumerate(data.scheduled) if c.name not in loads]
         order += [i for i, c in enumerate(data.scheduled) if c.name in loads]
         self.runs = [replace(run, scheduled=run.scheduled[:, order]) for run in data.runs]
-        self.span = np.ptp(data.stacked("outputs"), axis=0)
+        self.span = data.travel
         n_rows = sum(len(run.outputs) for run in self.runs) * structure.n
         self.n_rows = n_rows
         self.every = max(1, n_rows // MOST_ROWS)
         self.cuts: list[tuple[Array, Array]] = []
+        self.still = [bool(structure.loaded) and held(data, run) for run in self.runs]
+        self.unsure = [
+            0.0 if still or at_rest(data, run) else WARMING
+            for still, run in zip(self.still, self.runs, strict=True)
+        ]
 
     def of_few(self, most: int = MOST_SAMPLES) -> Search:
-        """Return the same search over evenly chosen recordings, where there are very many samples."""
+        """Return the same search over fewer samples, where there are very many.
+
+        Those are thinned where inputs go straight between them; else recordings are chosen evenly.
+        """
         total = sum(len(run.outputs) for run in self.runs)
         if total <= most:
             return self
-        count = max(most * len(self.runs) // total, 1)
+        every = -(-total // most)
+        while not self._straight(every):
+            every //= 2
+        count = max(min(most * every * len(self.runs) // total, len(self.runs)), 1)
         chosen = np.unique(np.linspace(0, len(self.runs) - 1, count).round().astype(int))
-        few = replace(self.data, runs=tuple(self.data.runs[i] for i in chosen.tolist()))
-        found = Search(few, self.structure, self.ridge)
+        runs = tuple(self.data.runs[i].thinned(every) for i in chosen.tolist())
+        found = Search(replace(self.data, runs=runs), self.structure, self.ridge)
         found.span, found.cuts = self.span, self.cuts
         return found
 
-    def held(self, run: Run) -> bool:
-        """Tell whether nothing moves in a run, so that its forces are what is compared."""
-        return bool(self.structure.loaded) and held(self.data, run)
+    def _straight(self, every: int) -> bool:
+        """Tell whether pressures go straight between every so many samples."""
+        missed = []
+        for run in self.runs:
+            t = np.arange(len(run.driven))
+            for column in run.driven.T:
+                missed.append(np.interp(t, t[::every], column[::every]) - column)
+        return _size(np.concatenate(missed)) <= STRAIGHT * self.structure.highest
 
-    def followed(self, values: Array, run: Run, *, held: bool) -> tuple[Array, Array]:
-        """Return displacements, or forces that are lacking, and their slopes."""
-        block = self.structure.block(values)
+    def followed(
+        self, values: Array, place: int, *, held: bool, sloped: bool = True
+    ) -> tuple[Array, Array]:
+        """Return displacements of a run, or forces that are lacking, and their slopes."""
+        block, run = self.structure.block(values), self.runs[place]
         return follow(
             block.coefficients(run.sample_time or 1.0),
             np.ascontiguousarray(run.driven),
@@ -88,7 +110,8 @@ class Search:
             np.ascontiguousarray(run.scheduled),
             held=held,
             every=self.every,
-            settled=self.held(run),
+            settled=self.still[place],
+            sloped=sloped,
         )
 
     def measured(self, run: Run) -> Array:
@@ -104,9 +127,9 @@ class Search:
         structure = self.structure
         values = structure.start
         values[structure.grip] = grip
-        found = [self.followed(values, run, held=True)[1] for run in self.runs]
-        for run, of_run in zip(self.runs, found, strict=True):
-            of_run[: round(self.unsure(run) * len(of_run))] = 0.0
+        found = [self.followed(values, place, held=True)[1] for place in range(len(self.runs))]
+        for unsure, of_run in zip(self.unsure, found, strict=True):
+            of_run[: round(unsure * len(of_run))] = 0.0
         slopes = np.concatenate(found)
         slopes[:, :, structure.grip :] = 0.0
         for k in range(structure.n):
@@ -119,9 +142,8 @@ class Search:
         for _ in range(2):
             rows = slopes * weights[..., np.newaxis]
             flat = rows.reshape(-1, rows.shape[2])
-            values = self.solved(
-                flat @ mix, -(flat @ base), base, mix, np.zeros(mix.shape[1]), self.ridge
-            )
+            triangle = _triangle(flat @ mix, -(flat @ base))
+            values = self.solved(triangle, base, mix, np.zeros(mix.shape[1]), self.ridge)
             weights = 1.0 / self.stiffness(values)
         if structure.in_newtons:
             forces = slice(structure.slices["damping"].start, structure.slices["loads"].stop)
@@ -137,7 +159,7 @@ class Search:
             for run in self.runs:
                 x, loads = np.split(run.scheduled, [len(structure.scheduled)], axis=1)
                 around = np.column_stack([np.ones(len(x)), run.outputs])
-                pulled = ((structure.powers(x) @ springs) * around).sum(axis=1)
+                pulled = ((structure.powers(x.T).T @ springs) * around).sum(axis=1)
                 pulled += loads @ values[structure.places("loads", k)]
                 most = max(most, -float(pulled.min()))
             values[structure.places("push", k)] = share * most
@@ -196,45 +218,40 @@ class Search:
         structure, found = self.structure, []
         for run in self.runs:
             y = self.measured(run)
-            columns = []
+            u = y / structure.scale
+            x = run.scheduled[:: self.every, : len(structure.scheduled)]
+            p = run.driven[:: self.every]
+            powers = structure.powers(x.T)
+            own = np.empty_like(u)
             for k in range(structure.n):
-                u = y[:, k] / structure.scale
-                own = np.full(len(u), values[structure.places("bladder", k)[0]])
                 springs = values[structure.places("springs", k)].reshape(-1, 1 + structure.n)
-                x = run.scheduled[:: self.every, : len(structure.scheduled)][: len(u)]
-                own += structure.powers(x) @ springs[:, 1 + k]
                 elastic = values[structure.places("elasticity", k)]
-                for i, e in enumerate(elastic, start=2):
-                    own += e * i * u ** (i - 1) / structure.scale
-                area = values[structure.places("areas", k)]
-                p = run.driven[:: self.every][: len(u), k]
-                for i, a in enumerate(area[1:], start=1):
-                    own -= p * a * i * u ** (i - 1) / structure.scale
-                columns.append(own + 0.3 * values[structure.places("friction", k)].sum())
-            found.append(np.column_stack(columns))
+                areas = values[structure.places("areas", k)]
+                slope = polynomial.polyder([0.0, 0.0, *elastic]) / structure.scale
+                narrowing = polynomial.polyder(areas) / structure.scale
+                own[:, k] = springs[:, 1 + k] @ powers + polynomial.polyval(u[:, k], slope)
+                own[:, k] -= p[:, k] * polynomial.polyval(u[:, k], narrowing)
+                own[:, k] += values[structure.places("bladder", k)[0]]
+                own[:, k] += 0.3 * values[structure.places("friction", k)].sum()
+            found.append(own)
         table = np.concatenate(found)
         return np.maximum(table, 0.1 * np.median(np.abs(table), axis=0))
 
     def solved(
-        self,
-        slopes: Array,
-        target: Array,
-        base: Array,
-        mix: Array,
-        prior: Array,
-        damping: float,
+        self, triangle: Array, base: Array, mix: Array, prior: Array, damping: float
     ) -> Array:
         """Return coefficients base + mix free with the least |slopes free - target| physics allows.
 
-        Damped towards ``prior``, by every number's own effect, so that units do not matter; where it
-        has none it stays. Springs are made stiff where they were found soft.
+        ``triangle`` is that of slopes and target. Damped towards ``prior``, by every number's own
+        effect, so that units do not matter; where it has none it stays. Springs are made stiff where
+        they were found soft.
         """
         structure = self.structure
-        size = np.sqrt((slopes**2).sum(axis=0))
+        size = np.sqrt((triangle[:, :-1] ** 2).sum(axis=0))
         known = size > UNKNOWN * size.max()
         base = base + mix[:, ~known] @ prior[~known]
-        slopes, mix, prior, size = slopes[:, known], mix[:, known], prior[known], size[known]
-        triangle: Array = np.linalg.qr(np.column_stack([slopes, target]), mode="r")  # type: ignore[assignment]
+        triangle = triangle[:, np.append(known, True)]
+        mix, prior, size = mix[:, known], prior[known], size[known]
         held = np.maximum(np.sqrt(damping), LIGHTEST) * size
         system = np.vstack([triangle[:, :-1], np.diag(held)])
         right = np.concatenate([triangle[:, -1], held * prior])
@@ -254,30 +271,27 @@ class Search:
             self.cuts.append((x, way))
         return values
 
-    def missed(self, values: Array, run: Run) -> tuple[Array, Array]:
+    def missed(self, values: Array, place: int, *, sloped: bool = True) -> tuple[Array, Array]:
         """Return the errors over a run relative to the ranges, and their slopes by coefficients.
 
         Of a run that does not begin at rest the first part does not count, until it has forgotten.
         """
-        if self.held(run):
-            found, by = self.followed(values, run, held=True)
+        still = self.still[place]
+        found, by = self.followed(values, place, held=still, sloped=sloped)
+        if still:
             areas = [values[self.structure.places("areas", k)[0]] for k in range(self.structure.n)]
             scale = 1.0 / (np.array(areas) * self.structure.highest)
         else:
-            found, by = self.followed(values, run, held=False)
-            found = found - self.measured(run)
+            found = found - self.measured(self.runs[place])
             scale = 1.0 / self.span
-        counts = (np.arange(len(found)) >= self.unsure(run) * len(found))[:, np.newaxis]
-        by = by * (scale * counts)[..., np.newaxis]
-        return (found * scale * counts).ravel(), by.reshape(-1, by.shape[2])
+        counts = (np.arange(len(found)) >= self.unsure[place] * len(found))[:, np.newaxis]
+        by *= (scale * counts)[..., np.newaxis]
+        return (found * scale * counts).ravel(), by.reshape(found.size, by.shape[2])
 
-    def unsure(self, run: Run) -> float:
-        """Return the share of a run in which it still remembers what came before it, unknown."""
-        return 0.0 if self.held(run) or at_rest(self.data, run) else WARMING
-
-    def errors(self, values: Array) -> tuple[Array, Array]:
-        """Return the errors over all runs, and their slopes."""
-        errors, slopes = zip(*(self.missed(values, run) for run in self.runs), strict=True)
+    def errors(self, values: Array, *, sloped: bool = True) -> tuple[Array, Array]:
+        """Return the errors over all runs, and their slopes, of no columns if not wanted."""
+        of_runs = [self.missed(values, place, sloped=sloped) for place in range(len(self.runs))]
+        errors, slopes = zip(*of_runs, strict=True)
         return np.concatenate(errors), np.concatenate(slopes)
 
     def covariance(self, values: Array) -> tuple[float, Array]:
@@ -308,7 +322,7 @@ class Search:
 
     def cost(self, values: Array) -> float:
         """Return the root mean square of the errors."""
-        found = _size(self.errors(values)[0])
+        found = _size(self.errors(values, sloped=False)[0])
         return found if np.isfinite(found) else np.inf
 
     def descend(self, values: Array, steps: int, tracker: Tracker) -> None:
@@ -323,27 +337,36 @@ class Search:
             usable = np.isfinite(moving).all(axis=1)
             now = mix.T @ values / mix.sum(axis=0)
             base = values - mix @ now
-            target = moving[usable] @ now - errors[usable]
-            for _ in range(MOST_TRIES):
+            moving, errors = moving[usable], errors[usable]
+            triangle = _triangle(moving, moving @ now - errors)
+            for number in range(MOST_TRIES):
                 try:
-                    tried = self.solved(moving[usable], target, base, mix, now, damping)
+                    tried = self.solved(triangle, base, mix, now, damping)
                 except ModelError:
                     damping = max(10.0 * damping, 1e-9)
                     continue
-                tried_errors, tried_slopes = self.errors(tried)
-                found = _size(tried_errors)
+                # most first tries are good, so that slopes are found at once
+                errors, slopes = self.errors(tried, sloped=number == 0)
+                found = _size(errors)
                 if found < cost:
+                    if number:
+                        errors, slopes = self.errors(tried)
                     break
                 damping = max(10.0 * damping, 1e-9)
             else:
                 return
             gained = (cost - found) / cost
-            values, errors, slopes, cost = tried, tried_errors, tried_slopes, found
+            values, cost = tried, found
             tracker.saw(values, cost)
             damping = max(damping / 5.0, LIGHTEST**2)
             slow = slow + 1 if gained < 1e-3 else 0
             if slow >= 3:
                 return
+
+
+def _triangle(slopes: Array, target: Array) -> Array:
+    """Return the triangle that has all that least squares of slopes and target ask of both."""
+    return np.linalg.qr(np.column_stack([slopes, target]), mode="r")  # type: ignore[return-value]
 
 
 def _size(errors: Array) -> float:

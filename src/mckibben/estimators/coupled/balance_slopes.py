@@ -28,9 +28,18 @@ from mckibben.blocks.coupled.balance_law import (
 
 
 @kernel
-def slower(decay: float, gain: float, before: float, moved: float) -> float:
+def slower(c: Array, i: int, before: float, moved: float) -> float:
     """Return how what a lag is behind moves with the logarithm of its time constant."""
-    return -decay * np.log(decay) * before + (gain - decay) * moved
+    n_l = int(c[5])
+    place = HEAD + int(c[4]) + i
+    return c[c.size - n_l + i] * before + (c[place + n_l] - c[place]) * moved
+
+
+@kernel
+def mixed(to: Array, kept: float, share: float, row: Array) -> None:
+    """Keep a share of some numbers, and add a share of others: the one loop over all coefficients."""
+    for j in range(to.size):
+        to[j] = kept * to[j] + share * row[j]
 
 
 @kernel
@@ -41,15 +50,17 @@ def by_springs(c: Array, k: int, y: Array, x: Array, slopes: Array) -> None:
     for i in range(slopes.size):
         slopes[i] = 0.0
     place = k * width + OWN
-    for q in range(1 + n_x * degree):
+    slopes[place] = 1.0
+    for j in range(n):
+        slopes[place + 1 + j] = y[j]
+    for i in range(n_x):
         power = 1.0
-        if q > 0:
-            for _ in range((q - 1) % degree + 1):
-                power *= x[(q - 1) // degree]
-        slopes[place] = power
-        for j in range(n):
-            slopes[place + 1 + j] = power * y[j]
-        place += 1 + n
+        for _ in range(degree):
+            power *= x[i]
+            place += 1 + n
+            slopes[place] = power
+            for j in range(n):
+                slopes[place + 1 + j] = power * y[j]
     place = (k + 1) * width - n_loads
     for i in range(n_loads):
         slopes[place + i] = x[n_x + i]
@@ -70,11 +81,10 @@ def direct(c: Array, state: Array, way: int, k: int, u: float, p: float, slopes:
         slopes[place + i] = power * v + (i + 2) * power * beyond
         power *= v
     place += n_e
-    power = 1.0
+    power, below = 1.0, 0.0
     for i in range(n_a):
-        slopes[place + i] = -p * power
-        if i > 0:
-            slopes[place + i] -= p * beyond * i * power / v if v != 0.0 else 0.0
+        slopes[place + i] = -p * (power + i * below * beyond)
+        below = power
         power *= v
     place += n_a
     wall, grown = c[own + 2], max(p + c[9], 0.0)
@@ -100,7 +110,7 @@ def direct(c: Array, state: Array, way: int, k: int, u: float, p: float, slopes:
             slopes[place + i] = decay * q_before + gain * (u - state[k])
             if way == IN_TIME:
                 kappa = c[own + place - k * width + i]
-                slopes[n * width + 1 + i] = kappa * slower(decay, gain, q_before, u - state[k])
+                slopes[n * width + 1 + i] = kappa * slower(c, i, q_before, u - state[k])
 
 
 @kernel
@@ -116,7 +126,8 @@ def remembered(
 ) -> None:
     """Add how the forces of muscle k move with the coefficients through its past.
 
-    ``memory`` has, by coefficient, how the state moves: displacements, stretches, stops, lags.
+    ``memory`` has, by coefficient, how the state moves: displacements, stretches, stops less their
+    muscle's stretch, which stays while they stick, and lags.
     """
     n, n_loads, m, n_l = int(c[0]), int(c[3]), int(c[4]), int(c[5])
     width = muscle_width(c)
@@ -129,17 +140,13 @@ def remembered(
     for i in range(m):
         row = 2 * n + k * m + i
         if abs(state[row] + moved) <= c[HEAD + i] * grown:
-            for j in range(slopes.size):
-                slopes[j] += c[place + i] * (memory[row, j] - memory[n + k, j])
+            mixed(slopes, 1.0, c[place + i], memory[row])
     carried = c[own + 4] * c[12] if way == IN_TIME else 0.0
     for i in range(n_l):
         kappa = c[own + width - n_loads - n_l + i]
         carried += kappa * (c[HEAD + m + n_l + i] if way == IN_TIME else 1.0)
-        row = 2 * n + n * m + k * n_l + i
-        for j in range(slopes.size):
-            slopes[j] += kappa * c[HEAD + m + i] * memory[row, j]
-    for j in range(slopes.size):
-        slopes[j] -= carried * memory[k, j]
+        mixed(slopes, 1.0, kappa * c[HEAD + m + i], memory[2 * n + n * m + k * n_l + i])
+    mixed(slopes, 1.0, -carried, memory[k])
 
 
 @kernel
@@ -159,36 +166,27 @@ def carry(
     own = muscles(c) + k * width
     grown = max(p + c[9], 0.0)
     moved = y + c[own + 2] * p - state[n + k]
-    stretch = k * width + 2
-    for i in range(m):
-        row = 2 * n + k * m + i
-        s = state[row] + moved
-        limit = c[HEAD + i] * grown
-        sticks = way != AT_REST and abs(s) <= limit
-        for j in range(moves.size):
-            if sticks:
-                memory[row, j] += moves[j] - memory[n + k, j]
-            else:
-                memory[row, j] = 0.0
-        if sticks:
-            memory[row, stretch] += p
-        elif way != AT_REST and grown > 0.0:
-            memory[row, n * width] = c[HEAD + i] if s > 0.0 else -c[HEAD + i]
+    mixed(memory[k], -1.0, 1.0, moves)
     for i in range(n_l):
         row = 2 * n + n * m + k * n_l + i
         gain = c[HEAD + m + n_l + i] if way == IN_TIME else 1.0
-        longer = slower(c[HEAD + m + i], gain, state[row], y - state[k])
-        for j in range(moves.size):
-            if way == AT_REST:
-                memory[row, j] = 0.0
-            else:
-                memory[row, j] = c[HEAD + m + i] * memory[row, j] + gain * (moves[j] - memory[k, j])
+        if way == AT_REST:
+            mixed(memory[row], 0.0, 0.0, moves)
+        else:
+            mixed(memory[row], c[HEAD + m + i], gain, memory[k])
         if way == IN_TIME:
-            memory[row, n * width + 1 + i] += longer
-    for j in range(moves.size):
-        memory[k, j] = moves[j]
-        memory[n + k, j] = moves[j]
-    memory[n + k, stretch] += p
+            memory[row, n * width + 1 + i] += slower(c, i, state[row], y - state[k])
+    mixed(memory[k], 0.0, 1.0, moves)
+    mixed(memory[n + k], 0.0, 1.0, moves)
+    memory[n + k, k * width + 2] += p
+    for i in range(m):
+        row = 2 * n + k * m + i
+        s = state[row] + moved
+        if way != AT_REST and abs(s) <= c[HEAD + i] * grown:
+            continue
+        mixed(memory[row], 0.0, -1.0, memory[n + k])
+        if way != AT_REST and grown > 0.0:
+            memory[row, n * width] += c[HEAD + i] if s > 0.0 else -c[HEAD + i]
 
 
 @kernel
@@ -205,8 +203,11 @@ def move(
     slopes: Array,
     scratch: Array,
 ) -> None:
-    """Make one move, free or held, with all slopes; found are displacements, or what forces lack."""
-    n, width = int(c[0]), muscle_width(c)
+    """Make one move, free or held, with all slopes; found are displacements, or what forces lack.
+
+    Slopes of no columns are not computed.
+    """
+    n, n_c, width = int(c[0]), slopes.shape[1], muscle_width(c)
     vectors = scratch[: 3 * n].reshape((3, n))
     residual, column, gradient = vectors[0], vectors[1], vectors[2]
     matrix = scratch[3 * n : 3 * n + n * n].reshape((n, n))
@@ -214,7 +215,13 @@ def move(
     reverse = scratch[3 * n + 2 * n * n : 3 * n + 3 * n * n].reshape((n, n))
     if not held:
         settle(c, state, way, y, x, p, scratch[3 * n + 3 * n * n :])
-    unbalanced(c, state, way, y, x, p, residual, matrix, gradient)
+    if held or n_c:
+        unbalanced(c, state, way, y, x, p, residual, matrix, gradient)
+    for k in range(n):
+        found[k] = residual[k] if held else y[k]
+    if not n_c:
+        keep(c, state, way, y, p)
+        return
     for k in range(n):
         by_springs(c, k, y, x, slopes[k])
         if shortened(c, muscles(c) + k * width, k, state, way, y[k], p[k])[1]:
@@ -222,36 +229,30 @@ def move(
         else:
             direct(c, state, way, k, y[k], p[k], slopes[k])
             remembered(c, state, way, k, y[k], p[k], memory, slopes[k])
-        found[k] = residual[k] if held else y[k]
-    if not held:
-        for i in range(n):
-            for k in range(n):
-                column[k] = 1.0 if i == k else 0.0
-                for j in range(n):
-                    copied[k, j] = matrix[k, j]
-            eliminate(copied, column)
-            for k in range(n):
-                reverse[k, i] = column[k]
-        for j in range(slopes.shape[1]):
-            for k in range(n):
-                column[k] = 0.0
-                for i in range(n):
-                    column[k] -= reverse[k, i] * slopes[i, j]
-            for k in range(n):
-                slopes[k, j] = column[k]
-    moves = memory[memory.shape[0] - 1]
+    for i in range(0 if held else n):
+        for k in range(n):
+            column[k] = -1.0 if i == k else 0.0
+            for j in range(n):
+                copied[k, j] = matrix[k, j]
+        eliminate(copied, column)
+        for k in range(n):
+            reverse[k, i] = column[k]
     for k in range(n):
-        own = muscles(c) + k * width
+        moves = memory[memory.shape[0] - n + k]
+        mixed(moves, 0.0, 0.0, moves)
+        for i in range(0 if held else n):
+            mixed(moves, 1.0, reverse[k, i], slopes[i])
+    for k in range(n):
+        own, moves = muscles(c) + k * width, memory[memory.shape[0] - n + k]
+        if not held:
+            mixed(slopes[k], 0.0, 1.0, moves)
         u, slack = shortened(c, own, k, state, way, y[k], p[k])
-        for j in range(slopes.shape[1]):
-            moves[j] = 0.0 if held or slack else slopes[k, j]
         if slack:
+            mixed(moves, 0.0, 0.0, moves)
             direct(c, state, way, k, u, p[k], moves)
             remembered(c, state, way, k, u, p[k], memory, moves)
             moves[k * width + 3] -= 1.0
-            stiffness = resisted(c, own, k, state, way, u, p[k])[1]
-            for j in range(slopes.shape[1]):
-                moves[j] /= -stiffness
+            mixed(moves, -1.0 / resisted(c, own, k, state, way, u, p[k])[1], 0.0, moves)
         carry(c, state, way, k, u, p[k], memory, moves)
     keep(c, state, way, y, p)
 
@@ -275,7 +276,7 @@ def follow(
     Parameters
     ----------
     c : array
-        Coefficients of the block.
+        Coefficients of the block, then decay times its logarithm, negative, of every lag.
     driven, measured, x : arrays, shapes (t, n), (t, n), (t, s)
         Pressures, displacements, what schedules and loads.
     held : bool
@@ -283,15 +284,15 @@ def follow(
     settled : bool
         Whether they have long been there at the start.
     every : int
-    memory : array, shape (states + 1, coefficients)
+    memory : array, shape (states + n, coefficients)
         To compute in; so is ``scratch``.
     found : array, shape (t / every, n)
         Displacements [mm], or forces that are lacking [N].
     slopes : array, shape (t / every, n, coefficients)
-        By every muscle's coefficients, the grip, and the lags' logarithms.
+        By every muscle's coefficients, the grip, and the lags' logarithms; of no columns if not wanted.
     """
     n = int(c[0])
-    n_states = memory.shape[0] - 1
+    n_states = memory.shape[0] - n
     state, rest = scratch[:n_states], scratch[n_states:]
     y, p, now = rest[:n], rest[n : 2 * n], rest[2 * n : 3 * n]
     work = rest[3 * n :]
@@ -326,8 +327,7 @@ def follow(
         for k in range(n):
             found[t // every, k] = now[k] if held else now[k] - offset[k]
             if not held and c[13] != 0.0:
-                for j in range(memory.shape[1]):
-                    row[k, j] -= tare[k, j]
+                mixed(row[k], 1.0, -1.0, tare[k])
 
 
 def run(
@@ -339,14 +339,17 @@ def run(
     held: bool,
     every: int = 1,
     settled: bool = False,
+    sloped: bool = True,
 ) -> tuple[Array, Array]:
     """Return what `follow` finds, of whose every so many samples the last is kept, and the slopes."""
     n, m, n_l = int(c[0]), int(c[4]), int(c[5])
     width = (c.size - HEAD - m - 2 * n_l) // n
-    n_states, n_c = n * (3 + m + n_l) + 2, n * width + 1 + n_l
+    n_states, n_c = n * (3 + m + n_l) + 2, (n * width + 1 + n_l) * sloped
+    decays = c[HEAD + m : HEAD + m + n_l]
+    c = np.concatenate([c, -decays * np.log(decays)])
     kept = -(-len(driven) // every)
     found, slopes = np.empty((kept, n)), np.empty((kept, n, n_c))
-    memory = np.zeros((n_states + 1, n_c))
+    memory = np.zeros((n_states + n, n_c))
     scratch = np.zeros(n_states + 10 * n + 4 * n * n)
     follow(c, driven, measured, x, held, settled, every, memory, scratch, found, slopes)
     return found, slopes

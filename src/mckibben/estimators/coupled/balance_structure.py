@@ -317,10 +317,9 @@ class Structure:
         return [low + np.array(s) * (high - low) for s in product(share, repeat=len(low))]
 
     def powers(self, x: Array) -> Array:
-        """Return the powers of what schedules, shape (..., s), as springs are multiplied by."""
-        orders = np.arange(1, self.degree + 1)
-        raised = (x[..., np.newaxis] ** orders).reshape(*x.shape[:-1], -1)
-        return np.concatenate([np.ones((*x.shape[:-1], 1)), raised], axis=-1)
+        """Return the powers of what schedules, shape (s, ...), as springs are multiplied by."""
+        powers = [v**d for v in x for d in range(1, self.degree + 1)]
+        return np.array([np.ones(x.shape[1:]), *powers])
 
     def spring_condition(self, x: Array, direction: Array, stiff: float) -> tuple[Array, float]:
         """Return that springs are stiff along a direction: a side and its least."""

@@ -50,6 +50,9 @@ class CoupledEstimator(Estimator):
     paired: ClassVar[bool] = True
     """Whether there must be an output to every input."""
 
+    fewer_outputs: ClassVar[bool] = False
+    """Whether there may be fewer of them, nevertheless."""
+
     alone: ClassVar[bool] = False
     """Whether it is a model of one muscle under no measured load, too."""
 
@@ -81,9 +84,15 @@ class CoupledEstimator(Estimator):
             )
         ):
             return "it is of several muscles, or of one under a measured load that changes"
-        if cls.paired and len(inputs) != len(outputs):
+        if not cls.fits(len(inputs), len(outputs)):
             return "it needs an output to every input"
         return None
+
+    @classmethod
+    def fits(cls, n_inputs: int, n_outputs: int) -> bool:
+        """Tell whether there may be so many of both."""
+        fewer = cls.fewer_outputs and n_outputs < n_inputs
+        return fewer or not cls.paired or n_inputs == n_outputs
 
     @classmethod
     def channel_settings(
@@ -133,7 +142,7 @@ class CoupledEstimator(Estimator):
                     file=recording.source,
                     remedy=f"give recordings of at least {FEWEST_SAMPLES} samples",
                 )
-        if self.paired and len(inputs) != len(outputs):
+        if not self.fits(len(inputs), len(outputs)):
             raise DataError(
                 f"there are {len(inputs)} inputs and {len(outputs)} outputs",
                 file=first.source,

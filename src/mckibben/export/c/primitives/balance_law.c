@@ -6,6 +6,7 @@
 #define MOST_STEPS 60
 #define MOST_SEARCHED 25
 #define BALANCED MCK_EITHER(2e-15, 1e-6)
+#define SURE MCK_EITHER(1e-11, 1e-5)
 #define LEAST_AREA MCK_R(0.01)
 #define NEVER MCK_R(1e30)
 #define OWN 6
@@ -83,21 +84,23 @@ static muscle read_muscle(const mck_balance *f, int k)
 static mck_real sprung(const mck_balance *f, const muscle *one, const mck_real *y,
                        const mck_real *x, mck_real *gradient)
 {
-    mck_real force = MCK_R(0.0);
+    const mck_real *row = one->springs;
+    mck_real force = row[0];
     for (int j = 0; j < f->n; j++) {
-        gradient[j] = MCK_R(0.0);
+        gradient[j] = row[1 + j];
+        force += gradient[j] * y[j];
     }
-    for (int q = 0; q < 1 + f->n_x * f->degree; q++) {
-        const mck_real *row = one->springs + q * (1 + f->n);
+    for (int i = 0; i < f->n_x; i++) {
         mck_real power = MCK_R(1.0);
-        for (int repeat = 0; q > 0 && repeat < (q - 1) % f->degree + 1; repeat++) {
-            power *= x[(q - 1) / f->degree];
-        }
-        force += power * row[0];
-        for (int j = 0; j < f->n; j++) {
-            const mck_real spring = power * row[1 + j];
-            force += spring * y[j];
-            gradient[j] += spring;
+        for (int q = 0; q < f->degree; q++) {
+            row += 1 + f->n;
+            power *= x[i];
+            force += power * row[0];
+            for (int j = 0; j < f->n; j++) {
+                const mck_real spring = power * row[1 + j];
+                force += spring * y[j];
+                gradient[j] += spring;
+            }
         }
     }
     for (int i = 0; i < f->n_loads; i++) {
@@ -158,14 +161,13 @@ static mck_real rubbed(const mck_balance *f, const muscle *one, int k, int way,
         const mck_real h = one->friction[i];
         const mck_real limit = f->limits[i] * grown;
         const mck_real s = f->stops[k * f->m + i] + moved;
-        if (s > limit) {
-            force += h * limit;
+        const mck_real held = mck_clip(s, -limit, limit);
+        force += h * held;
+        if (s > held) {
             *by_p += h * f->limits[i];
-        } else if (s < -limit) {
-            force -= h * limit;
+        } else if (s < held) {
             *by_p -= h * f->limits[i];
         } else {
-            force += h * s;
             *by_y += h;
             *by_p += h * one->wall;
         }
@@ -397,11 +399,13 @@ mck_real mck_balance_settle(const mck_balance *f, int way, mck_real *y, const mc
     mck_real *matrix = start + f->n;
     mck_real left = mck_balance_lack(f, way, y, x, p, residual, matrix);
     mck_real before = MCK_R(2.0) * left + MCK_R(1.0);
-    for (int tried = 0; tried < MOST_STEPS; tried++) {
+    int sure = 0;
+    for (int tried = 0; tried < MOST_STEPS && !sure; tried++) {
         if (left <= BALANCED || (left >= before && left < MCK_NEARLY) || !(left < MCK_INFINITY)) {
             break;
         }
         before = left;
+        sure = left <= SURE;
         for (int k = 0; k < f->n; k++) {
             step[k] = -residual[k];
         }
@@ -413,7 +417,13 @@ mck_real mck_balance_settle(const mck_balance *f, int way, mck_real *y, const mc
             }
             down = product(f->n, residual, step);
         }
-        left = search(f, way, y, x, p, residual, matrix, step, start, down);
+        if (sure) {
+            for (int k = 0; k < f->n; k++) {
+                y[k] += step[k];
+            }
+        } else {
+            left = search(f, way, y, x, p, residual, matrix, step, start, down);
+        }
     }
     for (int k = 0; k < f->n && !(left < MCK_NEARLY); k++) {
         y[k] = f->u[k];

@@ -1,0 +1,89 @@
+"""A balance of more muscles than the coordinates they move, of physics that is none of its own."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.optimize import brentq
+
+from mckibben import DataError, Recording, load
+from mckibben.estimators.coupled.balance import BalanceEstimator
+from mckibben.signals.broadband import random_wave
+
+Array = NDArray[np.float64]
+
+STEP = 0.05
+
+
+def joint(seed: int, *, noise: float = 0.02) -> Recording:
+    """Return a joint between two muscles, with friction that breaks away, moved at random from rest."""
+    time = np.arange(900) * STEP
+    rises = np.minimum(time / 2.0, 1.0)
+    p = np.array([random_wave(time, 0.2, 4.0, seed=10 * seed + k) * rises for k in (1, 2)])
+    angle, rubbed, angles = 0.0, 0.0, []
+
+    def excess(now: float, pulls: Array) -> float:
+        friction = 4.0 * np.clip(rubbed + now - angle, -0.6, 0.6)
+        return float(12.0 * now + friction - pulls @ [60.0 - 0.8 * now, -60.0 - 0.8 * now])
+
+    for pulls in p.T:
+        now = brentq(excess, -60.0, 60.0, args=(pulls,), xtol=1e-12)
+        rubbed, angle = float(np.clip(rubbed + now - angle, -0.6, 0.6)), now
+        angles.append(now)
+    measured = np.array(angles) + noise * np.random.default_rng(seed).standard_normal(len(time))
+    channels = {"pressure_1": p[0], "pressure_2": p[1], "displacement": measured}
+    return Recording(channels, STEP, meta={"name": f"run-{seed}"})
+
+
+@pytest.fixture(scope="module")
+def found() -> BalanceEstimator:
+    return BalanceEstimator().fit([joint(seed) for seed in (1, 2)])
+
+
+def test_two_muscles_at_a_joint_follow_what_was_not_trained(found: BalanceEstimator) -> None:
+    other = joint(3)
+    missed = found.predict(other)[0].ravel() - other["displacement"]
+    assert np.sqrt(np.mean(missed**2)) < 0.02 * np.ptp(other["displacement"])
+    assert any("along" in note for note in found.diagnostics_.notes)
+
+
+def test_its_inverse_gives_pressures_that_give_the_motion(
+    found: BalanceEstimator, tmp_path: Path
+) -> None:
+    found.fitted.save(tmp_path / "joint.json")
+    model = load(tmp_path / "joint.json")
+    assert model == found.fitted
+    reference = (
+        4.0
+        * np.sin(np.arange(300) * STEP)[:, np.newaxis]
+        * np.linspace(0.2, 1.0, 300)[:, np.newaxis]
+    )
+    inverse = model.inverse()
+    pressures = inverse.simulate(reference, sample_time=STEP)
+    assert pressures.shape == (300, 2)
+    np.testing.assert_allclose(model.simulate(pressures, sample_time=STEP), reference, atol=1e-8)
+
+
+def test_pressures_that_move_nothing_are_named() -> None:
+    run = joint(1)
+    idle = run.with_channels({}, pressure_3=np.abs(np.sin(run.time)))
+    with pytest.raises(DataError, match=r"pressure_3.*moves nothing"):
+        BalanceEstimator().fit([idle])
+
+
+def test_coordinates_that_only_move_together_are_refused() -> None:
+    run = joint(1, noise=0.0)
+    twice = Recording(
+        {
+            **{f"pressure_{k}": run[f"pressure_{1 + k % 2}"] for k in (1, 2)},
+            "pressure_3": run["pressure_1"] ** 2,
+            "displacement_1": run["displacement"],
+            "displacement_2": 2.0 * run["displacement"],
+        },
+        STEP,
+    )
+    with pytest.raises(DataError, match=r"all outputs move together"):
+        BalanceEstimator().fit([twice])

@@ -68,8 +68,8 @@ how much one has to help."""
 FIRM = 0.8
 """Of the most that muscles seem to resist shortening with, share at which they go slack at first."""
 
-DEAD_SAMPLES = 8_000
-"""By which they are compared."""
+FIRST_SAMPLES, MORE_SAMPLES, MOST_SAMPLES = 8_000, 15_000, 60_000
+"""By which starts, slack and dead zones are compared; to find the way by; and for the last steps."""
 
 LAST_STEPS = 10
 """On all recordings, after those on a few of them."""
@@ -146,19 +146,19 @@ class BalanceEstimator(CoupledEstimator):
         structure = self.structure(data, tracker)
         dead = 0.0
         with tracker.searching():
-            few = Search(data, structure, self.ridge).of_few()
-            self._begin(few, tracker)
-            assert tracker.best is not None
+            few = Search(data, structure, self.ridge).of_few(FIRST_SAMPLES)
             slack = len(data.inputs) > 1 if self.slack is None else self.slack
+            self._begin(few, tracker, slack)
+            assert tracker.best is not None
             if slack or self.contact:
-                few.descend(tracker.best, min(self.steps, DEAD_STEPS), tracker)
+                few.descend(tracker.best, min(self.steps, DEAD_STEPS), tracker, first=slack)
             if slack:
                 structure = self._slack(few, tracker)
             few = Search(few.data, structure, self.ridge)
             if self.contact:
-                dead, tracker.best = self._dead_zone(few, tracker)
-            search = Search(acting(data, dead), structure, self.ridge)
-            few = search.of_few()
+                dead, tracker.best = self._dead_zone(few, tracker, slack)
+            search = Search(acting(data, dead), structure, self.ridge).of_few(MOST_SAMPLES)
+            few = search.of_few(MORE_SAMPLES)
             tracker.best_cost = few.cost(tracker.best)
             few.descend(tracker.best, self.steps, tracker)
             tracker.reached(0.7)
@@ -190,7 +190,7 @@ class BalanceEstimator(CoupledEstimator):
         parts += [behind] if behind else []
         return parts[0] if len(parts) == 1 else Series(tuple(parts))
 
-    def _begin(self, few: Search, tracker: Tracker) -> None:
+    def _begin(self, few: Search, tracker: Tracker, first: bool) -> None:
         """Show the tracker where the linear stage and first steps from several starts lead."""
         starts = []
         for grip, plain in product(GRIPS if self.n_stops else GRIPS[:1], (False, True)):
@@ -200,38 +200,40 @@ class BalanceEstimator(CoupledEstimator):
         starts.sort(key=lambda start: start[0])
         few.check_loads(next(values for _, plain, values in starts if not plain), tracker)
         for _, _, start in starts if few.n_rows <= FEW_ROWS else starts[:FOLLOWED]:
-            few.descend(start, min(self.steps, FIRST_STEPS), tracker)
+            few.descend(start, min(self.steps, FIRST_STEPS), tracker, first=first)
 
     def _slack(self, few: Search, tracker: Tracker) -> Structure:
         """Return the structure of muscles that go slack if that helps, and show it to the tracker."""
         assert tracker.best is not None
-        fewer = few.of_few(DEAD_SAMPLES)
-        slack = Search(fewer.data, replace(few.structure, slack=True), self.ridge)
+        slack = Search(few.data, replace(few.structure, slack=True), self.ridge)
         slack.span = few.span
         part = tracker.part(0.5, 0.6)
         start = slack.slackened(tracker.best, FIRM)
-        slack.descend(start, min(self.steps, DEAD_STEPS), part)
-        if part.best is None or not part.best_cost < (1.0 - HELPS) * fewer.cost(tracker.best):
+        slack.descend(start, min(self.steps, DEAD_STEPS), part, first=True)
+        if part.best is None or not part.best_cost < (1.0 - HELPS) * few.cost(tracker.best):
             return few.structure
         tracker.best = part.best
         return slack.structure
 
-    def _dead_zone(self, few: Search, tracker: Tracker) -> tuple[float, Array]:
+    def _dead_zone(self, few: Search, tracker: Tracker, first: bool) -> tuple[float, Array]:
         """Return over which pressure a dead zone fades that helps most, 0 if none does, and where.
 
         Begins at what the tracker has found without one.
         """
         assert tracker.best is not None
-        fewer = few.of_few(DEAD_SAMPLES)
         dead, best = 0.0, tracker.best
-        least = (1.0 - HELPS) * fewer.cost(best)
+        cost = few.cost(best)
+        least = (1.0 - HELPS) * cost
         for pressure in np.array(DEAD_ZONES) * few.structure.highest:
             part = tracker.part(0.6, 0.65)
-            here = Search(acting(fewer.data, float(pressure)), few.structure, self.ridge)
+            here = Search(acting(few.data, float(pressure)), few.structure, self.ridge)
             here.span = few.span
-            here.descend(tracker.best, min(self.steps, DEAD_STEPS), part)
-            if part.best is not None and part.best_cost < least:
-                dead, best, least = float(pressure), part.best, part.best_cost
+            here.descend(best, min(self.steps, DEAD_STEPS), part, first=first)
+            if part.best is None or not part.best_cost < cost:
+                break
+            cost = part.best_cost
+            if cost < least:
+                dead, best = float(pressure), part.best
         return dead, best
 
     def uncertainty(

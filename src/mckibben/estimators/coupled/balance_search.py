@@ -21,9 +21,6 @@ from mckibben.estimators.optimisers.tracker import Tracker
 MOST_ROWS = 12_000
 """Errors to learn from; more are thinned evenly."""
 
-MOST_SAMPLES = 30_000
-"""To find the way by; the last steps look at all."""
-
 STRAIGHT = 0.01
 """What pressures may be off a straight line, relative to the highest."""
 
@@ -71,7 +68,7 @@ class Search:
             for still, run in zip(self.still, self.runs, strict=True)
         ]
 
-    def of_few(self, most: int = MOST_SAMPLES) -> Search:
+    def of_few(self, most: int) -> Search:
         """Return the same search over fewer samples, where there are very many.
 
         Those are thinned where inputs go straight between them; else recordings are chosen evenly.
@@ -325,9 +322,9 @@ class Search:
         found = _size(self.errors(values, sloped=False)[0])
         return found if np.isfinite(found) else np.inf
 
-    def descend(self, values: Array, steps: int, tracker: Tracker) -> None:
-        """Show a tracker ever better coefficients."""
-        mix = self.structure.free(moving=True)
+    def descend(self, values: Array, steps: int, tracker: Tracker, *, first: bool = False) -> None:
+        """Show a tracker ever better coefficients; at ``first`` walls and lags stay what they are."""
+        mix = self.structure.free(moving=True, first=first)
         damping = 1e-3
         errors, slopes = self.errors(values)
         cost = _size(errors)

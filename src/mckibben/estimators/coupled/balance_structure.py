@@ -205,12 +205,13 @@ class Structure:
         """Whether forces are in newtons: those of a muscle alone under one load."""
         return self.n == len(self.loaded) == 1
 
-    def free(self, *, moving: bool, plain: bool = False) -> Array:
+    def free(self, *, moving: bool, plain: bool = False, first: bool = False) -> Array:
         """Return how coefficients follow from what is free, shape (coefficients, free).
 
         ``moving`` frees walls, grip, lags, pushes, and areas at rest too. One number sets the unit of
         force: of a muscle alone its load's, while moving; else the first area at rest. ``plain``: areas
-        stay what they are at rest.
+        stay what they are at rest. ``first``: walls and lags stay, which else make up for slack that is
+        not there yet, and do not come back.
         """
         n_all = self.size
         columns: list[list[int]] = []
@@ -222,9 +223,10 @@ class Structure:
             free_areas = areas if moving and (newtons or k) else areas[1:]
             columns += [[place] for place in ([] if plain else free_areas)]
             columns += [[place] for place in self.places("loads", k).tolist() if not newtons]
-            if moving:
-                for name in ("wall", "push") if self.slack else ("wall",):
-                    columns += [[place] for place in self.places(name, k).tolist()]
+            for name, is_free in (("wall", not first), ("push", self.slack)):
+                columns += [
+                    [place] for place in self.places(name, k).tolist() if moving and is_free
+                ]
         for q in range(1 + len(self.scheduled) * self.degree):
             for k in range(self.n):
                 if q or not self.tare:  # displacements from rest make a constant of their own
@@ -233,7 +235,9 @@ class Structure:
                     sorted({self._spring(q, k, j), self._spring(q, j, k)}) for j in range(k, self.n)
                 ]
         if moving:
-            columns += [[place] for place in range(self.grip, self.size)]
+            columns += [
+                [place] for place in range(self.grip, self.grip + 1 if first else self.size)
+            ]
         mix = np.zeros((n_all, len(columns)))
         for number, places in enumerate(columns):
             mix[places, number] = 1.0

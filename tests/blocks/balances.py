@@ -69,6 +69,7 @@ def balances(
         scheduled=(*channels("extensor", "bar", n_x), *channels("force", "N", n_loads)),
         given=channels("pressure", "bar", n),
         tare=draw(st.booleans()),
+        settled=draw(st.booleans()),
     )
 
 

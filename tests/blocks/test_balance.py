@@ -17,7 +17,17 @@ from mckibben.blocks.core.fields import Channel, rows, vector
 from mckibben.blocks.coupled.balance import Balance
 from mckibben.blocks.coupled.load_estimate import LoadEstimate
 from mckibben.blocks.laws.trial import wander
-from tests.blocks.balances import FURTHEST, HIGHEST, SEEDS, STEP, balances, measured, motion, run
+from tests.blocks.balances import (
+    ALONE,
+    FURTHEST,
+    HIGHEST,
+    SEEDS,
+    STEP,
+    balances,
+    measured,
+    motion,
+    run,
+)
 from tests.blocks.strategies import numbers
 
 Array = NDArray[np.float64]
@@ -221,6 +231,15 @@ def test_a_tare_is_where_muscles_rest_under_the_first_load() -> None:
 
 
 # -- time ----------------------------------------------------------------------------------------
+
+
+def test_settled_muscles_are_where_a_long_hold_leaves_them() -> None:
+    moved = motion(ALONE.inverse(), (0.5, HIGHEST), seed=3)
+    held = np.vstack([np.repeat(moved[:1], 5000, axis=0), moved])
+    settled = run(replace(ALONE, settled=True).inverse(), moved)
+    just_come = run(ALONE.inverse(), moved)
+    np.testing.assert_allclose(settled, run(ALONE.inverse(), held)[5000:], atol=1e-9 * FURTHEST)
+    assert np.abs(just_come - settled).max() > 0.01
 
 
 def ramps(block: Block, highest: float, steps: int) -> Array:

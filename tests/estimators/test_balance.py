@@ -284,7 +284,24 @@ def test_recordings_that_begin_in_motion_do_little_harm() -> None:
     cut = [recording(seed).slice(300, 1200) for seed in (1, 2)]
     estimator = BalanceEstimator().fit(cut)
     assert any("does not begin at rest" in note for note in estimator.diagnostics_.notes)
+    assert not balance_of(estimator).settled
     assert error(estimator, recording(3)) < 0.3
+
+
+def test_recordings_that_begin_under_a_pressure_long_held_count_as_a_whole() -> None:
+    def held(seed: int) -> Recording:
+        time = np.arange(1200) * STEP
+        p = 1.5 + np.minimum(time / 2.0, 1.0) * (random_wave(time, 0.3, 4.0, seed=seed) - 1.5)
+        block = replace(MUSCLE, settled=True).inverse()
+        y = block.simulate(np.column_stack([p, 0.0 * p]), sample_time=STEP)[:, 0]
+        y = y - y[0] + NOISE * np.random.default_rng(seed).standard_normal(len(p))
+        return Recording({"pressure": p, "displacement": y}, STEP)
+
+    estimator = BalanceEstimator().fit([held(1), held(2)])
+    assert balance_of(estimator).settled
+    assert estimator.diagnostics_.rmse < 2.5 * NOISE
+    assert error(estimator, held(3)) < 3.0 * NOISE
+    assert any("long been held" in note for note in estimator.diagnostics_.notes)
 
 
 def test_what_recordings_cannot_tell_is_said() -> None:

@@ -149,6 +149,9 @@ class Balance(ManyChannels, Invertible):
         Displacements; what schedules, then the loads; pressures.
     tare : bool
         Whether displacements count from where the muscles rested, without pressure, at the start.
+    settled : bool
+        Whether the muscles have long been where the first sample finds them, so that nothing relaxes
+        any more; else they have come there just now.
     pressure_range : (float, float), optional
         Pressures are clipped to it, and said so.
     """
@@ -182,6 +185,7 @@ class Balance(ManyChannels, Invertible):
     scheduled: Channels
     given: Channels
     tare: bool = False
+    settled: bool = False
     pressure_range: tuple[FiniteFloat, FiniteFloat] | None = None
 
     def __post_init__(self) -> None:
@@ -278,7 +282,7 @@ class Balance(ManyChannels, Invertible):
         head = [
             *(len(self.driven), len(self.scheduled) - self.n_loads, self.degree, self.n_loads),
             *(len(self.limits), len(self.lags), len(self.elasticity[0]), len(self.areas[0])),
-            *(self.scale, self.grip, low, high, 1.0 / step, self.tare),
+            *(self.scale, self.grip, low, high, 1.0 / step, self.tare, not self.settled),
         ]
         lags = np.array(self.lags)
         decays = np.exp(-step / lags)

@@ -21,9 +21,9 @@ from mckibben.arrays import Array
 from mckibben.blocks.core.kernels import kernel
 from mckibben.blocks.core.linear_system import eliminate
 
-HEAD = 14
+HEAD = 15
 """n, schedules, degree, loads, stops, lags, elastic terms, area's terms, scale, p0, lowest and highest
-pressure, samples a second, tare."""
+pressure, samples a second, tare, what is left at the start to relax (1, or 0 if settled)."""
 
 MOST_STEPS, MOST_SEARCHED = 60, 25
 """Of Newton's method, and along each step."""
@@ -144,7 +144,7 @@ def lagging(c: Array, own: int, k: int, state: Array, way: int, y: float) -> tup
     slope = c[own + 3] * c[12] if way == IN_TIME else 0.0
     force = slope * moved
     for i in range(n_l):
-        gain = c[HEAD + m + n_l + i] if way == IN_TIME else 1.0
+        gain = c[HEAD + m + n_l + i] if way == IN_TIME else c[14]
         q = c[HEAD + m + i] * state[2 * n + n * m + k * n_l + i] + gain * moved
         force += c[place + i] * q
         slope += c[place + i] * gain
@@ -165,7 +165,7 @@ def keep(c: Array, state: Array, way: int, y: Array, p: Array) -> None:
             state[2 * n + k * m + i] = min(max(s, -limit), limit)
         for i in range(n_l):
             place = 2 * n + n * m + k * n_l + i
-            gain = c[HEAD + m + n_l + i] if way == IN_TIME else 1.0
+            gain = c[HEAD + m + n_l + i] if way == IN_TIME else c[14]
             if way == AT_REST:
                 state[place] = 0.0
             else:

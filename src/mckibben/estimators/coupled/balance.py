@@ -61,6 +61,9 @@ how much one has to help."""
 DEAD_SAMPLES = 8_000
 """By which they are compared."""
 
+EXPLAINED = 1.5
+"""Times the error of all but first parts up to which that of all, settled before, is no more."""
+
 LAST_STEPS = 10
 """On all recordings, after those on a few of them."""
 
@@ -120,7 +123,7 @@ class BalanceEstimator(CoupledEstimator):
         """Return the balance, solved for displacements."""
         data, notes = telling(data)
         check_directions(data)
-        tracker.notes += [*notes, *other_zeros(data), *not_at_rest(data)]
+        tracker.notes += [*notes, *other_zeros(data)]
         ways = directions(data)
         data = turned(data, ways)
         structure = self.structure(data, tracker)
@@ -128,6 +131,8 @@ class BalanceEstimator(CoupledEstimator):
         with tracker.searching():
             few = Search(data, structure, self.ridge).of_few()
             self._begin(few, tracker)
+            few = self._long_held(few, tracker)
+            structure = few.structure
             assert tracker.best is not None
             if len(data.inputs) == 1 if self.contact is None else self.contact:
                 few.descend(tracker.best, min(self.steps, DEAD_STEPS), tracker)
@@ -149,6 +154,7 @@ class BalanceEstimator(CoupledEstimator):
         ends = np.array([min(float(data.lowest.min()), 0.0), float(data.highest.max())])
         low, high = acted(ends, dead).tolist()
         balance = structure.block(tracker.best, (low, high) if limited else None)
+        tracker.notes += not_at_rest(data, settled=structure.settled)
         tracker.notes += [*held_back(balance, structure), *sentences(balance, structure)]
         if dead:
             tracker.notes.append(
@@ -176,6 +182,23 @@ class BalanceEstimator(CoupledEstimator):
         for _, _, start in starts if few.n_rows <= FEW_ROWS else starts[:FOLLOWED]:
             few.descend(start, min(self.steps, FIRST_STEPS), tracker)
 
+    def _long_held(self, few: Search, tracker: Tracker) -> Search:
+        """Return the search of muscles that were settled when recordings began, if that explains these.
+
+        Their first parts count then, which they do not where what came before is unknown. The tracker's
+        best is then where it leads.
+        """
+        if not any(few.unsure(run) for run in few.runs):
+            return few
+        settled = Search(few.data, replace(few.structure, settled=True), self.ridge)
+        settled.span = few.span
+        part = tracker.part(0.3, 0.5)
+        settled.descend(tracker.best, min(self.steps, DEAD_STEPS), part)
+        if part.best is None or part.best_cost > EXPLAINED * tracker.best_cost:
+            return few
+        tracker.best, tracker.best_cost = part.best, part.best_cost
+        return settled
+
     def _dead_zone(self, few: Search, tracker: Tracker) -> tuple[float, Array]:
         """Return over which pressure a dead zone fades that helps most, 0 if none does, and where.
 
@@ -201,7 +224,7 @@ class BalanceEstimator(CoupledEstimator):
         balance, contacts, _ = parts_of(block)
         told, _ = telling(data)
         shortened = turned(told, directions(told))
-        structure = self.structure(shortened, Tracker())
+        structure = replace(self.structure(shortened, Tracker()), settled=balance.settled)
         dead = 0.0 if contacts is None else float(contacts.pack()[0])
         search = Search(acting(shortened, dead), structure, self.ridge)
         condition, found = search.covariance(structure.values(balance))

@@ -251,7 +251,7 @@ class Search:
     def missed(self, values: Array, run: Run) -> tuple[Array, Array]:
         """Return the errors over a run relative to the ranges, and their slopes by coefficients.
 
-        Of a run that does not begin at rest the first part does not count, until it has forgotten.
+        Of a run that begins in an unknown state the first part does not count, until it has forgotten.
         """
         if self.held(run):
             found, by = self.followed(values, run, held=True)
@@ -267,7 +267,8 @@ class Search:
 
     def unsure(self, run: Run) -> float:
         """Return the share of a run in which it still remembers what came before it, unknown."""
-        return 0.0 if self.held(run) or at_rest(self.data, run) else WARMING
+        known = self.structure.settled or self.held(run) or at_rest(self.data, run)
+        return 0.0 if known else WARMING
 
     def errors(self, values: Array) -> tuple[Array, Array]:
         """Return the errors over all runs, and their slopes."""

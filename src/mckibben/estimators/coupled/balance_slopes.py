@@ -83,7 +83,7 @@ def direct(
         slopes[k * width + 3] = c[12] * (y[k] - state[k]) if way == IN_TIME else 0.0
         for i in range(n_l):
             q_before = state[2 * n + n * m + k * n_l + i]
-            gain = c[HEAD + m + n_l + i] if way == IN_TIME else 1.0
+            gain = c[HEAD + m + n_l + i] if way == IN_TIME else c[14]
             decay = c[HEAD + m + i]
             slopes[place + i] = decay * q_before + gain * (y[k] - state[k])
             if way == IN_TIME:
@@ -125,7 +125,7 @@ def remembered(
     carried = c[own + 3] * c[12] if way == IN_TIME else 0.0
     for i in range(n_l):
         kappa = c[own + width - n_loads - n_l + i]
-        carried += kappa * (c[HEAD + m + n_l + i] if way == IN_TIME else 1.0)
+        carried += kappa * (c[HEAD + m + n_l + i] if way == IN_TIME else c[14])
         row = 2 * n + n * m + k * n_l + i
         for j in range(slopes.size):
             slopes[j] += kappa * c[HEAD + m + i] * memory[row, j]
@@ -167,7 +167,7 @@ def carry(
             memory[row, n * width] = c[HEAD + i] if s > 0.0 else -c[HEAD + i]
     for i in range(n_l):
         row = 2 * n + n * m + k * n_l + i
-        gain = c[HEAD + m + n_l + i] if way == IN_TIME else 1.0
+        gain = c[HEAD + m + n_l + i] if way == IN_TIME else c[14]
         longer = slower(c[HEAD + m + i], gain, state[row], y - state[k])
         for j in range(moves.size):
             if way == AT_REST:

@@ -56,6 +56,8 @@ class Structure:
         Whether displacements count from rest at the start.
     lag_range : (float, float)
         Shortest and longest time constant that the recordings can tell [s].
+    settled : bool
+        Whether muscles had long been where every recording begins.
     """
 
     driven: tuple[Channel, ...]
@@ -72,6 +74,7 @@ class Structure:
     highest: float
     tare: bool
     lag_range: tuple[float, float]
+    settled: bool = False
 
     @property
     def n(self) -> int:
@@ -162,6 +165,7 @@ class Structure:
             scheduled=(*self.scheduled, *self.loaded),
             given=self.given,
             tare=self.tare,
+            settled=self.settled,
             pressure_range=pressure_range,
         )
 

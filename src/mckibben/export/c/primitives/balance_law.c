@@ -2,7 +2,7 @@
 
 #include "linear_system.h"
 
-#define HEAD 14
+#define HEAD 15
 #define MOST_STEPS 60
 #define MOST_SEARCHED 25
 #define BALANCED MCK_EITHER(2e-15, 1e-6)
@@ -39,6 +39,8 @@ mck_balance mck_balance_of(const mck_part *part, mck_real *state)
     f.lowest = c[10];
     f.highest = c[11];
     f.rate = c[12];
+    f.tared = c[13];
+    f.fresh = c[14];
     f.limits = c + HEAD;
     f.decays = f.limits + f.m;
     f.gains = f.decays + f.n_l;
@@ -170,7 +172,7 @@ static mck_real lagging(const mck_balance *f, const muscle *one, int k, int way,
     *slope = way == MCK_IN_TIME ? one->damping * f->rate : MCK_R(0.0);
     mck_real force = *slope * moved;
     for (int i = 0; way != MCK_AT_REST && i < f->n_l; i++) {
-        const mck_real gain = way == MCK_IN_TIME ? f->gains[i] : MCK_R(1.0);
+        const mck_real gain = way == MCK_IN_TIME ? f->gains[i] : f->fresh;
         const mck_real q = f->decays[i] * f->lags[k * f->n_l + i] + gain * moved;
         force += one->relaxation[i] * q;
         *slope += one->relaxation[i] * gain;
@@ -192,7 +194,7 @@ void mck_balance_keep(const mck_balance *f, int way, const mck_real *y, const mc
         }
         for (int i = 0; i < f->n_l; i++) {
             mck_real *lag = f->lags + k * f->n_l + i;
-            const mck_real gain = way == MCK_IN_TIME ? f->gains[i] : MCK_R(1.0);
+            const mck_real gain = way == MCK_IN_TIME ? f->gains[i] : f->fresh;
             const mck_real behind = f->decays[i] * *lag + gain * (y[k] - f->y[k]);
             *lag = way == MCK_AT_REST ? MCK_R(0.0) : behind;
         }
@@ -369,7 +371,7 @@ void mck_balance_begin(const mck_part *part, const mck_balance *f, const mck_rea
     (void)mck_balance_settle(f, MCK_AT_REST, y, x, p, p + f->n);
     mck_balance_keep(f, MCK_AT_REST, y, p);
     for (int k = 0; k < f->n; k++) {
-        f->tare[k] = part->coefficients[HEAD - 1] > MCK_R(0.0) ? y[k] : MCK_R(0.0);
+        f->tare[k] = f->tared > MCK_R(0.0) ? y[k] : MCK_R(0.0);
     }
     *f->first = MCK_R(1.0);
 }

@@ -234,7 +234,7 @@ def test_a_tare_is_where_muscles_rest_under_the_first_load() -> None:
 
 
 def test_settled_muscles_are_where_a_long_hold_leaves_them() -> None:
-    moved = motion(ALONE.inverse(), (0.5, HIGHEST), seed=3)
+    moved = motion(ALONE, (0.5, HIGHEST), seed=3)
     held = np.vstack([np.repeat(moved[:1], 5000, axis=0), moved])
     settled = run(replace(ALONE, settled=True).inverse(), moved)
     just_come = run(ALONE.inverse(), moved)

@@ -188,7 +188,7 @@ class BalanceEstimator(CoupledEstimator):
         Their first parts count then, which they do not where what came before is unknown. The tracker's
         best is then where it leads.
         """
-        if not any(few.unsure(run) for run in few.runs):
+        if tracker.best is None or not any(few.unsure(run) for run in few.runs):
             return few
         settled = Search(few.data, replace(few.structure, settled=True), self.ridge)
         settled.span = few.span

@@ -111,7 +111,7 @@ class BalanceEstimator(CoupledEstimator):
     finest: Annotated[float, Interval(gt=0, lt=0.5)] = 0.003
     lags: tuple[Annotated[float, Gt(0)], ...] | None = None
     n_lags: Annotated[int, Interval(ge=0, le=10)] = 2
-    elasticity: Annotated[int, Interval(ge=1, le=9)] = 6
+    elasticity: Annotated[int, Interval(ge=1, le=9)] = 9
     area: Annotated[int, Interval(ge=0, le=6)] = 2
     degree: Annotated[int, Interval(ge=1, le=4)] = 2
     tare: bool | None = None

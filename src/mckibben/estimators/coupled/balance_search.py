@@ -35,6 +35,9 @@ MOST_CUTS = 8
 LIGHTEST = 1e-7
 """Root of the damping of a step that is hardly damped."""
 
+TURNED_STEPS = 2
+"""Steps after which loads that were turned round are compared with those that were given."""
+
 UNKNOWN = 1e-10
 """Effect, relative to the largest of any number, that is none."""
 
@@ -150,9 +153,14 @@ class Search:
         for suspect in suspects:
             turned = self.turned(suspect)
             found = turned.begun(float(values[self.structure.grip]))
-            costs.append(turned.cost(found) if turned.loads_told(found) else np.inf)
+            tried = Tracker()
+            if turned.loads_told(found):
+                turned.descend(found, TURNED_STEPS, tried)
+            costs.append(tried.best_cost)
         best = int(np.argmin(costs))
-        if costs[best] < self.cost(values):
+        given = Tracker()
+        self.descend(values, TURNED_STEPS, given)
+        if costs[best] < min(given.best_cost, self.cost(values)):
             names = [self.runs[place].name for place in suspects[best]]
             raise DataError(
                 "the more it pulls, the shorter the muscle, as if its sign were wrong",

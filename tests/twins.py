@@ -1079,7 +1079,8 @@ class _Parallel:
         for q, tau in zip(self.behind[k], self.block.lags, strict=True):
             keep = math.exp(-self.step / tau)
             ramp = tau / self.step * (1.0 - keep)
-            out.append({"rest": 0.0, "first": dy, "time": keep * q + ramp * dy}[self.way])
+            first = 0.0 if self.block.settled else dy
+            out.append({"rest": 0.0, "first": first, "time": keep * q + ramp * dy}[self.way])
         return out
 
     def excess(self, k: int, y: list[float], x: list[float], p: float) -> float:
@@ -1088,7 +1089,10 @@ class _Parallel:
         force = self.springs(k, y, x) + _sum(block.friction[k], self.moved(k, y[k], p))
         force += _sum(block.relaxation[k], self.relaxing(k, y[k]))
         if self.way == "time":
-            force += block.damping[k] * (y[k] - self.y[k]) / self.step
+            low, high = block.hull[k]
+            flow = self.area(k, min(max(self.y[k], low), high)) / block.areas[k][0]
+            line = block.lines[k] if block.lines else 0.0
+            force += (block.damping[k] + line * flow**2) * (y[k] - self.y[k]) / self.step
         return p * self.area(k, y[k]) - force
 
     def pressures(self, y: list[float], x: list[float]) -> list[float]:

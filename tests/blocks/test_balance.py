@@ -107,6 +107,7 @@ def test_without_lags_it_obeys_the_contract_of_the_rate_independent(
         relaxation=((), ()),
         lags=(),
         damping=(0.0, 0.0),
+        lines=(),
         tare=tare,
         loads=rows(np.array(example.loads)[:, :n_loads]),
         scheduled=example.scheduled[: 1 + n_loads],
@@ -173,7 +174,9 @@ def incremental_energy(block: Balance, before: Array, y: Array, x: Array, p: Arr
             width, s = limit * (p[k] + block.grip), abs(stop + moved)
             energy += h * (0.5 * s * s if s < width else width * s - 0.5 * width * width)
         dy = y[k] - y0[k]
-        energy += 0.5 * block.damping[k] / STEP * dy * dy
+        flow = np.polyval(block.areas[k][::-1], before[k] / block.scale) / block.areas[k][0]
+        damping = block.damping[k] + block.lines[k] * flow**2
+        energy += 0.5 * damping / STEP * dy * dy
         for kappa, tau, q in zip(block.relaxation[k], block.lags, behind[k], strict=True):
             keep, ramp = np.exp(-STEP / tau), tau / STEP * (1.0 - np.exp(-STEP / tau))
             energy += kappa * (keep * q * dy + 0.5 * ramp * dy * dy)
@@ -252,6 +255,7 @@ def ramps(block: Block, highest: float, steps: int) -> Array:
 
 @given(balances(m=0, n_lags=2))
 def test_on_ramps_lags_are_exact_in_steps_of_any_length(block: Balance) -> None:
+    block = replace(block, lines=())  # whose areas are those of the last sample
     coarse = run(block, ramps(block, FURTHEST, 5), 0.2)
     fine = run(block, ramps(block, FURTHEST, 40), 0.025)
     np.testing.assert_allclose(fine[::8], coarse, atol=1e-9 * np.abs(coarse).max())
@@ -265,7 +269,7 @@ def test_shorter_steps_converge(
     damping: tuple[float, float], steps: tuple[int, ...], share: float
 ) -> None:
     """Without damping with the square of the step; with it straight, once steps are below its 7 ms."""
-    block = replace(Balance.example(), damping=damping).inverse()
+    block = replace(Balance.example(), damping=damping, lines=()).inverse()
     *found, last = (run(block, ramps(block, 2.5, n), 1.0 / n)[::n] for n in (*steps, 8 * steps[-1]))
     errors = [np.abs(each - last).max() for each in found]
     assert errors[1] < share * errors[0]
@@ -280,9 +284,9 @@ def test_shorter_steps_converge(
     [
         ({"friction": ((3.0, -1.5), (2.5, 2.0))}, "friction.*make energy"),
         ({"relaxation": ((1.0, -0.6), (0.8, 0.5))}, "relaxation.*make energy"),
-        ({"damping": (-0.1, 0.0)}, "damping, walls or grip"),
-        ({"walls": (0.0, -0.1)}, "damping, walls or grip"),
-        ({"grip": -0.5}, "damping, walls or grip"),
+        ({"damping": (-0.1, 0.0)}, "damping, lines, walls or grip"),
+        ({"walls": (0.0, -0.1)}, "damping, lines, walls or grip"),
+        ({"grip": -0.5}, "damping, lines, walls or grip"),
         ({"limits": (0.0, 2.0)}, "limits.*positive"),
         ({"lags": (0.8, -1.0)}, "lags.*positive"),
         ({"areas": ((0.0, 1.0, 0.0), (1.0, 0.0, 0.0))}, "areas at rest.*positive"),

@@ -31,6 +31,7 @@ MUSCLE = Balance(
     relaxation=((1.5, 1.0),),
     loads=((1.0,),),
     damping=(0.1,),
+    lines=(0.04,),
     walls=(0.0,),
     limits=(0.05, 0.3, 1.2),
     grip=0.6,
@@ -122,7 +123,7 @@ def test_a_dead_zone_is_found_where_there_is_one(found: BalanceEstimator) -> Non
 
 def test_it_keeps_to_physics(found: BalanceEstimator) -> None:
     b = balance_of(found)
-    assert min(*b.friction[0], *b.relaxation[0], b.damping[0], b.walls[0], b.grip) >= 0
+    assert min(*b.friction[0], *b.relaxation[0], b.damping[0], b.lines[0], b.walls[0], b.grip) >= 0
     y = np.linspace(b.hull[0][0], b.hull[0][1], 200)
     u = y / b.scale
     area = sum(a * u**i for i, a in enumerate(b.areas[0]))
@@ -229,11 +230,11 @@ def test_slopes_are_those_of_differences() -> None:
     values = np.concatenate([block.pack(), np.log(block.lags)])
     exact = run(block.coefficients(STEP), p, y, x, held=False)[1][:, 0]
     width = exact.shape[1] - 1 - len(block.lags)
-    # the block packs tables first, then damping, walls and grip; coefficients hull, wall, damping first
-    places = [*range(4, width), 3, 2, *range(width, exact.shape[1])]
+    # the block packs tables, damping, lines, walls, grip; coefficients begin hull, wall, damping, line
+    places = [*range(5, width), 3, 4, 2, *range(width, exact.shape[1])]
     for place, column in enumerate(places):
         step = np.zeros(values.size)
-        step[place] = 1e-6 * max(abs(values[place]), 0.1)
+        step[place] = 1e-6 * (abs(values[place]) or 0.1)
         slope = (at(values + step) - at(values - step)) / (2 * step[place])
         missed = np.abs(slope - exact[:, column])
         # but for the samples at which a stop just breaks away

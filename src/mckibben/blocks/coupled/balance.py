@@ -130,6 +130,9 @@ class Balance(ManyChannels, Invertible):
         How much of every load pulls at a muscle, usually 1.
     damping : sequence of n float
         Force by velocity [N s/mm], not negative.
+    lines : sequence of n float, optional
+        The same by the resistance of the line to what flows into a muscle: at rest, and elsewhere with
+        the square of its area. Default none.
     walls : sequence of n float
         Stretch of the wall by pressure, which friction feels at held length too [mm/bar].
     limits : sequence of m float
@@ -164,7 +167,7 @@ class Balance(ManyChannels, Invertible):
     increasing = ("limits",)
     parameters: ClassVar[tuple[str, ...]] = (
         *("springs", "elasticity", "areas", "friction", "relaxation", "loads"),
-        *("damping", "walls", "grip"),
+        *("damping", "lines", "walls", "grip"),
     )
 
     springs: Rows
@@ -184,6 +187,7 @@ class Balance(ManyChannels, Invertible):
     driven: Channels
     scheduled: Channels
     given: Channels
+    lines: Vector = ()
     tare: bool = False
     settled: bool = False
     pressure_range: tuple[FiniteFloat, FiniteFloat] | None = None
@@ -219,6 +223,8 @@ class Balance(ManyChannels, Invertible):
                     f"Remedy: give {n} rows of {width}."
                 )
         lengths = {"damping": self.damping, "walls": self.walls, "given": self.given}
+        if self.lines:
+            lengths["lines"] = self.lines
         for name, values in lengths.items():
             if len(values) != n:
                 raise ModelError(
@@ -241,9 +247,9 @@ class Balance(ManyChannels, Invertible):
                     f"{name} of {self.kind!r} has a negative stiffness, which would make energy. "
                     "Remedy: give none below 0."
                 )
-        if min(*self.damping, *self.walls, self.grip) < 0:
+        if min(*self.damping, *self.lines, *self.walls, self.grip) < 0:
             raise ModelError(
-                f"damping, walls or grip of {self.kind!r} is negative. Remedy: give none below 0."
+                f"damping, lines, walls or grip of {self.kind!r} is negative. Remedy: give none below 0."
             )
         if any(not low < high for low, high in self.hull):
             raise ModelError(f"hull of {self.kind!r} is {self.hull}. Remedy: lower ends first.")
@@ -256,7 +262,7 @@ class Balance(ManyChannels, Invertible):
     @property
     def rate_dependent(self) -> bool:  # type: ignore[override]
         """Whether anything relaxes or damps."""
-        return bool(self.lags) or any(self.damping)
+        return bool(self.lags) or any(self.damping) or any(self.lines)
 
     @property
     def n_states(self) -> int:
@@ -289,9 +295,13 @@ class Balance(ManyChannels, Invertible):
         gains = lags / step * -np.expm1(-step / lags)
         tables = [self.springs, self.elasticity, self.areas]
         tables += [self.friction, self.relaxation, self.loads]
+        lines = self.lines or (0.0,) * len(self.driven)
         own = [
             np.concatenate(
-                [self.hull[k], [self.walls[k], self.damping[k]], *(t[k] for t in tables)]
+                [
+                    *(self.hull[k], [self.walls[k], self.damping[k], lines[k]]),
+                    *(t[k] for t in tables),
+                ]
             )
             for k in range(len(self.driven))
         ]
@@ -373,6 +383,7 @@ class Balance(ManyChannels, Invertible):
             relaxation=((1.0, 0.6), (0.8, 0.5)),
             loads=((1.0,), (0.0,)),
             damping=(0.1, 0.05),
+            lines=(0.06, 0.04),
             walls=(0.05, 0.1),
             limits=(0.5, 2.0),
             grip=0.5,

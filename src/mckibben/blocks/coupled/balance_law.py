@@ -1,14 +1,16 @@
 """What holds in every sample of a balance of forces: its terms, and its two solutions.
 
-    p_k A_k(y_k) = loads + S_k(x) (1, y) + E_k(y_k) + sum_m h_km s_km + sum_l kappa_kl q_kl + d_k y_k'
+    p_k A_k(y_k) = loads + S_k(x) (1, y) + E_k(y_k) + sum_m h_km s_km + sum_l kappa_kl q_kl
+                   + (d_k + R_k (A_k / A0_k)^2) y_k'
 
 Of muscle k: stops s_m follow the stretch z = y + w p of its wall up to r_m (p + p0) either way; q_l,
-what a lag is behind, relaxes with its time constant. Pressures follow from displacements muscle by
-muscle; displacements from pressures as the minimum of a convex energy, by Newton's method with a search
-along every step.
+what a lag is behind, relaxes with its time constant; d damps, and so does the line behind which
+pressure is measured, R, which resists a flow of A y' (areas of the last sample, A0 at rest). Pressures
+follow from displacements muscle by muscle; displacements from pressures as the minimum of a convex
+energy, by Newton's method with a search along every step.
 
 Coefficients: the head, r (m), decays and gains of the lags (L each), then of every muscle: lowest and
-highest displacement known, w, d, springs (powers of what schedules by 1 + n), elasticity, area,
+highest displacement known, w, d, R, springs (powers of what schedules by 1 + n), elasticity, area,
 friction (m), relaxation (L), loads. State: y (n), z (n), stops (n by m), lags (n by L), the tare (n),
 whether nothing came before, samples amiss.
 """
@@ -47,7 +49,7 @@ def elastic(c: Array, own: int, k: int, y: Array, x: Array, gradient: Array) -> 
     for j in range(n):
         gradient[j] = 0.0
     force = 0.0
-    place = own + 4
+    place = own + 5
     for q in range(1 + n_x * degree):
         power = 1.0
         if q > 0:
@@ -80,7 +82,7 @@ def elastic(c: Array, own: int, k: int, y: Array, x: Array, gradient: Array) -> 
 def muscle_width(c: Array) -> int:
     """Return how many coefficients a muscle has."""
     springs = (1 + int(c[1]) * int(c[2])) * (1 + int(c[0]))
-    return 4 + springs + int(c[6]) + int(c[7]) + int(c[4]) + int(c[5]) + int(c[3])
+    return 5 + springs + int(c[6]) + int(c[7]) + int(c[4]) + int(c[5]) + int(c[3])
 
 
 @kernel
@@ -134,6 +136,20 @@ def rubbed(
 
 
 @kernel
+def flowing(c: Array, own: int, before: float) -> float:
+    """Return a muscle's area, over that at rest, where it moves on from somewhere."""
+    rest = c[own + muscle_width(c) - int(c[3]) - int(c[5]) - int(c[4]) - int(c[7])]
+    return area(c, own, min(max(before, c[own]), c[own + 1]))[0] / rest
+
+
+@kernel
+def damped(c: Array, own: int, before: float) -> float:
+    """Return the damping of a muscle that moves on from somewhere, over the sample time."""
+    flow = flowing(c, own, before)
+    return (c[own + 3] + c[own + 4] * flow * flow) * c[12]
+
+
+@kernel
 def lagging(c: Array, own: int, k: int, state: Array, way: int, y: float) -> tuple[float, float]:
     """Return relaxation and damping of muscle k at a displacement, and their slope by it."""
     if way == AT_REST:
@@ -141,7 +157,7 @@ def lagging(c: Array, own: int, k: int, state: Array, way: int, y: float) -> tup
     n, m, n_l = int(c[0]), int(c[4]), int(c[5])
     place = own + muscle_width(c) - int(c[3]) - n_l
     moved = y - state[k]
-    slope = c[own + 3] * c[12] if way == IN_TIME else 0.0
+    slope = damped(c, own, state[k]) if way == IN_TIME else 0.0
     force = slope * moved
     for i in range(n_l):
         gain = c[HEAD + m + n_l + i] if way == IN_TIME else c[14]

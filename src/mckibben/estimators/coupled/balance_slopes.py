@@ -16,6 +16,9 @@ from mckibben.blocks.coupled.balance_law import (
     FROM_REST,
     HEAD,
     IN_TIME,
+    area,
+    damped,
+    flowing,
     keep,
     muscle_width,
     muscles,
@@ -41,7 +44,7 @@ def direct(
     own = muscles(c) + k * width
     for i in range(slopes.size):
         slopes[i] = 0.0
-    place = k * width + 4
+    place = k * width + 5
     for q in range(1 + n_x * degree):
         power = 1.0
         if q > 0:
@@ -80,7 +83,15 @@ def direct(
             slopes[n * width] += by_grip
     place += m
     if way != AT_REST:
-        slopes[k * width + 3] = c[12] * (y[k] - state[k]) if way == IN_TIME else 0.0
+        speed = c[12] * (y[k] - state[k]) if way == IN_TIME else 0.0
+        flow, first = flowing(c, own, state[k]), place - m - n_a
+        slopes[k * width + 3] = speed
+        slopes[k * width + 4] = speed * flow * flow
+        power = 2.0 * c[own + 4] * flow * speed / c[own + first - k * width]
+        slopes[first] -= power * flow
+        for i in range(n_a):
+            slopes[first + i] += power
+            power *= min(max(state[k], c[own]), c[own + 1]) / scale
         for i in range(n_l):
             q_before = state[2 * n + n * m + k * n_l + i]
             gain = c[HEAD + m + n_l + i] if way == IN_TIME else c[14]
@@ -122,7 +133,13 @@ def remembered(
         if abs(state[row] + moved) <= c[HEAD + i] * grown:
             for j in range(slopes.size):
                 slopes[j] += c[place + i] * (memory[row, j] - memory[n + k, j])
-    carried = c[own + 3] * c[12] if way == IN_TIME else 0.0
+    carried = 0.0
+    if way == IN_TIME:
+        carried = damped(c, own, state[k])
+        if c[own] < state[k] < c[own + 1]:
+            a, by_y = area(c, own, state[k])
+            flow = flowing(c, own, state[k])
+            carried -= 2.0 * c[own + 4] * flow * flow / a * by_y * c[12] * (y - state[k])
     for i in range(n_l):
         kappa = c[own + width - n_loads - n_l + i]
         carried += kappa * (c[HEAD + m + n_l + i] if way == IN_TIME else c[14])

@@ -93,6 +93,7 @@ class Structure:
             "hull": 2,
             "wall": 1,
             "damping": 1,
+            "line": 1,
             "springs": (1 + len(self.scheduled) * self.degree) * (1 + self.n),
             "elasticity": self.n_elastic,
             "areas": self.n_area,
@@ -154,6 +155,7 @@ class Structure:
             relaxation=rows(np.maximum(part["relaxation"], 0.0)),
             loads=rows(part["loads"]),
             damping=vector(np.maximum(part["damping"][:, 0], 0.0)),
+            lines=vector(np.maximum(part["line"][:, 0], 0.0)),
             walls=vector(np.maximum(part["wall"][:, 0], 0.0)),
             limits=vector(self.limits),
             grip=float(max(values[self.grip], 0.0)),
@@ -171,7 +173,8 @@ class Structure:
 
     def values(self, block: Balance) -> Array:
         """Return the coefficients of a balance of this structure."""
-        tables = [block.hull, np.transpose([block.walls]), np.transpose([block.damping])]
+        single = (block.walls, block.damping, block.lines)
+        tables = [block.hull, *(np.transpose([column]) for column in single)]
         tables += [block.springs, block.elasticity, block.areas]
         tables += [block.friction, block.relaxation, block.loads]
         table = np.hstack([np.asarray(part, dtype=np.float64) for part in tables])
@@ -181,7 +184,8 @@ class Structure:
         """Return, for every parameter that a balance packs, its place among coefficients."""
         names = ("springs", "elasticity", "areas", "friction", "relaxation", "loads")
         by_name = [self.places(name, k) for name in names for k in range(self.n)]
-        single = [self.places(name, k) for name in ("damping", "wall") for k in range(self.n)]
+        singles = ("damping", "line", "wall")
+        single = [self.places(name, k) for name in singles for k in range(self.n)]
         return np.concatenate([*by_name, *single, [self.grip]]).astype(np.intp)
 
     @property
@@ -207,7 +211,7 @@ class Structure:
             columns += [[place] for place in ([] if plain else free_areas)]
             columns += [[place] for place in self.places("loads", k).tolist() if not newtons]
             if moving:
-                columns += [[place] for place in self.places("wall", k).tolist()]
+                columns += [[int(self.places(name, k)[0])] for name in ("line", "wall")]
         for q in range(1 + len(self.scheduled) * self.degree):
             for k in range(self.n):
                 if q or not self.tare:  # displacements from rest make a constant of their own
@@ -254,7 +258,7 @@ class Structure:
             if place > self.timing.start:
                 ask({place: 1.0, place - 1: -1.0}, APART)
         for k in range(self.n):
-            for name in ("friction", "relaxation", "damping", "wall"):
+            for name in ("friction", "relaxation", "damping", "line", "wall"):
                 for place in self.places(name, k).tolist():
                     ask({place: 1.0}, 0.0)
             for place in self.places("loads", k).tolist():

@@ -14,6 +14,7 @@ typedef struct {
     mck_real high;
     mck_real wall;
     mck_real damping;
+    mck_real line;
     const mck_real *springs;
     const mck_real *elasticity;
     const mck_real *areas;
@@ -59,14 +60,15 @@ mck_balance mck_balance_of(const mck_part *part, mck_real *state)
 static muscle read_muscle(const mck_balance *f, int k)
 {
     const int springs = (1 + f->n_x * f->degree) * (1 + f->n);
-    const int width = 4 + springs + f->n_e + f->n_a + f->m + f->n_l + f->n_loads;
+    const int width = 5 + springs + f->n_e + f->n_a + f->m + f->n_l + f->n_loads;
     const mck_real *own = f->muscles + k * width;
     muscle one;
     one.low = own[0];
     one.high = own[1];
     one.wall = own[2];
     one.damping = own[3];
-    one.springs = own + 4;
+    one.line = own[4];
+    one.springs = own + 5;
     one.elasticity = one.springs + springs;
     one.areas = one.elasticity + f->n_e;
     one.friction = one.areas + f->n_a;
@@ -169,7 +171,10 @@ static mck_real lagging(const mck_balance *f, const muscle *one, int k, int way,
                         mck_real y, mck_real *slope)
 {
     const mck_real moved = y - f->y[k];
-    *slope = way == MCK_IN_TIME ? one->damping * f->rate : MCK_R(0.0);
+    const mck_real flow =
+        area(f, one, mck_clip(f->y[k], one->low, one->high), slope) / one->areas[0];
+    const mck_real damping = one->damping + one->line * flow * flow;
+    *slope = way == MCK_IN_TIME ? damping * f->rate : MCK_R(0.0);
     mck_real force = *slope * moved;
     for (int i = 0; way != MCK_AT_REST && i < f->n_l; i++) {
         const mck_real gain = way == MCK_IN_TIME ? f->gains[i] : f->fresh;

@@ -1075,7 +1075,8 @@ class _Parallel:
         for q, tau in zip(self.behind[k], self.block.lags, strict=True):
             keep = math.exp(-self.step / tau)
             ramp = tau / self.step * (1.0 - keep)
-            out.append({"rest": 0.0, "first": dy, "time": keep * q + ramp * dy}[self.way])
+            first = 0.0 if self.block.settled else dy
+            out.append({"rest": 0.0, "first": first, "time": keep * q + ramp * dy}[self.way])
         return out
 
     def resisted(self, k: int, u: float, p: float) -> float:
@@ -1091,7 +1092,10 @@ class _Parallel:
         force += _sum(block.friction[k], self.moved(k, u, p))
         force += _sum(block.relaxation[k], self.relaxing(k, u))
         if self.way == "time":
-            force += block.damping[k] * (u - self.u[k]) / self.step
+            low, high = block.hull[k]
+            flow = self.area(k, min(max(self.u[k], low), high)) / block.areas[k][0]
+            line = block.lines[k] if block.lines else 0.0
+            force += (block.damping[k] + line * flow**2) * (u - self.u[k]) / self.step
         return force - p * self.area(k, u)
 
     def push(self, k: int) -> float:

@@ -58,6 +58,7 @@ def balances(
         relaxation=rows(rng.uniform(0.0, 2.0, (n, n_lags))),
         loads=rows(np.eye(n) if n_loads == n else rng.uniform(0.5, 1.0, (n, n_loads))),
         damping=vector(rng.uniform(0.0, 0.2, n) if n_lags else np.zeros(n)),
+        lines=vector(rng.uniform(0.0, 0.1, n)) if n_lags else (),
         walls=vector(rng.uniform(0.0, 0.1, n)),
         limits=vector(np.cumsum(rng.uniform(0.05, 0.3, m))),
         grip=draw(numbers(0.0, 2.0)),
@@ -69,6 +70,7 @@ def balances(
         scheduled=(*channels("extensor", "bar", n_x), *channels("force", "N", n_loads)),
         given=channels("pressure", "bar", n),
         tare=draw(st.booleans()),
+        settled=draw(st.booleans()),
     )
 
 
@@ -108,6 +110,7 @@ ALONE = Balance(
     relaxation=((1.0,),),
     loads=((1.0,),),
     damping=(0.1,),
+    lines=(0.04,),
     walls=(0.05,),
     limits=(0.2, 0.8),
     grip=0.5,

@@ -19,7 +19,17 @@ from mckibben.blocks.core.fields import Channel, rows, vector
 from mckibben.blocks.coupled.balance import Balance
 from mckibben.blocks.coupled.load_estimate import LoadEstimate
 from mckibben.blocks.laws.trial import wander
-from tests.blocks.balances import FURTHEST, HIGHEST, SEEDS, STEP, balances, measured, motion, run
+from tests.blocks.balances import (
+    ALONE,
+    FURTHEST,
+    HIGHEST,
+    SEEDS,
+    STEP,
+    balances,
+    measured,
+    motion,
+    run,
+)
 from tests.blocks.strategies import numbers
 
 Array = NDArray[np.float64]
@@ -99,6 +109,7 @@ def test_without_lags_it_obeys_the_contract_of_the_rate_independent(
         relaxation=((), ()),
         lags=(),
         damping=(0.0, 0.0),
+        lines=(),
         tare=tare,
         loads=rows(np.array(example.loads)[:, :n_loads]),
         scheduled=example.scheduled[: 1 + n_loads],
@@ -168,7 +179,9 @@ def incremental_energy(block: Balance, before: Array, y: Array, x: Array, p: Arr
             width, s = limit * (p[k] + block.grip), abs(stop + moved)
             energy += h * (0.5 * s * s if s < width else width * s - 0.5 * width * width)
         du = u - u0[k]
-        energy += 0.5 * block.damping[k] / STEP * du * du
+        flow = np.polyval(block.areas[k][::-1], u0[k] / block.scale) / block.areas[k][0]
+        damping = block.damping[k] + block.lines[k] * flow**2
+        energy += 0.5 * damping / STEP * du * du
         for kappa, tau, q in zip(block.relaxation[k], block.lags, behind[k], strict=True):
             keep, ramp = np.exp(-STEP / tau), tau / STEP * (1.0 - np.exp(-STEP / tau))
             energy += kappa * (keep * q * du + 0.5 * ramp * du * du)
@@ -278,6 +291,15 @@ def test_a_tare_is_where_muscles_rest_under_the_first_load() -> None:
 # -- time ----------------------------------------------------------------------------------------
 
 
+def test_settled_muscles_are_where_a_long_hold_leaves_them() -> None:
+    moved = motion(ALONE, (0.5, HIGHEST), seed=3)
+    held = np.vstack([np.repeat(moved[:1], 5000, axis=0), moved])
+    settled = run(replace(ALONE, settled=True).inverse(), moved)
+    just_come = run(ALONE.inverse(), moved)
+    np.testing.assert_allclose(settled, run(ALONE.inverse(), held)[5000:], atol=1e-9 * FURTHEST)
+    assert np.abs(just_come - settled).max() > 0.01
+
+
 def ramps(block: Block, highest: float, steps: int) -> Array:
     """Return ramps between turning points, so many steps each."""
     rng = np.random.default_rng(4)
@@ -288,6 +310,7 @@ def ramps(block: Block, highest: float, steps: int) -> Array:
 
 @given(balances(m=0, n_lags=2))
 def test_on_ramps_lags_are_exact_in_steps_of_any_length(block: Balance) -> None:
+    block = replace(block, lines=())  # whose areas are those of the last sample
     coarse = run(block, ramps(block, FURTHEST, 5), 0.2)
     fine = run(block, ramps(block, FURTHEST, 40), 0.025)
     np.testing.assert_allclose(fine[::8], coarse, atol=1e-9 * np.abs(coarse).max())
@@ -301,7 +324,7 @@ def test_shorter_steps_converge(
     damping: tuple[float, float], steps: tuple[int, ...], share: float
 ) -> None:
     """Without damping with the square of the step; with it straight, once steps are below its 7 ms."""
-    block = replace(Balance.example(), damping=damping).inverse()
+    block = replace(Balance.example(), damping=damping, lines=()).inverse()
     *found, last = (run(block, ramps(block, 2.5, n), 1.0 / n)[::n] for n in (*steps, 8 * steps[-1]))
     errors = [np.abs(each - last).max() for each in found]
     assert errors[1] < share * errors[0]
@@ -316,13 +339,13 @@ def test_shorter_steps_converge(
     [
         ({"friction": ((3.0, -1.5), (2.5, 2.0))}, "friction.*make energy"),
         ({"relaxation": ((1.0, -0.6), (0.8, 0.5))}, "relaxation.*make energy"),
-        ({"damping": (-0.1, 0.0)}, "damping, walls, grip, bladders or pushes"),
-        ({"walls": (0.0, -0.1)}, "damping, walls, grip, bladders or pushes"),
-        ({"bladders": (4.0, -5.0)}, "damping, walls, grip, bladders or pushes"),
-        ({"pushes": (-4.0, 5.0)}, "damping, walls, grip, bladders or pushes"),
+        ({"damping": (-0.1, 0.0)}, "damping, lines, walls, bladders, pushes or grip"),
+        ({"walls": (0.0, -0.1)}, "damping, lines, walls, bladders, pushes or grip"),
+        ({"bladders": (4.0, -5.0)}, "damping, lines, walls, bladders, pushes or grip"),
+        ({"pushes": (-4.0, 5.0)}, "damping, lines, walls, bladders, pushes or grip"),
         ({"pushes": (4.0,)}, "pushes.*give 2"),
         ({"bladders": ()}, "bladders.*give 2"),
-        ({"grip": -0.5}, "damping, walls, grip, bladders or pushes"),
+        ({"grip": -0.5}, "damping, lines, walls, bladders, pushes or grip"),
         ({"limits": (0.0, 2.0)}, "limits.*positive"),
         ({"lags": (0.8, -1.0)}, "lags.*positive"),
         ({"areas": ((0.0, 1.0, 0.0), (1.0, 0.0, 0.0))}, "areas at rest.*positive"),

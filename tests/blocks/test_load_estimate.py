@@ -82,7 +82,13 @@ def test_friction_takes_work_and_elasticity_none() -> None:
     works = []
     for friction in (((1.5,),), ((0.0,),)):
         block = replace(
-            ALONE, limits=(0.5,), friction=friction, lags=(), relaxation=((),), damping=(0.0,)
+            ALONE,
+            limits=(0.5,),
+            friction=friction,
+            lags=(),
+            relaxation=((),),
+            damping=(0.0,),
+            lines=(),
         )
         inputs = np.column_stack([path, np.full(path.size, 2.0)])
         loads = run(LoadEstimate(block), inputs, initial="virgin")[:, 0]

@@ -31,6 +31,7 @@ MUSCLE = Balance(
     relaxation=((1.5, 1.0),),
     loads=((1.0,),),
     damping=(0.1,),
+    lines=(0.04,),
     walls=(0.0,),
     limits=(0.05, 0.3, 1.2),
     grip=0.6,
@@ -122,7 +123,7 @@ def test_a_dead_zone_is_found_where_there_is_one(found: BalanceEstimator) -> Non
 
 def test_it_keeps_to_physics(found: BalanceEstimator) -> None:
     b = balance_of(found)
-    assert min(*b.friction[0], *b.relaxation[0], b.damping[0], b.walls[0], b.grip) >= 0
+    assert min(*b.friction[0], *b.relaxation[0], b.damping[0], b.lines[0], b.walls[0], b.grip) >= 0
     y = np.linspace(b.hull[0][0], b.hull[0][1], 200)
     u = y / b.scale
     area = sum(a * u**i for i, a in enumerate(b.areas[0]))
@@ -238,13 +239,13 @@ def test_slopes_are_those_of_differences(block: Balance) -> None:
     values = np.concatenate([block.pack(), np.log(block.lags)])
     exact = run(block.coefficients(STEP), p, y, x, held=False)[1][:, 0]
     width = exact.shape[1] - 1 - len(block.lags)
-    # the block packs tables first, then damping, walls, grip, bladders and pushes; coefficients have
-    # hull, wall, push, damping and bladder first
-    slack = [5, 3] if block.pushes else []
-    places = [*range(6, width), 4, 2, width, *slack, *range(width + 1, exact.shape[1])]
+    # the block packs tables first, then damping, lines, walls, grip, bladders and pushes; coefficients
+    # have hull, wall, push, damping, line and bladder first
+    slack = [6, 3] if block.pushes else []
+    places = [*range(7, width), 4, 5, 2, width, *slack, *range(width + 1, exact.shape[1])]
     for place, column in enumerate(places):
         step = np.zeros(values.size)
-        step[place] = 1e-6 * max(abs(values[place]), 0.1)
+        step[place] = 1e-6 * (abs(values[place]) or 0.1)
         slope = (at(values + step) - at(values - step)) / (2 * step[place])
         missed = np.abs(slope - exact[:, column])
         # but for the samples at which a stop just breaks away
@@ -295,7 +296,24 @@ def test_recordings_that_begin_in_motion_do_little_harm() -> None:
     cut = [recording(seed).slice(300, 1200) for seed in (1, 2)]
     estimator = BalanceEstimator().fit(cut)
     assert any("does not begin at rest" in note for note in estimator.diagnostics_.notes)
+    assert not balance_of(estimator).settled
     assert error(estimator, recording(3)) < 0.3
+
+
+def test_recordings_that_begin_under_a_pressure_long_held_count_as_a_whole() -> None:
+    def held(seed: int) -> Recording:
+        time = np.arange(1200) * STEP
+        p = 1.5 + np.minimum(time / 2.0, 1.0) * (random_wave(time, 0.3, 4.0, seed=seed) - 1.5)
+        block = replace(MUSCLE, settled=True).inverse()
+        y = block.simulate(np.column_stack([p, 0.0 * p]), sample_time=STEP)[:, 0]
+        y = y - y[0] + NOISE * np.random.default_rng(seed).standard_normal(len(p))
+        return Recording({"pressure": p, "displacement": y}, STEP)
+
+    estimator = BalanceEstimator().fit([held(1), held(2)])
+    assert balance_of(estimator).settled
+    assert estimator.diagnostics_.rmse < 2.5 * NOISE
+    assert error(estimator, held(3)) < 3.0 * NOISE
+    assert any("long been held" in note for note in estimator.diagnostics_.notes)
 
 
 def test_what_recordings_cannot_tell_is_said() -> None:

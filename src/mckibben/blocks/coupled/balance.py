@@ -131,6 +131,9 @@ class Balance(ManyChannels, Invertible):
         How much of every load pulls at a muscle, usually 1.
     damping : sequence of n float
         Force by velocity [N s/mm], not negative.
+    lines : sequence of n float, optional
+        The same by the resistance of the line to what flows into a muscle: at rest, and elsewhere with
+        the square of its area. Default none.
     walls : sequence of n float
         Stretch of the wall by pressure, which friction feels at held length too [mm/bar].
     limits : sequence of m float
@@ -155,6 +158,9 @@ class Balance(ManyChannels, Invertible):
         Force at which each goes slack [N], not negative.
     tare : bool
         Whether displacements count from where the muscles rested, without pressure, at the start.
+    settled : bool
+        Whether the muscles have long been where the first sample finds them, so that nothing relaxes
+        any more; else they have come there just now.
     pressure_range : (float, float), optional
         Pressures are clipped to it, and said so.
     """
@@ -167,7 +173,7 @@ class Balance(ManyChannels, Invertible):
     increasing = ("limits",)
     parameters: ClassVar[tuple[str, ...]] = (
         *("springs", "elasticity", "areas", "friction", "relaxation", "loads"),
-        *("damping", "walls", "grip", "bladders", "pushes"),
+        *("damping", "lines", "walls", "grip", "bladders", "pushes"),
     )
 
     springs: Rows
@@ -187,9 +193,11 @@ class Balance(ManyChannels, Invertible):
     driven: Channels
     scheduled: Channels
     given: Channels
+    lines: Vector = ()
     bladders: Vector = ()
     pushes: Vector = ()
     tare: bool = False
+    settled: bool = False
     pressure_range: tuple[FiniteFloat, FiniteFloat] | None = None
 
     def __post_init__(self) -> None:
@@ -225,6 +233,8 @@ class Balance(ManyChannels, Invertible):
         lengths = {"damping": self.damping, "walls": self.walls, "given": self.given}
         if self.bladders or self.pushes:
             lengths |= {"bladders": self.bladders, "pushes": self.pushes}
+        if self.lines:
+            lengths["lines"] = self.lines
         for name, values in lengths.items():
             if len(values) != n:
                 raise ModelError(
@@ -247,9 +257,10 @@ class Balance(ManyChannels, Invertible):
                     f"{name} of {self.kind!r} has a negative stiffness, which would make energy. "
                     "Remedy: give none below 0."
                 )
-        if min(*self.damping, *self.walls, self.grip, *self.bladders, *self.pushes) < 0:
+        single = (*self.damping, *self.lines, *self.walls, *self.bladders, *self.pushes)
+        if min(*single, self.grip) < 0:
             raise ModelError(
-                f"damping, walls, grip, bladders or pushes of {self.kind!r} has a negative number. "
+                f"damping, lines, walls, bladders, pushes or grip of {self.kind!r} is negative. "
                 "Remedy: give none below 0."
             )
         if any(not low < high for low, high in self.hull):
@@ -263,7 +274,7 @@ class Balance(ManyChannels, Invertible):
     @property
     def rate_dependent(self) -> bool:  # type: ignore[override]
         """Whether anything relaxes or damps."""
-        return bool(self.lags) or any(self.damping)
+        return bool(self.lags) or any(self.damping) or any(self.lines)
 
     @property
     def n_states(self) -> int:
@@ -289,7 +300,7 @@ class Balance(ManyChannels, Invertible):
         head = [
             *(len(self.driven), len(self.scheduled) - self.n_loads, self.degree, self.n_loads),
             *(len(self.limits), len(self.lags), len(self.elasticity[0]), len(self.areas[0])),
-            *(self.scale, self.grip, low, high, 1.0 / step, self.tare),
+            *(self.scale, self.grip, low, high, 1.0 / step, self.tare, not self.settled),
         ]
         lags = np.array(self.lags)
         decays = np.exp(-step / lags)
@@ -298,7 +309,8 @@ class Balance(ManyChannels, Invertible):
         tables += [self.friction, self.relaxation, self.loads]
         n = len(self.driven)
         never, none = n * (NEVER,), n * (0.0,)
-        single = [self.walls, self.pushes or never, self.damping, self.bladders or none]
+        single = [self.walls, self.pushes or never, self.damping]
+        single += [self.lines or none, self.bladders or none]
         own = [
             np.concatenate([self.hull[k], [t[k] for t in single], *(t[k] for t in tables)])
             for k in range(n)
@@ -382,6 +394,7 @@ class Balance(ManyChannels, Invertible):
             relaxation=((1.0, 0.6), (0.8, 0.5)),
             loads=((1.0,), (0.0,)),
             damping=(0.1, 0.05),
+            lines=(0.06, 0.04),
             walls=(0.05, 0.1),
             limits=(0.5, 2.0),
             grip=0.5,

@@ -1,16 +1,18 @@
 """What holds in every sample of a balance of forces: its terms, and its two solutions.
 
     loads + S_k(x) (1, y) + min(R_k, b_k) = 0
-    R_k = E_k(u_k) + sum_m h_km s_km + sum_l kappa_kl q_kl + d_k u_k' - p_k A_k(u_k)
+    R_k = E_k(u_k) + sum_m h_km s_km + sum_l kappa_kl q_kl + (d_k + l_k (A_k / A0_k)^2) u_k'
+          - p_k A_k(u_k)
 
 Of muscle k: R is what it resists shortening with, up to b, at which it buckles. Taut, it is as short as
 its ends are near, u = y; slack, u is where it resists with b. Stops s_m follow the stretch z = u + w p
-of its wall up to r_m (p + p0) either way; q_l, what a lag is behind, relaxes with its time constant.
-Pressures follow from displacements muscle by muscle; displacements from pressures as the minimum of a
-convex energy, by Newton's method with a search along every step.
+of its wall up to r_m (p + p0) either way; q_l, what a lag is behind, relaxes with its time constant; d
+damps, and so does the line behind which pressure is measured, which resists a flow of A u' with l (areas
+of the last sample, A0 at rest). Pressures follow from displacements muscle by muscle; displacements from
+pressures as the minimum of a convex energy, by Newton's method with a search along every step.
 
 Coefficients: the head, r (m), decays and gains of the lags (L each), then of every muscle: lowest and
-highest displacement known, w, b, d, its own spring, springs (powers of what schedules by 1 + n),
+highest displacement known, w, b, d, l, its own spring, springs (powers of what schedules by 1 + n),
 elasticity, area, friction (m), relaxation (L), loads. State: u (n), z (n), stops (n by m), lags (n by
 L), the tare (n), whether nothing came before, samples amiss.
 """
@@ -23,11 +25,11 @@ from mckibben.arrays import Array
 from mckibben.blocks.core.kernels import kernel
 from mckibben.blocks.core.linear_system import eliminate
 
-HEAD = 14
+HEAD = 15
 """n, schedules, degree, loads, stops, lags, elastic terms, area's terms, scale, p0, lowest and highest
-pressure, samples a second, tare."""
+pressure, samples a second, tare, what is left at the start to relax (1, or 0 if settled)."""
 
-OWN = 6
+OWN = 7
 """Coefficients of a muscle before its springs."""
 
 NEVER = 1e30
@@ -88,7 +90,7 @@ def elastic(c: Array, own: int, u: float) -> tuple[float, float]:
         power *= v
         value += c[place + i] * power
     slope /= c[8]
-    return value + slope * (u - inside) + c[own + 5] * u, slope + c[own + 5]
+    return value + slope * (u - inside) + c[own + 6] * u, slope + c[own + 6]
 
 
 @kernel
@@ -143,6 +145,20 @@ def rubbed(
 
 
 @kernel
+def flowing(c: Array, own: int, before: float) -> float:
+    """Return a muscle's area, over that at rest, where it moves on from somewhere."""
+    rest = c[own + muscle_width(c) - int(c[3]) - int(c[5]) - int(c[4]) - int(c[7])]
+    return area(c, own, min(max(before, c[own]), c[own + 1]))[0] / rest
+
+
+@kernel
+def damped(c: Array, own: int, before: float) -> float:
+    """Return the damping of a muscle that moves on from somewhere, over the sample time."""
+    flow = flowing(c, own, before)
+    return (c[own + 4] + c[own + 5] * flow * flow) * c[12]
+
+
+@kernel
 def lagging(c: Array, own: int, k: int, state: Array, way: int, y: float) -> tuple[float, float]:
     """Return relaxation and damping of muscle k at a displacement, and their slope by it."""
     if way == AT_REST:
@@ -150,10 +166,10 @@ def lagging(c: Array, own: int, k: int, state: Array, way: int, y: float) -> tup
     n, m, n_l = int(c[0]), int(c[4]), int(c[5])
     place = own + muscle_width(c) - int(c[3]) - n_l
     moved = y - state[k]
-    slope = c[own + 4] * c[12] if way == IN_TIME else 0.0
+    slope = damped(c, own, state[k]) if way == IN_TIME else 0.0
     force = slope * moved
     for i in range(n_l):
-        gain = c[HEAD + m + n_l + i] if way == IN_TIME else 1.0
+        gain = c[HEAD + m + n_l + i] if way == IN_TIME else c[14]
         q = c[HEAD + m + i] * state[2 * n + n * m + k * n_l + i] + gain * moved
         force += c[place + i] * q
         slope += c[place + i] * gain
@@ -223,7 +239,7 @@ def keep(c: Array, state: Array, way: int, y: Array, p: Array) -> None:
             state[2 * n + k * m + i] = min(max(s, -limit), limit)
         for i in range(n_l):
             place = 2 * n + n * m + k * n_l + i
-            gain = c[HEAD + m + n_l + i] if way == IN_TIME else 1.0
+            gain = c[HEAD + m + n_l + i] if way == IN_TIME else c[14]
             if way == AT_REST:
                 state[place] = 0.0
             else:

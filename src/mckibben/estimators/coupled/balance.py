@@ -71,6 +71,9 @@ FIRM = 0.8
 FIRST_SAMPLES, MORE_SAMPLES, MOST_SAMPLES = 8_000, 15_000, 60_000
 """By which starts, slack and dead zones are compared; to find the way by; and for the last steps."""
 
+EXPLAINED = 1.5
+"""Times the error of all but first parts up to which that of all, settled before, is no more."""
+
 LAST_STEPS = 10
 """On all recordings, after those on a few of them."""
 
@@ -121,7 +124,7 @@ class BalanceEstimator(CoupledEstimator):
     finest: Annotated[float, Interval(gt=0, lt=0.5)] = 0.003
     lags: tuple[Annotated[float, Gt(0)], ...] | None = None
     n_lags: Annotated[int, Interval(ge=0, le=10)] = 2
-    elasticity: Annotated[int, Interval(ge=1, le=9)] = 6
+    elasticity: Annotated[int, Interval(ge=1, le=9)] = 9
     area: Annotated[int, Interval(ge=0, le=6)] = 2
     degree: Annotated[int, Interval(ge=1, le=4)] = 2
     tare: bool | None = None
@@ -133,7 +136,7 @@ class BalanceEstimator(CoupledEstimator):
     def identify(self, data: TrainingData, tracker: Tracker) -> Block:
         """Return the balance, solved for displacements."""
         data, notes = telling(data)
-        tracker.notes += [*notes, *other_zeros(data), *not_at_rest(data)]
+        tracker.notes += [*notes, *other_zeros(data)]
         behind = None
         if len(data.inputs) > len(data.outputs):
             along = directions_of(data)
@@ -149,6 +152,8 @@ class BalanceEstimator(CoupledEstimator):
             few = Search(data, structure, self.ridge).of_few(FIRST_SAMPLES)
             slack = len(data.inputs) > 1 if self.slack is None else self.slack
             self._begin(few, tracker, slack)
+            few = self._long_held(few, tracker, slack)
+            structure = few.structure
             assert tracker.best is not None
             if slack or self.contact:
                 few.descend(tracker.best, min(self.steps, DEAD_STEPS), tracker, first=slack)
@@ -174,6 +179,7 @@ class BalanceEstimator(CoupledEstimator):
         ends = np.array([min(float(data.lowest.min()), 0.0), float(data.highest.max())])
         low, high = acted(ends, dead).tolist()
         balance = structure.block(tracker.best, (low, high) if limited else None)
+        tracker.notes += not_at_rest(data, settled=structure.settled)
         tracker.notes += [*held_back(balance, structure), *sentences(balance, structure)]
         if dead:
             tracker.notes.append(
@@ -201,6 +207,23 @@ class BalanceEstimator(CoupledEstimator):
         few.check_loads(next(values for _, plain, values in starts if not plain), tracker)
         for _, _, start in starts if few.n_rows <= FEW_ROWS else starts[:FOLLOWED]:
             few.descend(start, min(self.steps, FIRST_STEPS), tracker, first=first)
+
+    def _long_held(self, few: Search, tracker: Tracker, first: bool) -> Search:
+        """Return the search of muscles that were settled when recordings began, if that explains these.
+
+        Their first parts count then, which they do not where what came before is unknown. The tracker's
+        best is then where it leads.
+        """
+        if tracker.best is None or not any(few.unsure):
+            return few
+        settled = Search(few.data, replace(few.structure, settled=True), self.ridge)
+        settled.span = few.span
+        part = tracker.part(0.3, 0.5)
+        settled.descend(tracker.best, min(self.steps, DEAD_STEPS), part, first=first)
+        if part.best is None or part.best_cost > EXPLAINED * tracker.best_cost:
+            return few
+        tracker.best, tracker.best_cost = part.best, part.best_cost
+        return settled
 
     def _slack(self, few: Search, tracker: Tracker) -> Structure:
         """Return the structure of muscles that go slack if that helps, and show it to the tracker."""
@@ -245,7 +268,7 @@ class BalanceEstimator(CoupledEstimator):
         balance, contacts, _ = parts_of(block)
         told, _ = telling(data)
         shortened = turned(told, directions(told))
-        structure = self.structure(shortened, Tracker())
+        structure = replace(self.structure(shortened, Tracker()), settled=balance.settled)
         dead = 0.0 if contacts is None else float(contacts.pack()[0])
         search = Search(acting(shortened, dead), structure, self.ridge)
         condition, found = search.covariance(structure.values(balance))

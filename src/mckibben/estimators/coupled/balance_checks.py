@@ -155,11 +155,15 @@ def check_directions(data: TrainingData) -> None:
             )
 
 
-def not_at_rest(data: TrainingData) -> list[str]:
-    """Return which runs begin under pressure, so that what came before is not known."""
+def not_at_rest(data: TrainingData, *, settled: bool) -> list[str]:
+    """Return which runs begin under pressure, and whether that seems to have been held for long."""
+    names = [run.name for run in data.runs if not held(data, run) and not at_rest(data, run)]
+    if settled:
+        return [
+            f"{name} begins under a pressure that seems to have long been held" for name in names
+        ]
     return [
-        f"{run.name} does not begin at rest: its first part does not count, and simulations of it begin "
+        f"{name} does not begin at rest: its first part does not count, and simulations of it begin "
         "as if it did. Remedy: begin recordings without pressure"
-        for run in data.runs
-        if not held(data, run) and not at_rest(data, run)
+        for name in names
     ]

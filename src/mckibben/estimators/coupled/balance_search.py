@@ -36,6 +36,9 @@ MOST_CUTS = 8
 LIGHTEST = 1e-7
 """Root of the damping of a step that is hardly damped."""
 
+TURNED_STEPS = 2
+"""Steps after which loads that were turned round are compared with those that were given."""
+
 UNKNOWN = 1e-10
 """Effect, relative to the largest of any number, that is none."""
 
@@ -184,9 +187,14 @@ class Search:
         for suspect in suspects:
             turned = self.turned(suspect)
             found = turned.begun(float(values[self.structure.grip]))
-            costs.append(turned.cost(found) if turned.loads_told(found) else np.inf)
+            tried = Tracker()
+            if turned.loads_told(found):
+                turned.descend(found, TURNED_STEPS, tried)
+            costs.append(tried.best_cost)
         best = int(np.argmin(costs))
-        if costs[best] < self.cost(values):
+        given = Tracker()
+        self.descend(values, TURNED_STEPS, given)
+        if costs[best] < min(given.best_cost, self.cost(values)):
             names = [self.runs[place].name for place in suspects[best]]
             raise DataError(
                 "the more it pulls, the shorter the muscle, as if its sign were wrong",
@@ -271,7 +279,7 @@ class Search:
     def missed(self, values: Array, place: int, *, sloped: bool = True) -> tuple[Array, Array]:
         """Return the errors over a run relative to the ranges, and their slopes by coefficients.
 
-        Of a run that does not begin at rest the first part does not count, until it has forgotten.
+        Of a run that begins in an unknown state the first part does not count, until it has forgotten.
         """
         still = self.still[place]
         found, by = self.followed(values, place, held=still, sloped=sloped)

@@ -17,6 +17,9 @@ from mckibben.blocks.coupled.balance_law import (
     HEAD,
     IN_TIME,
     OWN,
+    area,
+    damped,
+    flowing,
     keep,
     muscle_width,
     muscles,
@@ -72,7 +75,7 @@ def direct(c: Array, state: Array, way: int, k: int, u: float, p: float, slopes:
     n, m, n_l, n_e, n_a = int(c[0]), int(c[4]), int(c[5]), int(c[6]), int(c[7])
     width, scale = muscle_width(c), c[8]
     own = muscles(c) + k * width
-    slopes[k * width + 5] = u
+    slopes[k * width + 6] = u
     place = k * width + OWN + (1 + int(c[1]) * int(c[2])) * (1 + n)
     inside = min(max(u, c[own]), c[own + 1])
     v, beyond = inside / scale, (u - inside) / scale
@@ -102,10 +105,18 @@ def direct(c: Array, state: Array, way: int, k: int, u: float, p: float, slopes:
             slopes[n * width] += by_grip
     place += m
     if way != AT_REST:
-        slopes[k * width + 4] = c[12] * (u - state[k]) if way == IN_TIME else 0.0
+        speed = c[12] * (u - state[k]) if way == IN_TIME else 0.0
+        flow, first = flowing(c, own, state[k]), place - m - n_a
+        slopes[k * width + 4] = speed
+        slopes[k * width + 5] = speed * flow * flow
+        power = 2.0 * c[own + 5] * flow * speed / c[own + first - k * width]
+        slopes[first] -= power * flow
+        for i in range(n_a):
+            slopes[first + i] += power
+            power *= min(max(state[k], c[own]), c[own + 1]) / scale
         for i in range(n_l):
             q_before = state[2 * n + n * m + k * n_l + i]
-            gain = c[HEAD + m + n_l + i] if way == IN_TIME else 1.0
+            gain = c[HEAD + m + n_l + i] if way == IN_TIME else c[14]
             decay = c[HEAD + m + i]
             slopes[place + i] = decay * q_before + gain * (u - state[k])
             if way == IN_TIME:
@@ -141,10 +152,16 @@ def remembered(
         row = 2 * n + k * m + i
         if abs(state[row] + moved) <= c[HEAD + i] * grown:
             mixed(slopes, 1.0, c[place + i], memory[row])
-    carried = c[own + 4] * c[12] if way == IN_TIME else 0.0
+    carried = 0.0
+    if way == IN_TIME:
+        carried = damped(c, own, state[k])
+        if c[own] < state[k] < c[own + 1]:
+            a, by_y = area(c, own, state[k])
+            flow = flowing(c, own, state[k])
+            carried -= 2.0 * c[own + 5] * flow * flow / a * by_y * c[12] * (y - state[k])
     for i in range(n_l):
         kappa = c[own + width - n_loads - n_l + i]
-        carried += kappa * (c[HEAD + m + n_l + i] if way == IN_TIME else 1.0)
+        carried += kappa * (c[HEAD + m + n_l + i] if way == IN_TIME else c[14])
         mixed(slopes, 1.0, kappa * c[HEAD + m + i], memory[2 * n + n * m + k * n_l + i])
     mixed(slopes, 1.0, -carried, memory[k])
 
@@ -169,7 +186,7 @@ def carry(
     mixed(memory[k], -1.0, 1.0, moves)
     for i in range(n_l):
         row = 2 * n + n * m + k * n_l + i
-        gain = c[HEAD + m + n_l + i] if way == IN_TIME else 1.0
+        gain = c[HEAD + m + n_l + i] if way == IN_TIME else c[14]
         if way == AT_REST:
             mixed(memory[row], 0.0, 0.0, moves)
         else:

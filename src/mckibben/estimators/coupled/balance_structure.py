@@ -60,6 +60,8 @@ class Structure:
         Whether muscles can go slack.
     lag_range : (float, float)
         Shortest and longest time constant that the recordings can tell [s].
+    settled : bool
+        Whether muscles had long been where every recording begins.
     """
 
     driven: tuple[Channel, ...]
@@ -77,6 +79,7 @@ class Structure:
     tare: bool
     slack: bool
     lag_range: tuple[float, float]
+    settled: bool = False
 
     @property
     def n(self) -> int:
@@ -96,6 +99,7 @@ class Structure:
             "wall": 1,
             "push": 1,
             "damping": 1,
+            "line": 1,
             "bladder": 1,
             "springs": (1 + len(self.scheduled) * self.degree) * (1 + self.n),
             "elasticity": self.n_elastic,
@@ -163,6 +167,7 @@ class Structure:
             relaxation=rows(np.maximum(part["relaxation"], 0.0)),
             loads=rows(part["loads"]),
             damping=vector(np.maximum(part["damping"][:, 0], 0.0)),
+            lines=vector(np.maximum(part["line"][:, 0], 0.0)),
             walls=vector(np.maximum(part["wall"][:, 0], 0.0)),
             bladders=vector(bladders) if self.slack else (),
             pushes=vector(np.maximum(part["push"][:, 0], 0.0)) if self.slack else (),
@@ -176,13 +181,15 @@ class Structure:
             scheduled=(*self.scheduled, *self.loaded),
             given=self.given,
             tare=self.tare,
+            settled=self.settled,
             pressure_range=pressure_range,
         )
 
     def values(self, block: Balance) -> Array:
         """Return the coefficients of a balance of this structure."""
         none, never = self.n * (0.0,), self.n * (NEVER,)
-        single = [block.walls, block.pushes or never, block.damping, block.bladders or none]
+        single = [block.walls, block.pushes or never, block.damping]
+        single += [block.lines or none, block.bladders or none]
         tables = [block.hull, np.transpose(single)]
         tables += [block.springs, block.elasticity, block.areas]
         tables += [block.friction, block.relaxation, block.loads]
@@ -193,7 +200,7 @@ class Structure:
         """Return, for every parameter that a balance packs, its place among coefficients."""
         tables = ("springs", "elasticity", "areas", "friction", "relaxation", "loads")
         slack = ("bladder", "push") if self.slack else ()
-        groups = ((*tables, "damping", "wall"), slack)
+        groups = ((*tables, "damping", "line", "wall"), slack)
         first, last = (
             [place for name in names for k in range(self.n) for place in self.places(name, k)]
             for names in groups
@@ -223,7 +230,7 @@ class Structure:
             free_areas = areas if moving and (newtons or k) else areas[1:]
             columns += [[place] for place in ([] if plain else free_areas)]
             columns += [[place] for place in self.places("loads", k).tolist() if not newtons]
-            for name, is_free in (("wall", not first), ("push", self.slack)):
+            for name, is_free in (("wall", not first), ("line", True), ("push", self.slack)):
                 columns += [
                     [place] for place in self.places(name, k).tolist() if moving and is_free
                 ]
@@ -275,7 +282,7 @@ class Structure:
             if place > self.timing.start:
                 ask({place: 1.0, place - 1: -1.0}, APART)
         for k in range(self.n):
-            for name in ("bladder", "push", "friction", "relaxation", "damping", "wall"):
+            for name in ("bladder", "push", "friction", "relaxation", "damping", "line", "wall"):
                 for place in self.places(name, k).tolist():
                     ask({place: 1.0}, 0.0)
             for place in self.places("loads", k).tolist():

@@ -2,14 +2,14 @@
 
 #include "linear_system.h"
 
-#define HEAD 14
+#define HEAD 15
 #define MOST_STEPS 60
 #define MOST_SEARCHED 25
 #define BALANCED MCK_EITHER(2e-15, 1e-6)
 #define SURE MCK_EITHER(1e-11, 1e-5)
 #define LEAST_AREA MCK_R(0.01)
 #define NEVER MCK_R(1e30)
-#define OWN 6
+#define OWN 7
 
 /* Coefficients of one muscle. */
 typedef struct {
@@ -18,6 +18,7 @@ typedef struct {
     mck_real wall;
     mck_real push;
     mck_real damping;
+    mck_real line;
     mck_real bladder;
     const mck_real *springs;
     const mck_real *elasticity;
@@ -44,6 +45,8 @@ mck_balance mck_balance_of(const mck_part *part, mck_real *state)
     f.lowest = c[10];
     f.highest = c[11];
     f.rate = c[12];
+    f.tared = c[13];
+    f.fresh = c[14];
     f.limits = c + HEAD;
     f.decays = f.limits + f.m;
     f.gains = f.decays + f.n_l;
@@ -70,7 +73,8 @@ static muscle read_muscle(const mck_balance *f, int k)
     one.wall = own[2];
     one.push = own[3];
     one.damping = own[4];
-    one.bladder = own[5];
+    one.line = own[5];
+    one.bladder = own[6];
     one.springs = own + OWN;
     one.elasticity = one.springs + springs;
     one.areas = one.elasticity + f->n_e;
@@ -180,10 +184,13 @@ static mck_real lagging(const mck_balance *f, const muscle *one, int k, int way,
                         mck_real y, mck_real *slope)
 {
     const mck_real moved = y - f->u[k];
-    *slope = way == MCK_IN_TIME ? one->damping * f->rate : MCK_R(0.0);
+    const mck_real flow =
+        area(f, one, mck_clip(f->u[k], one->low, one->high), slope) / one->areas[0];
+    const mck_real damping = one->damping + one->line * flow * flow;
+    *slope = way == MCK_IN_TIME ? damping * f->rate : MCK_R(0.0);
     mck_real force = *slope * moved;
     for (int i = 0; way != MCK_AT_REST && i < f->n_l; i++) {
-        const mck_real gain = way == MCK_IN_TIME ? f->gains[i] : MCK_R(1.0);
+        const mck_real gain = way == MCK_IN_TIME ? f->gains[i] : f->fresh;
         const mck_real q = f->decays[i] * f->lags[k * f->n_l + i] + gain * moved;
         force += one->relaxation[i] * q;
         *slope += one->relaxation[i] * gain;
@@ -258,7 +265,7 @@ void mck_balance_keep(const mck_balance *f, int way, const mck_real *y, const mc
         }
         for (int i = 0; i < f->n_l; i++) {
             mck_real *lag = f->lags + k * f->n_l + i;
-            const mck_real gain = way == MCK_IN_TIME ? f->gains[i] : MCK_R(1.0);
+            const mck_real gain = way == MCK_IN_TIME ? f->gains[i] : f->fresh;
             const mck_real behind = f->decays[i] * *lag + gain * (u - f->u[k]);
             *lag = way == MCK_AT_REST ? MCK_R(0.0) : behind;
         }
@@ -445,7 +452,7 @@ void mck_balance_begin(const mck_part *part, const mck_balance *f, const mck_rea
     (void)mck_balance_settle(f, MCK_AT_REST, y, x, p, p + f->n);
     mck_balance_keep(f, MCK_AT_REST, y, p);
     for (int k = 0; k < f->n; k++) {
-        f->tare[k] = part->coefficients[HEAD - 1] > MCK_R(0.0) ? y[k] : MCK_R(0.0);
+        f->tare[k] = f->tared > MCK_R(0.0) ? y[k] : MCK_R(0.0);
     }
     *f->first = MCK_R(1.0);
 }

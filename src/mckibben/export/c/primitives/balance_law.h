@@ -2,9 +2,10 @@
  *
  * Coefficients: n, scheduling inputs, degree, loads, stops m, lags l, elastic terms, area's terms,
  * scale, pressure below zero at which stops hold nothing, lowest and highest pressure, samples a second,
- * tare; m limits, l decays, l gains; then of every muscle: lowest and highest displacement known, wall,
- * force at which it goes slack, damping, own spring, springs (powers of what schedules by 1 + n),
- * elasticity, area, friction, relaxation, loads. State: n shortenings, n stretches, n by m stops, n by l lags, n tares, whether nothing came before,
+ * tare, what is left at the start to relax; m limits, l decays, l gains; then of every muscle: lowest
+ * and highest displacement known, wall, force at which it goes slack, damping, line, own spring, springs
+ * (powers of what schedules by 1 + n), elasticity, area, friction, relaxation, loads.
+ * State: n shortenings, n stretches, n by m stops, n by l lags, n tares, whether nothing came before,
  * count of samples amiss; scratch: n n + 6 n. */
 #ifndef MCK_BALANCE_LAW_H
 #define MCK_BALANCE_LAW_H
@@ -35,6 +36,8 @@ typedef struct {
     mck_real lowest;
     mck_real highest;
     mck_real rate;
+    mck_real tared;
+    mck_real fresh;
     const mck_real *limits;
     const mck_real *decays;
     const mck_real *gains;

@@ -45,14 +45,21 @@ MUSCLE = Balance(
 
 
 def recording(
-    seed: int, strongest: float = 60.0, n: int = 1200, *, noise: float = NOISE, sign: float = 1.0
+    seed: int,
+    strongest: float = 60.0,
+    n: int = 1200,
+    *,
+    noise: float = NOISE,
+    sign: float = 1.0,
+    muscle: Balance = MUSCLE,
+    highest: float = 0.3,
 ) -> Recording:
-    """Return a muscle under a load, both moving at random from rest."""
+    """Return a muscle under a load, both moving at random from rest, at frequencies up to one [Hz]."""
     time = np.arange(n) * STEP
     rises = np.minimum(time / 2.0, 1.0)
-    p = rises * random_wave(time, 0.3, 4.0, seed=seed)
-    force = rises * random_wave(time, 0.2, strongest, seed=100 + seed)
-    y = MUSCLE.inverse().simulate(np.column_stack([p, force]), sample_time=STEP)[:, 0]
+    p = rises * random_wave(time, highest, 4.0, seed=seed)
+    force = rises * random_wave(time, highest * 2.0 / 3.0, strongest, seed=100 + seed)
+    y = muscle.inverse().simulate(np.column_stack([p, force]), sample_time=STEP)[:, 0]
     y = y + noise * np.random.default_rng(seed).standard_normal(n)
     channels = {"pressure": p, "displacement": y, "force": sign * force}
     return Recording(channels, STEP, meta={"name": f"run-{seed}"})
@@ -118,6 +125,21 @@ def test_a_dead_zone_is_found_where_there_is_one(found: BalanceEstimator) -> Non
     np.testing.assert_allclose(back["pressure"], run_["pressure"], atol=1e-7)
     told = load_of(estimator.fitted).simulate(wished.select(["displacement", "pressure"]))
     np.testing.assert_allclose(told["force"], run_["force"], atol=1e-6)
+
+
+def test_a_mass_is_found_by_how_fast_it_swings() -> None:
+    heavy = replace(MUSCLE, mass=(0.02,))
+    *train, other = (recording(seed, muscle=heavy, highest=2.0) for seed in (1, 2, 3))
+    errors = []
+    for told in (False, True):
+        estimator = BalanceEstimator(mass=told).fit(train)
+        errors.append(error(estimator, other))
+    assert errors[1] < 3.0 * NOISE < 0.5 * errors[0]
+    np.testing.assert_allclose(balance_of(estimator).mass, 0.02, rtol=0.2)
+    # with it the pressures for a motion are as exact as without
+    y = np.column_stack([estimator.predict(other)[0].ravel(), other["force"]])
+    pressures = estimator.fitted.inverse().simulate(y, sample_time=STEP)[:, 0]
+    np.testing.assert_allclose(pressures, other["pressure"], atol=1e-8)
 
 
 def test_it_keeps_to_physics(found: BalanceEstimator) -> None:

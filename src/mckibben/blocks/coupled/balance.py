@@ -2,7 +2,7 @@
 
 What a muscle's pressure gives over its effective area holds its load, springs (its own and those that
 couple muscles, which stiffen with whatever schedules them), its rubber's elasticity, friction of the
-braid, relaxation and damping; see `mckibben.blocks.coupled.balance_law` for the equation. A load enters
+braid, relaxation, damping and inertia; see `mckibben.blocks.coupled.balance_law` for the equation. A load enters
 once. Springs are symmetric, what rubs and relaxes is not negative, areas outweigh friction, and
 stiffness outweighs what areas lose, as identification sees to: then pressures hold muscles in one place
 only, which is always found, and friction never makes energy.
@@ -151,6 +151,8 @@ class Balance(ManyChannels, Invertible):
         Whether displacements count from where the muscles rested, without pressure, at the start.
     pressure_range : (float, float), optional
         Pressures are clipped to it, and said so.
+    mass : sequence of n float, optional
+        Force by acceleration [N s^2/mm], not negative; none by default.
     """
 
     kind: ClassVar[str] = "balance"
@@ -161,7 +163,7 @@ class Balance(ManyChannels, Invertible):
     increasing = ("limits",)
     parameters: ClassVar[tuple[str, ...]] = (
         *("springs", "elasticity", "areas", "friction", "relaxation", "loads"),
-        *("damping", "walls", "grip"),
+        *("damping", "walls", "grip", "mass"),
     )
 
     springs: Rows
@@ -183,6 +185,7 @@ class Balance(ManyChannels, Invertible):
     given: Channels
     tare: bool = False
     pressure_range: tuple[FiniteFloat, FiniteFloat] | None = None
+    mass: Vector = ()
 
     def __post_init__(self) -> None:
         self.check_channels()
@@ -215,6 +218,8 @@ class Balance(ManyChannels, Invertible):
                     f"Remedy: give {n} rows of {width}."
                 )
         lengths = {"damping": self.damping, "walls": self.walls, "given": self.given}
+        if self.mass:
+            lengths["mass"] = self.mass
         for name, values in lengths.items():
             if len(values) != n:
                 raise ModelError(
@@ -237,9 +242,9 @@ class Balance(ManyChannels, Invertible):
                     f"{name} of {self.kind!r} has a negative stiffness, which would make energy. "
                     "Remedy: give none below 0."
                 )
-        if min(*self.damping, *self.walls, self.grip) < 0:
+        if min(*self.damping, *self.walls, *self.mass, self.grip) < 0:
             raise ModelError(
-                f"damping, walls or grip of {self.kind!r} is negative. Remedy: give none below 0."
+                f"damping, walls, mass or grip of {self.kind!r} is negative. Remedy: give none below 0."
             )
         if any(not low < high for low, high in self.hull):
             raise ModelError(f"hull of {self.kind!r} is {self.hull}. Remedy: lower ends first.")
@@ -251,13 +256,14 @@ class Balance(ManyChannels, Invertible):
 
     @property
     def rate_dependent(self) -> bool:  # type: ignore[override]
-        """Whether anything relaxes or damps."""
-        return bool(self.lags) or any(self.damping)
+        """Whether anything relaxes, damps or is heavy."""
+        return bool(self.lags) or any(self.damping) or any(self.mass)
 
     @property
     def n_states(self) -> int:
-        """Displacements, stretches, stops, lags and tare of every muscle; a start, samples amiss."""
-        return len(self.driven) * (3 + len(self.limits) + len(self.lags)) + 2
+        """Displacements, stretches, stops, lags, moves and tare of muscles; a start, samples amiss."""
+        own = 3 + len(self.limits) + len(self.lags) + (2 if self.mass else 0)
+        return len(self.driven) * own + 2
 
     @property
     def n_scratch(self) -> int:
@@ -278,16 +284,17 @@ class Balance(ManyChannels, Invertible):
         head = [
             *(len(self.driven), len(self.scheduled) - self.n_loads, self.degree, self.n_loads),
             *(len(self.limits), len(self.lags), len(self.elasticity[0]), len(self.areas[0])),
-            *(self.scale, self.grip, low, high, 1.0 / step, self.tare),
+            *(self.scale, self.grip, low, high, 1.0 / step, self.tare, bool(self.mass)),
         ]
         lags = np.array(self.lags)
         decays = np.exp(-step / lags)
         gains = lags / step * -np.expm1(-step / lags)
         tables = [self.springs, self.elasticity, self.areas]
         tables += [self.friction, self.relaxation, self.loads]
+        mass = self.mass or (0.0,) * len(self.driven)
         own = [
             np.concatenate(
-                [self.hull[k], [self.walls[k], self.damping[k]], *(t[k] for t in tables)]
+                [self.hull[k], [self.walls[k], self.damping[k], mass[k]], *(t[k] for t in tables)]
             )
             for k in range(len(self.driven))
         ]

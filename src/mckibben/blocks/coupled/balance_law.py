@@ -1,16 +1,18 @@
 """What holds in every sample of a balance of forces: its terms, and its two solutions.
 
-    p_k A_k(y_k) = loads + S_k(x) (1, y) + E_k(y_k) + sum_m h_km s_km + sum_l kappa_kl q_kl + d_k y_k'
+    p_k A_k(y_k) = loads + S_k(x) (1, y) + E_k(y_k) + sum_m h_km s_km + sum_l kappa_kl q_kl
+                   + d_k y_k' + m_k y_k''
 
 Of muscle k: stops s_m follow the stretch z = y + w p of its wall up to r_m (p + p0) either way; q_l,
-what a lag is behind, relaxes with its time constant. Pressures follow from displacements muscle by
-muscle; displacements from pressures as the minimum of a convex energy, by Newton's method with a search
-along every step.
+what a lag is behind, relaxes with its time constant. Accelerations are Houbolt's differences of four
+samples: of second order, stable at any sample time, and without echo in pressures. Pressures follow
+from displacements muscle by muscle; displacements from pressures as the minimum of a convex energy, by
+Newton's method with a search along every step.
 
 Coefficients: the head, r (m), decays and gains of the lags (L each), then of every muscle: lowest and
-highest displacement known, w, d, springs (powers of what schedules by 1 + n), elasticity, area,
-friction (m), relaxation (L), loads. State: y (n), z (n), stops (n by m), lags (n by L), the tare (n),
-whether nothing came before, samples amiss.
+highest displacement known, w, d, mass, springs (powers of what schedules by 1 + n), elasticity, area,
+friction (m), relaxation (L), loads. State: y (n), z (n), stops (n by m), lags (n by L), with mass the
+last two moves (n by 2), the tare (n), whether nothing came before, samples amiss.
 """
 
 from __future__ import annotations
@@ -21,9 +23,9 @@ from mckibben.arrays import Array
 from mckibben.blocks.core.kernels import kernel
 from mckibben.blocks.core.linear_system import eliminate
 
-HEAD = 14
+HEAD = 15
 """n, schedules, degree, loads, stops, lags, elastic terms, area's terms, scale, p0, lowest and highest
-pressure, samples a second, tare."""
+pressure, samples a second, tare, whether there is mass."""
 
 MOST_STEPS, MOST_SEARCHED = 60, 25
 """Of Newton's method, and along each step."""
@@ -47,7 +49,7 @@ def elastic(c: Array, own: int, k: int, y: Array, x: Array, gradient: Array) -> 
     """Return springs, elasticity and loads of muscle k, and fill their gradient by y."""
     n, n_x, degree, n_loads = int(c[0]), int(c[1]), int(c[2]), int(c[3])
     n_e, scale = int(c[6]), c[8]
-    place = own + 4
+    place = own + 5
     force = c[place]
     for j in range(n):
         gradient[j] = c[place + 1 + j]
@@ -84,7 +86,7 @@ def elastic(c: Array, own: int, k: int, y: Array, x: Array, gradient: Array) -> 
 def muscle_width(c: Array) -> int:
     """Return how many coefficients a muscle has."""
     springs = (1 + int(c[1]) * int(c[2])) * (1 + int(c[0]))
-    return 4 + springs + int(c[6]) + int(c[7]) + int(c[4]) + int(c[5]) + int(c[3])
+    return 5 + springs + int(c[6]) + int(c[7]) + int(c[4]) + int(c[5]) + int(c[3])
 
 
 @kernel
@@ -132,8 +134,16 @@ def rubbed(
 
 
 @kernel
+def accelerated(c: Array, k: int, state: Array, moved: float) -> float:
+    """Return the acceleration of muscle k by how it moves, and did."""
+    n = int(c[0])
+    place = 2 * n + n * (int(c[4]) + int(c[5])) + 2 * k
+    return c[12] * c[12] * (2.0 * moved - 3.0 * state[place] + state[place + 1])
+
+
+@kernel
 def lagging(c: Array, own: int, k: int, state: Array, way: int, y: float) -> tuple[float, float]:
-    """Return relaxation and damping of muscle k at a displacement, and their slope by it."""
+    """Return relaxation, damping and inertia of muscle k at a displacement, and their slope by it."""
     if way == AT_REST:
         return 0.0, 0.0
     n, m, n_l = int(c[0]), int(c[4]), int(c[5])
@@ -141,6 +151,9 @@ def lagging(c: Array, own: int, k: int, state: Array, way: int, y: float) -> tup
     moved = y - state[k]
     slope = c[own + 3] * c[12] if way == IN_TIME else 0.0
     force = slope * moved
+    if way == IN_TIME and c[14] != 0.0:
+        force += c[own + 4] * accelerated(c, k, state, moved)
+        slope += 2.0 * c[own + 4] * c[12] * c[12]
     for i in range(n_l):
         gain = c[HEAD + m + n_l + i] if way == IN_TIME else 1.0
         q = c[HEAD + m + i] * state[2 * n + n * m + k * n_l + i] + gain * moved
@@ -168,6 +181,10 @@ def keep(c: Array, state: Array, way: int, y: Array, p: Array) -> None:
                 state[place] = 0.0
             else:
                 state[place] = c[HEAD + m + i] * state[place] + gain * (y[k] - state[k])
+        if c[14] != 0.0:
+            place = 2 * n + n * (m + n_l) + 2 * k
+            state[place + 1] = state[place] if way == IN_TIME else 0.0
+            state[place] = y[k] - state[k] if way == IN_TIME else 0.0
         state[k] = y[k]
         state[n + k] = z
 
@@ -299,7 +316,7 @@ def settle(c: Array, state: Array, way: int, y: Array, x: Array, p: Array, scrat
 @kernel
 def begin(c: Array, state: Array, x: Array, p: Array, scratch: Array) -> None:
     """Rest without pressure, and take the tare there; nothing has come before the first sample."""
-    n, m, n_l = int(c[0]), int(c[4]), int(c[5])
+    n = int(c[0])
     for i in range(state.size):
         state[i] = 0.0
     y = scratch[:n]
@@ -310,5 +327,5 @@ def begin(c: Array, state: Array, x: Array, p: Array, scratch: Array) -> None:
     keep(c, state, AT_REST, y, p)
     if c[13] != 0.0:
         for k in range(n):
-            state[2 * n + n * m + n * n_l + k] = y[k]
+            state[state.size - 2 - n + k] = y[k]
     state[state.size - 2] = 1.0

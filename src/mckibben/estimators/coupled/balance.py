@@ -102,6 +102,8 @@ class BalanceEstimator(CoupledEstimator):
         several scheduled muscles' recordings start there.
     contact : bool, optional
         Whether a dead zone of small pressures is looked for; default of a muscle alone.
+    mass : bool
+        Whether what hangs at the muscles is so heavy that its acceleration matters.
     ridge : float
         Damping of the coefficients.
     steps : int
@@ -121,6 +123,7 @@ class BalanceEstimator(CoupledEstimator):
     degree: Annotated[int, Interval(ge=1, le=4)] = 2
     tare: bool | None = None
     contact: bool | None = None
+    mass: bool = False
     ridge: Annotated[float, Ge(0)] = 1e-6
     steps: Annotated[int, Interval(ge=0, le=1000)] = 25
 
@@ -280,6 +283,7 @@ class BalanceEstimator(CoupledEstimator):
             scheduled_hull=np.column_stack([x.min(axis=0), x.max(axis=0)]),
             highest=highest,
             tare=tare,
+            mass=self.mass,
         )
 
     def _lags(self, data: TrainingData) -> Array:

@@ -56,6 +56,8 @@ class Structure:
         Whether displacements count from rest at the start.
     lag_range : (float, float)
         Shortest and longest time constant that the recordings can tell [s].
+    mass : bool
+        Whether what moves is heavy.
     """
 
     driven: tuple[Channel, ...]
@@ -72,6 +74,7 @@ class Structure:
     highest: float
     tare: bool
     lag_range: tuple[float, float]
+    mass: bool = False
 
     @property
     def n(self) -> int:
@@ -90,6 +93,7 @@ class Structure:
             "hull": 2,
             "wall": 1,
             "damping": 1,
+            "mass": 1,
             "springs": (1 + len(self.scheduled) * self.degree) * (1 + self.n),
             "elasticity": self.n_elastic,
             "areas": self.n_area,
@@ -163,12 +167,18 @@ class Structure:
             given=self.given,
             tare=self.tare,
             pressure_range=pressure_range,
+            mass=vector(np.maximum(part["mass"][:, 0], 0.0)) if self.mass else (),
         )
 
     def values(self, block: Balance) -> Array:
         """Return the coefficients of a balance of this structure."""
         tables = [block.hull, np.transpose([block.walls]), np.transpose([block.damping])]
-        tables += [block.springs, block.elasticity, block.areas]
+        tables += [
+            np.transpose([block.mass or np.zeros(self.n)]),
+            block.springs,
+            block.elasticity,
+            block.areas,
+        ]
         tables += [block.friction, block.relaxation, block.loads]
         table = np.hstack([np.asarray(part, dtype=np.float64) for part in tables])
         return np.concatenate([table.ravel(), [block.grip], np.log(block.lags)])
@@ -178,7 +188,8 @@ class Structure:
         names = ("springs", "elasticity", "areas", "friction", "relaxation", "loads")
         by_name = [self.places(name, k) for name in names for k in range(self.n)]
         single = [self.places(name, k) for name in ("damping", "wall") for k in range(self.n)]
-        return np.concatenate([*by_name, *single, [self.grip]]).astype(np.intp)
+        heavy = [self.places("mass", k) for k in range(self.n) if self.mass]
+        return np.concatenate([*by_name, *single, [self.grip], *heavy]).astype(np.intp)
 
     @property
     def in_newtons(self) -> bool:
@@ -204,6 +215,7 @@ class Structure:
             columns += [[place] for place in self.places("loads", k).tolist() if not newtons]
             if moving:
                 columns += [[place] for place in self.places("wall", k).tolist()]
+                columns += [[place] for place in self.places("mass", k).tolist() if self.mass]
         for q in range(1 + len(self.scheduled) * self.degree):
             for k in range(self.n):
                 if q or not self.tare:  # displacements from rest make a constant of their own
@@ -250,7 +262,7 @@ class Structure:
             if place > self.timing.start:
                 ask({place: 1.0, place - 1: -1.0}, APART)
         for k in range(self.n):
-            for name in ("friction", "relaxation", "damping", "wall"):
+            for name in ("friction", "relaxation", "damping", "wall", "mass"):
                 for place in self.places(name, k).tolist():
                     ask({place: 1.0}, 0.0)
             for place in self.places("loads", k).tolist():

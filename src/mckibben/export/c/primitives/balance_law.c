@@ -2,7 +2,7 @@
 
 #include "linear_system.h"
 
-#define HEAD 14
+#define HEAD 15
 #define MOST_STEPS 60
 #define MOST_SEARCHED 25
 #define BALANCED MCK_EITHER(2e-15, 1e-6)
@@ -15,6 +15,7 @@ typedef struct {
     mck_real high;
     mck_real wall;
     mck_real damping;
+    mck_real mass;
     const mck_real *springs;
     const mck_real *elasticity;
     const mck_real *areas;
@@ -40,6 +41,7 @@ mck_balance mck_balance_of(const mck_part *part, mck_real *state)
     f.lowest = c[10];
     f.highest = c[11];
     f.rate = c[12];
+    f.heavy = c[14] > MCK_R(0.0);
     f.limits = c + HEAD;
     f.decays = f.limits + f.m;
     f.gains = f.decays + f.n_l;
@@ -48,7 +50,8 @@ mck_balance mck_balance_of(const mck_part *part, mck_real *state)
     f.z = f.y + f.n;
     f.stops = f.z + f.n;
     f.lags = f.stops + f.n * f.m;
-    f.tare = f.lags + f.n * f.n_l;
+    f.moves = f.lags + f.n * f.n_l;
+    f.tare = f.moves + (f.heavy ? 2 * f.n : 0);
     f.first = f.tare + f.n;
     f.amiss = f.first + 1;
     f.scratch = state + part->n_states;
@@ -58,14 +61,15 @@ mck_balance mck_balance_of(const mck_part *part, mck_real *state)
 static muscle read_muscle(const mck_balance *f, int k)
 {
     const int springs = (1 + f->n_x * f->degree) * (1 + f->n);
-    const int width = 4 + springs + f->n_e + f->n_a + f->m + f->n_l + f->n_loads;
+    const int width = 5 + springs + f->n_e + f->n_a + f->m + f->n_l + f->n_loads;
     const mck_real *own = f->muscles + k * width;
     muscle one;
     one.low = own[0];
     one.high = own[1];
     one.wall = own[2];
     one.damping = own[3];
-    one.springs = own + 4;
+    one.mass = own[4];
+    one.springs = own + 5;
     one.elasticity = one.springs + springs;
     one.areas = one.elasticity + f->n_e;
     one.friction = one.areas + f->n_a;
@@ -164,13 +168,19 @@ static mck_real rubbed(const mck_balance *f, const muscle *one, int k, int way,
     return force;
 }
 
-/* Relaxation and damping of muscle k at a displacement, and their slope by it. */
+/* Relaxation, damping and inertia of muscle k at a displacement, and their slope by it. */
 static mck_real lagging(const mck_balance *f, const muscle *one, int k, int way,
                         mck_real y, mck_real *slope)
 {
     const mck_real moved = y - f->y[k];
     *slope = way == MCK_IN_TIME ? one->damping * f->rate : MCK_R(0.0);
     mck_real force = *slope * moved;
+    if (way == MCK_IN_TIME && f->heavy) {
+        const mck_real heavy = one->mass * f->rate * f->rate;
+        const mck_real *before = f->moves + 2 * k;
+        force += heavy * (MCK_R(2.0) * moved - MCK_R(3.0) * before[0] + before[1]);
+        *slope += MCK_R(2.0) * heavy;
+    }
     for (int i = 0; way != MCK_AT_REST && i < f->n_l; i++) {
         const mck_real gain = way == MCK_IN_TIME ? f->gains[i] : MCK_R(1.0);
         const mck_real q = f->decays[i] * f->lags[k * f->n_l + i] + gain * moved;
@@ -197,6 +207,11 @@ void mck_balance_keep(const mck_balance *f, int way, const mck_real *y, const mc
             const mck_real gain = way == MCK_IN_TIME ? f->gains[i] : MCK_R(1.0);
             const mck_real behind = f->decays[i] * *lag + gain * (y[k] - f->y[k]);
             *lag = way == MCK_AT_REST ? MCK_R(0.0) : behind;
+        }
+        if (f->heavy) {
+            mck_real *before = f->moves + 2 * k;
+            before[1] = way == MCK_IN_TIME ? before[0] : MCK_R(0.0);
+            before[0] = way == MCK_IN_TIME ? y[k] - f->y[k] : MCK_R(0.0);
         }
         f->y[k] = y[k];
         f->z[k] = z;
@@ -379,7 +394,7 @@ void mck_balance_begin(const mck_part *part, const mck_balance *f, const mck_rea
     (void)mck_balance_settle(f, MCK_AT_REST, y, x, p, p + f->n);
     mck_balance_keep(f, MCK_AT_REST, y, p);
     for (int k = 0; k < f->n; k++) {
-        f->tare[k] = part->coefficients[HEAD - 1] > MCK_R(0.0) ? y[k] : MCK_R(0.0);
+        f->tare[k] = part->coefficients[13] > MCK_R(0.0) ? y[k] : MCK_R(0.0);
     }
     *f->first = MCK_R(1.0);
 }

@@ -2,10 +2,10 @@
 
 What a muscle's pressure gives over its effective area holds its load, springs (its own and those that
 couple muscles, which stiffen with whatever schedules them), its rubber's elasticity, friction of the
-braid, relaxation, damping and inertia; see `mckibben.blocks.coupled.balance_law` for the equation. A load enters
-once. Springs are symmetric, what rubs and relaxes is not negative, areas outweigh friction, and
-stiffness outweighs what areas lose, as identification sees to: then pressures hold muscles in one place
-only, which is always found, and friction never makes energy.
+braid, relaxation, damping and inertia; see `mckibben.blocks.coupled.balance_law` for the equation.
+A load enters once. Springs are symmetric, what rubs and relaxes is not negative, areas outweigh
+friction, and stiffness outweighs what areas lose, as identification sees to: then pressures hold
+muscles in one place only, which is always found, and friction never makes energy.
 
 This block gives pressures for displacements, explicitly: the compensator. Its inverse gives
 displacements for pressures. `mckibben.blocks.coupled.load_estimate` gives loads for both.

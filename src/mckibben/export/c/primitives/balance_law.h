@@ -3,7 +3,8 @@
  * Coefficients: n, scheduling inputs, degree, loads, stops m, lags l, elastic terms, area's terms,
  * scale, pressure below zero at which stops hold nothing, lowest and highest pressure, samples a second,
  * tare, mass; m limits, l decays, l gains; then of every muscle: lowest and highest displacement known,
- * wall, damping, mass, springs (powers of what schedules by 1 + n), elasticity, area, friction, relaxation, loads.
+ * wall, damping, mass, springs (powers of what schedules by 1 + n), elasticity, area, friction, relaxation,
+ * loads.
  * State: n displacements, n stretches, n by m stops, n by l lags, with mass n by 2 last moves, n tares,
  * whether nothing came before, count of samples amiss; scratch: n n + 6 n. */
 #ifndef MCK_BALANCE_LAW_H

@@ -234,7 +234,7 @@ def test_two_muscles_and_an_extensor() -> None:
 
 
 def test_slopes_are_those_of_differences() -> None:
-    block = replace(MUSCLE, walls=(0.1,))
+    block = replace(MUSCLE, walls=(0.1,), mass=(0.01,))
     some = recording(6, n=300)
     p, y, x = (
         np.ascontiguousarray(some[name][:, np.newaxis])
@@ -251,8 +251,8 @@ def test_slopes_are_those_of_differences() -> None:
     values = np.concatenate([block.pack(), np.log(block.lags)])
     exact = run(block.coefficients(STEP), p, y, x, held=False)[1][:, 0]
     width = exact.shape[1] - 1 - len(block.lags)
-    # the block packs tables first, then damping, walls and grip; coefficients hull, wall, damping first
-    places = [*range(4, width), 3, 2, *range(width, exact.shape[1])]
+    # the block packs tables first, damping, walls, grip, mass; coefficients hull, wall, damping, mass
+    places = [*range(5, width), 3, 2, width, 4, *range(width + 1, exact.shape[1])]
     for place, column in enumerate(places):
         step = np.zeros(values.size)
         step[place] = 1e-6 * max(abs(values[place]), 0.1)

@@ -1030,28 +1030,24 @@ class _Parallel:
     def __init__(self, block: Any, scheduled: list[float], sample_time: float) -> None:
         self.block, self.n, self.step = block, len(block.driven), sample_time
         n = self.n
-        self.y, self.z = [0.0] * n, [0.0] * n
+        self.u, self.z = [0.0] * n, [0.0] * n
         self.stops = [[0.0] * len(block.limits) for _ in range(n)]
         self.behind = [[0.0] * len(block.lags) for _ in range(n)]
         self.way = "rest"
-        self.keep(self.found([0.0] * n, scheduled), [0.0] * n)
-        self.tare = list(self.y) if block.tare else [0.0] * n
+        resting = self.found([0.0] * n, scheduled)
+        self.keep(resting, [0.0] * n)
+        self.tare = resting if block.tare else [0.0] * n
         self.way = "first"
 
     def springs(self, k: int, y: list[float], x: list[float]) -> float:
-        """Return loads, springs and elasticity of a muscle."""
+        """Return loads and springs of a muscle."""
         block, n = self.block, self.n
         scheduling, loads = x[: len(x) - len(block.loads[k])], x[len(x) - len(block.loads[k]) :]
         force = sum(c * load for c, load in zip(block.loads[k], loads, strict=True))
         for q, x_q in enumerate([1.0] + [v**d for v in scheduling for d in _degrees(block)]):
             row = block.springs[k][q * (1 + n) : (q + 1) * (1 + n)]
             force += x_q * (row[0] + sum(s * v for s, v in zip(row[1:], y, strict=True)))
-        return force + _beyond(
-            lambda u: sum(e * u**i for i, e in enumerate(block.elasticity[k], start=2)),
-            y[k],
-            block.hull[k],
-            block.scale,
-        )
+        return force
 
     def area(self, k: int, y: float) -> float:
         terms = self.block.areas[k]
@@ -1075,25 +1071,53 @@ class _Parallel:
 
     def relaxing(self, k: int, y: float) -> list[float]:
         """Return what a muscle's lags would be behind: on a ramp in time, by a step at once."""
-        dy, out = y - self.y[k], []
+        dy, out = y - self.u[k], []
         for q, tau in zip(self.behind[k], self.block.lags, strict=True):
             keep = math.exp(-self.step / tau)
             ramp = tau / self.step * (1.0 - keep)
             out.append({"rest": 0.0, "first": dy, "time": keep * q + ramp * dy}[self.way])
         return out
 
+    def resisted(self, k: int, u: float, p: float) -> float:
+        """Return what a muscle resists shortening with."""
+        block = self.block
+        force = _beyond(
+            lambda v: sum(e * v**i for i, e in enumerate(block.elasticity[k], start=2)),
+            u,
+            block.hull[k],
+            block.scale,
+        )
+        force += block.bladders[k] * u if block.bladders else 0.0
+        force += _sum(block.friction[k], self.moved(k, u, p))
+        force += _sum(block.relaxation[k], self.relaxing(k, u))
+        if self.way == "time":
+            force += block.damping[k] * (u - self.u[k]) / self.step
+        return force - p * self.area(k, u)
+
+    def push(self, k: int) -> float:
+        return self.block.pushes[k] if self.block.pushes else math.inf
+
+    def shortened(self, k: int, y: float, p: float) -> float:
+        """Return how short a muscle is, which is less than its ends are near where it is slack."""
+        if self.resisted(k, y, p) <= self.push(k):
+            return y
+        return bisect(lambda u: self.resisted(k, u, p), self.push(k), y - 1000.0, y)
+
     def excess(self, k: int, y: list[float], x: list[float], p: float) -> float:
         """Return how much more a muscle pulls than it holds."""
-        block = self.block
-        force = self.springs(k, y, x) + _sum(block.friction[k], self.moved(k, y[k], p))
-        force += _sum(block.relaxation[k], self.relaxing(k, y[k]))
-        if self.way == "time":
-            force += block.damping[k] * (y[k] - self.y[k]) / self.step
-        return p * self.area(k, y[k]) - force
+        return -self.springs(k, y, x) - min(self.resisted(k, y[k], p), self.push(k))
 
     def pressures(self, y: list[float], x: list[float]) -> list[float]:
         low, high = self.block.pressure_range or (-math.inf, math.inf)
-        found = [bisect(partial(self.excess, k, y, x), 0.0, -1000.0, 1000.0) for k in range(self.n)]
+        found = [
+            bisect(
+                partial(lambda k, p: -self.resisted(k, y[k], p), k),
+                max(self.springs(k, y, x), -self.push(k)),
+                -1000.0,
+                1000.0,
+            )
+            for k in range(self.n)
+        ]
         return [min(max(p, low), high) for p in found]
 
     def found(self, p: list[float], x: list[float]) -> list[float]:
@@ -1102,14 +1126,18 @@ class _Parallel:
         def missed(y: Any) -> list[float]:
             return [self.excess(k, list(y), x, p[k]) for k in range(self.n)]
 
-        return [float(y) for y in root(missed, self.y, tol=1e-14).x]
+        return [float(y) for y in root(missed, self.u, tol=1e-14).x]
 
     def keep(self, y: list[float], p: list[float]) -> None:
         muscles = list(enumerate(zip(y, p, strict=True)))
-        self.stops = [self.moved(k, *place) for k, place in muscles]
-        self.behind = [self.relaxing(k, here) for k, (here, _) in muscles]
-        self.z = [here + self.block.walls[k] * pressure for k, (here, pressure) in muscles]
-        self.y, self.way = y, "time"
+        u = [self.shortened(k, *place) for k, place in muscles]
+        self.stops = [self.moved(k, *place) for k, place in enumerate(zip(u, p, strict=True))]
+        self.behind = [self.relaxing(k, here) for k, here in enumerate(u)]
+        self.z = [
+            here + wall * pressure
+            for here, wall, pressure in zip(u, self.block.walls, p, strict=True)
+        ]
+        self.u, self.way = u, "time"
 
 
 def _degrees(block: Any) -> range:
@@ -1137,7 +1165,7 @@ def balance(block: Any, inputs: Rows, sample_time: float) -> Rows:
     for row in inputs:
         y = [here + tare for here, tare in zip(row[:n], arm.tare, strict=True)]
         out.append(arm.pressures(y, row[n:]))
-        there = arm.found(out[-1], row[n:]) if block.pressure_range else y
+        there = arm.found(out[-1], row[n:]) if block.pressure_range or block.pushes else y
         arm.keep(there, out[-1])
     return out
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import replace
 from typing import Any
 
@@ -11,6 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
+from scipy.optimize import minimize, minimize_scalar
 
 from mckibben import ModelError, ModelWarning, check_block
 from mckibben.blocks.core.block import Block
@@ -155,36 +157,49 @@ def test_any_pressures_find_their_equilibrium(block: Balance, seed: int) -> None
 def incremental_energy(block: Balance, before: Array, y: Array, x: Array, p: Array) -> float:
     """Return what the equilibrium of the next sample makes least, of two muscles and one extensor."""
     n, m, n_lags = 2, len(block.limits), len(block.lags)
-    y0, z0 = before[:n], before[n : 2 * n]
+    u0, z0 = before[:n], before[n : 2 * n]
     stops = before[2 * n :][: n * m].reshape(n, m)
     behind = before[2 * n + n * m :][: n * n_lags].reshape(n, n_lags)
     springs = np.array(block.springs).reshape(n, 2, 1 + n)
     now = springs[:, 0] + x[0] * springs[:, 1]
     energy = now[:, 0] @ y + 0.5 * y @ now[:, 1:] @ y + x[1] * (np.array(block.loads)[:, 0] @ y)
-    for k in range(n):
-        u, scale = y[k] / block.scale, block.scale
+
+    def own(u: float, k: int) -> float:
+        """Of a muscle as short as that."""
+        v, scale = u / block.scale, block.scale
+        energy = 0.5 * block.bladders[k] * u * u
         energy += sum(
-            e * scale * u ** (i + 1) / (i + 1) for i, e in enumerate(block.elasticity[k], start=2)
+            e * scale * v ** (i + 1) / (i + 1) for i, e in enumerate(block.elasticity[k], start=2)
         )
         energy -= p[k] * sum(
-            a * scale * u ** (i + 1) / (i + 1) for i, a in enumerate(block.areas[k])
+            a * scale * v ** (i + 1) / (i + 1) for i, a in enumerate(block.areas[k])
         )
-        moved = y[k] + block.walls[k] * p[k] - z0[k]
+        moved = u + block.walls[k] * p[k] - z0[k]
         for h, limit, stop in zip(block.friction[k], block.limits, stops[k], strict=True):
             width, s = limit * (p[k] + block.grip), abs(stop + moved)
             energy += h * (0.5 * s * s if s < width else width * s - 0.5 * width * width)
-        dy = y[k] - y0[k]
-        energy += 0.5 * block.damping[k] / STEP * dy * dy
+        du = u - u0[k]
+        energy += 0.5 * block.damping[k] / STEP * du * du
         for kappa, tau, q in zip(block.relaxation[k], block.lags, behind[k], strict=True):
             keep, ramp = np.exp(-STEP / tau), tau / STEP * (1.0 - np.exp(-STEP / tau))
-            energy += kappa * (keep * q * dy + 0.5 * ramp * dy * dy)
+            energy += kappa * (keep * q * du + 0.5 * ramp * du * du)
+        return float(energy)
+
+    for k in range(n):  # a slack muscle is longer than its ends are apart, and pushes all the same
+        push = block.pushes[k]
+        longer = minimize_scalar(
+            lambda by, k=k, push=push: own(y[k] - by, k) + push * by,
+            bounds=(0.0, 60.0),
+            method="bounded",
+            options={"xatol": 1e-9},
+        )
+        energy += min(own(y[k], k), longer.fun)
     return float(energy)
 
 
-def test_the_equilibrium_has_the_least_incremental_energy() -> None:
-    from scipy.optimize import minimize
-
-    block = Balance.example()
+@pytest.mark.parametrize("pushes", [(150.0, 120.0), (8.0, 12.0), (0.0, 0.0)])
+def test_the_equilibrium_has_the_least_incremental_energy(pushes: tuple[float, float]) -> None:
+    block = replace(Balance.example(), pushes=pushes)
     low, high = np.array([0.0, 0.0, 0.0, 0.0]), np.array([2.5, 2.5, 2.0, 30.0])
     inputs = wander(low, high, np.random.default_rng(3), 8, 6)
     for end in range(5, len(inputs), 9):
@@ -198,6 +213,46 @@ def test_the_equilibrium_has_the_least_incremental_energy() -> None:
         found = minimize(energy, before[:2], method="Nelder-Mead", options={"xatol": 1e-7})
         assert energy(y) <= found.fun + 1e-9 * abs(found.fun)
         np.testing.assert_allclose(y, found.x, atol=1e-3)
+
+
+# -- slack ---------------------------------------------------------------------------------------
+
+
+@given(balances(n=2, n_loads=0), SEEDS)
+def test_a_slack_muscle_pushes_as_hard_as_it_can_whatever_its_pressure(
+    block: Balance, seed: int
+) -> None:
+    """Then less pressure moves nothing; and no muscle is asked to push harder."""
+    slack = replace(block, bladders=(2.0, 3.0), pushes=(4.0, 0.0), tare=False)
+    inputs = motion(slack, (0.0, HIGHEST), seed)
+    inputs[-1, :2] = 0.0, HIGHEST
+    moved = run(slack.inverse(), inputs)
+    springs = np.array(slack.springs).reshape(2, -1, 3)
+    x = inputs[:, 2:]
+    powers = np.column_stack([np.ones(len(x)), *(x**d for d in range(1, slack.degree + 1))])
+    powers = powers[:, : springs.shape[1]]
+    around = np.column_stack([np.ones(len(x)), moved])
+    pushed = -np.einsum("tq,kqj,tj->tk", powers, springs, around)
+    assert (pushed <= np.array(slack.pushes) + 1e-6).all()
+    less = inputs.copy()
+    less[-1, :2] -= np.where(pushed[-1] >= np.array(slack.pushes) - 1e-9, 0.5, 0.0)
+    np.testing.assert_allclose(run(slack.inverse(), less), moved, atol=1e-7)
+
+
+@given(balances(n=2), SEEDS)
+def test_what_asks_a_muscle_to_push_harder_than_it_can_is_told(block: Balance, seed: int) -> None:
+    """Its pressure is that at which it is about to go slack; and what is reached needs no other."""
+    slack = replace(block, bladders=(2.0, 3.0), pushes=(4.0, 0.0))
+    inputs = motion(slack, (-5.0, FURTHEST), seed)
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        pressures = slack.simulate(inputs, sample_time=STEP)
+    found = run(slack.inverse(), beside(pressures, inputs))
+    if not told:
+        np.testing.assert_allclose(found, inputs[:, :2], atol=1e-8)
+    else:
+        assert "push" in str(told[0].message)
+        assert np.abs(found - inputs[:, :2]).max() > 1e-9
 
 
 # -- loads ---------------------------------------------------------------------------------------
@@ -297,10 +352,18 @@ def test_a_hanging_load_swings_as_newton_says() -> None:
     [
         ({"friction": ((3.0, -1.5), (2.5, 2.0))}, "friction.*make energy"),
         ({"relaxation": ((1.0, -0.6), (0.8, 0.5))}, "relaxation.*make energy"),
-        ({"damping": (-0.1, 0.0)}, "damping, walls, mass or grip"),
-        ({"walls": (0.0, -0.1)}, "damping, walls, mass or grip"),
-        ({"mass": (-0.1, 0.0)}, "damping, walls, mass or grip"),
-        ({"grip": -0.5}, "damping, walls, mass or grip"),
+        ({"damping": (-0.1, 0.0)}, "damping.*make energy"),
+        ({"walls": (0.0, -0.1)}, "walls.*make energy"),
+        ({"bladders": (4.0, -5.0)}, "bladders.*make energy"),
+        ({"pushes": (-4.0, 5.0)}, "pushes.*make energy"),
+        ({"pushes": (4.0,)}, "pushes.*give 2"),
+        ({"bladders": ()}, "bladders.*give 2"),
+        ({"mass": (-4.0, 5.0)}, "mass.*make energy"),
+        (
+            {"mass": (0.1, 0.1), "pushes": (4.0, 5.0), "bladders": (1.0, 1.0)},
+            "one of mass and pushes",
+        ),
+        ({"grip": -0.5}, "grip.*make energy"),
         ({"limits": (0.0, 2.0)}, "limits.*positive"),
         ({"lags": (0.8, -1.0)}, "lags.*positive"),
         ({"areas": ((0.0, 1.0, 0.0), (1.0, 0.0, 0.0))}, "areas at rest.*positive"),

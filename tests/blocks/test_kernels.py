@@ -182,6 +182,8 @@ ALONE = replace(
     loads=((1.0,),),
     damping=(0.0,),
     walls=(0.05,),
+    bladders=(),
+    pushes=(),
     lags=(),
     hull=((-20.0, 50.0),),
     driven=Balance.example().driven[:1],
@@ -235,12 +237,47 @@ def test_friction_beyond_the_area_still_finds_pressures_that_balance() -> None:
     np.testing.assert_allclose(loads, 0.0, atol=1e-10)
 
 
-def test_slopes_of_a_balance_are_those_of_differences() -> None:
-    """Free from rest, with a tare, through breaks of its stops and beyond its hull."""
-    hull = ((-2.0, 6.0), (-2.0, 8.0))
-    block = replace(Balance.example(), tare=True, hull=hull, grip=0.1, mass=(0.01, 0.02))
-    driven, x = path([0.0, 0.0], [4.0, 4.0]), path([0.0, 0.0], [1.0, 60.0])
-    driven, x = driven[:30], np.ascontiguousarray(x[:30])
+SLACK = replace(
+    Balance.example(),
+    springs=((0.0, 10.0, -7.0, -3.0, 1.0, 0.4), (0.0, -7.0, 11.0, -3.0, 0.4, 1.2)),
+    bladders=(8.0, 8.0),
+    pushes=(3.0, 0.0),
+)
+"""Of which now one muscle is slack, now the other."""
+
+
+@pytest.mark.parametrize("friction", [SLACK.friction, ((40.0, 30.0), (40.0, 30.0))])
+def test_slack_muscles_push_as_hard_as_they_can(friction: tuple[tuple[float, ...], ...]) -> None:
+    """Also where friction that breaks away throws Newton's steps far off."""
+    block = replace(SLACK, friction=friction)
+    pressures = np.column_stack(
+        [[0.0, 3.0, 3.0, 0.2, 0.0, 4.0], [0.0, 0.0, 4.0, 4.0, 0.0, 0.1], np.ones(6), np.zeros(6)]
+    )
+    expected = TWINS["balance-inverse"](block.inverse(), pressures.tolist(), 0.1)
+    moved = block.inverse().simulate(pressures, sample_time=0.1)
+    np.testing.assert_allclose(moved, expected, atol=1e-8)
+    inputs = np.column_stack([moved, pressures[:, 2:]])
+    inputs[3, 0] -= 12.0
+    with pytest.warns(ModelWarning, match="push"):
+        found = block.simulate(inputs, sample_time=0.1)
+    expected = TWINS["balance"](block, inputs.tolist(), 0.1)
+    np.testing.assert_allclose(found, expected, atol=1e-8)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"pushes": (150.0, 120.0)},
+        {"pushes": (0.5, 0.1)},
+        {"pushes": (), "bladders": (), "mass": (0.01, 0.02)},
+    ],
+)
+def test_slopes_of_a_balance_are_those_of_differences(change: dict[str, Any]) -> None:
+    """Free from rest, with a tare, through breaks of its stops, beyond its hull, and slack."""
+    block = replace(SLACK, tare=True, hull=((-2.0, 6.0), (-2.0, 8.0)), grip=0.1, **change)
+    driven, x = path([0.0, 0.0], [4.0, 4.0]), path([0.0, 0.0], [2.0, 1.0])
+    driven, x = np.ascontiguousarray(driven[:30]), np.ascontiguousarray(x[:30])
+    driven[:, 1] = driven[::-1, 1]
     start = block.coefficients(0.1)
     first = HEAD + len(block.limits) + 2 * len(block.lags)
 
@@ -249,12 +286,13 @@ def test_slopes_of_a_balance_are_those_of_differences() -> None:
 
     found, slopes = moved(start)
     inputs = np.column_stack([driven, x])
-    np.testing.assert_array_equal(found, block.inverse().simulate(inputs, sample_time=0.1))
+    free = block.inverse().simulate(inputs, sample_time=0.1)
+    np.testing.assert_allclose(found, free, rtol=1e-13)  # Newton's method begins elsewhere if slack
     alone, none = follow(start, driven, driven, x, held=False, sloped=False)
     np.testing.assert_array_equal(alone, found)
     assert none.shape == (30, 2, 0)
     n_own = start.size - first
-    for place in (2, 3, 4, 6, 8, 11, 13, 15, 16, 18, 19, 20, n_own - 1, n_own):
+    for place in (2, 3, 4, 5, 6, 8, 10, 13, 15, 17, 18, 20, 21, 22, n_own - 1, n_own):
         at = 9 if place == n_own else first + place
         step = np.zeros(start.size)
         step[at] = 1e-6 * max(abs(start[at]), 0.1)
@@ -276,6 +314,7 @@ def test_forces_that_a_held_balance_lacks_are_linear_in_its_coefficients() -> No
         lacking, slopes = follow(c, driven, measured, x, held=True, settled=settled)
         own = np.concatenate([c[-2 * width :].reshape(2, width).ravel()])
         own[[0, 1, width, width + 1]] = 0.0  # hulls
+        own[[3, width + 3]] = 0.0  # never slack
         np.testing.assert_allclose(slopes[:, :, : 2 * width] @ own, lacking, atol=1e-9)
 
 

@@ -198,9 +198,12 @@ def test_held_muscles_are_learned_from_by_their_force() -> None:
     np.testing.assert_allclose(balance_of(estimator).lags, MUSCLE.lags, rtol=0.35)
 
 
-def test_two_muscles_and_an_extensor() -> None:
+def test_two_muscles_that_go_slack_and_an_extensor() -> None:
     arm = replace(
         Balance.example(),
+        springs=((0.0, 10.0, -7.0, -3.0, 1.0, 0.4), (0.0, -7.0, 11.0, -3.0, 0.4, 1.2)),
+        bladders=(8.0, 8.0),
+        pushes=(3.0, 1.5),
         loads=((), ()),
         scheduled=(Balance.example().scheduled[0],),
         tare=True,
@@ -224,6 +227,8 @@ def test_two_muscles_and_an_extensor() -> None:
     estimator = BalanceEstimator(degree=1).fit(runs[:2])
     balance = balance_of(estimator)
     assert balance.tare
+    unit = balance.areas[0][0] / arm.areas[0][0]
+    np.testing.assert_allclose(balance.pushes, unit * np.array(arm.pushes), rtol=0.2)
     wrong = runs[1].with_channels({}, displacement_2=-runs[1]["displacement_2"])
     with pytest.raises(DataError, match=r"displacement_2.*falls while pressure_2 rises"):
         BalanceEstimator(degree=1).fit([runs[0], wrong])
@@ -233,8 +238,15 @@ def test_two_muscles_and_an_extensor() -> None:
     assert np.sqrt(np.mean(missed**2)) < 0.15
 
 
-def test_slopes_are_those_of_differences() -> None:
-    block = replace(MUSCLE, walls=(0.1,), mass=(0.01,))
+TAUT = replace(MUSCLE, walls=(0.1,))
+SLACK = replace(TAUT, springs=((-20.0, 4.0),), bladders=(4.0,), pushes=(6.0,))
+
+
+HEAVY = replace(TAUT, mass=(0.01,))
+
+
+@pytest.mark.parametrize("block", [TAUT, SLACK, HEAVY])
+def test_slopes_are_those_of_differences(block: Balance) -> None:
     some = recording(6, n=300)
     p, y, x = (
         np.ascontiguousarray(some[name][:, np.newaxis])
@@ -251,8 +263,10 @@ def test_slopes_are_those_of_differences() -> None:
     values = np.concatenate([block.pack(), np.log(block.lags)])
     exact = run(block.coefficients(STEP), p, y, x, held=False)[1][:, 0]
     width = exact.shape[1] - 1 - len(block.lags)
-    # the block packs tables first, damping, walls, grip, mass; coefficients hull, wall, damping, mass
-    places = [*range(5, width), 3, 2, width, 4, *range(width + 1, exact.shape[1])]
+    # the block packs tables first, then damping, walls, grip, bladders, pushes, mass; coefficients have
+    # hull, wall, push, damping, bladder and mass first
+    late = ([5, 3] if block.pushes else []) + ([6] if block.mass else [])
+    places = [*range(7, width), 4, 2, width, *late, *range(width + 1, exact.shape[1])]
     for place, column in enumerate(places):
         step = np.zeros(values.size)
         step[place] = 1e-6 * max(abs(values[place]), 0.1)

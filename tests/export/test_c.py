@@ -38,6 +38,7 @@ DOUBLE, SINGLE = 1e-12, 1e-4
 STEPS = 100_000
 SLOW = {
     "balance-inverse",
+    "slack balance inverse",
     "force-balance-inverse",
     "fuzzy-network-inverse",
     "recurrent-fuzzy-network",
@@ -80,7 +81,8 @@ def sdchm() -> Block:
 
 def heavy() -> Block:
     """Return two muscles at which masses hang."""
-    return replace(load("blocks", "balance").example(), mass=(0.01, 0.02))
+    example = load("blocks", "balance").example()
+    return replace(example, mass=(0.01, 0.02), pushes=(), bladders=())
 
 
 def joint() -> Block:
@@ -106,6 +108,11 @@ def feedforward(initial: Any) -> Block:
     return replace(block, friction=replace(block.friction, initial=initial))
 
 
+def slack() -> Block:
+    """Return a balance of muscles that go slack."""
+    return replace(load("blocks", "balance").example(), pushes=(8.0, 2.0))
+
+
 MODELS: dict[str, Block] = {
     **examples(),
     "SDCHM": sdchm(),
@@ -128,6 +135,8 @@ MODELS: dict[str, Block] = {
         for kind in ("air", "pi", "gpi", "preisach", "duhem", "bouc-wen", "eupi")
     },
     "virgin narx": virgin("narx-network"),
+    "slack balance": slack(),
+    "slack balance inverse": slack().inverse(),
     "force after virgin friction": feedforward("virgin"),
     "force after known friction": feedforward((0.5, -0.2, 0.1, 2.0)),
 }

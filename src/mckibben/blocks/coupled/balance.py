@@ -2,10 +2,10 @@
 
 What a muscle's pressure gives over its effective area holds its load, springs (its own and those that
 couple muscles, which stiffen with whatever schedules them), its rubber's elasticity, friction of the
-braid, relaxation, damping and inertia; see `mckibben.blocks.coupled.balance_law` for the equation.
-A load enters once. Springs are symmetric, what rubs and relaxes is not negative, areas outweigh
-friction, and stiffness outweighs what areas lose, as identification sees to: then pressures hold
-muscles in one place only, which is always found, and friction never makes energy.
+braid, relaxation, damping and inertia; what has to push harder than it can goes slack. The equation is
+that of `mckibben.blocks.coupled.balance_law`. A load enters once. Springs are symmetric, what rubs and
+relaxes is not negative, areas outweigh friction, and stiffness what areas lose, as identification sees
+to: then pressures hold muscles in one place only, which is found, and friction never makes energy.
 
 This block gives pressures for displacements, explicitly: the compensator. Its inverse gives
 displacements for pressures. `mckibben.blocks.coupled.load_estimate` gives loads for both.
@@ -48,6 +48,7 @@ from mckibben.blocks.coupled.balance_law import (
     FROM_REST,
     IN_TIME,
     NEARLY,
+    NEVER,
     begin,
     keep,
     pressed,
@@ -58,7 +59,7 @@ from mckibben.errors import ModelError, ModelWarning
 
 @kernel
 def balance_kernel(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
-    """Give pressures; the last state counts samples beyond the range of pressures."""
+    """Give pressures; the last state counts samples that muscles cannot reach."""
     c = coefficients
     n, n_x = int(c[0]), int(c[1]) + int(c[3])
     scratch = c[c.size - n * (n + 6) :]
@@ -71,10 +72,10 @@ def balance_kernel(coefficients: Array, state: Array, inputs: Array, outputs: Ar
         for j in range(n):
             y[j] = inputs[t, j] + tare[j]
         for k in range(n):
-            found = pressed(c, k, state, way, y, x, gradient)
+            found, reached = pressed(c, k, state, way, y, x, gradient)
             p[k] = min(max(found, c[10]), c[11])
             # a hair beyond is rounding
-            amiss = amiss or not abs(p[k] - found) <= 1e-9 * (1.0 + abs(found))
+            amiss = amiss or not (reached and abs(p[k] - found) <= 1e-9 * (1.0 + abs(found)))
             outputs[t, k] = p[k]
         if amiss:  # where the muscles go instead is what friction will remember
             settle(c, state, way, y, x, p, scratch[2 * n :])
@@ -147,6 +148,11 @@ class Balance(ManyChannels, Invertible):
         Highest power of what schedules.
     driven, scheduled, given : sequence of Channel
         Displacements; what schedules, then the loads; pressures.
+    bladders : sequence of n float
+        Of every muscle that can go slack, the spring of its own [N/mm], not negative; none for muscles
+        that cannot, whose own springs are among ``springs``.
+    pushes : sequence of n float
+        Force at which each goes slack [N], not negative.
     tare : bool
         Whether displacements count from where the muscles rested, without pressure, at the start.
     pressure_range : (float, float), optional
@@ -163,7 +169,7 @@ class Balance(ManyChannels, Invertible):
     increasing = ("limits",)
     parameters: ClassVar[tuple[str, ...]] = (
         *("springs", "elasticity", "areas", "friction", "relaxation", "loads"),
-        *("damping", "walls", "grip", "mass"),
+        *("damping", "walls", "grip", "bladders", "pushes", "mass"),
     )
 
     springs: Rows
@@ -183,6 +189,8 @@ class Balance(ManyChannels, Invertible):
     driven: Channels
     scheduled: Channels
     given: Channels
+    bladders: Vector = ()
+    pushes: Vector = ()
     tare: bool = False
     pressure_range: tuple[FiniteFloat, FiniteFloat] | None = None
     mass: Vector = ()
@@ -218,33 +226,32 @@ class Balance(ManyChannels, Invertible):
                     f"Remedy: give {n} rows of {width}."
                 )
         lengths = {"damping": self.damping, "walls": self.walls, "given": self.given}
-        if self.mass:
-            lengths["mass"] = self.mass
+        if self.bladders or self.pushes:
+            lengths |= {"bladders": self.bladders, "pushes": self.pushes}
+        lengths |= {"mass": self.mass} if self.mass else {}
         for name, values in lengths.items():
             if len(values) != n:
-                raise ModelError(
-                    f"{name} of {self.kind!r} has {len(values)} entries. Remedy: give {n}."
-                )
-        for name, positive in (
-            ("limits", self.limits),
-            ("lags", self.lags),
-            ("areas at rest", [row[0] for row in self.areas]),
-        ):
+                told = f"{name} of {self.kind!r} has {len(values)} entries"
+                raise ModelError(f"{told}. Remedy: give {n}.")
+        at_rest = [row[0] for row in self.areas]
+        above = {"limits": self.limits, "lags": self.lags, "areas at rest": at_rest}
+        for name, positive in above.items():
             rises = name == "areas at rest" or all(a < b for a, b in pairwise(positive))
             if any(not value > 0 for value in positive) or (name == "limits" and not rises):
                 raise ModelError(
                     f"{name} of {self.kind!r} are {positive}. Remedy: give positive ones"
                     f"{', in increasing order' if name == 'limits' else ''}."
                 )
-        for name in ("friction", "relaxation"):
-            if any(value < 0 for row in getattr(self, name) for value in row):
+        stiff = ("friction", "relaxation", "damping", "walls")
+        for name in (*stiff, "grip", "bladders", "pushes", "mass"):
+            if np.any(np.array(getattr(self, name)) < 0):
                 raise ModelError(
-                    f"{name} of {self.kind!r} has a negative stiffness, which would make energy. "
+                    f"{name} of {self.kind!r} has a number below 0, which would make energy. "
                     "Remedy: give none below 0."
                 )
-        if min(*self.damping, *self.walls, *self.mass, self.grip) < 0:
+        if self.mass and self.pushes:
             raise ModelError(
-                f"damping, walls, mass or grip of {self.kind!r} is negative. Remedy: give none below 0."
+                f"{self.kind!r} has mass and muscles that go slack. Remedy: give one of mass and pushes."
             )
         if any(not low < high for low, high in self.hull):
             raise ModelError(f"hull of {self.kind!r} is {self.hull}. Remedy: lower ends first.")
@@ -291,12 +298,13 @@ class Balance(ManyChannels, Invertible):
         gains = lags / step * -np.expm1(-step / lags)
         tables = [self.springs, self.elasticity, self.areas]
         tables += [self.friction, self.relaxation, self.loads]
-        mass = self.mass or (0.0,) * len(self.driven)
+        n = len(self.driven)
+        never, none = n * (NEVER,), n * (0.0,)
+        slack = [self.pushes or never, self.damping, self.bladders or none]
+        single = [self.walls, *slack, self.mass or none]
         own = [
-            np.concatenate(
-                [self.hull[k], [self.walls[k], self.damping[k], mass[k]], *(t[k] for t in tables)]
-            )
-            for k in range(len(self.driven))
+            np.concatenate([self.hull[k], [t[k] for t in single], *(t[k] for t in tables)])
+            for k in range(n)
         ]
         return np.concatenate([head, self.limits, decays, gains, *own])
 
@@ -313,7 +321,7 @@ class Balance(ManyChannels, Invertible):
             n = len(self.driven)
             y, p = first[:n] + state[-2 - n : -2], np.empty(n)
             for k in range(n):
-                p[k] = pressed(c, k, state, AT_REST, y, first[n:], scratch[:n])
+                p[k] = pressed(c, k, state, AT_REST, y, first[n:], scratch[:n])[0]
             keep(c, state, AT_REST, y, np.clip(p, c[10], c[11]))
             state[-2] = 0.0
         return state
@@ -338,11 +346,12 @@ class Balance(ManyChannels, Invertible):
         return c, state, scratch
 
     def report(self, state: Array) -> None:
-        """Warn of references that would need pressures out of range."""
+        """Warn of references that would need pressures out of range, or muscles that push."""
         if state[-1] > 0:
+            pushing = " or muscles to push harder than they can," if self.pushes else ""
             warnings.warn(
                 f"{int(state[-1])} samples need {self.given[0].name} beyond {self.pressure_range} "
-                f"{self.given[0].unit} and were clipped there",
+                f"{self.given[0].unit}{pushing} and were clipped there",
                 ModelWarning,
                 stacklevel=4,
             )
@@ -369,7 +378,7 @@ class Balance(ManyChannels, Invertible):
     def example(cls) -> Self:
         """Return two muscles beside an extensor, one of them under a load."""
         return cls(
-            springs=((0.0, 14.0, -2.0, -3.0, 1.0, 0.4), (0.0, -2.0, 16.0, -3.0, 0.4, 1.2)),
+            springs=((0.0, 10.0, -2.0, -3.0, 1.0, 0.4), (0.0, -2.0, 11.0, -3.0, 0.4, 1.2)),
             elasticity=((6.0, 4.0), (3.0, 8.0)),
             areas=((60.0, -25.0, -6.0), (66.0, -20.0, -8.0)),
             friction=((3.0, 1.5), (2.5, 2.0)),
@@ -381,6 +390,8 @@ class Balance(ManyChannels, Invertible):
             grip=0.5,
             lags=(0.8, 12.0),
             hull=((-20.0, 50.0), (-20.0, 50.0)),
+            bladders=(4.0, 5.0),
+            pushes=(150.0, 120.0),
             scale=50.0,
             degree=1,
             driven=tuple(Channel(f"displacement_{k}", "mm") for k in (1, 2)),

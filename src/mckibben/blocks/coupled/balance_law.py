@@ -1,18 +1,20 @@
 """What holds in every sample of a balance of forces: its terms, and its two solutions.
 
-    p_k A_k(y_k) = loads + S_k(x) (1, y) + E_k(y_k) + sum_m h_km s_km + sum_l kappa_kl q_kl
-                   + d_k y_k' + m_k y_k''
+    loads + S_k(x) (1, y) + min(R_k, b_k) = 0
+    R_k = E_k(u_k) + sum_m h_km s_km + sum_l kappa_kl q_kl + d_k u_k' + m_k u_k''
+          - p_k A_k(u_k)
 
-Of muscle k: stops s_m follow the stretch z = y + w p of its wall up to r_m (p + p0) either way; q_l,
-what a lag is behind, relaxes with its time constant. Accelerations are Houbolt's differences of four
-samples: of second order, stable at any sample time, and without echo in pressures. Pressures follow
-from displacements muscle by muscle; displacements from pressures as the minimum of a convex energy, by
-Newton's method with a search along every step.
+Of muscle k: R is what it resists shortening with, up to b, at which it buckles. Taut, it is as short as
+its ends are near, u = y; slack, u is where it resists with b. Stops s_m follow the stretch z = u + w p
+of its wall up to r_m (p + p0) either way; q_l, what a lag is behind, relaxes with its time constant.
+Accelerations are Houbolt's differences of four samples: of second order, stable, and without echo in
+pressures. Pressures follow from displacements muscle by muscle; displacements from pressures as the
+minimum of a convex energy, by Newton's method with a search along every step.
 
 Coefficients: the head, r (m), decays and gains of the lags (L each), then of every muscle: lowest and
-highest displacement known, w, d, mass, springs (powers of what schedules by 1 + n), elasticity, area,
-friction (m), relaxation (L), loads. State: y (n), z (n), stops (n by m), lags (n by L), with mass the
-last two moves (n by 2), the tare (n), whether nothing came before, samples amiss.
+highest displacement known, w, b, d, its own spring, mass, springs (powers of what schedules by 1 + n),
+elasticity, area, friction (m), relaxation (L), loads. State: u (n), z (n), stops (n by m), lags (n by
+L), with mass the last two moves (n by 2), the tare (n), whether nothing came before, samples amiss.
 """
 
 from __future__ import annotations
@@ -26,6 +28,12 @@ from mckibben.blocks.core.linear_system import eliminate
 HEAD = 15
 """n, schedules, degree, loads, stops, lags, elastic terms, area's terms, scale, p0, lowest and highest
 pressure, samples a second, tare, whether there is mass."""
+
+OWN = 7
+"""Coefficients of a muscle before its springs."""
+
+NEVER = 1e30
+"""Force at which what never goes slack would."""
 
 MOST_STEPS, MOST_SEARCHED = 60, 25
 """Of Newton's method, and along each step."""
@@ -45,11 +53,10 @@ sample time."""
 
 
 @kernel
-def elastic(c: Array, own: int, k: int, y: Array, x: Array, gradient: Array) -> float:
-    """Return springs, elasticity and loads of muscle k, and fill their gradient by y."""
+def sprung(c: Array, own: int, k: int, y: Array, x: Array, gradient: Array) -> float:
+    """Return springs and loads of muscle k, and fill their gradient by y."""
     n, n_x, degree, n_loads = int(c[0]), int(c[1]), int(c[2]), int(c[3])
-    n_e, scale = int(c[6]), c[8]
-    place = own + 5
+    place = own + OWN
     force = c[place]
     for j in range(n):
         gradient[j] = c[place + 1 + j]
@@ -64,18 +71,6 @@ def elastic(c: Array, own: int, k: int, y: Array, x: Array, gradient: Array) -> 
                 spring = power * c[place + 1 + j]
                 force += spring * y[j]
                 gradient[j] += spring
-    place += 1 + n
-    inside = min(max(y[k], c[own]), c[own + 1])
-    u = inside / scale
-    power = u
-    value, slope = 0.0, 0.0
-    for i in range(n_e):
-        slope += (i + 2) * c[place + i] * power
-        power *= u
-        value += c[place + i] * power
-    slope /= scale
-    force += value + slope * (y[k] - inside)
-    gradient[k] += slope
     place = own + muscle_width(c) - n_loads
     for i in range(n_loads):
         force += c[place + i] * x[n_x + i]
@@ -83,10 +78,26 @@ def elastic(c: Array, own: int, k: int, y: Array, x: Array, gradient: Array) -> 
 
 
 @kernel
+def elastic(c: Array, own: int, u: float) -> tuple[float, float]:
+    """Return a muscle's own spring and elasticity at a shortening, and their slope."""
+    place = own + OWN + (1 + int(c[1]) * int(c[2])) * (1 + int(c[0]))
+    inside = min(max(u, c[own]), c[own + 1])
+    v = inside / c[8]
+    power = v
+    value, slope = 0.0, 0.0
+    for i in range(int(c[6])):
+        slope += (i + 2) * c[place + i] * power
+        power *= v
+        value += c[place + i] * power
+    slope /= c[8]
+    return value + slope * (u - inside) + c[own + 5] * u, slope + c[own + 5]
+
+
+@kernel
 def muscle_width(c: Array) -> int:
     """Return how many coefficients a muscle has."""
     springs = (1 + int(c[1]) * int(c[2])) * (1 + int(c[0]))
-    return 5 + springs + int(c[6]) + int(c[7]) + int(c[4]) + int(c[5]) + int(c[3])
+    return OWN + springs + int(c[6]) + int(c[7]) + int(c[4]) + int(c[5]) + int(c[3])
 
 
 @kernel
@@ -149,11 +160,11 @@ def lagging(c: Array, own: int, k: int, state: Array, way: int, y: float) -> tup
     n, m, n_l = int(c[0]), int(c[4]), int(c[5])
     place = own + muscle_width(c) - int(c[3]) - n_l
     moved = y - state[k]
-    slope = c[own + 3] * c[12] if way == IN_TIME else 0.0
+    slope = c[own + 4] * c[12] if way == IN_TIME else 0.0
     force = slope * moved
     if way == IN_TIME and c[14] != 0.0:
-        force += c[own + 4] * accelerated(c, k, state, moved)
-        slope += 2.0 * c[own + 4] * c[12] * c[12]
+        force += c[own + 6] * accelerated(c, k, state, moved)
+        slope += 2.0 * c[own + 6] * c[12] * c[12]
     for i in range(n_l):
         gain = c[HEAD + m + n_l + i] if way == IN_TIME else 1.0
         q = c[HEAD + m + i] * state[2 * n + n * m + k * n_l + i] + gain * moved
@@ -163,12 +174,61 @@ def lagging(c: Array, own: int, k: int, state: Array, way: int, y: float) -> tup
 
 
 @kernel
+def resisted(
+    c: Array, own: int, k: int, state: Array, way: int, u: float, p: float
+) -> tuple[float, float, float]:
+    """Return what muscle k resists with at a shortening and a pressure, its slope, and its size."""
+    stretched, stiff = elastic(c, own, u)
+    friction, by_u, _ = rubbed(c, own, k, state, way, u, p)
+    behind, by_moving = lagging(c, own, k, state, way, u)
+    a, a_slope = area(c, own, u)
+    size = abs(stretched) + abs(friction) + abs(behind) + abs(p * a)
+    return (
+        stretched + friction + behind - p * a,
+        stiff + by_u + by_moving - p * a_slope,
+        size,
+    )
+
+
+@kernel
+def shortened(
+    c: Array, own: int, k: int, state: Array, way: int, y: float, p: float
+) -> tuple[float, bool]:
+    """Return how short muscle k is where its ends are y nearer, and whether it is slack."""
+    least = c[own + 3]
+    if least >= NEVER:
+        return y, False
+    excess, slope, _ = resisted(c, own, k, state, way, y, p)
+    excess -= least
+    if not excess > 0.0:
+        return y, False
+    low, high, u = -NEVER, y, y
+    reach = 1e-3 * c[8]
+    for _ in range(MOST_STEPS):
+        guess = u - excess / slope if slope > 0.0 else -NEVER
+        if not low < guess < high:
+            guess = high - reach if low == -NEVER else 0.5 * (low + high)
+            reach *= 2.0
+        u = guess
+        force, slope, size = resisted(c, own, k, state, way, u, p)
+        excess = force - least
+        if abs(excess) <= BALANCED * (size + least):
+            break
+        if excess > 0.0:
+            high = u
+        else:
+            low = u
+    return u, True
+
+
+@kernel
 def keep(c: Array, state: Array, way: int, y: Array, p: Array) -> None:
     """Bring the state to where the muscles are now."""
     n, m, n_l = int(c[0]), int(c[4]), int(c[5])
     for k in range(n):
         own = muscles(c) + k * muscle_width(c)
-        z = y[k] + c[own + 2] * p[k]
+        u = shortened(c, own, k, state, way, y[k], p[k])[0]
+        z = u + c[own + 2] * p[k]
         grown = max(p[k] + c[9], 0.0) if way != AT_REST else 0.0
         for i in range(m):
             s = state[2 * n + k * m + i] + z - state[n + k]
@@ -180,24 +240,30 @@ def keep(c: Array, state: Array, way: int, y: Array, p: Array) -> None:
             if way == AT_REST:
                 state[place] = 0.0
             else:
-                state[place] = c[HEAD + m + i] * state[place] + gain * (y[k] - state[k])
+                state[place] = c[HEAD + m + i] * state[place] + gain * (u - state[k])
         if c[14] != 0.0:
             place = 2 * n + n * (m + n_l) + 2 * k
             state[place + 1] = state[place] if way == IN_TIME else 0.0
-            state[place] = y[k] - state[k] if way == IN_TIME else 0.0
-        state[k] = y[k]
+            state[place] = u - state[k] if way == IN_TIME else 0.0
+        state[k] = u
         state[n + k] = z
 
 
 @kernel
-def pressed(c: Array, k: int, state: Array, way: int, y: Array, x: Array, gradient: Array) -> float:
-    """Return the pressure of muscle k that balances it where all muscles are.
+def pressed(
+    c: Array, k: int, state: Array, way: int, y: Array, x: Array, gradient: Array
+) -> tuple[float, bool]:
+    """Return the pressure of muscle k that balances it where all muscles are, and whether one does.
 
     It is the one root of a function that rises piecewise straight, since areas are larger than what
-    friction grows with pressure.
+    friction grows with pressure. Where the muscle would have to push more than it can, it is the
+    pressure at which it is about to go slack.
     """
     own = muscles(c) + k * muscle_width(c)
-    held = elastic(c, own, k, y, x, gradient) + lagging(c, own, k, state, way, y[k])[0]
+    asked = sprung(c, own, k, y, x, gradient)
+    pushes = asked >= -c[own + 3]
+    held = max(asked, -c[own + 3]) + elastic(c, own, y[k])[0]
+    held += lagging(c, own, k, state, way, y[k])[0]
     a = area(c, own, y[k])[0]
     low, high = -1e300, 1e300
     p = held / a
@@ -214,7 +280,7 @@ def pressed(c: Array, k: int, state: Array, way: int, y: Array, x: Array, gradie
         p -= excess / slope if slope > 0.0 else excess / a
         if not low < p < high:  # only where friction outgrows the area
             p = 0.5 * (low + high)
-    return p
+    return p, pushes
 
 
 @kernel
@@ -237,17 +303,16 @@ def unbalanced(
     worst = 0.0
     for k in range(n):
         own = muscles(c) + k * muscle_width(c)
-        force = elastic(c, own, k, y, x, gradient)
-        friction, by_y, _ = rubbed(c, own, k, state, way, y[k], p[k])
-        behind, by_moving = lagging(c, own, k, state, way, y[k])
-        a, a_slope = area(c, own, y[k])
-        residual[k] = force + friction + behind - p[k] * a
+        force = sprung(c, own, k, y, x, gradient)
+        resisting, slope, size = resisted(c, own, k, state, way, y[k], p[k])
+        if resisting > c[own + 3]:
+            resisting, slope = c[own + 3], 0.0
+        residual[k] = force + resisting
         for j in range(n):
             matrix[k, j] = gradient[j]
-        matrix[k, k] += by_y + by_moving - p[k] * a_slope
-        size = abs(force) + abs(friction) + abs(behind) + abs(p[k] * a)
-        for j in range(n):
             size += abs(gradient[j] * y[j])
+        matrix[k, k] += slope
+        size += abs(force)
         if not size < np.inf:
             return np.inf
         if size > 0.0:

@@ -65,6 +65,9 @@ DEAD_ZONES, DEAD_STEPS, HELPS = (0.01, 0.02, 0.035, 0.06), 10, 0.03
 """Pressures over which dead zones fade, relative to the highest; steps that each is followed for; and by
 how much one has to help."""
 
+FIRM = 0.8
+"""Of the most that muscles seem to resist shortening with, share at which they go slack at first."""
+
 DEAD_SAMPLES = 8_000
 """By which they are compared."""
 
@@ -100,10 +103,13 @@ class BalanceEstimator(CoupledEstimator):
     tare : bool, optional
         Whether displacements count from rest at the start of every recording. Default: where all of
         several scheduled muscles' recordings start there.
-    contact : bool, optional
-        Whether a dead zone of small pressures is looked for; default of a muscle alone.
+    contact : bool
+        Whether a dead zone of small pressures is looked for; default so.
+    slack : bool, optional
+        Whether it is looked for forces at which muscles go slack; default of several muscles.
     mass : bool
-        Whether what hangs at the muscles is so heavy that its acceleration matters.
+        Whether what hangs at the muscles is so heavy that its acceleration matters; then they are not
+        found to go slack.
     ridge : float
         Damping of the coefficients.
     steps : int
@@ -122,7 +128,8 @@ class BalanceEstimator(CoupledEstimator):
     area: Annotated[int, Interval(ge=0, le=6)] = 2
     degree: Annotated[int, Interval(ge=1, le=4)] = 2
     tare: bool | None = None
-    contact: bool | None = None
+    contact: bool = True
+    slack: bool | None = None
     mass: bool = False
     ridge: Annotated[float, Ge(0)] = 1e-6
     steps: Annotated[int, Interval(ge=0, le=1000)] = 25
@@ -146,8 +153,14 @@ class BalanceEstimator(CoupledEstimator):
             few = Search(data, structure, self.ridge).of_few()
             self._begin(few, tracker)
             assert tracker.best is not None
-            if len(data.inputs) == 1 if self.contact is None else self.contact:
+            slack = len(data.inputs) > 1 if self.slack is None else self.slack
+            slack = slack and not self.mass
+            if slack or self.contact:
                 few.descend(tracker.best, min(self.steps, DEAD_STEPS), tracker)
+            if slack:
+                structure = self._slack(few, tracker)
+            few = Search(few.data, structure, self.ridge)
+            if self.contact:
                 dead, tracker.best = self._dead_zone(few, tracker)
             search = Search(acting(data, dead), structure, self.ridge)
             few = search.of_few()
@@ -194,6 +207,20 @@ class BalanceEstimator(CoupledEstimator):
         for _, _, start in starts if few.n_rows <= FEW_ROWS else starts[:FOLLOWED]:
             few.descend(start, min(self.steps, FIRST_STEPS), tracker)
 
+    def _slack(self, few: Search, tracker: Tracker) -> Structure:
+        """Return the structure of muscles that go slack if that helps, and show it to the tracker."""
+        assert tracker.best is not None
+        fewer = few.of_few(DEAD_SAMPLES)
+        slack = Search(fewer.data, replace(few.structure, slack=True), self.ridge)
+        slack.span = few.span
+        part = tracker.part(0.5, 0.6)
+        start = slack.slackened(tracker.best, FIRM)
+        slack.descend(start, min(self.steps, DEAD_STEPS), part)
+        if part.best is None or not part.best_cost < (1.0 - HELPS) * fewer.cost(tracker.best):
+            return few.structure
+        tracker.best = part.best
+        return slack.structure
+
     def _dead_zone(self, few: Search, tracker: Tracker) -> tuple[float, Array]:
         """Return over which pressure a dead zone fades that helps most, 0 if none does, and where.
 
@@ -204,7 +231,7 @@ class BalanceEstimator(CoupledEstimator):
         dead, best = 0.0, tracker.best
         least = (1.0 - HELPS) * fewer.cost(best)
         for pressure in np.array(DEAD_ZONES) * few.structure.highest:
-            part = tracker.part(0.5, 0.6)
+            part = tracker.part(0.6, 0.65)
             here = Search(acting(fewer.data, float(pressure)), few.structure, self.ridge)
             here.span = few.span
             here.descend(tracker.best, min(self.steps, DEAD_STEPS), part)
@@ -283,6 +310,7 @@ class BalanceEstimator(CoupledEstimator):
             scheduled_hull=np.column_stack([x.min(axis=0), x.max(axis=0)]),
             highest=highest,
             tare=tare,
+            slack=False,
             mass=self.mass,
         )
 

@@ -150,6 +150,21 @@ class Search:
             values[forces] /= values[structure.places("loads", 0)[0]]
         return values
 
+    def slackened(self, values: Array, share: float) -> Array:
+        """Return coefficients by which muscles go slack at a share of the most they resist with."""
+        structure, values = self.structure, values.copy()
+        for k in range(structure.n):
+            springs = values[structure.places("springs", k)].reshape(-1, 1 + structure.n)
+            most = 0.0
+            for run in self.runs:
+                x, loads = np.split(run.scheduled, [len(structure.scheduled)], axis=1)
+                around = np.column_stack([np.ones(len(x)), run.outputs])
+                pulled = ((structure.powers(x.T).T @ springs) * around).sum(axis=1)
+                pulled += loads @ values[structure.places("loads", k)]
+                most = max(most, -float(pulled.min()))
+            values[structure.places("push", k)] = share * most
+        return values
+
     def loads_told(self, values: Array) -> bool:
         """Tell whether the linear stage found that a load pulls, and how much."""
         structure = self.structure
@@ -216,6 +231,7 @@ class Search:
                 narrowing = polynomial.polyder(areas) / structure.scale
                 own[:, k] = springs[:, 1 + k] @ powers + polynomial.polyval(u[:, k], slope)
                 own[:, k] -= p[:, k] * polynomial.polyval(u[:, k], narrowing)
+                own[:, k] += values[structure.places("bladder", k)[0]]
                 own[:, k] += 0.3 * values[structure.places("friction", k)].sum()
             found.append(own)
         table = np.concatenate(found)
@@ -236,28 +252,20 @@ class Search:
         base = base + mix[:, ~known] @ prior[~known]
         triangle = triangle[:, np.append(known, True)]
         mix, prior, size = mix[:, known], prior[known], size[known]
-        n_free, n = len(prior), structure.n
         held = np.maximum(np.sqrt(damping), LIGHTEST) * size
-        system = np.zeros((len(triangle) + n_free + n, n_free + n))
-        system[: len(triangle), :n_free] = triangle[:, :-1]
-        system[len(triangle) :, :] = np.diag([*held, *np.full(n, 1e-6 * float(size.max()))])
-        right = np.concatenate([triangle[:, -1], held * prior, np.zeros(n)])
-        whole = np.zeros((len(base) + n, n_free + n))
-        whole[: len(base), :n_free] = mix
-        whole[len(base) :, n_free:] = np.eye(n)
-        origin = np.append(base, np.zeros(n))
+        system = np.vstack([triangle[:, :-1], np.diag(held)])
+        right = np.concatenate([triangle[:, -1], held * prior])
         sides, least = structure.conditions(base + mix @ prior)
         stiff = float(least[-1])
         for _ in range(MOST_CUTS):
             softened = [structure.spring_condition(x, way, stiff) for x, way in self.cuts]
             all_sides = np.vstack([sides, *(row for row, _ in softened)])
             all_least = np.append(least, [bound for _, bound in softened])
-            on_free, missing = all_sides @ whole, all_least - all_sides @ origin
+            on_free, missing = all_sides @ mix, all_least - all_sides @ base
             asks = (on_free != 0).any(axis=1)  # not only of what stays
             free, _ = constrained_least_squares(system, right, on_free[asks], missing[asks])
-            found = origin + whole @ free
-            values, made_up = found[: len(base)], found[len(base) :]
-            x, way, softest = structure.softest(values, made_up)
+            values = base + mix @ free
+            x, way, softest = structure.softest(values)
             if softest >= 0.5 * stiff:
                 break
             self.cuts.append((x, way))
@@ -292,6 +300,11 @@ class Search:
         As if errors were independent; NaN of what is fixed, or what the runs do not determine.
         """
         mix = self.structure.free(moving=True)
+        if not self.structure.slack:  # bladders cannot be told from springs
+            bladders = [
+                int(self.structure.places("bladder", k)[0]) for k in range(self.structure.n)
+            ]
+            mix = mix[:, ~mix[bladders].any(axis=0)]
         errors, slopes = self.errors(values)
         moving = slopes @ mix
         size = np.maximum(np.sqrt((moving**2).sum(axis=0)), 1e-12)
@@ -322,7 +335,7 @@ class Search:
         for _ in range(steps):
             moving = slopes @ mix
             usable = np.isfinite(moving).all(axis=1)
-            now: Array = np.asarray(np.linalg.lstsq(mix, values, rcond=None)[0], np.float64)
+            now = mix.T @ values / mix.sum(axis=0)
             base = values - mix @ now
             moving, errors = moving[usable], errors[usable]
             triangle = _triangle(moving, moving @ now - errors)

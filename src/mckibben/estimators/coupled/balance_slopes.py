@@ -16,11 +16,14 @@ from mckibben.blocks.coupled.balance_law import (
     FROM_REST,
     HEAD,
     IN_TIME,
+    OWN,
     accelerated,
     keep,
     muscle_width,
     muscles,
+    resisted,
     settle,
+    shortened,
     unbalanced,
 )
 
@@ -41,17 +44,13 @@ def mixed(to: Array, kept: float, share: float, row: Array) -> None:
 
 
 @kernel
-def direct(
-    c: Array, state: Array, way: int, k: int, y: Array, x: Array, p: Array, slopes: Array
-) -> None:
-    """Fill how the forces of muscle k move with the coefficients, where it and its past stay."""
+def by_springs(c: Array, k: int, y: Array, x: Array, slopes: Array) -> None:
+    """Fill how springs and loads of muscle k move with the coefficients."""
     n, n_x, degree, n_loads = int(c[0]), int(c[1]), int(c[2]), int(c[3])
-    m, n_l, n_e, n_a, scale = int(c[4]), int(c[5]), int(c[6]), int(c[7]), c[8]
     width = muscle_width(c)
-    own = muscles(c) + k * width
     for i in range(slopes.size):
         slopes[i] = 0.0
-    place = k * width + 5
+    place = k * width + OWN
     slopes[place] = 1.0
     for j in range(n):
         slopes[place + 1 + j] = y[j]
@@ -63,22 +62,34 @@ def direct(
             slopes[place] = power
             for j in range(n):
                 slopes[place + 1 + j] = power * y[j]
-    place += 1 + n
-    inside = min(max(y[k], c[own]), c[own + 1])
-    u, beyond = inside / scale, (y[k] - inside) / scale
-    power = u
+    place = (k + 1) * width - n_loads
+    for i in range(n_loads):
+        slopes[place + i] = x[n_x + i]
+
+
+@kernel
+def direct(c: Array, state: Array, way: int, k: int, u: float, p: float, slopes: Array) -> None:
+    """Add how what muscle k resists with moves with the coefficients, where it and its past stay."""
+    n, m, n_l, n_e, n_a = int(c[0]), int(c[4]), int(c[5]), int(c[6]), int(c[7])
+    width, scale = muscle_width(c), c[8]
+    own = muscles(c) + k * width
+    slopes[k * width + 5] = u
+    place = k * width + OWN + (1 + int(c[1]) * int(c[2])) * (1 + n)
+    inside = min(max(u, c[own]), c[own + 1])
+    v, beyond = inside / scale, (u - inside) / scale
+    power = v
     for i in range(n_e):
-        slopes[place + i] = power * u + (i + 2) * power * beyond
-        power *= u
+        slopes[place + i] = power * v + (i + 2) * power * beyond
+        power *= v
     place += n_e
     power, below = 1.0, 0.0
     for i in range(n_a):
-        slopes[place + i] = -p[k] * (power + i * below * beyond)
+        slopes[place + i] = -p * (power + i * below * beyond)
         below = power
-        power *= u
+        power *= v
     place += n_a
-    wall, grown = c[own + 2], max(p[k] + c[9], 0.0)
-    moved = y[k] + wall * p[k] - state[n + k]
+    wall, grown = c[own + 2], max(p + c[9], 0.0)
+    moved = u + wall * p - state[n + k]
     for i in range(m):
         if way == AT_REST:
             break
@@ -86,26 +97,23 @@ def direct(
         s = state[2 * n + k * m + i] + moved
         slopes[place + i] = min(max(s, -limit), limit)
         if -limit <= s <= limit:
-            slopes[k * width + 2] += h * p[k]
+            slopes[k * width + 2] += h * p
         elif grown > 0.0:
             by_grip = h * c[HEAD + i] if s > 0.0 else -h * c[HEAD + i]
             slopes[n * width] += by_grip
     place += m
     if way != AT_REST:
-        slopes[k * width + 3] = c[12] * (y[k] - state[k]) if way == IN_TIME else 0.0
+        slopes[k * width + 4] = c[12] * (u - state[k]) if way == IN_TIME else 0.0
         if way == IN_TIME and c[14] != 0.0:
-            slopes[k * width + 4] = accelerated(c, k, state, y[k] - state[k])
+            slopes[k * width + 6] = accelerated(c, k, state, u - state[k])
         for i in range(n_l):
             q_before = state[2 * n + n * m + k * n_l + i]
             gain = c[HEAD + m + n_l + i] if way == IN_TIME else 1.0
             decay = c[HEAD + m + i]
-            slopes[place + i] = decay * q_before + gain * (y[k] - state[k])
+            slopes[place + i] = decay * q_before + gain * (u - state[k])
             if way == IN_TIME:
                 kappa = c[own + place - k * width + i]
-                slopes[n * width + 1 + i] = kappa * slower(c, i, q_before, y[k] - state[k])
-    place += n_l
-    for i in range(n_loads):
-        slopes[place + i] = x[n_x + i]
+                slopes[n * width + 1 + i] = kappa * slower(c, i, q_before, u - state[k])
 
 
 @kernel
@@ -136,13 +144,13 @@ def remembered(
         row = 2 * n + k * m + i
         if abs(state[row] + moved) <= c[HEAD + i] * grown:
             mixed(slopes, 1.0, c[place + i], memory[row])
-    carried = c[own + 3] * c[12] if way == IN_TIME else 0.0
+    carried = c[own + 4] * c[12] if way == IN_TIME else 0.0
     for i in range(n_l):
         kappa = c[own + width - n_loads - n_l + i]
         carried += kappa * (c[HEAD + m + n_l + i] if way == IN_TIME else 1.0)
         mixed(slopes, 1.0, kappa * c[HEAD + m + i], memory[2 * n + n * m + k * n_l + i])
     if way == IN_TIME and c[14] != 0.0:
-        row, heavy = 2 * n + n * (m + n_l) + 2 * k, c[own + 4] * c[12] * c[12]
+        row, heavy = 2 * n + n * (m + n_l) + 2 * k, c[own + 6] * c[12] * c[12]
         carried += 2.0 * heavy
         mixed(slopes, 1.0, -3.0 * heavy, memory[row])
         mixed(slopes, 1.0, heavy, memory[row + 1])
@@ -211,7 +219,7 @@ def move(
 
     Slopes of no columns are not computed.
     """
-    n, n_c = int(c[0]), slopes.shape[1]
+    n, n_c, width = int(c[0]), slopes.shape[1], muscle_width(c)
     vectors = scratch[: 3 * n].reshape((3, n))
     residual, column, gradient = vectors[0], vectors[1], vectors[2]
     matrix = scratch[3 * n : 3 * n + n * n].reshape((n, n))
@@ -227,8 +235,12 @@ def move(
         keep(c, state, way, y, p)
         return
     for k in range(n):
-        direct(c, state, way, k, y, x, p, slopes[k])
-        remembered(c, state, way, k, y[k], p[k], memory, slopes[k])
+        by_springs(c, k, y, x, slopes[k])
+        if shortened(c, muscles(c) + k * width, k, state, way, y[k], p[k])[1]:
+            slopes[k, k * width + 3] = 1.0
+        else:
+            direct(c, state, way, k, y[k], p[k], slopes[k])
+            remembered(c, state, way, k, y[k], p[k], memory, slopes[k])
     for i in range(0 if held else n):
         for k in range(n):
             column[k] = -1.0 if i == k else 0.0
@@ -243,10 +255,17 @@ def move(
         for i in range(0 if held else n):
             mixed(moves, 1.0, reverse[k, i], slopes[i])
     for k in range(n):
-        moves = memory[memory.shape[0] - n + k]
-        carry(c, state, way, k, y[k], p[k], memory, moves)
+        own, moves = muscles(c) + k * width, memory[memory.shape[0] - n + k]
         if not held:
             mixed(slopes[k], 0.0, 1.0, moves)
+        u, slack = shortened(c, own, k, state, way, y[k], p[k])
+        if slack:
+            mixed(moves, 0.0, 0.0, moves)
+            direct(c, state, way, k, u, p[k], moves)
+            remembered(c, state, way, k, u, p[k], memory, moves)
+            moves[k * width + 3] -= 1.0
+            mixed(moves, -1.0 / resisted(c, own, k, state, way, u, p[k])[1], 0.0, moves)
+        carry(c, state, way, k, u, p[k], memory, moves)
     keep(c, state, way, y, p)
 
 
@@ -308,7 +327,7 @@ def follow(
         for k in range(n):
             offset[k] = y[k]
             for j in range(memory.shape[1]):
-                tare[k, j] = memory[k, j]
+                tare[k, j] = 0.0 if held else row[k, j]
     for t in range(driven.shape[0]):
         for k in range(n):
             p[k] = driven[t, k]

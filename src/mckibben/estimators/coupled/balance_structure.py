@@ -1,8 +1,9 @@
 """What of a balance of forces is fixed, what is free, and what physics asks of it.
 
 Coefficients are those of the block, muscle by muscle, then the grip and the lags' logarithms. What is
-free is fewer numbers, of which they are an affine function: springs between two muscles are one number,
-and for every muscle one more says how much of its springs makes up for elasticity and area that soften.
+free is fewer numbers, of which they are an affine function: springs between two muscles are one number.
+Every muscle has a spring of its own, which makes up for elasticity and area that soften; of muscles that
+do not go slack nothing tells it from the others, to which it is added in the end.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from numpy.typing import NDArray
 from mckibben.arrays import Array
 from mckibben.blocks.core.fields import Channel, rows, vector
 from mckibben.blocks.coupled.balance import Balance
+from mckibben.blocks.coupled.balance_law import NEVER
 
 GRID = 21
 """Places along what is known of every muscle's displacement where conditions are asked for."""
@@ -54,6 +56,8 @@ class Structure:
         Pressure [bar].
     tare : bool
         Whether displacements count from rest at the start.
+    slack : bool
+        Whether muscles can go slack.
     lag_range : (float, float)
         Shortest and longest time constant that the recordings can tell [s].
     mass : bool
@@ -73,6 +77,7 @@ class Structure:
     scheduled_hull: Array
     highest: float
     tare: bool
+    slack: bool
     lag_range: tuple[float, float]
     mass: bool = False
 
@@ -92,7 +97,9 @@ class Structure:
         widths = {
             "hull": 2,
             "wall": 1,
+            "push": 1,
             "damping": 1,
+            "bladder": 1,
             "mass": 1,
             "springs": (1 + len(self.scheduled) * self.degree) * (1 + self.n),
             "elasticity": self.n_elastic,
@@ -138,6 +145,7 @@ class Structure:
         values = np.zeros(self.size)
         values[self.timing] = np.log(self.lags)
         for k in range(self.n):
+            values[self.places("push", k)] = NEVER
             values[self.places("hull", k)] = self.hull[k]
             values[self.places("areas", k)[0]] = 1.0
             values[self.places("loads", k)] = 1.0
@@ -147,8 +155,12 @@ class Structure:
         """Return the balance of some coefficients."""
         table = values[: self.grip].reshape(self.n, self.width)
         part = {name: table[:, place] for name, place in self.slices.items()}
+        springs, bladders = part["springs"].copy(), np.maximum(part["bladder"][:, 0], 0.0)
+        if not self.slack:
+            for k in range(self.n):
+                springs[k, 1 + k] += bladders[k]
         return Balance(
-            springs=rows(part["springs"]),
+            springs=rows(springs),
             elasticity=rows(part["elasticity"]),
             areas=rows(part["areas"]),
             friction=rows(np.maximum(part["friction"], 0.0)),
@@ -156,6 +168,8 @@ class Structure:
             loads=rows(part["loads"]),
             damping=vector(np.maximum(part["damping"][:, 0], 0.0)),
             walls=vector(np.maximum(part["wall"][:, 0], 0.0)),
+            bladders=vector(bladders) if self.slack else (),
+            pushes=vector(np.maximum(part["push"][:, 0], 0.0)) if self.slack else (),
             limits=vector(self.limits),
             grip=float(max(values[self.grip], 0.0)),
             lags=vector(np.clip(np.exp(values[self.timing]), *self.lag_range)),
@@ -172,24 +186,26 @@ class Structure:
 
     def values(self, block: Balance) -> Array:
         """Return the coefficients of a balance of this structure."""
-        tables = [block.hull, np.transpose([block.walls]), np.transpose([block.damping])]
-        tables += [
-            np.transpose([block.mass or np.zeros(self.n)]),
-            block.springs,
-            block.elasticity,
-            block.areas,
-        ]
+        none, never = self.n * (0.0,), self.n * (NEVER,)
+        single = [block.walls, block.pushes or never, block.damping, block.bladders or none]
+        single.append(block.mass or none)
+        tables = [block.hull, np.transpose(single)]
+        tables += [block.springs, block.elasticity, block.areas]
         tables += [block.friction, block.relaxation, block.loads]
         table = np.hstack([np.asarray(part, dtype=np.float64) for part in tables])
         return np.concatenate([table.ravel(), [block.grip], np.log(block.lags)])
 
     def packed(self) -> NDArray[np.intp]:
         """Return, for every parameter that a balance packs, its place among coefficients."""
-        names = ("springs", "elasticity", "areas", "friction", "relaxation", "loads")
-        by_name = [self.places(name, k) for name in names for k in range(self.n)]
-        single = [self.places(name, k) for name in ("damping", "wall") for k in range(self.n)]
-        heavy = [self.places("mass", k) for k in range(self.n) if self.mass]
-        return np.concatenate([*by_name, *single, [self.grip], *heavy]).astype(np.intp)
+        tables = ("springs", "elasticity", "areas", "friction", "relaxation", "loads")
+        slack = ("bladder", "push") if self.slack else ()
+        heavy = ("mass",) if self.mass else ()
+        groups = ((*tables, "damping", "wall"), (*slack, *heavy))
+        first, last = (
+            [place for name in names for k in range(self.n) for place in self.places(name, k)]
+            for names in groups
+        )
+        return np.array([*first, self.grip, *last], dtype=np.intp)
 
     @property
     def in_newtons(self) -> bool:
@@ -199,14 +215,14 @@ class Structure:
     def free(self, *, moving: bool, plain: bool = False) -> Array:
         """Return how coefficients follow from what is free, shape (coefficients, free).
 
-        ``moving`` frees walls, grip, lags, and areas at rest too. One number sets the unit of force: of
-        a muscle alone its load's, while moving; else the first area at rest. ``plain``: areas stay
-        what they are at rest.
+        ``moving`` frees walls, grip, lags, pushes, and areas at rest too. One number sets the unit of
+        force: of a muscle alone its load's, while moving; else the first area at rest. ``plain``: areas
+        stay what they are at rest.
         """
         n_all = self.size
         columns: list[list[int]] = []
         for k in range(self.n):
-            for name in ("elasticity", "friction", "relaxation", "damping"):
+            for name in ("bladder", "elasticity", "friction", "relaxation", "damping"):
                 columns += [[place] for place in self.places(name, k).tolist()]
             areas = self.places("areas", k).tolist()
             newtons = moving and self.in_newtons
@@ -214,8 +230,9 @@ class Structure:
             columns += [[place] for place in ([] if plain else free_areas)]
             columns += [[place] for place in self.places("loads", k).tolist() if not newtons]
             if moving:
-                columns += [[place] for place in self.places("wall", k).tolist()]
-                columns += [[place] for place in self.places("mass", k).tolist() if self.mass]
+                push, mass = ("push",) * self.slack, ("mass",) * self.mass
+                for name in ("wall", *push, *mass):
+                    columns += [[place] for place in self.places(name, k).tolist()]
         for q in range(1 + len(self.scheduled) * self.degree):
             for k in range(self.n):
                 if q or not self.tare:  # displacements from rest make a constant of their own
@@ -235,9 +252,9 @@ class Structure:
         return int(self.places("springs", k)[q * (1 + self.n) + 1 + j])
 
     def conditions(self, values: Array) -> tuple[Array, Array]:
-        """Return what is asked of coefficients and of the springs that make up, as sides and least.
+        """Return what is asked of coefficients, as sides and least.
 
-        Shapes (m, coefficients + n) and (m,): sides @ [coefficients, springs] >= least. What friction
+        Shapes (m, coefficients) and (m,): sides @ coefficients >= least. What friction
         at held length takes of an area is taken where the walls are now.
         """
         n_all = self.size
@@ -247,7 +264,7 @@ class Structure:
         stiff = LEAST_STIFF * unit * self.highest / self.scale
 
         def ask(entries: dict[int, float], bound: float) -> None:
-            row = np.zeros(n_all + self.n)
+            row = np.zeros(n_all)
             row[list(entries)] = list(entries.values())
             sides.append(row)
             least.append(bound)
@@ -262,7 +279,9 @@ class Structure:
             if place > self.timing.start:
                 ask({place: 1.0, place - 1: -1.0}, APART)
         for k in range(self.n):
-            for name in ("friction", "relaxation", "damping", "wall", "mass"):
+            for name in (
+                *("bladder", "push", "friction", "relaxation", "damping", "wall", "mass"),
+            ):
                 for place in self.places(name, k).tolist():
                     ask({place: 1.0}, 0.0)
             for place in self.places("loads", k).tolist():
@@ -270,7 +289,6 @@ class Structure:
             ask({int(self.places("wall", k)[0]): -1.0}, -0.1 * self.scale / self.highest)
             areas, friction = self.places("areas", k), self.places("friction", k)
             ask({int(areas[0]): 1.0}, 0.1 * unit)
-            ask({n_all + k: 1.0}, 0.0)
             wall = float(values[self.places("wall", k)[0]])
             taken = dict(zip(friction.tolist(), (-(self.limits + wall)).tolist(), strict=True))
             for u in np.linspace(self.hull[k, 0], self.hull[k, 1], GRID) / self.scale:
@@ -287,7 +305,7 @@ class Structure:
                 softening = order * u ** (order - 1) / self.scale
                 for p in (0.0, self.highest):
                     lost = dict(zip(areas[1:].tolist(), (-p * softening).tolist(), strict=True))
-                    ask(elastic | lost | {n_all + k: 1.0}, stiff)
+                    ask(elastic | lost | {int(self.places("bladder", k)[0]): 1.0}, stiff)
             for j in range(k):  # a first idea of what makes springs positive
                 for sign in (1.0, -1.0):
                     direction = np.zeros(self.n)
@@ -314,21 +332,19 @@ class Structure:
         return np.array([np.ones(x.shape[1:]), *powers])
 
     def spring_condition(self, x: Array, direction: Array, stiff: float) -> tuple[Array, float]:
-        """Return that springs less what makes up are stiff along a direction: a side and its least."""
-        n_all = self.size
-        row = np.zeros(n_all + self.n)
+        """Return that springs are stiff along a direction: a side and its least."""
+        row = np.zeros(self.size)
         for q, power in enumerate(self.powers(x)):
             for k in range(self.n):
                 for j in range(self.n):
                     row[self._spring(q, k, j)] += power * direction[k] * direction[j]
-        row[n_all:] -= direction**2
         return row, stiff * float(direction @ direction)
 
-    def softest(self, values: Array, made_up: Array) -> tuple[Array, Array, float]:
-        """Return where springs, less what makes up, are softest: level, direction and stiffness."""
+    def softest(self, values: Array) -> tuple[Array, Array, float]:
+        """Return where springs are softest: level, direction and stiffness."""
         found: list[tuple[float, Array, Array]] = []
         for x in self.levels():
-            matrix = -np.diag(made_up)
+            matrix = np.zeros((self.n, self.n))
             for q, power in enumerate(self.powers(x)):
                 for k in range(self.n):
                     for j in range(self.n):

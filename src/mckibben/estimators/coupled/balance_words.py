@@ -22,7 +22,7 @@ def sentences(block: Balance, structure: Structure) -> list[str]:
     for k, channel in enumerate(block.driven):
         y = float(np.mean(block.hull[k]))
         rest, middle = (_area(block, k, at) for at in (0.0, y))
-        spring = block.springs[k][1 + k]
+        spring = block.springs[k][1 + k] + (block.bladders[k] if block.bladders else 0.0)
         stiff = spring + _slope(block.elasticity[k], y / block.scale) / block.scale
         rubbing = sum(
             h * r * (p + block.grip) for h, r in zip(block.friction[k], block.limits, strict=True)
@@ -34,6 +34,11 @@ def sentences(block: Balance, structure: Structure) -> list[str]:
             f"rest); springs and rubber {stiff:.3g} {unit}/mm; friction up to {rubbing:.3g} {unit} "
             f"either way, {100 * rubbing / max(middle * p, 1e-12):.2g} % of the pull"
             + (f"; {fading:.3g} {unit}/mm more that fades within {times}" if block.lags else "")
+            + (
+                f"; it pushes up to {block.pushes[k]:.3g} {unit}, then goes slack"
+                if block.pushes
+                else ""
+            )
         )
     return found
 
@@ -76,8 +81,8 @@ def _stiffness(block: Balance, k: int, y: float, p: float) -> float:
     """Return a muscle's own stiffness without friction and what schedules."""
     u = y / block.scale
     narrows = sum(i * a * u ** (i - 1) for i, a in enumerate(block.areas[k]) if i)
-    own = block.springs[k][1 + k] + (_slope(block.elasticity[k], u) - p * narrows) / block.scale
-    return float(own)
+    own = block.springs[k][1 + k] + (block.bladders[k] if block.bladders else 0.0)
+    return float(own + (_slope(block.elasticity[k], u) - p * narrows) / block.scale)
 
 
 def _area(block: Balance, k: int, y: float) -> float:

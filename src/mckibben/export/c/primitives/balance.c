@@ -13,7 +13,9 @@ void mck_balance_start(const mck_part *part, mck_real *state, const mck_real *in
             y[j] = in[j] + f.tare[j];
         }
         for (int k = 0; k < f.n; k++) {
-            const mck_real found = mck_balance_pressed(&f, k, MCK_AT_REST, y, in + f.n, p + f.n);
+            int reached;
+            const mck_real found =
+                mck_balance_pressed(&f, k, MCK_AT_REST, y, in + f.n, p + f.n, &reached);
             p[k] = mck_clip(found, f.lowest, f.highest);
         }
         mck_balance_keep(&f, MCK_AT_REST, y, p);
@@ -25,16 +27,17 @@ void mck_balance_step(const mck_part *part, mck_real *state, const mck_real *in,
     const mck_balance f = mck_balance_of(part, state);
     const int way = mck_balance_way(&f);
     mck_real *y = f.scratch;
-    int clipped = 0;
+    int beyond = 0;
     for (int j = 0; j < f.n; j++) {
         y[j] = in[j] + f.tare[j];
     }
     for (int k = 0; k < f.n; k++) {
-        const mck_real found = mck_balance_pressed(&f, k, way, y, in + f.n, y + f.n);
+        int reached;
+        const mck_real found = mck_balance_pressed(&f, k, way, y, in + f.n, y + f.n, &reached);
         out[k] = mck_clip(found, f.lowest, f.highest);
-        clipped |= mck_abs(out[k] - found) > MCK_SLACK * (MCK_R(1.0) + mck_abs(found));
+        beyond |= !reached || mck_abs(out[k] - found) > MCK_SLACK * (MCK_R(1.0) + mck_abs(found));
     }
-    if (clipped) {
+    if (beyond) {
         /* where the muscles go instead is what friction will remember */
         (void)mck_balance_settle(&f, way, y, in + f.n, out, y + f.n + f.n);
         *f.amiss += MCK_R(1.0);
@@ -60,7 +63,7 @@ void mck_balance_inverse_step(const mck_part *part, mck_real *state, const mck_r
     const int way = mck_balance_way(&f);
     mck_real *y = f.scratch;
     for (int k = 0; k < f.n; k++) {
-        y[k] = f.y[k];
+        y[k] = f.u[k];
     }
     const mck_real left = mck_balance_settle(&f, way, y, in + f.n, in, y + f.n);
     mck_balance_keep(&f, way, y, in);

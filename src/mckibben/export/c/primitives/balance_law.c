@@ -8,13 +8,17 @@
 #define BALANCED MCK_EITHER(2e-15, 1e-6)
 #define SURE MCK_EITHER(1e-11, 1e-5)
 #define LEAST_AREA MCK_R(0.01)
+#define NEVER MCK_R(1e30)
+#define OWN 7
 
 /* Coefficients of one muscle. */
 typedef struct {
     mck_real low;
     mck_real high;
     mck_real wall;
+    mck_real push;
     mck_real damping;
+    mck_real bladder;
     mck_real mass;
     const mck_real *springs;
     const mck_real *elasticity;
@@ -46,8 +50,8 @@ mck_balance mck_balance_of(const mck_part *part, mck_real *state)
     f.decays = f.limits + f.m;
     f.gains = f.decays + f.n_l;
     f.muscles = f.gains + f.n_l;
-    f.y = state;
-    f.z = f.y + f.n;
+    f.u = state;
+    f.z = f.u + f.n;
     f.stops = f.z + f.n;
     f.lags = f.stops + f.n * f.m;
     f.moves = f.lags + f.n * f.n_l;
@@ -61,15 +65,17 @@ mck_balance mck_balance_of(const mck_part *part, mck_real *state)
 static muscle read_muscle(const mck_balance *f, int k)
 {
     const int springs = (1 + f->n_x * f->degree) * (1 + f->n);
-    const int width = 5 + springs + f->n_e + f->n_a + f->m + f->n_l + f->n_loads;
+    const int width = OWN + springs + f->n_e + f->n_a + f->m + f->n_l + f->n_loads;
     const mck_real *own = f->muscles + k * width;
     muscle one;
     one.low = own[0];
     one.high = own[1];
     one.wall = own[2];
-    one.damping = own[3];
-    one.mass = own[4];
-    one.springs = own + 5;
+    one.push = own[3];
+    one.damping = own[4];
+    one.bladder = own[5];
+    one.mass = own[6];
+    one.springs = own + OWN;
     one.elasticity = one.springs + springs;
     one.areas = one.elasticity + f->n_e;
     one.friction = one.areas + f->n_a;
@@ -78,9 +84,9 @@ static muscle read_muscle(const mck_balance *f, int k)
     return one;
 }
 
-/* Springs, elasticity and loads of muscle k, and their gradient by y. */
-static mck_real elastic(const mck_balance *f, const muscle *one, int k, const mck_real *y,
-                        const mck_real *x, mck_real *gradient)
+/* Springs and loads of a muscle, and their gradient by y. */
+static mck_real sprung(const mck_balance *f, const muscle *one, const mck_real *y,
+                       const mck_real *x, mck_real *gradient)
 {
     const mck_real *row = one->springs;
     mck_real force = row[0];
@@ -101,23 +107,28 @@ static mck_real elastic(const mck_balance *f, const muscle *one, int k, const mc
             }
         }
     }
-    const mck_real inside = mck_clip(y[k], one->low, one->high);
-    const mck_real u = inside / f->scale;
-    mck_real power = u;
-    mck_real value = MCK_R(0.0);
-    mck_real slope = MCK_R(0.0);
-    for (int i = 0; i < f->n_e; i++) {
-        slope += (mck_real)(i + 2) * one->elasticity[i] * power;
-        power *= u;
-        value += one->elasticity[i] * power;
-    }
-    slope /= f->scale;
-    force += value + slope * (y[k] - inside);
-    gradient[k] += slope;
     for (int i = 0; i < f->n_loads; i++) {
         force += one->loads[i] * x[f->n_x + i];
     }
     return force;
+}
+
+/* A muscle's own spring and elasticity at a shortening, and their slope. */
+static mck_real elastic(const mck_balance *f, const muscle *one, mck_real u, mck_real *slope)
+{
+    const mck_real inside = mck_clip(u, one->low, one->high);
+    const mck_real v = inside / f->scale;
+    mck_real power = v;
+    mck_real value = MCK_R(0.0);
+    mck_real slanted = MCK_R(0.0);
+    for (int i = 0; i < f->n_e; i++) {
+        slanted += (mck_real)(i + 2) * one->elasticity[i] * power;
+        power *= v;
+        value += one->elasticity[i] * power;
+    }
+    slanted /= f->scale;
+    *slope = slanted + one->bladder;
+    return value + slanted * (u - inside) + one->bladder * u;
 }
 
 /* Effective area of a muscle, and its slope; beyond what is known it goes on straight. */
@@ -172,7 +183,7 @@ static mck_real rubbed(const mck_balance *f, const muscle *one, int k, int way,
 static mck_real lagging(const mck_balance *f, const muscle *one, int k, int way,
                         mck_real y, mck_real *slope)
 {
-    const mck_real moved = y - f->y[k];
+    const mck_real moved = y - f->u[k];
     *slope = way == MCK_IN_TIME ? one->damping * f->rate : MCK_R(0.0);
     mck_real force = *slope * moved;
     if (way == MCK_IN_TIME && f->heavy) {
@@ -190,11 +201,64 @@ static mck_real lagging(const mck_balance *f, const muscle *one, int k, int way,
     return force;
 }
 
+/* What muscle k resists with at a shortening and a pressure, its slope, and its size. */
+static mck_real resisted(const mck_balance *f, const muscle *one, int k, int way, mck_real u,
+                         mck_real p, mck_real *slope, mck_real *size)
+{
+    mck_real stiff;
+    mck_real by_u;
+    mck_real by_p;
+    mck_real by_moving;
+    mck_real a_slope;
+    const mck_real stretched = elastic(f, one, u, &stiff);
+    const mck_real friction = rubbed(f, one, k, way, u, p, &by_u, &by_p);
+    const mck_real behind = lagging(f, one, k, way, u, &by_moving);
+    const mck_real given = p * area(f, one, u, &a_slope);
+    *slope = stiff + by_u + by_moving - p * a_slope;
+    *size = mck_abs(stretched) + mck_abs(friction) + mck_abs(behind) + mck_abs(given);
+    return stretched + friction + behind - given;
+}
+
+/* How short muscle k is where its ends are y nearer: less, if it is slack. */
+static mck_real shortened(const mck_balance *f, const muscle *one, int k, int way, mck_real y,
+                          mck_real p)
+{
+    mck_real slope;
+    mck_real size;
+    mck_real low = -NEVER;
+    mck_real high = y;
+    mck_real u = y;
+    mck_real reach = MCK_R(1e-3) * f->scale;
+    if (one->push >= NEVER) {
+        return y;
+    }
+    mck_real excess = resisted(f, one, k, way, u, p, &slope, &size) - one->push;
+    int done = !(excess > MCK_R(0.0));
+    for (int step = 0; step < MOST_STEPS && !done; step++) {
+        const mck_real guess = slope > MCK_R(0.0) ? u - excess / slope : -NEVER;
+        if (low < guess && guess < high) {
+            u = guess;
+        } else {
+            u = low > -NEVER ? MCK_R(0.5) * (low + high) : high - reach;
+            reach *= MCK_R(2.0);
+        }
+        excess = resisted(f, one, k, way, u, p, &slope, &size) - one->push;
+        done = mck_abs(excess) <= BALANCED * (size + one->push);
+        if (excess > MCK_R(0.0)) {
+            high = u;
+        } else {
+            low = u;
+        }
+    }
+    return u;
+}
+
 void mck_balance_keep(const mck_balance *f, int way, const mck_real *y, const mck_real *p)
 {
     for (int k = 0; k < f->n; k++) {
         const muscle one = read_muscle(f, k);
-        const mck_real z = y[k] + one.wall * p[k];
+        const mck_real u = shortened(f, &one, k, way, y[k], p[k]);
+        const mck_real z = u + one.wall * p[k];
         const mck_real grown =
             way != MCK_AT_REST ? mck_max(p[k] + f->grip, MCK_R(0.0)) : MCK_R(0.0);
         for (int i = 0; i < f->m; i++) {
@@ -205,15 +269,15 @@ void mck_balance_keep(const mck_balance *f, int way, const mck_real *y, const mc
         for (int i = 0; i < f->n_l; i++) {
             mck_real *lag = f->lags + k * f->n_l + i;
             const mck_real gain = way == MCK_IN_TIME ? f->gains[i] : MCK_R(1.0);
-            const mck_real behind = f->decays[i] * *lag + gain * (y[k] - f->y[k]);
+            const mck_real behind = f->decays[i] * *lag + gain * (u - f->u[k]);
             *lag = way == MCK_AT_REST ? MCK_R(0.0) : behind;
         }
         if (f->heavy) {
             mck_real *before = f->moves + 2 * k;
             before[1] = way == MCK_IN_TIME ? before[0] : MCK_R(0.0);
-            before[0] = way == MCK_IN_TIME ? y[k] - f->y[k] : MCK_R(0.0);
+            before[0] = way == MCK_IN_TIME ? u - f->u[k] : MCK_R(0.0);
         }
-        f->y[k] = y[k];
+        f->u[k] = u;
         f->z[k] = z;
     }
     *f->first = MCK_R(0.0);
@@ -226,11 +290,13 @@ int mck_balance_way(const mck_balance *f)
 
 /* The one root of a function that rises piecewise straight. */
 mck_real mck_balance_pressed(const mck_balance *f, int k, int way, const mck_real *y,
-                             const mck_real *x, mck_real *gradient)
+                             const mck_real *x, mck_real *gradient, int *reached)
 {
     const muscle one = read_muscle(f, k);
     mck_real unused;
-    mck_real held = elastic(f, &one, k, y, x, gradient);
+    const mck_real asked = sprung(f, &one, y, x, gradient);
+    *reached = asked >= -one.push;
+    mck_real held = mck_max(asked, -one.push) + elastic(f, &one, y[k], &unused);
     held += lagging(f, &one, k, way, y[k], &unused);
     const mck_real a = area(f, &one, y[k], &unused);
     mck_real low = -MCK_INFINITY;
@@ -266,20 +332,20 @@ mck_real mck_balance_lack(const mck_balance *f, int way, const mck_real *y, cons
     for (int k = 0; k < f->n; k++) {
         const muscle one = read_muscle(f, k);
         mck_real *row = matrix + k * f->n;
-        mck_real by_y;
-        mck_real by_p;
-        mck_real by_moving;
-        mck_real a_slope;
-        const mck_real force = elastic(f, &one, k, y, x, row);
-        const mck_real friction = rubbed(f, &one, k, way, y[k], p[k], &by_y, &by_p);
-        const mck_real behind = lagging(f, &one, k, way, y[k], &by_moving);
-        const mck_real given = p[k] * area(f, &one, y[k], &a_slope);
-        mck_real size = mck_abs(force) + mck_abs(friction) + mck_abs(behind) + mck_abs(given);
+        mck_real slope;
+        mck_real size;
+        const mck_real force = sprung(f, &one, y, x, row);
+        mck_real resisting = resisted(f, &one, k, way, y[k], p[k], &slope, &size);
+        if (resisting > one.push) {
+            resisting = one.push;
+            slope = MCK_R(0.0);
+        }
+        residual[k] = force + resisting;
+        size += mck_abs(force);
         for (int j = 0; j < f->n; j++) {
             size += mck_abs(row[j] * y[j]);
         }
-        row[k] += by_y + by_moving - p[k] * a_slope;
-        residual[k] = force + friction + behind - given;
+        row[k] += slope;
         if (!(size < MCK_INFINITY)) {
             worst = MCK_INFINITY;
         } else if (size > MCK_R(0.0)) {
@@ -375,7 +441,7 @@ mck_real mck_balance_settle(const mck_balance *f, int way, mck_real *y, const mc
         }
     }
     for (int k = 0; k < f->n && !(left < MCK_NEARLY); k++) {
-        y[k] = f->y[k];
+        y[k] = f->u[k];
     }
     return left;
 }
@@ -385,7 +451,7 @@ void mck_balance_begin(const mck_part *part, const mck_balance *f, const mck_rea
     mck_real *y = f->scratch;
     mck_real *p = y + f->n;
     for (int i = 0; i < part->n_states; i++) {
-        f->y[i] = MCK_R(0.0);
+        f->u[i] = MCK_R(0.0);
     }
     for (int k = 0; k < f->n; k++) {
         y[k] = MCK_R(0.0);

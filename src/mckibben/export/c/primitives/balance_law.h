@@ -2,11 +2,10 @@
  *
  * Coefficients: n, scheduling inputs, degree, loads, stops m, lags l, elastic terms, area's terms,
  * scale, pressure below zero at which stops hold nothing, lowest and highest pressure, samples a second,
- * tare, mass; m limits, l decays, l gains; then of every muscle: lowest and highest displacement known,
- * wall, damping, mass, springs (powers of what schedules by 1 + n), elasticity, area, friction, relaxation,
- * loads.
- * State: n displacements, n stretches, n by m stops, n by l lags, with mass n by 2 last moves, n tares,
- * whether nothing came before, count of samples amiss; scratch: n n + 6 n. */
+ * tare, mass; m limits, l decays, l gains; then of every muscle: lowest and highest displacement known, wall,
+ * force at which it goes slack, damping, own spring, mass, springs (powers of what schedules by 1 + n),
+ * elasticity, area, friction, relaxation, loads. State: n shortenings, n stretches, n by m stops, n by l
+ * lags, with mass n by 2 last moves, n tares, whether nothing came before, count of samples amiss; scratch: n n + 6 n. */
 #ifndef MCK_BALANCE_LAW_H
 #define MCK_BALANCE_LAW_H
 
@@ -41,7 +40,7 @@ typedef struct {
     const mck_real *decays;
     const mck_real *gains;
     const mck_real *muscles;
-    mck_real *y;
+    mck_real *u;
     mck_real *z;
     mck_real *stops;
     mck_real *lags;
@@ -64,9 +63,10 @@ int mck_balance_way(const mck_balance *f);
 /* Bring the state to where the muscles are now; something has come. */
 void mck_balance_keep(const mck_balance *f, int way, const mck_real *y, const mck_real *p);
 
-/* The pressure of muscle k that balances it where all muscles are; `gradient` has n numbers. */
+/* The pressure of muscle k that balances it where all muscles are, or, where it would have to push more
+ * than it can, at which it is about to go slack; and whether one does. `gradient` has n numbers. */
 mck_real mck_balance_pressed(const mck_balance *f, int k, int way, const mck_real *y,
-                             const mck_real *x, mck_real *gradient);
+                             const mck_real *x, mck_real *gradient, int *reached);
 
 /* What every muscle's forces exceed its pull by, n numbers, and its slopes by displacements, n by n;
  * returns the largest share. */

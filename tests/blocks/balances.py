@@ -34,6 +34,7 @@ def balances(
     n_loads: int | None = None,
     m: int | None = None,
     n_lags: int | None = None,
+    heavy: bool = False,
 ) -> Balance:
     """Draw a balance whose energy is convex: stiffness of 14 N/mm and more outweighs what is lost."""
     n = draw(st.integers(1, 3)) if n is None else n
@@ -71,6 +72,7 @@ def balances(
         given=channels("pressure", "bar", n),
         tare=draw(st.booleans()),
         settled=draw(st.booleans()),
+        mass=vector(rng.uniform(0.0, 0.03, n)) if heavy else (),
     )
 
 

@@ -46,14 +46,21 @@ MUSCLE = Balance(
 
 
 def recording(
-    seed: int, strongest: float = 60.0, n: int = 1200, *, noise: float = NOISE, sign: float = 1.0
+    seed: int,
+    strongest: float = 60.0,
+    n: int = 1200,
+    *,
+    noise: float = NOISE,
+    sign: float = 1.0,
+    muscle: Balance = MUSCLE,
+    highest: float = 0.3,
 ) -> Recording:
-    """Return a muscle under a load, both moving at random from rest."""
+    """Return a muscle under a load, both moving at random from rest, at frequencies up to one [Hz]."""
     time = np.arange(n) * STEP
     rises = np.minimum(time / 2.0, 1.0)
-    p = rises * random_wave(time, 0.3, 4.0, seed=seed)
-    force = rises * random_wave(time, 0.2, strongest, seed=100 + seed)
-    y = MUSCLE.inverse().simulate(np.column_stack([p, force]), sample_time=STEP)[:, 0]
+    p = rises * random_wave(time, highest, 4.0, seed=seed)
+    force = rises * random_wave(time, highest * 2.0 / 3.0, strongest, seed=100 + seed)
+    y = muscle.inverse().simulate(np.column_stack([p, force]), sample_time=STEP)[:, 0]
     y = y + noise * np.random.default_rng(seed).standard_normal(n)
     channels = {"pressure": p, "displacement": y, "force": sign * force}
     return Recording(channels, STEP, meta={"name": f"run-{seed}"})
@@ -119,6 +126,21 @@ def test_a_dead_zone_is_found_where_there_is_one(found: BalanceEstimator) -> Non
     np.testing.assert_allclose(back["pressure"], run_["pressure"], atol=1e-7)
     told = load_of(estimator.fitted).simulate(wished.select(["displacement", "pressure"]))
     np.testing.assert_allclose(told["force"], run_["force"], atol=1e-6)
+
+
+def test_a_mass_is_found_by_how_fast_it_swings() -> None:
+    heavy = replace(MUSCLE, mass=(0.02,))
+    *train, other = (recording(seed, muscle=heavy, highest=2.0) for seed in (1, 2, 3))
+    errors = []
+    for told in (False, True):
+        estimator = BalanceEstimator(mass=told).fit(train)
+        errors.append(error(estimator, other))
+    assert errors[1] < 3.0 * NOISE < 0.5 * errors[0]
+    np.testing.assert_allclose(balance_of(estimator).mass, 0.02, rtol=0.2)
+    # with it the pressures for a motion are as exact as without
+    y = np.column_stack([estimator.predict(other)[0].ravel(), other["force"]])
+    pressures = estimator.fitted.inverse().simulate(y, sample_time=STEP)[:, 0]
+    np.testing.assert_allclose(pressures, other["pressure"], atol=1e-8)
 
 
 def test_it_keeps_to_physics(found: BalanceEstimator) -> None:
@@ -221,7 +243,10 @@ TAUT = replace(MUSCLE, walls=(0.1,))
 SLACK = replace(TAUT, springs=((-20.0, 4.0),), bladders=(4.0,), pushes=(6.0,))
 
 
-@pytest.mark.parametrize("block", [TAUT, SLACK])
+HEAVY = replace(TAUT, mass=(0.01,))
+
+
+@pytest.mark.parametrize("block", [TAUT, SLACK, HEAVY])
 def test_slopes_are_those_of_differences(block: Balance) -> None:
     some = recording(6, n=300)
     p, y, x = (
@@ -239,10 +264,10 @@ def test_slopes_are_those_of_differences(block: Balance) -> None:
     values = np.concatenate([block.pack(), np.log(block.lags)])
     exact = run(block.coefficients(STEP), p, y, x, held=False)[1][:, 0]
     width = exact.shape[1] - 1 - len(block.lags)
-    # the block packs tables first, then damping, lines, walls, grip, bladders and pushes; coefficients
-    # have hull, wall, push, damping, line and bladder first
-    slack = [6, 3] if block.pushes else []
-    places = [*range(7, width), 4, 5, 2, width, *slack, *range(width + 1, exact.shape[1])]
+    # the block packs tables first, then damping, lines, walls, grip, bladders, pushes and mass;
+    # coefficients have hull, wall, push, damping, line, bladder and mass first
+    late = ([6, 3] if block.pushes else []) + ([7] if block.mass else [])
+    places = [*range(8, width), 4, 5, 2, width, *late, *range(width + 1, exact.shape[1])]
     for place, column in enumerate(places):
         step = np.zeros(values.size)
         step[place] = 1e-6 * (abs(values[place]) or 0.1)

@@ -79,6 +79,12 @@ def sdchm() -> Block:
     return Series((load("blocks", "per-channel")(muscles), Coupling(gains, own, coupled), network))
 
 
+def heavy() -> Block:
+    """Return two muscles at which masses hang."""
+    example = load("blocks", "balance").example()
+    return replace(example, mass=(0.01, 0.02), pushes=(), bladders=())
+
+
 def joint() -> Block:
     """Return two muscles in balance that move one coordinate."""
     balance = load("blocks", "balance").example()
@@ -112,6 +118,8 @@ MODELS: dict[str, Block] = {
     "SDCHM": sdchm(),
     "SDIHC": sdchm().inverse(),
     "MPI-NARMAX": mpi_narmax(),
+    "heavy muscles": heavy(),
+    "heavy muscles inverse": heavy().inverse(),
     "joint": joint(),
     "joint inverse": joint().inverse(),
     "explicit start": replace(load("blocks", "pi").example(), initial=(0.1, 0.2, 0.3, 0.4)),

@@ -2,10 +2,10 @@
 
 What a muscle's pressure gives over its effective area holds its load, springs (its own and those that
 couple muscles, which stiffen with whatever schedules them), its rubber's elasticity, friction of the
-braid, relaxation and damping; what has to push harder than it can goes slack. The equation is that of
-`mckibben.blocks.coupled.balance_law`. A load enters once. Springs are symmetric, what rubs and relaxes
-is not negative, areas outweigh friction, and stiffness what areas lose, as identification sees to:
-then pressures hold muscles in one place only, which is always found, and friction never makes energy.
+braid, relaxation, damping and inertia; what has to push harder than it can goes slack. The equation is
+that of `mckibben.blocks.coupled.balance_law`. A load enters once. Springs are symmetric, what rubs and
+relaxes is not negative, areas outweigh friction, and stiffness what areas lose, as identification sees
+to: then pressures hold muscles in one place only, which is found, and friction never makes energy.
 
 This block gives pressures for displacements, explicitly: the compensator. Its inverse gives
 displacements for pressures. `mckibben.blocks.coupled.load_estimate` gives loads for both.
@@ -43,17 +43,8 @@ from mckibben.blocks.core.kernels import kernel
 from mckibben.blocks.core.linear_system import newton_cost
 from mckibben.blocks.core.many_channels import ManyChannels
 from mckibben.blocks.core.refusals import explicit_state, needs_sample_time
-from mckibben.blocks.coupled.balance_law import (
-    AT_REST,
-    FROM_REST,
-    IN_TIME,
-    NEARLY,
-    NEVER,
-    begin,
-    keep,
-    pressed,
-    settle,
-)
+from mckibben.blocks.coupled.balance_law import NEARLY, NEVER, begin, keep, pressed, settle
+from mckibben.blocks.coupled.balance_terms import AT_REST, FROM_REST, IN_TIME
 from mckibben.errors import ModelError, ModelWarning
 
 
@@ -163,6 +154,8 @@ class Balance(ManyChannels, Invertible):
         any more; else they have come there just now.
     pressure_range : (float, float), optional
         Pressures are clipped to it, and said so.
+    mass : sequence of n float, optional
+        Force by acceleration [N s^2/mm], not negative; none by default.
     """
 
     kind: ClassVar[str] = "balance"
@@ -173,7 +166,7 @@ class Balance(ManyChannels, Invertible):
     increasing = ("limits",)
     parameters: ClassVar[tuple[str, ...]] = (
         *("springs", "elasticity", "areas", "friction", "relaxation", "loads"),
-        *("damping", "lines", "walls", "grip", "bladders", "pushes"),
+        *("damping", "lines", "walls", "grip", "bladders", "pushes", "mass"),
     )
 
     springs: Rows
@@ -199,6 +192,7 @@ class Balance(ManyChannels, Invertible):
     tare: bool = False
     settled: bool = False
     pressure_range: tuple[FiniteFloat, FiniteFloat] | None = None
+    mass: Vector = ()
 
     def __post_init__(self) -> None:
         self.check_channels()
@@ -235,33 +229,30 @@ class Balance(ManyChannels, Invertible):
             lengths |= {"bladders": self.bladders, "pushes": self.pushes}
         if self.lines:
             lengths["lines"] = self.lines
+        lengths |= {"mass": self.mass} if self.mass else {}
         for name, values in lengths.items():
             if len(values) != n:
-                raise ModelError(
-                    f"{name} of {self.kind!r} has {len(values)} entries. Remedy: give {n}."
-                )
-        for name, positive in (
-            ("limits", self.limits),
-            ("lags", self.lags),
-            ("areas at rest", [row[0] for row in self.areas]),
-        ):
+                told = f"{name} of {self.kind!r} has {len(values)} entries"
+                raise ModelError(f"{told}. Remedy: give {n}.")
+        at_rest = [row[0] for row in self.areas]
+        above = {"limits": self.limits, "lags": self.lags, "areas at rest": at_rest}
+        for name, positive in above.items():
             rises = name == "areas at rest" or all(a < b for a, b in pairwise(positive))
             if any(not value > 0 for value in positive) or (name == "limits" and not rises):
                 raise ModelError(
                     f"{name} of {self.kind!r} are {positive}. Remedy: give positive ones"
                     f"{', in increasing order' if name == 'limits' else ''}."
                 )
-        for name in ("friction", "relaxation"):
-            if any(value < 0 for row in getattr(self, name) for value in row):
+        stiff = ("friction", "relaxation", "damping", "walls")
+        for name in (*stiff, "grip", "bladders", "pushes", "mass"):
+            if np.any(np.array(getattr(self, name)) < 0):
                 raise ModelError(
-                    f"{name} of {self.kind!r} has a negative stiffness, which would make energy. "
+                    f"{name} of {self.kind!r} has a number below 0, which would make energy. "
                     "Remedy: give none below 0."
                 )
-        single = (*self.damping, *self.lines, *self.walls, *self.bladders, *self.pushes)
-        if min(*single, self.grip) < 0:
+        if self.mass and self.pushes:
             raise ModelError(
-                f"damping, lines, walls, bladders, pushes or grip of {self.kind!r} is negative. "
-                "Remedy: give none below 0."
+                f"{self.kind!r} has mass and muscles that go slack. Remedy: give one of mass and pushes."
             )
         if any(not low < high for low, high in self.hull):
             raise ModelError(f"hull of {self.kind!r} is {self.hull}. Remedy: lower ends first.")
@@ -273,13 +264,14 @@ class Balance(ManyChannels, Invertible):
 
     @property
     def rate_dependent(self) -> bool:  # type: ignore[override]
-        """Whether anything relaxes or damps."""
-        return bool(self.lags) or any(self.damping) or any(self.lines)
+        """Whether anything relaxes, damps or is heavy."""
+        return bool(self.lags) or any(self.damping) or any(self.lines) or any(self.mass)
 
     @property
     def n_states(self) -> int:
-        """Displacements, stretches, stops, lags and tare of every muscle; a start, samples amiss."""
-        return len(self.driven) * (3 + len(self.limits) + len(self.lags)) + 2
+        """Displacements, stretches, stops, lags, moves and tare of muscles; a start, samples amiss."""
+        own = 3 + len(self.limits) + len(self.lags) + (2 if self.mass else 0)
+        return len(self.driven) * own + 2
 
     @property
     def n_scratch(self) -> int:
@@ -300,7 +292,8 @@ class Balance(ManyChannels, Invertible):
         head = [
             *(len(self.driven), len(self.scheduled) - self.n_loads, self.degree, self.n_loads),
             *(len(self.limits), len(self.lags), len(self.elasticity[0]), len(self.areas[0])),
-            *(self.scale, self.grip, low, high, 1.0 / step, self.tare, not self.settled),
+            *(self.scale, self.grip, low, high, 1.0 / step),
+            *(self.tare, not self.settled, bool(self.mass)),
         ]
         lags = np.array(self.lags)
         decays = np.exp(-step / lags)
@@ -310,7 +303,7 @@ class Balance(ManyChannels, Invertible):
         n = len(self.driven)
         never, none = n * (NEVER,), n * (0.0,)
         single = [self.walls, self.pushes or never, self.damping]
-        single += [self.lines or none, self.bladders or none]
+        single += [self.lines or none, self.bladders or none, self.mass or none]
         own = [
             np.concatenate([self.hull[k], [t[k] for t in single], *(t[k] for t in tables)])
             for k in range(n)

@@ -27,7 +27,8 @@ from mckibben.blocks.core.kernels import kernel
 from mckibben.blocks.core.refusals import explicit_state
 from mckibben.blocks.core.saving import nested
 from mckibben.blocks.coupled.balance import Balance
-from mckibben.blocks.coupled.balance_law import AT_REST, FROM_REST, IN_TIME, keep, unbalanced
+from mckibben.blocks.coupled.balance_law import keep, unbalanced
+from mckibben.blocks.coupled.balance_terms import AT_REST, FROM_REST, IN_TIME
 from mckibben.blocks.memoryless.affine import Affine
 from mckibben.errors import ModelError
 

@@ -110,6 +110,9 @@ class BalanceEstimator(CoupledEstimator):
         Whether a dead zone of small pressures is looked for; default so.
     slack : bool, optional
         Whether it is looked for forces at which muscles go slack; default of several muscles.
+    mass : bool
+        Whether what hangs at the muscles is so heavy that its acceleration matters; then they are not
+        found to go slack.
     ridge : float
         Damping of the coefficients.
     steps : int
@@ -130,6 +133,7 @@ class BalanceEstimator(CoupledEstimator):
     tare: bool | None = None
     contact: bool = True
     slack: bool | None = None
+    mass: bool = False
     ridge: Annotated[float, Ge(0)] = 1e-6
     steps: Annotated[int, Interval(ge=0, le=1000)] = 25
 
@@ -151,6 +155,7 @@ class BalanceEstimator(CoupledEstimator):
         with tracker.searching():
             few = Search(data, structure, self.ridge).of_few(FIRST_SAMPLES)
             slack = len(data.inputs) > 1 if self.slack is None else self.slack
+            slack = slack and not self.mass
             self._begin(few, tracker, slack)
             few = self._long_held(few, tracker, slack)
             structure = few.structure
@@ -331,6 +336,7 @@ class BalanceEstimator(CoupledEstimator):
             highest=highest,
             tare=tare,
             slack=False,
+            mass=self.mass,
         )
 
     def _lags(self, data: TrainingData) -> Array:

@@ -1,7 +1,7 @@
 """Muscles that together move fewer coordinates: a tip in a plane by three, a joint by two.
 
 Each shortens by a linear function of the coordinates, as round a backbone that bends: along the
-direction in which its pressure moves them. What muscles would shorten by together, beside that, is none.
+direction in which its pressure moves them. By what moves no coordinate they do not shorten.
 """
 
 from __future__ import annotations

@@ -11,22 +11,20 @@ import numpy as np
 from mckibben.arrays import Array
 from mckibben.blocks.core.kernels import kernel
 from mckibben.blocks.core.linear_system import eliminate
-from mckibben.blocks.coupled.balance_law import (
+from mckibben.blocks.coupled.balance_law import keep, settle, shortened, unbalanced
+from mckibben.blocks.coupled.balance_terms import (
     AT_REST,
     FROM_REST,
     HEAD,
     IN_TIME,
     OWN,
+    accelerated,
     area,
     damped,
     flowing,
-    keep,
     muscle_width,
     muscles,
     resisted,
-    settle,
-    shortened,
-    unbalanced,
 )
 
 
@@ -114,6 +112,8 @@ def direct(c: Array, state: Array, way: int, k: int, u: float, p: float, slopes:
         for i in range(n_a):
             slopes[first + i] += power
             power *= min(max(state[k], c[own]), c[own + 1]) / scale
+        if way == IN_TIME and c[15] != 0.0:
+            slopes[k * width + 7] = accelerated(c, k, state, u - state[k])
         for i in range(n_l):
             q_before = state[2 * n + n * m + k * n_l + i]
             gain = c[HEAD + m + n_l + i] if way == IN_TIME else c[14]
@@ -138,7 +138,7 @@ def remembered(
     """Add how the forces of muscle k move with the coefficients through its past.
 
     ``memory`` has, by coefficient, how the state moves: displacements, stretches, stops less their
-    muscle's stretch, which stays while they stick, and lags.
+    muscle's stretch, which stays while they stick, lags, and the last moves.
     """
     n, n_loads, m, n_l = int(c[0]), int(c[3]), int(c[4]), int(c[5])
     width = muscle_width(c)
@@ -163,6 +163,11 @@ def remembered(
         kappa = c[own + width - n_loads - n_l + i]
         carried += kappa * (c[HEAD + m + n_l + i] if way == IN_TIME else c[14])
         mixed(slopes, 1.0, kappa * c[HEAD + m + i], memory[2 * n + n * m + k * n_l + i])
+    if way == IN_TIME and c[15] != 0.0:
+        row, heavy = 2 * n + n * (m + n_l) + 2 * k, c[own + 7] * c[12] * c[12]
+        carried += 2.0 * heavy
+        mixed(slopes, 1.0, -3.0 * heavy, memory[row])
+        mixed(slopes, 1.0, heavy, memory[row + 1])
     mixed(slopes, 1.0, -carried, memory[k])
 
 
@@ -193,6 +198,10 @@ def carry(
             mixed(memory[row], c[HEAD + m + i], gain, memory[k])
         if way == IN_TIME:
             memory[row, n * width + 1 + i] += slower(c, i, state[row], y - state[k])
+    if way == IN_TIME and c[15] != 0.0:
+        row = 2 * n + n * (m + n_l) + 2 * k
+        mixed(memory[row + 1], 0.0, 1.0, memory[row])
+        mixed(memory[row], 0.0, 1.0, memory[k])
     mixed(memory[k], 0.0, 1.0, moves)
     mixed(memory[n + k], 0.0, 1.0, moves)
     memory[n + k, k * width + 2] += p
@@ -313,7 +322,7 @@ def follow(
     state, rest = scratch[:n_states], scratch[n_states:]
     y, p, now = rest[:n], rest[n : 2 * n], rest[2 * n : 3 * n]
     work = rest[3 * n :]
-    tare = memory[2 * n + n * int(c[4]) + n * int(c[5]) : n_states - 2]
+    tare = memory[n_states - 2 - n : n_states - 2]
     row = slopes[0]
     for i in range(memory.shape[0]):
         for j in range(memory.shape[1]):
@@ -361,7 +370,7 @@ def run(
     """Return what `follow` finds, of whose every so many samples the last is kept, and the slopes."""
     n, m, n_l = int(c[0]), int(c[4]), int(c[5])
     width = (c.size - HEAD - m - 2 * n_l) // n
-    n_states, n_c = n * (3 + m + n_l) + 2, (n * width + 1 + n_l) * sloped
+    n_states, n_c = n * (3 + m + n_l + (2 if c[15] else 0)) + 2, (n * width + 1 + n_l) * sloped
     decays = c[HEAD + m : HEAD + m + n_l]
     c = np.concatenate([c, -decays * np.log(decays)])
     kept = -(-len(driven) // every)

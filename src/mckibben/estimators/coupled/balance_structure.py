@@ -62,6 +62,8 @@ class Structure:
         Shortest and longest time constant that the recordings can tell [s].
     settled : bool
         Whether muscles had long been where every recording begins.
+    mass : bool
+        Whether what moves is heavy.
     """
 
     driven: tuple[Channel, ...]
@@ -80,6 +82,7 @@ class Structure:
     slack: bool
     lag_range: tuple[float, float]
     settled: bool = False
+    mass: bool = False
 
     @property
     def n(self) -> int:
@@ -101,6 +104,7 @@ class Structure:
             "damping": 1,
             "line": 1,
             "bladder": 1,
+            "mass": 1,
             "springs": (1 + len(self.scheduled) * self.degree) * (1 + self.n),
             "elasticity": self.n_elastic,
             "areas": self.n_area,
@@ -183,13 +187,14 @@ class Structure:
             tare=self.tare,
             settled=self.settled,
             pressure_range=pressure_range,
+            mass=vector(np.maximum(part["mass"][:, 0], 0.0)) if self.mass else (),
         )
 
     def values(self, block: Balance) -> Array:
         """Return the coefficients of a balance of this structure."""
         none, never = self.n * (0.0,), self.n * (NEVER,)
         single = [block.walls, block.pushes or never, block.damping]
-        single += [block.lines or none, block.bladders or none]
+        single += [block.lines or none, block.bladders or none, block.mass or none]
         tables = [block.hull, np.transpose(single)]
         tables += [block.springs, block.elasticity, block.areas]
         tables += [block.friction, block.relaxation, block.loads]
@@ -200,7 +205,8 @@ class Structure:
         """Return, for every parameter that a balance packs, its place among coefficients."""
         tables = ("springs", "elasticity", "areas", "friction", "relaxation", "loads")
         slack = ("bladder", "push") if self.slack else ()
-        groups = ((*tables, "damping", "line", "wall"), slack)
+        heavy = ("mass",) if self.mass else ()
+        groups = ((*tables, "damping", "line", "wall"), (*slack, *heavy))
         first, last = (
             [place for name in names for k in range(self.n) for place in self.places(name, k)]
             for names in groups
@@ -230,7 +236,12 @@ class Structure:
             free_areas = areas if moving and (newtons or k) else areas[1:]
             columns += [[place] for place in ([] if plain else free_areas)]
             columns += [[place] for place in self.places("loads", k).tolist() if not newtons]
-            for name, is_free in (("wall", not first), ("line", True), ("push", self.slack)):
+            for name, is_free in (
+                ("wall", not first),
+                ("line", True),
+                ("push", self.slack),
+                ("mass", self.mass),
+            ):
                 columns += [
                     [place] for place in self.places(name, k).tolist() if moving and is_free
                 ]
@@ -282,7 +293,9 @@ class Structure:
             if place > self.timing.start:
                 ask({place: 1.0, place - 1: -1.0}, APART)
         for k in range(self.n):
-            for name in ("bladder", "push", "friction", "relaxation", "damping", "line", "wall"):
+            for name in (
+                *("bladder", "push", "friction", "relaxation", "damping", "line", "wall", "mass"),
+            ):
                 for place in self.places(name, k).tolist():
                     ask({place: 1.0}, 0.0)
             for place in self.places("loads", k).tolist():

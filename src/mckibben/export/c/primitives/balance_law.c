@@ -2,14 +2,14 @@
 
 #include "linear_system.h"
 
-#define HEAD 15
+#define HEAD 16
 #define MOST_STEPS 60
 #define MOST_SEARCHED 25
 #define BALANCED MCK_EITHER(2e-15, 1e-6)
 #define SURE MCK_EITHER(1e-11, 1e-5)
 #define LEAST_AREA MCK_R(0.01)
 #define NEVER MCK_R(1e30)
-#define OWN 7
+#define OWN 8
 
 /* Coefficients of one muscle. */
 typedef struct {
@@ -20,6 +20,7 @@ typedef struct {
     mck_real damping;
     mck_real line;
     mck_real bladder;
+    mck_real mass;
     const mck_real *springs;
     const mck_real *elasticity;
     const mck_real *areas;
@@ -47,6 +48,7 @@ mck_balance mck_balance_of(const mck_part *part, mck_real *state)
     f.rate = c[12];
     f.tared = c[13];
     f.fresh = c[14];
+    f.heavy = c[15] > MCK_R(0.0);
     f.limits = c + HEAD;
     f.decays = f.limits + f.m;
     f.gains = f.decays + f.n_l;
@@ -55,7 +57,8 @@ mck_balance mck_balance_of(const mck_part *part, mck_real *state)
     f.z = f.u + f.n;
     f.stops = f.z + f.n;
     f.lags = f.stops + f.n * f.m;
-    f.tare = f.lags + f.n * f.n_l;
+    f.moves = f.lags + f.n * f.n_l;
+    f.tare = f.moves + (f.heavy ? 2 * f.n : 0);
     f.first = f.tare + f.n;
     f.amiss = f.first + 1;
     f.scratch = state + part->n_states;
@@ -75,6 +78,7 @@ static muscle read_muscle(const mck_balance *f, int k)
     one.damping = own[4];
     one.line = own[5];
     one.bladder = own[6];
+    one.mass = own[7];
     one.springs = own + OWN;
     one.elasticity = one.springs + springs;
     one.areas = one.elasticity + f->n_e;
@@ -179,7 +183,7 @@ static mck_real rubbed(const mck_balance *f, const muscle *one, int k, int way,
     return force;
 }
 
-/* Relaxation and damping of muscle k at a displacement, and their slope by it. */
+/* Relaxation, damping and inertia of muscle k at a displacement, and their slope by it. */
 static mck_real lagging(const mck_balance *f, const muscle *one, int k, int way,
                         mck_real y, mck_real *slope)
 {
@@ -189,6 +193,12 @@ static mck_real lagging(const mck_balance *f, const muscle *one, int k, int way,
     const mck_real damping = one->damping + one->line * flow * flow;
     *slope = way == MCK_IN_TIME ? damping * f->rate : MCK_R(0.0);
     mck_real force = *slope * moved;
+    if (way == MCK_IN_TIME && f->heavy) {
+        const mck_real heavy = one->mass * f->rate * f->rate;
+        const mck_real *before = f->moves + 2 * k;
+        force += heavy * (MCK_R(2.0) * moved - MCK_R(3.0) * before[0] + before[1]);
+        *slope += MCK_R(2.0) * heavy;
+    }
     for (int i = 0; way != MCK_AT_REST && i < f->n_l; i++) {
         const mck_real gain = way == MCK_IN_TIME ? f->gains[i] : f->fresh;
         const mck_real q = f->decays[i] * f->lags[k * f->n_l + i] + gain * moved;
@@ -268,6 +278,11 @@ void mck_balance_keep(const mck_balance *f, int way, const mck_real *y, const mc
             const mck_real gain = way == MCK_IN_TIME ? f->gains[i] : f->fresh;
             const mck_real behind = f->decays[i] * *lag + gain * (u - f->u[k]);
             *lag = way == MCK_AT_REST ? MCK_R(0.0) : behind;
+        }
+        if (f->heavy) {
+            mck_real *before = f->moves + 2 * k;
+            before[1] = way == MCK_IN_TIME ? before[0] : MCK_R(0.0);
+            before[0] = way == MCK_IN_TIME ? u - f->u[k] : MCK_R(0.0);
         }
         f->u[k] = u;
         f->z[k] = z;

@@ -2,11 +2,11 @@
  *
  * Coefficients: n, scheduling inputs, degree, loads, stops m, lags l, elastic terms, area's terms,
  * scale, pressure below zero at which stops hold nothing, lowest and highest pressure, samples a second,
- * tare, what is left at the start to relax; m limits, l decays, l gains; then of every muscle: lowest
- * and highest displacement known, wall, force at which it goes slack, damping, line, own spring, springs
- * (powers of what schedules by 1 + n), elasticity, area, friction, relaxation, loads.
- * State: n shortenings, n stretches, n by m stops, n by l lags, n tares, whether nothing came before,
- * count of samples amiss; scratch: n n + 6 n. */
+ * tare, what is left at the start to relax, mass; m limits, l decays, l gains; then of every muscle:
+ * lowest and highest displacement known, wall, force at which it goes slack, damping, line, own spring,
+ * mass, springs (powers of what schedules by 1 + n), elasticity, area, friction, relaxation, loads.
+ * State: n shortenings, n stretches, n by m stops, n by l lags, with mass n by 2 last moves, n tares,
+ * whether nothing came before, count of samples amiss; scratch: n n + 6 n. */
 #ifndef MCK_BALANCE_LAW_H
 #define MCK_BALANCE_LAW_H
 
@@ -31,6 +31,7 @@ typedef struct {
     int n_l;
     int n_e;
     int n_a;
+    int heavy;
     mck_real scale;
     mck_real grip;
     mck_real lowest;
@@ -46,6 +47,7 @@ typedef struct {
     mck_real *z;
     mck_real *stops;
     mck_real *lags;
+    mck_real *moves;
     mck_real *tare;
     mck_real *first;
     mck_real *amiss;

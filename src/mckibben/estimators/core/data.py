@@ -27,6 +27,8 @@ RESTS = 0.03
 class Run:
     """One recording: what drives (n, k), outputs (n, m), what schedules (n, s), and which samples count.
 
+    ``recording`` is the place of the recording that it is, or is a stretch of, among all; ``unmeasured``
+    are channels that schedule and that it lacks, which are as in others on average.
     ``peak`` is the input from which the run is taken to have come before its first sample, where that
     is not below: it makes the memory at the start.
     """
@@ -38,6 +40,8 @@ class Run:
     counts: Mask
     sample_time: float | None
     peak: float | None = None
+    recording: int = 0
+    unmeasured: tuple[str, ...] = ()
 
     @property
     def u(self) -> Array:

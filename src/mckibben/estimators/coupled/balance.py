@@ -22,8 +22,8 @@ from mckibben.blocks.coupled.load_estimate import parts_of
 from mckibben.blocks.memoryless.affine import Affine
 from mckibben.blocks.memoryless.contact import LOST, Contact
 from mckibben.errors import ModelError
-from mckibben.estimators.core.data import TrainingData
-from mckibben.estimators.core.uncertainty import unknown
+from mckibben.estimators.core.data import Mask, TrainingData
+from mckibben.estimators.core.uncertainty import simulate_all, unknown
 from mckibben.estimators.coupled.balance_checks import (
     check_directions,
     moving,
@@ -32,14 +32,22 @@ from mckibben.estimators.coupled.balance_checks import (
     other_zeros,
     telling,
 )
+from mckibben.estimators.coupled.balance_loads import (
+    LOADS,
+    LOADS_HELP,
+    loads_told,
+    under,
+    varying,
+    with_loads,
+    without_held,
+    without_load,
+)
 from mckibben.estimators.coupled.balance_search import Search
 from mckibben.estimators.coupled.balance_structure import APART, Structure
 from mckibben.estimators.coupled.balance_words import held_back, sentences
-from mckibben.estimators.coupled.base import CoupledEstimator
+from mckibben.estimators.coupled.base import CoupledEstimator, schedules
 from mckibben.estimators.optimisers.tracker import Tracker
-
-LOADS = ("N",)
-"""Units of what loads a muscle, instead of scheduling its springs."""
+from mckibben.recording import Recording
 
 LIMITED = ("bar", "V")
 """Units of what the hardware limits."""
@@ -93,12 +101,23 @@ class BalanceEstimator(CoupledEstimator):
     tare : bool, optional
         Whether displacements count from rest at the start of every recording. Default: where all of
         several scheduled muscles' recordings start there.
+    unknown_load : bool, optional
+        Whether every recording but the first hung under a constant load of its own, which is found.
+        Default: recordings without the force that others have did; where none has any, if this makes
+        the model much better.
     contact : bool, optional
         Whether a dead zone of small pressures is looked for; default of a muscle alone.
     ridge : float
         Damping of the coefficients.
     steps : int
         Most Gauss-Newton steps.
+
+    Attributes
+    ----------
+    loads_ : array, shape (recordings, n)
+        Constant loads that were found, of every muscle in every recording: beyond that of the first or,
+        where others have a force, beyond their average. In N or, without a measured force, in bar on
+        muscle 1's area at rest.
     """
 
     effort: ClassVar[float] = 1.0
@@ -112,15 +131,35 @@ class BalanceEstimator(CoupledEstimator):
     area: Annotated[int, Interval(ge=0, le=6)] = 2
     degree: Annotated[int, Interval(ge=1, le=4)] = 2
     tare: bool | None = None
+    unknown_load: bool | None = None
     contact: bool | None = None
     ridge: Annotated[float, Ge(0)] = 1e-6
     steps: Annotated[int, Interval(ge=0, le=1000)] = 25
+
+    def data(
+        self, recordings: Recording | Sequence[Recording], rows: Sequence[Mask] | None = None
+    ) -> TrainingData:
+        """Return what is learned from recordings, of which some may lack a load that others have."""
+        listed = [recordings] if isinstance(recordings, Recording) else list(recordings)
+        if self.unknown_load is False:
+            return super().data(listed, rows)
+        scheduling = schedules(listed) if self.scheduling is None else self.scheduling
+        filled, lacking = with_loads(listed, scheduling)
+        data = super().data(filled, rows)
+        runs = [replace(run, unmeasured=lacking[run.recording]) for run in data.runs]
+        return replace(data, runs=tuple(runs))
+
+    def find(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
+        """Return the block found, and the data without what tells nothing."""
+        data, notes = without_held(data)
+        tracker.notes += notes
+        return self.identify(data, tracker), data
 
     def identify(self, data: TrainingData, tracker: Tracker) -> Block:
         """Return the balance, solved for displacements."""
         data, notes = telling(data)
         check_directions(data)
-        tracker.notes += [*notes, *other_zeros(data), *not_at_rest(data)]
+        tracker.notes += [*notes, *not_at_rest(data)]
         ways = directions(data)
         data = turned(data, ways)
         structure = self.structure(data, tracker)
@@ -129,6 +168,8 @@ class BalanceEstimator(CoupledEstimator):
             few = Search(data, structure, self.ridge).of_few()
             self._begin(few, tracker)
             assert tracker.best is not None
+            few = self._unknown_loads(few, tracker)
+            structure = few.structure
             if len(data.inputs) == 1 if self.contact is None else self.contact:
                 few.descend(tracker.best, min(self.steps, DEAD_STEPS), tracker)
                 dead, tracker.best = self._dead_zone(few, tracker)
@@ -149,6 +190,10 @@ class BalanceEstimator(CoupledEstimator):
         ends = np.array([min(float(data.lowest.min()), 0.0), float(data.highest.max())])
         low, high = acted(ends, dead).tolist()
         balance = structure.block(tracker.best, (low, high) if limited else None)
+        self.loads_ = structure.table_of_loads(tracker.best, 1 + data.runs[-1].recording)
+        tracker.notes += other_zeros(data, self.loads_)
+        tracker.notes += loads_told(data, self.loads_, balance, newtons=structure.in_newtons)
+        tracker.notes += varying(search, tracker.best)
         tracker.notes += [*held_back(balance, structure), *sentences(balance, structure)]
         if dead:
             tracker.notes.append(
@@ -176,6 +221,33 @@ class BalanceEstimator(CoupledEstimator):
         for _, _, start in starts if few.n_rows <= FEW_ROWS else starts[:FOLLOWED]:
             few.descend(start, min(self.steps, FIRST_STEPS), tracker)
 
+    def _unknown_loads(self, few: Search, tracker: Tracker) -> Search:
+        """Return the search for loads that recordings had of their own, too, if these help much.
+
+        The tracker's best is then where it leads.
+        """
+        structure = few.structure
+        own = without_load(few.data, every=True)
+        if (
+            self.unknown_load is not None
+            or structure.loaded
+            or structure.unmeasured
+            or structure.tare
+            or not own
+        ):
+            return few
+        several = Search(few.data, replace(structure, unmeasured=own), self.ridge)
+        several.span = few.span
+        assert tracker.best is not None
+        without = np.append(tracker.best, np.zeros(structure.n * len(own)))
+        print("gain", several.gain_of_loads(without))
+        part = tracker.part(0.3, 0.4)
+        self._begin(several, part)
+        if part.best is None or part.best_cost > (1.0 - LOADS_HELP) * tracker.best_cost:
+            return few
+        tracker.best, tracker.best_cost = part.best, part.best_cost
+        return several
+
     def _dead_zone(self, few: Search, tracker: Tracker) -> tuple[float, Array]:
         """Return over which pressure a dead zone fades that helps most, 0 if none does, and where.
 
@@ -194,6 +266,17 @@ class BalanceEstimator(CoupledEstimator):
                 dead, best, least = float(pressure), part.best, part.best_cost
         return dead, best
 
+    def free_runs(self, blocks: Sequence[Block], data: TrainingData) -> Array:
+        """Return the free-running outputs of blocks, each run under its own load."""
+        found = [
+            simulate_all(
+                [under(block, self.loads_[run.recording]) for block in blocks],
+                replace(data, runs=(run,)),
+            )
+            for run in data.runs
+        ]
+        return np.concatenate(found, axis=1)
+
     def uncertainty(
         self, block: Block, data: TrainingData, residual: Array, at_bounds: Sequence[int]
     ) -> tuple[float, Array]:
@@ -203,8 +286,10 @@ class BalanceEstimator(CoupledEstimator):
         shortened = turned(told, directions(told))
         structure = self.structure(shortened, Tracker())
         dead = 0.0 if contacts is None else float(contacts.pack()[0])
+        unmeasured = tuple(np.flatnonzero(self.loads_.any(axis=1)).tolist())
+        structure = replace(structure, unmeasured=unmeasured)
         search = Search(acting(shortened, dead), structure, self.ridge)
-        condition, found = search.covariance(structure.values(balance))
+        condition, found = search.covariance(structure.values(balance, self.loads_))
         packed = structure.packed()
         covariance = unknown(block)
         # dead zones come before; a sensor's gain and offset follow, which are not fitted
@@ -263,6 +348,7 @@ class BalanceEstimator(CoupledEstimator):
             scheduled_hull=np.column_stack([x.min(axis=0), x.max(axis=0)]),
             highest=highest,
             tare=tare,
+            unmeasured=() if tare else without_load(data, every=bool(self.unknown_load)),
         )
 
     def _lags(self, data: TrainingData) -> Array:

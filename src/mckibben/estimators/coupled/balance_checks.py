@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from mckibben.arrays import Array
 from mckibben.errors import DataError
 from mckibben.estimators.core.data import Run, TrainingData
 
@@ -95,9 +96,14 @@ def moving(data: TrainingData) -> TrainingData:
     return replace(data, runs=tuple(run for run in data.runs if not held(data, run)))
 
 
-def other_zeros(data: TrainingData) -> list[str]:
-    """Return which runs begin where others with the same inputs do not, as with another zero."""
+def other_zeros(data: TrainingData, loads: Array) -> list[str]:
+    """Return which runs begin where others with the same inputs do not, as with another zero.
+
+    Those of recordings with loads of their own do for that.
+    """
     data = moving(data)
+    known = tuple(run for run in data.runs if not loads[run.recording].any())
+    data = replace(data, runs=known)
     if not data.runs:
         return []
     first = np.array([[*run.driven[0], *run.scheduled[0]] for run in data.runs])

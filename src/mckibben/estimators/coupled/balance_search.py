@@ -80,16 +80,24 @@ class Search:
 
     def followed(self, values: Array, run: Run, *, held: bool) -> tuple[Array, Array]:
         """Return displacements, or forces that are lacking, and their slopes."""
-        block = self.structure.block(values)
-        return follow(
+        structure, own = self.structure, self.structure.own_loads(run.recording)
+        if own.size:
+            values = values.copy()
+            values[structure.constants] += values[own]
+        block = structure.block(values)
+        found, slopes = follow(
             block.coefficients(run.sample_time or 1.0),
             np.ascontiguousarray(run.driven),
             np.ascontiguousarray(run.outputs),
             np.ascontiguousarray(run.scheduled),
             held=held,
             every=self.every,
-            settled=self.held(run),
+            settled=self.held(run) or (held and not structure.tare),
         )
+        if structure.unmeasured:
+            slopes = np.pad(slopes, ((0, 0), (0, 0), (0, structure.size - structure.timing.stop)))
+            slopes[..., own] = slopes[..., structure.constants[: own.size]]
+        return found, slopes
 
     def measured(self, run: Run) -> Array:
         """Return the displacements that are compared."""
@@ -108,7 +116,7 @@ class Search:
         for run, of_run in zip(self.runs, found, strict=True):
             of_run[: round(self.unsure(run) * len(of_run))] = 0.0
         slopes = np.concatenate(found)
-        slopes[:, :, structure.grip :] = 0.0
+        slopes[:, :, structure.grip : structure.timing.stop] = 0.0
         for k in range(structure.n):
             slopes[:, :, structure.places("wall", k)] = 0.0
         mix = structure.free(moving=False, plain=plain)
@@ -125,7 +133,9 @@ class Search:
             weights = 1.0 / self.stiffness(values)
         if structure.in_newtons:
             forces = slice(structure.slices["damping"].start, structure.slices["loads"].stop)
-            values[forces] /= values[structure.places("loads", 0)[0]]
+            load = values[structure.places("loads", 0)[0]]
+            values[forces] /= load
+            values[structure.timing.stop :] /= load
         return values
 
     def loads_told(self, values: Array) -> bool:
@@ -294,6 +304,20 @@ class Search:
         lost = ~mix.any(axis=1) | mix[:, ~told].any(axis=1)
         covariance[lost] = covariance[:, lost] = np.nan
         return condition, covariance
+
+    def gain_of_loads(self, values: Array) -> float:
+        """Return by how much recordings' own loads would lessen the errors, were these straight."""
+        structure = self.structure
+        errors, slopes = self.errors(values)
+        usable = np.isfinite(slopes).all(axis=1)
+        own = slopes[usable][:, structure.timing.stop :]
+        others = slopes[usable] @ structure.free(moving=True)[:, : -own.shape[1]]
+        left = []
+        for columns in (others, np.hstack([others, own])):
+            size = np.maximum(np.sqrt((columns**2).sum(axis=0)), 1e-300)
+            found = np.linalg.lstsq(columns / size, errors[usable], rcond=1e-6)[0]
+            left.append(_size(errors[usable] - columns / size @ found))
+        return 1.0 - left[1] / left[0]
 
     def cost(self, values: Array) -> float:
         """Return the root mean square of the errors."""

@@ -56,6 +56,8 @@ class Structure:
         Whether displacements count from rest at the start.
     lag_range : (float, float)
         Shortest and longest time constant that the recordings can tell [s].
+    unmeasured : tuple of int
+        Recordings that hung under constant loads of their own, which are found too.
     """
 
     driven: tuple[Channel, ...]
@@ -72,6 +74,7 @@ class Structure:
     highest: float
     tare: bool
     lag_range: tuple[float, float]
+    unmeasured: tuple[int, ...] = ()
 
     @property
     def n(self) -> int:
@@ -126,7 +129,19 @@ class Structure:
     @property
     def size(self) -> int:
         """How many coefficients there are."""
-        return self.grip + 1 + self.lags.size
+        return self.timing.stop + len(self.unmeasured) * self.n
+
+    def own_loads(self, recording: int) -> NDArray[np.intp]:
+        """Return the places of the loads that only a recording has: of every muscle one, or none."""
+        if recording not in self.unmeasured:
+            return np.arange(0)
+        first = self.timing.stop + self.unmeasured.index(recording) * self.n
+        return np.arange(first, first + self.n)
+
+    @property
+    def constants(self) -> NDArray[np.intp]:
+        """Places of the muscles' constant forces."""
+        return np.array([self._spring(0, k, -1) for k in range(self.n)])
 
     @property
     def start(self) -> Array:
@@ -165,13 +180,20 @@ class Structure:
             pressure_range=pressure_range,
         )
 
-    def values(self, block: Balance) -> Array:
-        """Return the coefficients of a balance of this structure."""
+    def table_of_loads(self, values: Array, n_recordings: int) -> Array:
+        """Return the loads that only recordings have, shape (recordings, n)."""
+        table = np.zeros((n_recordings, self.n))
+        table[list(self.unmeasured)] = values[self.timing.stop :].reshape(-1, self.n)
+        return table
+
+    def values(self, block: Balance, loads: Array) -> Array:
+        """Return the coefficients of a balance of this structure, and of recordings' own loads."""
         tables = [block.hull, np.transpose([block.walls]), np.transpose([block.damping])]
         tables += [block.springs, block.elasticity, block.areas]
         tables += [block.friction, block.relaxation, block.loads]
         table = np.hstack([np.asarray(part, dtype=np.float64) for part in tables])
-        return np.concatenate([table.ravel(), [block.grip], np.log(block.lags)])
+        own = loads[list(self.unmeasured)].ravel()
+        return np.concatenate([table.ravel(), [block.grip], np.log(block.lags), own])
 
     def packed(self) -> NDArray[np.intp]:
         """Return, for every parameter that a balance packs, its place among coefficients."""
@@ -212,7 +234,8 @@ class Structure:
                     sorted({self._spring(q, k, j), self._spring(q, j, k)}) for j in range(k, self.n)
                 ]
         if moving:
-            columns += [[place] for place in range(self.grip, self.size)]
+            columns += [[place] for place in range(self.grip, self.timing.stop)]
+        columns += [[place] for place in range(self.timing.stop, self.size)]
         mix = np.zeros((n_all, len(columns)))
         for number, places in enumerate(columns):
             mix[places, number] = 1.0

@@ -1,0 +1,140 @@
+"""Constant loads that recordings hung under and nobody measured, which a balance of forces finds.
+
+A weight shifts a muscle's constant force. Where no force was recorded, the first recording's weight is
+the model's, and every other recording's is told relative to it, if that makes the model much better;
+where some recordings have a force, the others' constants are found as such.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from mckibben.arrays import Array
+from mckibben.blocks.compose import Series
+from mckibben.blocks.core.block import Block
+from mckibben.blocks.core.fields import rows
+from mckibben.blocks.core.inverse import Inverse
+from mckibben.blocks.coupled.balance import Balance
+from mckibben.blocks.coupled.load_estimate import parts_of
+from mckibben.estimators.core.data import TrainingData
+from mckibben.estimators.coupled.balance_checks import held
+from mckibben.estimators.coupled.balance_search import Search
+from mckibben.recording import Recording
+
+LOADS = ("N",)
+"""Units of what loads a muscle, instead of scheduling its springs."""
+
+LOADS_HELP = 0.2
+"""By how much loads of their own have to help, for them to be believed."""
+
+TOLD = 6
+"""Most recordings whose loads are told one by one."""
+
+WORSE = 3.0
+"""Times its error of the others from which a recording seems to have hung under a load that varied."""
+
+
+def with_loads(
+    recordings: Sequence[Recording], scheduling: Sequence[str]
+) -> tuple[list[Recording], list[tuple[str, ...]]]:
+    """Return recordings that all have the loads that any has, and for each which it had not.
+
+    These are what they are in others on average.
+    """
+    filled, lacking = [], []
+    means = {}
+    for name in scheduling:
+        found = [recording for recording in recordings if name in recording]
+        if found and all(recording.units[name] in LOADS for recording in found):
+            means[name] = float(np.mean(np.concatenate([recording[name] for recording in found])))
+    for recording in recordings:
+        without = tuple(name for name in means if name not in recording)
+        levels = {name: np.full(len(recording), means[name]) for name in without}
+        filled.append(recording.with_channels(dict.fromkeys(without, LOADS[0]), **levels))
+        lacking.append(without)
+    return filled, lacking
+
+
+def without_held(data: TrainingData) -> tuple[TrainingData, list[str]]:
+    """Return data without runs in which nothing moves and no force was measured, and what is said."""
+    loaded = any(channel.unit in LOADS for channel in data.scheduled)
+    tells = [(loaded and not run.unmeasured) or not held(data, run) for run in data.runs]
+    names = dict.fromkeys(run.name for run, told in zip(data.runs, tells, strict=True) if not told)
+    if not names or not any(tells):
+        return data, []
+    runs = tuple(run for run, told in zip(data.runs, tells, strict=True) if told)
+    return replace(data, runs=runs), [
+        f"in {name} nothing moves and no force was measured: it tells nothing, and is left out. "
+        "Remedy: record the force"
+        for name in names
+    ]
+
+
+def without_load(data: TrainingData, *, every: bool) -> tuple[int, ...]:
+    """Return the recordings without a load that others have; or every one but the first with it."""
+    lacking = {run.recording for run in data.runs if run.unmeasured}
+    found = dict.fromkeys(run.recording for run in data.runs)
+    reference = next((one for one in found if one not in lacking), None)
+    return tuple(one for one in found if one in lacking or (every and one != reference))
+
+
+def under(model: Block, loads: Sequence[float]) -> Block:
+    """Return a model all of whose muscles bear a constant load more [in the unit of its forces]."""
+    if not any(loads):
+        return model
+    balance, *_ = parts_of(model)
+    springs = np.array(balance.springs)
+    springs[:, 0] += loads
+    changed = replace(balance, springs=rows(springs)).inverse()
+    if not isinstance(model, Series):
+        return changed
+    own = [isinstance(part, Inverse) and part.forward is balance for part in model.parts]
+    parts = (changed if here else part for here, part in zip(own, model.parts, strict=True))
+    return Series(tuple(parts))
+
+
+def loads_told(
+    data: TrainingData, loads: Array, balance: Balance, *, newtons: bool
+) -> list[str]:
+    """Return what is said of loads that were found, shape (recordings, n)."""
+    runs = {run.recording: run for run in data.runs}
+    own = {place: run for place, run in runs.items() if loads[place].any()}
+    if not own:
+        return []
+    measured = [place for place, c in enumerate(data.scheduled) if c.unit in LOADS]
+    shares = np.array(balance.loads)
+    listed = []
+    for place, run in own.items():
+        level = shares @ run.scheduled[0, measured] if run.unmeasured else 0.0
+        values = " and ".join(f"{load:.3g}" for load in loads[place] + level)
+        listed.append(f"{values} in {run.name}")
+    if len(listed) > TOLD:
+        listed = [*listed[:TOLD], f"and {len(listed) - TOLD} more"]
+    unit = LOADS[0] if newtons else f"{balance.given[0].unit} on the area at rest"
+    said = f"loads that were not measured, taken as constant [{unit}]: {', '.join(listed)}"
+    if measured:
+        return [f"{said}. Remedy: record the force of all"]
+    first = next(run.name for place, run in runs.items() if place not in own)
+    return [
+        f"{said} more than in {first}, under whose load the model is. Remedy: record the force, or give "
+        "first what the model shall be under"
+    ]
+
+
+def varying(search: Search, values: Array) -> list[str]:
+    """Return which recordings are followed much worse than others, as under loads that vary."""
+    sizes = np.array(
+        [np.sqrt(np.mean(search.missed(values, run)[0] ** 2)) for run in search.runs]
+    )
+    notes = []
+    for place, run in enumerate(search.runs):
+        rest = np.delete(sizes, place)
+        if rest.size and sizes[place] > WORSE * np.median(rest):
+            notes.append(
+                f"{run.name} is followed {sizes[place] / np.median(rest):.2g} times worse than others, "
+                "as if something varied that was not measured. Remedy: record the force, or leave it out"
+            )
+    return notes

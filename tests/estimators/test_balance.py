@@ -16,8 +16,11 @@ from mckibben.blocks.coupled.balance import Balance
 from mckibben.blocks.coupled.load_estimate import load_of
 from mckibben.blocks.memoryless.contact import Contact
 from mckibben.estimators.coupled.balance import BalanceEstimator
+from mckibben.estimators.coupled.balance_loads import under
+from mckibben.estimators.coupled.balance_search import Search
 from mckibben.estimators.coupled.balance_slopes import run
 from mckibben.estimators.optimisers.constrained import constrained_least_squares
+from mckibben.estimators.optimisers.tracker import Tracker
 from mckibben.signals.broadband import random_wave
 
 STEP = 0.05
@@ -174,6 +177,85 @@ def test_held_muscles_are_learned_from_by_their_force() -> None:
     estimator = BalanceEstimator().fit([*free, Recording(channels, STEP)])
     assert error(estimator, recording(3)) < 3.0 * NOISE
     np.testing.assert_allclose(balance_of(estimator).lags, MUSCLE.lags, rtol=0.35)
+
+
+def hung(seed: int, weight: float, n: int = 1000, *, measured: bool = False) -> Recording:
+    """Return a muscle under a weight, driven at random from rest."""
+    time = np.arange(n) * STEP
+    p = np.minimum(time / 2.0, 1.0) * random_wave(time, 0.3, 4.0, seed=seed)
+    force = np.full(n, weight)
+    y = MUSCLE.inverse().simulate(np.column_stack([p, force]), sample_time=STEP)[:, 0]
+    y = y + NOISE * np.random.default_rng(seed).standard_normal(n)
+    channels = {"pressure": p, "displacement": y}
+    if measured:
+        channels["force"] = force
+    return Recording(channels, STEP, meta={"name": f"hung-{seed}"})
+
+
+def test_weights_that_nobody_measured_are_found() -> None:
+    estimator = BalanceEstimator().fit([hung(1, 0.0), hung(2, 40.0), hung(3, 80.0)])
+    found = estimator.loads_[:, 0] * 60.0  # bar on an area at rest of 60 N/bar
+    np.testing.assert_allclose(found, [0.0, 40.0, 80.0], atol=1.0)
+    assert estimator.diagnostics_.rmse < 2.5 * NOISE
+    assert error(estimator, hung(4, 0.0)) < 3.0 * NOISE  # under the load of the first
+    (said,) = (note for note in estimator.diagnostics_.notes if "not measured" in note)
+    assert "in hung-2" in said
+    assert "in hung-3 more than in hung-1" in said
+    heavier = under(estimator.fitted, estimator.loads_[1])
+    other = hung(5, 40.0)
+    missed = heavier.simulate(other.select(["pressure"]))["displacement"] - other["displacement"]
+    assert np.sqrt(np.mean(missed**2)) < 3.0 * NOISE
+
+
+def test_without_evidence_of_other_weights_there_are_none() -> None:
+    runs = [hung(seed, 40.0) for seed in (1, 2, 3)]
+    estimator = BalanceEstimator().fit(runs)
+    assert not estimator.loads_.any()
+    np.testing.assert_array_equal(
+        estimator.fitted.pack(), BalanceEstimator(unknown_load=False).fit(runs).fitted.pack()
+    )
+    forced = BalanceEstimator(unknown_load=True).fit(runs)
+    assert np.abs(forced.loads_ * 60.0).max() < 1.0
+
+
+def test_a_recording_without_the_force_that_others_have_hung_under_a_weight() -> None:
+    runs = [recording(1), recording(2), hung(3, 50.0)]
+    estimator = BalanceEstimator().fit(runs)
+    assert estimator.diagnostics_.rmse < 2.5 * NOISE
+    assert error(estimator, recording(4)) < 3.0 * NOISE
+    (said,) = (note for note in estimator.diagnostics_.notes if "not measured" in note)
+    weight = float(said.split("[N]: ")[1].split(" in hung-3")[0])
+    assert abs(weight - 50.0) < 1.0
+    with pytest.raises(DataError, match="no such channel"):
+        BalanceEstimator(unknown_load=False).fit(runs)
+
+
+def test_what_varied_and_was_not_measured_is_said() -> None:
+    unmeasured = recording(4, strongest=60.0).select(["pressure", "displacement"])
+    runs = [hung(1, 0.0), hung(2, 0.0), unmeasured]
+    notes = BalanceEstimator(steps=5).fit(runs).diagnostics_.notes
+    assert any("run-4" in note and "times worse than others" in note for note in notes)
+    time = np.arange(400) * STEP
+    held = {"pressure": 2.0 + np.sin(time), "displacement": np.full(400, 5.0)}
+    stuck = Recording(held, STEP, meta={"name": "stuck"})
+    estimator = BalanceEstimator(steps=2).fit([hung(1, 0.0), stuck])
+    assert any("stuck" in note and "nothing moves" in note for note in estimator.diagnostics_.notes)
+    assert estimator.diagnostics_.n_samples == 1000
+
+
+def test_slopes_by_weights_are_those_of_differences() -> None:
+    estimator = BalanceEstimator(unknown_load=True)
+    data = estimator.data([hung(1, 0.0, n=300), hung(2, 40.0, n=300)])
+    structure = estimator.structure(data, Tracker())
+    search = Search(data, structure, 1e-6)
+    values = search.begun(0.5)
+    (place,) = structure.own_loads(1)
+    step = np.zeros(values.size)
+    step[place] = 1e-6
+    slope = (search.errors(values + step)[0] - search.errors(values - step)[0]) / 2e-6
+    missed = np.abs(slope - search.errors(values)[1][:, place])
+    assert np.quantile(missed, 0.97) < 1e-4 * np.abs(slope).max()
+    assert not slope[:300].any()
 
 
 def test_two_muscles_and_an_extensor() -> None:

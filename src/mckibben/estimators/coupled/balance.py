@@ -226,21 +226,18 @@ class BalanceEstimator(CoupledEstimator):
 
         The tracker's best is then where it leads.
         """
-        structure = few.structure
-        own = without_load(few.data, every=True)
-        if (
-            self.unknown_load is not None
-            or structure.loaded
-            or structure.unmeasured
-            or structure.tare
-            or not own
-        ):
+        structure, own = few.structure, without_load(few.data, every=True)
+        settled = self.unknown_load is not None or structure.loaded or structure.unmeasured
+        if settled or structure.tare or not own:
             return few
         several = Search(few.data, replace(structure, unmeasured=own), self.ridge)
         several.span = few.span
         assert tracker.best is not None
-        without = np.append(tracker.best, np.zeros(structure.n * len(own)))
-        print("gain", several.gain_of_loads(without))
+        if (
+            several.gain_of_loads(np.append(tracker.best, np.zeros(structure.n * len(own))))
+            < LOADS_HELP
+        ):
+            return few
         part = tracker.part(0.3, 0.4)
         self._begin(several, part)
         if part.best is None or part.best_cost > (1.0 - LOADS_HELP) * tracker.best_cost:

@@ -27,7 +27,7 @@ from mckibben.recording import Recording
 LOADS = ("N",)
 """Units of what loads a muscle, instead of scheduling its springs."""
 
-LOADS_HELP = 0.2
+LOADS_HELP = 0.1
 """By how much loads of their own have to help, for them to be believed."""
 
 TOLD = 6
@@ -35,6 +35,9 @@ TOLD = 6
 
 WORSE = 3.0
 """Times its error of the others from which a recording seems to have hung under a load that varied."""
+
+BADLY = 0.03
+"""Error, relative to the range, from which all recordings may have."""
 
 
 def with_loads(
@@ -96,9 +99,7 @@ def under(model: Block, loads: Sequence[float]) -> Block:
     return Series(tuple(parts))
 
 
-def loads_told(
-    data: TrainingData, loads: Array, balance: Balance, *, newtons: bool
-) -> list[str]:
+def loads_told(data: TrainingData, loads: Array, balance: Balance, *, newtons: bool) -> list[str]:
     """Return what is said of loads that were found, shape (recordings, n)."""
     runs = {run.recording: run for run in data.runs}
     own = {place: run for place, run in runs.items() if loads[place].any()}
@@ -125,10 +126,8 @@ def loads_told(
 
 
 def varying(search: Search, values: Array) -> list[str]:
-    """Return which recordings are followed much worse than others, as under loads that vary."""
-    sizes = np.array(
-        [np.sqrt(np.mean(search.missed(values, run)[0] ** 2)) for run in search.runs]
-    )
+    """Return what tells of loads that varied unmeasured: recordings that are followed badly."""
+    sizes = np.array([np.sqrt(np.mean(search.missed(values, run)[0] ** 2)) for run in search.runs])
     notes = []
     for place, run in enumerate(search.runs):
         rest = np.delete(sizes, place)
@@ -137,4 +136,10 @@ def varying(search: Search, values: Array) -> list[str]:
                 f"{run.name} is followed {sizes[place] / np.median(rest):.2g} times worse than others, "
                 "as if something varied that was not measured. Remedy: record the force, or leave it out"
             )
+    badly = float(np.sqrt(np.mean(sizes**2)))
+    if badly > BADLY and not notes and not search.structure.loaded:
+        notes.append(
+            f"recordings are followed to {100 * badly:.2g} % of their range only; a load that varied, "
+            "among others, would do that. Remedy: record the force if it may vary"
+        )
     return notes

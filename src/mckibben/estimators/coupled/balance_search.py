@@ -92,7 +92,7 @@ class Search:
             np.ascontiguousarray(run.scheduled),
             held=held,
             every=self.every,
-            settled=self.held(run) or (held and not structure.tare),
+            settled=self.held(run) or (held and not structure.tare and at_rest(self.data, run)),
         )
         if structure.unmeasured:
             slopes = np.pad(slopes, ((0, 0), (0, 0), (0, structure.size - structure.timing.stop)))

@@ -23,7 +23,7 @@ from mckibben.blocks.memoryless.affine import Affine
 from mckibben.blocks.memoryless.contact import LOST, Contact
 from mckibben.errors import ModelError
 from mckibben.estimators.core.data import Mask, TrainingData
-from mckibben.estimators.core.uncertainty import simulate_all, unknown
+from mckibben.estimators.core.uncertainty import unknown
 from mckibben.estimators.coupled.balance_checks import (
     check_directions,
     moving,
@@ -36,9 +36,10 @@ from mckibben.estimators.coupled.balance_loads import (
     LOADS,
     LOADS_HELP,
     loads_told,
-    under,
+    simulate_under,
     varying,
     with_loads,
+    with_own_loads,
     without_held,
     without_load,
 )
@@ -226,17 +227,9 @@ class BalanceEstimator(CoupledEstimator):
 
         The tracker's best is then where it leads.
         """
-        structure, own = few.structure, without_load(few.data, every=True)
-        settled = self.unknown_load is not None or structure.loaded or structure.unmeasured
-        if settled or structure.tare or not own:
-            return few
-        several = Search(few.data, replace(structure, unmeasured=own), self.ridge)
-        several.span = few.span
         assert tracker.best is not None
-        if (
-            several.gain_of_loads(np.append(tracker.best, np.zeros(structure.n * len(own))))
-            < LOADS_HELP
-        ):
+        several = None if self.unknown_load is not None else with_own_loads(few, tracker.best)
+        if several is None:
             return few
         part = tracker.part(0.3, 0.4)
         self._begin(several, part)
@@ -265,14 +258,7 @@ class BalanceEstimator(CoupledEstimator):
 
     def free_runs(self, blocks: Sequence[Block], data: TrainingData) -> Array:
         """Return the free-running outputs of blocks, each run under its own load."""
-        found = [
-            simulate_all(
-                [under(block, self.loads_[run.recording]) for block in blocks],
-                replace(data, runs=(run,)),
-            )
-            for run in data.runs
-        ]
-        return np.concatenate(found, axis=1)
+        return simulate_under(blocks, data, self.loads_)
 
     def uncertainty(
         self, block: Block, data: TrainingData, residual: Array, at_bounds: Sequence[int]

@@ -20,6 +20,7 @@ from mckibben.blocks.core.inverse import Inverse
 from mckibben.blocks.coupled.balance import Balance
 from mckibben.blocks.coupled.load_estimate import parts_of
 from mckibben.estimators.core.data import TrainingData
+from mckibben.estimators.core.uncertainty import simulate_all
 from mckibben.estimators.coupled.balance_checks import held
 from mckibben.estimators.coupled.balance_search import Search
 from mckibben.recording import Recording
@@ -84,6 +85,20 @@ def without_load(data: TrainingData, *, every: bool) -> tuple[int, ...]:
     return tuple(one for one in found if one in lacking or (every and one != reference))
 
 
+def with_own_loads(search: Search, values: Array) -> Search | None:
+    """Return the search for loads of recordings' own, too, if a step says that they help.
+
+    None with a load that was measured, or displacements that count from rest under whatever load.
+    """
+    structure, own = search.structure, without_load(search.data, every=True)
+    if structure.loaded or structure.unmeasured or structure.tare or not own:
+        return None
+    found = Search(search.data, replace(structure, unmeasured=own), search.ridge)
+    found.span = search.span
+    gain = found.gain_of_loads(np.append(values, np.zeros(structure.n * len(own))))
+    return found if gain > LOADS_HELP else None
+
+
 def under(model: Block, loads: Sequence[float]) -> Block:
     """Return a model all of whose muscles bear a constant load more [in the unit of its forces]."""
     if not any(loads):
@@ -97,6 +112,17 @@ def under(model: Block, loads: Sequence[float]) -> Block:
     own = [isinstance(part, Inverse) and part.forward is balance for part in model.parts]
     parts = (changed if here else part for here, part in zip(own, model.parts, strict=True))
     return Series(tuple(parts))
+
+
+def simulate_under(blocks: Sequence[Block], data: TrainingData, loads: Array) -> Array:
+    """Return free-running outputs of blocks as `simulate_all`, recordings under loads of their own."""
+    found = [
+        simulate_all(
+            [under(block, loads[run.recording]) for block in blocks], replace(data, runs=(run,))
+        )
+        for run in data.runs
+    ]
+    return np.concatenate(found, axis=1)
 
 
 def loads_told(data: TrainingData, loads: Array, balance: Balance, *, newtons: bool) -> list[str]:

@@ -28,15 +28,14 @@ from mckibben.estimators.coupled.balance_checks import (
     check_directions,
     moving,
     not_at_rest,
+    of_channels,
     one_speed,
     other_zeros,
     telling,
 )
 from mckibben.estimators.coupled.balance_loads import (
     LOADS,
-    LOADS_HELP,
     loads_told,
-    simulate_under,
     varying,
     with_loads,
     with_own_loads,
@@ -44,6 +43,7 @@ from mckibben.estimators.coupled.balance_loads import (
     without_load,
 )
 from mckibben.estimators.coupled.balance_search import Search
+from mckibben.estimators.coupled.balance_starts import simulate_started, with_starts
 from mckibben.estimators.coupled.balance_structure import APART, Structure
 from mckibben.estimators.coupled.balance_words import held_back, sentences
 from mckibben.estimators.coupled.base import CoupledEstimator, schedules
@@ -69,6 +69,9 @@ how much one has to help."""
 
 DEAD_SAMPLES = 8_000
 """By which they are compared."""
+
+OWN_HELPS = 0.1
+"""By how much what runs have of their own has to help."""
 
 LAST_STEPS = 10
 """On all recordings, after those on a few of them."""
@@ -154,13 +157,14 @@ class BalanceEstimator(CoupledEstimator):
         """Return the block found, and the data without what tells nothing."""
         data, notes = without_held(data)
         tracker.notes += notes
-        return self.identify(data, tracker), data
+        block = self.identify(data, tracker)
+        return block, of_channels(data, block.scheduling)
 
     def identify(self, data: TrainingData, tracker: Tracker) -> Block:
         """Return the balance, solved for displacements."""
         data, notes = telling(data)
         check_directions(data)
-        tracker.notes += [*notes, *not_at_rest(data)]
+        tracker.notes += notes
         ways = directions(data)
         data = turned(data, ways)
         structure = self.structure(data, tracker)
@@ -169,7 +173,7 @@ class BalanceEstimator(CoupledEstimator):
             few = Search(data, structure, self.ridge).of_few()
             self._begin(few, tracker)
             assert tracker.best is not None
-            few = self._unknown_loads(few, tracker)
+            few = self._of_runs(few, tracker)
             structure = few.structure
             if len(data.inputs) == 1 if self.contact is None else self.contact:
                 few.descend(tracker.best, min(self.steps, DEAD_STEPS), tracker)
@@ -191,7 +195,9 @@ class BalanceEstimator(CoupledEstimator):
         ends = np.array([min(float(data.lowest.min()), 0.0), float(data.highest.max())])
         low, high = acted(ends, dead).tolist()
         balance = structure.block(tracker.best, (low, high) if limited else None)
-        self.loads_ = structure.table_of_loads(tracker.best, 1 + data.runs[-1].recording)
+        self._found = structure, tracker.best[structure.timing.stop :]
+        self.loads_ = structure.table_of_loads(self._found[1], 1 + data.runs[-1].recording)
+        tracker.notes += not_at_rest(data, found=structure.n_starts > 0)
         tracker.notes += other_zeros(data, self.loads_)
         tracker.notes += loads_told(data, self.loads_, balance, newtons=structure.in_newtons)
         tracker.notes += varying(search, tracker.best)
@@ -222,21 +228,23 @@ class BalanceEstimator(CoupledEstimator):
         for _, _, start in starts if few.n_rows <= FEW_ROWS else starts[:FOLLOWED]:
             few.descend(start, min(self.steps, FIRST_STEPS), tracker)
 
-    def _unknown_loads(self, few: Search, tracker: Tracker) -> Search:
-        """Return the search for loads that recordings had of their own, too, if these help much.
+    def _of_runs(self, few: Search, tracker: Tracker) -> Search:
+        """Return the search for what runs have of their own, too: loads and starts that help much.
 
         The tracker's best is then where it leads.
         """
-        assert tracker.best is not None
-        several = None if self.unknown_load is not None else with_own_loads(few, tracker.best)
-        if several is None:
-            return few
-        part = tracker.part(0.3, 0.4)
-        self._begin(several, part)
-        if part.best is None or part.best_cost > (1.0 - LOADS_HELP) * tracker.best_cost:
-            return few
-        tracker.best, tracker.best_cost = part.best, part.best_cost
-        return several
+        for having in (with_own_loads, with_starts):
+            assert tracker.best is not None
+            fixed = having is with_own_loads and self.unknown_load is not None
+            several = None if fixed else having(few, tracker.best)
+            if several is None:
+                continue
+            part = tracker.part(0.3, 0.4)
+            self._begin(several, part)
+            least = (1.0 - OWN_HELPS) * few.cost(tracker.best, whole=True)
+            if part.best is not None and part.best_cost < least:
+                few, tracker.best, tracker.best_cost = several, part.best, part.best_cost
+        return few
 
     def _dead_zone(self, few: Search, tracker: Tracker) -> tuple[float, Array]:
         """Return over which pressure a dead zone fades that helps most, 0 if none does, and where.
@@ -257,22 +265,19 @@ class BalanceEstimator(CoupledEstimator):
         return dead, best
 
     def free_runs(self, blocks: Sequence[Block], data: TrainingData) -> Array:
-        """Return the free-running outputs of blocks, each run under its own load."""
-        return simulate_under(blocks, data, self.loads_)
+        """Return the free-running outputs of blocks, each run under its own load from its own start."""
+        return np.array([simulate_started(block, data, *self._found) for block in blocks])
 
     def uncertainty(
         self, block: Block, data: TrainingData, residual: Array, at_bounds: Sequence[int]
     ) -> tuple[float, Array]:
         """Return condition and covariance of what is free, from the exact slopes of the free run."""
         balance, contacts, _ = parts_of(block)
-        told, _ = telling(data)
-        shortened = turned(told, directions(told))
-        structure = self.structure(shortened, Tracker())
+        shortened = turned(data, directions(data))
         dead = 0.0 if contacts is None else float(contacts.pack()[0])
-        unmeasured = tuple(np.flatnonzero(self.loads_.any(axis=1)).tolist())
-        structure = replace(structure, unmeasured=unmeasured)
+        structure, of_runs = self._found
         search = Search(acting(shortened, dead), structure, self.ridge)
-        condition, found = search.covariance(structure.values(balance, self.loads_))
+        condition, found = search.covariance(structure.values(balance, of_runs))
         packed = structure.packed()
         covariance = unknown(block)
         # dead zones come before; a sensor's gain and offset follow, which are not fitted

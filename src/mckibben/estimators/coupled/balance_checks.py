@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -61,6 +62,14 @@ def telling(data: TrainingData) -> tuple[TrainingData, list[str]]:
     runs = tuple(replace(run, scheduled=run.scheduled[:, kept]) for run in data.runs)
     scheduled = tuple(data.scheduled[place] for place in kept)
     return replace(data, runs=runs, scheduled=scheduled), notes
+
+
+def of_channels(data: TrainingData, names: Sequence[str]) -> TrainingData:
+    """Return data with some of the channels that schedule, in that order."""
+    known = [channel.name for channel in data.scheduled]
+    places = [known.index(name) for name in names]
+    runs = tuple(replace(run, scheduled=run.scheduled[:, places]) for run in data.runs)
+    return replace(data, runs=runs, scheduled=tuple(data.scheduled[place] for place in places))
 
 
 def one_speed(data: TrainingData) -> bool:
@@ -162,11 +171,12 @@ def check_directions(data: TrainingData) -> None:
             )
 
 
-def not_at_rest(data: TrainingData) -> list[str]:
-    """Return which runs begin under pressure, so that what came before is not known."""
+def not_at_rest(data: TrainingData, *, found: bool) -> list[str]:
+    """Return which runs begin under pressure, and whether what they remember was found."""
+    how = "what it remembers was found" if found else "its first part does not count"
     return [
-        f"{run.name} does not begin at rest: its first part does not count, and simulations of it begin "
-        "as if it did. Remedy: begin recordings without pressure"
+        f"{run.name} does not begin at rest: {how}, and simulations of it begin as if it did. "
+        "Remedy: begin recordings without pressure"
         for run in data.runs
         if not held(data, run) and not at_rest(data, run)
     ]

@@ -20,7 +20,6 @@ from mckibben.blocks.core.inverse import Inverse
 from mckibben.blocks.coupled.balance import Balance
 from mckibben.blocks.coupled.load_estimate import parts_of
 from mckibben.estimators.core.data import TrainingData
-from mckibben.estimators.core.uncertainty import simulate_all
 from mckibben.estimators.coupled.balance_checks import held
 from mckibben.estimators.coupled.balance_search import Search
 from mckibben.recording import Recording
@@ -112,17 +111,6 @@ def under(model: Block, loads: Sequence[float]) -> Block:
     own = [isinstance(part, Inverse) and part.forward is balance for part in model.parts]
     parts = (changed if here else part for here, part in zip(own, model.parts, strict=True))
     return Series(tuple(parts))
-
-
-def simulate_under(blocks: Sequence[Block], data: TrainingData, loads: Array) -> Array:
-    """Return free-running outputs of blocks as `simulate_all`, recordings under loads of their own."""
-    found = [
-        simulate_all(
-            [under(block, loads[run.recording]) for block in blocks], replace(data, runs=(run,))
-        )
-        for run in data.runs
-    ]
-    return np.concatenate(found, axis=1)
 
 
 def loads_told(data: TrainingData, loads: Array, balance: Balance, *, newtons: bool) -> list[str]:

@@ -85,6 +85,9 @@ class Search:
             values = values.copy()
             values[structure.constants] += values[own]
         block = structure.block(values)
+        begun, by_values = structure.begun(values, run.place, run.driven[0])
+        if held:
+            begun = begun[:0]
         found, slopes = follow(
             block.coefficients(run.sample_time or 1.0),
             np.ascontiguousarray(run.driven),
@@ -93,11 +96,16 @@ class Search:
             held=held,
             every=self.every,
             settled=self.held(run) or (held and not structure.tare and at_rest(self.data, run)),
+            begun=begun,
         )
-        if structure.unmeasured:
-            slopes = np.pad(slopes, ((0, 0), (0, 0), (0, structure.size - structure.timing.stop)))
-            slopes[..., own] = slopes[..., structure.constants[: own.size]]
-        return found, slopes
+        if structure.size == structure.timing.stop:
+            return found, slopes
+        whole = np.zeros((*slopes.shape[:2], structure.size))
+        whole[..., : structure.timing.stop] = slopes[..., : structure.timing.stop]
+        whole[..., own] = slopes[..., structure.constants[: own.size]]
+        if begun.size:
+            whole += slopes[..., structure.timing.stop :] @ by_values
+        return found, whole
 
     def measured(self, run: Run) -> Array:
         """Return the displacements that are compared."""
@@ -114,7 +122,8 @@ class Search:
         values[structure.grip] = grip
         found = [self.followed(values, run, held=True)[1] for run in self.runs]
         for run, of_run in zip(self.runs, found, strict=True):
-            of_run[: round(self.unsure(run) * len(of_run))] = 0.0
+            if not (self.held(run) or at_rest(self.data, run)):
+                of_run[: round(WARMING * len(of_run))] = 0.0
         slopes = np.concatenate(found)
         slopes[:, :, structure.grip : structure.timing.stop] = 0.0
         for k in range(structure.n):
@@ -135,7 +144,7 @@ class Search:
             forces = slice(structure.slices["damping"].start, structure.slices["loads"].stop)
             load = values[structure.places("loads", 0)[0]]
             values[forces] /= load
-            values[structure.timing.stop :] /= load
+            values[structure.timing.stop : structure.starts] /= load
         return values
 
     def loads_told(self, values: Array) -> bool:
@@ -258,10 +267,11 @@ class Search:
             self.cuts.append((x, way))
         return values
 
-    def missed(self, values: Array, run: Run) -> tuple[Array, Array]:
+    def missed(self, values: Array, run: Run, *, whole: bool = False) -> tuple[Array, Array]:
         """Return the errors over a run relative to the ranges, and their slopes by coefficients.
 
-        Of a run that does not begin at rest the first part does not count, until it has forgotten.
+        Of a run that does not begin at rest, and whose start is not found, the first part does not
+        count, until it has forgotten, but where the ``whole`` is asked for.
         """
         if self.held(run):
             found, by = self.followed(values, run, held=True)
@@ -271,17 +281,20 @@ class Search:
             found, by = self.followed(values, run, held=False)
             found = found - self.measured(run)
             scale = 1.0 / self.span
-        counts = (np.arange(len(found)) >= self.unsure(run) * len(found))[:, np.newaxis]
+        unsure = 0.0 if whole else self.unsure(run)
+        counts = (np.arange(len(found)) >= unsure * len(found))[:, np.newaxis]
         by = by * (scale * counts)[..., np.newaxis]
         return (found * scale * counts).ravel(), by.reshape(-1, by.shape[2])
 
     def unsure(self, run: Run) -> float:
         """Return the share of a run in which it still remembers what came before it, unknown."""
-        return 0.0 if self.held(run) or at_rest(self.data, run) else WARMING
+        known = self.structure.n_starts or self.held(run) or at_rest(self.data, run)
+        return 0.0 if known else WARMING
 
-    def errors(self, values: Array) -> tuple[Array, Array]:
+    def errors(self, values: Array, *, whole: bool = False) -> tuple[Array, Array]:
         """Return the errors over all runs, and their slopes."""
-        errors, slopes = zip(*(self.missed(values, run) for run in self.runs), strict=True)
+        missed = (self.missed(values, run, whole=whole) for run in self.runs)
+        errors, slopes = zip(*missed, strict=True)
         return np.concatenate(errors), np.concatenate(slopes)
 
     def covariance(self, values: Array) -> tuple[float, Array]:
@@ -306,7 +319,7 @@ class Search:
         return condition, covariance
 
     def gain_of_loads(self, values: Array) -> float:
-        """Return by how much recordings' own loads would lessen the errors, were these straight."""
+        """Return by how much loads, found last, would lessen the errors, were these straight."""
         structure = self.structure
         errors, slopes = self.errors(values)
         usable = np.isfinite(slopes).all(axis=1)
@@ -319,9 +332,9 @@ class Search:
             left.append(_size(errors[usable] - columns / size @ found))
         return 1.0 - left[1] / left[0]
 
-    def cost(self, values: Array) -> float:
-        """Return the root mean square of the errors."""
-        found = _size(self.errors(values)[0])
+    def cost(self, values: Array, *, whole: bool = False) -> float:
+        """Return the root mean square of the errors, or of those over ``whole`` runs."""
+        found = _size(self.errors(values, whole=whole)[0])
         return found if np.isfinite(found) else np.inf
 
     def descend(self, values: Array, steps: int, tracker: Tracker) -> None:

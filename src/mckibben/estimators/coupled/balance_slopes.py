@@ -23,6 +23,9 @@ from mckibben.blocks.coupled.balance_law import (
     unbalanced,
 )
 
+NOTHING: Array = np.zeros(0)
+"""Where no stops and lags begin: at rest."""
+
 
 @kernel
 def slower(decay: float, gain: float, before: float, moved: float) -> float:
@@ -243,12 +246,13 @@ def follow(
     held: bool,
     settled: bool,
     every: int,
+    begun: Array,
     memory: Array,
     scratch: Array,
     found: Array,
     slopes: Array,
 ) -> None:
-    """Run from rest to every sample; keep every so manieth.
+    """Run from rest, or from where stops and lags begin, to every sample; keep every so manieth.
 
     Parameters
     ----------
@@ -261,12 +265,15 @@ def follow(
     settled : bool
         Whether they have long been there at the start.
     every : int
+    begun : array, shape (n times stops and lags,)
+        Stops and lags before the first sample [mm], of muscles that are where its pressures hold them
+        without; none of those that come from rest.
     memory : array, shape (states + 1, coefficients)
         To compute in; so is ``scratch``.
     found : array, shape (t / every, n)
         Displacements [mm], or forces that are lacking [N].
     slopes : array, shape (t / every, n, coefficients)
-        By every muscle's coefficients, the grip, and the lags' logarithms.
+        By every muscle's coefficients, the grip, the lags' logarithms, and ``begun``.
     """
     n = int(c[0])
     n_states = memory.shape[0] - 1
@@ -293,6 +300,13 @@ def follow(
             offset[k] = y[k]
             for j in range(memory.shape[1]):
                 tare[k, j] = memory[k, j]
+    if begun.size > 0:
+        for k in range(n):
+            p[k] = driven[0, k]
+        move(c, state, AT_REST, False, y, x[0], p, memory, now, row, work)
+        for i in range(begun.size):
+            state[2 * n + i] = begun[i]
+            memory[2 * n + i, memory.shape[1] - begun.size + i] = 1.0
     for t in range(driven.shape[0]):
         for k in range(n):
             p[k] = driven[t, k]
@@ -317,14 +331,15 @@ def run(
     held: bool,
     every: int = 1,
     settled: bool = False,
+    begun: Array = NOTHING,
 ) -> tuple[Array, Array]:
     """Return what `follow` finds, of whose every so many samples the last is kept, and the slopes."""
     n, m, n_l = int(c[0]), int(c[4]), int(c[5])
     width = (c.size - HEAD - m - 2 * n_l) // n
-    n_states, n_c = n * (3 + m + n_l) + 2, n * width + 1 + n_l
+    n_states, n_c = n * (3 + m + n_l) + 2, n * width + 1 + n_l + begun.size
     kept = -(-len(driven) // every)
     found, slopes = np.empty((kept, n)), np.empty((kept, n, n_c))
     memory = np.zeros((n_states + 1, n_c))
     scratch = np.zeros(n_states + 10 * n + 4 * n * n)
-    follow(c, driven, measured, x, held, settled, every, memory, scratch, found, slopes)
+    follow(c, driven, measured, x, held, settled, every, begun, memory, scratch, found, slopes)
     return found, slopes

@@ -58,6 +58,8 @@ class Structure:
         Shortest and longest time constant that the recordings can tell [s].
     unmeasured : tuple of int
         Recordings that hung under constant loads of their own, which are found too.
+    n_starts : int
+        Runs whose memories at the start are found too: all, or none.
     """
 
     driven: tuple[Channel, ...]
@@ -75,6 +77,7 @@ class Structure:
     tare: bool
     lag_range: tuple[float, float]
     unmeasured: tuple[int, ...] = ()
+    n_starts: int = 0
 
     @property
     def n(self) -> int:
@@ -129,7 +132,37 @@ class Structure:
     @property
     def size(self) -> int:
         """How many coefficients there are."""
+        return self.starts + self.n_starts * self.n * (1 + self.lags.size)
+
+    @property
+    def starts(self) -> int:
+        """Place from which memories at the start are, run by run; before are recordings' own loads."""
         return self.timing.stop + len(self.unmeasured) * self.n
+
+    def start_of(self, place: int) -> NDArray[np.intp]:
+        """Return the places of what a run remembers, shape (n, 1 + lags): friction's share first."""
+        if not self.n_starts:
+            return np.zeros((0, 0), dtype=np.intp)
+        width = self.n * (1 + self.lags.size)
+        return (self.starts + place * width + np.arange(width)).reshape(self.n, -1)
+
+    def begun(self, values: Array, place: int, pressures: Array) -> tuple[Array, Array]:
+        """Return with what stops and lags of a run begin [mm], and how that moves with all values."""
+        own = self.start_of(place)
+        if not own.size:
+            return np.zeros(0), np.zeros((0, self.size))
+        n, m, n_l = self.n, self.limits.size, self.lags.size
+        grown = np.maximum(pressures + values[self.grip], 0.0)
+        holds = grown[:, np.newaxis] * self.limits
+        shares = values[own[:, :1]]
+        by = np.zeros((n * (m + n_l), self.size))
+        for k in range(n):
+            stops = slice(k * m, (k + 1) * m)
+            by[stops, own[k, 0]] = holds[k]
+            by[stops, self.grip] = shares[k] * self.limits * (grown[k] > 0.0)
+            lags = np.arange(n_l)
+            by[n * m + k * n_l + lags, own[k, 1 + lags]] = 1.0
+        return np.append((shares * holds).ravel(), values[own[:, 1:]].ravel()), by
 
     def own_loads(self, recording: int) -> NDArray[np.intp]:
         """Return the places of the loads that only a recording has: of every muscle one, or none."""
@@ -180,20 +213,21 @@ class Structure:
             pressure_range=pressure_range,
         )
 
-    def table_of_loads(self, values: Array, n_recordings: int) -> Array:
+    def table_of_loads(self, of_runs: Array, n_recordings: int) -> Array:
         """Return the loads that only recordings have, shape (recordings, n)."""
         table = np.zeros((n_recordings, self.n))
-        table[list(self.unmeasured)] = values[self.timing.stop :].reshape(-1, self.n)
+        for recording in self.unmeasured:
+            if recording < n_recordings:
+                table[recording] = of_runs[self.own_loads(recording) - self.timing.stop]
         return table
 
-    def values(self, block: Balance, loads: Array) -> Array:
-        """Return the coefficients of a balance of this structure, and of recordings' own loads."""
+    def values(self, block: Balance, of_runs: Array) -> Array:
+        """Return the coefficients of a balance of this structure, and what was found of runs alone."""
         tables = [block.hull, np.transpose([block.walls]), np.transpose([block.damping])]
         tables += [block.springs, block.elasticity, block.areas]
         tables += [block.friction, block.relaxation, block.loads]
         table = np.hstack([np.asarray(part, dtype=np.float64) for part in tables])
-        own = loads[list(self.unmeasured)].ravel()
-        return np.concatenate([table.ravel(), [block.grip], np.log(block.lags), own])
+        return np.concatenate([table.ravel(), [block.grip], np.log(block.lags), of_runs])
 
     def packed(self) -> NDArray[np.intp]:
         """Return, for every parameter that a balance packs, its place among coefficients."""
@@ -272,6 +306,13 @@ class Structure:
             ask({place: -1.0}, -min(longest, now + MOST_LONGER))
             if place > self.timing.start:
                 ask({place: 1.0, place - 1: -1.0}, APART)
+        for place in range(self.n_starts):
+            for k, own in enumerate(self.start_of(place).tolist()):
+                for number, most in zip(
+                    own, [1.0, *[np.ptp(self.hull[k])] * self.lags.size], strict=True
+                ):
+                    ask({number: 1.0}, -float(most))
+                    ask({number: -1.0}, -float(most))
         for k in range(self.n):
             for name in ("friction", "relaxation", "damping", "wall"):
                 for place in self.places(name, k).tolist():

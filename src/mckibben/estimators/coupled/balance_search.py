@@ -26,6 +26,9 @@ MOST_SAMPLES = 30_000
 WARMING = 0.2
 """Share of a run that does not begin at rest before which its errors do not count."""
 
+UNLIKELY = 0.03
+"""Error, relative to the range, as bad as a start with all friction loaded, or a range behind."""
+
 MOST_TRIES = 9
 """Dampings tried for a step, each ten times the last."""
 
@@ -286,6 +289,16 @@ class Search:
         by = by * (scale * counts)[..., np.newaxis]
         return (found * scale * counts).ravel(), by.reshape(-1, by.shape[2])
 
+    def unlikely(self, values: Array) -> tuple[Array, Array]:
+        """Return how far from rest the starts of runs are, as errors and slopes."""
+        structure = self.structure
+        places = np.arange(structure.starts, structure.size)
+        scale = np.full((structure.n_starts, structure.n, 1 + structure.lags.size), UNLIKELY)
+        scale[:, :, 1:] /= self.span[:, np.newaxis]
+        slopes = np.zeros((places.size, structure.size))
+        slopes[np.arange(places.size), places] = scale.ravel()
+        return scale.ravel() * values[places], slopes
+
     def unsure(self, run: Run) -> float:
         """Return the share of a run in which it still remembers what came before it, unknown."""
         known = self.structure.n_starts or self.held(run) or at_rest(self.data, run)
@@ -294,7 +307,7 @@ class Search:
     def errors(self, values: Array, *, whole: bool = False) -> tuple[Array, Array]:
         """Return the errors over all runs, and their slopes."""
         missed = (self.missed(values, run, whole=whole) for run in self.runs)
-        errors, slopes = zip(*missed, strict=True)
+        errors, slopes = zip(*missed, self.unlikely(values), strict=True)
         return np.concatenate(errors), np.concatenate(slopes)
 
     def covariance(self, values: Array) -> tuple[float, Array]:

@@ -12,8 +12,11 @@ from mckibben.arrays import Array
 from mckibben.blocks.compose import Series
 from mckibben.blocks.core.fields import DISPLACEMENT, FORCE, PRESSURE
 from mckibben.blocks.core.inverse import Inverse
+from mckibben.blocks.core.saving import from_dict
 from mckibben.blocks.coupled.balance import Balance
+from mckibben.blocks.coupled.known import beyond_known
 from mckibben.blocks.coupled.load_estimate import load_of
+from mckibben.blocks.memoryless.affine import Affine
 from mckibben.blocks.memoryless.contact import Contact
 from mckibben.estimators.coupled.balance import BalanceEstimator
 from mckibben.estimators.coupled.balance_loads import under
@@ -91,6 +94,27 @@ def test_it_recovers_a_muscle_of_its_own_kind(found: BalanceEstimator) -> None:
 
 def test_loads_beyond_those_trained_enter_as_they_are(found: BalanceEstimator) -> None:
     assert error(found, recording(4, strongest=140.0)) < 0.15
+
+
+def test_what_lies_beyond_training_is_told_with_its_recording(found: BalanceEstimator) -> None:
+    assert beyond_known(found.fitted, recording(3)) == []
+    (said,) = beyond_known(found.fitted, recording(4, strongest=140.0))
+    assert "run-4, force goes from" in said
+    compensator = found.fitted.inverse()
+    assert beyond_known(compensator, recording(3)) == []
+    far = recording(3).with_channels({}, displacement=recording(3)["displacement"] + 30.0)
+    (said,) = beyond_known(compensator, far)
+    assert "run-3, displacement goes from" in said
+    pressed = recording(3).with_channels({}, pressure=1.5 * recording(3)["pressure"])
+    (said,) = beyond_known(found.fitted, pressed)
+    assert "run-3, pressure goes from" in said
+    lengths = Series((found.fitted, Affine(-1.0, 250.0, DISPLACEMENT, DISPLACEMENT)))
+    turned = far.with_channels({}, displacement=250.0 - far["displacement"])
+    assert len(beyond_known(lengths.inverse(), turned)) == 1
+    older = {key: value for key, value in compensator.to_dict().items() if key != "known"}
+    heavy = recording(4, strongest=140.0)
+    (said,) = (note for note in beyond_known(compensator, heavy) if "force" in note)
+    assert said not in beyond_known(from_dict(older), heavy)
 
 
 def test_its_inverse_gives_back_the_pressures(found: BalanceEstimator) -> None:

@@ -151,6 +151,8 @@ class Balance(ManyChannels, Invertible):
         Whether displacements count from where the muscles rested, without pressure, at the start.
     pressure_range : (float, float), optional
         Pressures are clipped to it, and said so.
+    known : sequence of pairs of float
+        Lowest and highest of all that scheduled and loaded it where it was identified, if known.
     """
 
     kind: ClassVar[str] = "balance"
@@ -183,6 +185,7 @@ class Balance(ManyChannels, Invertible):
     given: Channels
     tare: bool = False
     pressure_range: tuple[FiniteFloat, FiniteFloat] | None = None
+    known: Rows = ()
 
     def __post_init__(self) -> None:
         self.check_channels()
@@ -240,6 +243,11 @@ class Balance(ManyChannels, Invertible):
         if min(*self.damping, *self.walls, self.grip) < 0:
             raise ModelError(
                 f"damping, walls or grip of {self.kind!r} is negative. Remedy: give none below 0."
+            )
+        if self.known and [len(row) for row in self.known] != [2] * len(self.scheduled):
+            raise ModelError(
+                f"known of {self.kind!r} is {self.known}. Remedy: give a pair for every channel that "
+                "schedules or loads it, or none."
             )
         if any(not low < high for low, high in self.hull):
             raise ModelError(f"hull of {self.kind!r} is {self.hull}. Remedy: lower ends first.")

@@ -18,6 +18,7 @@ from annotated_types import Ge, Gt, Interval
 from mckibben.arrays import Array
 from mckibben.blocks.compose import PerChannel, Series
 from mckibben.blocks.core.block import Block
+from mckibben.blocks.core.fields import rows
 from mckibben.blocks.coupled.load_estimate import parts_of
 from mckibben.blocks.memoryless.affine import Affine
 from mckibben.blocks.memoryless.contact import LOST, Contact
@@ -32,6 +33,7 @@ from mckibben.estimators.coupled.balance_checks import (
     one_speed,
     other_zeros,
     telling,
+    turned,
 )
 from mckibben.estimators.coupled.balance_loads import (
     LOADS,
@@ -195,6 +197,8 @@ class BalanceEstimator(CoupledEstimator):
         ends = np.array([min(float(data.lowest.min()), 0.0), float(data.highest.max())])
         low, high = acted(ends, dead).tolist()
         balance = structure.block(tracker.best, (low, high) if limited else None)
+        x = of_channels(data, balance.scheduling).stacked("scheduled")
+        balance = replace(balance, known=rows(np.column_stack([x.min(axis=0), x.max(axis=0)])))
         self._found = structure, tracker.best[structure.timing.stop :]
         self.loads_ = structure.table_of_loads(self._found[1], 1 + data.runs[-1].recording)
         tracker.notes += not_at_rest(data, found=structure.n_starts > 0)
@@ -393,10 +397,3 @@ def _side_by_side(parts: Sequence[Block]) -> list[Block]:
     if len(parts) < 2:
         return list(parts)
     return [PerChannel(tuple(parts))]
-
-
-def turned(data: TrainingData, ways: list[tuple[float, float]]) -> TrainingData:
-    """Return data whose outputs are shortenings from about zero."""
-    gains, offsets = np.array(ways).T
-    runs = [replace(run, outputs=(run.outputs - offsets) / gains) for run in data.runs]
-    return replace(data, runs=tuple(runs))

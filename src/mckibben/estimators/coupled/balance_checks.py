@@ -72,6 +72,13 @@ def of_channels(data: TrainingData, names: Sequence[str]) -> TrainingData:
     return replace(data, runs=runs, scheduled=tuple(data.scheduled[place] for place in places))
 
 
+def turned(data: TrainingData, ways: list[tuple[float, float]]) -> TrainingData:
+    """Return data whose outputs are shortenings from about zero."""
+    gains, offsets = np.array(ways).T
+    runs = [replace(run, outputs=(run.outputs - offsets) / gains) for run in data.runs]
+    return replace(data, runs=tuple(runs))
+
+
 def one_speed(data: TrainingData) -> bool:
     """Tell whether all inputs always move at about one speed, which tells nothing of rate."""
     speeds = []

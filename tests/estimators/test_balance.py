@@ -201,6 +201,8 @@ def test_held_muscles_are_learned_from_by_their_force() -> None:
     estimator = BalanceEstimator().fit([*free, Recording(channels, STEP)])
     assert error(estimator, recording(3)) < 3.0 * NOISE
     np.testing.assert_allclose(balance_of(estimator).lags, MUSCLE.lags, rtol=0.35)
+    (said,) = (note for note in estimator.diagnostics_.notes if "held in place" in note)
+    assert 0.0 < float(said.split("followed to ")[1].split(" N RMSE")[0]) < 2.0
 
 
 def hung(seed: int, weight: float, n: int = 1000, *, measured: bool = False) -> Recording:

@@ -37,6 +37,7 @@ from mckibben.estimators.coupled.balance_checks import (
 )
 from mckibben.estimators.coupled.balance_loads import (
     LOADS,
+    held_told,
     loads_told,
     varying,
     with_loads,
@@ -204,7 +205,7 @@ class BalanceEstimator(CoupledEstimator):
         tracker.notes += not_at_rest(data, found=structure.n_starts > 0)
         tracker.notes += other_zeros(data, self.loads_)
         tracker.notes += loads_told(data, self.loads_, balance, newtons=structure.in_newtons)
-        tracker.notes += varying(search, tracker.best)
+        tracker.notes += [*varying(search, tracker.best), *held_told(search, tracker.best)]
         tracker.notes += [*held_back(balance, structure), *sentences(balance, structure)]
         if dead:
             tracker.notes.append(

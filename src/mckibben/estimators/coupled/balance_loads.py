@@ -36,6 +36,9 @@ TOLD = 6
 WORSE = 3.0
 """Times its error of the others from which a recording seems to have hung under a load that varied."""
 
+SLACK = 0.02
+"""Load of a held muscle, relative to its largest, that is none."""
+
 BADLY = 0.03
 """Error, relative to the range, from which all recordings may have."""
 
@@ -157,3 +160,20 @@ def varying(search: Search, values: Array) -> list[str]:
             "among others, would do that. Remedy: record the force if it may vary"
         )
     return notes
+
+
+def held_told(search: Search, values: Array) -> list[str]:
+    """Return how well forces of muscles that were held are followed, which no displacement tells."""
+    runs = [run for run in search.runs if search.held(run)]
+    if not runs:
+        return []
+    unit = LOADS[0] if search.structure.in_newtons else search.structure.given[0].unit
+    lacking = np.concatenate([search.followed(values, run, held=True)[0] for run in runs])
+    pushes = np.concatenate([run.scheduled[:, -1] for run in runs]).min() < SLACK * max(
+        float(run.scheduled[:, -1].max()) for run in runs
+    )
+    slack = "; where they would have to push they are slack, and their force is zero" * bool(pushes)
+    return [
+        f"of muscles held in place ({len(runs)} recordings) forces are followed to "
+        f"{float(np.sqrt(np.mean(lacking**2))):.3g} {unit} RMSE, which displacements do not tell{slack}"
+    ]

@@ -67,7 +67,7 @@ class Stages:
         loads, contact : bool
             Whether loads of recordings' own and a dead zone are tried.
         """
-        self.begin(few, self.tracker)
+        self.begin(few)
         few = self.of_runs(self.long_held(few), data, loads=loads)
         if self.seeks_slack or contact:
             self.descend(few, self.best, self.tracker)
@@ -87,19 +87,19 @@ class Stages:
         """Show a tracker where so many steps lead."""
         search.descend(values, min(self.steps, steps), tracker, first=self.seeks_slack)
 
-    def begin(self, few: Search, tracker: Tracker) -> None:
-        """Show a tracker where the linear stage and first steps from several starts lead."""
+    def begin(self, few: Search) -> None:
+        """Show the tracker where the linear stage and first steps from several starts lead."""
         starts = []
         for grip, plain in product(
             GRIPS if few.structure.limits.size else GRIPS[:1], (False, True)
         ):
             values = few.begun(grip * few.structure.highest, plain=plain)
             starts.append((few.cost(values), plain, values))
-            tracker.saw(values, starts[-1][0])
+            self.tracker.saw(values, starts[-1][0])
         starts.sort(key=lambda start: start[0])
-        check_loads(few, next(values for _, plain, values in starts if not plain), tracker)
+        check_loads(few, next(values for _, plain, values in starts if not plain), self.tracker)
         for _, _, start in starts if few.n_rows <= FEW_ROWS else starts[:FOLLOWED]:
-            self.descend(few, start, tracker, FIRST_STEPS)
+            self.descend(few, start, self.tracker, FIRST_STEPS)
 
     def long_held(self, few: Search) -> Search:
         """Return the search of muscles that were settled when recordings began, if that explains these.
@@ -122,7 +122,8 @@ class Stages:
             if several is None:
                 continue
             part = self.tracker.part(0.4, 0.5)
-            self.begin(several, part)
+            none = np.zeros(several.structure.size - few.structure.size)
+            self.descend(several, np.append(self.best, none), part)
             least = (1.0 - OWN_HELPS) * few.cost(self.best, whole=True)
             if part.best is not None and part.best_cost < least:
                 few = several

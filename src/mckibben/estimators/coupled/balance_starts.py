@@ -26,8 +26,11 @@ EARLY, LARGER = 5, 2.0
 
 
 def with_starts(search: Search, values: Array, data: TrainingData) -> Search | None:
-    """Return the search for the starts of runs, too, if errors are largest there; else None."""
-    if search.structure.tare or search.structure.settled:
+    """Return the search for the starts of runs, too, if errors are largest there; else None.
+
+    So they are where runs were taken to begin settled, and did not.
+    """
+    if search.structure.tare:
         return None
     early, late = [], []
     for place in range(len(search.runs)):
@@ -37,7 +40,7 @@ def with_starts(search: Search, values: Array, data: TrainingData) -> Search | N
         late.append(np.mean(errors[first:] ** 2))
     if not np.mean(early) > LARGER**2 * np.mean(late):
         return None
-    return search.having(n_starts=1 + max(run.place for run in data.runs))
+    return search.having(settled=False, n_starts=1 + max(run.place for run in data.runs))
 
 
 def simulate_started(

@@ -29,6 +29,7 @@ from mckibben.blocks.laws.trial import wander
 from mckibben.blocks.play_type.gpi import GPI
 from mckibben.blocks.preisach_type.preisach import DEPTH, Preisach, _output, _solve, everett
 from mckibben.estimators.coupled.balance_slopes import run as follow
+from mckibben.estimators.coupled.balance_starts import begin_at
 from mckibben.estimators.coupled.recurrent_fit import remembered
 from mckibben.registry import load
 from mckibben.system.compiling import Deferred
@@ -303,6 +304,28 @@ def test_slopes_of_a_balance_are_those_of_differences(change: dict[str, Any]) ->
     longer = [replace(block, lags=(0.8 * f, 12.0)).coefficients(0.1) for f in (1 + 1e-6, 1 - 1e-6)]
     slope = (moved(longer[0])[0] - moved(longer[1])[0]) / 2e-6
     np.testing.assert_allclose(slope, slopes[:, :, n_own + 1], atol=1e-5)
+
+
+def test_a_balance_begun_in_motion_is_its_simulation_from_that_state() -> None:
+    block = replace(Balance.example(), grip=0.1)
+    driven, x = path([0.0, 0.0], [4.0, 4.0])[5:25], path([0.0, 0.0], [1.0, 60.0])[5:25]
+    driven, x = np.ascontiguousarray(driven), np.ascontiguousarray(x)
+    begun = np.array([0.1, 0.3, -0.05, 0.2, 0.5, -3.0, 0.2, 1.0])
+
+    def moved(begun: Array) -> tuple[Array, Array]:
+        return follow(block.coefficients(0.1), driven, driven, x, held=False, begun=begun)
+
+    found, slopes = moved(begun)
+    inputs = np.column_stack([driven, x])
+    state = block.inverse().initial_state(inputs[0])
+    begin_at(block, state, inputs[0], begun)
+    expected = block.inverse().simulate(inputs, sample_time=0.1, initial=tuple(state))
+    np.testing.assert_array_equal(found, expected)
+    for place in range(begun.size):
+        step = np.zeros(begun.size)
+        step[place] = 1e-6
+        slope = (moved(begun + step)[0] - moved(begun - step)[0]) / 2e-6
+        np.testing.assert_allclose(slope, slopes[:, :, place - begun.size], atol=1e-6)
 
 
 def test_forces_that_a_held_balance_lacks_are_linear_in_its_coefficients() -> None:

@@ -230,3 +230,29 @@ def test_a_model_that_tells_no_loads_says_so(cli: Cli, tmp_path: Path) -> None:
     assert "'pi' does not tell loads" in result.err
     assert "Remedy:" in result.err
     assert not (tmp_path / "est.json").exists()
+
+
+def test_one_muscle_is_told_which_input_was_taken_and_what_lies_beyond(
+    cli: Cli, tmp_path: Path
+) -> None:
+    time = np.arange(400) * 0.05
+    pressure = 2.0 - 2.0 * np.cos(time)
+    given = {
+        "voltage": 2.0 * pressure,
+        "pressure": pressure,
+        "displacement": 5.0 * pressure,
+        "force": 20.0 - 20.0 * np.cos(1.7 * time),
+    }
+    run, model = tmp_path / "run.csv", tmp_path / "model.json"
+    write(Recording(given, 0.05), run)
+    settings = [word for setting in SHORT for word in ("--set", setting)]
+    result = cli("fit", "balance", run, *settings, "-o", model)
+    assert result.code == 0, result.err
+    assert "--input pressure" in result.out
+    result = cli("fit", "balance", run, *settings, "--input", "pressure", "-o", model, "--force")
+    assert "--input pressure" not in result.out
+    result = cli("simulate", model, run, "-o", tmp_path / "out.csv")
+    assert "extrapolates" not in result.out
+    write(Recording({**given, "force": 2.0 * given["force"]}, 0.05), tmp_path / "heavy.csv")
+    result = cli("simulate", model, tmp_path / "heavy.csv", "-o", tmp_path / "out.csv", "--force")
+    assert "in heavy, force goes from" in result.out.replace("\n", " ")

@@ -12,12 +12,18 @@ from mckibben.arrays import Array
 from mckibben.blocks.compose import Series
 from mckibben.blocks.core.fields import DISPLACEMENT, FORCE, PRESSURE
 from mckibben.blocks.core.inverse import Inverse
+from mckibben.blocks.core.saving import from_dict
 from mckibben.blocks.coupled.balance import Balance
+from mckibben.blocks.coupled.known import beyond_known
 from mckibben.blocks.coupled.load_estimate import load_of
+from mckibben.blocks.memoryless.affine import Affine
 from mckibben.blocks.memoryless.contact import Contact
 from mckibben.estimators.coupled.balance import BalanceEstimator
+from mckibben.estimators.coupled.balance_loads import under
+from mckibben.estimators.coupled.balance_search import Search
 from mckibben.estimators.coupled.balance_slopes import run
 from mckibben.estimators.optimisers.constrained import constrained_least_squares
+from mckibben.estimators.optimisers.tracker import Tracker
 from mckibben.signals.broadband import random_wave
 
 STEP = 0.05
@@ -96,6 +102,27 @@ def test_it_recovers_a_muscle_of_its_own_kind(found: BalanceEstimator) -> None:
 
 def test_loads_beyond_those_trained_enter_as_they_are(found: BalanceEstimator) -> None:
     assert error(found, recording(4, strongest=140.0)) < 0.15
+
+
+def test_what_lies_beyond_training_is_told_with_its_recording(found: BalanceEstimator) -> None:
+    assert beyond_known(found.fitted, recording(3)) == []
+    (said,) = beyond_known(found.fitted, recording(4, strongest=140.0))
+    assert "run-4, force goes from" in said
+    compensator = found.fitted.inverse()
+    assert beyond_known(compensator, recording(3)) == []
+    far = recording(3).with_channels({}, displacement=recording(3)["displacement"] + 30.0)
+    (said,) = beyond_known(compensator, far)
+    assert "run-3, displacement goes from" in said
+    pressed = recording(3).with_channels({}, pressure=1.5 * recording(3)["pressure"])
+    (said,) = beyond_known(found.fitted, pressed)
+    assert "run-3, pressure goes from" in said
+    lengths = Series((found.fitted, Affine(-1.0, 250.0, DISPLACEMENT, DISPLACEMENT)))
+    turned = far.with_channels({}, displacement=250.0 - far["displacement"])
+    assert len(beyond_known(lengths.inverse(), turned)) == 1
+    older = {key: value for key, value in compensator.to_dict().items() if key != "known"}
+    heavy = recording(4, strongest=140.0)
+    (said,) = (note for note in beyond_known(compensator, heavy) if "force" in note)
+    assert said not in beyond_known(from_dict(older), heavy)
 
 
 def test_its_inverse_gives_back_the_pressures(found: BalanceEstimator) -> None:
@@ -197,6 +224,87 @@ def test_held_muscles_are_learned_from_by_their_force() -> None:
     estimator = BalanceEstimator().fit([*free, Recording(channels, STEP)])
     assert error(estimator, recording(3)) < 3.0 * NOISE
     np.testing.assert_allclose(balance_of(estimator).lags, MUSCLE.lags, rtol=0.35)
+    (said,) = (note for note in estimator.diagnostics_.notes if "held in place" in note)
+    assert 0.0 < float(said.split("followed to ")[1].split(" N RMSE")[0]) < 2.0
+
+
+def hung(seed: int, weight: float, n: int = 1000, *, measured: bool = False) -> Recording:
+    """Return a muscle under a weight, driven at random from rest."""
+    time = np.arange(n) * STEP
+    p = np.minimum(time / 2.0, 1.0) * random_wave(time, 0.3, 4.0, seed=seed)
+    force = np.full(n, weight)
+    y = MUSCLE.inverse().simulate(np.column_stack([p, force]), sample_time=STEP)[:, 0]
+    y = y + NOISE * np.random.default_rng(seed).standard_normal(n)
+    channels = {"pressure": p, "displacement": y}
+    if measured:
+        channels["force"] = force
+    return Recording(channels, STEP, meta={"name": f"hung-{seed}"})
+
+
+def test_weights_that_nobody_measured_are_found() -> None:
+    estimator = BalanceEstimator().fit([hung(1, 0.0), hung(2, 40.0), hung(3, 80.0)])
+    found = estimator.loads_[:, 0] * 60.0  # bar on an area at rest of 60 N/bar
+    np.testing.assert_allclose(found, [0.0, 40.0, 80.0], atol=1.0)
+    assert estimator.diagnostics_.rmse < 2.5 * NOISE
+    assert error(estimator, hung(4, 0.0)) < 3.0 * NOISE  # under the load of the first
+    (said,) = (note for note in estimator.diagnostics_.notes if "not measured" in note)
+    assert "in hung-2" in said
+    assert "in hung-3 more than in hung-1" in said
+    heavier = under(estimator.fitted, estimator.loads_[1])
+    other = hung(5, 40.0)
+    missed = heavier.simulate(other.select(["pressure"]))["displacement"] - other["displacement"]
+    assert np.sqrt(np.mean(missed**2)) < 3.0 * NOISE
+
+
+def test_without_evidence_of_other_weights_there_are_none() -> None:
+    runs = [hung(seed, 40.0) for seed in (1, 2, 3)]
+    estimator = BalanceEstimator().fit(runs)
+    assert not estimator.loads_.any()
+    np.testing.assert_array_equal(
+        estimator.fitted.pack(), BalanceEstimator(unknown_load=False).fit(runs).fitted.pack()
+    )
+    forced = BalanceEstimator(unknown_load=True).fit(runs)
+    assert np.abs(forced.loads_ * 60.0).max() < 1.0
+
+
+def test_a_recording_without_the_force_that_others_have_hung_under_a_weight() -> None:
+    runs = [recording(1), recording(2), hung(3, 50.0)]
+    estimator = BalanceEstimator().fit(runs)
+    assert estimator.diagnostics_.rmse < 2.5 * NOISE
+    assert error(estimator, recording(4)) < 3.0 * NOISE
+    (said,) = (note for note in estimator.diagnostics_.notes if "not measured" in note)
+    weight = float(said.split("[N]: ")[1].split(" in hung-3")[0])
+    assert abs(weight - 50.0) < 1.0
+    with pytest.raises(DataError, match="no such channel"):
+        BalanceEstimator(unknown_load=False).fit(runs)
+
+
+def test_what_varied_and_was_not_measured_is_said() -> None:
+    unmeasured = recording(4, strongest=60.0).select(["pressure", "displacement"])
+    runs = [hung(1, 0.0), hung(2, 0.0), unmeasured]
+    notes = BalanceEstimator(steps=5).fit(runs).diagnostics_.notes
+    assert any("run-4" in note and "times worse than others" in note for note in notes)
+    time = np.arange(400) * STEP
+    held = {"pressure": 2.0 + np.sin(time), "displacement": np.full(400, 5.0)}
+    stuck = Recording(held, STEP, meta={"name": "stuck"})
+    estimator = BalanceEstimator(steps=2).fit([hung(1, 0.0), stuck])
+    assert any("stuck" in note and "nothing moves" in note for note in estimator.diagnostics_.notes)
+    assert estimator.diagnostics_.n_samples == 1000
+
+
+def test_slopes_by_weights_are_those_of_differences() -> None:
+    estimator = BalanceEstimator(unknown_load=True)
+    data = estimator.data([hung(1, 0.0, n=300), hung(2, 40.0, n=300)])
+    structure = estimator.structure(data, Tracker())
+    search = Search(data, structure, 1e-6)
+    values = search.begun(0.5)
+    (place,) = structure.own.load(1)
+    step = np.zeros(values.size)
+    step[place] = 1e-6
+    slope = (search.errors(values + step)[0] - search.errors(values - step)[0]) / 2e-6
+    missed = np.abs(slope - search.errors(values)[1][:, place])
+    assert np.quantile(missed, 0.97) < 1e-4 * np.abs(slope).max()
+    assert not slope[:300].any()
 
 
 def test_two_muscles_that_go_slack_and_an_extensor() -> None:
@@ -317,12 +425,41 @@ def test_lags_that_recordings_cannot_tell_are_refused() -> None:
             BalanceEstimator(**settings).fit(recording(1))
 
 
+def test_what_recordings_that_begin_in_motion_remember_is_found() -> None:
+    cut = [recording(seed).slice(500, 1200) for seed in (1, 2, 6, 7)]
+    estimator = BalanceEstimator().fit(cut)
+    assert any("what it remembers was found" in note for note in estimator.diagnostics_.notes)
+    assert estimator.diagnostics_.rmse < 2.5 * NOISE < 0.1 * estimator.diagnostics_.rmse_from_rest
+    assert error(estimator, recording(3)) < 0.15
+    from_rest = BalanceEstimator().fit([recording(1), recording(2)]).diagnostics_
+    assert from_rest.rmse == from_rest.rmse_from_rest
+
+
 def test_recordings_that_begin_in_motion_do_little_harm() -> None:
     cut = [recording(seed).slice(300, 1200) for seed in (1, 2)]
     estimator = BalanceEstimator().fit(cut)
     assert any("does not begin at rest" in note for note in estimator.diagnostics_.notes)
     assert not balance_of(estimator).settled
     assert error(estimator, recording(3)) < 0.3
+
+
+def test_slopes_by_starts_are_those_of_differences() -> None:
+    estimator = BalanceEstimator()
+    data = estimator.data([recording(seed).slice(300, 700) for seed in (1, 2)])
+    structure = replace(estimator.structure(data, Tracker()), n_starts=2)
+    search = Search(data, structure, 1e-6)
+    values = search.begun(0.5)
+    own = structure.own.start(1)
+    values[own] = [[0.4, 1.0, -2.0]]
+    exact = search.errors(values)[1]
+    for place in (*own[0].tolist(), structure.grip):
+        step = np.zeros(values.size)
+        step[place] = 1e-6
+        slope = (search.errors(values + step)[0] - search.errors(values - step)[0]) / 2e-6
+        missed = np.abs(slope - exact[:, place])
+        assert np.quantile(missed, 0.97) < 1e-4 * np.abs(slope).max(), place
+        if place != structure.grip:
+            assert not slope[:400].any()
 
 
 def test_recordings_that_begin_under_a_pressure_long_held_count_as_a_whole() -> None:

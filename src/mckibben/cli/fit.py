@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import fields
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -21,6 +21,10 @@ from mckibben.cli.options import (
 from mckibben.cli.output import print_json, progress_bar, say
 from mckibben.errors import DataError, ModelError
 from mckibben.numerals import numeral
+
+if TYPE_CHECKING:
+    from mckibben.blocks.core.block import Block
+    from mckibben.recording import Recording
 
 STARTS_MATTER = 0.05
 """Relative difference of the errors from rest and from fitted starts that is told."""
@@ -94,6 +98,7 @@ def fit(
     unit_name = outputs[0].unit
     by_output = {c.name: e for c, e in zip(outputs, found.rmse_by_output, strict=True)}
     names = estimator.model_.parameter_names
+    notes = [*found.notes, *_unasked(input, estimator.model_, recordings[0])]
     undetermined = [names[place] for place in estimator.undetermined()]
     if as_json:
         print_json(
@@ -113,7 +118,7 @@ def fit(
                 "standard_errors": list(found.standard_errors),
                 "at_bounds": list(found.at_bounds),
                 "undetermined": undetermined,
-                "notes": list(found.notes),
+                "notes": notes,
             }
         )
         return
@@ -132,9 +137,24 @@ def fit(
         )
     if undetermined:
         say(f"Not determined by these recordings: {'; '.join(undetermined)}.")
-    for note in found.notes:
+    for note in notes:
         say(f"Note: {note}")
     say(f"Written: {out}")
+
+
+def _unasked(given: list[str] | None, model: Block, recording: Recording) -> list[str]:
+    """Return that the command was taken as input where the pressure was recorded too, if so."""
+    driven = [channel.name for channel in model.inputs]
+    if (
+        given
+        or "pressure" in driven
+        or not {"voltage", "pressure"} <= {*driven, *recording.channels}
+    ):
+        return []
+    return [
+        "the input is voltage. Remedy: for a model of the muscle alone, whose loads are forces and that "
+        "tells forces, say --input pressure"
+    ]
 
 
 def _one(names: list[str] | None) -> str | tuple[str, ...] | None:

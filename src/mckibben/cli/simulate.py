@@ -46,6 +46,7 @@ def simulate(
     from dataclasses import asdict
 
     from mckibben.blocks.core.saving import load
+    from mckibben.blocks.coupled.known import beyond_known
     from mckibben.files import write
     from mckibben.metrics import score
     from mckibben.outputs import claim_recording
@@ -65,6 +66,7 @@ def simulate(
         modelled = block.simulate(recording, initial=_initial(initial, block, recording))
     else:
         modelled = _predicted(block, recording, horizon)
+    notes = beyond_known(block, recording)
     result = recording.select(wanted)
     metrics: dict[str, dict[str, float]] = {}
     for channel in block.outputs:
@@ -79,7 +81,7 @@ def simulate(
     write(result.with_meta(model=str(model)), out)
     if as_json:
         head = {"file": str(out), "n_samples": len(result), "horizon": horizon}
-        print_json(head | {"metrics": metrics})
+        print_json(head | {"metrics": metrics, "notes": notes})
         return
     for name, figures in metrics.items():
         say(
@@ -87,6 +89,8 @@ def simulate(
             f"RMSE {numeral(figures['rmse'], 4)}, MAE {numeral(figures['mae'], 4)}, worst "
             f"{numeral(figures['max_error'], 4)} {recording.units[name]}, R² {numeral(figures['r2'], 5)}"
         )
+    for note in notes:
+        say(f"Note: {note}")
     say(f"Written: {out}")
 
 

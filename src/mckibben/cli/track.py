@@ -67,6 +67,7 @@ def track(
     """Let a compensator, or a controller with it, follow a reference on a virtual rig."""
     from mckibben.blocks.core.block import Block
     from mckibben.blocks.core.saving import load
+    from mckibben.blocks.coupled.known import beyond_known
     from mckibben.blocks.feedback.feedforward_feedback import FeedforwardFeedback
     from mckibben.control import control_law, dead_time_undone, tune_pid
     from mckibben.control import track as close
@@ -88,6 +89,7 @@ def track(
     # pressures recorded with the reference are not what the compensator will give
     given = {channel.name for channel in block.outputs} | set(_driven(block))
     wanted = wanted.select([name for name in wanted.channels if name not in given])
+    notes = beyond_known(block, wanted)
     held = {name: float(wanted[name][0]) for name in plant.inputs if name in wanted}
     step = wanted.sample_time or 0.02
     commanded = any(channel.name.startswith(COMMAND) for channel in block.outputs)
@@ -136,6 +138,7 @@ def track(
                 "step_time": {"median": found.step_time[0], "p99.9": found.step_time[1]},
                 "file": None if out is None else str(out),
                 "controller_file": None if controller_out is None else str(controller_out),
+                "notes": notes,
             }
         )
         return
@@ -155,6 +158,8 @@ def track(
         f"Controller: {1e6 * found.step_time[0]:.0f} µs a step (median), "
         f"{1e6 * found.step_time[1]:.0f} µs (99.9 %)."
     )
+    for note in notes:
+        say(f"Note: {note}")
     if out is not None:
         say(f"Written: {out}")
 

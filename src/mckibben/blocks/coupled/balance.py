@@ -18,7 +18,6 @@ Artificial Muscles"; areas and springs that couple follow what muscles in parall
 from __future__ import annotations
 
 import warnings
-from itertools import pairwise
 from typing import Annotated, ClassVar, Self
 
 import numpy as np
@@ -43,9 +42,10 @@ from mckibben.blocks.core.kernels import kernel
 from mckibben.blocks.core.linear_system import newton_cost
 from mckibben.blocks.core.many_channels import ManyChannels
 from mckibben.blocks.core.refusals import explicit_state, needs_sample_time
+from mckibben.blocks.coupled.balance_fields import check_fields
 from mckibben.blocks.coupled.balance_law import NEARLY, NEVER, begin, keep, pressed, settle
 from mckibben.blocks.coupled.balance_terms import AT_REST, FROM_REST, IN_TIME
-from mckibben.errors import ModelError, ModelWarning
+from mckibben.errors import ModelWarning
 
 
 @kernel
@@ -156,6 +156,8 @@ class Balance(ManyChannels, Invertible):
         Pressures are clipped to it, and said so.
     mass : sequence of n float, optional
         Force by acceleration [N s^2/mm], not negative; none by default.
+    known : sequence of pairs of float
+        Lowest and highest of all that scheduled and loaded it where it was identified, if known.
     """
 
     kind: ClassVar[str] = "balance"
@@ -193,69 +195,11 @@ class Balance(ManyChannels, Invertible):
     settled: bool = False
     pressure_range: tuple[FiniteFloat, FiniteFloat] | None = None
     mass: Vector = ()
+    known: Rows = ()
 
     def __post_init__(self) -> None:
         self.check_channels()
-        n = len(self.driven)
-        n_loads = len(self.loads[0]) if self.loads else 0
-        if n_loads > len(self.scheduled):
-            raise ModelError(
-                f"{self.kind!r} has {n_loads} loads, and {len(self.scheduled)} channels that schedule "
-                "or load it. Remedy: give every load a channel, behind what schedules."
-            )
-        if self.pressure_range is not None and not self.pressure_range[0] < self.pressure_range[1]:
-            raise ModelError(
-                f"pressure_range of {self.kind!r} is {self.pressure_range}. Remedy: the lower end first."
-            )
-        n_powers = 1 + (len(self.scheduled) - n_loads) * self.degree
-        widths = {
-            "springs": n_powers * (1 + n),
-            "elasticity": len(self.elasticity[0]) if self.elasticity else 0,
-            "areas": max(len(self.areas[0]) if self.areas else 0, 1),
-            "friction": len(self.limits),
-            "relaxation": len(self.lags),
-            "loads": n_loads,
-            "hull": 2,
-        }
-        for name, width in widths.items():
-            table = getattr(self, name)
-            if len(table) != n or any(len(row) != width for row in table):
-                raise ModelError(
-                    f"{name} of {self.kind!r} has rows of {[len(row) for row in table]}. "
-                    f"Remedy: give {n} rows of {width}."
-                )
-        lengths = {"damping": self.damping, "walls": self.walls, "given": self.given}
-        if self.bladders or self.pushes:
-            lengths |= {"bladders": self.bladders, "pushes": self.pushes}
-        if self.lines:
-            lengths["lines"] = self.lines
-        lengths |= {"mass": self.mass} if self.mass else {}
-        for name, values in lengths.items():
-            if len(values) != n:
-                told = f"{name} of {self.kind!r} has {len(values)} entries"
-                raise ModelError(f"{told}. Remedy: give {n}.")
-        at_rest = [row[0] for row in self.areas]
-        above = {"limits": self.limits, "lags": self.lags, "areas at rest": at_rest}
-        for name, positive in above.items():
-            rises = name == "areas at rest" or all(a < b for a, b in pairwise(positive))
-            if any(not value > 0 for value in positive) or (name == "limits" and not rises):
-                raise ModelError(
-                    f"{name} of {self.kind!r} are {positive}. Remedy: give positive ones"
-                    f"{', in increasing order' if name == 'limits' else ''}."
-                )
-        stiff = ("friction", "relaxation", "damping", "walls")
-        for name in (*stiff, "grip", "bladders", "pushes", "mass"):
-            if np.any(np.array(getattr(self, name)) < 0):
-                raise ModelError(
-                    f"{name} of {self.kind!r} has a number below 0, which would make energy. "
-                    "Remedy: give none below 0."
-                )
-        if self.mass and self.pushes:
-            raise ModelError(
-                f"{self.kind!r} has mass and muscles that go slack. Remedy: give one of mass and pushes."
-            )
-        if any(not low < high for low, high in self.hull):
-            raise ModelError(f"hull of {self.kind!r} is {self.hull}. Remedy: lower ends first.")
+        check_fields(self)
 
     @property
     def n_loads(self) -> int:

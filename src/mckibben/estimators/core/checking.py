@@ -76,8 +76,9 @@ def training_data(
             r.matrix(scheduling) if scheduling else np.empty((len(r), 0)),
             np.asarray(mask, dtype=bool),
             r.sample_time,
+            recording=place,
         )
-        for r, mask in zip(listed, masks, strict=True)
+        for place, (r, mask) in enumerate(zip(listed, masks, strict=True))
     )
 
     def channels(names: Sequence[str]) -> tuple[Channel, ...]:

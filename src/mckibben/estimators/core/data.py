@@ -27,6 +27,8 @@ RESTS = 0.03
 class Run:
     """One recording: what drives (n, k), outputs (n, m), what schedules (n, s), and which samples count.
 
+    ``place`` is that among all runs, ``recording`` that of its recording among all; ``unmeasured``
+    are channels that schedule and that it lacks, which are as in others on average.
     ``peak`` is the input from which the run is taken to have come before its first sample, where that
     is not below: it makes the memory at the start.
     """
@@ -38,6 +40,9 @@ class Run:
     counts: Mask
     sample_time: float | None
     peak: float | None = None
+    place: int = 0
+    recording: int = 0
+    unmeasured: tuple[str, ...] = ()
 
     @property
     def u(self) -> Array:
@@ -270,9 +275,9 @@ class TrainingData:
 
     def stretches(self, shortest: int) -> TrainingData:
         """Return the same data as runs whose samples all count; see `Run.stretches`."""
-        return replace(
-            self, runs=tuple(part for run in self.runs for part in run.stretches(shortest))
-        )
+        found = [part for run in self.runs for part in run.stretches(shortest)]
+        runs = tuple(replace(run, place=place) for place, run in enumerate(found))
+        return replace(self, runs=runs)
 
     def stacked(self, what: str) -> Array:
         """Return a field of all runs, one under another."""

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import product
 from typing import Annotated, ClassVar
 
 import numpy as np
@@ -19,19 +18,22 @@ from annotated_types import Ge, Gt, Interval
 from mckibben.arrays import Array
 from mckibben.blocks.compose import PerChannel, Series
 from mckibben.blocks.core.block import Block
+from mckibben.blocks.core.fields import rows
 from mckibben.blocks.coupled.load_estimate import parts_of
 from mckibben.blocks.memoryless.affine import Affine
 from mckibben.blocks.memoryless.contact import LOST, Contact
 from mckibben.errors import ModelError
-from mckibben.estimators.core.data import TrainingData
+from mckibben.estimators.core.data import Mask, TrainingData
 from mckibben.estimators.core.uncertainty import unknown
 from mckibben.estimators.coupled.balance_checks import (
     check_directions,
     moving,
     not_at_rest,
+    of_channels,
     one_speed,
     other_zeros,
     telling,
+    turned,
 )
 from mckibben.estimators.coupled.balance_coordinates import (
     directions_of,
@@ -39,40 +41,32 @@ from mckibben.estimators.coupled.balance_coordinates import (
     shortened,
     together,
 )
+from mckibben.estimators.coupled.balance_loads import (
+    LOADS,
+    held_told,
+    loads_told,
+    varying,
+    with_loads,
+    without_held,
+    without_load,
+)
 from mckibben.estimators.coupled.balance_search import Search
+from mckibben.estimators.coupled.balance_stages import Stages, acted, acting
+from mckibben.estimators.coupled.balance_starts import simulate_started
 from mckibben.estimators.coupled.balance_structure import APART, Structure
 from mckibben.estimators.coupled.balance_words import held_back, sentences
-from mckibben.estimators.coupled.base import CoupledEstimator
+from mckibben.estimators.coupled.base import CoupledEstimator, schedules
 from mckibben.estimators.optimisers.tracker import Tracker
-
-LOADS = ("N",)
-"""Units of what loads a muscle, instead of scheduling its springs."""
+from mckibben.recording import Recording
 
 LIMITED = ("bar", "V")
 """Units of what the hardware limits."""
 
-GRIPS = (0.05, 0.2, 0.4, 0.8)
-"""Where to begin, relative to the highest pressure."""
-
-FOLLOWED, FIRST_STEPS, FEW_ROWS = 2, 5, 6_000
-"""Starts that are followed for so many steps before the best of them is followed to its end; all are
-where there are no more errors than that."""
-
 FAR = 0.5
 """Displacements that all are further from zero than this share of their range count from elsewhere."""
 
-DEAD_ZONES, DEAD_STEPS, HELPS = (0.01, 0.02, 0.035, 0.06), 10, 0.03
-"""Pressures over which dead zones fade, relative to the highest; steps that each is followed for; and by
-how much one has to help."""
-
-FIRM = 0.8
-"""Of the most that muscles seem to resist shortening with, share at which they go slack at first."""
-
 FIRST_SAMPLES, MORE_SAMPLES, MOST_SAMPLES = 8_000, 15_000, 60_000
 """By which starts, slack and dead zones are compared; to find the way by; and for the last steps."""
-
-EXPLAINED = 1.5
-"""Times the error of all but first parts up to which that of all, settled before, is no more."""
 
 LAST_STEPS = 10
 """On all recordings, after those on a few of them."""
@@ -106,6 +100,10 @@ class BalanceEstimator(CoupledEstimator):
     tare : bool, optional
         Whether displacements count from rest at the start of every recording. Default: where all of
         several scheduled muscles' recordings start there.
+    unknown_load : bool, optional
+        Whether every recording but the first hung under a constant load of its own, which is found.
+        Default: recordings without the force that others have did; where none has any, if this makes
+        the model much better.
     contact : bool
         Whether a dead zone of small pressures is looked for; default so.
     slack : bool, optional
@@ -117,6 +115,13 @@ class BalanceEstimator(CoupledEstimator):
         Damping of the coefficients.
     steps : int
         Most Gauss-Newton steps.
+
+    Attributes
+    ----------
+    loads_ : array, shape (recordings, n)
+        Constant loads that were found, of every muscle in every recording: beyond that of the first or,
+        where others have a force, beyond their average. In N or, without a measured force, in bar on
+        muscle 1's area at rest.
     """
 
     effort: ClassVar[float] = 1.0
@@ -131,17 +136,38 @@ class BalanceEstimator(CoupledEstimator):
     area: Annotated[int, Interval(ge=0, le=6)] = 2
     degree: Annotated[int, Interval(ge=1, le=4)] = 2
     tare: bool | None = None
+    unknown_load: bool | None = None
     contact: bool = True
     slack: bool | None = None
     mass: bool = False
     ridge: Annotated[float, Ge(0)] = 1e-6
     steps: Annotated[int, Interval(ge=0, le=1000)] = 25
 
+    def data(
+        self, recordings: Recording | Sequence[Recording], rows: Sequence[Mask] | None = None
+    ) -> TrainingData:
+        """Return what is learned from recordings, of which some may lack a load that others have."""
+        listed = [recordings] if isinstance(recordings, Recording) else list(recordings)
+        if self.unknown_load is False:
+            return super().data(listed, rows)
+        scheduling = schedules(listed) if self.scheduling is None else self.scheduling
+        filled, lacking = with_loads(listed, scheduling)
+        data = super().data(filled, rows)
+        runs = [replace(run, unmeasured=lacking[run.recording]) for run in data.runs]
+        return replace(data, runs=tuple(runs))
+
+    def find(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
+        """Return the block found, and the data without what tells nothing."""
+        data, notes = without_held(data)
+        tracker.notes += notes
+        block = self.identify(data, tracker)
+        return block, of_channels(data, block.scheduling)
+
     def identify(self, data: TrainingData, tracker: Tracker) -> Block:
         """Return the balance, solved for displacements."""
         data, notes = telling(data)
-        tracker.notes += [*notes, *other_zeros(data)]
-        behind = None
+        tracker.notes += notes
+        recorded, behind = data, None
         if len(data.inputs) > len(data.outputs):
             along = directions_of(data)
             tracker.notes.append(in_words(data, along))
@@ -150,25 +176,16 @@ class BalanceEstimator(CoupledEstimator):
         check_directions(data)
         ways = directions(data)
         data = turned(data, ways)
-        structure = self.structure(data, tracker)
-        dead = 0.0
+        slack = len(data.inputs) > 1 if self.slack is None else self.slack
+        few = Search(data, self.structure(data, tracker), self.ridge).of_few(FIRST_SAMPLES)
+        stages = Stages(tracker, self.steps, seeks_slack=slack and not self.mass)
         with tracker.searching():
-            few = Search(data, structure, self.ridge).of_few(FIRST_SAMPLES)
-            slack = len(data.inputs) > 1 if self.slack is None else self.slack
-            slack = slack and not self.mass
-            self._begin(few, tracker, slack)
-            few = self._long_held(few, tracker, slack)
-            structure = few.structure
-            assert tracker.best is not None
-            if slack or self.contact:
-                few.descend(tracker.best, min(self.steps, DEAD_STEPS), tracker, first=slack)
-            if slack:
-                structure = self._slack(few, tracker)
-            few = Search(few.data, structure, self.ridge)
-            if self.contact:
-                dead, tracker.best = self._dead_zone(few, tracker, slack)
-            search = Search(acting(data, dead), structure, self.ridge).of_few(MOST_SAMPLES)
+            found, dead = stages.found(
+                few, data, loads=self.unknown_load is None, contact=self.contact
+            )
+            search = found.having(acting(data, dead)).of_few(MOST_SAMPLES)
             few = search.of_few(MORE_SAMPLES)
+            assert tracker.best is not None
             tracker.best_cost = few.cost(tracker.best)
             few.descend(tracker.best, self.steps, tracker)
             tracker.reached(0.7)
@@ -180,11 +197,19 @@ class BalanceEstimator(CoupledEstimator):
                 "no balance of forces runs free over these recordings. Remedy: check that displacements "
                 "count as shortening and loads as pulling the muscle longer"
             )
+        structure = search.structure
         limited = data.inputs[0].unit in LIMITED
         ends = np.array([min(float(data.lowest.min()), 0.0), float(data.highest.max())])
         low, high = acted(ends, dead).tolist()
         balance = structure.block(tracker.best, (low, high) if limited else None)
-        tracker.notes += not_at_rest(data, settled=structure.settled)
+        x = of_channels(data, balance.scheduling).stacked("scheduled")
+        balance = replace(balance, known=rows(np.column_stack([x.min(axis=0), x.max(axis=0)])))
+        self._found = structure, tracker.best
+        self.loads_ = structure.own.table_of_loads(tracker.best, 1 + data.runs[-1].recording)
+        tracker.notes += not_at_rest(data, settled=structure.settled, found=structure.n_starts > 0)
+        tracker.notes += other_zeros(recorded, self.loads_)
+        tracker.notes += loads_told(data, self.loads_, balance, newtons=structure.in_newtons)
+        tracker.notes += [*varying(search, tracker.best), *held_told(search, tracker.best)]
         tracker.notes += [*held_back(balance, structure), *sentences(balance, structure)]
         if dead:
             tracker.notes.append(
@@ -201,68 +226,12 @@ class BalanceEstimator(CoupledEstimator):
         parts += [behind] if behind else []
         return parts[0] if len(parts) == 1 else Series(tuple(parts))
 
-    def _begin(self, few: Search, tracker: Tracker, first: bool) -> None:
-        """Show the tracker where the linear stage and first steps from several starts lead."""
-        starts = []
-        for grip, plain in product(GRIPS if self.n_stops else GRIPS[:1], (False, True)):
-            values = few.begun(grip * few.structure.highest, plain=plain)
-            starts.append((few.cost(values), plain, values))
-            tracker.saw(values, starts[-1][0])
-        starts.sort(key=lambda start: start[0])
-        few.check_loads(next(values for _, plain, values in starts if not plain), tracker)
-        for _, _, start in starts if few.n_rows <= FEW_ROWS else starts[:FOLLOWED]:
-            few.descend(start, min(self.steps, FIRST_STEPS), tracker, first=first)
-
-    def _long_held(self, few: Search, tracker: Tracker, first: bool) -> Search:
-        """Return the search of muscles that were settled when recordings began, if that explains these.
-
-        Their first parts count then, which they do not where what came before is unknown. The tracker's
-        best is then where it leads.
-        """
-        if tracker.best is None or not any(few.unsure):
-            return few
-        settled = Search(few.data, replace(few.structure, settled=True), self.ridge)
-        settled.span = few.span
-        part = tracker.part(0.3, 0.5)
-        settled.descend(tracker.best, min(self.steps, DEAD_STEPS), part, first=first)
-        if part.best is None or part.best_cost > EXPLAINED * tracker.best_cost:
-            return few
-        tracker.best, tracker.best_cost = part.best, part.best_cost
-        return settled
-
-    def _slack(self, few: Search, tracker: Tracker) -> Structure:
-        """Return the structure of muscles that go slack if that helps, and show it to the tracker."""
-        assert tracker.best is not None
-        slack = Search(few.data, replace(few.structure, slack=True), self.ridge)
-        slack.span = few.span
-        part = tracker.part(0.5, 0.6)
-        start = slack.slackened(tracker.best, FIRM)
-        slack.descend(start, min(self.steps, DEAD_STEPS), part, first=True)
-        if part.best is None or not part.best_cost < (1.0 - HELPS) * few.cost(tracker.best):
-            return few.structure
-        tracker.best = part.best
-        return slack.structure
-
-    def _dead_zone(self, few: Search, tracker: Tracker, first: bool) -> tuple[float, Array]:
-        """Return over which pressure a dead zone fades that helps most, 0 if none does, and where.
-
-        Begins at what the tracker has found without one.
-        """
-        assert tracker.best is not None
-        dead, best = 0.0, tracker.best
-        cost = few.cost(best)
-        least = (1.0 - HELPS) * cost
-        for pressure in np.array(DEAD_ZONES) * few.structure.highest:
-            part = tracker.part(0.6, 0.65)
-            here = Search(acting(few.data, float(pressure)), few.structure, self.ridge)
-            here.span = few.span
-            here.descend(best, min(self.steps, DEAD_STEPS), part, first=first)
-            if part.best is None or not part.best_cost < cost:
-                break
-            cost = part.best_cost
-            if cost < least:
-                dead, best = float(pressure), part.best
-        return dead, best
+    def free_runs(self, blocks: Sequence[Block], data: TrainingData) -> Array:
+        """Return the free-running outputs of blocks, each run under its own load from its own start."""
+        structure, values = self._found
+        if structure.size == structure.own.first:
+            return super().free_runs(blocks, data)
+        return np.array([simulate_started(block, data, structure, values) for block in blocks])
 
     def uncertainty(
         self, block: Block, data: TrainingData, residual: Array, at_bounds: Sequence[int]
@@ -271,12 +240,12 @@ class BalanceEstimator(CoupledEstimator):
         if len(data.inputs) > len(data.outputs):
             return np.nan, unknown(block)  # directions are not among what is free
         balance, contacts, _ = parts_of(block)
-        told, _ = telling(data)
-        shortened = turned(told, directions(told))
-        structure = replace(self.structure(shortened, Tracker()), settled=balance.settled)
         dead = 0.0 if contacts is None else float(contacts.pack()[0])
-        search = Search(acting(shortened, dead), structure, self.ridge)
-        condition, found = search.covariance(structure.values(balance))
+        structure, values = self._found
+        search = Search(acting(turned(data, directions(data)), dead), structure, self.ridge)
+        condition, found = search.covariance(
+            structure.values(balance, values[structure.own.first :])
+        )
         packed = structure.packed()
         covariance = unknown(block)
         # dead zones come before; a sensor's gain and offset follow, which are not fitted
@@ -337,6 +306,7 @@ class BalanceEstimator(CoupledEstimator):
             tare=tare,
             slack=False,
             mass=self.mass,
+            unmeasured=() if tare else without_load(data, every=bool(self.unknown_load)),
         )
 
     def _lags(self, data: TrainingData) -> Array:
@@ -375,28 +345,8 @@ def directions(data: TrainingData) -> list[tuple[float, float]]:
     return found
 
 
-def acted(pressure: Array, dead: float) -> Array:
-    """Return what acts of pressures, of any shape, with a dead zone that fades over one."""
-    if not dead:
-        return pressure
-    return Contact(dead).simulate(pressure.ravel()).reshape(pressure.shape)
-
-
-def acting(data: TrainingData, dead: float) -> TrainingData:
-    """Return data driven by what acts of the pressures."""
-    runs = [replace(run, driven=acted(run.driven, dead)) for run in data.runs]
-    return replace(data, runs=tuple(runs)) if dead else data
-
-
 def _side_by_side(parts: Sequence[Block]) -> list[Block]:
     """Return one block a channel as a part of a series, or none."""
     if len(parts) < 2:
         return list(parts)
     return [PerChannel(tuple(parts))]
-
-
-def turned(data: TrainingData, ways: list[tuple[float, float]]) -> TrainingData:
-    """Return data whose outputs are shortenings from about zero."""
-    gains, offsets = np.array(ways).T
-    runs = [replace(run, outputs=(run.outputs - offsets) / gains) for run in data.runs]
-    return replace(data, runs=tuple(runs))

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
+from mckibben.arrays import Array
 from mckibben.errors import DataError
 from mckibben.estimators.core.data import Run, TrainingData
 
@@ -62,6 +64,21 @@ def telling(data: TrainingData) -> tuple[TrainingData, list[str]]:
     return replace(data, runs=runs, scheduled=scheduled), notes
 
 
+def of_channels(data: TrainingData, names: Sequence[str]) -> TrainingData:
+    """Return data with some of the channels that schedule, in that order."""
+    known = [channel.name for channel in data.scheduled]
+    places = [known.index(name) for name in names]
+    runs = tuple(replace(run, scheduled=run.scheduled[:, places]) for run in data.runs)
+    return replace(data, runs=runs, scheduled=tuple(data.scheduled[place] for place in places))
+
+
+def turned(data: TrainingData, ways: list[tuple[float, float]]) -> TrainingData:
+    """Return data whose outputs are shortenings from about zero."""
+    gains, offsets = np.array(ways).T
+    runs = [replace(run, outputs=(run.outputs - offsets) / gains) for run in data.runs]
+    return replace(data, runs=tuple(runs))
+
+
 def one_speed(data: TrainingData) -> bool:
     """Tell whether all inputs always move at about one speed, which tells nothing of rate."""
     speeds = []
@@ -94,9 +111,14 @@ def moving(data: TrainingData) -> TrainingData:
     return replace(data, runs=tuple(run for run in data.runs if not held(data, run)))
 
 
-def other_zeros(data: TrainingData) -> list[str]:
-    """Return which runs begin where others with the same inputs do not, as with another zero."""
+def other_zeros(data: TrainingData, loads: Array) -> list[str]:
+    """Return which runs begin where others with the same inputs do not, as with another zero.
+
+    Those of recordings with loads of their own do for that.
+    """
     data = moving(data)
+    known = tuple(run for run in data.runs if not loads[run.recording].any())
+    data = replace(data, runs=known)
     if not data.runs:
         return []
     first = np.array([[*run.driven[0], *run.scheduled[0]] for run in data.runs])
@@ -155,15 +177,16 @@ def check_directions(data: TrainingData) -> None:
             )
 
 
-def not_at_rest(data: TrainingData, *, settled: bool) -> list[str]:
-    """Return which runs begin under pressure, and whether that seems to have been held for long."""
+def not_at_rest(data: TrainingData, *, settled: bool, found: bool) -> list[str]:
+    """Return which runs begin under pressure, and what was made of that."""
     names = [run.name for run in data.runs if not held(data, run) and not at_rest(data, run)]
     if settled:
         return [
             f"{name} begins under a pressure that seems to have long been held" for name in names
         ]
+    how = "what it remembers was found" if found else "its first part does not count"
     return [
-        f"{name} does not begin at rest: its first part does not count, and simulations of it begin "
-        "as if it did. Remedy: begin recordings without pressure"
+        f"{name} does not begin at rest: {how}, and simulations of it begin as if it did. "
+        "Remedy: begin recordings without pressure"
         for name in names
     ]

@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.polynomial import polynomial
 
 from mckibben.arrays import Array
-from mckibben.errors import DataError, ModelError
+from mckibben.errors import ModelError
 from mckibben.estimators.core.data import Run, TrainingData
 from mckibben.estimators.core.uncertainty import inverted
 from mckibben.estimators.coupled.balance_checks import at_rest, held
 from mckibben.estimators.coupled.balance_slopes import run as follow
-from mckibben.estimators.coupled.balance_structure import LEAST_PULL, Structure
+from mckibben.estimators.coupled.balance_structure import Structure
 from mckibben.estimators.optimisers.constrained import constrained_least_squares
 from mckibben.estimators.optimisers.tracker import Tracker
 
@@ -27,6 +27,9 @@ STRAIGHT = 0.01
 WARMING = 0.2
 """Share of a run that does not begin at rest before which its errors do not count."""
 
+UNLIKELY = 0.03
+"""Error, relative to the range, as bad as a start with all friction loaded, or a range behind."""
+
 MOST_TRIES = 9
 """Dampings tried for a step, each ten times the last."""
 
@@ -35,9 +38,6 @@ MOST_CUTS = 8
 
 LIGHTEST = 1e-7
 """Root of the damping of a step that is hardly damped."""
-
-TURNED_STEPS = 2
-"""Steps after which loads that were turned round are compared with those that were given."""
 
 UNKNOWN = 1e-10
 """Effect, relative to the largest of any number, that is none."""
@@ -66,10 +66,18 @@ class Search:
         self.every = max(1, n_rows // MOST_ROWS)
         self.cuts: list[tuple[Array, Array]] = []
         self.still = [bool(structure.loaded) and held(data, run) for run in self.runs]
-        self.unsure = [
-            0.0 if still or at_rest(data, run) else WARMING
-            for still, run in zip(self.still, self.runs, strict=True)
+        self.resting = [at_rest(data, run) for run in self.runs]
+        self.warming = [
+            0.0 if still or resting else WARMING
+            for still, resting in zip(self.still, self.resting, strict=True)
         ]
+
+    def having(self, data: TrainingData | None = None, **changed: Any) -> Search:
+        """Return the same search over other data of the same ranges, or with a changed structure."""
+        structure = replace(self.structure, **changed) if changed else self.structure
+        found = Search(data or self.data, structure, self.ridge)
+        found.span = self.span
+        return found
 
     def of_few(self, most: int) -> Search:
         """Return the same search over fewer samples, where there are very many.
@@ -85,8 +93,8 @@ class Search:
         count = max(min(most * every * len(self.runs) // total, len(self.runs)), 1)
         chosen = np.unique(np.linspace(0, len(self.runs) - 1, count).round().astype(int))
         runs = tuple(self.data.runs[i].thinned(every) for i in chosen.tolist())
-        found = Search(replace(self.data, runs=runs), self.structure, self.ridge)
-        found.span, found.cuts = self.span, self.cuts
+        found = self.having(replace(self.data, runs=runs))
+        found.cuts = self.cuts
         return found
 
     def _straight(self, every: int) -> bool:
@@ -102,17 +110,33 @@ class Search:
         self, values: Array, place: int, *, held: bool, sloped: bool = True
     ) -> tuple[Array, Array]:
         """Return displacements of a run, or forces that are lacking, and their slopes."""
-        block, run = self.structure.block(values), self.runs[place]
-        return follow(
-            block.coefficients(run.sample_time or 1.0),
+        structure, run, own = self.structure, self.runs[place], self.structure.own
+        load = own.load(run.recording)
+        if load.size:
+            values = values.copy()
+            values[structure.constants] += values[load]
+        begun, by = own.begun(values, run.place, structure.grip, run.driven[0])
+        if held:
+            begun = begun[:0]
+        found, slopes = follow(
+            structure.block(values).coefficients(run.sample_time or 1.0),
             np.ascontiguousarray(run.driven),
             np.ascontiguousarray(run.outputs),
             np.ascontiguousarray(run.scheduled),
             held=held,
             every=self.every,
-            settled=self.still[place],
+            settled=self.still[place] or (held and self.resting[place] and not structure.tare),
             sloped=sloped,
+            begun=begun,
         )
+        if structure.size == own.first or not sloped:
+            return found, slopes
+        whole = np.zeros((*slopes.shape[:2], structure.size))
+        whole[..., : own.first] = slopes[..., : own.first]
+        whole[..., load] = slopes[..., structure.constants[: load.size]]
+        if begun.size:
+            whole += slopes[..., own.first :] @ by
+        return found, whole
 
     def measured(self, run: Run) -> Array:
         """Return the displacements that are compared."""
@@ -128,10 +152,10 @@ class Search:
         values = structure.start
         values[structure.grip] = grip
         found = [self.followed(values, place, held=True)[1] for place in range(len(self.runs))]
-        for unsure, of_run in zip(self.unsure, found, strict=True):
+        for unsure, of_run in zip(self.warming, found, strict=True):
             of_run[: round(unsure * len(of_run))] = 0.0
         slopes = np.concatenate(found)
-        slopes[:, :, structure.grip :] = 0.0
+        slopes[:, :, structure.grip : structure.timing.stop] = 0.0
         for k in range(structure.n):
             slopes[:, :, structure.places("wall", k)] = 0.0
         mix = structure.free(moving=False, plain=plain)
@@ -147,7 +171,9 @@ class Search:
             weights = 1.0 / self.stiffness(values)
         if structure.in_newtons:
             forces = slice(structure.slices["damping"].start, structure.slices["loads"].stop)
-            values[forces] /= values[structure.places("loads", 0)[0]]
+            load = values[structure.places("loads", 0)[0]]
+            values[forces] /= load
+            values[structure.own.first : structure.own.starts] /= load
         return values
 
     def slackened(self, values: Array, share: float) -> Array:
@@ -164,59 +190,6 @@ class Search:
                 most = max(most, -float(pulled.min()))
             values[structure.places("push", k)] = share * most
         return values
-
-    def loads_told(self, values: Array) -> bool:
-        """Tell whether the linear stage found that a load pulls, and how much."""
-        structure = self.structure
-        area = float(values[structure.places("areas", 0)[0]])
-        return not structure.in_newtons or area < 0.99 * structure.highest / LEAST_PULL
-
-    def check_loads(self, values: Array, tracker: Tracker) -> None:
-        """Refuse loads that seem to push where they should pull; note one that tells nothing.
-
-        Raises
-        ------
-        DataError
-            Naming the recording, or that it is all of them.
-        """
-        if self.loads_told(values):
-            return
-        channel = self.structure.loaded[0].name
-        suspects = [tuple(range(len(self.runs))), *((place,) for place in range(len(self.runs)))]
-        costs = []
-        for suspect in suspects:
-            turned = self.turned(suspect)
-            found = turned.begun(float(values[self.structure.grip]))
-            tried = Tracker()
-            if turned.loads_told(found):
-                turned.descend(found, TURNED_STEPS, tried)
-            costs.append(tried.best_cost)
-        best = int(np.argmin(costs))
-        given = Tracker()
-        self.descend(values, TURNED_STEPS, given)
-        if costs[best] < min(given.best_cost, self.cost(values)):
-            names = [self.runs[place].name for place in suspects[best]]
-            raise DataError(
-                "the more it pulls, the shorter the muscle, as if its sign were wrong",
-                file=names[0] if len(set(names)) == 1 else f"all {len(names)} recordings",
-                channel=channel,
-                remedy="give forces that pull the muscle longer as positive",
-            )
-        tracker.notes.append(
-            f"{channel} hardly tells area from springs: all forces may be wrong by a factor. Remedy: "
-            "record under loads that change while the pressure does not"
-        )
-
-    def turned(self, places: Sequence[int]) -> Search:
-        """Return the same search with the loads of some runs turned round."""
-        runs = list(self.runs)
-        for place in places:
-            scheduled = runs[place].scheduled.copy()
-            scheduled[:, -1] *= -1.0
-            runs[place] = replace(runs[place], scheduled=scheduled)
-        other = Search(replace(self.data, runs=tuple(runs)), self.structure, self.ridge)
-        other.span = self.span
-        return other
 
     def stiffness(self, values: Array) -> Array:
         """Return how stiff every muscle is at every sample kept, shape (samples, n)."""
@@ -276,10 +249,13 @@ class Search:
             self.cuts.append((x, way))
         return values
 
-    def missed(self, values: Array, place: int, *, sloped: bool = True) -> tuple[Array, Array]:
+    def missed(
+        self, values: Array, place: int, *, sloped: bool = True, whole: bool = False
+    ) -> tuple[Array, Array]:
         """Return the errors over a run relative to the ranges, and their slopes by coefficients.
 
-        Of a run that begins in an unknown state the first part does not count, until it has forgotten.
+        Of a run that begins in an unknown state, that is not found, the first part does not count, until
+        it has forgotten, but where the ``whole`` is asked for.
         """
         still = self.still[place]
         found, by = self.followed(values, place, held=still, sloped=sloped)
@@ -289,13 +265,33 @@ class Search:
         else:
             found = found - self.measured(self.runs[place])
             scale = 1.0 / self.span
-        counts = (np.arange(len(found)) >= self.unsure[place] * len(found))[:, np.newaxis]
+        known = whole or self.structure.settled or self.structure.n_starts
+        unsure = 0.0 if known else self.warming[place]
+        counts = (np.arange(len(found)) >= unsure * len(found))[:, np.newaxis]
         by *= (scale * counts)[..., np.newaxis]
         return (found * scale * counts).ravel(), by.reshape(found.size, by.shape[2])
 
-    def errors(self, values: Array, *, sloped: bool = True) -> tuple[Array, Array]:
+    def unlikely(self, values: Array) -> tuple[Array, Array]:
+        """Return how far from rest the starts of runs are, as errors and slopes."""
+        structure = self.structure
+        places = np.arange(structure.own.starts, structure.size)
+        scale = np.full((structure.n_starts, structure.n, 1 + structure.lags.size), UNLIKELY)
+        scale[:, :, 1:] /= self.span[:, np.newaxis]
+        slopes = np.zeros((places.size, structure.size))
+        slopes[np.arange(places.size), places] = scale.ravel()
+        return scale.ravel() * values[places], slopes
+
+    def errors(
+        self, values: Array, *, sloped: bool = True, whole: bool = False
+    ) -> tuple[Array, Array]:
         """Return the errors over all runs, and their slopes, of no columns if not wanted."""
-        of_runs = [self.missed(values, place, sloped=sloped) for place in range(len(self.runs))]
+        of_runs = [
+            self.missed(values, place, sloped=sloped, whole=whole)
+            for place in range(len(self.runs))
+        ]
+        if self.structure.n_starts:
+            far, by = self.unlikely(values)
+            of_runs.append((far, by if sloped else by[:, :0]))
         errors, slopes = zip(*of_runs, strict=True)
         return np.concatenate(errors), np.concatenate(slopes)
 
@@ -325,9 +321,9 @@ class Search:
         covariance[lost] = covariance[:, lost] = np.nan
         return condition, covariance
 
-    def cost(self, values: Array) -> float:
-        """Return the root mean square of the errors."""
-        found = _size(self.errors(values, sloped=False)[0])
+    def cost(self, values: Array, *, whole: bool = False) -> float:
+        """Return the root mean square of the errors, or of those over ``whole`` runs."""
+        found = _size(self.errors(values, sloped=False, whole=whole)[0])
         return found if np.isfinite(found) else np.inf
 
     def descend(self, values: Array, steps: int, tracker: Tracker, *, first: bool = False) -> None:

@@ -27,6 +27,9 @@ from mckibben.blocks.coupled.balance_terms import (
     resisted,
 )
 
+NOTHING: Array = np.zeros(0)
+"""Where no stops and lags begin: at rest."""
+
 
 @kernel
 def slower(c: Array, i: int, before: float, moved: float) -> float:
@@ -292,12 +295,13 @@ def follow(
     held: bool,
     settled: bool,
     every: int,
+    begun: Array,
     memory: Array,
     scratch: Array,
     found: Array,
     slopes: Array,
 ) -> None:
-    """Run from rest to every sample; keep every so manieth.
+    """Run from rest, or from where stops and lags begin, to every sample; keep every so manieth.
 
     Parameters
     ----------
@@ -310,12 +314,16 @@ def follow(
     settled : bool
         Whether they have long been there at the start.
     every : int
+    begun : array, shape (n times stops and lags,)
+        Stops and lags before the first sample [mm], of muscles that are where its pressures hold them
+        without; none of those that come from rest.
     memory : array, shape (states + n, coefficients)
         To compute in; so is ``scratch``.
     found : array, shape (t / every, n)
         Displacements [mm], or forces that are lacking [N].
     slopes : array, shape (t / every, n, coefficients)
-        By every muscle's coefficients, the grip, and the lags' logarithms; of no columns if not wanted.
+        By every muscle's coefficients, the grip, the lags' logarithms, and ``begun``; of no columns if
+        not wanted.
     """
     n = int(c[0])
     n_states = memory.shape[0] - n
@@ -342,6 +350,14 @@ def follow(
             offset[k] = y[k]
             for j in range(memory.shape[1]):
                 tare[k, j] = 0.0 if held else row[k, j]
+    if begun.size > 0:
+        for k in range(n):
+            p[k] = driven[0, k]
+        move(c, state, AT_REST, False, y, x[0], p, memory, now, row, work)
+        for i in range(begun.size):
+            state[2 * n + i] = begun[i]
+            if memory.shape[1] > 0:
+                memory[2 * n + i, memory.shape[1] - begun.size + i] = 1.0
     for t in range(driven.shape[0]):
         for k in range(n):
             p[k] = driven[t, k]
@@ -366,16 +382,18 @@ def run(
     every: int = 1,
     settled: bool = False,
     sloped: bool = True,
+    begun: Array = NOTHING,
 ) -> tuple[Array, Array]:
     """Return what `follow` finds, of whose every so many samples the last is kept, and the slopes."""
     n, m, n_l = int(c[0]), int(c[4]), int(c[5])
     width = (c.size - HEAD - m - 2 * n_l) // n
-    n_states, n_c = n * (3 + m + n_l + (2 if c[15] else 0)) + 2, (n * width + 1 + n_l) * sloped
+    n_states = n * (3 + m + n_l + (2 if c[15] else 0)) + 2
+    n_c = (n * width + 1 + n_l + begun.size) * sloped
     decays = c[HEAD + m : HEAD + m + n_l]
     c = np.concatenate([c, -decays * np.log(decays)])
     kept = -(-len(driven) // every)
     found, slopes = np.empty((kept, n)), np.empty((kept, n, n_c))
     memory = np.zeros((n_states + n, n_c))
     scratch = np.zeros(n_states + 10 * n + 4 * n * n)
-    follow(c, driven, measured, x, held, settled, every, memory, scratch, found, slopes)
+    follow(c, driven, measured, x, held, settled, every, begun, memory, scratch, found, slopes)
     return found, slopes

@@ -1,6 +1,7 @@
 """What of a balance of forces is fixed, what is free, and what physics asks of it.
 
-Coefficients are those of the block, muscle by muscle, then the grip and the lags' logarithms. What is
+Coefficients are those of the block, muscle by muscle, then the grip and the lags' logarithms, then what
+recordings and runs have of their own (`mckibben.estimators.coupled.balance_own`). What is
 free is fewer numbers, of which they are an affine function: springs between two muscles are one number.
 Every muscle has a spring of its own, which makes up for elasticity and area that soften; of muscles that
 do not go slack nothing tells it from the others, to which it is added in the end.
@@ -19,6 +20,7 @@ from mckibben.arrays import Array
 from mckibben.blocks.core.fields import Channel, rows, vector
 from mckibben.blocks.coupled.balance import Balance
 from mckibben.blocks.coupled.balance_law import NEVER
+from mckibben.estimators.coupled.balance_own import Own
 
 GRID = 21
 """Places along what is known of every muscle's displacement where conditions are asked for."""
@@ -64,6 +66,10 @@ class Structure:
         Whether muscles had long been where every recording begins.
     mass : bool
         Whether what moves is heavy.
+    unmeasured : tuple of int
+        Recordings that hung under constant loads of their own, which are found too.
+    n_starts : int
+        Runs whose memories at the start are found too: all, or none.
     """
 
     driven: tuple[Channel, ...]
@@ -83,6 +89,8 @@ class Structure:
     lag_range: tuple[float, float]
     settled: bool = False
     mass: bool = False
+    unmeasured: tuple[int, ...] = ()
+    n_starts: int = 0
 
     @property
     def n(self) -> int:
@@ -138,10 +146,21 @@ class Structure:
         """Places of the lags' logarithms."""
         return slice(self.grip + 1, self.grip + 1 + self.lags.size)
 
+    @cached_property
+    def own(self) -> Own:
+        """Places of what recordings and runs have of their own."""
+        n_lags, first = self.lags.size, self.timing.stop
+        return Own(first, self.n, n_lags, self.limits, self.unmeasured, self.n_starts)
+
     @property
     def size(self) -> int:
         """How many coefficients there are."""
-        return self.grip + 1 + self.lags.size
+        return self.own.stop
+
+    @property
+    def constants(self) -> NDArray[np.intp]:
+        """Places of the muscles' constant forces."""
+        return np.array([self._spring(0, k, -1) for k in range(self.n)])
 
     @property
     def start(self) -> Array:
@@ -190,8 +209,8 @@ class Structure:
             mass=vector(np.maximum(part["mass"][:, 0], 0.0)) if self.mass else (),
         )
 
-    def values(self, block: Balance) -> Array:
-        """Return the coefficients of a balance of this structure."""
+    def values(self, block: Balance, own: Array) -> Array:
+        """Return the coefficients of a balance of this structure, behind them what runs have alone."""
         none, never = self.n * (0.0,), self.n * (NEVER,)
         single = [block.walls, block.pushes or never, block.damping]
         single += [block.lines or none, block.bladders or none, block.mass or none]
@@ -199,7 +218,7 @@ class Structure:
         tables += [block.springs, block.elasticity, block.areas]
         tables += [block.friction, block.relaxation, block.loads]
         table = np.hstack([np.asarray(part, dtype=np.float64) for part in tables])
-        return np.concatenate([table.ravel(), [block.grip], np.log(block.lags)])
+        return np.concatenate([table.ravel(), [block.grip], np.log(block.lags), own])
 
     def packed(self) -> NDArray[np.intp]:
         """Return, for every parameter that a balance packs, its place among coefficients."""
@@ -253,9 +272,9 @@ class Structure:
                     sorted({self._spring(q, k, j), self._spring(q, j, k)}) for j in range(k, self.n)
                 ]
         if moving:
-            columns += [
-                [place] for place in range(self.grip, self.grip + 1 if first else self.size)
-            ]
+            stop = self.grip + 1 if first else self.timing.stop
+            columns += [[place] for place in range(self.grip, stop)]
+        columns += [[place] for place in range(self.own.first, self.size)]
         mix = np.zeros((n_all, len(columns)))
         for number, places in enumerate(columns):
             mix[places, number] = 1.0
@@ -292,6 +311,12 @@ class Structure:
             ask({place: -1.0}, -min(longest, now + MOST_LONGER))
             if place > self.timing.start:
                 ask({place: 1.0, place - 1: -1.0}, APART)
+        for place in range(self.n_starts):
+            for k, places in enumerate(self.own.start(place).tolist()):
+                far = float(np.ptp(self.hull[k]))
+                for number, most in zip(places, [1.0, *self.lags.size * [far]], strict=True):
+                    ask({number: 1.0}, -most)
+                    ask({number: -1.0}, -most)
         for k in range(self.n):
             for name in (
                 *("bladder", "push", "friction", "relaxation", "damping", "line", "wall", "mass"),

@@ -1,0 +1,89 @@
+"""What fields of a balance of forces have to be: of one size, and as physics asks."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mckibben.errors import ModelError
+
+if TYPE_CHECKING:
+    from mckibben.blocks.coupled.balance import Balance
+
+
+def check_fields(balance: Balance) -> None:
+    """Refuse a balance whose fields do not fit one another, or that would make energy.
+
+    Raises
+    ------
+    ModelError
+        Naming the field.
+    """
+    n = len(balance.driven)
+    n_loads = len(balance.loads[0]) if balance.loads else 0
+    if n_loads > len(balance.scheduled):
+        raise ModelError(
+            f"{balance.kind!r} has {n_loads} loads, and {len(balance.scheduled)} channels that schedule "
+            "or load it. Remedy: give every load a channel, behind what schedules."
+        )
+    reach = balance.pressure_range
+    if reach is not None and not reach[0] < reach[1]:
+        raise ModelError(
+            f"pressure_range of {balance.kind!r} is {reach}. Remedy: the lower end first."
+        )
+    n_powers = 1 + (len(balance.scheduled) - n_loads) * balance.degree
+    widths = {
+        "springs": n_powers * (1 + n),
+        "elasticity": len(balance.elasticity[0]) if balance.elasticity else 0,
+        "areas": max(len(balance.areas[0]) if balance.areas else 0, 1),
+        "friction": len(balance.limits),
+        "relaxation": len(balance.lags),
+        "loads": n_loads,
+        "hull": 2,
+    }
+    for name, width in widths.items():
+        table = getattr(balance, name)
+        if len(table) != n or any(len(row) != width for row in table):
+            raise ModelError(
+                f"{name} of {balance.kind!r} has rows of {[len(row) for row in table]}. "
+                f"Remedy: give {n} rows of {width}."
+            )
+    lengths = {"damping": balance.damping, "walls": balance.walls, "given": balance.given}
+    if balance.bladders or balance.pushes:
+        lengths |= {"bladders": balance.bladders, "pushes": balance.pushes}
+    if balance.lines:
+        lengths["lines"] = balance.lines
+    lengths |= {"mass": balance.mass} if balance.mass else {}
+    for name, values in lengths.items():
+        if len(values) != n:
+            told = f"{name} of {balance.kind!r} has {len(values)} entries"
+            raise ModelError(f"{told}. Remedy: give {n}.")
+    at_rest = [row[0] for row in balance.areas]
+    above = {"limits": balance.limits, "lags": balance.lags, "areas at rest": at_rest}
+    for name, positive in above.items():
+        rises = name == "areas at rest" or all(a < b for a, b in pairwise(positive))
+        if any(not value > 0 for value in positive) or (name == "limits" and not rises):
+            raise ModelError(
+                f"{name} of {balance.kind!r} are {positive}. Remedy: give positive ones"
+                f"{', in increasing order' if name == 'limits' else ''}."
+            )
+    stiff = ("friction", "relaxation", "damping", "walls")
+    for name in (*stiff, "grip", "bladders", "pushes", "mass"):
+        if np.any(np.array(getattr(balance, name)) < 0):
+            raise ModelError(
+                f"{name} of {balance.kind!r} has a number below 0, which would make energy. "
+                "Remedy: give none below 0."
+            )
+    if balance.mass and balance.pushes:
+        raise ModelError(
+            f"{balance.kind!r} has mass and muscles that go slack. Remedy: give one of mass and pushes."
+        )
+    if balance.known and [len(row) for row in balance.known] != [2] * len(balance.scheduled):
+        raise ModelError(
+            f"known of {balance.kind!r} is {balance.known}. Remedy: give a pair for every channel that "
+            "schedules or loads it, or none."
+        )
+    if any(not low < high for low, high in balance.hull):
+        raise ModelError(f"hull of {balance.kind!r} is {balance.hull}. Remedy: lower ends first.")

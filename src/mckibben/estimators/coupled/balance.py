@@ -107,7 +107,8 @@ class BalanceEstimator(CoupledEstimator):
     contact : bool
         Whether a dead zone of small pressures is looked for; default so.
     slack : bool, optional
-        Whether it is looked for forces at which muscles go slack; default of several muscles.
+        Whether it is looked for forces at which muscles go slack; default of several muscles, and of
+        recordings in which a muscle is held.
     mass : bool
         Whether what hangs at the muscles is so heavy that its acceleration matters; then they are not
         found to go slack.
@@ -176,8 +177,9 @@ class BalanceEstimator(CoupledEstimator):
         check_directions(data)
         ways = directions(data)
         data = turned(data, ways)
-        slack = len(data.inputs) > 1 if self.slack is None else self.slack
         few = Search(data, self.structure(data, tracker), self.ridge).of_few(FIRST_SAMPLES)
+        pushed = len(data.inputs) > 1 or any(few.still)  # by other muscles, or what holds it
+        slack = pushed if self.slack is None else self.slack
         stages = Stages(tracker, self.steps, seeks_slack=slack and not self.mass)
         with tracker.searching():
             found, dead = stages.found(

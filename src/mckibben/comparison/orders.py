@@ -23,7 +23,9 @@ from mckibben.comparison.trying import (
     rms_of,
 )
 from mckibben.errors import ModelError
+from mckibben.estimators.core.estimator import Estimator
 from mckibben.estimators.core.single import SingleEstimator
+from mckibben.estimators.coupled.base import CoupledEstimator
 from mckibben.recording import Recording
 from mckibben.system.workers import checked
 
@@ -40,6 +42,7 @@ GRIDS: Mapping[str, Mapping[str, tuple[Any, ...]]] = {
     "cpi": {"n_operators": (4, 6, 8), "n_creep": (1, 2, 3)},
     "preisach": {"n_levels": (6, 10, 15)},
     "kp": {"n_levels": (6, 10, 15)},
+    "balance": {"n_lags": (1, 2, 3), "n_stops": (4, 6, 8), "area": (2, 3)},
 }
 """Orders tried by default."""
 
@@ -50,7 +53,7 @@ class Choice:
 
     Parameters
     ----------
-    estimator : SingleEstimator
+    estimator : Estimator
         Fitted to all recordings with the orders chosen; its block is ``model_``.
     orders : mapping
         The orders chosen.
@@ -58,7 +61,7 @@ class Choice:
         All orders with their cross-validated free-run RMSE, infinite where they failed, and why.
     """
 
-    estimator: SingleEstimator
+    estimator: Estimator
     orders: Mapping[str, Any]
     tried: tuple[tuple[Mapping[str, Any], float, str], ...]
 
@@ -107,9 +110,9 @@ def identify(
             "{'n_operators': (5, 10)}."
         )
     listed = [recordings] if isinstance(recordings, Recording) else list(recordings)
-    named: SingleEstimator = estimator_class(**settings)
-    parts = tuple(folds(listed, named.input, max(n_folds, 2)))
-    data = Data(given_split(listed, ()), parts, Channels((named.input,), (named.output,)))
+    channels = _channels(estimator_class(**settings), listed)
+    parts = tuple(folds(listed, channels.inputs[0], max(n_folds, 2)))
+    data = Data(given_split(listed, ()), parts, channels)
     combinations = [dict(zip(grid, values, strict=True)) for values in product(*grid.values())]
     every = tuple(range(len(parts)))
     work = [
@@ -121,8 +124,20 @@ def identify(
     chosen, lowest, reason = min(tried, key=lambda item: item[1])
     if not np.isfinite(lowest):
         raise ModelError(f"every order of {family!r} failed: {reason}")
-    fitted: SingleEstimator = estimator_class(**settings, **chosen).fit(listed)
+    fitted: Estimator = estimator_class(**settings, **chosen).fit(listed)
     return Choice(fitted, chosen, tuple(tried))
+
+
+def _channels(estimator: Estimator, recordings: Sequence[Recording]) -> Channels:
+    """Return what an estimator takes of recordings."""
+    if isinstance(estimator, CoupledEstimator):
+        data = estimator.data(recordings)
+        names = (
+            [channel.name for channel in of] for of in (data.inputs, data.outputs, data.scheduled)
+        )
+        return Channels(*map(tuple, names))
+    assert isinstance(estimator, SingleEstimator)
+    return Channels((estimator.input,), (estimator.output,))
 
 
 def _error(tried: Tried) -> tuple[float, str]:

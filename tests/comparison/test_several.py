@@ -47,7 +47,8 @@ def test_the_order_of_recordings_does_not_decide_the_channels() -> None:
 
 
 @pytest.mark.parametrize(
-    ("models", "told"), [(["gpi"], "no model is told"), (["balance", "gpi"], "no model but balance")]
+    ("models", "told"),
+    [(["gpi"], "no model is told"), (["balance", "gpi"], "no model but balance")],
 )
 def test_a_load_that_only_some_models_find_is_said(models: list[str], told: str) -> None:
     wave = triangle(TIME, 4.0, 3.0)

@@ -46,6 +46,18 @@ def test_the_order_of_recordings_does_not_decide_the_channels() -> None:
             compare(runs, models=["coupled-memory"], jobs=1)
 
 
+@pytest.mark.parametrize(
+    ("models", "told"),
+    [(["gpi"], "no model is told"), (["balance", "gpi"], "no model but balance")],
+)
+def test_a_load_that_only_some_models_find_is_said(models: list[str], told: str) -> None:
+    wave = triangle(TIME, 4.0, 3.0)
+    channels = {"pressure": wave, "displacement": GPI.example().simulate(wave)}
+    single = Recording(channels | {"force": 10 + triangle(TIME, 7.0, 5.0)}, 0.05)
+    notes = plan_of(single, [], models=models, settings=None, seed=0).notes
+    assert any(told in note for note in notes)
+
+
 @pytest.mark.parametrize("load", [*INPUTS, *OUTPUTS])
 def test_no_model_is_told_what_it_is_to_give(load: str) -> None:
     with pytest.raises(DataError, match="named twice"):

@@ -143,6 +143,17 @@ def test_bad_recordings_are_named(balance_runs: list[Recording]) -> None:
         registry.load("estimators", "balance")(degree=9).fit(balance_runs)
 
 
+@pytest.mark.parametrize("lost", ["pressure_2", "displacement_2"])
+def test_the_order_of_recordings_does_not_hide_a_muscle(
+    lost: str, balance_runs: list[Recording]
+) -> None:
+    whole = balance_runs[0]
+    less = whole.select([name for name in whole.channels if name != lost])
+    for given in ([less, whole], [whole, less]):
+        with pytest.raises(DataError, match=lost):
+            registry.load("estimators", "balance")().fit(given)
+
+
 def test_projected_derivatives_agree_with_differences() -> None:
     rng = np.random.default_rng(1)
     x = rng.uniform(0, 1, (300, 2))

@@ -150,9 +150,10 @@ def track(
     if found.clipped >= len(found.recording):
         say("Pressures were at a limit throughout: the reference is out of reach.")
     elif found.clipped:
+        side = "below" if found.clipping_cost < 0 else "above"
         say(
             f"Pressures were at a limit in {found.clipped} steps; RMSE there is "
-            f"{numeral(found.clipping_cost, 3)} {measure} above that of the other steps."
+            f"{numeral(abs(found.clipping_cost), 3)} {measure} {side} that of the other steps."
         )
     say(
         f"Controller: {1e6 * found.step_time[0]:.0f} µs a step (median), "

@@ -21,7 +21,7 @@ from mckibben.comparison.shared_stretches import TESTED, told
 from mckibben.comparison.splits import given_split, held_out, listed, validation_folds
 from mckibben.comparison.trying import Data, Item, Tried
 from mckibben.errors import DataError, ModelError
-from mckibben.estimators.coupled.base import schedules
+from mckibben.estimators.coupled.base import CoupledEstimator, schedules
 from mckibben.recording import Recording, reading_notes
 from mckibben.signals import made_manageable
 
@@ -198,7 +198,7 @@ def plan_of(
         left_out=left_out,
         notes=(
             *notes,
-            *_about_load(every, channels, load),
+            *_about_load(every, channels, load, chosen),
             *_beyond_training(split.train, tests, channels),
             *shared,
             *reading_notes(every),
@@ -240,9 +240,10 @@ def _one_for_each_load(
 
 
 def _about_load(
-    recordings: Sequence[Recording], channels: Channels, load: str | None
+    recordings: Sequence[Recording], channels: Channels, load: str | None, models: Sequence[str]
 ) -> Iterator[str]:
-    """Tell of a load that does not change, and of one that does and is not told to any model."""
+    """Tell of a load that does not change, and of one that does and is not told to all models."""
+    finding = [m for m in models if isinstance(registry.load("estimators", m)(), CoupledEstimator)]
     named = (
         schedules(recordings, (*channels.inputs, *channels.outputs)) if load is None else (load,)
     )
@@ -252,7 +253,8 @@ def _about_load(
         if load is not None and not moves:
             yield f"{load} is {values[0][0]:g} throughout: what it does cannot be learned"
         elif channels.single and moves:
-            yield f"{name} is there, and no model is told it: see --load {name}"
+            told_of = f"no model but {', '.join(finding)}" if finding else "no model"
+            yield f"{name} is there, and {told_of} is told it: see --load {name}"
 
 
 def _beyond_training(

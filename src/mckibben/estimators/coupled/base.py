@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from abc import abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -115,8 +115,8 @@ class CoupledEstimator(Estimator):
         inputs, outputs = (
             (given,) if isinstance(given, str) else given for given in (self.input, self.output)
         )
-        inputs = inputs or driving(first)
-        outputs = outputs or numbered(first, "displacement") or one(first, "displacement")
+        inputs = inputs or in_any(listed, driving)
+        outputs = outputs or in_any(listed, moved)
         for what, names in (("pressure", inputs), ("displacement", outputs)):
             if not names:
                 raise DataError(
@@ -178,6 +178,18 @@ class CoupledEstimator(Estimator):
 def driving(recording: Recording) -> tuple[str, ...]:
     """Return the channels that drive the muscles of a recording, by their names."""
     return numbered(recording, "pressure") or one(recording, "voltage", "pressure")
+
+
+def moved(recording: Recording) -> tuple[str, ...]:
+    """Return the displacements of a recording, by their names."""
+    return numbered(recording, "displacement") or one(recording, "displacement")
+
+
+def in_any(
+    recordings: Sequence[Recording], named: Callable[[Recording], tuple[str, ...]]
+) -> tuple[str, ...]:
+    """Return the channels of so many muscles as any recording has, whichever comes first."""
+    return max((named(recording) for recording in recordings), key=len)
 
 
 def schedules(recordings: Sequence[Recording], others: Sequence[str] = ()) -> tuple[str, ...]:

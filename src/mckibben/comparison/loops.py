@@ -34,8 +34,8 @@ def closed_loops(
 ) -> dict[str, Tracked]:
     """Return what came of following a measured motion with every inverse, with PID, and with both.
 
-    Nothing is chosen by it. An inverse that fails is left out; its model is in the leaderboard. There are
-    none where the inverses do not give what drives the rig: pressures, and it takes volts.
+    Nothing is chosen by it. An inverse that fails is left out; its model is in the leaderboard.
+    There are none where inverses give pressures, and the rig takes volts.
 
     Parameters
     ----------

@@ -242,7 +242,7 @@ def _one_for_each_load(
 def _about_load(
     recordings: Sequence[Recording], channels: Channels, load: str | None
 ) -> Iterator[str]:
-    """Tell of a load that does not change, and of one that does and is not told to any model."""
+    """Tell of a load that does not change, and of one that does and is not told to most models."""
     named = (
         schedules(recordings, (*channels.inputs, *channels.outputs)) if load is None else (load,)
     )
@@ -252,7 +252,7 @@ def _about_load(
         if load is not None and not moves:
             yield f"{load} is {values[0][0]:g} throughout: what it does cannot be learned"
         elif channels.single and moves:
-            yield f"{name} is there, and no model is told it: see --load {name}"
+            yield f"{name} is there, and models of one input are not told it: see --load {name}"
 
 
 def _beyond_training(

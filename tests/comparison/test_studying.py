@@ -1,11 +1,15 @@
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from mckibben import GPI, PI, ModelError, Recording, study
 from mckibben.blocks.core.block import Block
+from mckibben.blocks.core.fields import Channel
 from mckibben.comparison.inverting import check_inverse, invert_best
+from mckibben.comparison.loops import closed_loops
 from mckibben.signals import irregular_triangle, triangle
 
 TIME = np.arange(0, 24, 0.02)
@@ -67,3 +71,13 @@ def test_models_without_inverse_are_passed_over(train: Recording) -> None:
     assert invert_best(replace(found, rows=()), train) is None
     with pytest.raises(ModelError, match="no output that it can reach"):
         check_inverse("pi", replace(PI.example(), input_range=None), train)
+
+
+@pytest.mark.parametrize(("driven", "closed"), [("voltage", True), ("pressure", False)])
+def test_no_loop_tells_a_regulator_pressures_as_volts(
+    driven: str, closed: bool, train: Recording
+) -> None:
+    model = replace(GPI.example(), input=Channel(driven, "V" if closed else "bar"))
+    row = SimpleNamespace(model="gpi", inverse=model.inverse())
+    board: Any = SimpleNamespace(rows=[row], outputs=("displacement",))
+    assert bool(closed_loops(board, "gpi", "rail", [train], 0)) is closed

@@ -35,6 +35,7 @@ def closed_loops(
     """Return what came of following a measured motion with every inverse, with PID, and with both.
 
     Nothing is chosen by it. An inverse that fails is left out; its model is in the leaderboard.
+    There are none where inverses give pressures, and the rig takes volts.
 
     Parameters
     ----------
@@ -47,6 +48,8 @@ def closed_loops(
     """
     rig = load_rig(plant)
     inverses = {row.model: row.inverse for row in board.rows if row.inverse is not None}
+    if not {channel.name for channel in inverses[chosen].outputs} <= set(rig.inputs):
+        return {}
     wanted = {channel.name for inverse in inverses.values() for channel in inverse.inputs}
     held = [name for name in rig.inputs if name in wanted]
     reference = _followed(tests, board.outputs, held)

@@ -242,7 +242,7 @@ def _one_for_each_load(
 def _about_load(
     recordings: Sequence[Recording], channels: Channels, load: str | None, models: Sequence[str]
 ) -> Iterator[str]:
-    """Tell of a load that does not change, and of one that does and is not told to all models."""
+    """Tell of a load that does not change, and of one that does and is not told to most models."""
     finding = [m for m in models if isinstance(registry.load("estimators", m)(), CoupledEstimator)]
     named = (
         schedules(recordings, (*channels.inputs, *channels.outputs)) if load is None else (load,)

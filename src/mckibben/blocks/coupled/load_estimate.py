@@ -3,7 +3,7 @@
 Where displacements and pressures are known, all in the equation of
 `mckibben.blocks.coupled.balance_law` is known but the loads:
 
-    C F = p A(y) - springs - elasticity - friction - relaxation - damping,
+    C F = p A(y) - springs - elasticity - friction - relaxation - damping - inertia,
 
 n equations of as many loads or fewer, solved by least squares with the pseudo-inverse of C. Pressures
 must be measured, not those that a compensator asks for.

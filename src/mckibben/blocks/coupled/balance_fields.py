@@ -70,7 +70,7 @@ def check_fields(balance: Balance) -> None:
                 f"{', in increasing order' if name == 'limits' else ''}."
             )
     stiff = ("friction", "relaxation", "damping", "walls")
-    for name in (*stiff, "grip", "bladders", "pushes", "mass"):
+    for name in (*stiff, "lines", "grip", "bladders", "pushes", "mass"):
         if np.any(np.array(getattr(balance, name)) < 0):
             raise ModelError(
                 f"{name} of {balance.kind!r} has a number below 0, which would make energy. "

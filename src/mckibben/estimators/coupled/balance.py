@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 from typing import Annotated, ClassVar
 
 import numpy as np
-from annotated_types import Ge, Gt, Interval
+from annotated_types import Gt, Interval
 
 from mckibben.arrays import Array
 from mckibben.blocks.compose import PerChannel, Series
@@ -54,7 +54,7 @@ from mckibben.estimators.coupled.balance_search import Search
 from mckibben.estimators.coupled.balance_stages import Stages, acted, acting
 from mckibben.estimators.coupled.balance_starts import simulate_started
 from mckibben.estimators.coupled.balance_structure import APART, Structure
-from mckibben.estimators.coupled.balance_words import held_back, sentences
+from mckibben.estimators.coupled.balance_words import held_back, missed, sentences
 from mckibben.estimators.coupled.base import CoupledEstimator, schedules
 from mckibben.estimators.optimisers.tracker import Tracker
 from mckibben.recording import Recording
@@ -102,8 +102,8 @@ class BalanceEstimator(CoupledEstimator):
         several scheduled muscles' recordings start there.
     unknown_load : bool, optional
         Whether every recording but the first hung under a constant load of its own, which is found.
-        Default: recordings without the force that others have did; where none has any, if this makes
-        the model much better.
+        Default: recordings without the force that others have did; of a muscle alone, where none has
+        any, if this makes the model much better.
     contact : bool
         Whether a dead zone of small pressures is looked for; default so.
     slack : bool, optional
@@ -141,7 +141,7 @@ class BalanceEstimator(CoupledEstimator):
     contact: bool = True
     slack: bool | None = None
     mass: bool = False
-    ridge: Annotated[float, Ge(0)] = 1e-6
+    ridge: Annotated[float, Interval(ge=0, le=1)] = 1e-6
     steps: Annotated[int, Interval(ge=0, le=1000)] = 25
 
     def data(
@@ -180,11 +180,13 @@ class BalanceEstimator(CoupledEstimator):
         few = Search(data, self.structure(data, tracker), self.ridge).of_few(FIRST_SAMPLES)
         pushed = len(data.inputs) > 1 or any(few.still)  # by other muscles, or what holds it
         slack = pushed if self.slack is None else self.slack
-        stages = Stages(tracker, self.steps, seeks_slack=slack and not self.mass)
+        none = np.zeros((1 + data.runs[-1].recording, len(data.inputs)))
+        same = not other_zeros(recorded, none)
+        stages = Stages(tracker, self.steps, slack and not self.mass, same_zeros=same)
         with tracker.searching():
-            found, dead = stages.found(
-                few, data, loads=self.unknown_load is None, contact=self.contact
-            )
+            alone = len(data.inputs) == 1  # of several, what drifts would be taken for loads
+            loads = self.unknown_load is None and alone
+            found, dead = stages.found(few, data, loads=loads, contact=self.contact)
             search = found.having(acting(data, dead)).of_few(MOST_SAMPLES)
             few = search.of_few(MORE_SAMPLES)
             assert tracker.best is not None
@@ -212,7 +214,8 @@ class BalanceEstimator(CoupledEstimator):
         tracker.notes += other_zeros(recorded, self.loads_)
         tracker.notes += loads_told(data, self.loads_, balance, newtons=structure.in_newtons)
         tracker.notes += [*varying(search, tracker.best), *held_told(search, tracker.best)]
-        tracker.notes += [*held_back(balance, structure), *sentences(balance, structure)]
+        tracker.notes += [*missed(tracker.best_cost), *held_back(balance, structure)]
+        tracker.notes += sentences(balance, structure)
         if dead:
             tracker.notes.append(
                 f"small pressures act little: as if {LOST * dead:.3g} {data.inputs[0].unit} were lost, "
@@ -263,14 +266,13 @@ class BalanceEstimator(CoupledEstimator):
         Raises
         ------
         ModelError
-            If nothing ever moves.
+            If there never is pressure.
         """
         y = data.stacked("outputs")
         span = data.travel
-        if not (span > 0).all():
+        if not data.highest.max() > 0:
             raise ModelError(
-                f"{data.outputs[int(np.argmin(span))].name} never changes. Remedy: record muscles that "
-                "move"
+                f"{data.inputs[0].name} never exceeds 0. Remedy: give pressures above the atmosphere's"
             )
         loaded = [channel.unit in LOADS for channel in data.scheduled]
         scheduled = [i for i, load in enumerate(loaded) if not load]

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.errors import DataError
+from mckibben.errors import DataError, ModelError
 from mckibben.estimators.core.data import Run, TrainingData
 
 ALIKE = 0.02
@@ -35,6 +35,15 @@ LARGEST = 1e12
 BEGUN = 0.1
 """Share of the range of pressure up to which a run begins at rest."""
 
+STILL = 0.005
+"""Share of the most that any muscle moves, below which one does not."""
+
+ALONGSIDE = 0.1
+"""Share of what schedules that pressures leave unexplained, below which it follows them."""
+
+FOLLOWS = 0.7
+"""Share of what a muscle moves that follows its pressure, from which it is known which way."""
+
 SAME, OFF = 0.05, 0.06
 """Shares of their ranges within which inputs are the same, and beyond which an output is another."""
 
@@ -52,12 +61,19 @@ def telling(data: TrainingData) -> tuple[TrainingData, list[str]]:
         ]
         moves = float(np.ptp(np.concatenate(means)))
         least = max(ALIKE * float(np.abs(values).max()), NOISE * float(np.ptp(values)))
-        if moves > least:
-            kept.append(place)
-        else:
+        if not moves > least:
             notes.append(
                 f"{channel.name} is about {values.mean():.3g} {channel.unit} in all recordings: what "
                 "it does cannot be told, and it is left out. Remedy: record at other values too"
+            )
+            continue
+        kept.append(place)
+        pressed = np.column_stack([data.stacked("driven"), np.ones(len(whole))])
+        left = whole[:, place] - pressed @ np.linalg.lstsq(pressed, whole[:, place], rcond=None)[0]
+        if np.std(left) < ALONGSIDE * np.std(whole[:, place]):
+            notes.append(
+                f"{channel.name} follows the pressures in all recordings: what it does cannot be told "
+                "from what they do. Remedy: record it changing while pressures do not"
             )
     runs = tuple(replace(run, scheduled=run.scheduled[:, kept]) for run in data.runs)
     scheduled = tuple(data.scheduled[place] for place in kept)
@@ -142,13 +158,21 @@ def other_zeros(data: TrainingData, loads: Array) -> list[str]:
 
 
 def check_directions(data: TrainingData) -> None:
-    """Refuse numbers that no muscle has, and displacements that fall as their own pressure rises.
+    """Refuse numbers that no muscle has, and displacements that stay or fall as their pressure rises.
 
     Raises
     ------
     DataError
         Naming the channel and the recording.
+    ModelError
+        If a muscle never moves.
     """
+    span = data.travel
+    if not (span > STILL * span.max()).all():
+        raise ModelError(
+            f"{data.outputs[int(np.argmin(span))].name} never changes, but by {span.min():.3g}. "
+            "Remedy: record muscles that move"
+        )
     for run in data.runs:
         for channels, table in ((data.inputs, run.driven), (data.outputs, run.outputs)):
             for place in np.flatnonzero(np.abs(table).max(axis=0) > LARGEST).tolist():
@@ -158,6 +182,7 @@ def check_directions(data: TrainingData) -> None:
                     channel=channels[place].name,
                     remedy="check its unit",
                 )
+    _check_turned(data)
     spans = data.highest - data.lowest
     for run in data.runs:
         moved = np.ptp(run.driven, axis=0) > 0.5 * spans
@@ -175,6 +200,30 @@ def check_directions(data: TrainingData) -> None:
                 channel=data.outputs[k].name,
                 remedy="give shortening, positive when a muscle contracts",
             )
+
+
+def _check_turned(data: TrainingData) -> None:
+    """Refuse recordings of a muscle alone in which it moves the other way than in most."""
+    if len(data.inputs) > 1:
+        return
+    ways = {}
+    for run in moving(data).runs:
+        columns = np.column_stack([run.driven, run.scheduled, np.ones(len(run.driven))])
+        by = np.linalg.lstsq(columns, run.outputs[:, 0], rcond=None)[0]
+        explained = abs(by[0]) * np.std(run.driven[:, 0])
+        if explained > FOLLOWS * np.std(run.outputs[:, 0]):
+            ways[run.name] = bool(by[0] > 0)
+    rising = sum(ways.values())
+    few = rising < len(ways) - rising
+    turned = [name for name, rises in ways.items() if rises == few]
+    if turned and len(turned) < len(ways):
+        raise DataError(
+            f"it {'rises' if few else 'falls'} with {data.inputs[0].name}, and does not in other "
+            "recordings",
+            file=turned[0],
+            channel=data.outputs[0].name,
+            remedy="count displacements the same way in all recordings",
+        )
 
 
 def not_at_rest(data: TrainingData, *, settled: bool, found: bool) -> list[str]:

@@ -30,7 +30,8 @@ FIRM = 0.8
 """Of the most that muscles seem to resist shortening with, share at which they go slack at first."""
 
 EXPLAINED = 1.5
-"""Times the error of all but first parts up to which that of all, settled before, is no more."""
+"""Times the error of all but first parts up to which that of all, settled before, is no more; it has to
+help against that of all from rest, too."""
 
 OWN_HELPS = 0.1
 """By how much what runs have of their own has to help."""
@@ -47,11 +48,14 @@ class Stages:
         Most steps of a descent.
     seeks_slack : bool
         Whether it is looked for slack; walls and lags then stay until it is found.
+    same_zeros : bool
+        Whether displacements count from the same in all recordings; else signs of loads are not told.
     """
 
     tracker: Tracker
     steps: int
     seeks_slack: bool
+    same_zeros: bool = True
 
     def found(
         self, few: Search, data: TrainingData, *, loads: bool, contact: bool
@@ -97,7 +101,8 @@ class Stages:
             starts.append((few.cost(values), plain, values))
             self.tracker.saw(values, starts[-1][0])
         starts.sort(key=lambda start: start[0])
-        check_loads(few, next(values for _, plain, values in starts if not plain), self.tracker)
+        if self.same_zeros:
+            check_loads(few, next(values for _, plain, values in starts if not plain), self.tracker)
         for _, _, start in starts if few.n_rows <= FEW_ROWS else starts[:FOLLOWED]:
             self.descend(few, start, self.tracker, FIRST_STEPS)
 
@@ -110,7 +115,8 @@ class Stages:
             return few
         settled, part = few.having(settled=True), self.tracker.part(0.3, 0.4)
         self.descend(settled, self.best, part)
-        if part.best is None or part.best_cost > EXPLAINED * self.tracker.best_cost:
+        from_rest = (1.0 - OWN_HELPS) * few.cost(self.best, whole=True)
+        if part.best is None or part.best_cost > min(EXPLAINED * self.tracker.best_cost, from_rest):
             return few
         self.tracker.best, self.tracker.best_cost = part.best, part.best_cost
         return settled

@@ -28,9 +28,10 @@ EARLY, LARGER = 5, 2.0
 def with_starts(search: Search, values: Array, data: TrainingData) -> Search | None:
     """Return the search for the starts of runs, too, if errors are largest there; else None.
 
-    So they are where runs were taken to begin settled, and did not.
+    So they are where runs were taken to begin settled, and did not. Where none begins at rest, starts
+    would take up what the model lacks.
     """
-    if search.structure.tare:
+    if search.structure.tare or not any(search.resting):
         return None
     early, late = [], []
     for place in range(len(search.runs)):

@@ -23,15 +23,18 @@ def beyond_known(model: Block, recording: Recording) -> list[str]:
     otherwise.
     """
     parts = model.parts if isinstance(model, Series) else (model,)
+    solved = [part.forward if isinstance(part, Inverse) else part for part in parts]
+    place = next((i for i, part in enumerate(solved) if isinstance(part, Balance)), None)
+    if place is None:
+        return []
+    part, balance = parts[place], solved[place]
+    assert isinstance(balance, Balance)
     driven = [channel for channel in model.inputs if channel.name not in model.scheduling]
     found = recording.matrix([channel.name for channel in driven])
-    for part in parts:
-        balance = part.forward if isinstance(part, Inverse) else part
-        if isinstance(balance, Balance):
-            break
-        found = run_many([part], np.ascontiguousarray(found), sample_time=recording.sample_time)[0]
-    else:
-        return []
+    for before in parts[:place]:
+        found = run_many([before], np.ascontiguousarray(found), sample_time=recording.sample_time)[
+            0
+        ]
     asked = [
         (channel, recording[channel.name], known)
         for channel, known in zip(balance.scheduled, balance.known, strict=False)

@@ -182,12 +182,13 @@ class BalanceEstimator(CoupledEstimator):
         slack = pushed if self.slack is None else self.slack
         none = np.zeros((1 + data.runs[-1].recording, len(data.inputs)))
         same = not other_zeros(recorded, none)
-        stages = Stages(tracker, self.steps, slack and not self.mass, same_zeros=same)
+        stages = Stages(few, tracker, self.steps, slack and not self.mass, same_zeros=same)
+        search = None
         with tracker.searching():
             alone = len(data.inputs) == 1  # of several, what drifts would be taken for loads
             loads = self.unknown_load is None and alone
-            found, dead = stages.found(few, data, loads=loads, contact=self.contact)
-            search = found.having(acting(data, dead)).of_few(MOST_SAMPLES)
+            stages.run(data, loads=loads, contact=self.contact)
+            search = stages.few.having(acting(data, stages.dead)).of_few(MOST_SAMPLES)
             few = search.of_few(MORE_SAMPLES)
             assert tracker.best is not None
             tracker.best_cost = few.cost(tracker.best)
@@ -201,7 +202,7 @@ class BalanceEstimator(CoupledEstimator):
                 "no balance of forces runs free over these recordings. Remedy: check that displacements "
                 "count as shortening and loads as pulling the muscle longer"
             )
-        structure = search.structure
+        search, structure, dead = search or stages.few, stages.few.structure, stages.dead
         limited = data.inputs[0].unit in LIMITED
         ends = np.array([min(float(data.lowest.min()), 0.0), float(data.highest.max())])
         low, high = acted(ends, dead).tolist()

@@ -37,12 +37,14 @@ OWN_HELPS = 0.1
 """By how much what runs have of their own has to help."""
 
 
-@dataclass(frozen=True)
+@dataclass
 class Stages:
-    """Trials in their order, the tracker's best being where the last one led.
+    """Trials in their order, the tracker's best being where the last one led, also if stopped between.
 
     Parameters
     ----------
+    few : Search
+        Of few samples, for what the recordings were found to ask for.
     tracker : Tracker
     steps : int
         Most steps of a descent.
@@ -50,34 +52,36 @@ class Stages:
         Whether it is looked for slack; walls and lags then stay until it is found.
     same_zeros : bool
         Whether displacements count from the same in all recordings; else signs of loads are not told.
+    dead : float
+        Pressure over which a dead zone fades.
     """
 
+    few: Search
     tracker: Tracker
     steps: int
     seeks_slack: bool
     same_zeros: bool = True
+    dead: float = 0.0
 
-    def found(
-        self, few: Search, data: TrainingData, *, loads: bool, contact: bool
-    ) -> tuple[Search, float]:
-        """Return the search for what the recordings ask for, and over which pressure a dead zone fades.
+    def run(self, data: TrainingData, *, loads: bool, contact: bool) -> None:
+        """Make all trials.
 
         Parameters
         ----------
-        few : Search
-            Of few samples.
         data : TrainingData
             Of all.
         loads, contact : bool
             Whether loads of recordings' own and a dead zone are tried.
         """
-        self.begin(few)
-        few = self.of_runs(self.long_held(few), data, loads=loads)
+        self.begin(self.few)
+        self.long_held(self.few)
+        self.of_runs(self.few, data, loads=loads)
         if self.seeks_slack or contact:
-            self.descend(few, self.best, self.tracker)
+            self.descend(self.few, self.best, self.tracker)
         if self.seeks_slack:
-            few = self.slack(few)
-        return few, self.dead_zone(few) if contact else 0.0
+            self.slack(self.few)
+        if contact:
+            self.dead_zone(self.few)
 
     @property
     def best(self) -> Array:
@@ -106,23 +110,23 @@ class Stages:
         for _, _, start in starts if few.n_rows <= FEW_ROWS else starts[:FOLLOWED]:
             self.descend(few, start, self.tracker, FIRST_STEPS)
 
-    def long_held(self, few: Search) -> Search:
-        """Return the search of muscles that were settled when recordings began, if that explains these.
+    def long_held(self, few: Search) -> None:
+        """Take muscles to have been settled when recordings began, if that explains these.
 
         Their first parts count then, which they do not where what came before is unknown.
         """
         if not any(few.warming):
-            return few
+            return
         settled, part = few.having(settled=True), self.tracker.part(0.3, 0.4)
         self.descend(settled, self.best, part)
         from_rest = (1.0 - OWN_HELPS) * few.cost(self.best, whole=True)
         if part.best is None or part.best_cost > min(EXPLAINED * self.tracker.best_cost, from_rest):
-            return few
+            return
         self.tracker.best, self.tracker.best_cost = part.best, part.best_cost
-        return settled
+        self.few = settled
 
-    def of_runs(self, few: Search, data: TrainingData, *, loads: bool) -> Search:
-        """Return the search for what runs have of their own, too: loads and starts that help much."""
+    def of_runs(self, few: Search, data: TrainingData, *, loads: bool) -> None:
+        """Find what runs have of their own, too: loads and starts that help much."""
         for having in (with_own_loads, with_starts) if loads else (with_starts,):
             several = having(few, self.best, data)
             if several is None:
@@ -132,22 +136,21 @@ class Stages:
             self.descend(several, np.append(self.best, none), part)
             least = (1.0 - OWN_HELPS) * few.cost(self.best, whole=True)
             if part.best is not None and part.best_cost < least:
-                few = several
                 self.tracker.best, self.tracker.best_cost = part.best, part.best_cost
-        return few
+                self.few = few = several
 
-    def slack(self, few: Search) -> Search:
-        """Return the search for muscles that go slack, if that helps."""
+    def slack(self, few: Search) -> None:
+        """Find where muscles go slack, if that helps."""
         slack, part = few.having(slack=True), self.tracker.part(0.5, 0.6)
         self.descend(slack, slack.slackened(self.best, FIRM), part)
         if part.best is None or not part.best_cost < (1.0 - HELPS) * few.cost(self.best):
-            return few
+            return
         self.tracker.best = part.best
-        return slack
+        self.few = slack
 
-    def dead_zone(self, few: Search) -> float:
-        """Return over which pressure a dead zone fades that helps most, 0 if none does."""
-        dead, start = 0.0, self.best
+    def dead_zone(self, few: Search) -> None:
+        """Find over which pressure a dead zone fades that helps most, if one does."""
+        start = self.best
         cost = few.cost(start)
         least = (1.0 - HELPS) * cost
         for pressure in (np.array(DEAD_ZONES) * few.structure.highest).tolist():
@@ -157,8 +160,7 @@ class Stages:
                 break
             cost = part.best_cost
             if cost < least:
-                dead, start, self.tracker.best = pressure, part.best, part.best
-        return dead
+                self.dead, start, self.tracker.best = pressure, part.best, part.best
 
 
 def acted(pressure: Array, dead: float) -> Array:

@@ -213,7 +213,7 @@ def folds(train: Sequence[Recording], channel: str, n: int) -> Iterator[Fold]:
 
 
 def _repeats(train: Sequence[Recording], channel: str, n: int) -> list[list[int]]:
-    """Return the first recordings at every level of an input that each holds, the second ...; or none."""
+    """Return the first recordings at every level of an input that all hold, the second ...; or none."""
     if any(np.ptp(recording[channel]) > 0 for recording in train):
         return []
     levels = [float(recording[channel][0]) for recording in train]

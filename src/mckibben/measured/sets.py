@@ -9,7 +9,7 @@ from pathlib import Path
 
 from mckibben.errors import DataError
 from mckibben.files import read
-from mckibben.files.channels import NAME, Folder, described
+from mckibben.files.channels import NAME, Folder, describing, description
 from mckibben.files.sources import inside
 from mckibben.measured.splits import Split, Task, split_of
 from mckibben.recording import Recording
@@ -55,12 +55,11 @@ class Set:
             Naming the file that cannot be read, and why.
         """
         found = []
-        for path in inside(self.folder):
-            for one in read(
-                path, description=self.description, gaps=self.split.gaps, informative=False
-            ):
-                even = one if self.split.resample is None else resample(one, self.split.resample)
-                found.append(even)
+        with describing(self.folder, self.description):
+            for path in inside(self.folder):
+                read_in = read(path, gaps=self.split.gaps, informative=False)
+                step = self.split.resample
+                found += read_in if step is None else [resample(one, step) for one in read_in]
         return found
 
     def tasks(self) -> Iterator[tuple[str, Task]]:
@@ -93,11 +92,10 @@ def sets_in(folder: Path) -> list[Set]:
 
 
 def _set(place: Path) -> Set:
-    known = KNOWN / f"{place.name}.toml"
-    beside = place / NAME
-    file = beside if beside.is_file() or not known.is_file() else known
-    description = described(file)
-    return Set(place.name, place, description, split_of(description.split, file))
+    beside, known = place / NAME, KNOWN / f"{place.name}.toml"
+    file = next((one for one in (beside, known) if one.is_file()), None)
+    said = Folder() if file is None else description(file)
+    return Set(place.name, place, said, split_of(said.split, str(file)))
 
 
 def _has_recordings(place: Path) -> bool:

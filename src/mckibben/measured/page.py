@@ -167,11 +167,10 @@ def _section(one: Outcome) -> Iterator[str]:
         yield f"| `{row.model}` | " + " | ".join(column.text(given) for column in columns) + " |"
     for figure in one.task.published:
         told = ", told the equations" if figure.told else ""
-        yield f"| {figure.what}{told} (printed) | {figure.rmse:g} {figure.unit} |" + " |" * (
-            len(columns) - 1
-        )
+        cells = [f"{figure.rmse:g}" if column.key == "test" else "–" for column in columns]
+        yield f"| {figure.what}{told} (printed) | " + " | ".join(cells) + " |"
     yield ""
-    notes = [*dict.fromkeys([*board.notes, *board.of_models])]
+    notes = board.of_models
     yield from (f"- {note}" for note in notes)
     yield from (f"- failed: `{row.model}`: {row.reason}" for row in board.rows if row.reason)
     if notes or any(row.reason for row in board.rows):

@@ -25,14 +25,13 @@ class Published(_Strict):
     what : str
         The model, and whose.
     rmse : float
-    unit : str
+        In the unit of the task's output.
     told : bool
         Whether that model was told the equations that made the data.
     """
 
     what: str
     rmse: float
-    unit: str
     told: bool = False
 
 
@@ -102,9 +101,6 @@ class Split(_Strict):
         Sample time to bring all to [s].
     gaps : {"error", "split", "interpolate"}
         What is done about gaps in time.
-    periods : int
-        How often each recording, which is one period of a motion without end, is repeated before what
-        is scored: then starts do not count.
     tasks : list of Task
         Default one, with the last quarter to test on.
     """

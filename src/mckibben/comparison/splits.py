@@ -33,6 +33,9 @@ ENOUGH = 12
 STEADY = 0.05
 """What schedules is a level of its run where it varies in it by no more than this share of its range."""
 
+PIECES = 4
+"""Of a part that has pieces from all over a recording."""
+
 BEYOND = 0.05
 """Share of the range of an input that a part may go beyond and still be within it: noise does."""
 
@@ -188,7 +191,9 @@ def _travel(u: Array) -> Array:
 def folds(train: Sequence[Recording], channel: str, n: int) -> Iterator[Fold]:
     """Yield the parts of a cross-validation over recordings, or over blocks of cycles of a single one.
 
-    Of recordings that each hold the input, such as a length, every part has one of each level.
+    Of recordings that each hold the input, such as a length, every part has one of each level. Of a
+    recording of fewer cycles than parts, which would leave out whole branches, every part has pieces
+    from all over it.
 
     Parameters
     ----------
@@ -206,9 +211,15 @@ def folds(train: Sequence[Recording], channel: str, n: int) -> Iterator[Fold]:
             yield Fold(kept, _all_rows(kept), left, _all_rows(left))
         return
     (recording,) = train
-    for start, stop in split_cycles(recording, channel, n):
-        mask = np.zeros(len(recording), dtype=bool)
-        mask[start:stop] = True
+    cycles = list(split_cycles(recording, channel, n))
+    place = np.zeros(len(recording), dtype=int)
+    for part, (start, stop) in enumerate(cycles):
+        place[start:stop] = part
+    if len(cycles) < n:
+        travel = _travel(recording[channel])
+        place = (travel / travel[-1] * PIECES * n).astype(int) % n
+    for part in range(place.max() + 1):
+        mask = place == part
         yield Fold((recording,), (~mask,), (recording,), (mask,))
 
 

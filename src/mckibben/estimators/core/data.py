@@ -76,6 +76,11 @@ class Run:
             if stop - start > shortest
         ]
 
+    def bridged(self) -> Array:
+        """Return the outputs that count, joined by straight lines, shape (n, m)."""
+        time, known = np.arange(len(self.counts)), np.flatnonzero(self.counts)
+        return np.column_stack([np.interp(time, known, y[known]) for y in self.outputs.T])
+
     def condensed(self) -> Run:
         """Return the run without samples that neither count nor are turning points of the input.
 
@@ -261,6 +266,12 @@ class TrainingData:
     def condensed(self) -> TrainingData:
         """Return the same data with every run condensed; see `Run.condensed`."""
         return replace(self, runs=tuple(run.condensed() for run in self.runs))
+
+    def bridged(self) -> TrainingData:
+        """Return the runs in which outputs count, straight lines in place of those that do not."""
+        known = [run for run in self.runs if run.counts.any()]
+        runs = [replace(run, outputs=run.bridged(), place=i) for i, run in enumerate(known)]
+        return replace(self, runs=tuple(runs))
 
     def stretches(self, shortest: int) -> TrainingData:
         """Return the same data as runs whose samples all count; see `Run.stretches`."""

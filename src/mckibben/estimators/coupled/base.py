@@ -31,8 +31,6 @@ FEWEST_SAMPLES = 50
 class CoupledEstimator(Estimator):
     """Settings common to all estimators of several inputs and outputs.
 
-    What counts of a recording is learned from in stretches, each with a memory of its own.
-
     Parameters
     ----------
     input, output : str or sequence of str, optional
@@ -55,6 +53,10 @@ class CoupledEstimator(Estimator):
 
     alone: ClassVar[bool] = False
     """Whether it is a model of one muscle under no measured load, too."""
+
+    through: ClassVar[bool] = False
+    """Whether it runs through what does not count, so that memory there is right; else stretches of
+    what counts each begin with a memory of their own."""
 
     fewest_inputs: ClassVar[int] = 1
     most_inputs: ClassVar[float] = np.inf
@@ -149,8 +151,8 @@ class CoupledEstimator(Estimator):
                 remedy="record as many of both, or fit coupled-memory or tsfnn",
             )
         found = training_data(listed, inputs, outputs, rows, scheduling, one_rate=False)
-        kept = found.stretches(FEWEST_SAMPLES - 1)
-        if not kept.runs:
+        kept = found.bridged() if self.through else found.stretches(FEWEST_SAMPLES - 1)
+        if sum(int(run.counts.sum()) for run in kept.runs) < FEWEST_SAMPLES:
             raise DataError(
                 f"no {FEWEST_SAMPLES} samples in a row count", remedy="give longer recordings"
             )

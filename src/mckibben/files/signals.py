@@ -128,11 +128,15 @@ def _signals(table: Table) -> list[Column]:
 
 
 def _named(column: Column, name: str) -> Column:
-    """Return a column that is called by a name; its own header tells the channel where it can."""
+    """Return a column that is called by a name, which tells the channel; or else its own header does."""
     header = parse(column.header)
-    if unit_of(channel_of(header)) is not None:
+    if not _is_standard(name) and _is_standard(column.header):
         return replace(column, header=name, says=column.header)
     return replace(column, header=name, unit=column.unit or header.unit)
+
+
+def _is_standard(header: str) -> bool:
+    return unit_of(channel_of(parse(header))) is not None
 
 
 def _same(one: Column, other: Column) -> bool:

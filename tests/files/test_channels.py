@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 from collections.abc import Callable
 from pathlib import Path
@@ -227,3 +228,12 @@ def test_measured_without_time(tmp_path: Path, measured: Callable[..., Path]) ->
     recording = one(Path(path))
     assert recording.sample_time == 0.1
     assert (recording.units["angle"], recording.units["voltage"]) == ("rad", "V")
+
+
+def test_what_the_documentation_shows_is_understood(tmp_path: Path) -> None:
+    text = (Path(__file__).parents[2] / "docs" / "files.md").read_text(encoding="utf-8")
+    shown = re.findall(r"```toml\n(.*?)```", text, re.DOTALL)
+    assert len(shown) == 2
+    for example in shown:
+        (tmp_path / NAME).write_text(example)
+        assert described(tmp_path).files

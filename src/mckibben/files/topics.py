@@ -153,7 +153,6 @@ class _Group:
     def take(self, number: int, when: int, message: bytes) -> None:
         if not self.layout.numbers:
             return
-        self._budget.samples(len(self._places))
         self.order.append(number)
         self.whens.append(when)
         self._waiting.append(message)
@@ -163,6 +162,7 @@ class _Group:
     def unpack(self) -> None:
         if not self._waiting:
             return
+        self._budget.samples(len(self._waiting) * len(self._places))
         raw = np.frombuffer(b"".join(self._waiting), np.uint8).reshape(len(self._waiting), -1)
         self._waiting.clear()
         for (at, kind), parts in zip(self._places, self._parts, strict=True):

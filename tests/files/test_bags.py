@@ -224,6 +224,26 @@ def test_samples_missing_and_times_repeated(tmp_path: Path) -> None:
         mckibben.read(path)
 
 
+def test_joints_are_told_by_name_in_whatever_order(tmp_path: Path) -> None:
+    def put(writer: Any, store: Any) -> None:
+        kind = "sensor_msgs/msg/JointState"
+        sent = writer.add_connection("/arm", kind, typestore=store)
+        stamp = store.types["builtin_interfaces/msg/Time"](0, 0)
+        header = store.types["std_msgs/msg/Header"](stamp=stamp, frame_id="")
+        none = np.zeros(0)
+        for k in range(50):
+            joints = {"a": 1.0 + k, "b": -1.0 - k}
+            names = sorted(joints, reverse=bool(k % 2))
+            position = np.array([joints[name] for name in names])
+            state = store.types[kind](header, names, position, none, none)
+            writer.write(sent, k * 10**7, store.serialize_cdr(state, kind))
+
+    recording = one(bag_of(tmp_path / "run", put))
+    assert recording.sample_time == 0.01  # by when it was recorded, as no stamp was set
+    assert recording["arm_position_a"].tolist() == [1.0 + k for k in range(50)]
+    assert recording["arm_position_b"].tolist() == [-1.0 - k for k in range(50)]
+
+
 def test_topics_with_no_time_in_common(tmp_path: Path) -> None:
     def put(writer: Any, store: Any) -> None:
         times = [k * 10**7 for k in range(50)]

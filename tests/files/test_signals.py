@@ -80,6 +80,18 @@ def test_clocks_of_their_own_become_the_slowest(tmp_path: Path) -> None:
         assert one(tmp_path, rate=100).sample_time == pytest.approx(0.01)
 
 
+def test_times_may_be_called_otherwise(tmp_path: Path) -> None:
+    put(tmp_path / "pressure_bar.csv", {"stamp_ms": 1000 * T, "value": 5 * T})
+    put(tmp_path / "displacement_mm.csv", {"stamp_ms": 1000 * T[::2], "value": T[::2]})
+    with pytest.raises(DataError, match="no such channel"):
+        mckibben.read(tmp_path, channels=["displacement"])
+    (tmp_path / NAME).write_text('[time]\ncolumn = "stamp"\n')
+    with pytest.warns(DataWarning, match="times of 'displacement'"):
+        recording = one(tmp_path)
+    assert recording.sample_time == pytest.approx(0.04)
+    assert recording["pressure"] == pytest.approx(5 * recording.time)
+
+
 def test_a_gap_of_the_faster_channel_is_not_bridged_unasked(tmp_path: Path) -> None:
     kept = np.delete(np.arange(N), np.arange(20, 40))
     put(tmp_path / "pressure_bar.csv", {"time_s": T[kept], "value": P[kept]})

@@ -46,7 +46,7 @@ def inside(path: Path) -> list[Path]:
     for each in found:
         together = said.joined(each.name)
         firsts[path / next(iter(together.values())) if together else each] = None
-    if len(firsts) == len(found) and not any(map(is_bag, found)) and signals.are_one(found):
+    if len(firsts) == len(found) and not any(map(is_bag, found)) and signals.are_one(found, said):
         return [path]
     return list(firsts)
 

@@ -58,8 +58,15 @@ def test_topics_are_put_on_the_slowest_clock(tmp_path: Path, kind: Kind, packed:
 @pytest.mark.parametrize("kind", KINDS)
 def test_units_that_types_and_names_tell(tmp_path: Path, kind: Kind) -> None:
     path = write(tmp_path / "run", kind)
-    with pytest.raises(DataError, match=r"both hold it.*--column pressure="):
-        mckibben.read(path)
+    asked = ["pressure"]  # which two topics and a field say
+    with pytest.raises(
+        DataError, match=r"'pressure'.*no such channel; the columns are /rig/pressure"
+    ):
+        mckibben.read(path, channels=asked)
+    with pytest.warns(DataWarning, match="by interpolation"):
+        everything = one(path)
+    assert everything["state_pressure"] == pytest.approx(pressure(everything.time))
+    assert everything.units["state_pressure"] == "bar"
     air = one(path, columns={"pressure": "/air/fluid_pressure"}, channels=["pressure"])
     assert air["pressure"] == pytest.approx(6 + 1e-5 * air.time)
     assert air.units["hand_wrench_force_z"] == "N"

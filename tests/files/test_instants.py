@@ -39,6 +39,7 @@ def read(folder: Path, times: Sequence[str], separator: str = ",", **options: An
         "%m/%d/%Y %H:%M:%S.%f",
         "%m/%d/%Y %I:%M:%S.%f %p",
         "%d-%m-%Y %H:%M:%S.%f",
+        "%d-%b-%Y %H:%M:%S.%f",
     ],
 )
 def test_dates_are_seconds_from_the_first(tmp_path: Path, form: str) -> None:
@@ -54,8 +55,9 @@ def test_zones_are_minded(tmp_path: Path) -> None:
     assert read(tmp_path, times).sample_time == 0.25
 
 
-def test_decimal_commas_in_dates(tmp_path: Path) -> None:
-    times = [instant.strftime("%d.%m.%Y %H:%M:%S,%f") for instant in INSTANTS]
+@pytest.mark.parametrize("form", ["%d.%m.%Y %H:%M:%S,%f", "%Y-%m-%d %H:%M:%S,%f"])
+def test_decimal_commas_in_dates(tmp_path: Path, form: str) -> None:
+    times = [instant.strftime(form) for instant in INSTANTS]
     assert read(tmp_path, times, ";").sample_time == 0.25
 
 
@@ -81,6 +83,7 @@ def test_a_day_that_may_be_a_month_is_refused_where_it_matters(tmp_path: Path, f
     [
         ("31.02.2026 23:59:57", "'31.02.2026 23:59:57' is no time"),
         ("01.13.2026 23:59:57", "is no time"),
+        ("01.Foo.2026 23:59:57", "is no time"),
         ("01.02.2026 25:00:00", "is no time"),
         ("2026-02-01T00:00:00", "is no time as '31.01.2026 23:59:55.000000' is"),
         ("soon", "'soon' is no time"),

@@ -150,6 +150,19 @@ def test_join_tells_which_belong_together(tmp_path: Path) -> None:
     assert roles(tmp_path)["train"] == [tmp_path / "1_pressure.csv", tmp_path / "2_pressure.csv"]
 
 
+def test_nothing_that_is_read_with_a_path_is_written_to(tmp_path: Path) -> None:
+    from mckibben.outputs import claim, never
+
+    put(tmp_path / "a_u.csv", {"time_s": T, "value": P})
+    put(tmp_path / "a_y.csv", {"time_s": T, "value": X})
+    (tmp_path / NAME).write_text('[[files]]\njoin = ["*_u.csv", "*_y.csv"]\n')
+    for read in (tmp_path, tmp_path / "a_u.csv"):
+        for written in ("a_y.csv", NAME):
+            with pytest.raises(DataError, match="it is read from"):
+                claim(tmp_path / written, never, inputs=[read], force=True)
+        claim(tmp_path / "new.csv", never, inputs=[read])
+
+
 def bad(folder: Path, name: str, **columns: Any) -> Path:
     put(folder / "pressure.csv", {"time_s": T, "value": P})
     put(folder / f"{name}.csv", columns)

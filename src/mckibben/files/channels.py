@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import os
 import tomllib
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Annotated, Any, Self
@@ -207,8 +210,26 @@ def described(folder: str | Path) -> Folder:
         given as it stands), or says what cannot be.
     """
     path = Path(folder) / NAME
-    if not os.path.lexists(path):
-        return Folder()
+    if os.path.lexists(path):
+        return description(path)
+    return dict(_elsewhere.get()).get(Path(folder).absolute(), Folder())
+
+
+@contextmanager
+def describing(folder: Path, what: Folder) -> Iterator[None]:
+    """Take this for what is said of a folder that has no description of its own, meanwhile."""
+    token = _elsewhere.set((*_elsewhere.get(), (folder.absolute(), what)))
+    try:
+        yield
+    finally:
+        _elsewhere.reset(token)
+
+
+_elsewhere: ContextVar[tuple[tuple[Path, Folder], ...]] = ContextVar("elsewhere", default=())
+
+
+def description(path: Path) -> Folder:
+    """Return what a description says, wherever it is; see `described`."""
     try:
         found = Folder.model_validate(tomllib.loads(read_text(path, most=DESCRIPTION)))
         for some in found.files:

@@ -38,6 +38,7 @@ def assign(table: Table, request: Request, path: Path) -> tuple[dict[str, Column
     mapped = {
         channel: _column(wanted, channel, table, path)
         for channel, wanted in request.columns.items()
+        if not (channel == "time" and table.has_clocks)
     }
     mapped = _described(table, request, path) | mapped
     named: dict[str, Column] = dict(mapped)
@@ -75,7 +76,7 @@ def _described(table: Table, request: Request, path: Path) -> dict[str, Column]:
     time, found = request.described.time, constants(request.described, table)
     said = {name: given.column for name, given in request.described.channels.items()}
     for channel, wanted in {"time": time.column, **said}.items():
-        if wanted is None or channel in request.columns:
+        if wanted is None or channel in request.columns or (channel == "time" and table.has_clocks):
             continue
         try:
             found[channel] = _column(wanted, channel, table, path)

@@ -47,12 +47,15 @@ def read(file: BufferedReader, path: Path) -> list[Table]:
     else:
         messages = _database(file, path)
     topics: dict[Connection, Topic] = {}
+    seen: dict[int, tuple[Connection, Topic]] = {}  # by identity, which is quicker to look up
     began: int | None = None
     for connection, when, message in messages:
-        topic = topics.get(connection)
-        if topic is None:
+        known = seen.get(id(connection))
+        if known is None:
             budget.parts(1)
-            topic = topics[connection] = Topic(connection, budget)
+            known = connection, topics.setdefault(connection, Topic(connection, budget))
+            seen[id(connection)] = known
+        topic = known[1]
         began = when if began is None else min(began, when)
         topic.take(when, message)
     left_out = [f"{one.topic} ({topic.problem})" for one, topic in topics.items() if topic.problem]

@@ -76,13 +76,16 @@ def _times(column: Column) -> Array:
 
 
 def _needed(clocked: Mapping[str, Column], request: Request) -> dict[str, Column]:
-    """Return what the common clock must suit: what is asked for, or else what has a meaning, or all."""
+    """Return what the common clock must suit: what is asked for, or else what has a meaning, or all.
+
+    A temperature that nobody asks for does not slow the rest down.
+    """
     told = {*request.columns, *request.described.channels}
     asked = {name: column for name, column in clocked.items() if request.asks_for(name)}
     known = {
         name: column
         for name, column in clocked.items()
-        if name in told or unit_of(name) is not None
+        if name in told or unit_of(name) not in (None, "degC")
     }
     return asked or known or dict(clocked)
 

@@ -15,12 +15,17 @@ from mckibben.files.table import Table
 
 _CLOCK = r"(?P<clock>\d{1,2}:\d{2}(?::\d{2}(?:[.,]\d{1,9})?)?)(?: ?(?P<half>[AaPp])\.?[Mm]\.?)?"
 _DAY = re.compile(
-    r"(?P<first>\d{1,2})(?P<mark>[./-])(?P<second>\d{1,2})(?P=mark)(?P<year>\d{4}|\d{2})"
+    r"(?P<first>\d{1,2})(?P<mark>[./-])(?P<second>\d{1,2}|[A-Za-z]{3})(?P=mark)(?P<year>\d{4}|\d{2})"
     rf"(?:[ T,]\s*{_CLOCK})?",
     re.ASCII,
 )
 _TIME = re.compile(_CLOCK, re.ASCII)
-_BEGINNING = re.compile(r"\d{4}\D?\d\d|\d{1,2}[./-]\d{1,2}[./-]\d{2}|\d{1,2}:\d\d", re.ASCII)
+_BEGINNING = re.compile(
+    r"\d{4}\D?\d\d|\d{1,2}[./-](?:\d{1,2}|[A-Za-z]{3})[./-]\d{2}|\d{1,2}:\d\d", re.ASCII
+)
+
+
+_MONTHS = ("jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec")
 
 
 def may_be_instant(text: str) -> bool:
@@ -38,7 +43,8 @@ def seconds(texts: Sequence[str], table: Table, path: Path) -> Array:
     Parameters
     ----------
     texts : sequence of str
-        All in one form: ISO 8601, with a zone or without; ``31.12.2026 12:00:00.5`` (the day first);
+        All in one form: ISO 8601, with a zone or without; ``31.12.2026 12:00:00.5`` or
+        ``31-Dec-2026 12:00:00.5`` (the day first);
         ``12/31/2026 12:00:00.5`` (with the day first or the month, as the numbers show); or
         ``12:00:00.5`` alone.
 
@@ -67,7 +73,9 @@ def seconds(texts: Sequence[str], table: Table, path: Path) -> Array:
 def _iso(texts: Sequence[str]) -> NDArray[np.datetime64]:
     import pandas as pd
 
-    found = pd.to_datetime(pd.Series(texts), format="ISO8601", utc=True, errors="coerce")
+    found = pd.to_datetime(
+        pd.Series(texts).str.replace(",", "."), format="ISO8601", utc=True, errors="coerce"
+    )
     return found.dt.tz_localize(None).to_numpy("datetime64[ns]")
 
 
@@ -85,6 +93,8 @@ def _matched(
 
 def _day_first(found: Sequence[re.Match[str]], table: Table, path: Path) -> bool:
     """Tell whether the day is before the month: where no number shows it, after dots it is."""
+    if any(match["second"].isalpha() for match in found):
+        return True
     firsts = {int(match["first"]) for match in found}
     seconds_ = {int(match["second"]) for match in found}
     if found[0]["mark"] == "." or max(firsts) > 12:
@@ -117,7 +127,9 @@ def _instant(match: re.Match[str], day_first: bool) -> np.datetime64 | None:
         year = groups["year"] if len(groups["year"]) == 4 else f"20{groups['year']}"
         one, other = groups["first"], groups["second"]
         one, other = (one, other) if day_first else (other, one)
-        day = f"{year}-{int(other):02d}-{int(one):02d}"
+        name = other.casefold()
+        month = _MONTHS.index(name) + 1 if name in _MONTHS else 0 if name.isalpha() else int(other)
+        day = f"{year}-{month:02d}-{int(one):02d}"
     try:
         return np.datetime64(f"{day}T{hours:02d}:{minute}:{second}", "ns")
     except ValueError:

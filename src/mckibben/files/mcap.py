@@ -82,7 +82,9 @@ class _Walk:
         problem = "" if cdr is not None else f"its messages are in {said}"
         if cdr is False and kind.count("/") == 1:
             kind = kind.replace("/", "/msg/")
-        self._connections[number] = Connection(topic, kind, definition, bool(cdr), problem)
+        found = Connection(topic, kind, definition, bool(cdr), problem)
+        if self._connections.get(number) != found:  # chunks say it again and again
+            self._connections[number] = found
 
     def _unpacked(self, content: BytesIO) -> BytesIO:
         *_, size, checksum = _CHUNKED.unpack(content.read(_CHUNKED.size))

@@ -51,12 +51,16 @@ def read(
     channels: Sequence[str] | None = None,
     informative: bool = True,
 ) -> list[Recording]:
-    """Read the recordings in a file; by its ending CSV, TSV, Parquet, MAT, HDF5 or TDMS.
+    """Read the recordings in a file, by its ending, or in a folder.
+
+    What ``channels.toml`` in the same folder says of the file (columns, units, calibrations, constants,
+    files with one signal each; see `mckibben.files.channels`) goes behind what is said here.
 
     Parameters
     ----------
     path : path
-        Ends in ``.csv .tsv .txt .dat .parquet .mat .h5 .hdf5 .tdms``.
+        Ends in ``.csv .tsv .txt .dat .parquet .mat .h5 .hdf5 .tdms .xlsx .bag .mcap .db3``; or a
+        folder of such files: a bag of ROS 2, files with one signal each, or several recordings.
     columns : mapping of str to str, optional
         Channel -> column, by its header with or without the unit. Standard channels are found by
         common names (``p``, ``Druck``, ``position``, ...) without it. ``time`` is a channel here.
@@ -64,7 +68,7 @@ def read(
         Channel -> unit, such as ``{"pressure": "kPa"}``; goes before what the header says.
     rate : float, optional
         Samples per second, positive, where there is no column of times. Without either, the
-        recording has no time.
+        recording has no time. Channels with times of their own are put on a clock of this rate.
     gaps : {"error", "split", "interpolate"}
         What to do where time is missing (a step of more than three median steps) or a sample is
         (blank, NaN or infinite): refuse, cut into several recordings, or bridge linearly.
@@ -72,13 +76,15 @@ def read(
         Channels that must be there and whole. Others are then left out, with a `DataWarning`, if
         samples of theirs are missing. By default all must be whole.
     informative : bool
-        Whether there must be something to learn from: at least 10 samples, and no constant channel
-        among those asked for. Without, two samples will do, as for simulating a model.
+        Whether there must be something to learn from: at least 10 samples, and no constant pressure
+        or other channel asked for that an experiment does not hold, as it does a length or a force.
+        Without, two samples will do, as for simulating a model.
 
     Returns
     -------
     list of Recording
-        One; or one for each stretch with ``gaps="split"``, and for each group of a TDMS file.
+        One; or one for each stretch with ``gaps="split"``, each group of a TDMS file, and each file of
+        a folder.
         In the package's units: bar, mm, N, s, rad, V, mm/s, degC. A file that `write` made gives
         a recording equal to the one written. What was assumed or mended on the way is in
         ``meta["notes"]``, a list of sentences, if there was anything.
@@ -92,7 +98,8 @@ def read(
     Warns
     -----
     DataWarning
-        Of units assumed, jittered time that was resampled, gaps bridged, and what was left out.
+        Of units assumed, jittered time that was resampled, channels put on one clock, gaps bridged, and
+        what was left out.
     """
     path = Path(path)
     request = Request(dict(columns or {}), dict(units or {}), rate, gaps, channels, informative)

@@ -9,9 +9,10 @@ from pathlib import Path
 
 import numpy as np
 
+from mckibben.arrays import Array
 from mckibben.errors import DataError
 from mckibben.files import formats, timebase
-from mckibben.files.channels import NAME, Described
+from mckibben.files.channels import NAME, Described, Folder, Time
 from mckibben.files.choosing import choose
 from mckibben.files.headers import channel_of, parse, unit_of
 from mckibben.files.request import Request
@@ -25,7 +26,7 @@ REMEDY = (
 )
 
 
-def are_one(paths: Sequence[Path]) -> bool:
+def are_one(paths: Sequence[Path], said: Folder) -> bool:
     """Tell whether the files of a folder hold one signal each and are one recording together.
 
     They are where each has one column beside the times, and these are of different channels, at least
@@ -44,7 +45,7 @@ def are_one(paths: Sequence[Path]) -> bool:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             tables = formats.tables(path)
-        signals = _signals(tables[0])
+        signals = _signals(tables[0], said.of(path.name).time.column)
         if len(tables) > 1 or len(signals) != 1:
             return False
         channels.append(channel_of(parse(_named(signals[0], path.stem).label)))
@@ -78,8 +79,9 @@ def joined(tables: Mapping[Path, Table], names: Sequence[str], request: Request)
         lengths differ.
     """
     signals: dict[Path, Column] = {}
+    stamp = request.columns.get("time", request.described.time.column)
     for (path, table), name in zip(tables.items(), names, strict=True):
-        found = _signals(table)
+        found = _signals(table, stamp)
         if len(found) != 1:
             raise DataError(
                 f"it has {len(found)} columns of numbers, where one signal is expected",
@@ -87,7 +89,9 @@ def joined(tables: Mapping[Path, Table], names: Sequence[str], request: Request)
                 remedy=f"leave it out of join in {NAME}, or save one column beside the times in it",
             )
         signals[path] = _named(found[0], name)
-    clocks = [[column for column in table.columns if _is_time(column)] for table in tables.values()]
+    clocks = [
+        [column for column in table.columns if _is_time(column, stamp)] for table in tables.values()
+    ]
     first = next(iter(tables.values()))
     columns = tuple(signals.values())
     if not any(clocks):
@@ -113,26 +117,31 @@ def joined(tables: Mapping[Path, Table], names: Sequence[str], request: Request)
         return Table((clocks[0][0], *columns), first.lines)
     return Table(
         tuple(
-            replace(signals[path], times=_seconds(table, request, path))
-            for path, table in tables.items()
+            replace(signals[path], times=_seconds(clock[0], table, request, path))
+            for (path, table), clock in zip(tables.items(), clocks, strict=True)
         )
     )
 
 
-def _is_time(column: Column) -> bool:
-    return channel_of(parse(column.label)) == "time"
+def _is_time(column: Column, stamp: str | None) -> bool:
+    header = parse(column.label)
+    return stamp in (column.header, header.name) or channel_of(header) == "time"
 
 
-def _signals(table: Table) -> list[Column]:
-    return [each for each in table.columns if each.values is not None and not _is_time(each)]
+def _signals(table: Table, stamp: str | None) -> list[Column]:
+    return [each for each in table.columns if each.values is not None and not _is_time(each, stamp)]
 
 
 def _named(column: Column, name: str) -> Column:
-    """Return a column that is called by a name; its own header tells the channel where it can."""
+    """Return a column that is called by a name, which tells the channel; or else its own header does."""
     header = parse(column.header)
-    if unit_of(channel_of(header)) is not None:
+    if not _is_standard(name) and _is_standard(column.header):
         return replace(column, header=name, says=column.header)
     return replace(column, header=name, unit=column.unit or header.unit)
+
+
+def _is_standard(header: str) -> bool:
+    return unit_of(channel_of(parse(header))) is not None
 
 
 def _same(one: Column, other: Column) -> bool:
@@ -143,16 +152,14 @@ def _same(one: Column, other: Column) -> bool:
     return np.array_equal(one.values, other.values, equal_nan=True)
 
 
-def _seconds(
-    table: Table, request: Request, path: Path
-) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+def _seconds(clock: Column, table: Table, request: Request, path: Path) -> Array:
     """Return the times of a file [s]."""
     units = {name: unit for name, unit in request.units.items() if name == "time"}
-    time = request.described.time
-    alone = Request({}, units, None, request.gaps, None, False, Described(time=time))
-    signal = replace(_signals(table)[0], header="signal", says=None, unit="1", flaw=None)
-    clock = next(column for column in table.columns if _is_time(column))
-    choice = choose(replace(table, columns=(clock, signal)), alone, path)
+    said = Described(time=Time(unit=request.described.time.unit))
+    alone = Request({}, units, None, request.gaps, None, informative=False, described=said)
+    time = replace(clock, header="time", says=None, unit=clock.unit or parse(clock.label).unit)
+    rest = Column("signal", np.zeros(table.n_samples), "1")
+    choice = choose(replace(table, columns=(time, rest)), alone, path)
     assert choice.time is not None
     timebase.check(choice.time, table, path)
     return convert(choice.time, choice.time_unit, "s")

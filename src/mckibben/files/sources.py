@@ -9,6 +9,7 @@ from pathlib import Path
 from mckibben.errors import DataError
 from mckibben.files import formats, signals
 from mckibben.files.channels import NAME, described
+from mckibben.files.own import description
 from mckibben.files.request import Request
 from mckibben.files.table import Table
 
@@ -36,7 +37,7 @@ def inside(path: Path) -> list[Path]:
     """
     if not path.is_dir() or is_bag(path):
         return [path]
-    found = _files(path) + sorted(each for each in path.iterdir() if is_bag(each))
+    found = _files(path) + [each for each in _listed(path) if is_bag(each)]
     if not found:
         raise DataError("there is no recording in the folder", file=path, remedy="name files")
     if os.path.lexists(path / PROTOCOL):
@@ -46,7 +47,7 @@ def inside(path: Path) -> list[Path]:
     for each in found:
         together = said.joined(each.name)
         firsts[path / next(iter(together.values())) if together else each] = None
-    if len(firsts) == len(found) and not any(map(is_bag, found)) and signals.are_one(found):
+    if len(firsts) == len(found) and not any(map(is_bag, found)) and signals.are_one(found, said):
         return [path]
     return list(firsts)
 
@@ -94,6 +95,35 @@ def tables(path: Path, request: Request) -> tuple[list[Table], str]:
     return [one], digest
 
 
+def read_with(path: Path) -> list[Path]:
+    """Return all files that are read where this one is, or this folder; some may be missing.
+
+    They are the parts of recordings and what describes them; a file of another kind stands alone.
+    """
+    if path.is_dir():
+        bags = (each for each in _listed(path) if is_bag(each))
+        parts = [*_files(path), *(file for bag in bags for file in _files(bag))]
+        about = [path / NAME, path / PROTOCOL, path / BAG]
+    elif path.suffix.casefold() in formats.READERS:
+        together = described(path.parent).joined(path.name)
+        parts = [path, *(path.with_name(name) for name in together.values())]
+        about = [path.with_name(NAME)]
+    else:
+        return [path]
+    return [*parts, *filter(None, map(description, parts)), *about]
+
+
 def _files(folder: Path) -> list[Path]:
-    found = (each for each in folder.iterdir() if each.suffix.casefold() in formats.READERS)
-    return sorted(each for each in found if each.is_file())
+    found = (each for each in _listed(folder) if each.suffix.casefold() in formats.READERS)
+    return [each for each in found if each.is_file()]
+
+
+def _listed(folder: Path) -> list[Path]:
+    try:
+        return sorted(folder.iterdir())
+    except OSError as error:
+        raise DataError(
+            f"it cannot be read ({(error.strerror or str(error)).lower()})",
+            file=folder,
+            remedy="check the folder and its rights",
+        ) from None

@@ -105,6 +105,11 @@ class Table:
         known = [column.values.size for column in self.columns if column.values is not None]
         return known[0] if known else _length(self.columns[0])
 
+    @property
+    def has_clocks(self) -> bool:
+        """Whether its columns have times of their own, so that none is of times."""
+        return any(column.times is not None for column in self.columns)
+
     def row(self, sample: int) -> int:
         """Return the row to name in an error for a sample counted from 0."""
         return sample + 1 if self.lines is None else int(self.lines[sample])

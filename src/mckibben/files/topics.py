@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Iterable, Mapping
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -133,8 +134,7 @@ class Topic:
         words = [of_topic if last in _PLAIN else last]
         if unit == "Pa":
             words = [of_topic, "pressure"]
-        indexed = header.replace("[", "/").replace("]", "")  # in brackets, units stand elsewhere
-        says = next((word for word in words if _is_standard(word)), indexed)
+        says = next((word for word in words if _is_standard(word)), _indexed(header))
         return Column(header, values.astype(np.float64), unit, says=says, times=times, held=held)
 
 
@@ -153,7 +153,6 @@ class _Group:
     def take(self, number: int, when: int, message: bytes) -> None:
         if not self.layout.numbers:
             return
-        self._budget.samples(len(self._places))
         self.order.append(number)
         self.whens.append(when)
         self._waiting.append(message)
@@ -163,6 +162,7 @@ class _Group:
     def unpack(self) -> None:
         if not self._waiting:
             return
+        self._budget.samples(len(self._waiting) * len(self._places))
         raw = np.frombuffer(b"".join(self._waiting), np.uint8).reshape(len(self._waiting), -1)
         self._waiting.clear()
         for (at, kind), parts in zip(self._places, self._parts, strict=True):
@@ -178,6 +178,11 @@ class _Group:
 
     def is_stamped(self) -> bool:
         return bool(self.layout.stamp) and bool(np.all(self.stamps() > 0))
+
+
+def _indexed(header: str) -> str:
+    """Return a header without brackets, in which units stand elsewhere."""
+    return header.replace("[", "/").replace("]", "")
 
 
 def _is_standard(word: str) -> bool:
@@ -198,8 +203,18 @@ def _types(connection: Connection) -> tuple[Types, str]:
     return {}, "the definition of its messages cannot be read"
 
 
-def table(columns: Iterable[Column], began: int, left_out: list[str]) -> Table:
-    """Return the table of the columns of a bag that began at an instant [ns since 1970]."""
+def table(columns: Sequence[Column], began: int, left_out: list[str]) -> Table:
+    """Return the table of the columns of a bag that began at an instant [ns since 1970].
+
+    Where several say the same channel, none does: it is for the caller to name one.
+    """
+    said = Counter(channel_of(parse(column.label)) for column in columns)
+    columns = [
+        column
+        if said[channel_of(parse(column.label))] == 1
+        else replace(column, says=_indexed(column.header))
+        for column in columns
+    ]
     meta = {"ignored_columns": left_out} if left_out else {}
     return Table(tuple(columns), start_time=began * 1e-9, meta=meta)
 

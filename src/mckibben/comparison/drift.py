@@ -32,6 +32,9 @@ FEWEST, MOST = 6, 40
 CERTAIN, TOLD = 0.98, 0.95
 """Confidence from which there is a drift, in its offset and its change together; and of intervals."""
 
+FORESEEN = 0.5
+"""Share of a drift up to which a model has foreseen it that is left with so much."""
+
 NOTABLE = 0.1
 """Share of the squared error below which a drift is not worth a word."""
 
@@ -107,6 +110,11 @@ class Drift:
     rmse: float
     adapted: float
 
+    @property
+    def size(self) -> float:
+        """Root mean square of the offset and the change over the test."""
+        return float(np.hypot(self.offset, self.change / np.sqrt(12.0)))
+
     def __str__(self) -> str:
         """Return it as a sentence without its end, or nothing where there is none to tell of."""
         if not self.certain:
@@ -124,6 +132,11 @@ class Drift:
         low, high = (numeral(end, 2) for end in interval)
         return f"{numeral(value, 2)} {self.unit} ({low} to {high})"
 
+    def foresees(self, other: Drift) -> bool:
+        """Tell whether what is left here of another model's drift is little, and may be chance."""
+        little = self.size < FORESEEN * other.size
+        return self.output == other.output and little and not self.certain
+
     def advice(self, invertible: bool) -> str:
         """Return what to do on the robot, as a sentence without its end."""
         left = (
@@ -133,7 +146,7 @@ class Drift:
         if not invertible:
             return f"adapt on the robot by an observer of a model that has an inverse, {left}"
         return (
-            "adapt on the robot: mckibben.control.DisturbanceObserver("
+            "adapt on the robot: from mckibben.control import DisturbanceObserver; DisturbanceObserver("
             f'mckibben.load("model.json").inverse(), filter_time={numeral(self.filter_time, 2)}), {left}'
         )
 

@@ -296,7 +296,7 @@ class Leaderboard:
         if best is None or best.drift is None or not best.drift.certain:
             return ""
         better = [row for row in self.rows if row.test_error < best.test_error and row.drift]
-        without = [row.model for row in better if row.drift and not row.drift.certain]
+        without = [row.model for row in better if row.drift and row.drift.foresees(best.drift)]
         foresaw = f"foreseen by {', '.join(without)}" if without else "which no model foresaw"
         return (
             f"{best.model}: {best.drift}, {foresaw}; {best.drift.advice(best.inverse is not None)}"

@@ -77,6 +77,22 @@ def test_a_drift_from_before_the_recording_is_found_and_gone_on_from() -> None:
     assert found.diagnostics_.rmse < 0.5 * settled.diagnostics_.rmse
 
 
+def test_an_interrupt_leaves_the_settled_model() -> None:
+    train = worked(SLOW, 120, 100, 0.01)
+    shares: list[float] = []
+
+    def stop(share: float, best: float) -> None:
+        shares.append(share)
+        if share > 0.55:
+            raise KeyboardInterrupt
+
+    found = CreepPIEstimator().fit(train, progress=stop)
+    assert found.diagnostics_.interrupted
+    assert shares == sorted(shares)
+    settled = CreepPIEstimator(settled=True).fit(train)
+    np.testing.assert_array_equal(found.model_.pack(), settled.model_.pack())
+
+
 def test_where_the_muscle_was_settled_nothing_is_made_up() -> None:
     pressure = levels(160)
     y = SLOW.simulate(pressure, sample_time=STEP)

@@ -78,15 +78,20 @@ class CreepingEstimator(SeparableEstimator):
             data.timed("creep depends on it", ", or use n_creep=0")
         if self.settled is not None or self.n_creep == 0 or self.method == "pso":
             return super().identify(data, tracker)
-        settled = self._with(settled=True).identify(data, tracker)
-        if tracker.interrupted:
+        first, second = tracker.part(0.0, 0.5), tracker.part(0.5, 0.9)
+        settled = self._with(settled=True).identify(data, first)
+        tracker.saw_all(first)
+        tracker.best, tracker.best_cost = first.best, first.best_cost
+        foresees = False
+        with tracker.searching():  # an interrupt leaves what is found by now
+            if not tracker.interrupted:
+                begun = self._with(settled=False).identify(data, second)
+                helps = second.best_cost < HELPS * first.best_cost
+                foresees = helps and self._foresees(data, second)
+        tracker.saw_all(second)
+        if tracker.interrupted or not foresees:
             return settled
-        part = tracker.part(0.5, 0.9)
-        begun = self._with(settled=False).identify(data, part)
-        foresees = part.best_cost < HELPS * tracker.best_cost and self._foresees(data, part)
-        tracker.saw_all(part)
-        if not foresees or part.interrupted:
-            return settled
+        tracker.best, tracker.best_cost = second.best, second.best_cost
         tracker.notes.append(UNDER_WAY)
         return begun
 
@@ -139,11 +144,9 @@ class CreepingEstimator(SeparableEstimator):
 
     def n_begun(self, data: TrainingData) -> int:
         """Return how many columns the basis has for creep that was under way when runs began."""
-        return (
-            0
-            if self.settled is not False
-            else self.n_creep * (1 + max(run.place for run in data.runs))
-        )
+        if self.settled is not False:
+            return 0
+        return self.n_creep * (1 + max(run.place for run in data.runs))
 
     def begun(self, theta: Array, run: Run, data: TrainingData) -> Array:
         """Return how creep that was under way when runs began fades over a run's history, (n, n_begun).

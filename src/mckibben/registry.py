@@ -99,6 +99,7 @@ PLUGINS: dict[str, dict[str, str | Preset]] = {
         "armax": preset(LINEAR, "ARMAX model, A y = B u + C e.", n_noise=2, effort=1.0),
         "arx": preset(LINEAR, "ARX model, A y = B u + e, by linear least squares."),
         "balance": "mckibben.estimators.coupled.balance:BalanceEstimator",
+        "balance-force": "mckibben.estimators.coupled.balance_force:BalanceForceEstimator",
         "bj": preset(
             LINEAR,
             "Box-Jenkins model, y = B / F u + C / D e; second order each by default.",

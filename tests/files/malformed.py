@@ -186,7 +186,7 @@ UNITS = {"units": {"pressure": "bar", "displacement": "mm"}}
 CASES: list[Case] = [
     # No file, or none that is known
     Case("missing.csv", nothing, "no such file"),
-    Case("folder.csv", Path.mkdir, "this is a folder"),
+    Case("folder.csv", Path.mkdir, "no recording in the folder"),
     Case("link.csv", loop, "it cannot be read"),
     Case("pipe.csv", os.mkfifo, "no ordinary file"),
     Case("book.xlsx", b"PK\x03\x04", "'.xlsx' cannot be read"),

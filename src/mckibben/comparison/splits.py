@@ -188,6 +188,8 @@ def _travel(u: Array) -> Array:
 def folds(train: Sequence[Recording], channel: str, n: int) -> Iterator[Fold]:
     """Yield the parts of a cross-validation over recordings, or over blocks of cycles of a single one.
 
+    Of recordings that each hold the input, such as a length, every part has one of each level.
+
     Parameters
     ----------
     channel : str
@@ -196,7 +198,9 @@ def folds(train: Sequence[Recording], channel: str, n: int) -> Iterator[Fold]:
         Largest number of parts, at least 2.
     """
     if len(train) > 1:
-        for group in np.array_split(np.arange(len(train)), min(n, len(train))):
+        for group in _repeats(train, channel, n) or np.array_split(
+            np.arange(len(train)), min(n, len(train))
+        ):
             kept = tuple(r for index, r in enumerate(train) if index not in group)
             left = tuple(train[index] for index in group)
             yield Fold(kept, _all_rows(kept), left, _all_rows(left))
@@ -206,6 +210,16 @@ def folds(train: Sequence[Recording], channel: str, n: int) -> Iterator[Fold]:
         mask = np.zeros(len(recording), dtype=bool)
         mask[start:stop] = True
         yield Fold((recording,), (~mask,), (recording,), (mask,))
+
+
+def _repeats(train: Sequence[Recording], channel: str, n: int) -> list[list[int]]:
+    """Return the first recordings at every level of an input that all hold, the second ...; or none."""
+    if any(np.ptp(recording[channel]) > 0 for recording in train):
+        return []
+    levels = [float(recording[channel][0]) for recording in train]
+    repeat = [levels[:place].count(level) for place, level in enumerate(levels)]
+    groups = [[place for place, k in enumerate(repeat) if k % n == one] for one in range(n)]
+    return [group for group in groups if group] if min(map(levels.count, levels)) > 1 else []
 
 
 def validation_folds(

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Literal
@@ -13,7 +12,8 @@ import numpy as np
 
 from mckibben.arrays import Array
 from mckibben.errors import DataError
-from mckibben.files import formats, timebase
+from mckibben.files import sources, timebase
+from mckibben.files.channels import about
 from mckibben.files.choosing import Choice, choose
 from mckibben.files.holes import Channels, treat
 from mckibben.files.notices import noted, warn
@@ -22,6 +22,11 @@ from mckibben.files.table import Table
 from mckibben.files.timebase import Span
 from mckibben.files.units import convert
 from mckibben.recording import Recording
+
+MAY_BE_HELD = frozenset(
+    {"displacement", "length", "contraction", "angle", "velocity", "force", "temperature"}
+)
+"""Channels that an experiment can hold: a recording of one length, or under one load, tells all else."""
 
 LONGEST_BRIDGE = 100
 """Times the samples there are: interpolating gaps to more than that is refused."""
@@ -92,11 +97,13 @@ def read(
     path = Path(path)
     request = Request(dict(columns or {}), dict(units or {}), rate, gaps, channels, informative)
     request.check(path)
+    return [each for one in sources.inside(path) for each in _read(one, request)]
+
+
+def _read(path: Path, request: Request) -> list[Recording]:
+    request = replace(request, described=about(path))
     with noted() as notes:
-        with formats.opening(path) as file:
-            tables = formats.read(file, path)
-            file.seek(0)
-            digest = hashlib.file_digest(file, "sha256").hexdigest()
+        tables, digest = sources.tables(path, request)
         found = [each for table in tables for each in _recordings(table, request, path, digest)]
     return [_with_notes(recording, notes) for recording in found]
 
@@ -144,6 +151,8 @@ def _recordings(table: Table, request: Request, path: Path, digest: str) -> list
 def _stated_step(choice: Choice, table: Table, request: Request, path: Path) -> float | None:
     """Return the sample time that the caller or the file states, which the times must not deny."""
     step = table.sample_time if request.rate is None else 1.0 / request.rate
+    if step is None and choice.time is None and not table.own:
+        return request.described.time.sample_time
     if step is None:
         return None
     if table.sample_time is not None and abs(step - table.sample_time) > 1e-3 * step:
@@ -226,7 +235,8 @@ def _announce_bridges(
 def _refuse_constant(channels: Channels, spans: list[Span], request: Request, path: Path) -> None:
     for name in request.channels or ():
         samples = np.concatenate([channels[name][start:stop] for start, stop in spans])
-        if samples.size and np.ptp(samples) == 0:
+        held = name.partition("_")[0] in MAY_BE_HELD
+        if not held and samples.size and np.ptp(samples) == 0:
             raise DataError(
                 f"it is constant, at {samples[0]:g}",
                 file=path,

@@ -56,27 +56,12 @@ class Run:
 
     def thinned(self, every: int) -> Run:
         """Return every so manieth sample."""
-        part = slice(None, None, every)
-        return replace(
-            self,
-            driven=self.driven[part],
-            outputs=self.outputs[part],
-            scheduled=self.scheduled[part],
-            counts=self.counts[part],
-            sample_time=None if self.sample_time is None else every * self.sample_time,
-        )
+        step = None if self.sample_time is None else every * self.sample_time
+        return replace(self._at(slice(None, None, every)), sample_time=step)
 
     def cut(self, start: int, stop: int | None = None) -> Run:
         """Return a part of the run, which begins with a memory of its own."""
-        part = slice(start, stop)
-        return replace(
-            self,
-            driven=self.driven[part],
-            outputs=self.outputs[part],
-            scheduled=self.scheduled[part],
-            counts=self.counts[part],
-            peak=None if start else self.peak,
-        )
+        return replace(self._at(slice(start, stop)), peak=None if start else self.peak)
 
     def carrying(self, u: Array, y: Array) -> Run:
         """Return the run with another input and output, each of shape (n,)."""
@@ -101,6 +86,10 @@ class Run:
 
         kept = self.counts.copy()
         kept[reversals(self.u)] = True
+        return self._at(kept)
+
+    def _at(self, kept: slice | Mask) -> Run:
+        """Return the samples kept."""
         return replace(
             self,
             driven=self.driven[kept],

@@ -311,9 +311,8 @@ class Search:
         size = np.maximum(np.sqrt((moving**2).sum(axis=0)), 1e-12)
         condition, own = inverted(moving / size)
         n_free = errors.size * self.every - mix.shape[1]
-        variance = float(errors @ errors) / max(
-            n_free, 1
-        )  # of all samples, of which some are looked at
+        # of all samples, of which some are looked at
+        variance = float(errors @ errors) / max(n_free, 1)
         scaled = mix / size
         told = np.isfinite(np.diag(own))
         covariance = variance * scaled[:, told] @ own[np.ix_(told, told)] @ scaled[:, told].T

@@ -15,7 +15,7 @@ from mckibben.blocks.core.block import Block
 from mckibben.errors import DataError
 from mckibben.estimators.core.checking import training_data
 from mckibben.estimators.core.data import Mask, TrainingData
-from mckibben.estimators.core.estimator import Estimator
+from mckibben.estimators.core.estimator import Estimator, resting
 from mckibben.estimators.core.uncertainty import unknown
 from mckibben.estimators.optimisers.tracker import Tracker
 from mckibben.recording import Recording
@@ -86,7 +86,7 @@ class CoupledEstimator(Estimator):
             return "it is of several muscles, or of one under a measured load that changes"
         if not cls.fits(len(inputs), len(outputs)):
             return "it needs an output to every input"
-        return None
+        return resting(recordings, inputs)
 
     @classmethod
     def fits(cls, n_inputs: int, n_outputs: int) -> bool:

@@ -60,12 +60,15 @@ def _with_either(
     basis: Array, target: Array, least: Array, either: NDArray[np.bool_], with_offset: bool
 ) -> tuple[Array, float]:
     """Solve where some columns may have either sign: without what these take up, then for them."""
+    from scipy.linalg import qr, solve_triangular
+
     offset = np.ones((len(basis), int(with_offset)))
     free, bound = np.column_stack([offset, basis[:, either]]), basis[:, ~either]
-    free_scale = np.maximum(np.linalg.norm(free, axis=0), 1e-300)
-    directions, spread, turned = np.linalg.svd(free / free_scale, full_matrices=False)
-    known = spread > 1e-12 * spread[0]
-    directions = directions[:, known]
+    scale = np.maximum(np.linalg.norm(free, axis=0), 1e-300)
+    directions, triangle, order = qr(free / scale, mode="economic", pivoting=True)
+    sizes = np.abs(np.diag(triangle))
+    rank = int(np.count_nonzero(sizes > 1e-12 * sizes[0]))
+    directions, triangle, order = directions[:, :rank], triangle[:rank, :rank], order[:rank]
 
     def left(columns: Array) -> Array:
         return np.asarray(columns - directions @ (directions.T @ columns))
@@ -74,7 +77,8 @@ def _with_either(
     x[~either], _ = solve_linear(
         left(bound), left(target), nonnegative=True, least=least[~either], with_offset=False
     )
-    taken = directions.T @ (target - bound @ x[~either]) / spread[known]
-    found = turned[known].T @ taken / free_scale
+    found = np.zeros(scale.size)
+    found[order] = solve_triangular(triangle, directions.T @ (target - bound @ x[~either]))
+    found /= scale
     x[either] = found[int(with_offset) :]
     return x, float(found[0]) if with_offset else 0.0

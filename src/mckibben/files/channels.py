@@ -227,7 +227,6 @@ def describing(folder: Path, what: Folder) -> Iterator[None]:
 
 _elsewhere: ContextVar[tuple[tuple[Path, Folder], ...]] = ContextVar("elsewhere", default=())
 
-
 def description(path: Path) -> Folder:
     """Return what a description says, wherever it is; see `described`."""
     try:

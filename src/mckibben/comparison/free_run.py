@@ -10,6 +10,7 @@ import numpy as np
 from mckibben.arrays import Array
 from mckibben.blocks.compose import Series
 from mckibben.blocks.core.block import Block
+from mckibben.blocks.dynamic.creep_start import begun_places, begun_state
 from mckibben.blocks.dynamic.linear_start import LinearStart
 from mckibben.comparison.splits import Mask, predecessor
 from mckibben.errors import ModelWarning
@@ -74,6 +75,13 @@ def known_start(
     if isinstance(block, LinearStart) and block.initial == "fitted":
         inputs = recording.matrix(channel.name for channel in block.inputs)
         return block.fitted_state(inputs, recording[outputs[0]], recording.sample_time, rows)
+    if begun_places(block):
+        inputs = recording.matrix(channel.name for channel in block.inputs)
+        known = np.ones(len(recording), dtype=bool) if rows is None else rows
+        state = block.initial_state(inputs[0])
+        return begun_state(
+            block, state, inputs, recording[outputs[0]], recording.sample_time, known
+        )
     return measured_start(block, recording, outputs)
 
 

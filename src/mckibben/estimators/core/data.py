@@ -295,6 +295,16 @@ class TrainingData:
                 found.append(run)
         return found
 
+    def between(self, start: float, stop: float) -> TrainingData:
+        """Return the same runs of which only what is between two shares of their time counts."""
+        runs = []
+        for run in self.runs:
+            counts, n = np.zeros_like(run.counts), run.counts.size
+            part = slice(round(start * n), round(stop * n))
+            counts[part] = run.counts[part]
+            runs.append(replace(run, counts=counts))
+        return replace(self, runs=tuple(runs))
+
     def thinned(self, most: int) -> TrainingData:
         """Return the same runs with fewer samples that count, spread evenly; inputs stay whole."""
         total = sum(int(run.counts.sum()) for run in self.runs)

@@ -76,11 +76,6 @@ class Run:
             if stop - start > shortest
         ]
 
-    def bridged(self) -> Array:
-        """Return the outputs that count, joined by straight lines, shape (n, m)."""
-        time, known = np.arange(len(self.counts)), np.flatnonzero(self.counts)
-        return np.column_stack([np.interp(time, known, y[known]) for y in self.outputs.T])
-
     def condensed(self) -> Run:
         """Return the run without samples that neither count nor are turning points of the input.
 
@@ -268,10 +263,24 @@ class TrainingData:
         return replace(self, runs=tuple(run.condensed() for run in self.runs))
 
     def bridged(self) -> TrainingData:
-        """Return the runs in which outputs count, straight lines in place of those that do not."""
+        """Return the runs up to their last outputs that count, with likely ones for those that do not.
+
+        These go straight with the inputs, as those that count do, and meet them on either side.
+        """
         known = [run for run in self.runs if run.counts.any()]
-        runs = [replace(run, outputs=run.bridged(), place=i) for i, run in enumerate(known)]
-        return replace(self, runs=tuple(runs))
+        runs = [run.cut(0, int(np.flatnonzero(run.counts)[-1]) + 1) for run in known]
+        columns = [np.column_stack([run.driven, run.scheduled, np.ones(len(run.u))]) for run in runs]
+        counting = [columns[i][run.counts] for i, run in enumerate(runs)]
+        targets = np.concatenate([run.outputs[run.counts] for run in runs])
+        by = np.linalg.lstsq(np.concatenate(counting), targets, rcond=None)[0]
+        found = []
+        for place, (run, given) in enumerate(zip(runs, columns, strict=True)):
+            time, at = np.arange(len(run.u)), np.flatnonzero(run.counts)
+            left = (run.outputs - given @ by)[at]
+            meeting = np.column_stack([np.interp(time, at, column) for column in left.T])
+            outputs = np.where(run.counts[:, np.newaxis], run.outputs, given @ by + meeting)
+            found.append(replace(run, outputs=outputs, place=place))
+        return replace(self, runs=tuple(found))
 
     def stretches(self, shortest: int) -> TrainingData:
         """Return the same data as runs whose samples all count; see `Run.stretches`."""

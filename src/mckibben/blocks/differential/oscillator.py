@@ -48,7 +48,7 @@ STABLE = 2.5
 """Radians of the fastest oscillation in a substep beyond which Runge-Kutta steps may grow."""
 
 PERIODS, REPEATS = 100, 1e-9
-"""Periods run until two are the same, at most, and the difference that is none, relative to the range."""
+"""Periods run until two are the same, at most; and the difference that is none, by the range."""
 
 BETWEEN = 2
 """Samples put into a substep where the input is band-limited: straight lines join them."""

@@ -13,7 +13,7 @@ from mckibben.arrays import Array
 from mckibben.blocks.core.fields import vector
 from mckibben.blocks.differential.duhem_oscillator import DuhemOscillator
 from mckibben.blocks.differential.oscillator import Oscillator
-from mckibben.estimators.differential.oscillator import Linear, OscillatorEstimator
+from mckibben.estimators.differential.oscillator import OscillatorEstimator
 from mckibben.estimators.differential.oscillator_slopes import follow_duhem
 
 BEYOND = 1.1
@@ -21,10 +21,6 @@ BEYOND = 1.1
 
 TIGHT = 0.8
 """Share of the range of knots that the forces have to fill."""
-
-SHARE, ROUND, REACH = 0.5, 0.4, 1.5
-"""Of a start: the element's share of the stiffness; by how much its slopes rise and fall from end to
-end; and where its outermost knots are, by the force at the largest displacement."""
 
 
 @dataclass(kw_only=True, repr=False, eq=False)
@@ -43,22 +39,11 @@ class DuhemOscillatorEstimator(OscillatorEstimator):
     n_positive: ClassVar[int] = 3
     follows: ClassVar[Callable[..., None]] = staticmethod(follow_duhem)
 
-    def starts(self, linear: Linear, most: float, fields: dict[str, Any]) -> list[Oscillator]:
-        """Return an element with half the stiffness, whose loops are round, of two pieces a curve."""
-        slope = SHARE * linear.stiffness
-        ways = np.linspace(-1.0, 1.0, 3)
-        rising = vector(slope * (1.0 - ROUND * ways))
-        knots = vector(REACH * slope * most * ways)
+    def starts(self, slope: float, bend: float, fields: dict[str, Any]) -> list[Oscillator]:
+        """Return an element of two pieces a curve, whose slope goes to 0 where its force is largest."""
+        most, rising = slope / bend, (2.0 * slope, slope, 0.0)
         return [
-            DuhemOscillator(
-                linear.mass,
-                0.5 * linear.damping,
-                linear.stiffness - slope,
-                rising,
-                rising[::-1],
-                knots,
-                **fields,
-            )
+            DuhemOscillator(rising=rising, falling=rising[::-1], knots=(-most, 0.0, most), **fields)
         ]
 
     def refined(self, model: Oscillator, forces: Array) -> Oscillator | None:

@@ -1282,6 +1282,37 @@ def pid(block: Any, inputs: Rows, sample_time: float) -> Rows:
     return outputs
 
 
+def state_network(block: Any, inputs: Rows, sample_time: float) -> Rows:
+    def rates(x: list[float], u: float) -> list[float]:
+        known = [*x, u, 1.0]
+        units = [math.tanh(_sum(tuple(row), known)) for row in block.hidden]
+        pairs = zip(block.linear, block.readout, strict=True)
+        return [_sum(own, known) + _sum(read, units) for own, read in pairs]
+
+    def step(x: list[float], start: float, end: float, h: float) -> list[float]:
+        def moved(share: float, k: list[float]) -> list[float]:
+            return [a + share * h * b for a, b in zip(x, k, strict=True)]
+
+        k1 = rates(x, start)
+        k2 = rates(moved(0.5, k1), (start + end) / 2)
+        k3 = rates(moved(0.5, k2), (start + end) / 2)
+        k4 = rates(moved(1.0, k3), end)
+        mean = [(a + 2 * b + 2 * c + d) / 6 for a, b, c, d in zip(k1, k2, k3, k4, strict=True)]
+        return moved(1.0, mean)
+
+    given = [(u - block.input_offset) / block.input_scale for u in _column(inputs)]
+    x, n = [0.0] * len(block.linear), block.substeps
+    for _ in range(1000):
+        x = step(x, given[0], given[0], 0.1)
+    outputs = []
+    for before, now in itertools.pairwise([given[0], *given]):
+        for s in range(n):
+            start, end = (before + (now - before) * (s + d) / n for d in (0, 1))
+            x = step(x, start, end, block.rate * sample_time / n)
+        outputs.append(block.output_offset + block.output_scale * x[0])
+    return _rows(outputs)
+
+
 TWINS: dict[str, Twin] = {
     "activation-memory": activation_memory,
     "activation-pressure": activation_pressure,
@@ -1339,6 +1370,7 @@ TWINS: dict[str, Twin] = {
     "process-model": process_model,
     "rate-dependent-pi": rate_dependent_pi,
     "rate-dependent-pi-inverse": rate_dependent_pi_inverse,
+    "state-network": state_network,
     "tondu-lopez": tondu_lopez,
     "recurrent-fuzzy-network": recurrent_fuzzy_network,
     "transfer-function": transfer_function,

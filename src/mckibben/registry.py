@@ -78,6 +78,7 @@ PLUGINS: dict[str, dict[str, str | Preset]] = {
             "mckibben.blocks.coupled.recurrent_fuzzy_network:RecurrentFuzzyNetwork"
         ),
         "series": "mckibben.blocks.compose:Series",
+        "state-network": "mckibben.blocks.dynamic.state_network:StateNetwork",
         "tondu-lopez": "mckibben.blocks.force.tondu_lopez:TonduLopez",
         "transfer-function": "mckibben.blocks.dynamic.transfer_function:TransferFunction",
     },
@@ -221,6 +222,7 @@ PLUGINS: dict[str, dict[str, str | Preset]] = {
             memory_settings={"threshold_rule": "paper", "initial": "virgin"},
             n_friction=0,
         ),
+        "state-network": "mckibben.estimators.dynamic.state_network:StateNetworkEstimator",
         "tsfnn": "mckibben.estimators.coupled.sdchm:TSFNNEstimator",
     },
     "papers": {

@@ -35,6 +35,7 @@ QUICK: dict[str, Any] = {
     "n_stops": 3,
     "n_lags": 1,
     "steps": 3,
+    "n_steps": 8,
     "ridge": 1e-3,
     "n_sets": 2,
     "elements": ("both",),

@@ -25,7 +25,8 @@ from mckibben.arrays import Array
 from mckibben.blocks.core.block import Kernel
 from mckibben.blocks.core.fields import DISPLACEMENT, FORCE, STRICT, ChannelField, StoredInitial
 from mckibben.blocks.core.kernels import kernel
-from mckibben.blocks.differential.oscillator import Hold, Oscillator, Positive, Substeps, oscillate
+from mckibben.blocks.differential.oscillator import Oscillator, Positive, oscillate
+from mckibben.blocks.dynamic.repeating import Hold, Substeps
 
 
 @kernel

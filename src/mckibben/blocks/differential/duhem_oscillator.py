@@ -32,7 +32,8 @@ from mckibben.blocks.core.fields import (
     Vector,
 )
 from mckibben.blocks.core.kernels import kernel
-from mckibben.blocks.differential.oscillator import Hold, Oscillator, Positive, Substeps, oscillate
+from mckibben.blocks.differential.oscillator import Oscillator, Positive, oscillate
+from mckibben.blocks.dynamic.repeating import Hold, Substeps
 from mckibben.errors import ModelError
 
 

@@ -9,18 +9,17 @@ whatever pace: its slope f looks at z and at the direction of y'. Models differ 
 From sample to sample the input goes in a straight line (first-order hold) or stays (zero-order); the
 equations are integrated by the classic Runge-Kutta method in substeps of equal length. f jumps only
 where y' passes 0, so that z' has corners and no jumps. A period of a recording can be run with its
-input band-limited between samples, `Oscillator.steady_state`.
+input band-limited between samples, `Repeating.steady_state`.
 """
 
 from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Callable
-from dataclasses import replace
-from typing import Annotated, Any, ClassVar, Literal, Self, cast
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
-from annotated_types import Gt, Interval
+from annotated_types import Gt
 from pydantic import FiniteFloat
 
 from mckibben.arrays import Array
@@ -30,13 +29,10 @@ from mckibben.blocks.core.fields import Initial
 from mckibben.blocks.core.kernels import inlined
 from mckibben.blocks.core.refusals import explicit_state, needs_sample_time
 from mckibben.blocks.core.single_channel import SingleChannel
+from mckibben.blocks.dynamic.repeating import Repeating
 from mckibben.errors import ModelError
-from mckibben.recording import Recording
-from mckibben.signals.periodic import band_limited
 
 Positive = Annotated[FiniteFloat, Gt(0)]
-Substeps = Annotated[int, Interval(ge=1, le=10_000)]
-Hold = Literal["first", "zero"]
 
 HEAD = 7
 """Numbers before those of the element."""
@@ -46,12 +42,6 @@ SETTLING = 64
 
 STABLE = 2.5
 """Radians of the fastest oscillation in a substep beyond which Runge-Kutta steps may grow."""
-
-PERIODS, REPEATS = 100, 1e-9
-"""Periods run until two are the same, at most; and the difference that is none, by the range."""
-
-BETWEEN = 2
-"""Samples put into a substep where the input is band-limited: straight lines join them."""
 
 
 @inlined
@@ -94,7 +84,7 @@ def oscillate(slope: Any, coefficients: Array, state: Array, inputs: Array, outp
     state[0], state[1], state[2] = y, v, z
 
 
-class Oscillator(SingleChannel, Primitive):
+class Oscillator(Repeating, SingleChannel, Primitive):
     """A block with the fields of an oscillator, whose element a class adds."""
 
     rate_dependent: ClassVar[bool] = True
@@ -105,8 +95,6 @@ class Oscillator(SingleChannel, Primitive):
     damping: float
     stiffness: float
     output_offset: float | None
-    substeps: int
-    hold: Hold
     initial: Any
 
     @property
@@ -182,48 +170,3 @@ class Oscillator(SingleChannel, Primitive):
             k4 = share(z + step * k3)
             z += step / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
         return z
-
-    def steady_state(self, recording: Recording) -> Recording:
-        """Return the response to a recording that repeats for ever, after all starts have died away.
-
-        The input is taken to be band-limited between samples, as a multisine measured over whole
-        periods is; neither holds of `simulate`, which starts somewhere and joins samples as `hold` says.
-
-        Parameters
-        ----------
-        recording : Recording
-            A whole number of periods of the input, with time.
-
-        Returns
-        -------
-        Recording
-            Of the input, and the modelled output.
-
-        Raises
-        ------
-        ModelError
-            Where no response comes to repeat itself.
-        """
-        given = self._inputs_from(recording)
-        step, ratio = needs_sample_time(self.kind, recording.sample_time), BETWEEN * self.substeps
-        fine = np.ascontiguousarray(np.roll(band_limited(given[:, 0], ratio), -1)[:, np.newaxis])
-        block = cast("Self", replace(self, substeps=1, hold="first"))  # type: ignore[type-var]
-        state, found = np.zeros(4), np.empty_like(fine)
-        run = block.bind(step / ratio, state, fine, found)
-        state[3] = given[0, 0]
-        before = np.full(len(given), np.inf)
-        for _ in range(PERIODS):
-            run()
-            now = np.roll(found[ratio - 1 :: ratio, 0], 1)
-            change = np.abs(now - before).max()
-            if not np.isfinite(now).all() or change <= REPEATS * np.ptp(now):
-                break
-            before = now.copy()
-        if not change <= REPEATS * np.ptp(now):
-            raise ModelError(
-                f"the response of {self.kind!r} to {recording.name} does not come to repeat itself in "
-                f"{PERIODS} periods. Remedy: use simulate, which starts from rest."
-            )
-        units = {self.outputs[0].name: self.outputs[0].unit}
-        kept = recording.select([self.inputs[0].name])
-        return kept.with_channels(units, **{self.outputs[0].name: now})

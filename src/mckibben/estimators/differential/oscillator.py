@@ -18,30 +18,20 @@ from annotated_types import Interval
 
 from mckibben.arrays import Array
 from mckibben.blocks.core.block import Block
-from mckibben.blocks.differential.oscillator import BETWEEN, Oscillator
-from mckibben.blocks.dynamic.process_model import ProcessModel
+from mckibben.blocks.differential.oscillator import Oscillator
 from mckibben.errors import DataError, ModelError
 from mckibben.estimators.core.data import TrainingData
 from mckibben.estimators.core.single import SingleEstimator
 from mckibben.estimators.core.uncertainty import inverted, relative_sizes
-from mckibben.estimators.differential.oscillator_runs import FreeRuns, Path, Way
-from mckibben.estimators.linear.process import ProcessModelEstimator
+from mckibben.estimators.differential.oscillator_runs import FreeRuns, Way
+from mckibben.estimators.dynamic.linear_oscillator import MOST_SUBSTEPS, linear_oscillator
+from mckibben.estimators.dynamic.paths import averaged, paths
 from mckibben.estimators.optimisers.tracker import Tracker
-from mckibben.signals.periodic import band_limited
 
 ANGLE, COARSE_ANGLE = 1 / 30, 1 / 3
 """Of the linear oscillator in a substep, and in one of the search's coarse ones, at most [rad]."""
 
-MOST_SUBSTEPS, FEWEST_COARSE = 1000, 2
-
-FORGOTTEN = 3 * np.log(1e8)
-"""Times the linear oscillator's decay after which a start counts as forgotten.
-
-Thrice what a hundred-millionth takes, for smaller motion meets less hysteresis and decays slower.
-"""
-
-MOST_PERIODS = 20
-"""Periods run before the one that counts, at most."""
+FEWEST_COARSE = 2
 
 FIRST_STEPS, STEPS = 12, 60
 """Steps from every start, and of the best."""
@@ -66,7 +56,7 @@ class OscillatorEstimator(SingleEstimator):
     periodic : bool
         Whether every recording is a whole number of periods of a motion that repeats itself, as under
         a multisine after some periods. Then no start counts, and the input is taken to be band-limited
-        between samples; run such models by `Oscillator.steady_state`. Otherwise recordings begin at
+        between samples; run such models by `Repeating.steady_state`. Otherwise recordings begin at
         rest, and the input goes in straight lines from sample to sample.
     fit_offset : bool
         Whether the displacement has an offset to be found; else it is 0 without force.
@@ -116,21 +106,18 @@ class OscillatorEstimator(SingleEstimator):
                 "periodic=true and whole periods of a motion that repeats itself."
             )
         linear = linear_oscillator(data, self.channels(data))
-        fine, coarse = (
-            int(np.clip(np.ceil(linear.frequency * step / angle), fewest, MOST_SUBSTEPS))
-            for angle, fewest in ((ANGLE, 1), (COARSE_ANGLE, FEWEST_COARSE))
-        )
-        fine = fine if self.substeps is None else self.substeps
+        fine = self.substeps or linear.substeps(step, ANGLE)
+        coarse = min(max(linear.substeps(step, COARSE_ANGLE), FEWEST_COARSE), fine)
+        self._warm = linear.forgets(data)
+        merged = averaged(data) if self.periodic else data
         fields = self.channels(data) | {
             "output_offset": 0.0 if self.fit_offset else None,
             "substeps": fine,
             "initial": self.starting_rule,
         }
-        longest = MOST_PERIODS * max(run.u.size for run in data.runs)
-        self._warm = int(min(np.ceil(FORGOTTEN / max(linear.decay * step, 1e-9)), longest))
         middle = float(np.mean(data.target)) if self.fit_offset else 0.0
         most = float(np.abs(data.target - middle).max())
-        first, coarse = replace(data, runs=data.runs[:1]), min(coarse, fine)
+        first = replace(merged, runs=merged.runs[:1])
 
         def begun(model: Oscillator) -> tuple[Oscillator, float]:
             return self.search(model, first, coarse, tracker).descended(FIRST_STEPS, FIRST_GAIN)
@@ -155,7 +142,7 @@ class OscillatorEstimator(SingleEstimator):
                 break
             model, _ = begun(finer)
         for substeps, gain, told in ((coarse, FIRST_GAIN, False), (fine, LEAST_GAIN, True)):
-            search = self.search(model, data, substeps, tracker, told)
+            search = self.search(model, merged, substeps, tracker, told)
             model, _ = search.descended(STEPS, gain)
         return model, data
 
@@ -170,24 +157,8 @@ class OscillatorEstimator(SingleEstimator):
         """Return the errors of models of one structure on all runs."""
         at_rest = not self.periodic and self.starting_rule == "first_sample"
         way = Way(self.n_positive, type(self).follows, at_rest)
-        return FreeRuns(model, data, self.paths(data, substeps), way, tracker, told)
-
-    def paths(self, data: TrainingData, substeps: int) -> list[Path]:
-        """Return the inputs of all runs in steps."""
-        found = []
-        for run in data.runs:
-            n = run.u.size
-            if not self.periodic:
-                before = run.u[0] if self.starting_rule == "first_sample" else 0.0
-                steps = np.arange(1 + substeps * n) / substeps
-                u = np.interp(steps, np.arange(n + 1), np.append(before, run.u))
-                found.append(Path(run, u, substeps, 0))
-                continue
-            ratio, skipped = BETWEEN * substeps, self._warm
-            places = np.arange(-(skipped + 1) * ratio, (n - 1) * ratio + 1) % (n * ratio)
-            fine = data.once(("fine", run.recording, ratio), lambda: band_limited(run.u, ratio))  # noqa: B023
-            found.append(Path(run, fine[places], ratio, skipped))
-        return found
+        warm = self._warm if self.periodic else None
+        return FreeRuns(model, data, paths(data, substeps, warm, at_rest), way, tracker, told)
 
     def free_runs(self, blocks: Sequence[Block], data: TrainingData) -> Array:
         """Return the outputs of blocks where samples count: in steady state, of periodic recordings."""
@@ -211,47 +182,3 @@ class OscillatorEstimator(SingleEstimator):
         condition, inverse = inverted(search.slopes(theta) / search.scale(block) * size)
         variance = float(residual @ residual) / max(residual.size - size.size, 1)
         return condition, variance * inverse * np.outer(size, size)
-
-
-@dataclass(frozen=True)
-class Linear:
-    """An oscillator without hysteresis: mass [kg], damping [N s/mm] and stiffness [N/mm]."""
-
-    mass: float
-    damping: float
-    stiffness: float
-
-    @property
-    def frequency(self) -> float:
-        """Angular frequency without damping [rad/s]."""
-        return float(np.sqrt(1e3 * self.stiffness / self.mass))
-
-    @property
-    def decay(self) -> float:
-        """How fast its free motion dies away [1/s]: the slower of two lags, where overdamped."""
-        half = 500.0 * self.damping / self.mass
-        return half - float(np.sqrt(max(half**2 - self.frequency**2, 0.0)))
-
-
-def linear_oscillator(data: TrainingData, channels: dict[str, Any]) -> Linear:
-    """Return the linear oscillator with the least free-run error, each run from a start of its own.
-
-    Raises
-    ------
-    DataError
-        If the displacement falls while the force rises slowly.
-    """
-    estimator = ProcessModelEstimator(
-        structure="P2U", input=channels["input"].name, output=channels["output"].name, n_refined=1
-    )
-    model, _ = estimator.find(data, Tracker())
-    assert isinstance(model, ProcessModel)
-    assert model.damping is not None
-    if not model.gain > 0:
-        raise DataError(
-            "the displacement falls while the force rises slowly",
-            channel=channels["output"].name,
-            remedy="turn the sign of one of them",
-        )
-    (time,), stiffness = model.time_constants, 1.0 / model.gain
-    return Linear(1e3 * stiffness * time**2, 2.0 * model.damping * time * stiffness, stiffness)

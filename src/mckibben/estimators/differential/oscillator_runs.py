@@ -11,8 +11,9 @@ import numpy as np
 from mckibben.arrays import Array
 from mckibben.blocks.differential.oscillator import Oscillator
 from mckibben.errors import ModelError
-from mckibben.estimators.core.data import Run, TrainingData
+from mckibben.estimators.core.data import TrainingData
 from mckibben.estimators.differential.oscillator_slopes import OWN
+from mckibben.estimators.dynamic.paths import Path
 from mckibben.estimators.optimisers.descent import Damping, damped, descend
 from mckibben.estimators.optimisers.tracker import Tracker
 
@@ -26,16 +27,6 @@ LARGEST = 1e50
 
 DIFFERENCE = 1e-6
 """Of a parameter, relative, by which starts at rest are moved."""
-
-
-@dataclass(frozen=True)
-class Path:
-    """The input of a run in steps, and where samples lie on it; see `oscillator_slopes.follow`."""
-
-    run: Run
-    inputs: Array
-    every: int
-    skipped: int
 
 
 @dataclass(frozen=True)

@@ -28,6 +28,7 @@ MODELS: tuple[tuple[str, str, dict[str, int]], ...] = (
     ("light grey", "duhem-oscillator", {}),
     ("light grey", "duhem-oscillator", {"n_pieces": 1}),
     ("light grey", "duhem-oscillator", {"n_pieces": 4}),
+    ("black", "state-network", {}),
 )
 
 PUBLISHED = (

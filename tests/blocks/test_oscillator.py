@@ -55,7 +55,6 @@ def test_a_sweep_from_rest_agrees_with_a_solver_of_tight_tolerance() -> None:
         np.abs(replace(HARD, substeps=n).simulate(u, sample_time=STEP) - expected).max()
         for n in (10, 40)
     ]
-    print(errors)
     assert errors[0] < 1e-4 * np.ptp(expected)
     assert errors[1] < errors[0] / 10  # of second order, for the element has corners
     wrong = replace(HARD, gamma=1.01 * HARD.gamma).simulate(u, sample_time=STEP)

@@ -87,18 +87,19 @@ def follow_network(
                 for i in range(p):
                     at[d, i] = moved[d, i] + way * h * tangent[last, d, i]
             for d in range(n):
-                for i in range(p):
-                    s = 0.0
-                    for e in range(n):
-                        s += turned[d, e] * at[e, i]
-                    tangent[stage, d, i] = s
+                own = tangent[stage, d]
+                own[:] = 0.0
+                for e in range(n):
+                    share = turned[d, e]
+                    for i in range(p):
+                        own[i] += share * at[e, i]
                 for e in range(width):
-                    tangent[stage, d, d * width + e] += known[e]
+                    own[d * width + e] += known[e]
                 for j in range(units):
                     share = readout[d, j] * bend[j]
                     for e in range(width):
-                        tangent[stage, d, first_unit + j * width + e] += share * known[e]
-                    tangent[stage, d, first_read + d * units + j] += act[j]
+                        own[first_unit + j * width + e] += share * known[e]
+                    own[first_read + d * units + j] += act[j]
         for d in range(n):
             ends, middle = rate[0, d] + rate[3, d], rate[1, d] + rate[2, d]
             state[d] += h / 6.0 * (ends + 2.0 * middle)

@@ -8,8 +8,11 @@ whatever pace: its slope f looks at z and at the direction of y'. Models differ 
 
 From sample to sample the input goes in a straight line (first-order hold) or stays (zero-order); the
 equations are integrated by the classic Runge-Kutta method in substeps of equal length. f jumps only
-where y' passes 0, so that z' has corners and no jumps. A period of a recording can be run with its
-input band-limited between samples, `Repeating.steady_state`.
+where y' passes 0, so that z' has corners and no jumps; steps over these leave errors of second order.
+
+Straight lines take (omega T)^2 / 12 off a sine of the input, T being the sample time: where that counts,
+and the input is known beforehand, put samples between by a spline. A period of a recording can be run
+with its input band-limited between samples, `Repeating.steady_state`.
 """
 
 from __future__ import annotations

@@ -29,6 +29,7 @@ MODELS: tuple[tuple[str, str, dict[str, int]], ...] = (
     ("light grey", "duhem-oscillator", {"n_pieces": 1}),
     ("light grey", "duhem-oscillator", {"n_pieces": 4}),
     ("black", "state-network", {}),
+    ("black", "state-network", {"n_units": 15}),
 )
 
 PUBLISHED = (

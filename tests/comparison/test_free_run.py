@@ -74,3 +74,22 @@ def test_overflow_is_refused() -> None:
     recording = Recording({"pressure": U, "displacement": U}, 0.01)
     with pytest.raises(ModelError, match="not finite"):
         run_free(block, recording, "displacement")
+
+
+def test_of_a_period_that_comes_again_no_start_counts() -> None:
+    block = RateDependentPI.example()
+    wave = 2.5 + 2.0 * np.sin(2 * np.pi * np.arange(200) / 200)
+    recording = recorded(block, np.tile(wave, 3)).slice(200, 400)
+    found = run_free(block, recording.with_meta(**{PERIODIC: True}), "displacement")
+    expected = block.simulate(np.tile(wave, 2), sample_time=0.01)[200:]
+    np.testing.assert_array_equal(found, expected)
+    assert not np.array_equal(found, block.simulate(wave, sample_time=0.01))
+
+
+def test_the_blocks_own_rule_starts_what_has_come_just_now() -> None:
+    """After long rest at the first input creep would be over, which the first output denies."""
+    block = Series((Affine(1.0, 0.0, PRESSURE, DISPLACEMENT), Creep.example()))
+    recording = recorded(block, U)
+    np.testing.assert_array_equal(
+        run_free(block, recording, "displacement"), recording["displacement"]
+    )

@@ -12,9 +12,13 @@ from mckibben.blocks.compose import Series
 from mckibben.blocks.core.block import Block
 from mckibben.blocks.dynamic.creep_start import begun_places, begun_state
 from mckibben.blocks.dynamic.linear_start import LinearStart
+from mckibben.blocks.dynamic.repeating import Repeating
 from mckibben.comparison.splits import Mask, predecessor
 from mckibben.errors import ModelWarning
 from mckibben.recording import Recording
+
+PERIODIC = "periodic"
+"""In the ``meta`` of a recording that is one period of a motion which repeats itself."""
 
 SETTLING = 256
 """Samples for which the first input is held after the peak before it, so that rates die away."""
@@ -49,6 +53,9 @@ def run_free(
         If the output is not finite.
     """
     outputs = (output,) if isinstance(output, str) else output
+    if recording.meta.get(PERIODIC):
+        repeated = _repeated(block, recording, outputs)
+        return repeated[:, 0] if isinstance(output, str) else repeated
     before = predecessor(recording, known)
     rows = [np.ones(len(r), dtype=bool) for r in known] if known_rows is None else known_rows
     if before is not None:
@@ -63,6 +70,16 @@ def run_free(
         )
     found = block.simulate(recording, initial=start.tolist()).matrix(outputs)
     return found[:, 0] if isinstance(output, str) else found
+
+
+def _repeated(block: Block, recording: Recording, outputs: Sequence[str]) -> Array:
+    """Return the response to a period that comes again and again: at least the second."""
+    if isinstance(block, Repeating):
+        return block.steady_state(recording).matrix(outputs)
+    names = [channel.name for channel in block.inputs]
+    twice = np.tile(recording.matrix(names), (2, 1))
+    found: Array = block.simulate(twice, sample_time=recording.sample_time)[len(recording) :]
+    return found
 
 
 def known_start(

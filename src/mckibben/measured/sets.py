@@ -3,23 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib import resources
 from pathlib import Path
 
+from mckibben.comparison.free_run import PERIODIC
 from mckibben.errors import DataError
 from mckibben.files import read
 from mckibben.files.channels import NAME, Folder, describing, description
 from mckibben.files.sources import inside
-from mckibben.measured.splits import Split, Task, split_of
+from mckibben.measured.splits import FEWEST, Split, Task, split_of
 from mckibben.recording import Recording
 from mckibben.signals import resample
 
 KNOWN = Path(str(resources.files("mckibben.measured"))) / "known"
 """Descriptions of public recordings, by the name of their folder: ``NAME.toml``."""
-
-FEWEST = 10
-"""Samples on either side of a cut."""
 
 
 @dataclass(frozen=True)
@@ -60,7 +58,7 @@ class Set:
                 read_in = read(path, gaps=self.split.gaps, informative=False)
                 step = self.split.resample
                 found += read_in if step is None else [resample(one, step) for one in read_in]
-        return found
+        return found if self.split.period is None else _periods(found, self.split.period)
 
     def tasks(self) -> Iterator[tuple[str, Task]]:
         """Give every task with what is left out, if it leaves out in turn: then it is several."""
@@ -96,6 +94,22 @@ def _set(place: Path) -> Set:
     file = next((one for one in (beside, known) if one.is_file()), None)
     said = Folder() if file is None else description(file)
     return Set(place.name, place, said, split_of(said.split, str(file)))
+
+
+def _periods(recordings: list[Recording], length: int) -> list[Recording]:
+    """Return whole periods as recordings of their own, none of which goes on from another."""
+    found = []
+    for one in recordings:
+        if len(one) % length:
+            raise DataError(
+                f"{len(one)} samples are not a whole number of periods of {length}",
+                file=one.source,
+                remedy="correct period in [split]",
+            )
+        for start in range(0, len(one), length):
+            part = replace(one.slice(start, start + length), start_time=0.0)
+            found.append(part.with_meta(**{PERIODIC: True}))
+    return found
 
 
 def _has_recordings(place: Path) -> bool:

@@ -12,6 +12,9 @@ from mckibben.errors import DataError
 
 WHERE = "channels.toml"
 
+FEWEST = 10
+"""Samples on either side of a cut, and of a period."""
+
 
 class _Strict(BaseModel):
     model_config = ConfigDict(extra="forbid", allow_inf_nan=False, frozen=True)
@@ -101,6 +104,9 @@ class Split(_Strict):
         Sample time to bring all to [s].
     gaps : {"error", "split", "interpolate"}
         What is done about gaps in time.
+    period : int, optional
+        Samples after which the motion repeats itself: recordings are cut into periods, of each of which
+        no start counts.
     tasks : list of Task
         Default one, with the last quarter to test on.
     """
@@ -109,6 +115,7 @@ class Split(_Strict):
     about: str = ""
     resample: Annotated[float, Field(gt=0)] | None = None
     gaps: Literal["error", "split", "interpolate"] = "interpolate"
+    period: Annotated[int, Field(ge=FEWEST)] | None = None
     tasks: Annotated[list[Task], Field(min_length=1)] = [Task()]
 
 

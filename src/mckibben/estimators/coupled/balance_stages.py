@@ -11,6 +11,7 @@ from mckibben.arrays import Array
 from mckibben.blocks.memoryless.contact import Contact
 from mckibben.estimators.core.data import TrainingData
 from mckibben.estimators.coupled.balance_loads import check_loads, with_own_loads
+from mckibben.estimators.coupled.balance_prior import likely
 from mckibben.estimators.coupled.balance_search import Search
 from mckibben.estimators.coupled.balance_starts import with_starts
 from mckibben.estimators.optimisers.tracker import Tracker
@@ -98,6 +99,10 @@ class Stages:
     def begin(self, few: Search) -> None:
         """Show the tracker where the linear stage and first steps from several starts lead."""
         starts = []
+        if few.belief is not None:
+            values = likely(few)
+            starts.append((few.cost(values), True, values))
+            self.tracker.saw(values, starts[-1][0])
         for grip, plain in product(
             GRIPS if few.structure.limits.size else GRIPS[:1], (False, True)
         ):

@@ -1,4 +1,4 @@
-"""Identify the muscles of the library, and write their files: python docs/measured/library.py [FOLDER]
+"""Identify the muscles of the library: python docs/measured/library.py [FOLDER].
 
 Those of the virtual rigs are put on one virtual bench, under random pressures and pulls. FOLDER holds
 measured recordings (festo_isometric_20mm, festo_dmsp10_levels); without it, or where it lacks them, the
@@ -15,12 +15,12 @@ from typing import Any
 import numpy as np
 
 import mckibben
-from mckibben.estimators.coupled.balance_loads import solved_in
-from mckibben.errors import ModelWarning
+from mckibben.errors import DataWarning, ModelWarning
 from mckibben.estimators.coupled.balance import BalanceEstimator
+from mckibben.estimators.coupled.balance_loads import solved_in
 from mckibben.muscles.library import FOLDER, Conditions, Muscle, described
 from mckibben.muscles.sheet import Sheet
-from mckibben.muscles.traits import traits
+from mckibben.muscles.traits import ALONG, PLACES, traits
 from mckibben.recording import Recording
 from mckibben.rigs.parameters import Air, Range, Sensor
 from mckibben.rigs.parameters import Muscle as Physics
@@ -44,11 +44,27 @@ HELD = {
 }
 """Rest lengths [mm], names of files, titles."""
 
+HELD_UNTOLD = ["friction", "relaxation", "damping", "wall"]
+"""What muscles that do not move show of, but do not tell apart."""
+
+LEVELS = "dmsp10-250"
+
+HELD_SOURCE = "Muscle_Sensory of Agile-and-Adaptive-Robotics, BPA_Static_Characterization_Test"
+LEVELS_SOURCE = "pam_lqi_pid of tbazina, lqr_steady_state_points.csv"
+
+FURTHER = 1.1
+"""Times the largest displacement known up to which traits are told."""
+
 OWN_DATA = "numbers fitted by this package to its own virtual rig: free, as the package is"
 NO_LICENCE = "numbers fitted here; the recordings have no licence and are not distributed"
 
 SHEET_20 = {"diameter_mm": 20.0, "max_force_N": 1500.0, "max_contraction": 0.25}
-SHEET_10 = {"diameter_mm": 10.0, "max_force_N": 630.0, "max_pressure_bar": 8.0, "max_contraction": 0.25}
+SHEET_10 = {
+    "diameter_mm": 10.0,
+    "max_force_N": 630.0,
+    "max_pressure_bar": 8.0,
+    "max_contraction": 0.25,
+}
 """Of the maker's catalogue."""
 
 
@@ -112,7 +128,7 @@ def identified(
     name: str, recordings: list[Recording], sheet: Sheet, told: dict[str, Any], **settings: Any
 ) -> Muscle:
     """Return a muscle as identified from recordings."""
-    found = BalanceEstimator(contact=False, elasticity=7, **settings).fit(recordings)
+    found = BalanceEstimator(elasticity=7, **settings).fit(recordings)
     _, balance, _ = solved_in(found.model_)
     moved = np.concatenate([run["displacement"] for run in recordings])
     pressed = np.concatenate([run["pressure"] for run in recordings])
@@ -129,15 +145,19 @@ def identified(
         seconds=short(sum(len(run) * (run.sample_time or 0.0) for run in recordings)),
         rmse=short(found.diagnostics_.rmse),
     )
-    errors = trait_errors(found, balance, sheet)
+    held = all(np.ptp(run["displacement"]) == 0.0 for run in recordings)
+    errors = trait_errors(found, balance, sheet, held)
     print(name, f"rmse {found.diagnostics_.rmse:.3g}", *found.diagnostics_.notes, sep="\n  ")
     for place, (value, error) in enumerate(zip(traits(balance, sheet), errors, strict=True)):
         print(f"  {place}: {value:.3f} +- {error:.3f}")
     return Muscle(name, sheet=sheet, conditions=conditions, balance=balance, errors=errors, **told)
 
 
-def trait_errors(found: BalanceEstimator, balance: Any, sheet: Sheet) -> Any:
-    """Return standard errors of traits, by the balance's; inf of what the recordings do not tell."""
+def trait_errors(found: BalanceEstimator, balance: Any, sheet: Sheet, held: bool) -> Any:
+    """Return standard errors of traits, by the balance's; inf of what the recordings do not tell.
+
+    Without a measured force, area and elasticity are told in their ratio only.
+    """
     values = balance.pack()
     covariance = found.diagnostics_.covariance[-values.size :, -values.size :]
     told = np.isfinite(np.diag(covariance))
@@ -151,31 +171,60 @@ def trait_errors(found: BalanceEstimator, balance: Any, sheet: Sheet) -> Any:
     slopes = np.nan_to_num(slopes)
     own = covariance[np.ix_(told, told)]
     variance = np.einsum("ij,jk,ik->i", slopes[:, told], own, slopes[:, told])
-    return np.where(np.isfinite(base), np.round(np.sqrt(variance), 4), np.inf)
+    errors = np.where(np.isfinite(base), np.round(np.sqrt(variance), 4), np.inf)
+    beyond = ALONG * sheet.stroke > FURTHER * balance.hull[0][1]
+    for name in ("loss", "elasticity"):
+        errors[PLACES[name]][beyond if balance.n_loads else slice(None)] = np.inf
+    untold = [] if balance.lags else ["relaxation", "damping"]
+    untold += HELD_UNTOLD if held else []
+    for name in untold:
+        errors[PLACES[name]] = np.inf
+    return errors
+
+
+def about(title: str, source: str, licence: str, *, virtual: bool = False) -> dict[str, Any]:
+    """Return what is said of a muscle."""
+    return {"title": title, "source": source, "licence": licence, "virtual": virtual}
 
 
 def ends(values: Any) -> tuple[float, float]:
+    """Return lowest and highest."""
     return short(np.min(values)), short(np.max(values))
 
 
 def short(value: Any) -> float:
+    """Return a number of four digits."""
     return float(f"{float(value):.4g}")
 
 
 def main(folder: Path | None, only: list[str]) -> None:
     """Write the files."""
-    warnings.simplefilter("ignore", ModelWarning)
+    for category in (DataWarning, ModelWarning):
+        warnings.simplefilter("ignore", category)
     for name, (_, title) in RIGS.items():
         if only and name not in only:
             continue
         rig: Any = mckibben.load_rig(name)
-        told = {"title": f"{title} (virtual)", "source": f"virtual rig {name}, version {rig.version}, "
-                f"its muscle on a bench; {rig.source}", "licence": OWN_DATA, "virtual": True}  # fmt: skip
+        source = f"virtual rig {name}, version {rig.version}, its muscle on a bench; {rig.source}"
+        told = about(f"{title} (virtual)", source, OWN_DATA, virtual=True)
         stand, sheet = bench(name)
-        write(identified(name, driven(stand, sheet), sheet, told))
+        write(identified(name, driven(stand, sheet), sheet, told, contact=False))
+    for name, (length, files, title) in HELD.items():
+        runs = sorted(folder.glob(f"festo_isometric_20mm/{files}*.csv")) if folder else []
+        if (only and name not in only) or not runs:
+            continue
+        told = about(f"{title} (measured, held)", HELD_SOURCE, NO_LICENCE)
+        sheet = Sheet(rest_length_mm=length, **SHEET_20)
+        write(identified(name, [mckibben.read(run)[0] for run in runs], sheet, told))
+    levels = folder / "festo_dmsp10_levels" if folder else Path("none")
+    for path in sorted(levels.glob("*.csv")) if not only or LEVELS in only else []:
+        told = about("Festo DMSP-10, 250 mm (measured, levels)", LEVELS_SOURCE, NO_LICENCE)
+        runs = [run.select(["pressure", "displacement"]) for run in mckibben.read(path)]
+        write(identified(LEVELS, runs, sheet, told, n_lags=0))
 
 
 def write(muscle: Muscle) -> None:
+    """Write a muscle into the library."""
     (FOLDER / f"{muscle.name}.toml").write_text(described(muscle), encoding="utf-8")
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from mckibben.arrays import Array
 from mckibben.blocks.core.saving import from_dict, to_dict
@@ -43,7 +43,7 @@ class Conditions(BaseModel):
 class _File(BaseModel):
     """A file of the library."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+    model_config = ConfigDict(frozen=True, extra="forbid")
 
     format: str
     version: int
@@ -53,7 +53,7 @@ class _File(BaseModel):
     virtual: bool
     sheet: Sheet
     conditions: Conditions
-    uncertainty: dict[str, list[FiniteFloat | str]]
+    uncertainty: dict[str, tuple[float, ...]]
     balance: dict[str, Any]
 
 

@@ -17,8 +17,11 @@ from mckibben.muscles.library import list as all_muscles
 from mckibben.muscles.sheet import Sheet, refused
 from mckibben.muscles.traits import COUNT, PLACES
 
-ALIKE = 0.05
-"""Logarithm by which muscles of one make and size differ: no spread is less."""
+ALIKE = 0.1
+"""Logarithm by which muscles of one make and size differ."""
+
+NEAR = 0.5
+"""Logarithm of size, slenderness or braid over which muscles get unlike."""
 
 FEWEST = 3
 """Muscles that tell of a spread."""
@@ -44,15 +47,12 @@ class Prior:
         NaN of what no muscle tells.
     levels, shapes : dict of str to float
         Standard deviations.
-    nearest : Muscle
-        From which to begin.
     """
 
     sheet: Sheet
     mean: Array
     levels: dict[str, float]
     shapes: dict[str, float]
-    nearest: Muscle
 
     def weights(self) -> Array:
         """Return rows that make independent numbers of deviation 1 of traits less their mean."""
@@ -99,49 +99,67 @@ def prior_of(given: str | Path, *, without: Sequence[str] = ()) -> Prior:
 
 
 def of_muscles(muscles: Sequence[Muscle], sheet: Sheet, like: Muscle | None = None) -> Prior:
-    """Return what some muscles say of one with a data sheet, or like one of them."""
+    """Return what some muscles say of one with a data sheet, or of the same make as one of them.
+
+    Their traits are taken for a Gaussian process over size, slenderness and braid (kriging): near a
+    muscle its own traits are likely, and far from all their mean, with the spread of all.
+    """
     if not muscles:
-        raise DataError("there are no muscles to tell of others", remedy="name fewer to leave out")
+        raise DataError("there are no muscles to tell of others", remedy="leave fewer out")
+    muscles = sorted(muscles, key=lambda muscle: muscle.name)
     table = np.array([muscle.traits for muscle in muscles])
     told = np.isfinite(table)
-    mean = np.where(told, table, 0.0).sum(axis=0) / np.where(told.any(axis=0), told.sum(axis=0), np.nan)
-    levels, shapes = {}, {}
-    centre = mean.copy()
+    shapes = np.array([muscle.sheet.shape for muscle in muscles])
+    here = sheet.shape if like is None else like.sheet.shape
+    mean = np.full(COUNT, np.nan)
+    of_levels, of_shapes = {}, {}
     for name, place in PLACES.items():
-        levels[name], shapes[name] = _spreads(table[:, place] - mean[place])
-        if like is not None:
-            away = (like.traits - mean)[place]
-            known = np.isfinite(away)
-            if known.any():
-                centre[place] += np.where(known, away, away[known].mean())
-    nearest = like or min(
-        (m for m in muscles), key=lambda m: (_distance(m.sheet, sheet), m.name)
-    )
-    return Prior(sheet, centre, levels, shapes, nearest)
+        level, shape = _spreads(table[:, place])
+        spread = float(np.hypot(level, shape))
+        for number in range(place.start, place.stop):
+            which = told[:, number]
+            if which.any():
+                middle = float(table[which, number].mean())
+                share, _ = _shares(shapes[which], here, spread)
+                mean[number] = middle + share @ (table[which, number] - middle)
+        left = _shares(shapes[told[:, place].any(axis=1)], here, spread)[1]
+        of_levels[name] = float(np.hypot(left * level, ALIKE))
+        of_shapes[name] = float(np.hypot(left * shape, ALIKE))
+    return Prior(sheet, mean, of_levels, of_shapes)
 
 
-def _spreads(away: Array) -> tuple[float, float]:
+def _shares(shapes: Array, here: Array, spread: float) -> tuple[Array, float]:
+    """Return how much of each muscle's deviation one here has, and the share of spread left."""
+    if not len(shapes):
+        return np.zeros(0), 1.0
+
+    def alike(one: Array, other: Array) -> Array:
+        apart = (one[:, np.newaxis] - other) / NEAR
+        return np.asarray(np.exp(-0.5 * (apart**2).sum(axis=2)))
+
+    near = alike(shapes, here[np.newaxis])[:, 0]
+    among = alike(shapes, shapes) + (ALIKE / spread) ** 2 * np.eye(len(shapes))
+    share: Array = np.asarray(np.linalg.solve(among, near), dtype=np.float64)
+    return share, max(1.0 - float(near @ share), 0.0) ** 0.5
+
+
+def _spreads(table: Array) -> tuple[float, float]:
     """Return the deviations of muscles' levels, and of shapes from these, as few muscles tell them.
 
     A new one's is Student's; the Gaussian with the same middle two thirds is taken.
     """
-    told = np.isfinite(away)
+    told = np.isfinite(table)
     muscles = told.any(axis=1)
     n = int(muscles.sum())
     if n < FEWEST:
         return UNTOLD, UNTOLD
-    away, told = away[muscles], told[muscles]
-    level = np.nansum(away, axis=1) / told.sum(axis=1)
+    table, told = table[muscles], told[muscles]
+    away = np.where(told, table, 0.0)
+    away = np.where(told, away - away.sum(axis=0) / np.maximum(told.sum(axis=0), 1), 0.0)
+    level = away.sum(axis=1) / told.sum(axis=1)
     shape = np.where(told, away - level[:, np.newaxis], 0.0)
     free = n - 1
     new = (1.0 + 1.0 / n) * float(student.ppf(MIDDLE, free)) ** 2
     of_level = float(np.sqrt(new * (level - level.mean()) @ (level - level.mean()) / free))
-    apart = max((away.shape[1] - 1) * free, 1)
-    of_shape = float(np.sqrt(new * (shape**2).sum() / apart))
+    of_shape = float(np.sqrt(new * (shape**2).sum() / max((table.shape[1] - 1) * free, 1)))
     return max(of_level, ALIKE), max(of_shape, ALIKE)
-
-
-def _distance(one: Sheet, other: Sheet) -> float:
-    """Return how much braids differ, in logarithms."""
-    lengths = np.log(one.rest_length_mm / other.rest_length_mm)
-    return float(abs(np.log(one.area / other.area)) + 0.1 * abs(lengths))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -37,7 +36,7 @@ class Sheet(BaseModel):
     max_contraction : float, optional
         At the highest pressure without load, of the rest length. Default what is usual of the braid.
     like : str, optional
-        The muscle of the library to begin from: one of the same make. Default the mean of all.
+        A muscle of the library of the same make.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
@@ -67,7 +66,7 @@ class Sheet(BaseModel):
         """Pull at rest over that on the section."""
         return (self.max_force_N or 0.0) / (self._section * self.max_pressure_bar)
 
-    @cached_property
+    @property
     def braid(self) -> tuple[float, float]:
         """Constants a and b of the braid: its area is the section's by a (1 - contraction)^2 - b."""
         if self.braid_angle_deg is None:  # a - b is 2 / sin^2 - 3
@@ -76,13 +75,13 @@ class Sheet(BaseModel):
         angle = math.radians(self.braid_angle_deg)
         return 3.0 / math.tan(angle) ** 2, 1.0 / math.sin(angle) ** 2
 
-    @cached_property
+    @property
     def area(self) -> float:
         """Effective area at rest [N/bar]."""
         a, b = self.braid
         return self._section * (a - b)
 
-    @cached_property
+    @property
     def contraction(self) -> float:
         """Largest contraction, of the rest length."""
         a, b = self.braid
@@ -97,6 +96,13 @@ class Sheet(BaseModel):
     def force(self) -> float:
         """Pull at rest length under the highest pressure [N]."""
         return self.area * self.max_pressure_bar
+
+    @property
+    def shape(self) -> Array:
+        """Size, slenderness and braid, in logarithms: muscles near one another here are alike."""
+        return np.log(
+            [self.diameter_mm, self.rest_length_mm / self.diameter_mm, math.sqrt(self.braid[0])]
+        )
 
     def narrowed(self, share: Array) -> Array:
         """Return the area over that at rest, by contraction as a share of the largest."""

@@ -38,8 +38,8 @@ TIMES = np.array([0.1, 0.4, 1.6, 6.4, 25.6, 102.4])
 """After which stiffness has not relaxed yet [s]."""
 
 LEAST = {"elasticity": 0.05, "friction": 3e-4, "relaxation": 0.03, "damping": 1e-3, "wall": 3e-3}
-"""Shares that hardly matter: of the force at the largest contraction, of force, of force over stroke (by a second), of
-stroke."""
+"""What hardly matters: of the force at the largest contraction, of force, of the elastic stiffness, of force
+over stroke by a second, of stroke."""
 
 GROUPS = {
     "area": 1,
@@ -63,7 +63,7 @@ PLACES = {
 COUNT: int = _ENDS[-1]
 
 
-def traits(balance: Balance, sheet: Sheet) -> Array:
+def traits(balance: Balance, sheet: Sheet, zero: float = 0.0) -> Array:
     """Return the traits of a muscle, those that it has not as NaN.
 
     Parameters
@@ -72,43 +72,49 @@ def traits(balance: Balance, sheet: Sheet) -> Array:
         Of one muscle.
     sheet : Sheet
         Its own.
+    zero : float
+        How short it is where displacements count from [mm].
 
     Returns
     -------
     array, shape (COUNT,)
     """
-    rest = balance.areas[0][0]
+    area = np.array(balance.areas[0])
+    ends = sheet.stroke * ALONG - zero
+    at_rest = np.array([-zero])
+    rest = max(float(_straight(area, balance, at_rest)[0]), 0.1 * float(area[0]))
     force = rest * sheet.max_pressure_bar  # in the model's own unit of force
     newtons = bool(balance.n_loads)
     found = {
         "area": [_log(rest / (balance.loads[0][0] * sheet.area)) if newtons else np.nan],
-        "loss": _log(_straight(np.array(balance.areas[0]), balance, sheet.stroke * ALONG) / rest, 0.01)
-        - np.log(sheet.narrowed(ALONG)),
+        "loss": _log(_straight(area, balance, ends) / rest, 0.01) - np.log(sheet.narrowed(ALONG)),
     }
-    ends = sheet.stroke * ALONG
     h, limits = np.array(balance.friction[0]), np.array(balance.limits)
 
     def rubbed(p: float, travels: Array) -> Array:
         return np.minimum(travels[:, np.newaxis], limits * (p + balance.grip)) @ h
 
     own = balance.springs[0][1] + sum(balance.bladders)
-    elastic = _straight(np.array([0.0, 0.0, *balance.elasticity[0]]), balance, ends) + own * ends
-    pulled = force / rest * _straight(np.array(balance.areas[0]), balance, ends[-1:])
-    held = pulled - rubbed(sheet.max_pressure_bar, ends[-1:])
-    held = np.maximum(held, 0.1 * np.abs(pulled))
+    powers = np.array([balance.springs[0][0], own * balance.scale, *balance.elasticity[0]])
+    at_zero = _straight(powers, balance, at_rest)
+    elastic = _straight(powers, balance, ends) - at_zero
+    furthest = min(sheet.stroke, float(balance.hull[0][1]) + zero)  # areas beyond are guesses
+    share = np.array([furthest / sheet.stroke, 1.0])
+    kept = _straight(area, balance, np.array([furthest - zero]))[0] / rest
+    held = force * max(kept, 0.02) * np.divide(*sheet.narrowed(share)[::-1])
     found["elasticity"] = _log(elastic / held + LEAST["elasticity"], 0.01)
     pressures = sheet.max_pressure_bar * PRESSURES
     shares = [rubbed(p, sheet.stroke * TRAVELS) / (p * rest) for p in pressures.tolist()]
     found["friction"] = _log(np.concatenate(shares) + LEAST["friction"])
-    kept = np.exp(-TIMES[:, np.newaxis] / np.array([*balance.lags, 1.0]))
-    relaxing = kept @ np.array([*balance.relaxation[0], 0.0])
-    stiffness = max(float(elastic[-1]), 0.05 * float(held[0])) / sheet.stroke
+    left = np.exp(-TIMES[:, np.newaxis] / np.array([*balance.lags, 1.0]))
+    relaxing = left @ np.array([*balance.relaxation[0], 0.0])
+    stiffness = max(float(elastic[-1]), 0.05 * held) / sheet.stroke
     found["relaxation"] = _log(relaxing / stiffness + LEAST["relaxation"])
     damping = balance.damping[0] + sum(balance.lines)
     found["damping"] = _log([damping * sheet.stroke / force + LEAST["damping"]])
     stretch = balance.walls[0] * sheet.max_pressure_bar / sheet.stroke
     found["wall"] = _log([stretch + LEAST["wall"]])
-    found["offset"] = [balance.springs[0][0] / force if newtons else np.nan]
+    found["offset"] = [at_zero[0] / force if newtons else np.nan]
     return np.concatenate([np.ravel(found[name]) for name in GROUPS])
 
 
@@ -118,7 +124,7 @@ def _log(values: object, least: float = 1e-6) -> Array:
 
 def _straight(powers: Array, balance: Balance, y: Array) -> Array:
     """Return a polynomial, which goes on straight beyond what is known."""
-    inside = np.clip(y, *balance.hull[0])
+    inside = np.clip(y, balance.hull[0][0], balance.hull[0][1])
     u = inside / balance.scale
     slope = polynomial.polyval(u, polynomial.polyder(powers)) / balance.scale
     return np.asarray(polynomial.polyval(u, powers) + slope * (y - inside))

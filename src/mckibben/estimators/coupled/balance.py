@@ -52,7 +52,7 @@ from mckibben.estimators.coupled.balance_loads import (
     without_held,
     without_load,
 )
-from mckibben.estimators.coupled.balance_prior import believed, refined
+from mckibben.estimators.coupled.balance_prior import believed, refined, told_by
 from mckibben.estimators.coupled.balance_search import Search
 from mckibben.estimators.coupled.balance_stages import Stages, acted, acting
 from mckibben.estimators.coupled.balance_starts import simulate_started
@@ -164,6 +164,11 @@ class BalanceEstimator(CoupledEstimator):
         data = super().data(filled, rows)
         runs = [replace(run, unmeasured=lacking[run.recording]) for run in data.runs]
         return replace(data, runs=tuple(runs))
+
+    @property
+    def spans(self) -> tuple[float, ...] | None:
+        """The stroke of the data sheet, if there is one."""
+        return None if self.prior is None else (told_by(self.prior).sheet.stroke,)
 
     def find(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
         """Return the block found, and the data without what tells nothing."""
@@ -358,8 +363,9 @@ def directions(data: TrainingData) -> list[tuple[float, float]]:
     falls = len(data.outputs) == 1 and bool(free.runs) and free.falls
     gain = -1.0 if falls else 1.0
     found = []
-    for column in (gain * y).T:
-        away = column.min() > FAR * np.ptp(column) or column.max() < 0.0
+    for column, span in zip((gain * y).T, data.travel.tolist(), strict=True):
+        far = FAR * (np.ptp(column) if data.spans is None else span)
+        away = column.min() > far or column.max() < 0.0
         found.append((gain, gain * float(column.min()) if away else 0.0))
     return found
 

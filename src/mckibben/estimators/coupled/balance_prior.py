@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from copy import copy
 from dataclasses import dataclass, replace
-
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 
 from mckibben.arrays import Array
+from mckibben.blocks.coupled.balance import Balance
 from mckibben.errors import ModelError
 from mckibben.estimators.coupled.balance_search import Search
 from mckibben.estimators.coupled.balance_structure import Structure
@@ -20,8 +21,11 @@ from mckibben.muscles.traits import TIMES, traits
 STEP = 1e-5
 """Relative change of a coefficient by which traits' slopes are found."""
 
-FIRST_NOISE = 0.03
+FIRST_NOISE = 0.01
 """Error relative to the range, of independent samples, before any is known."""
+
+ZERO, ZERO_STEPS = 0.03, 6
+"""Share of the rest length by which it is unsure where displacements count from, and steps to there."""
 
 REFINED = 3
 """Times that the noise is found anew."""
@@ -48,23 +52,43 @@ class Belief:
     prior: Prior
     noise: float = FIRST_NOISE
 
+    @cached_property
+    def weights(self) -> Array:
+        """Rows that make independent numbers of traits."""
+        return self.prior.weights()
+
     def errors(self, structure: Structure, values: Array) -> tuple[Array, Array]:
-        """Return how far coefficients are from what is likely, and the slopes."""
-        weights = self.prior.weights()
-        sheet, mean = self.prior.sheet, np.nan_to_num(self.prior.mean)
-        found = traits(structure.block(values), sheet)
-        known = np.isfinite(found)
-        away = np.where(known, found - mean, 0.0)
-        slopes = np.zeros((found.size, values.size))
+        """Return how far coefficients are from what is likely, and the slopes.
+
+        Where displacements count from is as likely makes them most so (variable projection).
+        """
+        sheet, weights = self.prior.sheet, self.noise * self.weights
+        block = structure.block(values)
+        unsure = ZERO * sheet.rest_length_mm
+
+        def away(balance: Balance, zero: float) -> Array:
+            found = traits(balance, sheet, zero) - self.prior.mean
+            return np.append(
+                weights @ np.where(np.isfinite(found), found, 0.0), self.noise * zero / unsure
+            )
+
+        zero, by_zero = 0.0, np.zeros(1)
+        for _ in range(ZERO_STEPS):
+            now = away(block, zero)
+            by_zero = (away(block, zero + STEP * unsure) - now) / (STEP * unsure)
+            step = -float(by_zero @ now) / float(by_zero @ by_zero)
+            zero += min(max(step, -unsure), unsure)
+        now = away(block, zero)
+        slopes = np.zeros((now.size, values.size))
         places = np.flatnonzero(structure.free(moving=True).any(axis=1))
         force = float(values[structure.places("areas", 0)[0]]) * structure.highest
         for place in places[places < structure.own.first].tolist():
             moved = values.copy()
             step = STEP * max(abs(values[place]), 1e-3 * force)
             moved[place] += step
-            slopes[:, place] = (traits(structure.block(moved), sheet) - found) / step
-        rows = self.noise * weights
-        return rows @ away, rows @ np.where(known[:, np.newaxis], slopes, 0.0)
+            slopes[:, place] = (away(structure.block(moved), zero) - now) / step
+        slopes -= np.outer(by_zero, by_zero @ slopes) / float(by_zero @ by_zero)
+        return now, slopes
 
 
 def likely(search: Search) -> Array:
@@ -91,12 +115,12 @@ def refined(search: Search, tracker: Tracker, steps: int) -> Search:
     """Show a tracker where its best leads as the noise gets known; return the search with that."""
     for _ in range(REFINED):
         assert tracker.best is not None
-        assert search.belief is not None
-        values = tracker.best
+        values, belief = tracker.best, search.belief
+        assert belief is not None
         runs = range(len(search.runs))
         noise = noise_of([search.missed(values, place, sloped=False)[0] for place in runs])
         search = copy(search)
-        search.belief = replace(search.belief, noise=noise)
+        search.belief = replace(belief, noise=noise)
         tracker.best_cost = search.cost(values)
         search.descend(values, steps, tracker)
     return search
@@ -119,6 +143,11 @@ def noise_of(errors: list[Array]) -> float:
     return float(np.sqrt(power / count * alike))
 
 
+def told_by(given: str | Path | Prior) -> Prior:
+    """Return a prior, or that of a muscle's name or a file."""
+    return given if isinstance(given, Prior) else prior_of(given)
+
+
 def believed(structure: Structure, given: str | Path | Prior) -> tuple[Structure, Belief]:
     """Return the structure that can be what is likely, and that belief.
 
@@ -134,7 +163,7 @@ def believed(structure: Structure, given: str | Path | Prior) -> tuple[Structure
             "a prior is of one muscle under its load alone. Remedy: leave prior out for several "
             "muscles, or where something schedules them"
         )
-    prior = given if isinstance(given, Prior) else prior_of(given)
+    prior = told_by(given)
     stroke, hull = prior.sheet.stroke, structure.hull
     hull = np.array([[hull[0, 0], max(hull[0, 1], stroke)]])
     highest = max(structure.highest, prior.sheet.max_pressure_bar)

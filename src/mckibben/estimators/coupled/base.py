@@ -148,13 +148,20 @@ class CoupledEstimator(Estimator):
                 file=first.source,
                 remedy="record as many of both, or fit coupled-memory or tsfnn",
             )
-        found = training_data(listed, inputs, outputs, rows, scheduling, one_rate=False)
+        found = training_data(
+            listed, inputs, outputs, rows, scheduling, one_rate=False, spans=self.spans
+        )
         kept = found.stretches(FEWEST_SAMPLES - 1)
         if not kept.runs:
             raise DataError(
                 f"no {FEWEST_SAMPLES} samples in a row count", remedy="give longer recordings"
             )
         return kept
+
+    @property
+    def spans(self) -> tuple[float, ...] | None:
+        """Ranges of the outputs, if they are known before."""
+        return None
 
     def find(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
         """Return the block found."""

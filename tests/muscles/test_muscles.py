@@ -102,7 +102,10 @@ def test_weights_make_deviations_of_one() -> None:
         ("diameter_mm = 20.0\nrest_length_mm = 200.0\nmax_force_N = 1e5", "no braid"),
         ("diameter_mm = 20.0\nrest_length_mm = 200.0\nbraid_angle_deg = 25.0\nx = 1", "x"),
         ("diameter_mm = ", "no TOML"),
-        ('diameter_mm = 20.0\nrest_length_mm = 200.0\nbraid_angle_deg = 25.0\nlike = "x"', "no muscle"),
+        (
+            'diameter_mm = 20.0\nrest_length_mm = 200.0\nbraid_angle_deg = 25.0\nlike = "x"',
+            "no muscle",
+        ),
         ('format = "mckibben-muscle"\nversion = 2', "no identified muscle"),
         ('format = "mckibben-muscle"\nversion = 1', "title"),
     ],
@@ -121,5 +124,3 @@ def test_muscles_are_loaded_from_files_too(tmp_path: Path) -> None:
     assert np.array_equal(prior_of(path).mean, prior_of("rail").mean, equal_nan=True)
     with pytest.raises(DataError, match="no muscle 'nobody'"):
         load("nobody")
-
-

@@ -23,6 +23,9 @@ ALIKE = 0.1
 NEAR = 0.5
 """Logarithm of size, slenderness or braid over which muscles get unlike."""
 
+ZERO = 0.03
+"""Share of the rest length by which displacements count from elsewhere."""
+
 FEWEST = 3
 """Muscles that tell of a spread."""
 
@@ -47,12 +50,15 @@ class Prior:
         NaN of what no muscle tells.
     levels, shapes : dict of str to float
         Standard deviations.
+    zero : float
+        Standard deviation of where displacements count from, beyond rest [mm].
     """
 
     sheet: Sheet
     mean: Array
     levels: dict[str, float]
     shapes: dict[str, float]
+    zero: float
 
     def weights(self) -> Array:
         """Return rows that make independent numbers of deviation 1 of traits less their mean."""
@@ -125,7 +131,7 @@ def of_muscles(muscles: Sequence[Muscle], sheet: Sheet, like: Muscle | None = No
         left = _shares(shapes[told[:, place].any(axis=1)], here, spread)[1]
         of_levels[name] = float(np.hypot(left * level, ALIKE))
         of_shapes[name] = float(np.hypot(left * shape, ALIKE))
-    return Prior(sheet, mean, of_levels, of_shapes)
+    return Prior(sheet, mean, of_levels, of_shapes, ZERO * sheet.rest_length_mm)
 
 
 def _shares(shapes: Array, here: Array, spread: float) -> tuple[Array, float]:

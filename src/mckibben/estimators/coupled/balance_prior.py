@@ -24,8 +24,8 @@ STEP = 1e-5
 FIRST_NOISE = 0.01
 """Error relative to the range, of independent samples, before any is known."""
 
-ZERO, ZERO_STEPS = 0.03, 6
-"""Share of the rest length by which it is unsure where displacements count from, and steps to there."""
+ZERO_STEPS = 6
+"""To where displacements are likely to count from."""
 
 REFINED = 3
 """Times that the noise is found anew."""
@@ -64,7 +64,7 @@ class Belief:
         """
         sheet, weights = self.prior.sheet, self.noise * self.weights
         block = structure.block(values)
-        unsure = ZERO * sheet.rest_length_mm
+        unsure = self.prior.zero
 
         def away(balance: Balance, zero: float) -> Array:
             found = traits(balance, sheet, zero) - self.prior.mean

@@ -38,8 +38,8 @@ TIMES = np.array([0.1, 0.4, 1.6, 6.4, 25.6, 102.4])
 """After which stiffness has not relaxed yet [s]."""
 
 LEAST = {"elasticity": 0.05, "friction": 3e-4, "relaxation": 0.03, "damping": 1e-3, "wall": 3e-3}
-"""What hardly matters: of the force at the largest contraction, of force, of elastic stiffness, of force over
-stroke by a second, of stroke."""
+"""What hardly matters: of the force at the largest contraction, of force, of elastic stiffness, of force
+over stroke by a second, of stroke."""
 
 GROUPS = {
     "area": 1,

@@ -10,6 +10,7 @@ import sys
 import warnings
 from pathlib import Path
 from typing import Any
+from unittest.mock import patch
 
 import numpy as np
 
@@ -19,7 +20,9 @@ from mckibben.blocks.coupled.load_estimate import LoadEstimate, load_of
 from mckibben.errors import DataWarning, ModelWarning
 from mckibben.estimators.coupled.balance import BalanceEstimator
 from mckibben.muscles import Sheet
+from mckibben.muscles import prior as process
 from mckibben.muscles.prior import of_muscles
+from mckibben.muscles.traits import PLACES
 from mckibben.signals.broadband import random_wave
 
 STEP, LITTLE, MUCH = 0.02, 10.0, 90.0
@@ -77,6 +80,33 @@ def mas20() -> None:
         )
 
 
+def left_out() -> None:
+    """Print how likely muscles are by the others, for settings of the process."""
+    listed = [muscle for muscle in muscles.list() if muscle.name != "mas20-hanging"]
+    for smooth in (0.01, 1.0, 2.0):
+        for near in (0.25, 0.5, 1.0):
+            with (
+                patch.object(process, "SMOOTH", smooth),
+                patch.object(process, "NEAR", near),
+            ):
+                print(f"smooth {smooth:g}, near {near:g}: {sum(map(likelihood, listed)):.1f}")
+
+
+def likelihood(muscle: muscles.Muscle) -> float:
+    """Return the logarithm of a muscle's likelihood by the others, but for the wall's stretch."""
+    prior = of_muscles([other for other in muscles.list() if other is not muscle], muscle.sheet)
+    found = 0.0
+    for name, place in PLACES.items():
+        away = (muscle.traits - prior.mean)[place]
+        known = np.isfinite(away)
+        if name == "wall" or not known.any():  # one muscle has any
+            continue
+        covariance = prior.covariance(name)[np.ix_(known, known)]
+        found -= 0.5 * float(away[known] @ np.linalg.solve(covariance, away[known]))
+        found -= 0.5 * float(np.linalg.slogdet(covariance)[1])
+    return found
+
+
 def rmse(found: Any, run: Recording, channel: str = "displacement") -> float:
     """Return the error of a channel."""
     return float(np.sqrt(np.mean((found - run[channel]) ** 2)))
@@ -128,4 +158,5 @@ if __name__ == "__main__":
         warnings.simplefilter("ignore", category)
     if len(sys.argv) > 1:
         held(Path(sys.argv[1]))
+    left_out()
     mas20()

@@ -85,12 +85,15 @@ def test_a_muscle_of_the_library_is_likely_itself_and_others_less_sure() -> None
     assert all(known.levels[name] <= far.levels[name] for name in ("friction", "relaxation"))
 
 
-def test_weights_make_deviations_of_one() -> None:
+def test_weights_make_independent_numbers_of_deviation_one() -> None:
     prior = prior_of("rail")
+    covariance = np.zeros(2 * (len(prior.mean),))
     for name, place in PLACES.items():
-        level = np.zeros(len(prior.mean))
-        level[place] = prior.levels[name]
-        assert np.linalg.norm(prior.weights() @ level) == pytest.approx(1.0)
+        covariance[place, place] = prior.covariance(name)
+    weights = prior.weights()
+    np.testing.assert_allclose(
+        weights @ covariance @ weights.T, np.eye(len(weights)), rtol=0, atol=1e-9
+    )
 
 
 @pytest.mark.parametrize(

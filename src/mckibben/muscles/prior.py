@@ -15,16 +15,19 @@ from mckibben.errors import DataError
 from mckibben.muscles.library import FORMAT, Muscle, load, parsed
 from mckibben.muscles.library import list as all_muscles
 from mckibben.muscles.sheet import Sheet, refused
-from mckibben.muscles.traits import COUNT, PLACES
+from mckibben.muscles.traits import COUNT, PLACES, POSITIONS
 
 ALIKE = 0.1
 """Logarithm by which muscles of one make and size differ."""
 
-NEAR = 0.5
+NEAR = 0.25
 """Logarithm of size, slenderness or braid over which muscles get unlike."""
 
 ZERO = 0.03
 """Share of the rest length by which displacements count from elsewhere."""
+
+SMOOTH, FINE = 1.0, 0.03
+"""Neighbours over which traits of a name go together, and what each has alone."""
 
 FEWEST = 3
 """Muscles that tell of a spread."""
@@ -40,7 +43,7 @@ UNTOLD = 1.0
 class Prior:
     """What is likely of a muscle's traits.
 
-    Traits of a name go up and down together by a level, and each differs from that by its shape.
+    Traits of a name go up and down together by a level, and differ from it by a smooth shape.
 
     Parameters
     ----------
@@ -60,17 +63,22 @@ class Prior:
     shapes: dict[str, float]
     zero: float
 
+    def covariance(self, name: str) -> Array:
+        """Return the covariance of traits of a name."""
+        place = POSITIONS[name]
+        apart = ((place[:, np.newaxis] - place) / SMOOTH) ** 2
+        curved = self.shapes[name] ** 2 * np.exp(-0.5 * apart.sum(axis=2))
+        return np.asarray(self.levels[name] ** 2 + curved + FINE**2 * np.eye(len(place)))
+
     def weights(self) -> Array:
         """Return rows that make independent numbers of deviation 1 of traits less their mean."""
         rows = []
         for name, place in PLACES.items():
-            known = np.flatnonzero(np.isfinite(self.mean[place])) + place.start
-            if not known.size:
-                continue
-            part = np.zeros((1 + known.size, COUNT))
-            part[0, known] = 1.0 / (known.size * self.levels[name])
-            part[1:, known] = (np.eye(known.size) - 1.0 / known.size) / self.shapes[name]
-            rows.append(part if known.size > 1 else part[:1])
+            known = np.flatnonzero(np.isfinite(self.mean[place]))
+            part = np.zeros((known.size, COUNT))
+            factor = np.linalg.cholesky(self.covariance(name)[np.ix_(known, known)])
+            part[:, known + place.start] = np.linalg.inv(factor)
+            rows.append(part)
         return np.concatenate(rows)
 
 

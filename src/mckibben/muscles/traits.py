@@ -53,12 +53,21 @@ GROUPS = {
 }
 """Names of traits, and how many numbers each has."""
 
+GRIDS = {"friction": (PRESSURES.size, TRAVELS.size)}
+"""Of names whose numbers are no row."""
+
 _ENDS = np.cumsum([0, *GROUPS.values()]).tolist()
 PLACES = {
     name: slice(first, last)
     for name, first, last in zip(GROUPS, _ENDS[:-1], _ENDS[1:], strict=True)
 }
 """Where those of a name are among all."""
+
+POSITIONS = {
+    name: np.stack([grid.ravel() for grid in np.indices(GRIDS.get(name, (count,)))], axis=1)
+    for name, count in GROUPS.items()
+}
+"""Where each number of a name is among its neighbours, shape (numbers, ways)."""
 
 COUNT: int = _ENDS[-1]
 

@@ -220,6 +220,7 @@ def main(folder: Path | None, only: list[str]) -> None:
     for path in sorted(levels.glob("*.csv")) if not only or LEVELS in only else []:
         told = about("Festo DMSP-10, 250 mm (measured, levels)", LEVELS_SOURCE, NO_LICENCE)
         runs = [run.select(["pressure", "displacement"]) for run in mckibben.read(path)]
+        sheet = Sheet(rest_length_mm=250.0, **SHEET_10)
         write(identified(LEVELS, runs, sheet, told, n_lags=0))
 
 

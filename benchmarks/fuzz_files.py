@@ -18,9 +18,11 @@ import sys
 import tempfile
 import time
 import warnings
+import zipfile
 from collections.abc import Callable, Sequence
 from multiprocessing.connection import Connection
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -29,6 +31,26 @@ TIME = np.arange(N) / 50
 PRESSURE = 2 + np.sin(TIME * 9)
 DISPLACEMENT = 10 - 3 * np.cos(TIME * 9)
 COLUMNS = {"time_s": TIME, "pressure_bar": PRESSURE, "displacement_mm": DISPLACEMENT}
+
+DESCRIBED = """
+[time]
+column = "time_s"
+unit = "s"
+[channels.pressure]
+column = "pressure_bar"
+unit = "psi"
+gain = 2.5
+offset = -1.25
+[channels.force]
+value = 1.962
+unit = "N"
+[[files]]
+match = "*good*"
+[files.channels.force]
+value = 3.924
+[split]
+test = ["*.csv"]
+"""
 
 MOST_MEMORY = 600 * 2**20
 MOST_SECONDS = 10.0
@@ -119,6 +141,68 @@ def _tdms(folder: Path) -> Path:
     return folder / "good.tdms"
 
 
+def _xlsx(folder: Path) -> Path:
+    import openpyxl
+
+    book = openpyxl.Workbook()
+    book.active.append(["a run"])
+    for row in (["time", *list(COLUMNS)[1:]], *_rows()):
+        book.active.append(row)
+    book.create_sheet("notes").append(["by", "Jane"])
+    book.save(folder / "packed.xlsx")
+    with (
+        zipfile.ZipFile(folder / "packed.xlsx") as old,
+        zipfile.ZipFile(folder / "good.xlsx", "w", zipfile.ZIP_STORED) as new,  # to be seen into
+    ):
+        for info in old.infolist():
+            if info.filename != "docProps/core.xml":  # which tells the time of day
+                new.writestr(zipfile.ZipInfo(info.filename), old.read(info))
+    return folder / "good.xlsx"
+
+
+def _bag(kind: str, packed: bool) -> Maker:
+    def make(folder: Path) -> Path:
+        from rosbags.rosbag1 import Writer as Writer1
+        from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin
+        from rosbags.rosbag2 import Writer as Writer2
+        from rosbags.typesys import Stores, get_typestore
+
+        ros1 = kind == "bag"
+        store = get_typestore(Stores.ROS1_NOETIC if ros1 else Stores.ROS2_JAZZY)
+        path = folder / ("good.bag" if ros1 else "good")
+        plugin = StoragePlugin.MCAP if kind == "mcap" else StoragePlugin.SQLITE3
+        writer: Any = Writer1(path) if ros1 else Writer2(path, version=9, storage_plugin=plugin)
+        if packed and ros1:
+            writer.set_compression(Writer1.CompressionFormat.LZ4)
+        elif packed:
+            writer.set_compression(CompressionMode.STORAGE, CompressionFormat.ZSTD)
+        name = "std_msgs/msg/Float64"
+        serialize = store.serialize_ros1 if ros1 else store.serialize_cdr
+        with writer:
+            for column, values in list(COLUMNS.items())[1:]:
+                sent = writer.add_connection(f"/rig/{column}", name, typestore=store)
+                for time_, value in zip(TIME, values, strict=True):
+                    message = serialize(store.types[name](float(value)), name)
+                    writer.write(sent, 10**9 + round(1e9 * time_), message)
+        return path if ros1 else folder / "good" / f"good.{kind}"
+
+    return make
+
+
+def _described(folder: Path) -> Path:
+    _text("good.csv", ",")(folder)
+    (folder / "channels.toml").write_text(DESCRIBED, encoding="utf-8")
+    return folder / "channels.toml"
+
+
+def _signals(folder: Path) -> Path:
+    rows = list(zip(TIME.tolist(), PRESSURE.tolist(), DISPLACEMENT.tolist(), strict=True))
+    for place, name in ((1, "pressure_bar"), (2, "displacement_mm")):
+        text = "".join(f"{row[0]!r},{row[place]!r}\n" for row in rows[:: 3 - place])
+        (folder / f"{name}.csv").write_text(f"time_s,value\n{text}", encoding="utf-8")
+    return folder / "pressure_bar.csv"
+
+
 def _protocol(folder: Path) -> Path:
     _text("run.csv", ",")(folder)
     content = {"seed": 1, "runs": [{"name": "run", "file": "run.csv", "role": "test"}]}
@@ -146,6 +230,14 @@ KINDS: dict[str, Maker] = {
     "mat73": _hdf5("good.mat", 512),
     "hdf5": _hdf5("good.h5", 0),
     "tdms": _tdms,
+    "xlsx": _xlsx,
+    "bag": _bag("bag", False),
+    "bag-packed": _bag("bag", True),
+    "mcap": _bag("mcap", False),
+    "mcap-packed": _bag("mcap", True),
+    "db3": _bag("db3", False),
+    "channels": _described,
+    "signals": _signals,
     "protocol": _protocol,
     "rig": _rig,
 }
@@ -198,7 +290,7 @@ def _serve(pipe: Connection) -> None:
     for make in KINDS.values():  # what the libraries load counts for none of the files
         with tempfile.TemporaryDirectory() as place:
             path = make(Path(place))
-            if path.suffix in (".csv", ".parquet", ".mat", ".h5", ".tdms"):
+            if path.suffix not in (".json", ".toml"):
                 read(path)
     load_rig("mas20-hanging")
     sizes = Path("/proc/self/statm").read_text(encoding="ascii").split()
@@ -207,7 +299,9 @@ def _serve(pipe: Connection) -> None:
     pipe.send("ready")
     while path := pipe.recv():
         try:
-            if path.suffix == ".toml":
+            if path.name == "channels.toml" or path.stem == "pressure_bar":
+                read(path.parent)
+            elif path.suffix == ".toml":
                 load_rig(path)
             elif path.name == "protocol.json":
                 roles(path.parent)

@@ -498,6 +498,63 @@ def stepping(model: Callable[[Any, float], Any]) -> Twin:
     return twin
 
 
+def _oscillator(slope: Callable[[Any, float, float], float]) -> Twin:
+    """Return the twin of a mass-spring-damper with an element of a slope, from [block, z, y']."""
+
+    def rates(block: Any, x: list[float], u: float) -> list[float]:
+        y, v, z = x
+        pull = u - block.damping * v - block.stiffness * y - z
+        return [v, 1000.0 * pull / block.mass, v * slope(block, z, v)]
+
+    def rest(block: Any, u: float) -> list[float]:
+        def taken(_: float, z: float) -> float:
+            f = slope(block, z, u)
+            return f / (block.stiffness + f)
+
+        z = 0.0
+        for k in range(64):
+            first, h = u / 64 * k, u / 64
+            k1 = taken(first, z)
+            k2 = taken(first, z + h / 2 * k1)
+            k3 = taken(first, z + h / 2 * k2)
+            z += h / 6 * (k1 + 2 * k2 + 2 * k3 + taken(first, z + h * k3))
+        return [(u - z) / block.stiffness, 0.0, z]
+
+    def moved(x: list[float], h: float, k: list[float]) -> list[float]:
+        return [a + h * b for a, b in zip(x, k, strict=True)]
+
+    def twin(block: Any, inputs: Rows, sample_time: float) -> Rows:
+        given, n = _column(inputs), block.substeps
+        x, h = rest(block, given[0]), sample_time / n
+        outputs = []
+        for before, now in itertools.pairwise([given[0], *given]):
+            if block.hold == "zero":
+                now = before
+            for s in range(n):
+                start, end = (before + (now - before) * (s + d) / n for d in (0, 1))
+                k1 = rates(block, x, start)
+                k2 = rates(block, moved(x, h / 2, k1), (start + end) / 2)
+                k3 = rates(block, moved(x, h / 2, k2), (start + end) / 2)
+                k4 = rates(block, moved(x, h, k3), end)
+                mean = [
+                    (a + 2 * b + 2 * c + d) / 6 for a, b, c, d in zip(k1, k2, k3, k4, strict=True)
+                ]
+                x = moved(x, h, mean)
+            outputs.append(x[0] + (block.output_offset or 0.0))
+        return _rows(outputs)
+
+    return twin
+
+
+def _bouc_wen_slope(block: Any, z: float, v: float) -> float:
+    return float(block.slope - block.gamma * _sign(v) * z - block.delta * abs(z))
+
+
+def _duhem_slope(block: Any, z: float, v: float) -> float:
+    slopes = block.rising if v > 0 else block.falling
+    return _lines(block.knots, slopes, min(max(z, block.knots[0]), block.knots[-1]))
+
+
 # -- dynamic models --------------------------------------------------------------------------
 
 
@@ -1225,6 +1282,37 @@ def pid(block: Any, inputs: Rows, sample_time: float) -> Rows:
     return outputs
 
 
+def state_network(block: Any, inputs: Rows, sample_time: float) -> Rows:
+    def rates(x: list[float], u: float) -> list[float]:
+        known = [*x, u, 1.0]
+        units = [math.tanh(_sum(tuple(row), known)) for row in block.hidden]
+        pairs = zip(block.linear, block.readout, strict=True)
+        return [_sum(own, known) + _sum(read, units) for own, read in pairs]
+
+    def step(x: list[float], start: float, end: float, h: float) -> list[float]:
+        def moved(share: float, k: list[float]) -> list[float]:
+            return [a + share * h * b for a, b in zip(x, k, strict=True)]
+
+        k1 = rates(x, start)
+        k2 = rates(moved(0.5, k1), (start + end) / 2)
+        k3 = rates(moved(0.5, k2), (start + end) / 2)
+        k4 = rates(moved(1.0, k3), end)
+        mean = [(a + 2 * b + 2 * c + d) / 6 for a, b, c, d in zip(k1, k2, k3, k4, strict=True)]
+        return moved(1.0, mean)
+
+    given = [(u - block.input_offset) / block.input_scale for u in _column(inputs)]
+    x, n = [0.0] * len(block.linear), block.substeps
+    for _ in range(1000):
+        x = step(x, given[0], given[0], 0.1)
+    outputs = []
+    for before, now in itertools.pairwise([given[0], *given]):
+        for s in range(n):
+            start, end = (before + (now - before) * (s + d) / n for d in (0, 1))
+            x = step(x, start, end, block.rate * sample_time / n)
+        outputs.append(block.output_offset + block.output_scale * x[0])
+    return _rows(outputs)
+
+
 TWINS: dict[str, Twin] = {
     "activation-memory": activation_memory,
     "activation-pressure": activation_pressure,
@@ -1235,6 +1323,7 @@ TWINS: dict[str, Twin] = {
     "balance-inverse": balance_inverse,
     "bouc-wen": stepping(_BoucWen),
     "bouc-wen-inverse": _solved(_BoucWen),
+    "bouc-wen-oscillator": _oscillator(_bouc_wen_slope),
     "braid-equilibrium": braid_equilibrium,
     "braid-equilibrium-inverse": braid_equilibrium_inverse,
     "chou-hannaford": chou_hannaford,
@@ -1248,6 +1337,7 @@ TWINS: dict[str, Twin] = {
     "creep-inverse": creep_inverse,
     "duhem": stepping(_Duhem),
     "duhem-inverse": _solved(_Duhem),
+    "duhem-oscillator": _oscillator(_duhem_slope),
     "eupi": eupi,
     "eupi-inverse": eupi_inverse,
     "exponential": exponential,
@@ -1280,6 +1370,7 @@ TWINS: dict[str, Twin] = {
     "process-model": process_model,
     "rate-dependent-pi": rate_dependent_pi,
     "rate-dependent-pi-inverse": rate_dependent_pi_inverse,
+    "state-network": state_network,
     "tondu-lopez": tondu_lopez,
     "recurrent-fuzzy-network": recurrent_fuzzy_network,
     "transfer-function": transfer_function,

@@ -18,7 +18,11 @@ TESTS = (
     "blocks/test_gpi.py::test_operators_side_by_side_are_the_model",
     "blocks/test_eupi.py::test_operators_side_by_side_are_the_model",
     "blocks/test_maxwell_slip.py",
+    "blocks/test_oscillator.py::test_streams_are_batches",
+    "estimators/test_oscillator.py::test_runs_with_derivatives_are_those_of_the_block_and_exact",
     "estimators/test_narx.py::test_feeding_back_agrees_with_its_twin",
+    "estimators/test_state_network.py::test_runs_with_derivatives_are_those_of_the_block_and_exact",
+    "estimators/test_state_network.py::test_a_run_that_leaves_all_bounds_ends",
     "signals/test_reversals.py",
 )
 """Quick without a compiler, and between them in every line of every kernel."""

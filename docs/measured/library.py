@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 
 import mckibben
+from mckibben.blocks.coupled.load_estimate import parts_of
 from mckibben.errors import DataWarning, ModelWarning
 from mckibben.estimators.coupled.balance import BalanceEstimator
-from mckibben.estimators.coupled.balance_loads import solved_in
 from mckibben.muscles.library import FOLDER, Conditions, Muscle, described
 from mckibben.muscles.sheet import Sheet
 from mckibben.muscles.traits import ALONG, PLACES, traits
@@ -129,7 +129,7 @@ def identified(
 ) -> Muscle:
     """Return a muscle as identified from recordings."""
     found = BalanceEstimator(elasticity=7, **settings).fit(recordings)
-    _, balance, _ = solved_in(found.model_)
+    balance, _, _ = parts_of(found.model_)
     moved = np.concatenate([run["displacement"] for run in recordings])
     pressed = np.concatenate([run["pressure"] for run in recordings])
     pulled = np.concatenate([run["force"] for run in recordings if "force" in run] or [[]])

@@ -155,17 +155,17 @@ def claim_recording(path: Path, *, inputs: Iterable[Path], force: bool) -> None:
 
 
 def refuse_inputs(path: Path, inputs: Iterable[Path]) -> None:
-    """Refuse an output that is an input, or the description beside one.
+    """Refuse an output that is an input, part of one, or the description beside one.
 
     Raises
     ------
     DataError
         Whatever name it goes by: another spelling, a link, or a second name of the same file.
     """
-    from mckibben.files.own import description
+    from mckibben.files.sources import read_with
 
     for given in inputs:
-        for read in filter(None, (given, description(given))):
+        for read in read_with(given):
             if _same(path, read):
                 raise DataError(
                     f"it is read from {read}, so it is not written to",

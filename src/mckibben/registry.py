@@ -31,6 +31,9 @@ PLUGINS: dict[str, dict[str, str | Preset]] = {
         "air": "mckibben.blocks.dynamic.air:Air",
         "balance": "mckibben.blocks.coupled.balance:Balance",
         "bouc-wen": "mckibben.blocks.differential.bouc_wen:BoucWen",
+        "bouc-wen-oscillator": (
+            "mckibben.blocks.differential.bouc_wen_oscillator:BoucWenOscillator"
+        ),
         "braid-equilibrium": "mckibben.blocks.force.braid_equilibrium:BraidEquilibrium",
         "chou-hannaford": "mckibben.blocks.force.chou_hannaford:ChouHannaford",
         "contact": "mckibben.blocks.memoryless.contact:Contact",
@@ -38,6 +41,7 @@ PLUGINS: dict[str, dict[str, str | Preset]] = {
         "coupling": "mckibben.blocks.coupled.coupling:Coupling",
         "creep": "mckibben.blocks.dynamic.creep:Creep",
         "duhem": "mckibben.blocks.differential.duhem:Duhem",
+        "duhem-oscillator": "mckibben.blocks.differential.duhem_oscillator:DuhemOscillator",
         "eupi": "mckibben.blocks.play_type.eupi:EUPI",
         "exponential": "mckibben.blocks.memoryless.logarithm:Exponential",
         "feedforward-feedback": "mckibben.blocks.feedback.feedforward_feedback:FeedforwardFeedback",
@@ -74,6 +78,7 @@ PLUGINS: dict[str, dict[str, str | Preset]] = {
             "mckibben.blocks.coupled.recurrent_fuzzy_network:RecurrentFuzzyNetwork"
         ),
         "series": "mckibben.blocks.compose:Series",
+        "state-network": "mckibben.blocks.dynamic.state_network:StateNetwork",
         "tondu-lopez": "mckibben.blocks.force.tondu_lopez:TonduLopez",
         "transfer-function": "mckibben.blocks.dynamic.transfer_function:TransferFunction",
     },
@@ -99,6 +104,7 @@ PLUGINS: dict[str, dict[str, str | Preset]] = {
         "armax": preset(LINEAR, "ARMAX model, A y = B u + C e.", n_noise=2, effort=1.0),
         "arx": preset(LINEAR, "ARX model, A y = B u + e, by linear least squares."),
         "balance": "mckibben.estimators.coupled.balance:BalanceEstimator",
+        "balance-force": "mckibben.estimators.coupled.balance_force:BalanceForceEstimator",
         "bj": preset(
             LINEAR,
             "Box-Jenkins model, y = B / F u + C / D e; second order each by default.",
@@ -108,6 +114,9 @@ PLUGINS: dict[str, dict[str, str | Preset]] = {
             effort=1.0,
         ),
         "bouc-wen": "mckibben.estimators.differential.bouc_wen:BoucWenEstimator",
+        "bouc-wen-oscillator": (
+            "mckibben.estimators.differential.bouc_wen_oscillator:BoucWenOscillatorEstimator"
+        ),
         "coupled-memory": "mckibben.estimators.coupled.memory:CoupledMemoryEstimator",
         "coupled-pi": preset(
             SDCHM,
@@ -118,6 +127,9 @@ PLUGINS: dict[str, dict[str, str | Preset]] = {
         ),
         "cpi": "mckibben.estimators.play_type.creep_pi:CreepPIEstimator",
         "duhem": "mckibben.estimators.differential.duhem:DuhemEstimator",
+        "duhem-oscillator": (
+            "mckibben.estimators.differential.duhem_oscillator:DuhemOscillatorEstimator"
+        ),
         "eupi": "mckibben.estimators.play_type.eupi:EUPIEstimator",
         "force-bilinear": preset(FORCE_LAW, "The bilinear-quadratic law.", law="bilinear"),
         "force-chou": "mckibben.estimators.force.static:ChouHannafordEstimator",
@@ -211,6 +223,7 @@ PLUGINS: dict[str, dict[str, str | Preset]] = {
             memory_settings={"threshold_rule": "paper", "initial": "virgin"},
             n_friction=0,
         ),
+        "state-network": "mckibben.estimators.dynamic.state_network:StateNetworkEstimator",
         "tsfnn": "mckibben.estimators.coupled.sdchm:TSFNNEstimator",
     },
     "papers": {

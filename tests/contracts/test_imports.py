@@ -31,7 +31,7 @@ LAYERS = (
     {"estimators", "export", "stream", "outputs"},
     {"control"},
     {"comparison"},
-    {"papers", "missing"},
+    {"papers", "measured", "missing"},
     {"report"},
     {"app"},
     {"cli"},

@@ -11,6 +11,7 @@ import numpy as np
 
 from mckibben import GPI, PI, Recording
 from mckibben.blocks.coupled.force_balance import ForceBalance
+from mckibben.blocks.differential.bouc_wen_oscillator import BoucWenOscillator
 from mckibben.blocks.dynamic.air import Air
 from mckibben.blocks.force.multistate_friction import MultistateFriction
 from mckibben.blocks.force.polynomial_force import PolynomialForce
@@ -34,6 +35,7 @@ QUICK: dict[str, Any] = {
     "n_stops": 3,
     "n_lags": 1,
     "steps": 3,
+    "n_steps": 8,
     "ridge": 1e-3,
     "n_sets": 2,
     "elements": ("both",),
@@ -128,12 +130,22 @@ def commanded(seed: int) -> Recording:
     return Recording({"voltage": volts, "pressure": p}, STEP)
 
 
+def shaken(seed: int) -> Recording:
+    """A mass on a spring beside an element that remembers, shaken by a force from rest."""
+    rng, t = np.random.default_rng(seed), STEP * np.arange(SAMPLES)
+    waves = rng.uniform(0.4, 1.0, 4), 2 * np.pi * np.array([0.3, 0.7, 1.1, 1.9])
+    force = sum(a * np.sin(w * t) for a, w in zip(*waves, strict=True))
+    y = BoucWenOscillator.example().simulate(force, sample_time=STEP) + noise(seed, 0.02)
+    return Recording({"force": force, "displacement": y}, STEP)
+
+
 KINDS = {
     "muscle": Kind(("pressure",), ("displacement",), muscle),
     "isobaric": Kind(("length",), ("force",), isobaric, ("pressure",)),
     "activated": Kind(("contraction",), ("pressure",), activated, ("force",)),
     "commanded": Kind(("voltage",), ("pressure",), commanded),
     "loaded": Kind(("voltage",), ("displacement",), loaded, ("force",), n_runs=4),
+    "shaken": Kind(("force",), ("displacement",), shaken),
     "two muscles": Kind(
         ("pressure_1", "pressure_2"),
         ("displacement_1", "displacement_2"),

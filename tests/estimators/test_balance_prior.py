@@ -12,9 +12,8 @@ import pytest
 from mckibben import ModelError, Recording, muscles
 from mckibben.arrays import Array
 from mckibben.blocks.core.block import Block
-from mckibben.blocks.coupled.load_estimate import load_of
+from mckibben.blocks.coupled.load_estimate import load_of, parts_of
 from mckibben.estimators.coupled.balance import BalanceEstimator
-from mckibben.estimators.coupled.balance_loads import solved_in
 from mckibben.estimators.coupled.balance_prior import noise_of
 from mckibben.muscles import Prior, Sheet
 from mckibben.muscles.prior import of_muscles
@@ -80,7 +79,7 @@ def test_a_prior_without_doubt_returns_itself() -> None:
         shapes=dict.fromkeys(prior.shapes, 1e-3),
         zero=1e-3,
     )
-    _, balance, _ = solved_in(fitted(moved(1, 5.0), sure))
+    balance, _, _ = parts_of(fitted(moved(1, 5.0), sure))
     away = traits(balance, SHEET) - prior.mean
     assert np.sqrt(np.nanmean(away**2)) < 0.1  # four stops do not make every friction
 

@@ -8,9 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mckibben import DataError, Recording
+from mckibben import DataError, Recording, registry
+from mckibben.blocks.core.saving import from_dict, to_dict
 from mckibben.blocks.force.multistate_friction import EACH_WAY, MultistateFriction
 from mckibben.blocks.force.tondu_lopez import TonduLopez
+from mckibben.estimators.coupled.balance_force import BalanceForceEstimator
 from mckibben.estimators.force.activation_memory import ActivationMemoryEstimator
 from mckibben.estimators.force.activation_pressure import (
     ActivationPressureEstimator,
@@ -24,6 +26,7 @@ from mckibben.estimators.force.static import (
 )
 from mckibben.papers.activation_pressure.published import activation_pressure
 from mckibben.papers.multistate_friction.published import static_force
+from tests.estimators.test_balance import recording
 
 TRUTH = MultistateFriction(
     EACH_WAY,
@@ -124,10 +127,10 @@ def sines(frequency: float, force: float) -> Recording:
 def test_activation_pressure_finds_the_published_profile_again() -> None:
     runs = [sines(w, f) for w in (0.5, 1.0, 2.0) for f in (0.0, 100.0, 200.0, 300.0)]
     fit: Any = ActivationPressureEstimator(method="ls", rate_time_constant=0.0).fit(runs)
-    for recording, frequency in ((runs[0], 0.5), (runs[-1], 2.0)):
+    for run, frequency in ((runs[0], 0.5), (runs[-1], 2.0)):
         told = replace(fit.model_, frequency=frequency)
-        error = told.simulate(recording)["pressure"] - recording["pressure"]
-        assert np.abs(error).max() < 0.1 * np.ptp(recording["pressure"])
+        error = told.simulate(run)["pressure"] - run["pressure"]
+        assert np.abs(error).max() < 0.1 * np.ptp(run["pressure"])
     assert fit.model_.gamma[0] / fit.model_.gamma[1] == pytest.approx(0.267 / 0.667, rel=0.3)
 
 
@@ -179,3 +182,52 @@ def test_memory_needs_no_frequency() -> None:
     runs = [sines(w, 150.0) for w in (0.5, 2.0)]
     fit: Any = ActivationMemoryEstimator().fit(runs)
     assert fit.diagnostics_.rmse < 0.05 * np.ptp(runs[0]["pressure"])
+
+
+class TestBalanceForce:
+    """A balance asked for its load, as a model of force."""
+
+    @staticmethod
+    def moved(seed: int) -> Recording:
+        """A muscle with friction under a load, both at random."""
+        run = recording(seed)
+        return run.with_channels({"length": "mm"}, length=150.0 - run["displacement"])
+
+    @pytest.mark.parametrize("channel", ["displacement", "length"])
+    def test_force_is_recovered_where_a_static_law_leaves_the_loop(self, channel: str) -> None:
+        runs, other = [self.moved(1), self.moved(2)], self.moved(3)
+        fit: Any = BalanceForceEstimator(input=channel).fit(runs)
+        error = np.std(fit.predict([other])[0] - other["force"])
+        law: Any = PolynomialForceEstimator(law="bilinear").fit(runs)
+        left = np.std(law.predict([other])[0] - other["force"])
+        assert error < 0.3 * left
+        assert [c.name for c in fit.fitted.inputs] == [channel, "pressure"]
+        again = from_dict(to_dict(fit.fitted))
+        np.testing.assert_array_equal(
+            again.simulate(other)["force"], fit.fitted.simulate(other)["force"]
+        )
+
+    def test_length_and_displacement_tell_the_same(self) -> None:
+        runs = isometric(static_force())
+        runs = [
+            r.with_channels({"displacement": "mm"}, displacement=200.0 - r["length"]) for r in runs
+        ]
+        forces = [
+            BalanceForceEstimator(input=name).fit(runs).predict(runs)
+            for name in ("length", "displacement")
+        ]
+        np.testing.assert_allclose(np.concatenate(forces[0]), np.concatenate(forces[1]), atol=1e-6)
+
+    def test_it_says_where_it_has_no_place(self) -> None:
+        runs = isometric(static_force())
+        assert BalanceForceEstimator.objection(runs, ["length"], ["force"]) is None
+        assert BalanceForceEstimator.objection(runs, ["pressure"], ["force"]) is not None
+        bare = [run.select(["length", "force"]) for run in runs]
+        assert "pressure" in str(BalanceForceEstimator.objection(bare, ["length"], ["force"]))
+
+
+def test_models_of_what_rests_in_every_recording_are_not_offered() -> None:
+    runs = isometric(static_force())
+    for name in ("pi", "balance", "arx"):
+        found = registry.load("estimators", name).objection(runs, ["length"], ["force"])
+        assert "rests in every recording" in str(found)

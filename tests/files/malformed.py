@@ -10,6 +10,7 @@ import io
 import math
 import os
 import sys
+import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -168,6 +169,46 @@ def gapped(lengths: Sequence[int], pause: float) -> bytes:
     return good(time_s=time[:N])
 
 
+def xlsx(**columns: Sequence[object]) -> bytes:
+    """Return a spreadsheet."""
+    import openpyxl
+
+    book = openpyxl.Workbook(write_only=True)
+    sheet = book.create_sheet("Data")
+    sheet.append(list(columns))
+    for row in zip(*columns.values(), strict=True):
+        sheet.append(row)
+    buffer = io.BytesIO()
+    book.save(buffer)
+    return buffer.getvalue()
+
+
+def mcap(pressures: Sequence[float], topic: str = "/pressure_bar") -> bytes:
+    """Return a bag of ROS 2 with a topic of numbers."""
+    from rosbags.rosbag2 import StoragePlugin, Writer
+    from rosbags.typesys import Stores, get_typestore
+
+    store, kind = get_typestore(Stores.ROS2_JAZZY), "std_msgs/msg/Float64"
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "bag"
+        with Writer(path, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+            sent = writer.add_connection(topic, kind, typestore=store)
+            for k, value in enumerate(pressures):
+                message = store.serialize_cdr(store.types[kind](value), kind)
+                writer.write(sent, 10**8 * k, message)
+        return (path / "bag.mcap").read_bytes()
+
+
+def described(text: str) -> Maker:
+    """Make a sound table, and a description of its folder beside it."""
+
+    def make(path: Path) -> None:
+        path.write_bytes(good())
+        (path.parent / "channels.toml").write_text(text)
+
+    return make
+
+
 def nothing(path: Path) -> None:
     """Make no file at all."""
 
@@ -181,15 +222,17 @@ GARBAGE = bytes(range(256)) * 4
 PARQUET = parquet(pressure_bar=PRESSURE, displacement_mm=DISPLACEMENT)
 MAT = mat(pressure=PRESSURE, displacement=DISPLACEMENT)
 HDF5 = hdf5(pressure_bar=PRESSURE, displacement_mm=DISPLACEMENT)
+XLSX = xlsx(pressure_bar=PRESSURE, displacement_mm=DISPLACEMENT)
+MCAP = mcap(PRESSURE)
 UNITS = {"units": {"pressure": "bar", "displacement": "mm"}}
 
 CASES: list[Case] = [
     # No file, or none that is known
     Case("missing.csv", nothing, "no such file"),
-    Case("folder.csv", Path.mkdir, "this is a folder"),
+    Case("folder.csv", Path.mkdir, "no recording in the folder"),
     Case("link.csv", loop, "it cannot be read"),
     Case("pipe.csv", os.mkfifo, "no ordinary file"),
-    Case("book.xlsx", b"PK\x03\x04", "'.xlsx' cannot be read"),
+    Case("book.xls", b"\xd0\xcf\x11\xe0", "'.xls' cannot be read"),
     Case("notes.docx", b"PK\x03\x04", "'.docx' cannot be read"),
     Case("no_ending", good(), "'nothing' cannot be read"),
     # Content of another kind
@@ -305,7 +348,6 @@ CASES: list[Case] = [
     Case("overflow.csv", good(pressure_bar=put(PRESSURE, 2, "1e999")), "not finite", "pressure", 4),
     Case("blank_column.csv", good(pressure_bar=[""] * N), "holds text", "pressure", 2),
     Case("constant.csv", good(pressure_bar=[2.5] * N), "constant, at 2.5", "pressure"),
-    Case("constant_output.csv", good(displacement_mm=[0] * N), "constant, at 0", "displacement"),
     # Time
     Case("no_instant.csv", good(time_s=put(TIME, 5, "")), "time is missing", "time", 7),
     Case("infinite_time.csv", good(time_s=put(TIME, 5, "inf")), "time is missing", "time", 7),
@@ -379,6 +421,43 @@ CASES: list[Case] = [
     Case("text.tdms", good(), "damaged"),
     Case("no_samples.tdms", tdms(n=0), "no channel in it has samples"),
     Case("two_clocks.tdms", tdms(increments=(0.1, 0.2)), "several time bases"),
+    # Spreadsheets
+    Case("truncated.xlsx", XLSX[: len(XLSX) // 2], "damaged"),
+    Case("garbage.xlsx", b"PK\x03\x04" + GARBAGE, "damaged"),
+    Case("text.xlsx", good(), "damaged"),
+    Case("spreadsheet.csv", XLSX, "it is a spreadsheet or an archive"),
+    Case("words.xlsx", xlsx(pressure=["high"] * N), "no sheet in it has numbers"),
+    Case("no_column.xlsx", xlsx(pressure_bar=PRESSURE), "no such channel", "displacement"),
+    Case(
+        "blank.xlsx",
+        xlsx(pressure_bar=put(PRESSURE, 4, None), displacement_mm=DISPLACEMENT),
+        "1 of 30 samples",
+        "pressure",
+        6,
+    ),
+    Case(
+        "backwards.xlsx",
+        xlsx(time_s=put(TIME, 5, 0.05), pressure_bar=PRESSURE, displacement_mm=DISPLACEMENT),
+        "back from 0.4 to 0.05",
+        "time",
+        7,
+    ),
+    # Bags
+    Case("truncated.mcap", MCAP[:300], "damaged"),
+    Case("garbage.mcap", b"\x89MCAP0\r\n" + GARBAGE, "damaged"),
+    Case("text.mcap", good(), "damaged"),
+    Case("mcap.bag", MCAP, "by its content it is MCAP"),
+    Case("garbage.bag", b"#ROSBAG V2.0\n" + GARBAGE, "damaged"),
+    Case("text.db3", good(), "damaged"),
+    Case("garbage.db3", b"SQLite format 3\0" + GARBAGE, "damaged"),
+    Case("no_topic.mcap", MCAP, "no such channel", "displacement"),
+    # Descriptions of the folder
+    Case(
+        "no_described.csv",
+        described("[channels.pressure]\ncolumn = 'A0'"),
+        "no column 'A0'",
+        "pressure",
+    ),
 ]
 
 if __name__ == "__main__":

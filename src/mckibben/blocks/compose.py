@@ -23,6 +23,9 @@ from mckibben.blocks.core.fields import STRICT, Channel, Initial
 from mckibben.errors import ModelError
 from mckibben.system.compiling import in_turn
 
+AT_REST = ("first_sample", "fitted")
+"""Rules by which a block starts at rest at its first input, where no output is known."""
+
 
 @dataclass(frozen=True, config=STRICT)
 class Series(Composition):
@@ -131,7 +134,7 @@ class Series(Composition):
         by_name = dict(zip((channel.name for channel in self.inputs), given, strict=True))
         signals: list[str] | None = None
         for number, part in enumerate(self.parts):
-            at_rest = not part.rate_dependent or part.start == "first_sample"
+            at_rest = not part.rate_dependent or part.start in AT_REST
             if number < len(self.parts) - 1 and not at_rest:
                 raise ModelError(
                     f"{part.kind!r} starts from a memory of its own and depends on the rate, so parts "

@@ -23,6 +23,7 @@ from mckibben.cli.export import app as export_app
 from mckibben.cli.fit import fit
 from mckibben.cli.info import info
 from mckibben.cli.invert import invert
+from mckibben.cli.measured import measured
 from mckibben.cli.muscles import app as muscles_app
 from mckibben.cli.output import InterruptionError, finish, say, visible
 from mckibben.cli.plot import plot
@@ -51,6 +52,7 @@ app = typer.Typer(
 )
 for command in (study, characterize, fit, compare, simulate, invert, track, plot, reproduce, info):
     app.command()(command)
+app.command()(measured)
 app.command("check-block")(check_block)
 app.command("app")(workbench)
 app.add_typer(export_app)

@@ -10,6 +10,7 @@ import numpy as np
 from mckibben.arrays import Array
 from mckibben.blocks.compose import Series
 from mckibben.blocks.core.block import Block
+from mckibben.blocks.dynamic.creep_start import begun_places, begun_state
 from mckibben.blocks.dynamic.linear_start import LinearStart
 from mckibben.comparison.splits import Mask, predecessor
 from mckibben.errors import ModelWarning
@@ -74,6 +75,13 @@ def known_start(
     if isinstance(block, LinearStart) and block.initial == "fitted":
         inputs = recording.matrix(channel.name for channel in block.inputs)
         return block.fitted_state(inputs, recording[outputs[0]], recording.sample_time, rows)
+    if begun_places(block):
+        inputs = recording.matrix(channel.name for channel in block.inputs)
+        known = np.ones(len(recording), dtype=bool) if rows is None else rows
+        state = block.initial_state(inputs[0])
+        return begun_state(
+            block, state, inputs, recording[outputs[0]], recording.sample_time, known
+        )
     return measured_start(block, recording, outputs)
 
 
@@ -91,9 +99,10 @@ def _begins(recording: Recording, known: Recording) -> bool:
 def measured_start(block: Block, recording: Recording, names: str | Sequence[str]) -> Array:
     """Return the state before the first sample that best explains the first measured output.
 
-    The candidates are memories of a single excursion: the input came down from a peak between the
-    first sample and the highest of the block's range or the recording. The lowest peak that explains
-    the output is taken, so a model that has only risen starts from its own rule.
+    The candidates are the block's own rule, for what has come to the first sample just now; and memories
+    of a single excursion, long ago: the input came down from a peak between the first sample and the
+    highest of the block's range or the recording. The lowest peak that explains the output is taken, so
+    a model that has only risen starts from its own rule.
     """
     inputs = recording.matrix(channel.name for channel in block.inputs)
     first = inputs[0]
@@ -112,8 +121,8 @@ def measured_start(block: Block, recording: Recording, names: str | Sequence[str
     measured = float(recording[name][0])
     place = [channel.name for channel in block.outputs].index(name)
 
-    def after(peak: float) -> tuple[float, Array]:
-        history = np.repeat(first[np.newaxis], SETTLING + 1, axis=0)
+    def after(peak: float, settling: int = SETTLING) -> tuple[float, Array]:
+        history = np.repeat(first[np.newaxis], settling + 1, axis=0)
         history[0, 0] = peak
         state = block.initial_state(history[0], "first_sample" if peak > first[0] else None)
         outputs = np.empty((len(history), len(block.outputs)))
@@ -126,7 +135,7 @@ def measured_start(block: Block, recording: Recording, names: str | Sequence[str
             return np.inf, state
         return abs(float(outputs[-1, place]) - measured), state
 
-    best_error, best_state = after(first[0])
+    best_error, best_state = after(first[0], 0)[0], block.initial_state(first)
     low, high = float(first[0]), float(highest)
     for _ in range(3):
         peaks = np.linspace(low, high, 17)

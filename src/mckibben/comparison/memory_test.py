@@ -29,7 +29,8 @@ def memory_test(
 ) -> Memory:
     """Compare the branch gaps of a model with the measured ones, and let it hold.
 
-    Of several outputs, each over the input that is its own, while the others do what they do.
+    Of several outputs, each over the input that is its own, while the others do what they do. Where an
+    input rests, as a held length does, over the first that moves of what else the model is told.
 
     Parameters
     ----------
@@ -41,6 +42,7 @@ def memory_test(
         Every output's input, and the output.
     """
     measured, modelled = [], []
+    pairs = [(_moving(block, recordings, given), output) for given, output in pairs]
     for recording, found in zip(recordings, outputs, strict=True):
         for place, (input_name, output_name) in enumerate(pairs):
             both = np.column_stack([recording[output_name], found[:, place]])
@@ -53,6 +55,14 @@ def memory_test(
     held = [hold_test(block, recordings[0], *pair) for pair in pairs]
     kept = [share for share in held if share is not None]
     return Memory(ratio, gap.size, float(np.mean(kept)) if kept else None)
+
+
+def _moving(block: Block, recordings: Sequence[Recording], given: str) -> str:
+    """Return an input, or where it rests the first of the block's that moves."""
+    for name in (given, *(channel.name for channel in block.inputs if channel.name != given)):
+        if any(name in r and np.ptp(r[name]) > 0 for r in recordings):
+            return name
+    return given
 
 
 def branch_gaps(u: Array, y: Array) -> Array:

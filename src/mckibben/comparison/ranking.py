@@ -8,10 +8,13 @@ from contextlib import closing
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+import numpy as np
+
 from mckibben.arrays import Array
 from mckibben.comparison.bootstrap import BlockBootstrap, interval, skill_of
 from mckibben.comparison.channels import Names
 from mckibben.comparison.coverage import OffTraining
+from mckibben.comparison.drift import Drift, Stretch, drift_of
 from mckibben.comparison.kept import Kept
 from mckibben.comparison.planning import N_FOLDS, Plan, Settings, plan_of
 from mckibben.comparison.recommending import CONSTANT
@@ -283,6 +286,7 @@ def _ranking(
             rmse_interval=interval(samples),
             difference_interval=interval(samples - done[0][1]),
             off_training=_off_training(row, finished[row.model].outputs, plan),
+            drift=_drift(finished[row.model].outputs, plan),
         )
         for row, samples in done
     ]
@@ -308,6 +312,29 @@ def _off_training(row: Row, outputs: Sequence[Array], plan: Plan) -> OffTraining
     errors = errors_on_test(outputs, plan.data)
     fitted = None if row.train is None else row.train.rmse
     return plan.coverage.of(errors, plan.data.split.test_rows, fitted, plan.unit)
+
+
+def _drift(outputs: Sequence[Array], plan: Plan) -> Drift | None:
+    """Return the slow part of a model's error on the test, of the output where that is largest."""
+    split, channels = plan.data.split, plan.data.channels
+    step = split.test[0].sample_time
+    if step is None:
+        return None
+    recordings = (*split.train, *split.test)
+    rows = [*(np.ones(len(recording), dtype=bool) for recording in split.train), *split.test_rows]
+    inputs = [recording.matrix(channels.inputs) for recording in recordings]
+    n, found = len(split.train), []
+    for place, name in enumerate(channels.outputs):
+        stretches = [
+            Stretch(recording[name] - modelled[:, place], given, counts)
+            for recording, modelled, given, counts in zip(
+                recordings, outputs, inputs, rows, strict=True
+            )
+        ]
+        unit = split.test[0].units[name]
+        found.append(drift_of(stretches[:n], stretches[n:], step, name, unit))
+    told = [drift for drift in found if drift is not None]
+    return max(told, key=lambda drift: (drift.certain, drift.share), default=None)
 
 
 def _best(plan: Plan, finished: Mapping[str, Tried]) -> str:

@@ -11,6 +11,7 @@ import numpy as np
 
 from mckibben.blocks.core.block import Block
 from mckibben.comparison.coverage import OffTraining
+from mckibben.comparison.drift import Drift
 from mckibben.comparison.limits import caution
 from mckibben.comparison.recommending import CONSTANT, order, recommended
 from mckibben.errors import MckibbenError
@@ -95,6 +96,9 @@ class Row:
         The memory test, on the test set.
     off_training : OffTraining or None
         How a model of local rules does where training has been on the test set, and where it has not.
+    drift : Drift or None
+        The slow part of the error on the test, of the output where it is largest; None of tests without
+        time, or too short to tell.
     block : Block or None
         The model identified.
     diagnostics : mapping
@@ -120,6 +124,7 @@ class Row:
     difference_interval: tuple[float, float] | None = None
     memory: Memory | None = None
     off_training: OffTraining | None = None
+    drift: Drift | None = None
     block: Block | None = field(default=None, repr=False)
     diagnostics: Mapping[str, Any] = field(default_factory=dict, repr=False)
 
@@ -196,6 +201,7 @@ class Row:
             "skill_least": _finite(self.skill_least),
             "memory": None if self.memory is None else asdict(self.memory),
             "off_training": None if self.off_training is None else self.off_training.to_dict(),
+            "drift": None if self.drift is None else self.drift.to_dict(),
             "rate_dependent": self.block is not None and bool(self.block.rate_dependent),
             "invertible": self.inverse is not None,
             "caution": self.caution,
@@ -284,12 +290,26 @@ class Leaderboard:
         return tuple(f"{r.model}: {r.off_training}" for r in self.rows if r.off_training)
 
     @property
+    def drift(self) -> str:
+        """How the chosen model's error drifts on the test, and what to do about it, if it does."""
+        best = self.best
+        if best is None or best.drift is None or not best.drift.certain:
+            return ""
+        better = [row for row in self.rows if row.test_error < best.test_error and row.drift]
+        without = [row.model for row in better if row.drift and row.drift.foresees(best.drift)]
+        foresaw = f"foreseen by {', '.join(without)}" if without else "which no model foresaw"
+        return (
+            f"{best.model}: {best.drift}, {foresaw}; {best.drift.advice(best.inverse is not None)}"
+        )
+
+    @property
     def of_models(self) -> tuple[str, ...]:
-        """What is to be said of models: `off_training`, and what the chosen one's fit had to say."""
+        """What is to be said of models: `off_training`, `drift`, and what the chosen one's fit said."""
         best = self.best
         noted = () if best is None else best.diagnostics.get("notes", ())
         return (
             *self.off_training,
+            *([self.drift] if self.drift else []),
             *(f"{best.model}: {note}" for note in noted if best is not None),
         )
 

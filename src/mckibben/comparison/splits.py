@@ -33,6 +33,9 @@ ENOUGH = 12
 STEADY = 0.05
 """What schedules is a level of its run where it varies in it by no more than this share of its range."""
 
+PIECES = 4
+"""Of a part that has pieces from all over a recording."""
+
 BEYOND = 0.05
 """Share of the range of an input that a part may go beyond and still be within it: noise does."""
 
@@ -188,6 +191,10 @@ def _travel(u: Array) -> Array:
 def folds(train: Sequence[Recording], channel: str, n: int) -> Iterator[Fold]:
     """Yield the parts of a cross-validation over recordings, or over blocks of cycles of a single one.
 
+    Of recordings that each hold the input, such as a length, every part has one of each level. Of a
+    recording of fewer cycles than parts, which would leave out whole branches, every part has pieces
+    from all over it.
+
     Parameters
     ----------
     channel : str
@@ -196,16 +203,34 @@ def folds(train: Sequence[Recording], channel: str, n: int) -> Iterator[Fold]:
         Largest number of parts, at least 2.
     """
     if len(train) > 1:
-        for group in np.array_split(np.arange(len(train)), min(n, len(train))):
+        for group in _repeats(train, channel, n) or np.array_split(
+            np.arange(len(train)), min(n, len(train))
+        ):
             kept = tuple(r for index, r in enumerate(train) if index not in group)
             left = tuple(train[index] for index in group)
             yield Fold(kept, _all_rows(kept), left, _all_rows(left))
         return
     (recording,) = train
-    for start, stop in split_cycles(recording, channel, n):
-        mask = np.zeros(len(recording), dtype=bool)
-        mask[start:stop] = True
+    cycles = list(split_cycles(recording, channel, n))
+    place = np.zeros(len(recording), dtype=int)
+    for part, (start, stop) in enumerate(cycles):
+        place[start:stop] = part
+    if len(cycles) < n:
+        travel = _travel(recording[channel])
+        place = (travel / travel[-1] * PIECES * n).astype(int) % n
+    for part in range(place.max() + 1):
+        mask = place == part
         yield Fold((recording,), (~mask,), (recording,), (mask,))
+
+
+def _repeats(train: Sequence[Recording], channel: str, n: int) -> list[list[int]]:
+    """Return the first recordings at every level of an input that all hold, the second ...; or none."""
+    if any(np.ptp(recording[channel]) > 0 for recording in train):
+        return []
+    levels = [float(recording[channel][0]) for recording in train]
+    repeat = [levels[:place].count(level) for place, level in enumerate(levels)]
+    groups = [[place for place, k in enumerate(repeat) if k % n == one] for one in range(n)]
+    return [group for group in groups if group] if min(map(levels.count, levels)) > 1 else []
 
 
 def validation_folds(

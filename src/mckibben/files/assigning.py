@@ -6,7 +6,10 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from mckibben.errors import DataError
+from mckibben.files.calibration import constants
+from mckibben.files.channels import NAME
 from mckibben.files.headers import LONGEST, channel_of, parse, snake_case
+from mckibben.files.notices import warn
 from mckibben.files.request import Request
 from mckibben.files.table import Column, Table
 
@@ -16,8 +19,9 @@ _LISTED = 30
 def assign(table: Table, request: Request, path: Path) -> tuple[dict[str, Column], list[str]]:
     """Return the column of every channel, in the order of the file, and the columns left out.
 
-    Columns that the request maps go before those whose headers say the channel, numbers go before
-    text, and text is left out unless it was asked for or may be the time.
+    Columns that the request maps go before those that the folder describes, and these before those
+    whose headers say the channel; numbers go before text, and text is left out unless it was asked for
+    or may be the time.
 
     Raises
     ------
@@ -34,14 +38,16 @@ def assign(table: Table, request: Request, path: Path) -> tuple[dict[str, Column
     mapped = {
         channel: _column(wanted, channel, table, path)
         for channel, wanted in request.columns.items()
+        if not (channel == "time" and table.has_clocks)
     }
+    mapped = _described(table, request, path) | mapped
     named: dict[str, Column] = dict(mapped)
     left_out: list[str] = []
     numbers_first = sorted(table.columns, key=lambda column: column.values is None)
     for column in numbers_first:
         if any(column is taken for taken in mapped.values()):
             continue
-        header = parse(column.header)
+        header = parse(column.label)
         channel = column.header if table.own else channel_of(header)
         if channel in mapped and not table.own:
             channel = snake_case(header.name)
@@ -60,9 +66,31 @@ def assign(table: Table, request: Request, path: Path) -> tuple[dict[str, Column
         else:
             named[channel] = column
     order = {id(column): place for place, column in enumerate(table.columns)}
-    named = dict(sorted(named.items(), key=lambda item: order[id(item[1])]))
+    named = dict(sorted(named.items(), key=lambda item: order.get(id(item[1]), len(order))))
     _require(named, table, request, path)
     return named, left_out
+
+
+def _described(table: Table, request: Request, path: Path) -> dict[str, Column]:
+    """Return the columns and constants that the folder names; what is not needed may be missing."""
+    time, found = request.described.time, constants(request.described, table)
+    said = {name: given.column for name, given in request.described.channels.items()}
+    for channel, wanted in {"time": time.column, **said}.items():
+        if wanted is None or channel in request.columns or (channel == "time" and table.has_clocks):
+            continue
+        try:
+            found[channel] = _column(wanted, channel, table, path)
+        except DataError as error:
+            if time.sample_time is not None if channel == "time" else not request.asks_for(channel):
+                warn(path, f"channel {channel!r} is left out: {error.problem}")
+                continue
+            raise DataError(
+                error.problem,
+                file=path,
+                channel=channel,
+                remedy=f"correct its column in {NAME}, or say --column {channel}=COLUMN",
+            ) from None
+    return found
 
 
 def _column(wanted: str, channel: str, table: Table, path: Path) -> Column:
@@ -72,6 +100,7 @@ def _column(wanted: str, channel: str, table: Table, path: Path) -> Column:
         lambda column: parse(column.header).name == wanted.strip(),
         lambda column: column.header.casefold().strip() == wanted.casefold().strip(),
         lambda column: snake_case(parse(column.header).name) == snake_case(wanted),
+        lambda column: column.label == wanted,
     )
     for reading in readings:
         matches = [column for column in table.columns if reading(column)]

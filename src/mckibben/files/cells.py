@@ -9,11 +9,11 @@ import numpy as np
 
 from mckibben.arrays import Array
 from mckibben.files.dialect import Dialect
+from mckibben.files.instants import may_be_instant
 from mckibben.files.marks import REMEDY, Doubt, is_marked, may_be_doubted
 from mckibben.files.table import Column, Flaw
 
 _SHOWN = 5  # cells of text that are kept, where they are no times
-_INSTANT = re.compile(r"\d{4}\D?\d\d")
 _FLAW = "correct that cell, or leave it blank and say --gaps split or interpolate"
 
 
@@ -112,4 +112,4 @@ class Cells:
         if self._n < _SHOWN or len(self._texts) == self._n:
             first = next((cell for cell in (*self._texts, *cells) if cell), "")
             texts = [*([""] * (self._n - len(self._texts))), *cells]
-            self._texts += texts if _INSTANT.match(first) else texts[:_SHOWN]
+            self._texts += texts if may_be_instant(first) else texts[:_SHOWN]

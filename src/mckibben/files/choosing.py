@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -10,8 +10,10 @@ import numpy as np
 
 from mckibben.arrays import Array
 from mckibben.errors import DataError
-from mckibben.files import plausible, timebase
+from mckibben.files import clocks, instants, plausible, timebase
 from mckibben.files.assigning import assign
+from mckibben.files.calibration import calibrated
+from mckibben.files.channels import Described
 from mckibben.files.headers import LONGEST, parse, unit_of
 from mckibben.files.notices import warn
 from mckibben.files.request import Request
@@ -63,7 +65,12 @@ def choose(table: Table, request: Request, path: Path) -> Choice:
         If a channel asked for is missing, two columns are one channel, a cell is no number, or a
         unit is unknown or of the wrong dimension.
     """
+    if table.own:
+        request = replace(request, described=Described())
     named, left_out = assign(table, request, path)
+    named, dropped = clocks.on_one(named, request, path)
+    left_out += dropped
+    named, calibration = calibrated(named, request.described)
     found = _Findings(ignored=[*table.meta.get("ignored_columns", ()), *left_out])
     time, time_unit = None, "s"
     if "time" in named:
@@ -93,7 +100,11 @@ def choose(table: Table, request: Request, path: Path) -> Choice:
             f"no unit is given, so these are assumed: {_listed(found.assumed)}; "
             "say --unit CHANNEL=UNIT where that is wrong",
         )
-    notes = {"ignored_columns": found.ignored, "pressure_reference": found.references}
+    notes = {
+        "ignored_columns": found.ignored,
+        "pressure_reference": found.references,
+        "calibration": calibration,
+    }
     meta = {name: note for name, note in notes.items() if note}
     return Choice(channels, units, time, time_unit, meta)
 
@@ -144,7 +155,7 @@ def _unit(
     given = request.units.get(channel)
     text = column.unit if given is None else given
     if text is None and not own:
-        text = parse(column.header).unit
+        text = parse(column.label).unit
     expected = unit_of(channel)
     if text is None:
         return _assumed(channel, expected, values, path, found)
@@ -205,7 +216,7 @@ def _time(
         return _instants(column, table, request, path, found), "s"
     values = _numbers("time", column, table, request, path, found)
     assert values is not None  # time is a channel that _numbers never leaves out
-    stated = request.units.get("time") or column.unit or parse(column.header).unit
+    stated = request.units.get("time") or column.unit or parse(column.label).unit
     unit = None if stated else timebase.unit_by_size(values, table, path)
     if unit is None:
         unit = _unit("time", column, values, table.own, request, path, found).name
@@ -222,21 +233,8 @@ def _time(
 def _instants(
     column: Column, table: Table, request: Request, path: Path, found: _Findings
 ) -> Array | None:
-    """Return ISO 8601 instants as seconds since the first."""
+    """Return instants as seconds since the first; None where the rate is given instead."""
     if request.rate is not None:
         found.ignored.append(column.header)
         return None
-    import pandas as pd
-
-    instants = pd.to_datetime(pd.Series(column.texts), format="ISO8601", utc=True, errors="coerce")
-    bad = np.flatnonzero(instants.isna())
-    if bad.size:
-        raise DataError(
-            f"{column.texts[bad[0]][:40]!r} is no time",
-            file=path,
-            channel="time",
-            row=table.row(int(bad[0])),
-            remedy="write times in seconds or as 2026-01-31T12:00:00.5, or give --rate",
-        )
-    since = instants - instants.iloc[0]
-    return np.asarray(since.dt.total_seconds(), dtype=np.float64)
+    return instants.seconds(column.texts, table, path)

@@ -57,7 +57,8 @@ def read(file: BufferedReader, path: Path) -> list[Table]:
     description = _described(path, data)
     if description is not None:
         return [_own(data, description)]
-    return [_parse(_utf8(data, path), Budget(file, path), path)]
+    data, separators = _said(_utf8(data, path))
+    return [parsed(data, separators, Budget(file, path), path)]
 
 
 def write(recording: Recording, path: Path) -> None:
@@ -152,11 +153,26 @@ def _utf8(data: bytes, path: Path) -> bytes:
     return data
 
 
-def _parse(data: bytes, budget: Budget, path: Path) -> Table:
-    separators: Sequence[str | None] = SEPARATORS
-    if said := _SAID.match(data):
-        separators = (said[1].decode(),)
-        data = b" " * (said.end() - 1) + data[said.end() - 1 :]  # the lines keep their numbers
+def _said(data: bytes) -> tuple[bytes, Sequence[str | None]]:
+    """Return a text without a first line that tells of the separator, and those there may be."""
+    said = _SAID.match(data)
+    if said is None:
+        return data, SEPARATORS
+    # the lines keep their numbers
+    return b" " * (said.end() - 1) + data[said.end() - 1 :], (said[1].decode(),)
+
+
+def parsed(data: bytes, separators: Sequence[str | None], budget: Budget, path: Path) -> Table:
+    """Return the table in a text in UTF-8, whose lines line feeds end.
+
+    Parameters
+    ----------
+    data : bytes
+    separators : sequence of str or None
+        What may stand between its cells; None is blanks.
+    budget : Budget
+    path : Path
+    """
     lines, comment = Lines.of(data, path)
     dialect = detect(lines.sample(), separators)
     headers, units, first = _head(lines.sample(), comment, dialect, path)

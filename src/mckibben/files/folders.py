@@ -8,24 +8,22 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from mckibben.errors import DataError
-from mckibben.files.formats import READERS
+from mckibben.files.sources import PROTOCOL, inside
 from mckibben.system.ordinary import DESCRIPTION, read_text
 
 
 def roles(folder: Path) -> dict[str, list[Path]]:
     """Return the recordings of a folder by role, as its protocol.json has them, or all to train.
 
+    A folder that is one recording itself, as of files with one signal each, stands for that.
+
     Raises
     ------
     DataError
-        If there are none.
+        If there are none, or it cannot be told which files are one.
     """
-    protocol = folder / "protocol.json"
-    found = sorted(
-        path for path in folder.iterdir() if path.suffix.casefold() in READERS and path.is_file()
-    )
-    if not found:
-        raise DataError("there is no recording in the folder", file=folder, remedy="name files")
+    protocol = folder / PROTOCOL
+    found = inside(folder)
     if not os.path.lexists(protocol):
         return {"train": found}
     text = read_text(protocol, most=DESCRIPTION)

@@ -24,6 +24,10 @@ READERS: dict[str, str] = {
     ".h5": "hdf5",
     ".hdf5": "hdf5",
     ".tdms": "tdms",
+    ".xlsx": "xlsx",
+    ".bag": "bags",
+    ".mcap": "bags",
+    ".db3": "bags",
 }
 """Ending of the file's name -> module of this folder with ``read(file, path) -> list[Table]``."""
 
@@ -36,7 +40,10 @@ _SIGNATURES: dict[bytes, tuple[str, tuple[str, ...]]] = {
     b"TDSm": ("TDMS", (".tdms",)),
     b"MATLAB 5.0 MAT": ("MATLAB", (".mat",)),
     b"MATLAB 7.3 MAT": ("MATLAB 7.3", (".mat",)),
-    b"PK\x03\x04": ("a spreadsheet or an archive", ()),
+    b"PK\x03\x04": ("a spreadsheet or an archive", (".xlsx",)),
+    b"#ROSBAG V": ("a bag of ROS 1", (".bag",)),
+    b"\x89MCAP0\r\n": ("MCAP", (".mcap",)),
+    b"SQLite format 3\x00": ("a database, as bags of ROS 2 are", (".db3",)),
     b"\xd0\xcf\x11\xe0": ("an Excel workbook", ()),
 }
 

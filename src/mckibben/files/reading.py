@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Literal
@@ -13,7 +12,8 @@ import numpy as np
 
 from mckibben.arrays import Array
 from mckibben.errors import DataError
-from mckibben.files import formats, timebase
+from mckibben.files import sources, timebase
+from mckibben.files.channels import about
 from mckibben.files.choosing import Choice, choose
 from mckibben.files.holes import Channels, treat
 from mckibben.files.notices import noted, warn
@@ -22,6 +22,11 @@ from mckibben.files.table import Table
 from mckibben.files.timebase import Span
 from mckibben.files.units import convert
 from mckibben.recording import Recording
+
+MAY_BE_HELD = frozenset(
+    {"displacement", "length", "contraction", "angle", "velocity", "force", "temperature"}
+)
+"""Channels that an experiment can hold: a recording of one length, or under one load, tells all else."""
 
 LONGEST_BRIDGE = 100
 """Times the samples there are: interpolating gaps to more than that is refused."""
@@ -46,12 +51,16 @@ def read(
     channels: Sequence[str] | None = None,
     informative: bool = True,
 ) -> list[Recording]:
-    """Read the recordings in a file; by its ending CSV, TSV, Parquet, MAT, HDF5 or TDMS.
+    """Read the recordings in a file, by its ending, or in a folder.
+
+    What ``channels.toml`` in the same folder says of the file (columns, units, calibrations, constants,
+    files with one signal each; see `mckibben.files.channels`) goes behind what is said here.
 
     Parameters
     ----------
     path : path
-        Ends in ``.csv .tsv .txt .dat .parquet .mat .h5 .hdf5 .tdms``.
+        Ends in ``.csv .tsv .txt .dat .parquet .mat .h5 .hdf5 .tdms .xlsx .bag .mcap .db3``; or a
+        folder of such files: a bag of ROS 2, files with one signal each, or several recordings.
     columns : mapping of str to str, optional
         Channel -> column, by its header with or without the unit. Standard channels are found by
         common names (``p``, ``Druck``, ``position``, ...) without it. ``time`` is a channel here.
@@ -59,7 +68,7 @@ def read(
         Channel -> unit, such as ``{"pressure": "kPa"}``; goes before what the header says.
     rate : float, optional
         Samples per second, positive, where there is no column of times. Without either, the
-        recording has no time.
+        recording has no time. Channels with times of their own are put on a clock of this rate.
     gaps : {"error", "split", "interpolate"}
         What to do where time is missing (a step of more than three median steps) or a sample is
         (blank, NaN or infinite): refuse, cut into several recordings, or bridge linearly.
@@ -67,13 +76,15 @@ def read(
         Channels that must be there and whole. Others are then left out, with a `DataWarning`, if
         samples of theirs are missing. By default all must be whole.
     informative : bool
-        Whether there must be something to learn from: at least 10 samples, and no constant channel
-        among those asked for. Without, two samples will do, as for simulating a model.
+        Whether there must be something to learn from: at least 10 samples, and no constant pressure
+        or other channel asked for that an experiment does not hold, as it does a length or a force.
+        Without, two samples will do, as for simulating a model.
 
     Returns
     -------
     list of Recording
-        One; or one for each stretch with ``gaps="split"``, and for each group of a TDMS file.
+        One; or one for each stretch with ``gaps="split"``, each group of a TDMS file, and each file of
+        a folder.
         In the package's units: bar, mm, N, s, rad, V, mm/s, degC. A file that `write` made gives
         a recording equal to the one written. What was assumed or mended on the way is in
         ``meta["notes"]``, a list of sentences, if there was anything.
@@ -87,16 +98,19 @@ def read(
     Warns
     -----
     DataWarning
-        Of units assumed, jittered time that was resampled, gaps bridged, and what was left out.
+        Of units assumed, jittered time that was resampled, channels put on one clock, gaps bridged, and
+        what was left out.
     """
     path = Path(path)
     request = Request(dict(columns or {}), dict(units or {}), rate, gaps, channels, informative)
     request.check(path)
+    return [each for one in sources.inside(path) for each in _read(one, request)]
+
+
+def _read(path: Path, request: Request) -> list[Recording]:
+    request = replace(request, described=about(path))
     with noted() as notes:
-        with formats.opening(path) as file:
-            tables = formats.read(file, path)
-            file.seek(0)
-            digest = hashlib.file_digest(file, "sha256").hexdigest()
+        tables, digest = sources.tables(path, request)
         found = [each for table in tables for each in _recordings(table, request, path, digest)]
     return [_with_notes(recording, notes) for recording in found]
 
@@ -144,6 +158,8 @@ def _recordings(table: Table, request: Request, path: Path, digest: str) -> list
 def _stated_step(choice: Choice, table: Table, request: Request, path: Path) -> float | None:
     """Return the sample time that the caller or the file states, which the times must not deny."""
     step = table.sample_time if request.rate is None else 1.0 / request.rate
+    if step is None and choice.time is None and not table.own:
+        return request.described.time.sample_time
     if step is None:
         return None
     if table.sample_time is not None and abs(step - table.sample_time) > 1e-3 * step:
@@ -226,7 +242,8 @@ def _announce_bridges(
 def _refuse_constant(channels: Channels, spans: list[Span], request: Request, path: Path) -> None:
     for name in request.channels or ():
         samples = np.concatenate([channels[name][start:stop] for start, stop in spans])
-        if samples.size and np.ptp(samples) == 0:
+        held = name.partition("_")[0] in MAY_BE_HELD
+        if not held and samples.size and np.ptp(samples) == 0:
             raise DataError(
                 f"it is constant, at {samples[0]:g}",
                 file=path,

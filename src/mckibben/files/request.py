@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
 import numpy as np
 
 from mckibben.errors import DataError
+from mckibben.files.channels import Described
 
 FEWEST = 10
 """Samples; a shorter recording, or stretch of one, shows no loop."""
@@ -17,7 +18,13 @@ FEWEST = 10
 
 @dataclass(frozen=True)
 class Request:
-    """What the caller of `read` asked for; see there."""
+    """What the caller of `read` asked for; see there.
+
+    Parameters
+    ----------
+    described : Described
+        What the folder says of the file; what the caller asked for goes before.
+    """
 
     columns: Mapping[str, str]
     units: Mapping[str, str]
@@ -25,6 +32,7 @@ class Request:
     gaps: Literal["error", "split", "interpolate"]
     channels: Sequence[str] | None
     informative: bool = True
+    described: Described = field(default_factory=Described)
 
     @property
     def fewest(self) -> int:

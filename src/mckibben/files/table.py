@@ -48,6 +48,12 @@ class Column:
         The cells of a column of text; of a text file the first ones only, if they are no times.
     flaw : Flaw, optional
         Why the samples cannot be used, if they cannot.
+    says : str, optional
+        What tells the channel and the unit in place of the header, as the name of a file does.
+    times : numpy.ndarray, shape (n,), optional
+        Times of the samples [s], where not all columns were sampled together.
+    held : bool
+        Whether the last sample holds until the next, as counts and switches do.
     """
 
     header: str
@@ -55,6 +61,14 @@ class Column:
     unit: str | None = None
     texts: Sequence[str] = ()
     flaw: Flaw | None = None
+    says: str | None = None
+    times: Array | None = None
+    held: bool = False
+
+    @property
+    def label(self) -> str:
+        """What tells the channel and the unit."""
+        return self.says or self.header
 
 
 @dataclass(frozen=True)
@@ -84,6 +98,17 @@ class Table:
     meta: Mapping[str, Any] = field(default_factory=dict)
     name: str | None = None
     own: bool = False
+
+    @property
+    def n_samples(self) -> int:
+        """Samples of each column."""
+        known = [column.values.size for column in self.columns if column.values is not None]
+        return known[0] if known else _length(self.columns[0])
+
+    @property
+    def has_clocks(self) -> bool:
+        """Whether its columns have times of their own, so that none is of times."""
+        return any(column.times is not None for column in self.columns)
 
     def row(self, sample: int) -> int:
         """Return the row to name in an error for a sample counted from 0."""
@@ -116,6 +141,7 @@ def printable(table: Table) -> Table:
             column,
             header=plain(column.header),
             unit=None if column.unit is None else plain(column.unit),
+            says=None if column.says is None else plain(column.says),
         )
         for column in table.columns
     )

@@ -103,6 +103,8 @@ def _read_smoothed(x: Array, places: Array, ratio: float) -> Array:
     from scipy.interpolate import make_interp_spline
     from scipy.signal import firwin, kaiserord, oaconvolve
 
+    if np.ptp(x) == 0:  # what is held stays held, to the bit
+        return np.full(places.size, x[0])
     n_taps, beta = kaiserord(STOP_BAND, (1 - PASS_SHARE) / ratio)
     half = n_taps // 2
     low_pass = firwin(2 * half + 1, 0.5 * (1 + PASS_SHARE) / ratio, window=("kaiser", beta))

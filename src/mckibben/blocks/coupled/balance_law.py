@@ -113,7 +113,7 @@ def pressed(
     """
     own = muscles(c) + k * muscle_width(c)
     asked = sprung(c, own, k, y, x, gradient)
-    pushes = asked >= -c[own + 3]
+    reached = asked >= -c[own + 3]
     held = max(asked, -c[own + 3]) + elastic(c, own, y[k])[0]
     held += lagging(c, own, k, state, way, y[k])[0]
     a = area(c, own, y[k])[0]
@@ -132,7 +132,7 @@ def pressed(
         p -= excess / slope if slope > 0.0 else excess / a
         if not low < p < high:  # only where friction outgrows the area
             p = 0.5 * (low + high)
-    return p, pushes
+    return p, reached
 
 
 @kernel

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from mckibben.blocks.compose import Series
 from mckibben.blocks.core.block import Block
-from mckibben.blocks.core.inverse import Inverse
 from mckibben.blocks.core.running import run_many
-from mckibben.blocks.coupled.balance import Balance
+from mckibben.blocks.coupled.balance_in import balance_in
 from mckibben.numerals import numeral
 from mckibben.recording import Recording
 
@@ -22,25 +20,20 @@ def beyond_known(model: Block, recording: Recording) -> list[str]:
     What schedules and loads it; and what drives the model: displacements of a compensator, pressures
     otherwise.
     """
-    parts = model.parts if isinstance(model, Series) else (model,)
-    solved = [part.forward if isinstance(part, Inverse) else part for part in parts]
-    place = next((i for i, part in enumerate(solved) if isinstance(part, Balance)), None)
-    if place is None:
+    placed = balance_in(model)
+    if placed is None:
         return []
-    part, balance = parts[place], solved[place]
-    assert isinstance(balance, Balance)
+    balance = placed.balance
     driven = [channel for channel in model.inputs if channel.name not in model.scheduling]
     found = recording.matrix([channel.name for channel in driven])
-    for before in parts[:place]:
-        found = run_many([before], np.ascontiguousarray(found), sample_time=recording.sample_time)[
-            0
-        ]
+    for part in placed.before:
+        found = run_many([part], np.ascontiguousarray(found), sample_time=recording.sample_time)[0]
     asked = [
         (channel, recording[channel.name], known)
         for channel, known in zip(balance.scheduled, balance.known, strict=False)
     ]
     for place, channel in enumerate(driven):
-        known = balance.hull[place] if part is balance else balance.pressure_range
+        known = balance.pressure_range if placed.solved else balance.hull[place]
         if known is not None:
             asked.append((channel, found[:, place], known))
     notes = []

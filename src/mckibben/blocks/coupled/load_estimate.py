@@ -22,11 +22,11 @@ from mckibben.arrays import Array
 from mckibben.blocks.compose import PerChannel, Series
 from mckibben.blocks.core.block import Block, Kernel, Primitive
 from mckibben.blocks.core.fields import STRICT, Channel, Initial
-from mckibben.blocks.core.inverse import Inverse
 from mckibben.blocks.core.kernels import kernel
 from mckibben.blocks.core.refusals import explicit_state
 from mckibben.blocks.core.saving import nested
 from mckibben.blocks.coupled.balance import Balance
+from mckibben.blocks.coupled.balance_in import balance_in
 from mckibben.blocks.coupled.balance_law import keep, unbalanced
 from mckibben.blocks.coupled.balance_terms import AT_REST, FROM_REST, IN_TIME
 from mckibben.blocks.memoryless.affine import Affine
@@ -205,13 +205,9 @@ def parts_of(model: Block) -> tuple[Balance, Block | None, Block | None]:
     ModelError
         If the model solves none.
     """
-    parts = model.parts if isinstance(model, Series) else (model,)
-    for place, part in enumerate(parts):
-        match part:
-            case Inverse(forward=Balance() as balance) if len(parts) <= 3:
-                before = parts[0] if place else None
-                behind = parts[-1] if place < len(parts) - 1 else None
-                return balance, before, behind
+    match balance_in(model):
+        case (balance, True, before, behind) if max(len(before), len(behind)) <= 1:
+            return balance, next(iter(before), None), next(iter(behind), None)
     raise ModelError(
         f"{model.title!r} does not tell loads by displacements and pressures. Remedy: identify "
         "'balance', on recordings with a measured force."

@@ -8,7 +8,7 @@ a_k = exp(-T / tau_k), so the output answers at once and the inverse is in close
 
 from __future__ import annotations
 
-from typing import ClassVar, Self
+from typing import ClassVar, Literal, Self
 
 import numpy as np
 from pydantic.dataclasses import dataclass
@@ -63,6 +63,9 @@ class Creep(SingleChannel, Invertible):
         c_k: creep once it has ended, relative to the immediate response; not negative.
     time_constants : sequence of float, length K
         tau_k [s], positive.
+    initial : {"first_sample", "virgin", "fitted"}
+        Where the elements are before the first sample: at rest at the first input, or at 0, or, on
+        recordings whose output is known, where that tells (else at rest at the first input).
     input, output : Channel
         Channel driven and channel given.
     """
@@ -72,10 +75,10 @@ class Creep(SingleChannel, Invertible):
     inverse_kernel: ClassVar[Kernel] = creep_inverse_kernel
     rate_dependent: ClassVar[bool] = True
     parameters: ClassVar[tuple[str, ...]] = ("compliances", "time_constants")
-    initial: ClassVar[Initial] = "first_sample"
 
     compliances: Vector
     time_constants: Vector
+    initial: Literal["first_sample", "virgin", "fitted"] = "first_sample"
     input: ChannelField = DISPLACEMENT
     output: ChannelField = DISPLACEMENT
 
@@ -99,11 +102,9 @@ class Creep(SingleChannel, Invertible):
     def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
         """Return the elements at rest: at the first input, or, virgin, at 0."""
         start = self.initial if initial is None else initial
-        if start == "first_sample":
-            return np.full(self.n_states, first[0])
-        if start == "virgin":
-            return np.zeros(self.n_states)
-        return explicit_state(self, start)
+        if not isinstance(start, str):
+            return explicit_state(self, start)
+        return np.full(self.n_states, 0.0 if start == "virgin" else first[0])
 
     def coefficients(self, sample_time: float | None) -> Array:
         """Return [decays over a sample, compliances].

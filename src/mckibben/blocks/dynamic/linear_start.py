@@ -70,15 +70,7 @@ class LinearStart(Block):
         at_rest = np.empty((len(inputs), 1))
         self.bind(sample_time, state.copy(), inputs, at_rest)()
         free = self.free_responses(len(inputs), sample_time)
-        left = outputs[counts] - at_rest[counts, 0]
-        if free.shape[1] and np.isfinite(left).all():
-            size = np.maximum(np.linalg.norm(free, axis=0), 1e-300)
-            responses, spread, turned = np.linalg.svd(free / size, full_matrices=False)
-            moved = spread > 1e-12 * spread[0]
-            u, known, v = np.linalg.svd(responses[np.ix_(counts, moved)], full_matrices=False)
-            told = known > KNOWN
-            found = v[told].T @ ((u.T @ left)[told] / known[told])
-            state[: self.n_free] += turned[moved].T @ (found / spread[moved]) / size
+        state[: self.n_free] += told_by(free, outputs - at_rest[:, 0], counts)
         return state
 
     def free_responses(self, n: int, sample_time: float | None) -> Array:
@@ -91,3 +83,26 @@ class LinearStart(Block):
             self.bind(sample_time, state, inputs, outputs)()
             columns[:, place] = outputs[:, 0] - self.output_offset
         return columns
+
+
+def told_by(free: Array, left: Array, counts: Mask) -> Array:
+    """Return how much of every free response explains best what is left, as far as that tells, (k,).
+
+    Parameters
+    ----------
+    free : array, shape (n, k)
+        What a unit of every state adds to the output.
+    left : array, shape (n,)
+        What is to be explained.
+    counts : array of bool, shape (n,)
+        Where that is known.
+    """
+    if not free.shape[1] or not np.isfinite(left[counts]).all():
+        return np.zeros(free.shape[1])
+    size = np.maximum(np.linalg.norm(free, axis=0), 1e-300)
+    responses, spread, turned = np.linalg.svd(free / size, full_matrices=False)
+    moved = spread > 1e-12 * spread[0]
+    u, known, v = np.linalg.svd(responses[np.ix_(counts, moved)], full_matrices=False)
+    told = known > KNOWN
+    found = v[told].T @ ((u.T @ left[counts])[told] / known[told])
+    return np.asarray(turned[moved].T @ (found / spread[moved]) / size)

@@ -59,27 +59,12 @@ class Run:
 
     def thinned(self, every: int) -> Run:
         """Return every so manieth sample."""
-        part = slice(None, None, every)
-        return replace(
-            self,
-            driven=self.driven[part],
-            outputs=self.outputs[part],
-            scheduled=self.scheduled[part],
-            counts=self.counts[part],
-            sample_time=None if self.sample_time is None else every * self.sample_time,
-        )
+        step = None if self.sample_time is None else every * self.sample_time
+        return replace(self._at(slice(None, None, every)), sample_time=step)
 
     def cut(self, start: int, stop: int | None = None) -> Run:
         """Return a part of the run, which begins with a memory of its own."""
-        part = slice(start, stop)
-        return replace(
-            self,
-            driven=self.driven[part],
-            outputs=self.outputs[part],
-            scheduled=self.scheduled[part],
-            counts=self.counts[part],
-            peak=None if start else self.peak,
-        )
+        return replace(self._at(slice(start, stop)), peak=None if start else self.peak)
 
     def carrying(self, u: Array, y: Array) -> Run:
         """Return the run with another input and output, each of shape (n,)."""
@@ -104,6 +89,10 @@ class Run:
 
         kept = self.counts.copy()
         kept[reversals(self.u)] = True
+        return self._at(kept)
+
+    def _at(self, kept: slice | Mask) -> Run:
+        """Return the samples kept."""
         return replace(
             self,
             driven=self.driven[kept],
@@ -282,6 +271,28 @@ class TrainingData:
         """Return the same data with every run condensed; see `Run.condensed`."""
         return replace(self, runs=tuple(run.condensed() for run in self.runs))
 
+    def bridged(self) -> TrainingData:
+        """Return the runs up to their last outputs that count, with likely ones for those that do not.
+
+        These go straight with the inputs, as those that count do, and meet them on either side.
+        """
+        known = [run for run in self.runs if run.counts.any()]
+        runs = [run.cut(0, int(np.flatnonzero(run.counts)[-1]) + 1) for run in known]
+        columns = [
+            np.column_stack([run.driven, run.scheduled, np.ones(len(run.u))]) for run in runs
+        ]
+        counting = [columns[i][run.counts] for i, run in enumerate(runs)]
+        targets = np.concatenate([run.outputs[run.counts] for run in runs])
+        by = np.linalg.lstsq(np.concatenate(counting), targets, rcond=None)[0]
+        found = []
+        for place, (run, given) in enumerate(zip(runs, columns, strict=True)):
+            time, at = np.arange(len(run.u)), np.flatnonzero(run.counts)
+            left = (run.outputs - given @ by)[at]
+            meeting = np.column_stack([np.interp(time, at, column) for column in left.T])
+            outputs = np.where(run.counts[:, np.newaxis], run.outputs, given @ by + meeting)
+            found.append(replace(run, outputs=outputs, place=place))
+        return replace(self, runs=tuple(found))
+
     def stretches(self, shortest: int) -> TrainingData:
         """Return the same data as runs whose samples all count; see `Run.stretches`."""
         found = [part for run in self.runs for part in run.stretches(shortest)]
@@ -303,6 +314,16 @@ class TrainingData:
             if travel[place] > MOVES * span[place] and others.all():
                 found.append(run)
         return found
+
+    def between(self, start: float, stop: float) -> TrainingData:
+        """Return the same runs of which only what is between two shares of their time counts."""
+        runs = []
+        for run in self.runs:
+            counts, n = np.zeros_like(run.counts), run.counts.size
+            part = slice(round(start * n), round(stop * n))
+            counts[part] = run.counts[part]
+            runs.append(replace(run, counts=counts))
+        return replace(self, runs=tuple(runs))
 
     def thinned(self, most: int) -> TrainingData:
         """Return the same runs with fewer samples that count, spread evenly; inputs stay whole."""

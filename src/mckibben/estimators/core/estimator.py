@@ -313,3 +313,9 @@ def _rms(residual: Array) -> Array:
     with np.errstate(over="ignore", invalid="ignore"):  # a model that overflows has no finite error
         found: Array = np.sqrt(np.mean(residual**2, axis=0))
     return found
+
+
+def resting(recordings: Sequence[Recording], inputs: Sequence[str]) -> str | None:
+    """Return why nothing can be learned of what inputs do, if all rest in every recording; else None."""
+    moving = any(name in r and np.ptp(r[name]) > 0 for r in recordings for name in inputs)
+    return None if moving else f"{' and '.join(inputs)} rests in every recording"

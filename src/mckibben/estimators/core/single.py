@@ -13,7 +13,7 @@ from mckibben.blocks.core.fields import Channel
 from mckibben.blocks.memoryless.negative import Negative
 from mckibben.estimators.core.checking import training_data
 from mckibben.estimators.core.data import Mask, TrainingData
-from mckibben.estimators.core.estimator import Estimator
+from mckibben.estimators.core.estimator import Estimator, resting
 from mckibben.estimators.optimisers.tracker import Tracker
 from mckibben.recording import Recording
 
@@ -68,7 +68,9 @@ class SingleEstimator(Estimator):
             return f"it maps {cls.made_for[0]} to {cls.made_for[1]}"
         needed = cls(input=given, output=wanted).scheduling
         absent = [name for name in needed if any(name not in r for r in recordings)]
-        return f"it needs the channel {absent[0]!r} too" if absent else None
+        if absent:
+            return f"it needs the channel {absent[0]!r} too"
+        return None if cls.told else resting(recordings, inputs)
 
     @classmethod
     def channel_settings(

@@ -135,6 +135,7 @@ class BalanceEstimator(CoupledEstimator):
     effort: ClassVar[float] = 1.0
     alone: ClassVar[bool] = True
     fewer_outputs: ClassVar[bool] = True
+    through: ClassVar[bool] = True
 
     n_stops: Annotated[int, Interval(ge=0, le=30)] = 6
     finest: Annotated[float, Interval(gt=0, lt=0.5)] = 0.003

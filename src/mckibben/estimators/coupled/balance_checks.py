@@ -191,9 +191,7 @@ def check_directions(data: TrainingData) -> None:
         alike = np.corrcoef(run.driven.T)
         if np.linalg.eigvalsh(alike)[0] < APART:
             continue  # they move together, so that none tells of its own
-        columns = np.column_stack([run.driven, run.scheduled, np.ones(len(run.driven))])
-        by = np.linalg.lstsq(columns, run.outputs, rcond=None)[0]
-        for k in np.flatnonzero(np.diag(by[: len(spans)]) < 0).tolist():
+        for k in np.flatnonzero(np.diag(_by_pressures(run)) < 0).tolist():
             raise DataError(
                 f"it falls while {data.inputs[k].name} rises",
                 file=run.name,
@@ -202,17 +200,22 @@ def check_directions(data: TrainingData) -> None:
             )
 
 
+def _by_pressures(run: Run) -> Array:
+    """Return how displacements move with pressures, were that straight, shape (pressures, outputs)."""
+    columns = np.column_stack([run.driven, run.scheduled, np.ones(len(run.driven))])
+    found = np.asarray(np.linalg.lstsq(columns, run.outputs, rcond=None)[0], dtype=np.float64)
+    return found[: run.driven.shape[1]]
+
+
 def _check_turned(data: TrainingData) -> None:
     """Refuse recordings of a muscle alone in which it moves the other way than in most."""
     if len(data.inputs) > 1:
         return
     ways = {}
     for run in moving(data).runs:
-        columns = np.column_stack([run.driven, run.scheduled, np.ones(len(run.driven))])
-        by = np.linalg.lstsq(columns, run.outputs[:, 0], rcond=None)[0]
-        explained = abs(by[0]) * np.std(run.driven[:, 0])
-        if explained > FOLLOWS * np.std(run.outputs[:, 0]):
-            ways[run.name] = bool(by[0] > 0)
+        by = float(_by_pressures(run)[0, 0])
+        if abs(by) * np.std(run.u) > FOLLOWS * np.std(run.y):
+            ways[run.name] = by > 0
     rising = sum(ways.values())
     few = rising < len(ways) - rising
     turned = [name for name, rises in ways.items() if rises == few]

@@ -17,8 +17,8 @@ from mckibben.arrays import Array
 from mckibben.blocks.compose import Series
 from mckibben.blocks.core.block import Block
 from mckibben.blocks.core.fields import rows
-from mckibben.blocks.core.inverse import Inverse
 from mckibben.blocks.coupled.balance import Balance
+from mckibben.blocks.coupled.balance_in import balance_in
 from mckibben.errors import DataError
 from mckibben.estimators.core.data import TrainingData
 from mckibben.estimators.coupled.balance_checks import held
@@ -124,21 +124,13 @@ def under(model: Block, loads: Sequence[float]) -> Block:
     """Return a model all of whose muscles bear a constant load more [in the unit of its forces]."""
     if not any(loads):
         return model
-    before, balance, behind = solved_in(model)
-    springs = np.array(balance.springs)
+    placed = balance_in(model)
+    assert placed is not None
+    springs = np.array(placed.balance.springs)
     springs[:, 0] += loads
-    changed = replace(balance, springs=rows(springs)).inverse()
-    return Series((*before, changed, *behind)) if before or behind else changed
-
-
-def solved_in(model: Block) -> tuple[tuple[Block, ...], Balance, tuple[Block, ...]]:
-    """Return the balance that a model solves, between what is before and behind."""
-    parts = model.parts if isinstance(model, Series) else (model,)
-    place = next(place for place, part in enumerate(parts) if isinstance(part, Inverse))
-    solved = parts[place]
-    assert isinstance(solved, Inverse)
-    assert isinstance(solved.forward, Balance)
-    return parts[:place], solved.forward, parts[place + 1 :]
+    changed = replace(placed.balance, springs=rows(springs)).inverse()
+    parts = (*placed.before, changed, *placed.behind)
+    return Series(parts) if len(parts) > 1 else changed
 
 
 def loads_told(data: TrainingData, loads: Array, balance: Balance, *, newtons: bool) -> list[str]:

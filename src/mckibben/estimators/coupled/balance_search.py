@@ -10,7 +10,7 @@ from numpy.polynomial import polynomial
 
 from mckibben.arrays import Array
 from mckibben.errors import ModelError
-from mckibben.estimators.core.data import Run, TrainingData
+from mckibben.estimators.core.data import Mask, Run, TrainingData
 from mckibben.estimators.core.uncertainty import inverted
 from mckibben.estimators.coupled.balance_checks import at_rest, held
 from mckibben.estimators.coupled.balance_slopes import run as follow
@@ -149,10 +149,12 @@ class Search:
             whole += slopes[..., own.first :] @ by
         return found, whole
 
-    def measured(self, run: Run) -> Array:
-        """Return the displacements that are compared."""
-        kept = np.arange(-(-len(run.outputs) // self.every)) * self.every + self.every - 1
-        return run.outputs[np.minimum(kept, len(run.outputs) - 1)]
+    def compared(self, run: Run) -> tuple[Array, Mask]:
+        """Return the displacements that are compared, and which of them count."""
+        n = len(run.outputs)
+        kept = np.arange(-(-n // self.every)) * self.every + self.every - 1
+        kept = np.minimum(kept, n - 1)
+        return run.outputs[kept], run.counts[kept]
 
     def begun(self, grip: float, *, plain: bool = False) -> Array:
         """Return coefficients that balance the forces where the muscles were.
@@ -163,8 +165,9 @@ class Search:
         values = structure.start
         values[structure.grip] = grip
         found = [self.followed(values, place, held=True)[1] for place in range(len(self.runs))]
-        for unsure, of_run in zip(self.warming, found, strict=True):
+        for run, unsure, of_run in zip(self.runs, self.warming, found, strict=True):
             of_run[: round(unsure * len(of_run))] = 0.0
+            of_run[~self.compared(run)[1]] = 0.0
         slopes = np.concatenate(found)
         slopes[:, :, structure.grip : structure.timing.stop] = 0.0
         for k in range(structure.n):
@@ -206,7 +209,7 @@ class Search:
         """Return how stiff every muscle is at every sample kept, shape (samples, n)."""
         structure, found = self.structure, []
         for run in self.runs:
-            y = self.measured(run)
+            y = self.compared(run)[0]
             u = y / structure.scale
             x = run.scheduled[:: self.every, : len(structure.scheduled)]
             p = run.driven[:: self.every]
@@ -268,19 +271,20 @@ class Search:
         Of a run that begins in an unknown state, that is not found, the first part does not count, until
         it has forgotten, but where the ``whole`` is asked for.
         """
-        still = self.still[place]
+        still, (measured, counts) = self.still[place], self.compared(self.runs[place])
         found, by = self.followed(values, place, held=still, sloped=sloped)
         if still:
             areas = [values[self.structure.places("areas", k)[0]] for k in range(self.structure.n)]
             scale = 1.0 / (np.array(areas) * self.structure.highest)
         else:
-            found = found - self.measured(self.runs[place])
+            found = found - measured
             scale = 1.0 / self.span
         known = whole or self.structure.settled or self.structure.n_starts
         unsure = 0.0 if known else self.warming[place]
-        counts = (np.arange(len(found)) >= unsure * len(found))[:, np.newaxis]
-        by *= (scale * counts)[..., np.newaxis]
-        return (found * scale * counts).ravel(), by.reshape(found.size, by.shape[2])
+        counts &= np.arange(len(found)) >= unsure * len(found)
+        weights = scale * counts[:, np.newaxis]
+        by *= weights[..., np.newaxis]
+        return (found * weights).ravel(), by.reshape(found.size, by.shape[2])
 
     def unlikely(self, values: Array) -> tuple[Array, Array]:
         """Return how far from rest the starts of runs are, as errors and slopes."""
@@ -325,9 +329,8 @@ class Search:
         size = np.maximum(np.sqrt((moving**2).sum(axis=0)), 1e-12)
         condition, own = inverted(moving / size)
         n_free = errors.size * self.every - mix.shape[1]
-        variance = float(errors @ errors) / max(
-            n_free, 1
-        )  # of all samples, of which some are looked at
+        # of all samples, of which some are looked at
+        variance = float(errors @ errors) / max(n_free, 1)
         scaled = mix / size
         told = np.isfinite(np.diag(own))
         covariance = variance * scaled[:, told] @ own[np.ix_(told, told)] @ scaled[:, told].T

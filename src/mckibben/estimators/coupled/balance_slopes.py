@@ -253,7 +253,8 @@ def move(
         return
     for k in range(n):
         by_springs(c, k, y, x, slopes[k])
-        if shortened(c, muscles(c) + k * width, k, state, way, y[k], p[k])[1]:
+        residual[k], slack = shortened(c, muscles(c) + k * width, k, state, way, y[k], p[k])
+        if slack:
             slopes[k, k * width + 3] = 1.0
         else:
             direct(c, state, way, k, y[k], p[k], slopes[k])
@@ -275,8 +276,8 @@ def move(
         own, moves = muscles(c) + k * width, memory[memory.shape[0] - n + k]
         if not held:
             mixed(slopes[k], 0.0, 1.0, moves)
-        u, slack = shortened(c, own, k, state, way, y[k], p[k])
-        if slack:
+        u = residual[k]
+        if u < y[k]:  # slack
             mixed(moves, 0.0, 0.0, moves)
             direct(c, state, way, k, u, p[k], moves)
             remembered(c, state, way, k, u, p[k], memory, moves)

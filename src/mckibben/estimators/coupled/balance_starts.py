@@ -14,10 +14,11 @@ from mckibben.arrays import Array
 from mckibben.blocks.core.block import Block
 from mckibben.blocks.core.running import run_many
 from mckibben.blocks.coupled.balance import Balance
+from mckibben.blocks.coupled.balance_in import balance_in
 from mckibben.blocks.coupled.balance_law import keep, settle
 from mckibben.blocks.coupled.balance_terms import AT_REST
 from mckibben.estimators.core.data import TrainingData
-from mckibben.estimators.coupled.balance_loads import solved_in, under
+from mckibben.estimators.coupled.balance_loads import under
 from mckibben.estimators.coupled.balance_search import Search
 from mckibben.estimators.coupled.balance_structure import Structure
 
@@ -63,14 +64,15 @@ def simulate_started(
         model = under(block, values[structure.own.load(run.recording)].tolist())
         state = model.initial_state(run.inputs[0])
         if structure.n_starts:
-            (before, balance, _), n = solved_in(model), structure.n
+            placed, n = balance_in(model), structure.n
+            assert placed is not None
             first = run.inputs[0].copy()
-            for part in before:
+            for part in placed.before:
                 first[:n] = run_many([part], first[np.newaxis, :n])[0][0]
             known = values.copy()
-            known[structure.grip] = balance.grip
+            known[structure.grip] = placed.balance.grip
             begun, _ = structure.own.begun(known, run.place, structure.grip, first[:n])
-            begin_at(balance, state, first, begun)
+            begin_at(placed.balance, state, first, begun)
         found = run_many([model], run.inputs, sample_time=run.sample_time, initial=tuple(state))
         outputs.append(found[0][run.counts].ravel())
     return np.concatenate(outputs)

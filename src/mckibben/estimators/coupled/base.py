@@ -15,7 +15,7 @@ from mckibben.blocks.core.block import Block
 from mckibben.errors import DataError
 from mckibben.estimators.core.checking import training_data
 from mckibben.estimators.core.data import Mask, TrainingData
-from mckibben.estimators.core.estimator import Estimator
+from mckibben.estimators.core.estimator import Estimator, resting
 from mckibben.estimators.core.uncertainty import unknown
 from mckibben.estimators.optimisers.tracker import Tracker
 from mckibben.recording import Recording
@@ -30,8 +30,6 @@ FEWEST_SAMPLES = 50
 @dataclass(kw_only=True, repr=False, eq=False)
 class CoupledEstimator(Estimator):
     """Settings common to all estimators of several inputs and outputs.
-
-    What counts of a recording is learned from in stretches, each with a memory of its own.
 
     Parameters
     ----------
@@ -55,6 +53,10 @@ class CoupledEstimator(Estimator):
 
     alone: ClassVar[bool] = False
     """Whether it is a model of one muscle under no measured load, too."""
+
+    through: ClassVar[bool] = False
+    """Whether it runs through what does not count, so that memory there is right; else stretches of
+    what counts each begin with a memory of their own."""
 
     fewest_inputs: ClassVar[int] = 1
     most_inputs: ClassVar[float] = np.inf
@@ -86,7 +88,7 @@ class CoupledEstimator(Estimator):
             return "it is of several muscles, or of one under a measured load that changes"
         if not cls.fits(len(inputs), len(outputs)):
             return "it needs an output to every input"
-        return None
+        return resting(recordings, inputs)
 
     @classmethod
     def fits(cls, n_inputs: int, n_outputs: int) -> bool:
@@ -151,8 +153,8 @@ class CoupledEstimator(Estimator):
         found = training_data(
             listed, inputs, outputs, rows, scheduling, one_rate=False, spans=self.spans
         )
-        kept = found.stretches(FEWEST_SAMPLES - 1)
-        if not kept.runs:
+        kept = found.bridged() if self.through else found.stretches(FEWEST_SAMPLES - 1)
+        if sum(int(run.counts.sum()) for run in kept.runs) < FEWEST_SAMPLES:
             raise DataError(
                 f"no {FEWEST_SAMPLES} samples in a row count", remedy="give longer recordings"
             )

@@ -79,9 +79,10 @@ class CreepPIEstimator(CreepingEstimator):
     def basis(self, theta: Array, run: Run, data: TrainingData) -> Array:
         """Return the pieces of the map over the run's history, with their creep."""
         x, _ = self.argument(theta, run, data)
-        return with_creep(
+        crept = with_creep(
             PolynomialMap(self.map_size).pieces(x), *self.creep(theta), run.sample_time
         )
+        return np.hstack([crept, self.begun(theta, run, data)])
 
     def argument(self, theta: Array, run: Run, data: TrainingData) -> tuple[Array, Array]:
         """Return the argument of the map, 0 to 1, and its derivatives by the relative weights."""
@@ -100,6 +101,7 @@ class CreepPIEstimator(CreepingEstimator):
         pieces = PolynomialMap(self.map_size)
         raised, step = self.raised(theta, data)
         taus, compliances = self.tail(theta)
+        linear, left = np.split(linear, [self.map_size])
 
         def of(run: Run) -> Array:
             x, by_weights = self.argument(theta, run, data)
@@ -108,17 +110,23 @@ class CreepPIEstimator(CreepingEstimator):
             at_once = slopes[:, np.newaxis] * np.column_stack([by_weights, by_offset])
             crept = with_creep(at_once, taus, compliances, run.sample_time)
             given = pieces.pieces(x) @ linear
-            return np.column_stack([crept, creep_moves(given, taus, compliances, run.sample_time)])
+            moved = creep_moves(given, taus, compliances, run.sample_time)
+            if left.size:
+                moved[:, : taus.size] += self.begun_moves(theta, left, run, data)
+            return np.column_stack([crept, moved])
 
         return counting(data, of)
 
     def least(self, matrix: Array, data: TrainingData) -> Array:
         """Return a little of every piece, so that the map increases everywhere."""
         low, high = data.output_range
-        return np.full(matrix.shape[1], 1e-6 * (high - low))
+        floor = np.full(matrix.shape[1], 1e-6 * (high - low))
+        floor[self.map_size :] = -np.inf  # what is left of creep
+        return floor
 
     def build(self, theta: Array, linear: Array, offset: float, data: TrainingData) -> Series:
         """Return the series: logarithm, memory, map and creep."""
+        linear = linear[: self.map_size]
         weights = theta[: self.n_operators]
         raised, radii = self.memory(theta, data)
         low, high = self._logs(raised, data)

@@ -1,0 +1,111 @@
+"""Force by length, or displacement, and pressure: a balance of forces asked for its load.
+
+Unlike a static law it remembers: friction and what relaxes come from the balance, at held length
+through the stretch of the wall.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Annotated, ClassVar
+
+import numpy as np
+from annotated_types import Interval
+
+from mckibben.arrays import Array
+from mckibben.blocks.compose import PerChannel, Series
+from mckibben.blocks.core.block import Block
+from mckibben.blocks.core.fields import Channel
+from mckibben.blocks.coupled.load_estimate import load_of
+from mckibben.blocks.memoryless.affine import Affine
+from mckibben.estimators.core.data import TrainingData
+from mckibben.estimators.core.single import SingleEstimator
+from mckibben.estimators.core.uncertainty import unknown
+from mckibben.estimators.coupled.balance import BalanceEstimator
+from mckibben.estimators.coupled.base import FEWEST_SAMPLES
+from mckibben.estimators.optimisers.tracker import Tracker
+from mckibben.recording import Recording
+
+
+@dataclass(kw_only=True, repr=False, eq=False)
+class BalanceForceEstimator(SingleEstimator):
+    """Force by length or displacement and pressure, from a balance of forces.
+
+    Parameters
+    ----------
+    pressure : str
+        Channel of the pressure.
+    n_stops, n_lags, elasticity, area, contact
+        As of `balance`.
+    """
+
+    input: str = "length"
+    output: str = "force"
+    pressure: str = "pressure"
+    n_stops: Annotated[int, Interval(ge=0, le=30)] = 6
+    n_lags: Annotated[int, Interval(ge=0, le=10)] = 2
+    elasticity: Annotated[int, Interval(ge=1, le=9)] = 9
+    area: Annotated[int, Interval(ge=0, le=6)] = 2
+    contact: bool = True
+
+    effort: ClassVar[float] = 1.0
+    told: ClassVar[tuple[str, ...]] = ("pressure",)
+    rises: ClassVar[bool] = False
+
+    @classmethod
+    def objection(
+        cls,
+        recordings: Sequence[Recording],
+        inputs: Sequence[str],
+        outputs: Sequence[str],
+        scheduling: Sequence[str] | None = None,
+    ) -> str | None:
+        kinds = [name.partition("_")[0] for name in (*inputs, *outputs)]
+        if kinds not in (["length", "force"], ["displacement", "force"]):
+            return "it maps length, or displacement, to force"
+        return super().objection(recordings, inputs, outputs, scheduling)
+
+    def identify(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
+        place, (pressure,) = data.inputs[0], data.scheduled
+        longest = data.input_range[1] if place.name.startswith("length") else None
+        displacement = Channel("displacement", place.unit)
+        runs = tuple(
+            replace(
+                run,
+                driven=run.scheduled,
+                outputs=run.driven if longest is None else longest - run.driven,
+                scheduled=run.outputs,
+            )
+            for run in data.runs
+        )
+        muscle = replace(
+            data,
+            runs=runs,
+            inputs=(pressure,),
+            outputs=(place if longest is None else displacement,),
+            scheduled=data.outputs,
+        ).stretches(FEWEST_SAMPLES - 1)
+        balance = BalanceEstimator(
+            n_stops=self.n_stops,
+            n_lags=self.n_lags,
+            elasticity=self.elasticity,
+            area=self.area,
+            contact=self.contact,
+        )
+        force = load_of(balance.find(muscle, tracker)[0])
+        if longest is None:
+            return force, data
+        shortening = Affine(-1.0, longest, place, displacement)
+        before = PerChannel((shortening, Affine(1.0, 0.0, pressure, pressure)))
+        return Series((before, *(force.parts if isinstance(force, Series) else (force,)))), data
+
+    def uncertainty(
+        self, block: Block, data: TrainingData, residual: Array, at_bounds: Sequence[int]
+    ) -> tuple[float, Array]:
+        """Return that neither is known: the balance's are those of displacements."""
+        return np.nan, unknown(block)
+
+    def undetermined(self) -> tuple[int, ...]:
+        """Return none, since it is not known."""
+        return ()

@@ -1,0 +1,47 @@
+"""From the columns of a file to channels, by what the folder says of them: units, gains, constants."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from mckibben.files.channels import Channel, Described
+from mckibben.files.table import Column, Table
+
+
+def constants(described: Described, table: Table) -> dict[str, Column]:
+    """Return columns for the channels that are constants, by channel; the header is the channel's."""
+    n = table.n_samples
+    return {
+        name: Column(name, np.full(n, given.value), given.unit)
+        for name, given in described.channels.items()
+        if given.value is not None
+    }
+
+
+def calibrated(
+    named: Mapping[str, Column], described: Described
+) -> tuple[dict[str, Column], dict[str, Any]]:
+    """Return columns in the units that are said, gain times themselves plus offset; and which were.
+
+    A column of text stays one, to be refused as such.
+    """
+    columns: dict[str, Column] = {}
+    told: dict[str, Any] = {}
+    for name, column in named.items():
+        given = described.time if name == "time" else described.channels.get(name)
+        if given is not None and given.unit is not None:
+            column = replace(column, unit=given.unit)
+        if isinstance(given, Channel) and given.is_calibrated and column.values is not None:
+            gain, offset = 1.0 if given.gain is None else given.gain, given.offset or 0.0
+            with np.errstate(over="ignore"):
+                values = gain * column.values + offset
+            column = replace(column, values=values)
+            told[name] = {"column": column.header, "gain": gain, "offset": offset}
+        elif isinstance(given, Channel) and given.value is not None and column.header == name:
+            told[name] = {"value": given.value, "unit": given.unit}
+        columns[name] = column
+    return columns, told

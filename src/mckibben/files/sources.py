@@ -1,0 +1,129 @@
+"""What one recording is on disk: a file, files with one signal each, or the folder of a bag."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from pathlib import Path
+
+from mckibben.errors import DataError
+from mckibben.files import formats, signals
+from mckibben.files.channels import NAME, described
+from mckibben.files.own import description
+from mckibben.files.request import Request
+from mckibben.files.table import Table
+
+BAG = "metadata.yaml"
+"""In the folder of a bag of ROS 2."""
+
+PROTOCOL = "protocol.json"
+"""Tells in a folder what each recording in it is for."""
+
+
+def is_bag(path: Path) -> bool:
+    """Tell whether a folder is a bag of ROS 2."""
+    return path.is_dir() and (path / BAG).is_file()
+
+
+def inside(path: Path) -> list[Path]:
+    """Return what to read the recordings of a path from: itself, unless it is a folder of several.
+
+    Of files that are one recording, as ``channels.toml`` has it, the first stands for all.
+
+    Raises
+    ------
+    DataError
+        If it is a folder without recordings, or of files with one signal each that cannot be told.
+    """
+    if not path.is_dir() or is_bag(path):
+        return [path]
+    found = _files(path) + [each for each in _listed(path) if is_bag(each)]
+    if not found:
+        raise DataError("there is no recording in the folder", file=path, remedy="name files")
+    if os.path.lexists(path / PROTOCOL):
+        return found
+    said = described(path)
+    firsts: dict[Path, None] = {}
+    for each in found:
+        together = said.joined(each.name)
+        firsts[path / next(iter(together.values())) if together else each] = None
+    if len(firsts) == len(found) and not any(map(is_bag, found)) and signals.are_one(found, said):
+        return [path]
+    return list(firsts)
+
+
+def tables(path: Path, request: Request) -> tuple[list[Table], str]:
+    """Return what is in a recording as it stands there, and the SHA-256 of its files.
+
+    Errors are those of `mckibben.files.formats.read` and `mckibben.files.signals.joined`.
+    """
+    if is_bag(path):
+        parts = {each.name: each for each in _files(path)}
+        if not parts:
+            raise DataError(
+                "there is no .db3 or .mcap file in it", file=path, remedy="copy all of it"
+            )
+    elif path.is_dir():
+        parts = {each.stem: each for each in _files(path)}
+    else:
+        together = described(path.parent).joined(path.name)
+        parts = {name: path.with_name(file) for name, file in together.items()} or {"": path}
+    found: dict[Path, list[Table]] = {}
+    digests: list[str] = []
+    for each in parts.values():
+        with formats.opening(each) as file:
+            found[each] = formats.read(file, each)
+            file.seek(0)
+            digests.append(hashlib.file_digest(file, "sha256").hexdigest())
+    if len(found) == 1:
+        return next(iter(found.values())), digests[0]
+    digest = hashlib.sha256("".join(digests).encode()).hexdigest()
+    if is_bag(path):
+        from mckibben.files.topics import one_bag
+
+        return [one_bag(found)], digest
+    for each, several in found.items():
+        if len(several) > 1:
+            raise DataError(
+                f"it holds {len(several)} recordings, where one signal is expected",
+                file=each,
+                remedy=f"leave it out of join in {NAME}",
+            )
+    one = signals.joined(
+        {each: several[0] for each, several in found.items()}, list(parts), request
+    )
+    return [one], digest
+
+
+def read_with(path: Path) -> list[Path]:
+    """Return all files that are read where this one is, or this folder; some may be missing.
+
+    They are the parts of recordings and what describes them; a file of another kind stands alone.
+    """
+    if path.is_dir():
+        bags = (each for each in _listed(path) if is_bag(each))
+        parts = [*_files(path), *(file for bag in bags for file in _files(bag))]
+        about = [path / NAME, path / PROTOCOL, path / BAG]
+    elif path.suffix.casefold() in formats.READERS:
+        together = described(path.parent).joined(path.name)
+        parts = [path, *(path.with_name(name) for name in together.values())]
+        about = [path.with_name(NAME)]
+    else:
+        return [path]
+    return [*parts, *filter(None, map(description, parts)), *about]
+
+
+def _files(folder: Path) -> list[Path]:
+    found = (each for each in _listed(folder) if each.suffix.casefold() in formats.READERS)
+    return [each for each in found if each.is_file()]
+
+
+def _listed(folder: Path) -> list[Path]:
+    try:
+        return sorted(folder.iterdir())
+    except OSError as error:
+        raise DataError(
+            f"it cannot be read ({(error.strerror or str(error)).lower()})",
+            file=folder,
+            remedy="check the folder and its rights",
+        ) from None

@@ -1,0 +1,199 @@
+"""Folders of recordings to one page: splits, tasks, figures, bad descriptions."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mckibben import GPI, DataError, Recording, compare, write
+from mckibben.measured.page import page, table
+from mckibben.measured.running import outcomes
+from mckibben.measured.sets import KNOWN, parted, sets_in
+from mckibben.measured.splits import split_of
+from mckibben.signals import irregular_triangle
+from tests.cli.conftest import Cli
+
+TIME = np.arange(0, 30, 0.02)
+MODELS = ["pi", "gpi"]
+
+
+def recorded(seed: int) -> Recording:
+    u = irregular_triangle(TIME, 12, 5.0, seed=seed)
+    noise = 0.02 * np.random.default_rng(seed).standard_normal(u.size)
+    return Recording({"pressure": u, "displacement": GPI.example().simulate(u) + noise}, 0.02)
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """Two sets: one muscle without a description; one whose voltages and split are described."""
+    plain, volts = tmp_path / "data" / "plain", tmp_path / "data" / "volts"
+    plain.mkdir(parents=True)
+    volts.mkdir()
+    write(recorded(1), plain / "run.csv")
+    for seed in (2, 3, 4):
+        run = recorded(seed)
+        rows = np.column_stack([TIME, (run["pressure"] + 1.0) / 2.0, run["displacement"]])
+        text = "t,A0,y\n" + "\n".join(",".join(f"{v:.9g}" for v in row) for row in rows)
+        (volts / f"run{seed}.csv").write_text(text + "\n")
+    (volts / "channels.toml").write_text(
+        """
+        [time]
+        column = "t"
+        unit = "s"
+        [channels.pressure]
+        column = "A0"
+        unit = "bar"
+        gain = 2.0
+        offset = -1.0
+        [channels.displacement]
+        column = "y"
+        unit = "mm"
+        [split]
+        title = "By volts"
+        about = "A sensor of volts."
+        [[split.tasks]]
+        name = "last run"
+        test = ["run4"]
+        models = ["pi", "gpi"]
+        [[split.tasks.published]]
+        what = "Somebody's"
+        rmse = 0.5
+        [[split.tasks]]
+        name = "in turn"
+        leave_out = ["run2", "run3"]
+        models = ["pi"]
+        [[split.tasks]]
+        name = "cut"
+        files = ["run2"]
+        cut = 0.6
+        models = ["pi"]
+        """
+    )
+    return tmp_path / "data"
+
+
+def test_every_task_is_the_comparison_it_says(folder: Path) -> None:
+    plain, volts = sets_in(folder)
+    done = {one.label: one for one in outcomes([volts], jobs=1)}
+    assert list(done) == [
+        "By volts: last run",
+        "By volts: in turn, without run2",
+        "By volts: in turn, without run3",
+        "By volts: cut",
+    ]
+    runs = {run.name: run for run in volts.recordings()}
+    np.testing.assert_allclose(runs["run2"]["pressure"], recorded(2)["pressure"], atol=1e-7)
+    expected = compare([runs["run2"], runs["run3"]], [runs["run4"]], models=MODELS, jobs=1)
+    board = done["By volts: last run"].board
+    assert board is not None
+    assert [r.test_error for r in board.rows] == [r.test_error for r in expected.rows]
+    assert done["By volts: last run"].span == pytest.approx(np.ptp(runs["run4"]["displacement"]))
+    assert done["By volts: last run"].regret == pytest.approx(
+        expected.rows[0].test_error / min(r.test_error for r in expected.rows) - 1.0
+    )
+    train, test = parted(volts.split.tasks[2], list(runs.values()), volts.folder)
+    assert [len(run) for run in (*train, *test)] == [900, 600]
+    assert plain.title == "plain"
+
+
+def test_the_page_has_every_figure_of_every_task(folder: Path) -> None:
+    done = list(outcomes(sets_in(folder), models=["gpi"], jobs=1))
+    text = page(done, "mckibben measured FOLDER")
+    for one in done:
+        assert one.board is not None
+        (row,) = one.board.rows
+        if one.left_out:
+            assert f"without {one.left_out}" in text
+            assert f"{100 * row.test_error / one.span:.2f}" in text
+        else:
+            assert f"| {one.heading} | `gpi` |" in text
+            assert f"{row.test_error:.3g}" in text
+    assert "| Somebody's (printed) | – | 0.5 |" in text
+    assert "A sensor of volts." in text
+    rows = table(done)
+    rows = rows[rows["model"] == "gpi"]
+    assert list(rows["left_out"]) == ["", "", "run2", "run3", ""]
+    np.testing.assert_allclose(
+        rows["test.rmse"], [one.board.rows[0].test_error for one in done if one.board]
+    )
+
+
+def test_a_set_that_cannot_be_read_is_said_and_the_rest_goes_on(folder: Path) -> None:
+    (folder / "plain" / "run.csv").write_text("pressure_bar,displacement_mm\n1,2\n1,x\n")
+    done = list(outcomes(sets_in(folder), models=["pi"], jobs=1))
+    assert done[0].board is None
+    assert "run.csv" in done[0].reason
+    assert all(one.board is not None for one in done[1:])
+    assert "run.csv" in page(done, "it")
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"cuts": 0.5}, "split.cuts"),
+        ({"tasks": [{"cut": 1.5}]}, "split.tasks.0.cut"),
+        ({"tasks": [{"cut": 0.5, "test": ["a"]}]}, "one of test, leave_out and cut"),
+        ({"tasks": []}, "split.tasks"),
+        ({"resample": -1.0}, "split.resample"),
+        ({"resample": float("nan")}, "split.resample"),
+    ],
+)
+def test_what_cannot_be_a_split_is_refused_by_its_name(given: dict[str, object], said: str) -> None:
+    with pytest.raises(DataError, match=r"channels\.toml") as caught:
+        split_of(given)
+    assert said in str(caught.value)
+
+
+def test_patterns_that_match_nothing_are_refused_with_the_names_there_are(folder: Path) -> None:
+    text = (folder / "volts" / "channels.toml").read_text().replace('"run4"', '"run9"')
+    (folder / "volts" / "channels.toml").write_text(text)
+    _, volts = sets_in(folder)
+    with pytest.raises(DataError, match=r"run9.*run2, run3, run4"):
+        parted(volts.split.tasks[0], volts.recordings(), volts.folder)
+
+
+def test_descriptions_of_public_sets_are_sound() -> None:
+    from mckibben.files.channels import description
+
+    files = sorted(KNOWN.glob("*.toml"))
+    assert files
+    for file in files:
+        assert split_of(description(file).split, str(file)).about
+
+
+def test_the_command_writes_page_and_rows_and_goes_on(
+    cli: Cli, folder: Path, tmp_path: Path
+) -> None:
+    out = tmp_path / "out"
+    result = cli("measured", folder, "-o", out, "--models", "pi,gpi", "--jobs", "1")
+    assert result.code == 0, result.err
+    first = (out / "measured.md").read_text()
+    assert "By volts: last run" in result.out
+    assert (out / "measured.csv").read_text().count("\n") == 1 + 5 * 3
+    assert not (out / "unfinished").exists()
+    again = cli("measured", folder, "-o", out, "--only", "plain", "--models", "pi", "--jobs", "1")
+    assert again.code == 0, again.err
+    assert (out / "measured.md").read_text() != first
+    (out / "measured.md").write_text("mine")
+    assert cli("measured", folder, "-o", out, "--models", "pi").code == 2
+    assert (out / "measured.md").read_text() == "mine"
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["nowhere"], "no such folder"),
+        (["data", "--only", "nothing"], "there is no set 'nothing'"),
+        (["data/plain/run.csv"], "no such folder"),
+    ],
+)
+def test_the_command_refuses_in_words(
+    cli: Cli, folder: Path, words: list[str], said: str, tmp_path: Path
+) -> None:
+    given = [str(tmp_path / word) if place == 0 else word for place, word in enumerate(words)]
+    result = cli("measured", *given, "-o", tmp_path / "out")
+    assert result.code == 2
+    assert said in result.err
+    assert "Traceback" not in result.err

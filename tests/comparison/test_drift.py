@@ -1,0 +1,186 @@
+"""Drift of models' errors: said where it is, not where it is not, and taken out as is advised."""
+
+from __future__ import annotations
+
+import csv
+import os
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from mckibben import PI, Recording, compare, registry
+from mckibben.comparison.drift import Drift, Stretch, adapted_by, drift_of
+from mckibben.comparison.free_run import run_free
+from mckibben.control import DisturbanceObserver
+
+DATA = Path(os.environ.get("MCKIBBEN_DATA", Path(__file__).parents[2] / "shared" / "data"))
+STEP = 4.0
+SEEDS = 100
+
+
+def stretch(errors: np.ndarray, inputs: np.ndarray) -> Stretch:
+    return Stretch(errors, inputs[:, np.newaxis], np.ones(errors.size, dtype=bool))
+
+
+def noise(n: int, alike: float, seed: int) -> np.ndarray:
+    """Return stationary noise of unit deviation whose neighbours are so much alike."""
+    white = np.random.default_rng(seed).standard_normal(n + 500)
+    return np.asarray(lfilter([np.sqrt(1 - alike**2)], [1, -alike], white))[500:]
+
+
+def found(errors: np.ndarray, inputs: np.ndarray, n: int) -> Drift:
+    """Return the drift of errors of which the first n are in training, where their mean is none."""
+    errors = errors - errors[:n].mean()
+    drift = drift_of(
+        [stretch(errors[:n], inputs[:n])], [stretch(errors[n:], inputs[n:])], STEP, "y", "mm"
+    )
+    assert drift is not None
+    return drift
+
+
+@pytest.mark.parametrize("alike", [0.0, 0.5, 0.8])
+@pytest.mark.parametrize(("n", "n_test"), [(160, 60), (600, 200)])
+def test_stationary_noise_is_no_drift_and_an_injected_one_is(
+    n: int, n_test: int, alike: float
+) -> None:
+    alarms, seen, offsets, changes = 0, 0, 0, 0
+    ramp = np.concatenate([np.zeros(n), np.linspace(2.0, 4.0, n_test)])
+    for seed in range(SEEDS):
+        inputs = np.random.default_rng(seed + 1000).uniform(0, 5, n + n_test)
+        errors = noise(n + n_test, alike, seed)
+        alarms += found(errors, inputs, n).certain
+        drift = found(errors + ramp, inputs, n)
+        seen += drift.certain
+        offsets += drift.offset_interval[0] <= 3.0 <= drift.offset_interval[1]
+        changes += drift.change_interval[0] <= 2.0 <= drift.change_interval[1]
+    assert alarms <= 0.05 * SEEDS
+    assert seen >= 0.7 * SEEDS
+    assert min(offsets, changes) >= 0.9 * SEEDS
+
+
+def test_a_model_that_is_wrong_at_high_inputs_does_not_drift_where_these_fade() -> None:
+    time = np.arange(900)
+    peak = np.where(time < 600, 5.0 - 3.0 * (time % 300) / 300, 5.0 - 4.0 * (time - 600) / 300)
+    inputs = 0.5 * peak * (1 - np.cos(0.9 * time))
+    errors = 0.2 * inputs**2 + 0.1 * noise(900, 0.3, 0)
+    raw = errors[600:] - errors[:600].mean()
+    assert abs(raw[200:].mean() - raw[:100].mean()) > 1.0
+    assert not found(errors, inputs, 600).certain
+
+
+def test_of_too_short_a_test_nothing_is_told() -> None:
+    inputs = np.random.default_rng(0).uniform(0, 5, 300)
+    errors = noise(300, 0.0, 0)
+    assert drift_of([], [stretch(errors[:20], inputs[:20])], STEP, "y", "mm") is None
+    slow = 2.5 - 2.5 * np.cos(np.arange(300) * 2 * np.pi / 100)
+    assert drift_of([], [stretch(errors, slow)], STEP, "y", "mm") is None
+
+
+def test_samples_that_are_not_scored_have_no_say() -> None:
+    inputs = np.random.default_rng(0).uniform(0, 5, 300)
+    errors = noise(300, 0.0, 0)
+    spoilt, counts = errors.copy(), np.ones(100, dtype=bool)
+    spoilt[210:240], counts[10:40] = 50.0, False
+    test = Stretch(spoilt[200:], inputs[200:, np.newaxis], counts)
+    drift = drift_of([stretch(errors[:200], inputs[:200])], [test], STEP, "y", "mm")
+    assert drift is not None
+    assert not drift.certain
+
+
+def levels(n: int) -> np.ndarray:
+    return np.random.default_rng(3).uniform(0.5, 5.5, n)
+
+
+def test_what_is_advised_takes_the_drift_out_of_the_loop() -> None:
+    model = PI.example()
+    low, high = (float(end[0]) for end in model.reachable())
+    span = high - low
+    reference = low + span * (0.6 + 0.2 * np.sin(np.arange(400) * 0.7))
+    drift = span * (0.1 + 0.0004 * np.arange(400))
+
+    def missed(observed: bool) -> np.ndarray:
+        observer = DisturbanceObserver(model.inverse(), filter_time=24.0)
+        observer.reset(STEP)
+        plant, alone = model.stream(STEP), model.inverse().stream(STEP)
+        measured, errors = np.zeros(1), []
+        for wanted, off in zip(reference, drift, strict=True):
+            pressure = observer.step(np.array([wanted]), measured, np.empty(0))
+            if not observed:
+                pressure = alone.step([wanted]).copy()
+            measured = plant.step(pressure) + off
+            observer.applied(pressure)
+            errors.append(measured[0] - wanted)
+        return np.array(errors)
+
+    alone, observed = missed(False), missed(True)
+    np.testing.assert_allclose(observed, adapted_by(alone, STEP, 24.0), atol=1e-9)
+    assert np.sqrt(np.mean(observed**2)) < 0.35 * np.sqrt(np.mean(alone**2))
+
+
+def run(drift: np.ndarray) -> Recording:
+    """Return what a play model gives, with noise and what drifts."""
+    pressure = levels(drift.size)
+    y = PI.example().simulate(pressure) + drift
+    y += 0.05 * np.random.default_rng(4).standard_normal(y.size)
+    return Recording({"pressure": pressure, "displacement": y}, STEP)
+
+
+def test_the_leaderboard_says_drift_and_what_to_do(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    none = np.zeros(320)
+    board = compare(run(none).slice(0, 240), run(none).slice(240, 320), models=["pi", "gpi"])
+    assert board.drift == ""
+    assert all(row.drift is not None and not row.drift.certain for row in board.rows)
+    off = run(np.where(np.arange(320) < 240, 0.0, 0.5))
+    board = compare(off.slice(0, 240), off.slice(240, 320), models=["pi", "gpi"])
+    assert "drift, slower than the motion: displacement is off by 0.5" in board.drift
+    assert "which no model foresaw" in board.drift
+    assert board.best is not None
+    assert board.best.block is not None
+    monkeypatch.chdir(tmp_path)
+    board.best.block.save("model.json")
+    (advised,) = re.findall(r"adapt on the robot: (.*\)), which", board.drift)
+    exec(f"import mckibben; {advised}", {})
+    assert board.drift in board.to_dict()["notes"]
+    (row,) = [row for row in board.rows if row.model == board.to_dict()["chosen"]]
+    assert row.drift is not None
+    assert row.to_dict()["drift"]["offset"] == pytest.approx(0.5, abs=0.05)
+    assert row.drift.adapted < 0.7 * row.drift.rmse
+
+
+def test_a_measured_muscle_goes_on_creeping_and_cpi_foresees_it() -> None:
+    path = DATA / "festo_dmsp10_levels" / "festo_dmsp10_levels.csv"
+    if not path.exists():
+        pytest.skip("the measured recordings are not here")
+    with path.open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    names = {"pressure": "pressure_bar", "displacement": "displacement_mm"}
+    channels = {name: np.array([float(row[of]) for row in rows]) for name, of in names.items()}
+    whole = Recording(channels, STEP)
+    train, test = whole.slice(0, 150), whole.slice(150, 200)
+
+    def missed(**settings: bool) -> tuple[float, Drift]:
+        model = registry.load("estimators", "cpi")(**settings).fit(train).model_
+        errors = [
+            r["displacement"] - run_free(model, r, "displacement", (train,)) for r in (train, test)
+        ]
+        known, asked = (
+            stretch(e, r["pressure"]) for e, r in zip(errors, (train, test), strict=True)
+        )
+        drift = drift_of([known], [asked], STEP, "displacement", "mm")
+        assert drift is not None
+        return float(np.sqrt(np.mean(errors[1] ** 2))), drift
+
+    error, foreseen = missed()
+    assert error < 0.15
+    error, drift = missed(settled=True)
+    assert error > 0.2
+    assert drift.certain
+    assert foreseen.foresees(drift)
+    assert not drift.foresees(foreseen)
+    assert drift.offset == pytest.approx(0.2, abs=0.05)
+    assert drift.adapted < 0.75 * error

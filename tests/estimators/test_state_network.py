@@ -1,0 +1,72 @@
+"""State-space networks identified: derivatives are exact, and hysteresis in a loop is learned."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from mckibben import ModelError
+from mckibben.blocks.dynamic.state_network import StateNetwork
+from mckibben.estimators.dynamic.state_network import StateNetworkEstimator
+from mckibben.estimators.dynamic.state_network_slopes import follow_network
+from tests.estimators.test_oscillator import missed, shaken
+
+Array = NDArray[np.float64]
+
+
+def test_runs_with_derivatives_are_those_of_the_block_and_exact() -> None:
+    model, n = StateNetwork.example(), 30
+    force = 3.0 * np.sin(0.3 * np.arange(1, n + 1))
+    inputs = (np.append(0.0, force) - model.input_offset) / model.input_scale
+
+    def run(model: Any, slopes: bool = False) -> tuple[Array, Array]:
+        p = model.n_parameters
+        linear, hidden, readout = map(np.array, (model.linear, model.hidden, model.readout))
+        given, table = np.empty(n), np.empty((n if slopes else 0, p))
+        state, moved = np.zeros(2), np.zeros((2, p))
+        assert follow_network(
+            linear, hidden, readout, 0.15, state, moved, inputs, 1, 0, given, table
+        )
+        return model.output_offset + model.output_scale * given, model.output_scale * table
+
+    outputs, slopes = run(model, True)
+    block = replace(model, substeps=1).simulate(force, sample_time=0.01, initial="virgin")
+    np.testing.assert_allclose(outputs, block, rtol=1e-12)
+    values = model.pack()
+    for place in range(values.size):
+        low, high = values.copy(), values.copy()
+        low[place] -= 1e-6
+        high[place] += 1e-6
+        expected = (run(model.unpack(high))[0] - run(model.unpack(low))[0]) / 2e-6
+        np.testing.assert_allclose(slopes[:, place], expected, atol=1e-7)
+
+
+def test_a_run_that_leaves_all_bounds_ends() -> None:
+    weights = np.array([[5.0, 0.0, 1.0]]), np.zeros((1, 3)), np.zeros((1, 1))
+    given, none = np.empty(50), np.empty((0, 7))
+    state, moved = np.ones(1), np.zeros((1, 7))
+    assert not follow_network(*weights, 1.0, state, moved, np.zeros(51), 1, 0, given, none)
+
+
+def test_hysteresis_in_a_loop_is_learned_without_being_told_of() -> None:
+    noisy, test = shaken("quick", periodic=True, n=1024)
+    several, one = (
+        missed(
+            StateNetworkEstimator(periodic=True, n_units=units, n_steps=15).fit(noisy).model_,
+            test,
+            periodic=True,
+        )
+        for units in (4, 1)
+    )
+    assert several < 0.03
+    assert several < 0.4 * one
+
+
+def test_what_cannot_be_learned_from_is_refused() -> None:
+    noisy, _ = shaken("slipping", periodic=True)
+    with pytest.raises(ModelError, match=r"are not fitted.*periodic=true"):
+        StateNetworkEstimator(initial="fitted").fit(noisy)

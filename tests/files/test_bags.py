@@ -1,0 +1,352 @@
+"""Bags of ROS 1 and ROS 2, written by another program's library."""
+
+from __future__ import annotations
+
+import shutil
+import sqlite3
+import sys
+from collections.abc import Callable
+from contextlib import closing
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import mckibben
+from mckibben import DataError, DataWarning, Recording
+from mckibben.files.folders import roles
+from mckibben.files.messages import layout
+from tests.files.rosbags_made import BEGAN, FAST, SLOW, Kind, N, angle, pressure, write
+
+KINDS: tuple[Kind, ...] = ("bag", "mcap", "db3")
+ASKED: dict[str, Any] = {
+    "columns": {"pressure": "/rig/pressure/data", "angle": "/joint_states/position/elbow"},
+    "units": {"pressure": "bar", "angle": "rad"},
+    "channels": ["pressure", "angle"],
+}
+
+
+def one(path: Path, **options: Any) -> Recording:
+    (recording,) = mckibben.read(path, **options)
+    return recording
+
+
+def file_of(path: Path, kind: Kind) -> Path:
+    """Return the file in a bag's folder."""
+    return next(path.glob(f"*.{kind}")) if path.is_dir() else path
+
+
+@pytest.mark.parametrize("packed", [False, True])
+@pytest.mark.parametrize("kind", KINDS)
+def test_topics_are_put_on_the_slowest_clock(tmp_path: Path, kind: Kind, packed: bool) -> None:
+    if packed and kind == "db3":
+        pytest.skip("is packed as a whole file, which is no database then")
+    path = write(tmp_path / "run", kind, packed=packed)
+    with pytest.warns(DataWarning, match=r"pressure 100, angle 40.*times of 'angle'"):
+        recording = one(path, **ASKED)
+    assert recording.sample_time == pytest.approx(SLOW * 1e-9)
+    t = recording.time
+    assert recording["angle"] == pytest.approx(angle(t), abs=1e-12)
+    between = np.interp(t, np.arange(N) * FAST * 1e-9, pressure(np.arange(N) * FAST * 1e-9))
+    assert recording["pressure"] == pytest.approx(between, abs=1e-12)
+    assert recording["joint_states_effort_shoulder"].tolist() == [2.0] * recording.n_samples
+    assert recording["state_mode"].tolist() == [float(k % 3) for k in range(recording.n_samples)]
+    assert recording["state_strain_2"] == pytest.approx(3 * t, abs=1e-6)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_units_that_types_and_names_tell(tmp_path: Path, kind: Kind) -> None:
+    path = write(tmp_path / "run", kind)
+    asked = ["pressure"]  # which two topics and a field say
+    with pytest.raises(
+        DataError, match=r"'pressure'.*no such channel; the columns are /rig/pressure"
+    ):
+        mckibben.read(path, channels=asked)
+    with pytest.warns(DataWarning, match="by interpolation"):
+        everything = one(path)
+    assert everything["state_pressure"] == pytest.approx(pressure(everything.time))
+    assert everything.units["state_pressure"] == "bar"
+    air = one(path, columns={"pressure": "/air/fluid_pressure"}, channels=["pressure"])
+    assert air["pressure"] == pytest.approx(6 + 1e-5 * air.time)
+    assert air.units["hand_wrench_force_z"] == "N"
+    state = one(path, columns={"pressure": "/state/pressure_kPa"}, channels=["pressure"])
+    assert state["pressure"] == pytest.approx(pressure(state.time))
+
+
+def test_times_are_those_of_the_header(tmp_path: Path) -> None:
+    path = write(tmp_path / "run", "mcap", late=3_000_000)
+    with pytest.warns(DataWarning, match="by interpolation"):
+        recording = one(path, **ASKED)
+    # the angle is stamped, the pressure is not: it seems 3 ms late, as it was recorded
+    t = recording.time + 0.003
+    assert recording["angle"] == pytest.approx(angle(t), abs=1e-9)
+    assert recording["pressure"] == pytest.approx(pressure(recording.time), abs=2e-3)
+
+
+def test_a_rate_may_be_asked_for(tmp_path: Path) -> None:
+    path = write(tmp_path / "run", "bag")
+    with pytest.warns(DataWarning, match="200 a second, by interpolation"):
+        recording = one(path, rate=200, **ASKED)
+    assert recording.sample_time == 0.005
+    assert recording["angle"] == pytest.approx(angle(recording.time), abs=5e-3)
+
+
+def test_a_file_and_its_folder_are_one(tmp_path: Path) -> None:
+    path = write(tmp_path / "run", "mcap")
+    with pytest.warns(DataWarning):
+        assert one(path, **ASKED) == one(file_of(path, "mcap"), **ASKED)
+    assert roles(tmp_path) == {"train": [path]}
+
+
+def test_a_bag_in_several_files(tmp_path: Path) -> None:
+    whole, cut = write(tmp_path / "whole", "db3"), write(tmp_path / "cut", "db3")
+    first = file_of(cut, "db3")
+    second = first.with_name("cut_1.db3")
+    shutil.copy(first, second)
+    for path, sign in ((first, ">="), (second, "<")):
+        with closing(sqlite3.connect(path)) as base:
+            base.execute(f"DELETE FROM messages WHERE timestamp {sign} ?", [BEGAN + N * FAST // 2])
+            base.commit()
+    with pytest.warns(DataWarning):
+        found, expected = one(cut, **ASKED), one(whole, **ASKED)
+    assert found["angle"] == pytest.approx(expected["angle"], abs=1e-9)
+    assert found.time == pytest.approx(expected.time, abs=1e-6)
+
+
+def test_definitions_of_the_standard_are_known_without_the_file(tmp_path: Path) -> None:
+    path = write(tmp_path / "run", "db3")
+    with closing(sqlite3.connect(file_of(path, "db3"))) as base:
+        base.execute("DROP TABLE message_definitions")
+        base.commit()
+    with (
+        pytest.warns(DataWarning, match="by interpolation"),
+        pytest.warns(DataWarning, match=r"/state \(the type 'rig_msgs/msg/State' is not defined"),
+    ):
+        recording = one(path, **ASKED)
+    assert recording["angle"] == pytest.approx(angle(recording.time), abs=1e-12)
+
+
+@pytest.mark.parametrize("big", [False, True])
+def test_layouts_agree_with_another_library(big: bool) -> None:
+    from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+    store = get_typestore(Stores.ROS2_JAZZY)
+    text = "bool a\nfloat64 b\nstring c\nuint8[] d\nfloat64[] e\nint16 f\nfloat64[] g\nint64[2] h\n"
+    store.register(get_types_from_msg(text, "x/msg/All"))
+    kind = store.types["x/msg/All"]
+    rng = np.random.default_rng(0)
+    for n in range(9):
+        sent: Any = kind(
+            a=bool(n % 2),
+            b=rng.normal(),
+            c="word" * n,
+            d=np.arange(n, dtype=np.uint8),
+            e=rng.normal(size=n % 3),
+            f=-n,
+            g=rng.normal(size=n % 2),
+            h=np.array([n, -n]),
+        )
+        raw = bytes(store.serialize_cdr(sent, "x/msg/All", little_endian=not big))
+        found = layout(raw, "x/msg/All", store.fielddefs, cdr=True)
+        values = {
+            path: np.frombuffer(raw, of, 1, at)[0] for path, (at, of) in found.numbers.items()
+        }
+        assert [values["a"], values["b"], values["f"]] == [sent.a, sent.b, sent.f]
+        for name in "degh":
+            array = getattr(sent, name)
+            assert [values[f"{name}[{k}]"] for k in range(len(array))] == array.tolist()
+        assert found.holds(raw)
+
+
+# What cannot be read ------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_truncated(tmp_path: Path, kind: Kind) -> None:
+    path = file_of(write(tmp_path / "run", kind), kind)
+    whole = path.read_bytes()
+    for length in (5, 100, len(whole) // 2, len(whole) - (4000 if kind == "db3" else 1)):
+        if (kind, length) == ("mcap", len(whole) - 1):
+            length = whole.rindex(b"/rig/pressure", 0, len(whole) // 2)
+        path.write_bytes(whole[:length])
+        with pytest.raises(DataError, match="damaged") as caught:
+            mckibben.read(path, **ASKED)
+        assert caught.value.file == path
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_wrong_kind(tmp_path: Path, kind: Kind) -> None:
+    path = file_of(write(tmp_path / "run", kind), kind)
+    other = path.rename(path.with_suffix(".csv"))
+    with pytest.raises(DataError, match=f"by its content it is .* to end in .{kind}"):
+        mckibben.read(other)
+    wrong = tmp_path / f"wrong.{kind}"
+    wrong.write_text("time_s,pressure_bar\n0,1\n")
+    with pytest.raises(DataError, match="damaged"):
+        mckibben.read(wrong)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_column_that_is_not_there(tmp_path: Path, kind: Kind) -> None:
+    path = write(tmp_path / "run", kind)
+    with pytest.raises(
+        DataError, match=r"'force'.*no column '/scale/data'; there are /rig/pressure"
+    ):
+        mckibben.read(path, columns={"force": "/scale/data"})
+
+
+def bag_of(path: Path, put: Callable[[Any, Any], None]) -> Path:
+    """Write a bag of ROS 2 by a function of its writer and types, and return its file."""
+    from rosbags.rosbag2 import StoragePlugin, Writer
+    from rosbags.typesys import Stores, get_typestore
+
+    store = get_typestore(Stores.ROS2_JAZZY)
+    with Writer(path, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+        put(writer, store)
+    return next(path.glob("*.mcap"))
+
+
+def floats(topic: str, times: list[int], values: list[float]) -> Callable[[Any, Any], None]:
+    """Return a function that writes numbers at times [ns]."""
+
+    def put(writer: Any, store: Any) -> None:
+        kind = "std_msgs/msg/Float64"
+        sent = writer.add_connection(topic, kind, typestore=store)
+        for when, value in zip(times, values, strict=True):
+            writer.write(sent, when, store.serialize_cdr(store.types[kind](value), kind))
+
+    return put
+
+
+def test_samples_missing_and_times_repeated(tmp_path: Path) -> None:
+    times = [k * 10**7 for k in range(50)]
+    values = [1.0 + k for k in range(50)]
+    nan = [*values[:7], float("nan"), *values[8:]]
+    path = bag_of(tmp_path / "nan", floats("/pressure_bar", times, nan))
+    with pytest.raises(DataError, match=r"'pressure', row 8: 1 of 50 samples are missing"):
+        mckibben.read(path)
+    path = bag_of(tmp_path / "again", floats("/pressure_bar", [*times[:7], *times[6:-1]], values))
+    with pytest.raises(DataError, match=r"'pressure', row 8: its time goes from 0.06 s to 0.06 s"):
+        mckibben.read(path)
+
+
+def test_joints_are_told_by_name_in_whatever_order(tmp_path: Path) -> None:
+    def put(writer: Any, store: Any) -> None:
+        kind = "sensor_msgs/msg/JointState"
+        sent = writer.add_connection("/arm", kind, typestore=store)
+        stamp = store.types["builtin_interfaces/msg/Time"](0, 0)
+        header = store.types["std_msgs/msg/Header"](stamp=stamp, frame_id="")
+        none = np.zeros(0)
+        for k in range(50):
+            joints = {"a": 1.0 + k, "b": -1.0 - k}
+            names = sorted(joints, reverse=bool(k % 2))
+            position = np.array([joints[name] for name in names])
+            state = store.types[kind](header, names, position, none, none)
+            writer.write(sent, k * 10**7, store.serialize_cdr(state, kind))
+
+    recording = one(bag_of(tmp_path / "run", put))
+    assert recording.sample_time == 0.01  # by when it was recorded, as no stamp was set
+    assert recording["arm_position_a"].tolist() == [1.0 + k for k in range(50)]
+    assert recording["arm_position_b"].tolist() == [-1.0 - k for k in range(50)]
+
+
+def test_topics_with_no_time_in_common(tmp_path: Path) -> None:
+    def put(writer: Any, store: Any) -> None:
+        times = [k * 10**7 for k in range(50)]
+        floats("/pressure_bar", times, [1.0 + k for k in range(50)])(writer, store)
+        later = [10**10 + when for when in times]
+        floats("/force_N", later, [1.0 + k for k in range(50)])(writer, store)
+
+    with pytest.raises(
+        DataError, match=r"no time in common: pressure from 0 to 0.49 s; force from 10"
+    ):
+        mckibben.read(bag_of(tmp_path / "run", put))
+
+
+def test_no_numbers(tmp_path: Path) -> None:
+    def put(writer: Any, store: Any) -> None:
+        kind = "std_msgs/msg/String"
+        sent = writer.add_connection("/words", kind, typestore=store)
+        writer.write(sent, 1, store.serialize_cdr(store.types[kind]("up"), kind))
+
+    with pytest.raises(DataError, match=r"no topic in it has numbers.*its topics are /words"):
+        mckibben.read(bag_of(tmp_path / "run", put))
+
+
+def test_chunks_that_unpack_to_more_than_they_say(tmp_path: Path) -> None:
+    import bz2
+    import struct
+
+    from backports import zstd
+
+    from mckibben.files.mcap import MAGIC
+
+    bomb = zstd.compress(bytes(2**28))
+    assert len(bomb) < 2**16
+    for said in (2**28, 2**20, 2**62):
+        content = struct.pack("<QQQI", 0, 1, said, 0) + struct.pack("<I4sQ", 4, b"zstd", len(bomb))
+        chunk = struct.pack("<BQ", 6, len(content) + len(bomb)) + content + bomb
+        path = tmp_path / "bomb.mcap"
+        path.write_bytes(MAGIC + chunk)
+        with pytest.raises(DataError, match=r"damaged.* more than"):
+            mckibben.read(path)
+    path = write(tmp_path / "run", "bag", packed=True)
+    whole = path.read_bytes()
+    start = whole.index(b"BZh")
+    packed = bz2.compress(bytes(2**27))
+    room = whole.index(b"op=\x04") - start
+    assert len(packed) < room
+    path.write_bytes(whole[:start] + packed + whole[start + len(packed) :])
+    with pytest.raises(DataError, match=r"damaged.* more than is read"):
+        mckibben.read(path)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "x/msg/Loop again",
+        "float64[100000000] x",
+        "x/msg/Nothing[4000000000] x\n" + "=" * 80 + "\nMSG: x/msg/Nothing\n",
+        "not a definition at all",
+        "float64 " + "y" * 300_000,
+    ],
+)
+def test_hostile_definitions(text: str) -> None:
+    from mckibben.files.limits import Budget
+    from mckibben.files.topics import Connection, Topic
+
+    with Path(__file__).open("rb") as file:
+        for cdr in (True, False):
+            topic = Topic(Connection("/x", "x/msg/Loop", text, cdr), Budget(file, Path("x.bag")))
+            topic.take(0, b"\0\1\0\0" + bytes(100))
+            assert topic.problem
+
+
+def test_a_database_whose_tables_are_views(tmp_path: Path) -> None:
+    path = tmp_path / "run.db3"
+    with closing(sqlite3.connect(path)) as base:
+        base.execute("CREATE TABLE topics (id, name, type, serialization_format)")
+        base.execute(
+            "CREATE VIEW messages AS WITH RECURSIVE n(topic_id) AS (SELECT 1 UNION ALL "
+            "SELECT topic_id FROM n) SELECT topic_id, 0 AS timestamp, 0 AS data, 0 AS id FROM n"
+        )
+        base.commit()
+    with pytest.raises(DataError, match="no tables of topics and messages"):
+        mckibben.read(path)
+
+
+def test_a_folder_without_files(tmp_path: Path) -> None:
+    (tmp_path / "metadata.yaml").write_text("rosbag2_bagfile_information: {}")
+    with pytest.raises(DataError, match=r"no .db3 or .mcap file in it"):
+        mckibben.read(tmp_path)
+
+
+def test_missing_library_says_what_to_install(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "run.bag"
+    path.write_text("#ROSBAG V2.0\n")
+    monkeypatch.setitem(sys.modules, "rosbags", None)
+    with pytest.raises(DataError, match=r"not installed. Remedy: pip install mckibben\[ros\]"):
+        mckibben.read(path)

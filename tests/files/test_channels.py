@@ -1,0 +1,239 @@
+"""What channels.toml says: columns, units, calibrations, constants, and files that are otherwise."""
+
+from __future__ import annotations
+
+import re
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import mckibben
+from mckibben import DataError, DataWarning, Recording
+from mckibben.files.channels import NAME, described
+
+N = 60
+T = np.arange(N) / 50
+RAW = 1 + 0.5 * np.sin(9 * T)
+LASER = 2 * np.cos(9 * T)
+PSI = 6894.757293168361 / 1e5
+
+CHANNELS = """
+[time]
+column = "stamp"
+unit = "ms"
+[channels.pressure]
+column = "A0"
+unit = "psi"
+gain = 2.5
+offset = -1.25
+[channels.displacement]
+column = "A1"
+unit = "mm"
+[channels.force]
+value = 1.962
+unit = "N"
+[[files]]
+match = "*load400g*"
+[files.channels.force]
+value = 3.924
+[split]
+test = ["*400g*"]
+rule = {by = "peak"}
+"""
+
+Folder = Callable[..., Path]
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Folder:
+    """Write a folder with channels.toml and two files, and return it."""
+
+    def make(said: str = CHANNELS, header: str = "stamp,A0,A1", **more: Any) -> Path:
+        (tmp_path / NAME).write_text(said)
+        columns = ((1000 * T).tolist(), RAW.tolist(), LASER.tolist())
+        rows = "\n".join(",".join(map(repr, row)) for row in zip(*columns, strict=True))
+        for name in ("run_load200g.csv", "run_load400g.csv"):
+            (tmp_path / name).write_text(f"{header}\n{rows}\n")
+        return tmp_path
+
+    return make
+
+
+def one(path: Path, **options: Any) -> Recording:
+    (recording,) = mckibben.read(path, **options)
+    return recording
+
+
+def test_columns_are_calibrated_and_constants_are_channels(folder: Folder) -> None:
+    recording = one(folder() / "run_load200g.csv")
+    assert recording.sample_time == 0.02
+    assert recording["pressure"] == pytest.approx(PSI * (2.5 * RAW - 1.25))
+    assert recording["displacement"] == pytest.approx(LASER)
+    assert recording["force"].tolist() == [1.962] * N
+    assert recording.meta["calibration"] == {
+        "pressure": {"column": "A0", "gain": 2.5, "offset": -1.25},
+        "force": {"value": 1.962, "unit": "N"},
+    }
+
+
+def test_files_may_be_otherwise(folder: Folder) -> None:
+    light, heavy = mckibben.read(folder())
+    assert (light["force"][0], heavy["force"][0]) == (1.962, 3.924)
+    assert np.array_equal(light["pressure"], heavy["pressure"])
+
+
+def test_an_offset_moves_what_the_header_states(folder: Folder) -> None:
+    path = folder("[channels.pressure]\noffset = -10.0\n", "time_ms,pressure_kPa,x_mm")
+    assert one(path / "run_load200g.csv")["pressure"] == pytest.approx((RAW - 10) / 100)
+
+
+def test_what_the_caller_says_goes_before(folder: Folder) -> None:
+    path = folder() / "run_load200g.csv"
+    assert one(path, units={"pressure": "bar"})["pressure"] == pytest.approx(2.5 * RAW - 1.25)
+    assert one(path, columns={"pressure": "A1"})["pressure"] == pytest.approx(
+        PSI * (2.5 * LASER - 1.25)
+    )
+    measured = one(path, columns={"force": "A1"}, units={"force": "kN"})
+    assert measured["force"] == pytest.approx(1000 * LASER)
+
+
+def test_sample_time_is_for_files_without_times(folder: Folder) -> None:
+    said = "[time]\nsample_time = 0.004\n"
+    assert one(folder(said, "A9,p_bar,x_mm") / "run_load200g.csv").sample_time == 0.004
+    assert one(folder(said, "time_ms,p_bar,x_mm") / "run_load200g.csv").sample_time == 0.02
+    assert one(folder(said, "A9,p_bar,x_mm") / "run_load200g.csv", rate=10).sample_time == 0.1
+
+
+def test_a_constant_goes_before_a_column_of_that_name(folder: Folder) -> None:
+    path = folder("[channels.force]\nvalue = 5\nunit='N'\n", "time_ms,p_bar,force_N")
+    recording = one(path / "run_load200g.csv")
+    assert recording["force"].tolist() == [5.0] * N
+    assert recording.meta["ignored_columns"] == ["force_N"]
+
+
+def test_what_this_package_wrote_stands_as_it_is(folder: Folder) -> None:
+    made = Recording({"pressure": RAW, "displacement": LASER}, 0.02)
+    path = folder() / "made.csv"
+    mckibben.write(made, path)
+    assert one(path) == made
+
+
+def test_a_column_that_is_missing(folder: Folder) -> None:
+    path = folder(header="stamp,A0,B1") / "run_load200g.csv"
+    with pytest.raises(DataError, match=r"'displacement'.*no column 'A1'.*channels.toml") as caught:
+        mckibben.read(path, channels=["pressure", "displacement"])
+    assert (caught.value.file, caught.value.channel) == (path, "displacement")
+    with pytest.warns(DataWarning, match="'displacement' is left out: there is no column 'A1'"):
+        assert "displacement" not in one(path, channels=["pressure"])
+
+
+def test_errors_are_of_the_channel_and_its_row(folder: Folder) -> None:
+    path = folder() / "run_load200g.csv"
+    path.write_text(path.read_text().replace(f",{RAW.tolist()[3]!r},", ",NaN,", 1))
+    with pytest.raises(DataError, match=r"'pressure', row 5: 1 of 60 samples are missing"):
+        mckibben.read(path)
+
+
+def test_described_gives_the_split_as_it_stands(folder: Folder) -> None:
+    found = described(folder())
+    assert found.split == {"test": ["*400g*"], "rule": {"by": "peak"}}
+    assert found.of("run_load400g.csv").channels["force"].value == 3.924
+    assert found.of("run_load400g.csv").channels["force"].unit == "N"
+    assert described(Path("nowhere")).split is None
+
+
+@pytest.mark.parametrize(
+    ("said", "problem"),
+    [
+        ("[channels", "it is no TOML"),
+        ("a = " + "[" * 20_000, "it is no TOML"),
+        ("[chanels.pressure]\nunit='bar'", "chanels is not known"),
+        ("[channels.pressure]\ngains=2.0", "channels.pressure.gains is not known"),
+        ("[channels.pressure]\ngain='two'", "channels.pressure.gain: "),
+        ("[channels.pressure]\ngain=nan", "channels.pressure.gain: "),
+        ("[channels.pressure]\ngain=inf\nunit='bar'", "channels.pressure.gain: "),
+        ("[channels.pressure]\ngain=0\nunit='bar'", "a gain of 0"),
+        ("[channels.pressure]\ngain=2", "a gain needs the unit"),
+        ("[channels.pressure]\nvalue=2\ncolumn='A0'", "a value is a constant"),
+        ("[channels.time]\ncolumn='A0'", "times are described in"),
+        ("[time]\nsample_time=0", "time.sample_time: "),
+        ("[time]\nsample_time='fast'", "time.sample_time: "),
+        ("[[files]]\nsheet='a'", "one of match and join"),
+        ("[[files]]\nmatch='a'\njoin=['b', 'c']", "one of match and join"),
+        ("[[files]]\njoin=['u*.mat', 'y.mat']", "all names in join have one"),
+        ("[[files]]\njoin=['../u.mat', 'y.mat']", "in the same folder"),
+        ("[[files]]\nmatch='*'\n[files.channels.force]\ngain=2", "a gain needs the unit"),
+        ("split = 3", "split: "),
+    ],
+)
+def test_what_cannot_be_is_refused(folder: Folder, said: str, problem: str) -> None:
+    path = folder(said)
+    with pytest.raises(DataError) as caught:
+        mckibben.read(path / "run_load200g.csv")
+    assert problem in caught.value.problem
+    assert caught.value.file == path / NAME
+    assert caught.value.remedy
+
+
+def test_binary_and_other_than_files_are_refused(folder: Folder) -> None:
+    path = folder()
+    (path / NAME).write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(DataError, match="not text"):
+        mckibben.read(path)
+    (path / NAME).unlink()
+    (path / NAME).symlink_to(path / NAME)
+    with pytest.raises(DataError, match="cannot be read"):
+        mckibben.read(path)
+
+
+# Measured files, where they are at hand ---------------------------------------------------------
+
+
+@pytest.mark.filterwarnings("ignore::mckibben.DataWarning")
+def test_measured_loads(tmp_path: Path, measured: Callable[..., Path]) -> None:
+    for name in ("sample2_load200g", "sample2_load400g"):
+        shutil.copy(measured("cavatappi_loads", name), tmp_path)
+    (tmp_path / NAME).write_text(
+        "[[files]]\nmatch = '*load200g*'\n[files.channels.force]\nvalue = 1.962\nunit = 'N'\n"
+        "[[files]]\nmatch = '*load400g*'\n[files.channels.force]\nvalue = 3.924\nunit = 'N'\n"
+    )
+    light, heavy = mckibben.read(tmp_path, gaps="interpolate")
+    assert (light["force"][0], heavy["force"][0]) == (1.962, 3.924)
+    assert light["pressure"].max() > 10
+
+
+@pytest.mark.filterwarnings("ignore::mckibben.DataWarning")
+def test_measured_inputs_without_pressure(tmp_path: Path, measured: Callable[..., Path]) -> None:
+    path = shutil.copy(measured("soft_arm_three_muscles", "trial_00"), tmp_path)
+    (tmp_path / NAME).write_text(
+        "".join(
+            f"[channels.pressure_{k}]\ncolumn = 'u{k}'\nunit = 'bar'\ngain = 0.1\n"
+            for k in (1, 2, 3)
+        )
+    )
+    recording = one(Path(path))
+    assert recording["pressure_1"][0] == pytest.approx(0.1 * 4.11602, rel=1e-3)
+
+
+def test_measured_without_time(tmp_path: Path, measured: Callable[..., Path]) -> None:
+    path = shutil.copy(measured("sma_wing"), tmp_path)
+    (tmp_path / NAME).write_text(
+        "[time]\nsample_time = 0.1\n[channels.angle]\ncolumn = 'output'\n"
+        "[channels.voltage]\ncolumn = 'input'\n"
+    )
+    recording = one(Path(path))
+    assert recording.sample_time == 0.1
+    assert (recording.units["angle"], recording.units["voltage"]) == ("rad", "V")
+
+
+def test_what_the_documentation_shows_is_understood(tmp_path: Path) -> None:
+    text = (Path(__file__).parents[2] / "docs" / "files.md").read_text(encoding="utf-8")
+    shown = re.findall(r"```toml\n(.*?)```", text, re.DOTALL)
+    assert len(shown) == 2
+    for example in shown:
+        (tmp_path / NAME).write_text(example)
+        assert described(tmp_path).files

@@ -1,0 +1,242 @@
+"""Folders: of files with one signal each, which are one recording, and of several recordings."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import mckibben
+from mckibben import DataError, DataWarning, Recording
+from mckibben.files.channels import NAME
+from mckibben.files.folders import roles
+
+N = 60
+T = np.arange(N) / 50
+P = 2 + np.sin(9 * T)
+X = 3 * np.cos(9 * T)
+
+
+def put(path: Path, columns: Mapping[str, Sequence[float] | np.ndarray[Any, Any]]) -> None:
+    rows = zip(*(np.asarray(column).tolist() for column in columns.values()), strict=True)
+    text = [",".join(columns), *(",".join(map(repr, row)) for row in rows)]
+    path.write_text("\n".join(text))
+
+
+def one(path: Path, **options: Any) -> Recording:
+    (recording,) = mckibben.read(path, **options)
+    return recording
+
+
+def test_files_named_as_channels_are_one_recording(tmp_path: Path) -> None:
+    put(tmp_path / "pressure.csv", {"time_s": T, "value [kPa]": 100 * P})
+    put(tmp_path / "displacement_cm.csv", {"time_s": T, "value": X / 10})
+    recording = one(tmp_path, channels=["pressure", "displacement"])
+    assert recording["pressure"] == pytest.approx(P)
+    assert recording["displacement"] == pytest.approx(X)
+    assert recording.sample_time == 0.02
+    assert recording.name == tmp_path.name
+    assert roles(tmp_path) == {"train": [tmp_path]}
+
+
+def test_headers_may_tell_instead_of_names(tmp_path: Path) -> None:
+    put(tmp_path / "a.csv", {"t_ms": 1000 * T, "p_bar": P})
+    put(tmp_path / "b.csv", {"t_ms": 1000 * T, "stroke_mm": X})
+    assert set(one(tmp_path).channels) == {"pressure", "displacement"}
+
+
+def test_one_column_each(tmp_path: Path) -> None:
+    put(tmp_path / "pressure_bar.csv", {"value": P})
+    put(tmp_path / "displacement_mm.csv", {"value": X})
+    recording = one(tmp_path, rate=50)
+    assert recording.sample_time == 0.02
+    assert recording["displacement"].tolist() == X.tolist()
+
+
+def test_mat_files(tmp_path: Path) -> None:
+    from scipy.io import savemat
+
+    savemat(tmp_path / "pressure.mat", {"u": P})
+    savemat(tmp_path / "displacement.mat", {"y": X})
+    recording = one(tmp_path, units={"pressure": "bar", "displacement": "mm"}, rate=50)
+    assert recording["pressure"].tolist() == P.tolist()
+
+
+def test_clocks_of_their_own_become_the_slowest(tmp_path: Path) -> None:
+    slow = T[::5] + 0.003
+    put(tmp_path / "pressure_bar.csv", {"time_s": T, "value": 5 * T})
+    put(tmp_path / "displacement_mm.csv", {"time_ms": 1000 * slow, "value": slow})
+    with pytest.warns(DataWarning, match=r"displacement 10, pressure 50.*times of 'displacement'"):
+        recording = one(tmp_path)
+    assert recording.sample_time == pytest.approx(0.1)
+    assert recording.time == pytest.approx(slow)
+    assert recording["pressure"] == pytest.approx(5 * slow)
+    assert recording["displacement"] == pytest.approx(slow)
+    with pytest.warns(DataWarning, match="100 a second"):
+        assert one(tmp_path, rate=100).sample_time == pytest.approx(0.01)
+
+
+def test_times_may_be_called_otherwise(tmp_path: Path) -> None:
+    put(tmp_path / "pressure_bar.csv", {"stamp_ms": 1000 * T, "value": 5 * T})
+    put(tmp_path / "displacement_mm.csv", {"stamp_ms": 1000 * T[::2], "value": T[::2]})
+    with pytest.raises(DataError, match="no such channel"):
+        mckibben.read(tmp_path, channels=["displacement"])
+    (tmp_path / NAME).write_text('[time]\ncolumn = "stamp"\n')
+    with pytest.warns(DataWarning, match="times of 'displacement'"):
+        recording = one(tmp_path)
+    assert recording.sample_time == pytest.approx(0.04)
+    assert recording["pressure"] == pytest.approx(5 * recording.time)
+
+
+def test_a_gap_of_the_faster_channel_is_not_bridged_unasked(tmp_path: Path) -> None:
+    kept = np.delete(np.arange(N), np.arange(20, 40))
+    put(tmp_path / "pressure_bar.csv", {"time_s": T[kept], "value": P[kept]})
+    put(tmp_path / "displacement_mm.csv", {"time_s": T[::2], "value": X[::2]})
+    with (
+        pytest.warns(DataWarning, match="by interpolation"),
+        pytest.raises(DataError, match="'pressure', row 11: 10 of 30 samples are missing"),
+    ):
+        mckibben.read(tmp_path)
+    with (
+        pytest.warns(DataWarning, match="by interpolation"),
+        pytest.warns(DataWarning, match="10 missing sample"),
+    ):
+        assert one(tmp_path, gaps="interpolate").n_samples == 30
+
+
+def test_recordings_of_several_channels_are_several(tmp_path: Path) -> None:
+    for name in ("run1", "run2"):
+        put(tmp_path / f"{name}.csv", {"time_s": T, "pressure_bar": P, "displacement_mm": X})
+    assert [recording.name for recording in mckibben.read(tmp_path)] == ["run1", "run2"]
+    assert len(roles(tmp_path)["train"]) == 2
+
+
+def test_recordings_of_one_channel_are_several(tmp_path: Path) -> None:
+    for name in ("reference1", "reference2"):
+        put(tmp_path / f"{name}.csv", {"time_s": T, "displacement_mm": X})
+    assert len(mckibben.read(tmp_path)) == 2
+
+
+@pytest.mark.parametrize(
+    "headers",
+    [
+        {"a": "q", "b": "r"},
+        {"1_pressure": "value", "1_stroke": "value", "2_pressure": "value"},
+        {"a": "pressure_bar", "b": "displacement_mm", "c": "pressure_bar"},
+    ],
+)
+def test_what_cannot_be_told_is_asked(tmp_path: Path, headers: dict[str, str]) -> None:
+    for name, header in headers.items():
+        put(tmp_path / f"{name}.csv", {"time_s": T, header: P})
+    with pytest.raises(DataError, match=r"neither their names nor .*join = \["):
+        mckibben.read(tmp_path)
+    with pytest.raises(DataError, match="neither their names"):
+        roles(tmp_path)
+
+
+def test_join_tells_which_belong_together(tmp_path: Path) -> None:
+    for run in (1, 2):
+        put(tmp_path / f"{run}_pressure.csv", {"time_s": T, "value [bar]": run * P})
+        put(tmp_path / f"{run}_stroke.csv", {"time_s": T, "value [mm]": X})
+    (tmp_path / NAME).write_text('[[files]]\njoin = ["*_pressure.csv", "*_stroke.csv"]\n')
+    first, second = mckibben.read(tmp_path)
+    assert second["pressure"].tolist() == (2 * first["pressure"]).tolist()
+    assert second["displacement"].tolist() == X.tolist()
+    assert one(tmp_path / "2_pressure.csv") == second
+    assert roles(tmp_path)["train"] == [tmp_path / "1_pressure.csv", tmp_path / "2_pressure.csv"]
+
+
+def test_nothing_that_is_read_with_a_path_is_written_to(tmp_path: Path) -> None:
+    from mckibben.outputs import claim, never
+
+    put(tmp_path / "a_u.csv", {"time_s": T, "value": P})
+    put(tmp_path / "a_y.csv", {"time_s": T, "value": X})
+    (tmp_path / NAME).write_text('[[files]]\njoin = ["*_u.csv", "*_y.csv"]\n')
+    for read in (tmp_path, tmp_path / "a_u.csv"):
+        for written in ("a_y.csv", NAME):
+            with pytest.raises(DataError, match="it is read from"):
+                claim(tmp_path / written, never, inputs=[read], force=True)
+        claim(tmp_path / "new.csv", never, inputs=[read])
+
+
+def bad(folder: Path, name: str, **columns: Any) -> Path:
+    put(folder / "pressure.csv", {"time_s": T, "value": P})
+    put(folder / f"{name}.csv", columns)
+    return folder
+
+
+@pytest.mark.filterwarnings("ignore::mckibben.DataWarning")
+@pytest.mark.parametrize(
+    ("columns", "channel", "row", "problem"),
+    [
+        ({"value": X}, "time", None, "0 columns of times, where another file has one"),
+        ({"time_s": T, "t": T, "value": X}, "time", None, "2 columns of times"),
+        ({"time_s": T + 100, "value": X}, "pressure", None, "no time in common"),
+        ({"time_s": T[::-1], "value": X}, "time", 3, "goes back"),
+        ({"time_s": [*T[:5], *T[4:-1]], "value": X}, "time", 7, "is repeated"),
+        ({"time_s": T, "value": [*X[:5], np.nan, *X[6:]]}, "displacement", 7, "1 of 60 samples"),
+        ({"time_s": [*T[:5], np.nan, *T[6:]], "value": X}, "time", 7, "the time is missing"),
+    ],
+)
+def test_bad_files_of_signals(
+    tmp_path: Path, columns: Any, channel: str, row: int | None, problem: str
+) -> None:
+    with pytest.raises(DataError) as caught:
+        mckibben.read(bad(tmp_path, "displacement", **columns))
+    assert problem in caught.value.problem
+    assert (caught.value.channel, caught.value.row) == (channel, row)
+    assert tmp_path in (caught.value.file, getattr(caught.value.file, "parent", None))
+    assert caught.value.remedy
+
+
+def test_lengths_that_differ(tmp_path: Path) -> None:
+    put(tmp_path / "pressure.csv", {"value": P})
+    put(tmp_path / "displacement.csv", {"value": X[:-1]})
+    with pytest.raises(DataError, match=r"displacement.csv 59, pressure.csv 60.*Remedy"):
+        mckibben.read(tmp_path)
+
+
+def test_a_part_that_is_missing_or_no_signal(tmp_path: Path) -> None:
+    (tmp_path / NAME).write_text('[[files]]\njoin = ["a.csv", "b.csv"]\n')
+    put(tmp_path / "a.csv", {"time_s": T, "pressure_bar": P})
+    with pytest.raises(DataError, match=r"b.csv: it cannot be read \(no such file"):
+        mckibben.read(tmp_path)
+    put(tmp_path / "b.csv", {"time_s": T, "force_N": P, "displacement_mm": X})
+    with pytest.raises(DataError, match=r"b.csv.*2 columns of numbers, where one signal"):
+        mckibben.read(tmp_path / "a.csv")
+
+
+def test_measured_files_of_one_signal(tmp_path: Path) -> None:
+    from tests.files.conftest import SHARED
+
+    source = SHARED / "bouc_wen_benchmark"
+    if not source.is_dir():
+        pytest.skip(f"{source} is not here")
+    for path in source.glob("*.mat"):
+        shutil.copy(path, tmp_path)
+    with pytest.raises(DataError, match=r"differ in length.*join"):
+        mckibben.read(tmp_path)
+    (tmp_path / NAME).write_text(
+        f"[time]\nsample_time = {1 / 750!r}\n"
+        '[channels.force]\ncolumn = "u_multisine"\nunit = "N"\n'
+        '[channels.displacement]\ncolumn = "y_multisine"\nunit = "m"\n'
+        '[[files]]\njoin = ["u*_multisine.mat", "y*_multisine.mat"]\n'
+    )
+    train, test = mckibben.read(tmp_path, channels=["force", "displacement"])
+    assert (train.n_samples, test.n_samples) == (4 * 8192, 8192)
+    assert train.sample_time == 1 / 750
+    assert 0.5 < np.abs(test["displacement"]).max() < 5
+
+
+Measured = Callable[..., Path]
+
+
+def test_held_lengths_are_taken_as_they_are(measured: Measured) -> None:
+    held = measured("festo_isometric_20mm", "muscle12cm_contracted10mm_run1")
+    with pytest.warns(DataWarning, match="not uniform"):
+        recording = one(held, channels=["pressure", "displacement", "force"])
+    assert np.ptp(recording["displacement"]) == 0

@@ -90,9 +90,8 @@ def left_out() -> None:
                 patch.object(process, "SMOOTH", smooth),
                 patch.object(process, "NEAR", near),
             ):
-                print(
-                    f"smooth {smooth:g}, near {near:g}: {sum(likelihood(one, listed) for one in listed):.1f}"
-                )
+                found = sum(likelihood(one, listed) for one in listed)
+                print(f"smooth {smooth:g}, near {near:g}: {found:.1f}")
 
 
 def likelihood(muscle: muscles.Muscle, listed: list[muscles.Muscle]) -> float:

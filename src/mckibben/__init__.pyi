@@ -1,5 +1,6 @@
 """The face of the package: what is here can be had from it, and is imported when it is first used."""
 
+from . import muscles as muscles
 from .blocks.compose import Parallel as Parallel
 from .blocks.compose import PerChannel as PerChannel
 from .blocks.compose import Series as Series

@@ -27,6 +27,7 @@ LAYERS = (
     {"rigs"},
     {"environments"},
     {"blocks"},
+    {"muscles"},
     {"estimators", "export", "stream", "outputs"},
     {"control"},
     {"comparison"},

@@ -49,6 +49,14 @@ def fit(
     method: Annotated[
         str | None, typer.Option("--method", help="How to search: ls, pso-ls, pso.")
     ] = None,
+    prior: Annotated[
+        str | None,
+        typer.Option(
+            "--prior",
+            metavar="NAME|FILE",
+            help="What is likely before: a muscle (muscles list), or a data sheet (.toml).",
+        ),
+    ] = None,
     settings: Settings = None,
     validation: Annotated[
         list[Path] | None,
@@ -70,10 +78,11 @@ def fit(
     claim_model(out, inputs=[*files, *(validation or [])], force=force)
     estimator_class = registry.load("estimators", model)
     given = settings_of(model, settings or [])
-    named = {"input": _one(input), "output": _one(output), "method": method}
+    named = {"input": _one(input), "output": _one(output), "method": method, "prior": prior}
     given = {key: value for key, value in named.items() if value is not None} | given
-    if "method" in given and "method" not in {field.name for field in fields(estimator_class)}:
-        raise ModelError(f"{model!r} has no setting 'method'. Remedy: leave --method out.")
+    known = {field.name for field in fields(estimator_class)}
+    for name in given.keys() & {"method", "prior"} - known:
+        raise ModelError(f"{model!r} has no setting {name!r}. Remedy: leave --{name} out.")
     estimator = estimator_class(**{"seed": seed} | given)
     if validation and not estimator.stops_early:
         raise DataError(f"{model!r} does not stop early", remedy="leave --validation out")

@@ -24,6 +24,7 @@ from mckibben.cli.fit import fit
 from mckibben.cli.info import info
 from mckibben.cli.invert import invert
 from mckibben.cli.measured import measured
+from mckibben.cli.muscles import app as muscles_app
 from mckibben.cli.output import InterruptionError, finish, say, visible
 from mckibben.cli.plot import plot
 from mckibben.cli.reproduce import reproduce
@@ -56,6 +57,7 @@ app.command("check-block")(check_block)
 app.command("app")(workbench)
 app.add_typer(export_app)
 app.add_typer(rig_app)
+app.add_typer(muscles_app)
 
 
 def _show_version(wanted: bool) -> None:

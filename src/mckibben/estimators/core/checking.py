@@ -23,6 +23,7 @@ def training_data(
     scheduling: Sequence[str] = (),
     *,
     one_rate: bool = True,
+    spans: tuple[float, ...] | None = None,
 ) -> TrainingData:
     """Check recordings and return them as training data.
 
@@ -39,6 +40,8 @@ def training_data(
         Further channels that the model is given.
     one_rate : bool
         Whether all must have the same sample time.
+    spans : tuple of float, optional
+        Ranges of the outputs, where these are known otherwise; then outputs may be constant.
 
     Raises
     ------
@@ -84,7 +87,7 @@ def training_data(
     def channels(names: Sequence[str]) -> tuple[Channel, ...]:
         return tuple(Channel(name, first.units[name]) for name in names)
 
-    data = TrainingData(runs, channels(driven), channels(given), channels(scheduling))
+    data = TrainingData(runs, channels(driven), channels(given), channels(scheduling), spans=spans)
     counting = np.concatenate([run.outputs[run.counts] for run in runs])
     if len(counting) < FEWEST_SAMPLES:
         raise DataError(
@@ -92,7 +95,8 @@ def training_data(
             file=first.source,
             remedy=f"give at least {FEWEST_SAMPLES}",
         )
-    for names, values in ((driven, data.stacked("driven")), (given, counting)):
+    moving = () if spans else given
+    for names, values in ((driven, data.stacked("driven")), (moving, counting[:, : len(moving)])):
         for name, column in zip(names, values.T, strict=True):
             if np.ptp(column) == 0:
                 raise DataError(

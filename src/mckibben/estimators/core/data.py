@@ -19,6 +19,9 @@ Made = TypeVar("Made")
 MOVES = 0.1
 """An input moves in a run where it covers this share of the range it has over all runs."""
 
+MOVES_AT_ALL = 0.02
+"""Share of its known range below which an output does not move."""
+
 RESTS = 0.03
 """An input rests where it stays below this share of that range above its lowest value."""
 
@@ -121,7 +124,8 @@ class Run:
 class TrainingData:
     """All runs to identify from, and the channels that they share.
 
-    ``early`` are runs to stop a search early by, to which nothing is fitted.
+    ``early`` are runs to stop a search early by, to which nothing is fitted; ``spans`` are ranges of the
+    outputs that are known otherwise, for where they do not move.
     """
 
     runs: tuple[Run, ...]
@@ -129,6 +133,7 @@ class TrainingData:
     outputs: tuple[Channel, ...]
     scheduled: tuple[Channel, ...] = ()
     early: TrainingData | None = None
+    spans: tuple[float, ...] | None = None
     _memo: dict[Hashable, Array] = field(default_factory=dict, init=False, repr=False)
     _latest: dict[Hashable, tuple[Array, Any]] = field(default_factory=dict, init=False, repr=False)
 
@@ -186,7 +191,11 @@ class TrainingData:
     @property
     def travel(self) -> Array:
         """Range of every output over all runs."""
-        return self.once("travel", lambda: np.ptp(self.stacked("outputs"), axis=0))
+        found = self.once("travel", lambda: np.ptp(self.stacked("outputs"), axis=0))
+        if self.spans is None:
+            return found
+        spans = np.array(self.spans)
+        return np.where(found > MOVES_AT_ALL * spans, found, spans)
 
     @property
     def input_range(self) -> tuple[float, float]:
@@ -269,7 +278,9 @@ class TrainingData:
         """
         known = [run for run in self.runs if run.counts.any()]
         runs = [run.cut(0, int(np.flatnonzero(run.counts)[-1]) + 1) for run in known]
-        columns = [np.column_stack([run.driven, run.scheduled, np.ones(len(run.u))]) for run in runs]
+        columns = [
+            np.column_stack([run.driven, run.scheduled, np.ones(len(run.u))]) for run in runs
+        ]
         counting = [columns[i][run.counts] for i, run in enumerate(runs)]
         targets = np.concatenate([run.outputs[run.counts] for run in runs])
         by = np.linalg.lstsq(np.concatenate(counting), targets, rcond=None)[0]

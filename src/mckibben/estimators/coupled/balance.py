@@ -10,10 +10,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Annotated, ClassVar
 
 import numpy as np
 from annotated_types import Gt, Interval
+from pydantic import InstanceOf
 
 from mckibben.arrays import Array
 from mckibben.blocks.compose import PerChannel, Series
@@ -50,6 +52,7 @@ from mckibben.estimators.coupled.balance_loads import (
     without_held,
     without_load,
 )
+from mckibben.estimators.coupled.balance_prior import believed, refined, told_by
 from mckibben.estimators.coupled.balance_search import Search
 from mckibben.estimators.coupled.balance_stages import Stages, acted, acting
 from mckibben.estimators.coupled.balance_starts import simulate_started
@@ -57,6 +60,7 @@ from mckibben.estimators.coupled.balance_structure import APART, Structure
 from mckibben.estimators.coupled.balance_words import held_back, missed, sentences
 from mckibben.estimators.coupled.base import CoupledEstimator, schedules
 from mckibben.estimators.optimisers.tracker import Tracker
+from mckibben.muscles.prior import Prior
 from mckibben.recording import Recording
 
 LIMITED = ("bar", "V")
@@ -116,6 +120,9 @@ class BalanceEstimator(CoupledEstimator):
         Damping of the coefficients.
     steps : int
         Most Gauss-Newton steps.
+    prior : str, Path or Prior, optional
+        What is likely before, weighed against the recordings by their noise: a muscle of the library, or
+        the file of a data sheet (`mckibben.muscles.prior_of`). Of one muscle.
 
     Attributes
     ----------
@@ -144,6 +151,7 @@ class BalanceEstimator(CoupledEstimator):
     mass: bool = False
     ridge: Annotated[float, Interval(ge=0, le=1)] = 1e-6
     steps: Annotated[int, Interval(ge=0, le=1000)] = 25
+    prior: str | Path | InstanceOf[Prior] | None = None
 
     def data(
         self, recordings: Recording | Sequence[Recording], rows: Sequence[Mask] | None = None
@@ -157,6 +165,11 @@ class BalanceEstimator(CoupledEstimator):
         data = super().data(filled, rows)
         runs = [replace(run, unmeasured=lacking[run.recording]) for run in data.runs]
         return replace(data, runs=tuple(runs))
+
+    @property
+    def spans(self) -> tuple[float, ...] | None:
+        """The stroke of the data sheet, if there is one."""
+        return None if self.prior is None else (told_by(self.prior).sheet.stroke,)
 
     def find(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
         """Return the block found, and the data without what tells nothing."""
@@ -178,7 +191,10 @@ class BalanceEstimator(CoupledEstimator):
         check_directions(data)
         ways = directions(data)
         data = turned(data, ways)
-        few = Search(data, self.structure(data, tracker), self.ridge).of_few(FIRST_SAMPLES)
+        structure, belief = self.structure(data, tracker), None
+        if self.prior is not None:
+            structure, belief = believed(structure, self.prior)
+        few = Search(data, structure, self.ridge, belief).of_few(FIRST_SAMPLES)
         pushed = len(data.inputs) > 1 or any(few.still)  # by other muscles, or what holds it
         slack = pushed if self.slack is None else self.slack
         none = np.zeros((1 + data.runs[-1].recording, len(data.inputs)))
@@ -195,7 +211,10 @@ class BalanceEstimator(CoupledEstimator):
             tracker.best_cost = few.cost(tracker.best)
             few.descend(tracker.best, self.steps, tracker)
             tracker.reached(0.7)
-            if few is not search:
+            if few.belief is not None:
+                few = refined(few, tracker, self.steps)
+                search.belief = few.belief
+            if len(few.runs) < len(search.runs) or few.n_rows < search.n_rows:
                 tracker.best_cost = search.cost(tracker.best)
                 search.descend(tracker.best, min(self.steps, LAST_STEPS), tracker)
         if tracker.best is None or not np.isfinite(tracker.best_cost):
@@ -289,7 +308,7 @@ class BalanceEstimator(CoupledEstimator):
             tare = bool(scheduled) and bool((np.abs(first) <= AT_START * span).all())
         if tare:
             margin = 0.15 * span
-        still = one_speed(data)
+        still = self.prior is None and one_speed(data)
         if still and self.n_lags and self.lags is None:
             tracker.notes.append(
                 "all moves at about one speed, so that relaxation cannot be told from friction, and is "
@@ -345,8 +364,9 @@ def directions(data: TrainingData) -> list[tuple[float, float]]:
     falls = len(data.outputs) == 1 and bool(free.runs) and free.falls
     gain = -1.0 if falls else 1.0
     found = []
-    for column in (gain * y).T:
-        away = column.min() > FAR * np.ptp(column) or column.max() < 0.0
+    for column, span in zip((gain * y).T, data.travel.tolist(), strict=True):
+        far = FAR * (np.ptp(column) if data.spans is None else span)
+        away = column.min() > far or column.max() < 0.0
         found.append((gain, gain * float(column.min()) if away else 0.0))
     return found
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.polynomial import polynomial
@@ -17,6 +17,9 @@ from mckibben.estimators.coupled.balance_slopes import run as follow
 from mckibben.estimators.coupled.balance_structure import Structure
 from mckibben.estimators.optimisers.constrained import constrained_least_squares
 from mckibben.estimators.optimisers.tracker import Tracker
+
+if TYPE_CHECKING:
+    from mckibben.estimators.coupled.balance_prior import Belief
 
 MOST_ROWS = 12_000
 """Errors to learn from; more are thinned evenly."""
@@ -52,10 +55,18 @@ class Search:
     structure : Structure
     ridge : float
         Damping.
+    belief : Belief, optional
+        What is likely before.
     """
 
-    def __init__(self, data: TrainingData, structure: Structure, ridge: float) -> None:
-        self.data, self.structure, self.ridge = data, structure, ridge
+    def __init__(
+        self,
+        data: TrainingData,
+        structure: Structure,
+        ridge: float,
+        belief: Belief | None = None,
+    ) -> None:
+        self.data, self.structure, self.ridge, self.belief = data, structure, ridge, belief
         loads = {channel.name for channel in structure.loaded}
         order = [i for i, c in enumerate(data.scheduled) if c.name not in loads]
         order += [i for i, c in enumerate(data.scheduled) if c.name in loads]
@@ -75,7 +86,7 @@ class Search:
     def having(self, data: TrainingData | None = None, **changed: Any) -> Search:
         """Return the same search over other data of the same ranges, or with a changed structure."""
         structure = replace(self.structure, **changed) if changed else self.structure
-        found = Search(data or self.data, structure, self.ridge)
+        found = Search(data or self.data, structure, self.ridge, self.belief)
         found.span = self.span
         return found
 
@@ -295,6 +306,9 @@ class Search:
         ]
         if self.structure.n_starts:
             far, by = self.unlikely(values)
+            of_runs.append((far, by if sloped else by[:, :0]))
+        if self.belief is not None:
+            far, by = self.belief.errors(self.structure, values)
             of_runs.append((far, by if sloped else by[:, :0]))
         errors, slopes = zip(*of_runs, strict=True)
         return np.concatenate(errors), np.concatenate(slopes)

@@ -11,6 +11,7 @@ from mckibben.arrays import Array
 from mckibben.blocks.memoryless.contact import Contact
 from mckibben.estimators.core.data import TrainingData
 from mckibben.estimators.coupled.balance_loads import check_loads, with_own_loads
+from mckibben.estimators.coupled.balance_prior import likely
 from mckibben.estimators.coupled.balance_search import Search
 from mckibben.estimators.coupled.balance_starts import with_starts
 from mckibben.estimators.optimisers.tracker import Tracker
@@ -98,14 +99,18 @@ class Stages:
     def begin(self, few: Search) -> None:
         """Show the tracker where the linear stage and first steps from several starts lead."""
         starts = []
-        for grip, plain in product(
-            GRIPS if few.structure.limits.size else GRIPS[:1], (False, True)
-        ):
+        if few.belief is not None:
+            values = likely(few)
+            starts.append((few.cost(values), True, values))
+            self.tracker.saw(values, starts[-1][0])
+        grips = GRIPS if few.structure.limits.size else GRIPS[:1]
+        told = few.belief is None or not all(few.still)  # of one length, forces tell of no other
+        for grip, plain in product(grips if told else (), (False, True)):
             values = few.begun(grip * few.structure.highest, plain=plain)
             starts.append((few.cost(values), plain, values))
             self.tracker.saw(values, starts[-1][0])
         starts.sort(key=lambda start: start[0])
-        if self.same_zeros:
+        if self.same_zeros and told:
             check_loads(few, next(values for _, plain, values in starts if not plain), self.tracker)
         for _, _, start in starts if few.n_rows <= FEW_ROWS else starts[:FOLLOWED]:
             self.descend(few, start, self.tracker, FIRST_STEPS)

@@ -150,13 +150,20 @@ class CoupledEstimator(Estimator):
                 file=first.source,
                 remedy="record as many of both, or fit coupled-memory or tsfnn",
             )
-        found = training_data(listed, inputs, outputs, rows, scheduling, one_rate=False)
+        found = training_data(
+            listed, inputs, outputs, rows, scheduling, one_rate=False, spans=self.spans
+        )
         kept = found.bridged() if self.through else found.stretches(FEWEST_SAMPLES - 1)
         if sum(int(run.counts.sum()) for run in kept.runs) < FEWEST_SAMPLES:
             raise DataError(
                 f"no {FEWEST_SAMPLES} samples in a row count", remedy="give longer recordings"
             )
         return kept
+
+    @property
+    def spans(self) -> tuple[float, ...] | None:
+        """Ranges of the outputs, if they are known before."""
+        return None
 
     def find(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
         """Return the block found."""

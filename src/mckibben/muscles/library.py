@@ -1,0 +1,202 @@
+"""Identified muscles as files: TOML that a person can read, one a muscle."""
+
+from __future__ import annotations
+
+import tomllib
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from mckibben.arrays import Array
+from mckibben.blocks.core.saving import from_dict, to_dict
+from mckibben.blocks.coupled.balance import Balance
+from mckibben.errors import DataError, ModelError
+from mckibben.muscles.sheet import Sheet, refused
+from mckibben.muscles.traits import GROUPS, PLACES, traits
+from mckibben.system.ordinary import DESCRIPTION, read_text
+
+FORMAT, VERSION = "mckibben-muscle", 1
+
+FOLDER = Path(__file__).parent / "library"
+
+UNSURE = 0.5
+"""Standard error of a trait's logarithm from which its recordings have not told it."""
+
+
+class Conditions(BaseModel):
+    """What a muscle was identified under: lowest and highest of each."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    pressure_bar: tuple[float, float]
+    displacement_mm: tuple[float, float]
+    force_N: tuple[float, float] | None = None  # noqa: N815
+    fastest_mm_per_s: float = Field(ge=0)
+    seconds: float = Field(gt=0)
+    rmse: float = Field(ge=0)
+
+
+class _File(BaseModel):
+    """A file of the library."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    format: str
+    version: int
+    title: str
+    source: str
+    licence: str
+    virtual: bool
+    sheet: Sheet
+    conditions: Conditions
+    uncertainty: dict[str, tuple[float, ...]]
+    balance: dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Muscle:
+    """An identified muscle.
+
+    Parameters
+    ----------
+    name : str
+    title, source, licence : str
+        What it is, where its recordings come from, and what may be done with these numbers.
+    virtual : bool
+        Whether it is a virtual rig's.
+    sheet : Sheet
+    conditions : Conditions
+    balance : Balance
+        As fitted.
+    errors : array
+        Standard errors of its traits (`mckibben.muscles.traits`); NaN of those not told.
+    """
+
+    name: str
+    title: str
+    source: str
+    licence: str
+    virtual: bool
+    sheet: Sheet
+    conditions: Conditions
+    balance: Balance
+    errors: Array
+
+    @property
+    def traits(self) -> Array:
+        """What its recordings told of it, the rest NaN."""
+        found = traits(self.balance, self.sheet)
+        return np.where(self.errors < UNSURE, found, np.nan)
+
+
+@cache
+def names() -> tuple[str, ...]:
+    """Return the names of the muscles that come with the package, in alphabetical order."""
+    return tuple(sorted(path.stem for path in FOLDER.glob("*.toml")))
+
+
+def list() -> tuple[Muscle, ...]:  # noqa: A001
+    """Return the muscles that come with the package, by their names.
+
+    >>> import mckibben
+    >>> "mas20-hanging" in [muscle.name for muscle in mckibben.muscles.list()]
+    True
+    """
+    return tuple(load(name) for name in names())
+
+
+def load(name: str | Path) -> Muscle:
+    """Return an identified muscle, by its name or from a file.
+
+    Raises
+    ------
+    DataError
+        On an unknown name, or a file that is no identified muscle.
+    """
+    path = Path(name)
+    if path.suffix != ".toml":
+        if str(name) not in names():
+            raise DataError(
+                f"there is no muscle {str(name)!r} in the library",
+                remedy=f"use one of {', '.join(names())}, or a file that ends in .toml",
+            )
+        path = FOLDER / f"{name}.toml"
+    return _load(path.resolve())
+
+
+@cache
+def _load(path: Path) -> Muscle:
+    content = parsed(path)
+    if content.get("format") != FORMAT or content.get("version") != VERSION:
+        raise DataError(
+            f'it is no identified muscle (format = "{FORMAT}", version = {VERSION})',
+            file=path,
+            remedy="give a muscle's file, or a name that mckibben muscles list tells",
+        )
+    try:
+        found = _File.model_validate(content)
+        balance = from_dict(to_dict(Balance.example()) | found.balance)
+    except ValidationError as error:
+        raise refused(error, path, "what a muscle's file holds") from None
+    except ModelError as error:
+        raise DataError(
+            f"its balance: {error}", file=path, remedy="write it again by docs/measured/library.py"
+        ) from None
+    assert isinstance(balance, Balance)
+    errors = np.concatenate(
+        [np.array(found.uncertainty[name], dtype=np.float64) for name in GROUPS]
+    )
+    fields = found.model_dump(include={"title", "source", "licence", "virtual"})
+    return Muscle(path.stem, **fields, sheet=found.sheet, conditions=found.conditions,
+                  balance=balance, errors=errors)  # fmt: skip
+
+
+def parsed(path: Path) -> dict[str, Any]:
+    """Return what a TOML file holds.
+
+    Raises
+    ------
+    DataError
+        If it cannot be read, or is no TOML.
+    """
+    try:
+        return tomllib.loads(read_text(path, most=DESCRIPTION))
+    except tomllib.TOMLDecodeError as error:
+        raise DataError(f"it is no TOML: {error}", file=path, remedy="correct it there") from None
+
+
+def described(muscle: Muscle) -> str:
+    """Return a muscle as the text of its file."""
+    block = to_dict(muscle.balance)
+    channels = {"driven", "scheduled", "given"}
+    left = {"format", "version", "kind", "pressure_range", *channels}
+    text = [f'format = "{FORMAT}"', f"version = {VERSION}"]
+    text += [f"{name} = {_toml(getattr(muscle, name))}" for name in ("title", "source", "licence")]
+    text += [f"virtual = {_toml(muscle.virtual)}", "", "[sheet]"]
+    text += _pairs(muscle.sheet.model_dump(exclude_none=True))
+    text += ["", "[conditions]", *_pairs(muscle.conditions.model_dump(exclude_none=True))]
+    text += ["", "[uncertainty]  # standard errors of the logarithms of its traits; inf: not told"]
+    text += [f"{name} = {_toml(muscle.errors[place].tolist())}" for name, place in PLACES.items()]
+    text += ["", "[balance]", *_pairs({k: v for k, v in block.items() if k not in left})]
+    text += _pairs({k: block[k] for k in block if k in channels})
+    return "\n".join(text) + "\n"
+
+
+def _pairs(content: dict[str, Any]) -> list[str]:  # type: ignore[valid-type]
+    return [f"{name} = {_toml(value)}" for name, value in content.items()]
+
+
+def _toml(value: Any) -> str:
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, str):
+        return '"' + value.replace("\\", "\\\\").replace('"', '\\"') + '"'
+    if isinstance(value, dict):
+        return "{ " + ", ".join(f"{k} = {_toml(v)}" for k, v in value.items()) + " }"
+    if isinstance(value, tuple | type([])):
+        return "[" + ", ".join(map(_toml, value)) + "]"
+    return repr(value)

@@ -1,0 +1,179 @@
+"""What the library says of a muscle before it is recorded: a Gaussian over its traits."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from pydantic import ValidationError
+from scipy.stats import t as student
+
+from mckibben.arrays import Array
+from mckibben.errors import DataError
+from mckibben.muscles.library import FORMAT, Muscle, load, parsed
+from mckibben.muscles.library import list as all_muscles
+from mckibben.muscles.sheet import Sheet, refused
+from mckibben.muscles.traits import COUNT, PLACES, POSITIONS
+
+ALIKE = 0.1
+"""Logarithm by which muscles of one make and size differ."""
+
+NEAR = 0.25
+"""Logarithm of size, slenderness or braid over which muscles get unlike."""
+
+ZERO = 0.03
+"""Share of the rest length by which displacements count from elsewhere."""
+
+SMOOTH, FINE = 1.0, 0.03
+"""Neighbours over which traits of a name go together, and what each has alone."""
+
+FEWEST = 3
+"""Muscles that tell of a spread."""
+
+MIDDLE = 0.8413
+"""Quantile at which a Gaussian is one deviation from its mean."""
+
+UNTOLD = 1.0
+"""Spread of what fewer tell."""
+
+
+@dataclass(frozen=True)
+class Prior:
+    """What is likely of a muscle's traits.
+
+    Traits of a name go up and down together by a level, and differ from it by a smooth shape.
+
+    Parameters
+    ----------
+    sheet : Sheet
+        Of the muscle.
+    mean : array, shape (COUNT,)
+        NaN of what no muscle tells.
+    levels, shapes : dict of str to float
+        Standard deviations.
+    zero : float
+        Standard deviation of where displacements count from, beyond rest [mm].
+    """
+
+    sheet: Sheet
+    mean: Array
+    levels: dict[str, float]
+    shapes: dict[str, float]
+    zero: float
+
+    def covariance(self, name: str) -> Array:
+        """Return the covariance of traits of a name."""
+        place = POSITIONS[name]
+        apart = ((place[:, np.newaxis] - place) / SMOOTH) ** 2
+        curved = self.shapes[name] ** 2 * np.exp(-0.5 * apart.sum(axis=2))
+        return np.asarray(self.levels[name] ** 2 + curved + FINE**2 * np.eye(len(place)))
+
+    def weights(self) -> Array:
+        """Return rows that make independent numbers of deviation 1 of traits less their mean."""
+        rows = []
+        for name, place in PLACES.items():
+            known = np.flatnonzero(np.isfinite(self.mean[place]))
+            part = np.zeros((known.size, COUNT))
+            factor = np.linalg.cholesky(self.covariance(name)[np.ix_(known, known)])
+            part[:, known + place.start] = np.linalg.inv(factor)
+            rows.append(part)
+        return np.concatenate(rows)
+
+
+def prior_of(given: str | Path, *, without: Sequence[str] = ()) -> Prior:
+    """Return what the library says of a muscle.
+
+    Parameters
+    ----------
+    given : str or path
+        A muscle of the library, from which to begin, or the TOML file of a data sheet (or of an
+        identified muscle).
+    without : sequence of str
+        Muscles of the library that are not asked.
+
+    Raises
+    ------
+    DataError
+        On an unknown name, or a file that is neither.
+    """
+    muscles = [muscle for muscle in all_muscles() if muscle.name not in without]
+    path = Path(given)
+    if path.suffix != ".toml":
+        return of_muscles(muscles, load(given).sheet, load(given))
+    content = parsed(path)
+    if content.get("format") == FORMAT:
+        return of_muscles(muscles, load(path).sheet, load(path))
+    try:
+        sheet = Sheet.model_validate(content)
+    except ValidationError as error:
+        raise refused(error, path, "numbers of a data sheet") from None
+    return of_muscles(muscles, sheet, load(sheet.like) if sheet.like else None)
+
+
+def of_muscles(muscles: Sequence[Muscle], sheet: Sheet, like: Muscle | None = None) -> Prior:
+    """Return what some muscles say of one with a data sheet, or of the same make as one of them.
+
+    Their traits are taken for a Gaussian process over size, slenderness and braid (kriging): near a
+    muscle its own traits are likely, and far from all their mean, with the spread of all.
+    """
+    if not muscles:
+        raise DataError("there are no muscles to tell of others", remedy="leave fewer out")
+    muscles = sorted(muscles, key=lambda muscle: muscle.name)
+    table = np.array([muscle.traits for muscle in muscles])
+    told = np.isfinite(table)
+    shapes = np.array([muscle.sheet.shape for muscle in muscles])
+    here = sheet.shape if like is None else like.sheet.shape
+    mean = np.full(COUNT, np.nan)
+    of_levels, of_shapes = {}, {}
+    for name, place in PLACES.items():
+        level, shape = _spreads(table[:, place])
+        spread = float(np.hypot(level, shape))
+        for number in range(place.start, place.stop):
+            which = told[:, number]
+            if which.any():
+                middle = float(table[which, number].mean())
+                share, _ = _shares(shapes[which], here, spread)
+                mean[number] = middle + share @ (table[which, number] - middle)
+        left = _shares(shapes[told[:, place].any(axis=1)], here, spread)[1]
+        of_levels[name] = float(np.hypot(left * level, ALIKE))
+        of_shapes[name] = float(np.hypot(left * shape, ALIKE))
+    return Prior(sheet, mean, of_levels, of_shapes, ZERO * sheet.rest_length_mm)
+
+
+def _shares(shapes: Array, here: Array, spread: float) -> tuple[Array, float]:
+    """Return how much of each muscle's deviation one here has, and the share of spread left."""
+    if not len(shapes):
+        return np.zeros(0), 1.0
+
+    def alike(one: Array, other: Array) -> Array:
+        apart = (one[:, np.newaxis] - other) / NEAR
+        return np.asarray(np.exp(-0.5 * (apart**2).sum(axis=2)))
+
+    near = alike(shapes, here[np.newaxis])[:, 0]
+    among = alike(shapes, shapes) + (ALIKE / spread) ** 2 * np.eye(len(shapes))
+    share: Array = np.asarray(np.linalg.solve(among, near), dtype=np.float64)
+    return share, max(1.0 - float(near @ share), 0.0) ** 0.5
+
+
+def _spreads(table: Array) -> tuple[float, float]:
+    """Return the deviations of muscles' levels, and of shapes from these, as few muscles tell them.
+
+    A new one's is Student's; the Gaussian with the same middle two thirds is taken.
+    """
+    told = np.isfinite(table)
+    muscles = told.any(axis=1)
+    n = int(muscles.sum())
+    if n < FEWEST:
+        return UNTOLD, UNTOLD
+    table, told = table[muscles], told[muscles]
+    away = np.where(told, table, 0.0)
+    away = np.where(told, away - away.sum(axis=0) / np.maximum(told.sum(axis=0), 1), 0.0)
+    level = away.sum(axis=1) / told.sum(axis=1)
+    shape = np.where(told, away - level[:, np.newaxis], 0.0)
+    free = n - 1
+    new = (1.0 + 1.0 / n) * float(student.ppf(MIDDLE, free)) ** 2
+    of_level = float(np.sqrt(new * (level - level.mean()) @ (level - level.mean()) / free))
+    of_shape = float(np.sqrt(new * (shape**2).sum() / max((table.shape[1] - 1) * free, 1)))
+    return max(of_level, ALIKE), max(of_shape, ALIKE)

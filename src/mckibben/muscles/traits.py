@@ -1,0 +1,139 @@
+"""What a balance of forces says of a muscle, whatever its size: numbers to compare muscles by.
+
+A data sheet gives the scales: the area at rest A and its loss with contraction by the braid's geometry,
+the stroke, the highest pressure P, the force P A. Over these, in logarithms, are taken
+
+    area         at rest (of models that know newtons); and its loss, over the braid's
+    elasticity   the force without pressure, along the stroke, beyond that at displacement 0
+    friction     after travels from a reversal, under a low and a high pressure
+    relaxation   the stiffness that has not relaxed after some times
+    damping      by velocity, and of the line
+    wall         its stretch by pressure
+    offset       the force without pressure at displacement 0 (of models that know newtons)
+
+They depend neither on how many stops and lags a model has, nor on which displacements it was fitted.
+What may vanish has the least that would matter added before the logarithm; the offset, which has a
+sign, is over the force, and no logarithm.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.polynomial import polynomial
+
+from mckibben.arrays import Array
+from mckibben.blocks.coupled.balance import Balance
+from mckibben.muscles.sheet import Sheet
+
+ALONG = np.array([0.2, 0.4, 0.6, 0.8, 1.0])
+"""Contractions, as shares of the largest."""
+
+TRAVELS = np.geomspace(0.001, 0.2, 6)
+"""From a reversal, as shares of the stroke."""
+
+PRESSURES = np.array([0.25, 0.75])
+"""At which friction is looked at, as shares of the highest."""
+
+TIMES = np.array([0.1, 0.4, 1.6, 6.4, 25.6, 102.4])
+"""After which stiffness has not relaxed yet [s]."""
+
+LEAST = {"elasticity": 0.05, "friction": 3e-4, "relaxation": 0.03, "damping": 1e-3, "wall": 3e-3}
+"""What hardly matters: of the force at the largest contraction, of force, of elastic stiffness, of force
+over stroke by a second, of stroke."""
+
+GROUPS = {
+    "area": 1,
+    "loss": ALONG.size,
+    "elasticity": ALONG.size,
+    "friction": PRESSURES.size * TRAVELS.size,
+    "relaxation": TIMES.size,
+    "damping": 1,
+    "wall": 1,
+    "offset": 1,
+}
+"""Names of traits, and how many numbers each has."""
+
+GRIDS = {"friction": (PRESSURES.size, TRAVELS.size)}
+"""Of names whose numbers are no row."""
+
+_ENDS = np.cumsum([0, *GROUPS.values()]).tolist()
+PLACES = {
+    name: slice(first, last)
+    for name, first, last in zip(GROUPS, _ENDS[:-1], _ENDS[1:], strict=True)
+}
+"""Where those of a name are among all."""
+
+POSITIONS = {
+    name: np.stack([grid.ravel() for grid in np.indices(GRIDS.get(name, (count,)))], axis=1)
+    for name, count in GROUPS.items()
+}
+"""Where each number of a name is among its neighbours, shape (numbers, ways)."""
+
+COUNT: int = _ENDS[-1]
+
+
+def traits(balance: Balance, sheet: Sheet, zero: float = 0.0) -> Array:
+    """Return the traits of a muscle, those that it has not as NaN.
+
+    Parameters
+    ----------
+    balance : Balance
+        Of one muscle.
+    sheet : Sheet
+        Its own.
+    zero : float
+        How short it is where displacements count from [mm].
+
+    Returns
+    -------
+    array, shape (COUNT,)
+    """
+    area = np.array(balance.areas[0])
+    ends = sheet.stroke * ALONG - zero
+    at_rest = np.array([-zero])
+    rest = max(float(_straight(area, balance, at_rest)[0]), 0.1 * float(area[0]))
+    force = rest * sheet.max_pressure_bar  # in the model's own unit of force
+    newtons = bool(balance.n_loads)
+    found = {
+        "area": [_log(rest / (balance.loads[0][0] * sheet.area)) if newtons else np.nan],
+        "loss": _log(_straight(area, balance, ends) / rest, 0.01) - np.log(sheet.narrowed(ALONG)),
+    }
+    h, limits = np.array(balance.friction[0]), np.array(balance.limits)
+
+    def rubbed(p: float, travels: Array) -> Array:
+        return np.minimum(travels[:, np.newaxis], limits * (p + balance.grip)) @ h
+
+    own = balance.springs[0][1] + sum(balance.bladders)
+    powers = np.array([balance.springs[0][0], own * balance.scale, *balance.elasticity[0]])
+    at_zero = _straight(powers, balance, at_rest)
+    elastic = _straight(powers, balance, ends) - at_zero
+    furthest = min(sheet.stroke, float(balance.hull[0][1]) + zero)  # areas beyond are guesses
+    share = np.array([furthest / sheet.stroke, 1.0])
+    kept = _straight(area, balance, np.array([furthest - zero]))[0] / rest
+    held = force * max(kept, 0.02) * np.divide(*sheet.narrowed(share)[::-1])
+    found["elasticity"] = _log(elastic / held + LEAST["elasticity"], 0.01)
+    pressures = sheet.max_pressure_bar * PRESSURES
+    shares = [rubbed(p, sheet.stroke * TRAVELS) / (p * rest) for p in pressures.tolist()]
+    found["friction"] = _log(np.concatenate(shares) + LEAST["friction"])
+    left = np.exp(-TIMES[:, np.newaxis] / np.array([*balance.lags, 1.0]))
+    relaxing = left @ np.array([*balance.relaxation[0], 0.0])
+    stiffness = max(float(elastic[-1]), 0.05 * held) / sheet.stroke
+    found["relaxation"] = _log(relaxing / stiffness + LEAST["relaxation"])
+    damping = balance.damping[0] + sum(balance.lines)
+    found["damping"] = _log([damping * sheet.stroke / force + LEAST["damping"]])
+    stretch = balance.walls[0] * sheet.max_pressure_bar / sheet.stroke
+    found["wall"] = _log([stretch + LEAST["wall"]])
+    found["offset"] = [at_zero[0] / force if newtons else np.nan]
+    return np.concatenate([np.ravel(found[name]) for name in GROUPS])
+
+
+def _log(values: object, least: float = 1e-6) -> Array:
+    return np.log(np.maximum(np.asarray(values, dtype=np.float64), least))
+
+
+def _straight(powers: Array, balance: Balance, y: Array) -> Array:
+    """Return a polynomial, which goes on straight beyond what is known."""
+    inside = np.clip(y, balance.hull[0][0], balance.hull[0][1])
+    u = inside / balance.scale
+    slope = polynomial.polyval(u, polynomial.polyder(powers)) / balance.scale
+    return np.asarray(polynomial.polyval(u, powers) + slope * (y - inside))

@@ -1,0 +1,38 @@
+"""The library of muscles from the command line."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+from mckibben import muscles, write
+from mckibben.muscles.library import FOLDER
+from tests.cli.conftest import Cli
+from tests.estimators.test_balance_prior import moved
+
+
+def test_muscles_are_listed_and_shown(cli: Cli) -> None:
+    listed = json.loads(cli("muscles", "list", "--json").out)
+    assert {name: listed[name]["virtual"] for name in listed} == {
+        muscle.name: muscle.virtual for muscle in muscles.list()
+    }
+    assert "rail" in cli("muscles", "list").out
+    assert cli("muscles", "show", "rail").out == (FOLDER / "rail.toml").read_text("utf-8")
+    shown = json.loads(cli("muscles", "show", "rail", "--json").out)
+    assert shown["sheet"] == listed["rail"]["sheet"]
+
+
+def test_a_fit_begins_from_a_muscle_or_says_what_is_wrong(cli: Cli, tmp_path: Path) -> None:
+    write(moved(1, 5.0), tmp_path / "run.csv")
+    asked = ["fit", "balance", tmp_path / "run.csv", "-o"]
+    few = ["--set", "steps=2", "--set", "contact=false"]
+    plain, told = tmp_path / "plain.json", tmp_path / "told.json"
+    assert cli(*asked, plain, *few).code == 0
+    assert cli(*asked, told, "--prior", "rail", *few).code == 0
+    assert plain.read_text("utf-8") != told.read_text("utf-8")
+    nobody = cli(*asked, tmp_path / "x.json", "--prior", "nobody")
+    assert nobody.code == 2
+    assert "no muscle 'nobody'" in nobody.err
+    other = cli("fit", "pi", tmp_path / "run.csv", "-o", tmp_path / "x.json", "--prior", "rail")
+    assert other.code == 2
+    assert "leave --prior out" in other.err

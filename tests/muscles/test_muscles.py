@@ -1,0 +1,129 @@
+"""The library of identified muscles, and what it says of others."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.polynomial import Polynomial
+
+from mckibben import DataError, muscles
+from mckibben.blocks.core.fields import rows
+from mckibben.muscles import Sheet
+from mckibben.muscles.library import FOLDER, described, load
+from mckibben.muscles.prior import of_muscles, prior_of
+from mckibben.muscles.traits import PLACES, traits
+from mckibben.rigs import rig_names
+
+NAMES = [muscle.name for muscle in muscles.list()]
+RAIL = load("rail")
+OTHER = Sheet(
+    diameter_mm=40.0,
+    rest_length_mm=500.0,
+    braid_angle_deg=RAIL.sheet.braid_angle_deg,
+    max_pressure_bar=4.0,
+    max_contraction=RAIL.sheet.max_contraction,
+)
+"""The rail's muscle, made larger."""
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_files_are_what_they_describe(name: str) -> None:
+    text = (FOLDER / f"{name}.toml").read_text(encoding="utf-8")
+    assert described(load(name)) == text
+    assert muscles.show(name) == text
+
+
+def test_virtual_muscles_are_those_of_the_rigs_and_marked() -> None:
+    assert {muscle.name for muscle in muscles.list() if muscle.virtual} == set(rig_names())
+
+
+def test_traits_do_not_know_size() -> None:
+    larger = muscles.scaled(RAIL.balance, RAIL.sheet, OTHER)
+    np.testing.assert_allclose(
+        traits(larger, OTHER), traits(RAIL.balance, RAIL.sheet), rtol=0, atol=1e-9
+    )
+    again = muscles.scaled(larger, OTHER, RAIL.sheet)
+    np.testing.assert_allclose(again.pack(), RAIL.balance.pack(), rtol=1e-12, atol=1e-12)
+
+
+def test_traits_do_not_know_where_displacements_count_from() -> None:
+    zero, old = 4.0, RAIL.balance
+    along = Polynomial([zero / old.scale, 1.0])
+    held = Polynomial([old.springs[0][0], old.springs[0][1] * old.scale, *old.elasticity[0]])(along)
+    moved = replace(
+        old,
+        areas=rows([Polynomial(old.areas[0])(along).coef.tolist()]),
+        springs=rows([[held.coef[0], held.coef[1] / old.scale]]),
+        elasticity=rows([held.coef[2:].tolist()]),
+        hull=rows((np.array(old.hull) - zero).tolist()),
+    )
+    np.testing.assert_allclose(
+        traits(moved, RAIL.sheet, zero), traits(old, RAIL.sheet), rtol=0, atol=1e-9
+    )
+
+
+def test_braid_follows_from_the_largest_force_as_from_the_angle() -> None:
+    by_angle = Sheet(diameter_mm=20.0, rest_length_mm=200.0, braid_angle_deg=25.0)
+    by_force = Sheet(diameter_mm=20.0, rest_length_mm=200.0, max_force_N=by_angle.force)
+    np.testing.assert_allclose(by_force.braid, by_angle.braid, rtol=1e-12)
+
+
+def test_order_of_the_library_is_irrelevant() -> None:
+    one, other = (of_muscles(order, OTHER) for order in (muscles.list(), muscles.list()[::-1]))
+    assert np.array_equal(one.mean, other.mean)
+    assert (one.levels, one.shapes) == (other.levels, other.shapes)
+
+
+def test_a_muscle_of_the_library_is_likely_itself_and_others_less_sure() -> None:
+    known, told = prior_of("rail"), np.isfinite(RAIL.traits)
+    far = prior_of("rail", without=("rail", "mas20-hanging", "dmsp20-150", "dmsp20-300"))
+    away = np.abs(known.mean - RAIL.traits)[told], np.abs(far.mean - RAIL.traits)[told]
+    assert np.median(away[0]) < 0.3 * np.median(away[1])
+    assert all(known.levels[name] <= far.levels[name] for name in ("friction", "relaxation"))
+
+
+def test_weights_make_independent_numbers_of_deviation_one() -> None:
+    prior = prior_of("rail")
+    covariance = np.zeros(2 * (len(prior.mean),))
+    for name, place in PLACES.items():
+        covariance[place, place] = prior.covariance(name)
+    weights = prior.weights()
+    np.testing.assert_allclose(
+        weights @ covariance @ weights.T, np.eye(len(weights)), rtol=0, atol=1e-9
+    )
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("diameter_mm = 20.0\nrest_length_mm = 200.0", "neither braid_angle_deg nor max_force_N"),
+        ("diameter_mm = 20.0\nbraid_angle_deg = 25.0", "rest_length_mm"),
+        ("diameter_mm = 20.0\nrest_length_mm = 200.0\nbraid_angle_deg = 60.0", "braid_angle_deg"),
+        ("diameter_mm = 20.0\nrest_length_mm = 200.0\nmax_force_N = 1e5", "no braid"),
+        ("diameter_mm = 20.0\nrest_length_mm = 200.0\nbraid_angle_deg = 25.0\nx = 1", "x"),
+        ("diameter_mm = ", "no TOML"),
+        (
+            'diameter_mm = 20.0\nrest_length_mm = 200.0\nbraid_angle_deg = 25.0\nlike = "x"',
+            "no muscle",
+        ),
+        ('format = "mckibben-muscle"\nversion = 2', "no identified muscle"),
+        ('format = "mckibben-muscle"\nversion = 1', "title"),
+    ],
+)
+def test_bad_sheets_are_refused_by_what_is_wrong(tmp_path: Path, text: str, said: str) -> None:
+    path = tmp_path / "sheet.toml"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(DataError, match=said):
+        prior_of(path)
+
+
+def test_muscles_are_loaded_from_files_too(tmp_path: Path) -> None:
+    path = tmp_path / "own.toml"
+    path.write_text(described(RAIL), encoding="utf-8")
+    assert load(path).balance == RAIL.balance
+    assert np.array_equal(prior_of(path).mean, prior_of("rail").mean, equal_nan=True)
+    with pytest.raises(DataError, match="no muscle 'nobody'"):
+        load("nobody")

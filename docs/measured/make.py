@@ -1,8 +1,8 @@
 """Make all pages of measured recordings: python docs/measured/make.py FOLDER [PEERS].
 
 FOLDER holds the public recordings named in src/mckibben/measured/known. In turn: every model on every
-set (measured.md); the library of identified muscles (src/mckibben/muscles/library); what priors from it
-are worth (priors.txt); and, with the Python of an environment that has the peers
+set (measured.md); the library of identified muscles (src/mckibben/muscles/library); how far forces
+at held lengths repeat (repeats.txt); what priors from it are worth (priors.txt); and, with the Python of an environment that has the peers
 (benchmarks/peers.txt), these beside ours (peers.md). Takes about an hour on two cores.
 """
 
@@ -22,8 +22,9 @@ def main() -> None:
     command = Path(sys.executable).with_name("mckibben")
     subprocess.run([command, "measured", folder, "-o", HERE], check=True)
     subprocess.run([sys.executable, HERE / "library.py", folder], check=True)
-    with (HERE / "priors.txt").open("w", encoding="utf-8") as file:
-        subprocess.run([sys.executable, HERE / "priors.py", folder], check=True, stdout=file)
+    for name in ("repeats", "priors"):
+        with (HERE / f"{name}.txt").open("w", encoding="utf-8") as file:
+            subprocess.run([sys.executable, HERE / f"{name}.py", folder], check=True, stdout=file)
     for python in peers:
         subprocess.run([python, ROOT / "benchmarks" / "peers.py", folder], check=True)
 

@@ -1,9 +1,10 @@
 """Make all pages of measured recordings: python docs/measured/make.py FOLDER [PEERS].
 
 FOLDER holds the public recordings named in src/mckibben/measured/known. In turn: every model on every
-set (measured.md); the library of identified muscles (src/mckibben/muscles/library); how far forces
-at held lengths repeat (repeats.txt); what priors from it are worth (priors.txt); and, with the Python of an environment that has the peers
-(benchmarks/peers.txt), these beside ours (peers.md). Takes about an hour on two cores.
+set (measured.md); the library of identified muscles (src/mckibben/muscles/library); how far forces at
+held lengths repeat (repeats.txt); what priors from the library are worth (priors.txt); and, with the
+Python of an environment that has the peers (benchmarks/peers.txt), these beside ours (peers.md). Takes
+about an hour on two cores.
 """
 
 from __future__ import annotations

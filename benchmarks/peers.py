@@ -91,9 +91,16 @@ class Data:
     span: float
 
 
+def told_of(recordings: Sequence[Recording], channels: Channels) -> list[str]:
+    """Return what peers are told: what any of our models is, which of a force is the pressure too."""
+    told = [*channels.inputs, *channels.scheduled(recordings)]
+    forced = "force" in channels.outputs and all("pressure" in one for one in recordings)
+    return list(dict.fromkeys([*told, *(["pressure"] if forced else [])]))
+
+
 def data_of(train: Sequence[Recording], test: Sequence[Recording], channels: Channels) -> Data:
     """Return recordings as peers are given them, scaled as they are on the training side."""
-    told = [*channels.inputs, *channels.scheduled([*train, *test])]
+    told = told_of([*train, *test], channels)
     inputs = np.vstack([one.matrix(told) for one in train])
     outputs = np.vstack([one.matrix(channels.outputs) for one in train])
     middle, spread = inputs.mean(axis=0), inputs.std(axis=0)
@@ -263,6 +270,9 @@ def _told(error: BaseException) -> str:
 def rows_of(peer: Peer, data: Data) -> list[Row]:
     """Return the rows of a peer: by its defaults, and by a search."""
     row = Row(model=peer.name, package=peer.package)
+    inputs = data.train[0][0].shape[1]
+    if peer.one_input and inputs > 1:
+        return [replace(row, reason=f"takes one input only, and there are {inputs}")]
     if peer is GRU:
         return [seeded(peer, data, row)]
     found = [searched(peer, data, row)]
@@ -306,7 +316,7 @@ def run(one: Set, task: Task, recordings: list[Recording], kept: Kept) -> TaskRo
     plan = plan_of(train, test, models=task.models, settings=task.settings, **asked)
     split, channels = plan.data.split, plan.data.channels
     data = data_of(split.train, split.test, channels)
-    told = [*channels.inputs, *channels.scheduled([*train, *test])]
+    told = told_of([*train, *test], channels)
     gives = TaskRows(title, plan.unit, told, list(channels.outputs), plan.board().split)
     for peer in PEERS:
         rows = kept.get(title, f"{peer.package} {peer.name}")

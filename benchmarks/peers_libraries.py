@@ -75,6 +75,8 @@ class Peer:
         Settings that the package's own defaults fill up; None where it has none.
     note : str
         What was done to give it what it takes.
+    one_input : bool
+        Whether it takes no more.
     """
 
     name: str
@@ -83,6 +85,7 @@ class Peer:
     grid: tuple[Settings, ...]
     default: Settings | None
     note: str
+    one_input: bool = False
 
 
 def grid(**choices: Sequence[Any]) -> tuple[Settings, ...]:
@@ -166,13 +169,13 @@ def network(runs: Sequence[Run], how: Settings, trials: Sequence[Trial]) -> Simu
     torch.manual_seed(0)
     nn = torch.nn
     layers = (
-        *(nn.Linear(lag * (1 + u.shape[1]), units), nn.Tanh()),
+        *(nn.Linear(2 * lag, units), nn.Tanh()),
         *(nn.Linear(units, units), nn.Tanh(), nn.Linear(units, 1)),
     )
     model = neural.NARXNN(
         net=nn.Sequential(*layers),
         ylag=lag,
-        xlag=_lags(lag, u.shape[1]),
+        xlag=lag,
         basis_function=basis.Polynomial(degree=1),
         optim_params={"betas": (0.9, 0.999), "eps": 1e-5},
         random_state=0,
@@ -359,9 +362,10 @@ NARX = (
     Peer(
         name="NARXNN, network",
         package="sysidentpy",
-        fit=each_output(network),
+        fit=network,
         grid=grid(units=[10], present=[True, False], lags=[1, 2, 4]),
         default={},
-        note=f"{JOINED}; {PRESENT}; {BY_OUTPUT}; two layers of 10 tanh, as in its documentation",
+        note=f"{JOINED}; {PRESENT}; two layers of 10 tanh, as in its documentation",
+        one_input=True,  # its lags of inputs are integers, those of several would be lists
     ),
 )

@@ -231,10 +231,14 @@ def tested(peer: Peer, how: Settings, data: Data, row: Row) -> Row:
 
 
 def searched(peer: Peer, data: Data, row: Row) -> Row:
-    """Return the row of a peer with the settings that do best on what is held back, in the budget."""
+    """Return the row of a peer with the settings that do best on what is held back, in the budget.
+
+    They are tried in random order, so that what the budget leaves out is not of one kind.
+    """
     best, best_error, tries, reason = None, float("inf"), 0, "none of its settings runs free"
     started = time.perf_counter()
-    for how in peer.grid:
+    for place in np.random.default_rng(0).permutation(len(peer.grid)):
+        how = peer.grid[place]
         left = BUDGET - (time.perf_counter() - started)
         if left <= 0:
             break

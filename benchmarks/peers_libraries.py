@@ -70,7 +70,7 @@ class Peer:
     name, package : str
     fit : callable
     grid : tuple of mapping
-        Settings to search among, cheapest first.
+        Settings to search among.
     default : mapping or None
         Settings that the package's own defaults fill up; None where it has none.
     note : str

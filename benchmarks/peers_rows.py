@@ -130,7 +130,7 @@ of zero mean and unit variance.
 
 - **defaults**: the library's own settings. Else settings are searched for by the free-running error on a
   quarter of the training side (the last quarter of each recording; of four or more recordings, every
-  fourth one), within {budget:.0f} s for each peer and set, and fitted again to all of it.
+  fourth one), in random order within {budget:.0f} s for each peer and set, and fitted again to all of it.
 - **test RMSE**: also in per cent of the range of what is tested on; of several outputs, the mean.
 - **fit**: one fit with the settings shown; **search**: all that came before it. Ours are fitted as they
   are offered, without a search but their own; of the one chosen, the search is the whole comparison of
@@ -138,6 +138,8 @@ of zero mean and unit variance.
 - **step**: time of a sample in a simulation of 20 000, as the library simulates.
 - **branch kept**: the model's gap between rising and falling branches over the measured one, on the
   test, as in the memory test of `mckibben.compare`: 1 is perfect, 0 has forgotten. A dash: no pairs.
+  Where the input mostly rests, as the pressure at held lengths does, noise makes the branches, and the
+  figure means little.
 
 Times are of one busy machine of two cores: their orders of magnitude count.
 """
@@ -242,5 +244,6 @@ def _figure(value: float | None) -> str:
 def _settings(row: Row) -> str:
     words = [f"{name}={value}" for name, value in row.settings.items()]
     if row.tries:
-        words.append(f"of {row.tries}" + ("" if row.tries == row.settings_there else " tried"))
+        short = "" if row.tries == row.settings_there else f" in time, of {row.settings_there}"
+        words.append(f"the best of {row.tries}{short}")
     return ", ".join(words)

@@ -70,7 +70,7 @@ class Peer:
     name, package : str
     fit : callable
     grid : tuple of mapping
-        Settings to search among.
+        Settings to search among, cheapest first.
     default : mapping or None
         Settings that the package's own defaults fill up; None where it has none.
     note : str
@@ -355,7 +355,7 @@ NARX = (
         name="FROLS, polynomial NARX",
         package="sysidentpy",
         fit=each_output(polynomial),
-        grid=grid(degree=[1, 2, 3], present=[False, True], lags=[1, 2, 3, 5]),
+        grid=grid(lags=[1, 2, 3, 5], degree=[1, 2, 3], present=[True, False]),
         default={},
         note=f"{JOINED}; {PRESENT}; {BY_OUTPUT}; searched by least squares, up to {MOST_TERMS} terms",
     ),

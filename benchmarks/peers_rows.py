@@ -130,7 +130,7 @@ of zero mean and unit variance.
 
 - **defaults**: the library's own settings. Else settings are searched for by the free-running error on a
   quarter of the training side (the last quarter of each recording; of four or more recordings, every
-  fourth one), in random order within {budget:.0f} s for each peer and set, and fitted again to all of it.
+  fourth one), within {budget:.0f} s a peer and set, the cheapest first, and fitted again to all of it.
 - **test RMSE**: also in per cent of the range of what is tested on; of several outputs, the mean.
 - **fit**: one fit with the settings shown; **search**: all that came before it. Ours are fitted as they
   are offered, without a search but their own; of the one chosen, the search is the whole comparison of

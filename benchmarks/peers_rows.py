@@ -130,7 +130,8 @@ of zero mean and unit variance.
 
 - **defaults**: the library's own settings. Else settings are searched for by the free-running error on a
   quarter of the training side (the last quarter of each recording; of four or more recordings, every
-  fourth one), within {budget:.0f} s a peer and set, the cheapest first, and fitted again to all of it.
+  fourth one), within {budget:.0f} s a peer and set, the cheapest first; one that takes a quarter of that
+  is given up. The best are fitted again to all of the training side.
 - **test RMSE**: also in per cent of the range of what is tested on; of several outputs, the mean.
 - **fit**: one fit with the settings shown; **search**: all that came before it. Ours are fitted as they
   are offered, without a search but their own; of the one chosen, the search is the whole comparison of
@@ -141,7 +142,9 @@ of zero mean and unit variance.
   Where the input mostly rests, as the pressure at held lengths does, noise makes the branches, and the
   figure means little.
 
-Times are of one busy machine of two cores: their orders of magnitude count.
+Of ours, `balance`, `balance-force`, `gpi`, `cpi` and `preisach` are shown, where they are offered, and the
+one chosen among all. Times are of one machine of two cores, in several sittings beside other work: their
+orders of magnitude count, and on a quiet one the searches of the large sets get further.
 """
 
 

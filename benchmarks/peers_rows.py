@@ -142,9 +142,9 @@ of zero mean and unit variance.
   Where the input mostly rests, as the pressure at held lengths does, noise makes the branches, and the
   figure means little.
 
-Of ours, `balance`, `balance-force`, `gpi`, `cpi` and `preisach` are shown, where they are offered, and the
-one chosen among all. Times are of one machine of two cores, in several sittings beside other work: their
-orders of magnitude count, and on a quiet one the searches of the large sets get further.
+Of ours, `balance`, `balance-force`, `gpi`, `cpi` and `preisach` are shown where they are offered, and
+the one chosen among all. Times are of one machine of two cores, in several sittings beside other work:
+their orders of magnitude count, and on a quiet one the searches of the large sets get further.
 """
 
 

@@ -181,6 +181,18 @@ def test_the_command_writes_page_and_rows_and_goes_on(
     assert (out / "measured.md").read_text() == "mine"
 
 
+@pytest.mark.parametrize("inside", ["", "plain"])
+def test_results_in_the_folder_are_no_set_of_the_next_run(
+    cli: Cli, folder: Path, inside: str
+) -> None:
+    given = folder / inside
+    for _ in range(2):
+        result = cli("measured", given, "-o", given / "page", "--models", "pi", "--jobs", "1")
+        assert result.code == 0, result.err
+        assert "## page" not in (given / "page" / "measured.md").read_text()
+        assert "pi, CV RMSE" in result.out
+
+
 @pytest.mark.parametrize(
     ("words", "said"),
     [

@@ -5,7 +5,7 @@
 Every figure is of runs that nothing learned from. Of several seeds or runs, a cell has median and range,
 and a target is met by the median. Seeds are those of sensor noise and of random references. Forces are
 found from pressure and displacement by solving the balance for its load. FOLDER holds measured
-recordings, which do not come with the package (see docs/models/measured.py and loads.py); sections
+recordings, which do not come with the package (see docs/measured); sections
 without theirs are passed over. All sections take about ten minutes on one core.
 """
 
@@ -21,7 +21,7 @@ from pathlib import Path
 import numpy as np
 
 from balance_arm import arm, joint, robust, whole
-from balance_measured import coiled, hanging, lifting, measured
+from balance_measured import hanging, lifting, measured
 from balance_rail import rail, rail_runs
 from balance_rows import BALANCE, Array, Fits, Row, table
 from mckibben import Recording
@@ -81,7 +81,7 @@ def speed(seeds: int) -> Iterator[Row]:
 def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__)
-    choices = ("rail", "arm", "coiled", "measured", "speed", "robust", "all")
+    choices = ("rail", "arm", "measured", "speed", "robust", "all")
     parser.add_argument(
         "sections", nargs="*", default=["all"], metavar="SECTION", help=f"{choices}"
     )
@@ -94,7 +94,6 @@ def main() -> None:
     sections: dict[str, tuple[Callable[[], Iterator[Row]], ...]] = {
         "rail": (lambda: rail(given.seeds),),
         "arm": (lambda: arm(given.seeds),),
-        "coiled": (lambda: coiled(given.data),),
         "measured": (
             lambda: hanging(given.seeds),
             lambda: lifting(given.seeds),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import runpy
 import warnings
 from collections.abc import Iterator
 from pathlib import Path
@@ -12,12 +11,13 @@ import numpy as np
 
 from balance_rows import BALANCE, Fits, Row, free_run, missed, rms
 from mckibben import Recording, compare
+from mckibben.measured.sets import parted, sets_in
 from mckibben.papers.activation_pressure.protocol import FORCES
 from mckibben.papers.activation_pressure.rerun import REST_LENGTH, modelled
 from mckibben.rigs import record
 
-PAGES = Path(__file__).resolve().parent.parent / "docs" / "models"
-"""Where recordings are read and split for the documentation."""
+TARGETS = {"festo_dmsp10_levels": 0.8, "festo_dmsp10_static": np.nan, "cavatappi_loads": 5.0}
+"""In per cent of the range of what is tested on."""
 
 SMOOTHED = 5
 """Samples of 5 ms over which displacement is averaged."""
@@ -82,42 +82,21 @@ def lifting(seeds: int) -> Iterator[Row]:
         yield Row("E", what, "% of range", target, figures, note)
 
 
-def coiled(folder: Path | None) -> Iterator[Row]:
-    """Yield the targets of coiled muscles under two loads; nothing where they are absent."""
-    if folder is None or not (folder / "cavatappi_loads").is_dir():
-        return
-    page = runpy.run_path(str(PAGES / "loads.py"))
-    settings: dict[str, dict[str, Any]] = page["MODELS"] | {BALANCE: {}}
-    warnings.simplefilter("ignore")
-    for sample in page["SAMPLES"]:
-        whole = [page["recording"](folder, sample, grams) for grams in page["LOADS"]]
-        cuts = [round(page["FITTED"] * len(run)) for run in whole]
-        train = [run.slice(0, cut) for run, cut in zip(whole, cuts, strict=True)]
-        test = [run.slice(cut, len(run)) for run, cut in zip(whole, cuts, strict=True)]
-        span = max(float(np.ptp(run["displacement"])) for run in test)
-        figures = {}
-        for name, how in settings.items():
-            row = page["tried"](train, test, name, how)
-            if not row.reason:
-                figures[name] = [100 * row.test_error / span]
-        each = [page["tried"]([a], [b], "p2uz", {}) for a, b in zip(train, test, strict=True)]
-        errors = np.array([row.test_error for row in each])
-        weights = np.array([len(run) for run in test])
-        together = np.sqrt(np.sum(weights * errors**2) / weights.sum())
-        figures["p2uz, one each"] = [float(100 * together / span)]
-        yield Row(
-            "coiled", f"sample {sample}, 200 and 400 g, one model", "% of range", 5.0, figures
-        )
-
-
 def measured(folder: Path | None) -> Iterator[Row]:
-    """Yield the targets of a measured Festo muscle; nothing where it is absent."""
-    if folder is None or not (folder / "festo_dmsp10_levels").is_dir():
+    """Yield the targets of measured muscles, by the splits of docs/measured; nothing without them."""
+    if folder is None:
         return
-    page = runpy.run_path(str(PAGES / "measured.py"))
     warnings.simplefilter("ignore")
-    for name, target in (("levels", 0.19), ("static", np.nan)):
-        train, test = page[name](folder)
-        board = compare(train, test, models=["cpi", "gpi", "preisach", BALANCE], n_folds=0)
-        figures = {row.model: [row.test.rmse] for row in board.rows if row.test is not None}
-        yield Row("measured", f"DMSP-10 {name}", "mm", target, figures)
+    for one in sets_in(folder):
+        for _, task in one.tasks() if one.name in TARGETS else ():
+            train, test = parted(task, one.recordings(), one.folder)
+            span = max(float(np.ptp(run["displacement"])) for run in test)
+            models = (
+                ("coupled-memory", BALANCE) if task.load else ("cpi", "gpi", "preisach", BALANCE)
+            )
+            board = compare(train, test, models=models, load=task.load, n_folds=0)
+            figures = {
+                r.model: [100 * r.test_error / span] for r in board.rows if r.test is not None
+            }
+            what = f"{one.title} {task.name}".strip()
+            yield Row("measured", what, "% of range", TARGETS[one.name], figures)

@@ -142,15 +142,27 @@ def held(folder: Path) -> None:
         narrowed = long.narrowed(run["displacement"] / long.stroke)
         return run["pressure"] * long.area * narrowed
 
+    def straight(run: Recording) -> Any:
+        left = 1.0 - run["displacement"] / long.stroke
+        return long.force * run["pressure"] / long.max_pressure_bar * left
+
     told(of(LoadEstimate.of(muscles.scaled(short.balance, short.sheet, long))), None, "scaled only")
-    told(braid, None, "braid of the data sheet only (Chou and Hannaford)")
+    laws = {
+        "the braid of Chou and Hannaford": braid,
+        "the catalogue's straight line (Festo)": straight,
+    }
+    for title, law in laws.items():
+        told(law, None, f"{title}, data sheet only")
     for y, same in runs.items():
         run = same[0]
-        columns = np.column_stack([braid(run), np.ones(len(run))])
-        gain, offset = np.linalg.lstsq(columns, run["force"], rcond=None)[0]
-        told(
-            lambda one, g=gain, o=offset: g * braid(one) + o, y, f"braid, one inflation at {y:g} mm"
-        )
+        for title, law in laws.items():
+            columns = np.column_stack([law(run), np.ones(len(run))])
+            gain, offset = np.linalg.lstsq(columns, run["force"], rcond=None)[0]
+            told(
+                lambda one, law=law, g=gain, o=offset: g * law(one) + o,
+                y,
+                f"{title}, gain and offset by one inflation at {y:g} mm",
+            )
         model = BalanceEstimator(prior=prior).fit(run).model_
         told(of(load_of(model)), y, f"balance, one inflation at {y:g} mm")
 

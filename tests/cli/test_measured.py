@@ -12,6 +12,7 @@ from mckibben.measured.page import page, table
 from mckibben.measured.running import outcomes
 from mckibben.measured.sets import KNOWN, parted, sets_in
 from mckibben.measured.splits import split_of
+from mckibben.numerals import numeral
 from mckibben.signals import irregular_triangle
 from tests.cli.conftest import Cli
 
@@ -106,7 +107,7 @@ def test_the_page_has_every_figure_of_every_task(folder: Path) -> None:
         (row,) = one.board.rows
         if one.left_out:
             assert f"without {one.left_out}" in text
-            assert f"{100 * row.test_error / one.span:.2f}" in text
+            assert numeral(100 * row.test_error / one.span, 3) in text
         else:
             assert f"| {one.heading} | `gpi` |" in text
             assert f"{row.test_error:.3g}" in text

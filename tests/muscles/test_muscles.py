@@ -127,3 +127,10 @@ def test_muscles_are_loaded_from_files_too(tmp_path: Path) -> None:
     assert np.array_equal(prior_of(path).mean, prior_of("rail").mean, equal_nan=True)
     with pytest.raises(DataError, match="no muscle 'nobody'"):
         load("nobody")
+
+
+def test_a_sheet_names_muscles_that_are_not_asked() -> None:
+    sheet = OTHER.model_copy(update={"without": ["rail"]})
+    expected = of_muscles([one for one in muscles.list() if one.name != "rail"], OTHER)
+    np.testing.assert_array_equal(prior_of(sheet).mean, expected.mean)
+    assert prior_of(sheet).levels == prior_of(OTHER, without=["rail"]).levels == expected.levels

@@ -123,7 +123,7 @@ def _cell(model: str, one: Outcome, column: Mapping[str, float]) -> str:
     assert one.board is not None
     if model not in column:
         return "–"
-    text = f"{column[model]:.2f}" if column[model] < PER_CENT else ">100"
+    text = numeral(column[model], 3) if column[model] < PER_CENT else ">100"
     text = f"**{text}**" if column[model] <= BEST * min(column.values()) else text
     chosen = one.board.best is not None and one.board.best.model == model
     return f"<u>{text}</u>" if chosen else text

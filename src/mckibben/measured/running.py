@@ -116,6 +116,7 @@ def outcomes(
                 load=task.load,
                 models=task.models if models == "all" else models,
                 settings=task.settings,
+                n_folds=task.folds,
                 seed=seed,
                 jobs=jobs,
                 folder=Kept(folder).inside(f"{one.name}-{place}"),

@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
+from mckibben.comparison.planning import N_FOLDS
 from mckibben.errors import DataError
 
 WHERE = "channels.toml"
@@ -53,7 +54,7 @@ class Task(_Strict):
         Instead: each in turn is tested on, with all others fitted.
     cut : float
         Instead: share of every recording, from its start, that is fitted; the rest is tested.
-    inputs, outputs, load, models, settings
+    inputs, outputs, load, models, settings, folds
         As of `mckibben.compare`.
     """
 
@@ -67,6 +68,7 @@ class Task(_Strict):
     load: str | None = None
     models: Literal["all", "quick"] | list[str] = "all"
     settings: dict[str, dict[str, Any]] = {}
+    folds: Annotated[int, Field(ge=0)] = N_FOLDS
     published: list[Published] = []
 
     @model_validator(mode="after")

@@ -82,13 +82,13 @@ class Prior:
         return np.concatenate(rows)
 
 
-def prior_of(given: str | Path, *, without: Sequence[str] = ()) -> Prior:
+def prior_of(given: str | Path | Sheet, *, without: Sequence[str] = ()) -> Prior:
     """Return what the library says of a muscle.
 
     Parameters
     ----------
-    given : str or path
-        A muscle of the library, from which to begin, or the TOML file of a data sheet (or of an
+    given : str, path or Sheet
+        A muscle of the library, from which to begin; a data sheet, or its TOML file (or that of an
         identified muscle).
     without : sequence of str
         Muscles of the library that are not asked.
@@ -99,6 +99,9 @@ def prior_of(given: str | Path, *, without: Sequence[str] = ()) -> Prior:
         On an unknown name, or a file that is neither.
     """
     muscles = [muscle for muscle in all_muscles() if muscle.name not in without]
+    if isinstance(given, Sheet):
+        asked = [muscle for muscle in muscles if muscle.name not in (given.without or ())]
+        return of_muscles(asked, given, load(given.like) if given.like else None)
     path = Path(given)
     if path.suffix != ".toml":
         return of_muscles(muscles, load(given).sheet, load(given))
@@ -109,7 +112,7 @@ def prior_of(given: str | Path, *, without: Sequence[str] = ()) -> Prior:
         sheet = Sheet.model_validate(content)
     except ValidationError as error:
         raise refused(error, path, "numbers of a data sheet") from None
-    return of_muscles(muscles, sheet, load(sheet.like) if sheet.like else None)
+    return prior_of(sheet, without=without)
 
 
 def of_muscles(muscles: Sequence[Muscle], sheet: Sheet, like: Muscle | None = None) -> Prior:

@@ -37,6 +37,8 @@ class Sheet(BaseModel):
         At the highest pressure without load, of the rest length. Default what is usual of the braid.
     like : str, optional
         A muscle of the library of the same make.
+    without : list of str, optional
+        Muscles of the library that are not asked.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
@@ -48,6 +50,7 @@ class Sheet(BaseModel):
     max_pressure_bar: float = Field(default=6.0, gt=0, le=50)
     max_contraction: float | None = Field(default=None, ge=0.02, le=0.6)
     like: str | None = None
+    without: list[str] | None = None
 
     def model_post_init(self, _: Any) -> None:
         """Refuse a sheet that tells no braid."""

@@ -10,12 +10,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Annotated, ClassVar
 
 import numpy as np
 from annotated_types import Gt, Interval
-from pydantic import InstanceOf
 
 from mckibben.arrays import Array
 from mckibben.blocks.compose import PerChannel, Series
@@ -52,7 +50,7 @@ from mckibben.estimators.coupled.balance_loads import (
     without_held,
     without_load,
 )
-from mckibben.estimators.coupled.balance_prior import believed, refined, told_by
+from mckibben.estimators.coupled.balance_prior import Told, believed, refined, told_by
 from mckibben.estimators.coupled.balance_search import Search
 from mckibben.estimators.coupled.balance_stages import Stages, acted, acting
 from mckibben.estimators.coupled.balance_starts import simulate_started
@@ -60,7 +58,6 @@ from mckibben.estimators.coupled.balance_structure import APART, Structure
 from mckibben.estimators.coupled.balance_words import held_back, missed, sentences
 from mckibben.estimators.coupled.base import CoupledEstimator, schedules
 from mckibben.estimators.optimisers.tracker import Tracker
-from mckibben.muscles.prior import Prior
 from mckibben.recording import Recording
 
 LIMITED = ("bar", "V")
@@ -120,9 +117,9 @@ class BalanceEstimator(CoupledEstimator):
         Damping of the coefficients.
     steps : int
         Most Gauss-Newton steps.
-    prior : str, Path or Prior, optional
+    prior : str, Path, Sheet or Prior, optional
         What is likely before, weighed against the recordings by their noise: a muscle of the library, or
-        the file of a data sheet (`mckibben.muscles.prior_of`). Of one muscle.
+        a data sheet or its file (`mckibben.muscles.prior_of`). Of one muscle.
 
     Attributes
     ----------
@@ -151,7 +148,7 @@ class BalanceEstimator(CoupledEstimator):
     mass: bool = False
     ridge: Annotated[float, Interval(ge=0, le=1)] = 1e-6
     steps: Annotated[int, Interval(ge=0, le=1000)] = 25
-    prior: str | Path | InstanceOf[Prior] | None = None
+    prior: Told = None
 
     def data(
         self, recordings: Recording | Sequence[Recording], rows: Sequence[Mask] | None = None

@@ -23,7 +23,7 @@ from mckibben.estimators.core.data import TrainingData
 from mckibben.estimators.core.single import SingleEstimator
 from mckibben.estimators.core.uncertainty import unknown
 from mckibben.estimators.coupled.balance import BalanceEstimator
-from mckibben.estimators.coupled.base import FEWEST_SAMPLES
+from mckibben.estimators.coupled.balance_prior import Told, told_by
 from mckibben.estimators.optimisers.tracker import Tracker
 from mckibben.recording import Recording
 
@@ -36,7 +36,7 @@ class BalanceForceEstimator(SingleEstimator):
     ----------
     pressure : str
         Channel of the pressure.
-    n_stops, n_lags, elasticity, area, contact
+    n_stops, n_lags, elasticity, area, contact, prior
         As of `balance`.
     """
 
@@ -48,6 +48,7 @@ class BalanceForceEstimator(SingleEstimator):
     elasticity: Annotated[int, Interval(ge=1, le=9)] = 9
     area: Annotated[int, Interval(ge=0, le=6)] = 2
     contact: bool = True
+    prior: Told = None
 
     effort: ClassVar[float] = 1.0
     told: ClassVar[tuple[str, ...]] = ("pressure",)
@@ -68,13 +69,24 @@ class BalanceForceEstimator(SingleEstimator):
 
     def identify(self, data: TrainingData, tracker: Tracker) -> tuple[Block, TrainingData]:
         place, (pressure,) = data.inputs[0], data.scheduled
-        longest = data.input_range[1] if place.name.startswith("length") else None
-        displacement = Channel("displacement", place.unit)
+        balance = BalanceEstimator(
+            n_stops=self.n_stops,
+            n_lags=self.n_lags,
+            elasticity=self.elasticity,
+            area=self.area,
+            contact=self.contact,
+            prior=self.prior,
+        )
+        rest = None
+        if place.name.startswith("length"):
+            told = self.prior is not None
+            rest = told_by(self.prior).sheet.rest_length_mm if told else data.input_range[1]
+        displacement = place if rest is None else Channel("displacement", place.unit)
         runs = tuple(
             replace(
                 run,
                 driven=run.scheduled,
-                outputs=run.driven if longest is None else longest - run.driven,
+                outputs=run.driven if rest is None else rest - run.driven,
                 scheduled=run.outputs,
             )
             for run in data.runs
@@ -83,20 +95,14 @@ class BalanceForceEstimator(SingleEstimator):
             data,
             runs=runs,
             inputs=(pressure,),
-            outputs=(place if longest is None else displacement,),
+            outputs=(displacement,),
             scheduled=data.outputs,
-        ).stretches(FEWEST_SAMPLES - 1)
-        balance = BalanceEstimator(
-            n_stops=self.n_stops,
-            n_lags=self.n_lags,
-            elasticity=self.elasticity,
-            area=self.area,
-            contact=self.contact,
-        )
+            spans=balance.spans,
+        ).bridged()
         force = load_of(balance.find(muscle, tracker)[0])
-        if longest is None:
+        if rest is None:
             return force, data
-        shortening = Affine(-1.0, longest, place, displacement)
+        shortening = Affine(-1.0, rest, place, displacement)
         before = PerChannel((shortening, Affine(1.0, 0.0, pressure, pressure)))
         return Series((before, *(force.parts if isinstance(force, Series) else (force,)))), data
 

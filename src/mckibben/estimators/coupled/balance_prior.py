@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from pydantic import InstanceOf
 
 from mckibben.arrays import Array
 from mckibben.blocks.coupled.balance import Balance
@@ -16,6 +19,7 @@ from mckibben.estimators.coupled.balance_search import Search
 from mckibben.estimators.coupled.balance_structure import Structure
 from mckibben.estimators.optimisers.tracker import Tracker
 from mckibben.muscles.prior import Prior, prior_of
+from mckibben.muscles.sheet import Sheet
 from mckibben.muscles.traits import TIMES, traits
 
 STEP = 1e-5
@@ -143,12 +147,18 @@ def noise_of(errors: list[Array]) -> float:
     return float(np.sqrt(power / count * alike))
 
 
-def told_by(given: str | Path | Prior) -> Prior:
-    """Return a prior, or that of a muscle's name or a file."""
-    return given if isinstance(given, Prior) else prior_of(given)
+Told = str | Path | Sheet | InstanceOf[Prior] | None
+"""What a prior may be given as: a muscle's name, a file, a data sheet (as a mapping, too), or itself."""
 
 
-def believed(structure: Structure, given: str | Path | Prior) -> tuple[Structure, Belief]:
+def told_by(given: Any) -> Prior:
+    """Return a prior, or that of a muscle's name, a file or a data sheet."""
+    if isinstance(given, Prior):
+        return given
+    return prior_of(Sheet(**given) if isinstance(given, Mapping) else given)
+
+
+def believed(structure: Structure, given: Any) -> tuple[Structure, Belief]:
     """Return the structure that can be what is likely, and that belief.
 
     It knows all displacements and times that the muscle has, told by the recordings or not.

@@ -1,0 +1,32 @@
+"""Make all pages of measured recordings: python docs/measured/make.py FOLDER [PEERS].
+
+FOLDER holds the public recordings named in src/mckibben/measured/known. In turn: every model on every
+set (measured.md); the library of identified muscles (src/mckibben/muscles/library); what priors from it
+are worth (priors.txt); and, with the Python of an environment that has the peers
+(benchmarks/peers.txt), these beside ours (peers.md). Takes about an hour on two cores.
+"""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+HERE = Path(__file__).parent
+ROOT = HERE.parent.parent
+
+
+def main() -> None:
+    """Run one after another; what is finished of the first and the last is kept when stopped."""
+    folder, *peers = sys.argv[1:]
+    command = Path(sys.executable).with_name("mckibben")
+    subprocess.run([command, "measured", folder, "-o", HERE], check=True)
+    subprocess.run([sys.executable, HERE / "library.py", folder], check=True)
+    with (HERE / "priors.txt").open("w", encoding="utf-8") as file:
+        subprocess.run([sys.executable, HERE / "priors.py", folder], check=True, stdout=file)
+    for python in peers:
+        subprocess.run([python, ROOT / "benchmarks" / "peers.py", folder], check=True)
+
+
+if __name__ == "__main__":
+    main()

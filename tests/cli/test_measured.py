@@ -130,6 +130,23 @@ def test_a_set_that_cannot_be_read_is_said_and_the_rest_goes_on(folder: Path) ->
     assert "run.csv" in page(done, "it")
 
 
+def test_a_set_that_quick_models_do_not_fit_is_said_and_the_rest_goes_on(folder: Path) -> None:
+    (folder / "held").mkdir()
+    for seed, length in enumerate((150.0, 140.0, 150.0)):
+        pressure = recorded(seed)["pressure"]
+        held = {"pressure": pressure, "length": np.full(pressure.size, length)}
+        write(
+            Recording(held | {"force": 40.0 * pressure}, 0.02), folder / "held" / f"run{seed}.csv"
+        )
+    (folder / "held" / "channels.toml").write_text(
+        '[[split.tasks]]\ntest = ["run2"]\ninputs = ["length"]\noutputs = ["force"]\n'
+    )
+    wanted = [one for one in sets_in(folder) if one.name in ("held", "plain")]
+    held_, plain = outcomes(wanted, models="quick", jobs=1)
+    assert "no models to compare" in held_.reason
+    assert plain.board is not None
+
+
 @pytest.mark.parametrize(
     ("given", "said"),
     [
@@ -180,6 +197,18 @@ def test_the_command_writes_page_and_rows_and_goes_on(
     (out / "measured.md").write_text("mine")
     assert cli("measured", folder, "-o", out, "--models", "pi").code == 2
     assert (out / "measured.md").read_text() == "mine"
+
+
+@pytest.mark.parametrize("inside", ["", "plain"])
+def test_results_in_the_folder_are_no_set_of_the_next_run(
+    cli: Cli, folder: Path, inside: str
+) -> None:
+    given = folder / inside
+    for _ in range(2):
+        result = cli("measured", given, "-o", given / "page", "--models", "pi", "--jobs", "1")
+        assert result.code == 0, result.err
+        assert "## page" not in (given / "page" / "measured.md").read_text()
+        assert "pi, CV RMSE" in result.out
 
 
 @pytest.mark.parametrize(

@@ -48,6 +48,21 @@ def test_nearly_parallel_columns_are_solved_without_squaring_the_condition() -> 
     np.testing.assert_allclose([*x, offset], [2, 1, 5], rtol=1e-6)
 
 
+@pytest.mark.parametrize("nonnegative", [False, True])
+def test_a_column_that_varies_by_rounding_is_not_fitted_with(nonnegative: bool) -> None:
+    rng = np.random.default_rng(2)
+    moving = rng.standard_normal(200)
+    saturated = np.nextafter(np.tanh(20.3) + np.zeros(200), rng.integers(0, 3, 200))
+    x, offset = solve_linear(
+        np.column_stack([moving, saturated]),
+        2.0 * moving + 5 + rng.standard_normal(200),
+        nonnegative=nonnegative,
+    )
+    assert x[0] == pytest.approx(2.0, abs=0.3)
+    assert x[1] == 0.0
+    assert offset == pytest.approx(5.0, abs=0.3)
+
+
 @pytest.mark.parametrize("name", ["mpi", "cpi"])
 def test_moves_in_closed_form_are_those_of_finite_differences(name: str) -> None:
     time = np.arange(800) * 0.05

@@ -50,7 +50,7 @@ def measured(
     from mckibben.outputs import Results
     from mckibben.system import workers
 
-    sets = sets_in(folder)
+    sets = sets_in(folder, results=out)
     names = [one.name for one in sets]
     if unknown := [name for name in only or [] if name not in names]:
         raise DataError(

@@ -78,8 +78,9 @@ def _repeated(block: Block, recording: Recording, outputs: Sequence[str]) -> Arr
         return block.steady_state(recording).matrix(outputs)
     names = [channel.name for channel in block.inputs]
     twice = np.tile(recording.matrix(names), (2, 1))
-    found: Array = block.simulate(twice, sample_time=recording.sample_time)[len(recording) :]
-    return found
+    found = block.simulate(twice, sample_time=recording.sample_time)[len(recording) :]
+    given = [channel.name for channel in block.outputs]
+    return np.asarray(found[:, [given.index(name) for name in outputs]])
 
 
 def known_start(

@@ -216,7 +216,7 @@ def _checked(
     names = channels.inputs, channels.outputs
     training_data(recordings, *names, one_rate=channels.single)
     if others:
-        training_data([recordings[0], *others], *names, one_rate=channels.single)
+        training_data([*recordings, *others], *names, one_rate=channels.single)
     units = {name: recordings[0].units[name] for name in channels.outputs}
     if len(set(units.values())) > 1:
         raise DataError(

@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field, replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -215,8 +216,12 @@ def ranked(
             samples[model] = bootstrap.rmse(errors_on_test(tried.outputs, data))
         return samples[model]
 
+    @cache
+    def drift(model: str) -> Drift | None:
+        return _drift(finished[model].outputs, plan)
+
     def current() -> Ranking:
-        return _ranking(plan, finished, resampled)
+        return _ranking(plan, finished, resampled, drift)
 
     def tell() -> None:
         if progress is not None:
@@ -270,7 +275,10 @@ def _with_skill(tried: Tried, plan: Plan) -> Tried:
 
 
 def _ranking(
-    plan: Plan, finished: Mapping[str, Tried], resampled: Callable[[str, Tried], Array]
+    plan: Plan,
+    finished: Mapping[str, Tried],
+    resampled: Callable[[str, Tried], Array],
+    drift: Callable[[str], Drift | None],
 ) -> Ranking:
     done = [
         (tried.row, resampled(model, tried))
@@ -286,7 +294,7 @@ def _ranking(
             rmse_interval=interval(samples),
             difference_interval=interval(samples - done[0][1]),
             off_training=_off_training(row, finished[row.model].outputs, plan),
-            drift=_drift(finished[row.model].outputs, plan),
+            drift=drift(row.model),
         )
         for row, samples in done
     ]

@@ -124,7 +124,7 @@ def outcomes(
                 progress=progress,
             )
         except MckibbenError as error:
-            if isinstance(error, DataError) or models == "all":
+            if isinstance(error, DataError) or models in ("all", "quick"):
                 yield Outcome(one, left, task, None, reason=str(error))
                 continue
             raise

@@ -66,8 +66,14 @@ class Set:
             yield from task.parts()
 
 
-def sets_in(folder: Path) -> list[Set]:
+def sets_in(folder: Path, results: Path | None = None) -> list[Set]:
     """Return the sets of a folder: each folder in it with recordings, or itself.
+
+    Parameters
+    ----------
+    folder : Path
+    results : Path, optional
+        Where the page is written: no set, though a table of an earlier run be in it.
 
     Raises
     ------
@@ -78,7 +84,9 @@ def sets_in(folder: Path) -> list[Set]:
         raise DataError(
             "there is no such folder", file=folder, remedy="name a folder of recordings"
         )
-    places = sorted(one for one in folder.iterdir() if one.is_dir() and _has_recordings(one))
+    own = None if results is None else results.resolve()
+    places = sorted(one for one in folder.iterdir() if one.is_dir() and one.resolve() != own)
+    places = [one for one in places if _has_recordings(one)]
     places = places or ([folder] if _has_recordings(folder) else [])
     if not places:
         raise DataError(

@@ -24,6 +24,7 @@ from mckibben.estimators.core.single import SingleEstimator
 from mckibben.estimators.core.uncertainty import unknown
 from mckibben.estimators.coupled.balance import BalanceEstimator
 from mckibben.estimators.coupled.balance_prior import Told, told_by
+from mckibben.estimators.coupled.base import FEWEST_SAMPLES
 from mckibben.estimators.optimisers.tracker import Tracker
 from mckibben.recording import Recording
 
@@ -98,7 +99,7 @@ class BalanceForceEstimator(SingleEstimator):
             outputs=(displacement,),
             scheduled=data.outputs,
             spans=balance.spans,
-        ).bridged()
+        ).stretches(FEWEST_SAMPLES - 1)  # a force that does not count is not to be told as a load
         force = load_of(balance.find(muscle, tracker)[0])
         if rest is None:
             return force, data

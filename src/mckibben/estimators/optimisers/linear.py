@@ -7,6 +7,9 @@ from numpy.typing import NDArray
 
 from mckibben.arrays import Array
 
+CONSTANT = 1e-13
+"""Share of its mean below which what a column varies by is rounding, not to be fitted with."""
+
 
 def solve_linear(
     basis: Array,
@@ -46,6 +49,7 @@ def solve_linear(
     triangle: Array = np.linalg.qr(np.column_stack([basis - means, target - mean]), mode="r")  # type: ignore[assignment]
     scale = np.maximum(np.sqrt((triangle[:, :m] ** 2).sum(axis=0)), 1e-300)
     scaled, right = triangle[:, :m] / scale, triangle[:, m]
+    scaled[:, scale <= CONSTANT * np.sqrt(len(basis)) * np.abs(means)] = 0.0
     if nonnegative:
         floor = np.zeros(m) if least is None else least
         if (either := np.isneginf(floor)).any():

@@ -59,6 +59,16 @@ class Outcome:
         return f"{self.heading}, without {self.left_out}" if self.left_out else self.heading
 
     @property
+    def failed(self) -> str:
+        """Why no model was fitted; empty where one was."""
+        if self.board is None:
+            return self.reason
+        if any(row.test is not None for row in self.board.rows):
+            return ""
+        reasons = dict.fromkeys(row.reason for row in self.board.rows if row.reason)
+        return " ".join(reasons) or "no model has a place on these channels"
+
+    @property
     def regret(self) -> float | None:
         """Test RMSE of the model chosen over the least of all, less 1; None where none is chosen."""
         board = self.board

@@ -104,12 +104,21 @@ def prior_of(given: str | Path, *, without: Sequence[str] = ()) -> Prior:
         return of_muscles(muscles, load(given).sheet, load(given))
     content = parsed(path)
     if content.get("format") == FORMAT:
-        return of_muscles(muscles, load(path).sheet, load(path))
+        own = load(path)
+        return of_muscles(_with(own, muscles, without), own.sheet, own)
     try:
         sheet = Sheet.model_validate(content)
     except ValidationError as error:
         raise refused(error, path, "numbers of a data sheet") from None
-    return of_muscles(muscles, sheet, load(sheet.like) if sheet.like else None)
+    like = load(sheet.like) if sheet.like else None
+    return of_muscles(_with(like, muscles, without), sheet, like)
+
+
+def _with(own: Muscle | None, muscles: list[Muscle], without: Sequence[str]) -> list[Muscle]:
+    """Return the muscles that are asked: a user's own too, unless it is one of them already."""
+    if own is None or own.name in without or any(one.balance == own.balance for one in muscles):
+        return muscles
+    return [*(one for one in muscles if one.name != own.name), own]
 
 
 def of_muscles(muscles: Sequence[Muscle], sheet: Sheet, like: Muscle | None = None) -> Prior:

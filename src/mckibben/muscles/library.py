@@ -189,7 +189,7 @@ def parsed(path: Path) -> dict[str, Any]:
         If it cannot be read, or is no TOML.
     """
     try:
-        return tomllib.loads(read_text(path, most=DESCRIPTION))
+        return tomllib.loads(read_text(path, most=DESCRIPTION).removeprefix("\ufeff"))
     except (tomllib.TOMLDecodeError, RecursionError, ValueError) as error:
         raise DataError(f"it is no TOML: {error}", file=path, remedy="correct it there") from None
 

@@ -105,11 +105,10 @@ def test_the_page_has_every_figure_of_every_task(folder: Path) -> None:
     for one in done:
         assert one.board is not None
         (row,) = one.board.rows
+        assert f"| {one.label} | `gpi` |" in text
         if one.left_out:
-            assert f"without {one.left_out}" in text
             assert numeral(100 * row.test_error / one.span, 3) in text
         else:
-            assert f"| {one.heading} | `gpi` |" in text
             assert f"{row.test_error:.3g}" in text
     assert "| Somebody's (printed) | – | 0.5 |" in text
     assert "A sensor of volts." in text
@@ -150,10 +149,11 @@ def test_a_set_that_quick_models_do_not_fit_is_said_and_the_rest_goes_on(folder:
 @pytest.mark.parametrize(
     ("given", "said"),
     [
-        ({"cuts": 0.5}, "split.cuts"),
+        ({"cuts": 0.5}, "split.cuts is not known"),
         ({"tasks": [{"cut": 1.5}]}, "split.tasks.0.cut"),
         ({"tasks": [{"cut": 0.5, "test": ["a"]}]}, "one of test, leave_out and cut"),
         ({"tasks": []}, "split.tasks"),
+        ({"tasks": [{"name": "a"}, {"name": "a"}]}, "two tasks have the same name"),
         ({"resample": -1.0}, "split.resample"),
         ({"resample": float("nan")}, "split.resample"),
     ],
@@ -170,6 +170,43 @@ def test_patterns_that_match_nothing_are_refused_with_the_names_there_are(folder
     _, volts = sets_in(folder)
     with pytest.raises(DataError, match=r"run9.*run2, run3, run4"):
         parted(volts.split.tasks[0], volts.recordings(), volts.folder)
+
+
+def test_each_pattern_has_to_match_something(folder: Path) -> None:
+    text = (folder / "volts" / "channels.toml").read_text().replace('"run4"', '"run4", "run9"')
+    (folder / "volts" / "channels.toml").write_text(text)
+    _, volts = sets_in(folder)
+    with pytest.raises(DataError, match=r"run9.*run2, run3, run4"):
+        parted(volts.split.tasks[0], volts.recordings(), volts.folder)
+
+
+def test_titles_are_words_and_no_markdown(folder: Path) -> None:
+    path = folder / "volts" / "channels.toml"
+    path.write_text(path.read_text().replace('"By volts"', r'"a | b\n## <c>"'))
+    _, volts = sets_in(folder)
+    text = page(list(outcomes([volts], models=["pi"], jobs=1)), "it")
+    assert r"| a \| b \#\# \<c\>: last run | `pi` |" in text
+
+
+def test_results_among_recordings_are_refused(cli: Cli, folder: Path) -> None:
+    before = sorted(folder.rglob("*"))
+    for out in (folder, folder / "volts", folder / "measured"):
+        result = cli("measured", folder, "-o", out, "--models", "pi", "--jobs", "1")
+        assert result.code == 2
+        assert "read results as recordings" in result.err
+    assert sorted(folder.rglob("*")) == before
+
+
+def test_where_nothing_can_be_compared_is_bad_input(cli: Cli, folder: Path, tmp_path: Path) -> None:
+    path = folder / "volts" / "channels.toml"
+    given = "[split]\n[[split.tasks]]\nsettings = {pi = {n_operators = -5}}\n"
+    path.write_text(path.read_text().split("[split]")[0].rstrip() + "\n" + given)
+    words = ["-o", tmp_path / "out", "--only", "volts", "--models", "pi", "--jobs", "1"]
+    result = cli("measured", folder, *words)
+    assert result.code == 2
+    assert "volts: n_operators is -5" in result.out
+    assert "nothing could be compared" in result.err
+    assert "none: n_operators is -5" in (tmp_path / "out" / "measured.md").read_text()
 
 
 def test_descriptions_of_public_sets_are_sound() -> None:
@@ -197,18 +234,6 @@ def test_the_command_writes_page_and_rows_and_goes_on(
     (out / "measured.md").write_text("mine")
     assert cli("measured", folder, "-o", out, "--models", "pi").code == 2
     assert (out / "measured.md").read_text() == "mine"
-
-
-@pytest.mark.parametrize("inside", ["", "plain"])
-def test_results_in_the_folder_are_no_set_of_the_next_run(
-    cli: Cli, folder: Path, inside: str
-) -> None:
-    given = folder / inside
-    for _ in range(2):
-        result = cli("measured", given, "-o", given / "page", "--models", "pi", "--jobs", "1")
-        assert result.code == 0, result.err
-        assert "## page" not in (given / "page" / "measured.md").read_text()
-        assert "pi, CV RMSE" in result.out
 
 
 @pytest.mark.parametrize(

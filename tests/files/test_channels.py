@@ -14,6 +14,7 @@ import pytest
 import mckibben
 from mckibben import DataError, DataWarning, Recording
 from mckibben.files.channels import NAME, described
+from mckibben.measured.splits import split_of
 
 N = 60
 T = np.arange(N) / 50
@@ -190,6 +191,27 @@ def test_binary_and_other_than_files_are_refused(folder: Folder) -> None:
         mckibben.read(path)
 
 
+def test_editors_that_mark_the_byte_order_are_understood(folder: Folder) -> None:
+    path = folder()
+    plain = described(path)
+    (path / NAME).write_bytes(b"\xef\xbb\xbf" + (path / NAME).read_bytes())
+    assert described(path) == plain
+
+
+def test_what_was_corrected_meanwhile_counts(folder: Folder) -> None:
+    path = folder()
+    before = one(path / "run_load200g.csv")["pressure"]
+    (path / NAME).write_text(CHANNELS.replace("gain = 2.5", "gain = 5.0"))
+    after = one(path / "run_load200g.csv")["pressure"]
+    np.testing.assert_allclose(after - before, 2.5 * RAW * PSI)
+
+
+def test_as_many_files_as_folders_hold_are_told_apart(folder: Folder) -> None:
+    many = '[[files]]\nmatch = "a"\n' * 1001
+    with pytest.raises(DataError, match="at most 1000"):
+        described(folder(many))
+
+
 # Measured files, where they are at hand ---------------------------------------------------------
 
 
@@ -233,7 +255,8 @@ def test_measured_without_time(tmp_path: Path, measured: Callable[..., Path]) ->
 def test_what_the_documentation_shows_is_understood(tmp_path: Path) -> None:
     text = (Path(__file__).parents[2] / "docs" / "files.md").read_text(encoding="utf-8")
     shown = re.findall(r"```toml\n(.*?)```", text, re.DOTALL)
-    assert len(shown) == 2
+    assert len(shown) == 3
     for example in shown:
         (tmp_path / NAME).write_text(example)
-        assert described(tmp_path).files
+        said = described(tmp_path)
+        assert said.files or split_of(said.split).title

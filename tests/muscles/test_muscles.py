@@ -134,3 +134,46 @@ def test_a_sheet_names_muscles_that_are_not_asked() -> None:
     expected = of_muscles([one for one in muscles.list() if one.name != "rail"], OTHER)
     np.testing.assert_array_equal(prior_of(sheet).mean, expected.mean)
     assert prior_of(sheet).levels == prior_of(OTHER, without=["rail"]).levels == expected.levels
+
+
+def test_a_muscle_of_ones_own_is_asked_as_those_of_the_library(tmp_path: Path) -> None:
+    path = tmp_path / "own.toml"
+    own = replace(RAIL.balance, areas=rows((0.5 * np.array(RAIL.balance.areas)).tolist()))
+    path.write_text(described(replace(RAIL, balance=own)), encoding="utf-8")
+    area = PLACES["area"]
+    asked, not_asked = prior_of(path).mean[area], prior_of(path, without=["own"]).mean[area]
+    assert asked - load(path).traits[area] == pytest.approx(0.0, abs=0.5)
+    assert not_asked - asked > 0.2
+    path.write_text(path.read_text().replace("areas = [[", "areas = [[1"))
+    assert load(path).balance != own  # as it is now, not as it was
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("offset = [", "set_off = [", "uncertainty: .*offset"),
+        ("wall = [", "wall = [0.1, ", "uncertainty: .*wall"),
+        ("damping = [0", "damping = [-0", "uncertainty.damping"),
+        ("loads = [[1.0]]", "loads = [[0.0]]", "no muscle of this data sheet"),
+        ("areas = [[", "areas = [[-", "areas at rest"),
+        ('title = "', 'title = 1 # "', "title"),
+        ("version = 1", "version = 1\na = " + "[" * 10_000, "no TOML"),
+        ("version = 1", "version = 1" + "0" * 5_000, "no TOML"),
+    ],
+)
+def test_bad_muscles_are_refused_by_what_is_wrong(
+    tmp_path: Path, old: str, new: str, said: str
+) -> None:
+    text = described(RAIL)
+    assert old in text
+    (tmp_path / "bad.toml").write_text(text.replace(old, new, 1), encoding="utf-8")
+    with pytest.raises(DataError, match=rf"bad\.toml.*{said}") as caught:
+        prior_of(tmp_path / "bad.toml")
+    assert str(caught.value).count("Remedy") == 1
+
+
+def test_files_written_can_be_read_whatever_the_title(tmp_path: Path) -> None:
+    title = 'a "b" \\ \n\x1b\x7f ü'
+    path = tmp_path / "own.toml"
+    path.write_text(described(replace(RAIL, title=title)), encoding="utf-8")
+    assert load(path).title == title

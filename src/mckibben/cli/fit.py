@@ -75,9 +75,11 @@ def fit(
     from mckibben.comparison.offered import settings_of
     from mckibben.outputs import claim_model
 
-    claim_model(out, inputs=[*files, *(validation or [])], force=force)
     estimator_class = registry.load("estimators", model)
     given = settings_of(model, settings or [])
+    before = prior or given.get("prior")
+    sheets = [Path(before)] if isinstance(before, str) else []
+    claim_model(out, inputs=[*files, *(validation or []), *sheets], force=force)
     named = {"input": _one(input), "output": _one(output), "method": method, "prior": prior}
     given = {key: value for key, value in named.items() if value is not None} | given
     known = {field.name for field in fields(estimator_class)}

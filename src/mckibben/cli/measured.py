@@ -50,7 +50,7 @@ def measured(
     from mckibben.outputs import Results
     from mckibben.system import workers
 
-    sets = sets_in(folder, results=out)
+    sets = sets_in(folder)
     names = [one.name for one in sets]
     if unknown := [name for name in only or [] if name not in names]:
         raise DataError(
@@ -59,11 +59,17 @@ def measured(
             remedy=f"use one of {', '.join(names)}",
         )
     asked = [one for one in sets if only is None or one.name in only]
+    if out.resolve().is_relative_to(folder.resolve()):
+        raise DataError(
+            f"it is inside {folder}, where the next run would read results as recordings",
+            file=out,
+            remedy="give a folder elsewhere with -o",
+        )
     target = make_folder(out)
     if jobs != 1:
         workers.prepare()
     with stoppable(target):
-        results = Results(target, inputs=[], force=force)
+        results = Results(target, inputs=[one.folder for one in asked], force=force)
         results.claim([PAGE, ROWS])
         found: list[Outcome] = []
         with progress_bar("measured", plainly=True) as tell:
@@ -85,12 +91,17 @@ def measured(
         else:
             say(f"Written: {target / PAGE}, {target / ROWS}")
         forget_kept(target)
+        if all(one.failed for one in found):
+            raise DataError(
+                "nothing could be compared",
+                file=folder,
+                remedy=f"see the reasons in {target / PAGE}",
+            )
 
 
 def _say(one: Outcome, *, quiet: bool) -> None:
     if not quiet:
-        chosen = one.reason if one.board is None else one.board.chosen
-        say(f"{one.label}: {chosen}")
+        say(f"{one.label}: {one.failed or (one.board.chosen if one.board else '')}")
 
 
 def _told(one: Outcome) -> dict[str, object]:

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from fnmatch import fnmatchcase
+from functools import lru_cache
 from pathlib import Path
 from typing import Annotated, Any, Self
 
@@ -156,7 +157,7 @@ class Folder(Described):
         As it stands in the file; nothing here looks into it.
     """
 
-    files: list[Files] = []
+    files: Annotated[list[Files], Field(max_length=1000)] = []
     split: dict[str, Any] | None = None
 
     def of(self, name: str) -> Described:
@@ -231,15 +232,20 @@ _elsewhere: ContextVar[tuple[tuple[Path, Folder], ...]] = ContextVar("elsewhere"
 def description(path: Path) -> Folder:
     """Return what a description says, wherever it is; see `described`."""
     try:
-        found = Folder.model_validate(tomllib.loads(read_text(path, most=DESCRIPTION)))
-        for some in found.files:
-            found.of(some.match or (some.join or [""])[0])
+        return _understood(read_text(path, most=DESCRIPTION).removeprefix("\ufeff"))
     except (tomllib.TOMLDecodeError, RecursionError, ValueError) as error:
         raise DataError(
             _in_words(error),
             file=path,
             remedy="correct it; docs/files.md shows what can stand there",
         ) from None
+
+
+@lru_cache(maxsize=8)  # it is asked of every file in the folder
+def _understood(text: str) -> Folder:
+    found = Folder.model_validate(tomllib.loads(text))
+    for some in found.files:
+        found.of(some.match or (some.join or [""])[0])
     return found
 
 

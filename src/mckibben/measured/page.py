@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
 import numpy as np
@@ -46,14 +47,17 @@ CHOICE = """
 
 def page(outcomes: Sequence[Outcome], command: str) -> str:
     """Return the page, in Markdown."""
-    done = [one for one in outcomes if one.board and one.board.rows and not one.left_out]
+    compared = [one for one in outcomes if one.board and one.board.rows]
+    done = [one for one in compared if not one.left_out]
     lines = [HEAD.format(command=command)]
+    if compared:
+        lines += [CHOICE.strip("\n"), *(_choice(one) for one in compared)]
     if done:
-        lines += [CHOICE.strip("\n"), *(_choice(one) for one in done), OVERVIEW]
+        lines += [OVERVIEW]
         lines += [*_matrix(done, lambda one: one.heading)]
     for name in dict.fromkeys(one.set.name for one in outcomes):
         own = [one for one in outcomes if one.set.name == name]
-        lines += ["", f"## {own[0].set.title}", ""]
+        lines += ["", f"## {_inline(own[0].set.title)}", ""]
         if own[0].set.split.about:
             lines += [own[0].set.split.about.strip(), ""]
         for one in own:
@@ -77,6 +81,11 @@ def table(outcomes: Iterable[Outcome]) -> pd.DataFrame:
     return pd.concat(frames, ignore_index=True) if frames else pd.DataFrame()
 
 
+def _inline(text: str) -> str:
+    """Return words of a description as such: on one line, and nothing that Markdown would take up."""
+    return re.sub(r"([\\`*\[\]<>|#])", r"\\\1", " ".join(text.split()))
+
+
 def _tested(board: Leaderboard) -> list[Row]:
     return [row for row in board.rows if row.test is not None]
 
@@ -87,10 +96,11 @@ def _choice(one: Outcome) -> str:
     best, lowest = board.best, board.lowest
     seconds = f"{one.seconds:.0f} s"
     if best is None or lowest is None:
-        return f"| {one.heading} | none: {board.not_recommended} | | | | | {seconds} |"
+        why = _inline(board.not_recommended or one.failed)
+        return f"| {_inline(one.label)} | none: {why} | | | | | {seconds} |"
     above = "–" if lowest.model == best.model else f"{PER_CENT * (one.regret or 0.0):.0f} %"
     return (
-        f"| {one.heading} | `{best.model}` | {_figure(best, board)} | {best.test_rank} "
+        f"| {_inline(one.label)} | `{best.model}` | {_figure(best, board)} | {best.test_rank} "
         f"| `{lowest.model}` {_figure(lowest, board)} | {above} | {seconds} |"
     )
 
@@ -112,7 +122,7 @@ def _matrix(done: Sequence[Outcome], heading: Callable[[Outcome], str]) -> Itera
         ratios = [column[model] for column in beside if model in column]
         return -len(ratios), float(np.median(ratios))
 
-    yield "| model | " + " | ".join(heading(one) for one in done) + " |"
+    yield "| model | " + " | ".join(_inline(heading(one)) for one in done) + " |"
     yield "|---|" + "---:|" * len(done)
     for model in sorted(models, key=place):
         cells = [_cell(model, *both) for both in zip(done, shares, strict=True)]
@@ -131,7 +141,7 @@ def _cell(model: str, one: Outcome, column: Mapping[str, float]) -> str:
 
 def _in_turn(parts: Sequence[Outcome]) -> Iterator[str]:
     """Give the section of a task that leaves out in turn."""
-    yield f"### {parts[0].task.name or 'Each left out in turn'}"
+    yield f"### {_inline(parts[0].task.name) or 'Each left out in turn'}"
     yield ""
     done = [one for one in parts if one.board is not None and one.board.rows]
     if done:
@@ -146,7 +156,7 @@ def _in_turn(parts: Sequence[Outcome]) -> Iterator[str]:
 
 def _section(one: Outcome) -> Iterator[str]:
     if one.task.name:
-        yield f"### {one.task.name}"
+        yield f"### {_inline(one.task.name)}"
         yield ""
     board = one.board
     if board is None or not board.rows:
@@ -166,12 +176,18 @@ def _section(one: Outcome) -> Iterator[str]:
         given = row.to_dict()
         yield f"| `{row.model}` | " + " | ".join(column.text(given) for column in columns) + " |"
     for figure in one.task.published:
-        told = ", told the equations" if figure.told else ""
         cells = [f"{figure.rmse:g}" if column.key == "test" else "–" for column in columns]
-        yield f"| {figure.what}{told} (printed) | " + " | ".join(cells) + " |"
+        yield f"| {_inline(figure.what)} (printed) | " + " | ".join(cells) + " |"
     yield ""
-    notes = board.of_models
+    failed = [f"failed: `{row.model}`: {row.reason}" for row in board.rows if row.reason]
+    notes = [*_mended(one.notes), *board.of_models, *failed]
     yield from (f"- {note}" for note in notes)
-    yield from (f"- failed: `{row.model}`: {row.reason}" for row in board.rows if row.reason)
-    if notes or any(row.reason for row in board.rows):
+    if notes:
         yield ""
+
+
+def _mended(notes: Sequence[str]) -> Iterator[str]:
+    """Give what was mended in reading, that of the first file in full."""
+    if notes:
+        more = f" (and {len(notes) - 1} more of the kind)" if len(notes) > 1 else ""
+        yield f"as read: {notes[0]}{more}"

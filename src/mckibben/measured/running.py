@@ -38,6 +38,8 @@ class Outcome:
         Of the whole comparison, cross-validation and tests included.
     reason : str
         Why it failed.
+    notes : tuple of str
+        What was assumed or mended in reading, by recording.
     """
 
     set: Set
@@ -47,6 +49,7 @@ class Outcome:
     span: float = float("nan")
     seconds: float = float("nan")
     reason: str = ""
+    notes: tuple[str, ...] = ()
 
     @property
     def heading(self) -> str:
@@ -57,6 +60,16 @@ class Outcome:
     def label(self) -> str:
         """The same, with what is left out."""
         return f"{self.heading}, without {self.left_out}" if self.left_out else self.heading
+
+    @property
+    def failed(self) -> str:
+        """Why no model was fitted; empty where one was."""
+        if self.board is None:
+            return self.reason
+        if any(row.test is not None for row in self.board.rows):
+            return ""
+        reasons = dict.fromkeys(row.reason for row in self.board.rows if row.reason)
+        return " ".join(reasons) or "no model has a place on these channels"
 
     @property
     def regret(self) -> float | None:
@@ -134,4 +147,6 @@ def outcomes(
         span = max(
             float(np.ptp(np.concatenate([r[name] for r in tested]))) for name in board.outputs
         )
-        yield Outcome(one, left, task, board, span, time.perf_counter() - started)
+        seconds = time.perf_counter() - started
+        notes = tuple(f"{r.name}: {note}" for r in (*train, *test) for note in r.notes)
+        yield Outcome(one, left, task, board, span, seconds, notes=notes)

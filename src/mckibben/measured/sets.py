@@ -12,7 +12,7 @@ from mckibben.errors import DataError
 from mckibben.files import read
 from mckibben.files.channels import NAME, Folder, describing, description
 from mckibben.files.sources import inside
-from mckibben.measured.splits import FEWEST, Split, Task, split_of
+from mckibben.measured.splits import FEWEST, Split, Task, matches, split_of
 from mckibben.recording import Recording
 from mckibben.signals import resample
 
@@ -66,14 +66,8 @@ class Set:
             yield from task.parts()
 
 
-def sets_in(folder: Path, results: Path | None = None) -> list[Set]:
+def sets_in(folder: Path) -> list[Set]:
     """Return the sets of a folder: each folder in it with recordings, or itself.
-
-    Parameters
-    ----------
-    folder : Path
-    results : Path, optional
-        Where the page is written: no set, though a table of an earlier run be in it.
 
     Raises
     ------
@@ -84,9 +78,7 @@ def sets_in(folder: Path, results: Path | None = None) -> list[Set]:
         raise DataError(
             "there is no such folder", file=folder, remedy="name a folder of recordings"
         )
-    own = None if results is None else results.resolve()
-    places = sorted(one for one in folder.iterdir() if one.is_dir() and one.resolve() != own)
-    places = [one for one in places if _has_recordings(one)]
+    places = sorted(one for one in folder.iterdir() if one.is_dir() and _has_recordings(one))
     places = places or ([folder] if _has_recordings(folder) else [])
     if not places:
         raise DataError(
@@ -137,6 +129,14 @@ def parted(
     DataError
         If a side would be empty.
     """
+    called = sorted({one.name for one in recordings})
+    for pattern in (*task.files, *task.test):
+        if not any(matches(name, [pattern]) for name in called):
+            raise DataError(
+                f"no recording is called {pattern}: there are {', '.join(called)}",
+                file=where,
+                remedy="correct the patterns in [split]",
+            )
     taking = [one for one in recordings if task.about(one.name)]
     if task.cut is not None:
         cuts = [round(task.cut * len(one)) for one in taking]
@@ -153,10 +153,9 @@ def parted(
     train = [one for one in taking if not task.tests(one.name)]
     test = [one for one in taking if task.tests(one.name)]
     if not train or (task.test and not test):
-        names = ", ".join(sorted({one.name for one in recordings}))
+        side = "fitted" if not train else "tested on"
         raise DataError(
-            f"no recording is {'to be fitted' if not train else 'called ' + ' or '.join(task.test)}: "
-            f"there are {names}",
+            f"no recording is to be {side}: there are {', '.join(called)}",
             file=where,
             remedy="correct the patterns in [split]",
         )

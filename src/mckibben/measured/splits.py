@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from fnmatch import fnmatchcase
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
 
 from mckibben.comparison.planning import N_FOLDS
 from mckibben.errors import DataError
@@ -30,13 +30,10 @@ class Published(_Strict):
         The model, and whose.
     rmse : float
         In the unit of the task's output.
-    told : bool
-        Whether that model was told the equations that made the data.
     """
 
     what: str
     rmse: float
-    told: bool = False
 
 
 class Task(_Strict):
@@ -120,6 +117,13 @@ class Split(_Strict):
     period: Annotated[int, Field(ge=FEWEST)] | None = None
     tasks: Annotated[list[Task], Field(min_length=1)] = [Task()]
 
+    @field_validator("tasks")
+    @classmethod
+    def _told_apart(cls, tasks: list[Task]) -> list[Task]:
+        if len({task.name for task in tasks}) < len(tasks):
+            raise ValueError("two tasks have the same name: give each its own")
+        return tasks
+
 
 def split_of(given: dict[str, Any] | None, file: str = WHERE) -> Split:
     """Return a table ``split``, checked; one task with compare's own split where there is none.
@@ -134,9 +138,11 @@ def split_of(given: dict[str, Any] | None, file: str = WHERE) -> Split:
     except ValidationError as error:
         first = error.errors()[0]
         where = ".".join(str(step) for step in ("split", *first["loc"]))[:100]
-        said = first["msg"].removeprefix("Value error, ")[:300]
+        said = ": " + first["msg"].removeprefix("Value error, ")[:300]
+        if first["type"] == "extra_forbidden":
+            said = " is not known"
         raise DataError(
-            f"{where}: {said}",
+            f"{where}{said}",
             file=file,
             remedy="correct it; docs/files.md shows what can stand there",
         ) from None

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+import json
 import tomllib
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
 
 from mckibben.arrays import Array
 from mckibben.blocks.core.saving import from_dict, to_dict
@@ -53,8 +54,16 @@ class _File(BaseModel):
     virtual: bool
     sheet: Sheet
     conditions: Conditions
-    uncertainty: dict[str, tuple[float, ...]]
+    uncertainty: dict[str, tuple[Annotated[float, Field(ge=0)], ...]]
     balance: dict[str, Any]
+
+    @field_validator("uncertainty")
+    @classmethod
+    def _is_whole(cls, given: dict[str, tuple[float, ...]]) -> dict[str, tuple[float, ...]]:
+        if {name: len(values) for name, values in given.items()} != GROUPS:
+            wanted = ", ".join(f"{name} ({count})" for name, count in GROUPS.items())
+            raise ValueError(f"it has to hold {wanted}")
+        return given
 
 
 @dataclass(frozen=True)
@@ -125,10 +134,15 @@ def load(name: str | Path) -> Muscle:
                 remedy=f"use one of {', '.join(names())}, or a file that ends in .toml",
             )
         path = FOLDER / f"{name}.toml"
-    return _load(path.resolve())
+        return _own(path)
+    return _load(path)
 
 
 @cache
+def _own(path: Path) -> Muscle:
+    return _load(path)
+
+
 def _load(path: Path) -> Muscle:
     content = parsed(path)
     if content.get("format") != FORMAT or content.get("version") != VERSION:
@@ -143,16 +157,27 @@ def _load(path: Path) -> Muscle:
     except ValidationError as error:
         raise refused(error, path, "what a muscle's file holds") from None
     except ModelError as error:
-        raise DataError(
-            f"its balance: {error}", file=path, remedy="write it again by docs/measured/library.py"
-        ) from None
+        problem, _, remedy = str(error).partition(". Remedy: ")
+        remedy = remedy.removesuffix(".") or "correct it"
+        raise DataError(f"its balance: {problem}", file=path, remedy=remedy) from None
     assert isinstance(balance, Balance)
     errors = np.concatenate(
         [np.array(found.uncertainty[name], dtype=np.float64) for name in GROUPS]
     )
     fields = found.model_dump(include={"title", "source", "licence", "virtual"})
-    return Muscle(path.stem, **fields, sheet=found.sheet, conditions=found.conditions,
-                  balance=balance, errors=errors)  # fmt: skip
+    muscle = Muscle(path.stem, **fields, sheet=found.sheet, conditions=found.conditions,
+                    balance=balance, errors=errors)  # fmt: skip
+    try:
+        sound = bool(np.isfinite(muscle.traits[errors < UNSURE]).all())
+    except (ArithmeticError, LookupError):
+        sound = False
+    if not sound:
+        raise DataError(
+            "its balance is that of no muscle of this data sheet",
+            file=path,
+            remedy="correct [balance], or [sheet]",
+        )
+    return muscle
 
 
 def parsed(path: Path) -> dict[str, Any]:
@@ -164,8 +189,8 @@ def parsed(path: Path) -> dict[str, Any]:
         If it cannot be read, or is no TOML.
     """
     try:
-        return tomllib.loads(read_text(path, most=DESCRIPTION))
-    except tomllib.TOMLDecodeError as error:
+        return tomllib.loads(read_text(path, most=DESCRIPTION).removeprefix("\ufeff"))
+    except (tomllib.TOMLDecodeError, RecursionError, ValueError) as error:
         raise DataError(f"it is no TOML: {error}", file=path, remedy="correct it there") from None
 
 
@@ -194,7 +219,7 @@ def _toml(value: Any) -> str:
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, str):
-        return '"' + value.replace("\\", "\\\\").replace('"', '\\"') + '"'
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
     if isinstance(value, dict):
         return "{ " + ", ".join(f"{k} = {_toml(v)}" for k, v in value.items()) + " }"
     if isinstance(value, tuple | type([])):

@@ -100,19 +100,29 @@ def prior_of(given: str | Path | Sheet, *, without: Sequence[str] = ()) -> Prior
     """
     muscles = [muscle for muscle in all_muscles() if muscle.name not in without]
     if isinstance(given, Sheet):
-        asked = [muscle for muscle in muscles if muscle.name not in (given.without or ())]
-        return of_muscles(asked, given, load(given.like) if given.like else None)
+        without = (*without, *(given.without or ()))
+        like = load(given.like) if given.like else None
+        asked = [muscle for muscle in muscles if muscle.name not in without]
+        return of_muscles(_with(like, asked, without), given, like)
     path = Path(given)
     if path.suffix != ".toml":
         return of_muscles(muscles, load(given).sheet, load(given))
     content = parsed(path)
     if content.get("format") == FORMAT:
-        return of_muscles(muscles, load(path).sheet, load(path))
+        own = load(path)
+        return of_muscles(_with(own, muscles, without), own.sheet, own)
     try:
         sheet = Sheet.model_validate(content)
     except ValidationError as error:
         raise refused(error, path, "numbers of a data sheet") from None
     return prior_of(sheet, without=without)
+
+
+def _with(own: Muscle | None, muscles: list[Muscle], without: Sequence[str]) -> list[Muscle]:
+    """Return the muscles that are asked: a user's own too, unless it is one of them already."""
+    if own is None or own.name in without or any(one.balance == own.balance for one in muscles):
+        return muscles
+    return [*(one for one in muscles if one.name != own.name), own]
 
 
 def of_muscles(muscles: Sequence[Muscle], sheet: Sheet, like: Muscle | None = None) -> Prior:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -24,12 +25,15 @@ COMMANDS: dict[str, list[str]] = {
     "characterize": ["run.csv"],
     "fit": ["pi", "run.csv", "-o", "out.json"],
     "compare": ["run.csv", "--test", "two.csv", "--models", "pi", "--jobs", "1"],
+    "measured": ["sets", "-o", "out", "--models", "pi", "--jobs", "1"],
     "simulate": ["model.json", "run.csv", "-o", "out.csv"],
     "invert": ["model.json", "-o", "out.json"],
     "track": ["inverse.json", "--rig", "mas20-hanging", "--reference", "run.csv"],
     "plot": ["run.csv", "-o", "out.png"],
     "reproduce": ["multistate", "--quick", "--jobs", "1"],
     "info": ["run.csv"],
+    "muscles list": [],
+    "muscles show": ["rail"],
     "app": ["workspace", "--no-show"],
     "export c": ["model.json", "-o", "out"],
     "export fmu": ["model.json", "-o", "out.fmu", "--platforms", "none"],
@@ -107,6 +111,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
         u = triangle(np.arange(0, 4, 0.02), 4.0, peaks)
         y = GPI.example().simulate(u)
         write(Recording({"pressure": u, "displacement": y}, 0.02), place / name)
+    (place / "sets").mkdir()
+    shutil.copy(place / "run.csv", place / "sets")
     GPI.example().save(place / "model.json")
     GPI.example().inverse().save(place / "inverse.json")
     return place

@@ -317,5 +317,7 @@ def _rms(residual: Array) -> Array:
 
 def resting(recordings: Sequence[Recording], inputs: Sequence[str]) -> str | None:
     """Return why nothing can be learned of what inputs do, if all rest in every recording; else None."""
-    moving = any(name in r and np.ptp(r[name]) > 0 for r in recordings for name in inputs)
-    return None if moving else f"{' and '.join(inputs)} rests in every recording"
+    known = [r[name] for r in recordings for name in inputs if name in r]
+    if not known or any(np.ptp(values) > 0 for values in known):
+        return None
+    return f"{' and '.join(inputs)} rests in every recording"

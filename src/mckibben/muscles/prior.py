@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 from pydantic import ValidationError
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 from mckibben.arrays import Array
 from mckibben.errors import DataError
@@ -186,7 +186,7 @@ def _spreads(table: Array) -> tuple[float, float]:
     level = away.sum(axis=1) / told.sum(axis=1)
     shape = np.where(told, away - level[:, np.newaxis], 0.0)
     free = n - 1
-    new = (1.0 + 1.0 / n) * float(student.ppf(MIDDLE, free)) ** 2
+    new = (1.0 + 1.0 / n) * float(stdtrit(free, MIDDLE)) ** 2
     of_level = float(np.sqrt(new * (level - level.mean()) @ (level - level.mean()) / free))
     of_shape = float(np.sqrt(new * (shape**2).sum() / max((table.shape[1] - 1) * free, 1)))
     return max(of_level, ALIKE), max(of_shape, ALIKE)

@@ -50,9 +50,11 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
-for command in (study, characterize, fit, compare, simulate, invert, track, plot, reproduce, info):
+for command in (
+    *(study, characterize, fit, compare, simulate, invert, track, plot, reproduce, info),
+    measured,
+):
     app.command()(command)
-app.command()(measured)
 app.command("check-block")(check_block)
 app.command("app")(workbench)
 app.add_typer(export_app)

@@ -8,11 +8,12 @@ from importlib import resources
 from pathlib import Path
 
 from mckibben.comparison.free_run import PERIODIC
+from mckibben.comparison.splits import FEWEST
 from mckibben.errors import DataError
 from mckibben.files import read
 from mckibben.files.channels import NAME, Folder, describing, description
 from mckibben.files.sources import inside
-from mckibben.measured.splits import FEWEST, Split, Task, matches, split_of
+from mckibben.measured.splits import Split, Task, matches, split_of
 from mckibben.recording import Recording
 from mckibben.signals import resample
 

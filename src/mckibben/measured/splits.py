@@ -9,12 +9,10 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
 
 from mckibben.comparison.planning import N_FOLDS
+from mckibben.comparison.splits import FEWEST
 from mckibben.errors import DataError
 
 WHERE = "channels.toml"
-
-FEWEST = 10
-"""Samples on either side of a cut, and of a period."""
 
 
 class _Strict(BaseModel):

@@ -308,6 +308,20 @@ class Estimator(Parametrised, ABC):
         return tuple(np.flatnonzero(block.pack() == 0).tolist())
 
 
+class ErrorsUnknown:
+    """What an estimator inherits first whose fits do not tell how sure parameters are."""
+
+    def uncertainty(
+        self, block: Block, data: TrainingData, residual: Array, at_bounds: Sequence[int]
+    ) -> tuple[float, Array]:
+        """Return that neither condition nor covariance is known."""
+        return np.nan, unknown(block)
+
+    def undetermined(self) -> tuple[int, ...]:
+        """Return none, since it is not known."""
+        return ()
+
+
 def _rms(residual: Array) -> Array:
     """Return the root mean square of every column."""
     with np.errstate(over="ignore", invalid="ignore"):  # a model that overflows has no finite error

@@ -10,18 +10,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Annotated, ClassVar
 
-import numpy as np
 from annotated_types import Interval
 
-from mckibben.arrays import Array
 from mckibben.blocks.compose import PerChannel, Series
 from mckibben.blocks.core.block import Block
 from mckibben.blocks.core.fields import Channel
 from mckibben.blocks.coupled.load_estimate import load_of
 from mckibben.blocks.memoryless.affine import Affine
 from mckibben.estimators.core.data import TrainingData
+from mckibben.estimators.core.estimator import ErrorsUnknown
 from mckibben.estimators.core.single import SingleEstimator
-from mckibben.estimators.core.uncertainty import unknown
 from mckibben.estimators.coupled.balance import BalanceEstimator
 from mckibben.estimators.coupled.balance_prior import Told, told_by
 from mckibben.estimators.coupled.base import FEWEST_SAMPLES
@@ -30,7 +28,7 @@ from mckibben.recording import Recording
 
 
 @dataclass(kw_only=True, repr=False, eq=False)
-class BalanceForceEstimator(SingleEstimator):
+class BalanceForceEstimator(ErrorsUnknown, SingleEstimator):
     """Force by length or displacement and pressure, from a balance of forces.
 
     Parameters
@@ -106,13 +104,3 @@ class BalanceForceEstimator(SingleEstimator):
         shortening = Affine(-1.0, rest, place, displacement)
         before = PerChannel((shortening, Affine(1.0, 0.0, pressure, pressure)))
         return Series((before, *(force.parts if isinstance(force, Series) else (force,)))), data
-
-    def uncertainty(
-        self, block: Block, data: TrainingData, residual: Array, at_bounds: Sequence[int]
-    ) -> tuple[float, Array]:
-        """Return that neither is known: the balance's are those of displacements."""
-        return np.nan, unknown(block)
-
-    def undetermined(self) -> tuple[int, ...]:
-        """Return none, since it is not known."""
-        return ()

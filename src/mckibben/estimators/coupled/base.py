@@ -10,13 +10,11 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from mckibben.arrays import Array
 from mckibben.blocks.core.block import Block
 from mckibben.errors import DataError
 from mckibben.estimators.core.checking import training_data
 from mckibben.estimators.core.data import Mask, TrainingData
-from mckibben.estimators.core.estimator import Estimator, resting
-from mckibben.estimators.core.uncertainty import unknown
+from mckibben.estimators.core.estimator import ErrorsUnknown, Estimator, resting
 from mckibben.estimators.optimisers.tracker import Tracker
 from mckibben.recording import Recording
 
@@ -28,7 +26,7 @@ FEWEST_SAMPLES = 50
 
 
 @dataclass(kw_only=True, repr=False, eq=False)
-class CoupledEstimator(Estimator):
+class CoupledEstimator(ErrorsUnknown, Estimator):
     """Settings common to all estimators of several inputs and outputs.
 
     Parameters
@@ -172,16 +170,6 @@ class CoupledEstimator(Estimator):
     @abstractmethod
     def identify(self, data: TrainingData, tracker: Tracker) -> Block:
         """Return the block found."""
-
-    def uncertainty(
-        self, block: Block, data: TrainingData, residual: Array, at_bounds: Sequence[int]
-    ) -> tuple[float, Array]:
-        """Return that neither is known: these models have hundreds of parameters."""
-        return np.nan, unknown(block)
-
-    def undetermined(self) -> tuple[int, ...]:
-        """Return none, since it is not known."""
-        return ()
 
 
 def driving(recording: Recording) -> tuple[str, ...]:

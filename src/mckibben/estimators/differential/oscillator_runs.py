@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import islice
 
 import numpy as np
@@ -14,7 +15,7 @@ from mckibben.errors import ModelError
 from mckibben.estimators.core.data import TrainingData
 from mckibben.estimators.differential.oscillator_slopes import OWN
 from mckibben.estimators.dynamic.paths import Path
-from mckibben.estimators.optimisers.descent import Damping, damped, descend
+from mckibben.estimators.optimisers.descent import Damping, descend, marquardt
 from mckibben.estimators.optimisers.tracker import Tracker
 
 FIRST_DAMPING, HEAVIEST = 1e-3, 1e9
@@ -46,11 +47,6 @@ class Way:
     n_positive: int
     follows: Callable[..., None]
     at_rest: bool
-
-
-def steady(theta: Array, slopes: Array, errors: Array, damping: float) -> Iterable[Array]:
-    """Return where a damped step leads that leaves alone what next to nothing depends on."""
-    return (theta + damped(slopes, errors, damping, FLOOR),)
 
 
 class FreeRuns:
@@ -105,7 +101,7 @@ class FreeRuns:
 
     def descended(self, steps: int, least_gain: float) -> tuple[Oscillator, float]:
         """Return the model at the end of a descent, and its RMSE."""
-        trust = Damping(FIRST_DAMPING, HEAVIEST, steps=steady)
+        trust = Damping(FIRST_DAMPING, HEAVIEST, steps=partial(marquardt, floor=FLOOR))
         start = self.coordinates(self.template)
         path = descend(self.errors, self.slopes, start, trust, least_gain=least_gain)
         with self.tracker.searching():

@@ -7,7 +7,7 @@ left to the descent, whose derivatives are exact.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import islice
@@ -31,7 +31,7 @@ from mckibben.estimators.dynamic.linear_oscillator import (
 )
 from mckibben.estimators.dynamic.paths import averaged, paths
 from mckibben.estimators.dynamic.state_network_slopes import follow_network
-from mckibben.estimators.optimisers.descent import Damping, damped, descend
+from mckibben.estimators.optimisers.descent import Damping, descend, marquardt
 from mckibben.estimators.optimisers.tracker import Tracker
 
 ANGLE = 1 / 3
@@ -97,7 +97,7 @@ class StateNetworkEstimator(SingleEstimator):
             search.errors,
             search.slopes,
             template.pack(),
-            Damping(FIRST_DAMPING, HEAVIEST, steps=steady),
+            Damping(FIRST_DAMPING, HEAVIEST, steps=partial(marquardt, floor=FLOOR)),
             least_gain=LEAST_GAIN,
         )
         with tracker.searching():
@@ -166,11 +166,6 @@ class StateNetworkEstimator(SingleEstimator):
         power = float(residual @ residual) / max(residual.size - size.size, 1)
         repeats = residual.size / merged.target.size
         return condition, power / repeats * inverse * np.outer(size, size)
-
-
-def steady(theta: Array, slopes: Array, errors: Array, damping: float) -> Iterable[Array]:
-    """Return where a damped step leads that leaves alone what next to nothing depends on."""
-    return (theta + damped(slopes, errors, damping, FLOOR),)
 
 
 class NetworkRuns:

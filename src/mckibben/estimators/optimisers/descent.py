@@ -131,9 +131,11 @@ class Radius(Trust):
         return not ratio > 0.25
 
 
-def marquardt(theta: Array, slopes: Array, errors: Array, damping: float) -> Iterable[Array]:
-    """Return where the damped step leads."""
-    return (theta + damped(slopes, errors, damping),)
+def marquardt(
+    theta: Array, slopes: Array, errors: Array, damping: float, floor: float = 0.0
+) -> Iterable[Array]:
+    """Return where the damped step leads; see `damped`."""
+    return (theta + damped(slopes, errors, damping, floor),)
 
 
 class Damping(Trust):

@@ -19,7 +19,6 @@ from .blocks.play_type.rate_dependent_pi import RateDependentPI as RateDependent
 from .characterization import characterize as characterize
 from .comparison.orders import identify as identify
 from .comparison.ranking import compare as compare
-from .comparison.studying import study as study
 from .errors import DataError as DataError
 from .errors import DataWarning as DataWarning
 from .errors import MckibbenError as MckibbenError
@@ -37,6 +36,7 @@ from .report import write_report as write_report
 from .rigs import Rig as Rig
 from .rigs import check_rig as check_rig
 from .rigs import load_rig as load_rig
+from .studying.study import study as study
 from .version import __version__ as __version__
 
 __all__: list[str]

@@ -16,11 +16,11 @@ from mckibben.blocks.play_type.gpi import GPI
 from mckibben.blocks.play_type.pi import PI
 from mckibben.blocks.play_type.rate_dependent_pi import RateDependentPI
 from mckibben.characterization import characterize
-from mckibben.comparison.inverting import InverseCheck, check_inverse
 from mckibben.comparison.results import Leaderboard, Memory, Row
-from mckibben.comparison.studying import Study
 from mckibben.metrics import score
 from mckibben.recording import Recording
+from mckibben.studying.inverting import InverseCheck, check_inverse
+from mckibben.studying.study import Study
 
 Array = NDArray[np.float64]
 

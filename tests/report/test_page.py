@@ -12,9 +12,9 @@ import pytest
 
 from mckibben.blocks.play_type.gpi import GPI
 from mckibben.blocks.play_type.pi import PI
-from mckibben.comparison.studying import Study
 from mckibben.report import write_report
 from mckibben.report.page import page
+from mckibben.studying.study import Study
 from tests.report.studies_by_hand import measured, models, renamed, study
 
 SECTIONS = (

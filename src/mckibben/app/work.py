@@ -98,8 +98,8 @@ def loop(workspace: Workspace, given: dict[str, Any], tell: Tell) -> str:
 
 def report(workspace: Workspace, given: dict[str, Any], tell: Tell) -> str:
     """Study the recordings with chosen models, and write the report."""
-    from mckibben.comparison.studying import study
     from mckibben.report import write_report
+    from mckibben.studying.study import study
 
     found = study(
         workspace.with_role("train"),

@@ -16,7 +16,7 @@ from mckibben.cli.stopping import forget_kept, stop_short, stoppable
 from mckibben.numerals import numeral
 
 if TYPE_CHECKING:
-    from mckibben.comparison.studying import Study
+    from mckibben.studying.study import Study
 
 
 @spread
@@ -44,9 +44,9 @@ def study(
     folder = make_folder(out)
     with stoppable(folder):
         begun = asked.begin(files, reading, folder, study_files)
-        from mckibben.comparison.studying import study as find
         from mckibben.recording import notes_by_file
         from mckibben.report import StudyFolder
+        from mckibben.studying.study import study as find
 
         results = StudyFolder(begun.results or folder)
 

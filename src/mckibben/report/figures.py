@@ -17,7 +17,7 @@ from mckibben.report.drawing import N_COLOURS, Drawing, Panel, left_out
 from mckibben.report.shown import Shown, shown, unique
 
 if TYPE_CHECKING:
-    from mckibben.comparison.studying import Study
+    from mckibben.studying.study import Study
 
 
 def time(study: Study) -> Drawing:

@@ -26,9 +26,9 @@ from mckibben.report.drawing import (
 )
 
 if TYPE_CHECKING:
-    from mckibben.comparison.inverting import InverseCheck
     from mckibben.comparison.results import Leaderboard
     from mckibben.control import Tracked
+    from mckibben.studying.inverting import InverseCheck
 
 OFF_THE_CHART = 3.0
 """Cross-validated errors beyond so many times the largest test error would squeeze all others."""

@@ -13,7 +13,7 @@ from mckibben.report.shown import Shown, drawn, shown, unique
 
 if TYPE_CHECKING:
     from mckibben.comparison.results import Leaderboard, Row
-    from mckibben.comparison.studying import Study
+    from mckibben.studying.study import Study
 
 N_VALUES = 180_000
 """Numbers in all plots together, so that the file stays under 6 MB beside plotly.js."""

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from mckibben.comparison.results import Leaderboard
-    from mckibben.comparison.studying import Study
+    from mckibben.studying.study import Study
 
 PAGE_SHARE = 0.1
 """Share of the time that may go into pages which the next model makes old."""

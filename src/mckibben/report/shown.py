@@ -12,7 +12,7 @@ from mckibben.arrays import Array
 from mckibben.recording import Recording
 
 if TYPE_CHECKING:
-    from mckibben.comparison.studying import Study
+    from mckibben.studying.study import Study
 
 MOST_RECORDINGS = 6
 """Recordings with figures of their own; the others are named."""

@@ -13,8 +13,8 @@ from mckibben.numerals import numeral, typeset
 
 if TYPE_CHECKING:
     from mckibben.comparison.results import Leaderboard, Row
-    from mckibben.comparison.studying import Study
     from mckibben.recording import Recording
+    from mckibben.studying.study import Study
 
 WORSE_ON_TEST = 1.5
 """Test error over training error from which more varied data are asked for."""

@@ -11,8 +11,6 @@ from typing import Any
 from mckibben.arrays import Array
 from mckibben.characterization import Characterization, characterize
 from mckibben.comparison.channels import Names
-from mckibben.comparison.inverting import InverseCheck, invert_best
-from mckibben.comparison.loops import closed_loops, published_rig
 from mckibben.comparison.planning import Settings, plan_of
 from mckibben.comparison.ranking import ranked
 from mckibben.comparison.results import Leaderboard
@@ -21,6 +19,8 @@ from mckibben.comparison.standing import Standing
 from mckibben.control import Tracked
 from mckibben.errors import DataError
 from mckibben.recording import Recording
+from mckibben.studying.inverting import InverseCheck, invert_best
+from mckibben.studying.loops import closed_loops, published_rig
 
 
 @dataclass(frozen=True)

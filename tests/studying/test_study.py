@@ -8,9 +8,9 @@ import pytest
 from mckibben import GPI, PI, ModelError, Recording, study
 from mckibben.blocks.core.block import Block
 from mckibben.blocks.core.fields import Channel
-from mckibben.comparison.inverting import check_inverse, invert_best
-from mckibben.comparison.loops import closed_loops
 from mckibben.signals import irregular_triangle, triangle
+from mckibben.studying.inverting import check_inverse, invert_best
+from mckibben.studying.loops import closed_loops
 
 TIME = np.arange(0, 24, 0.02)
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from mckibben.arrays import Array
 from mckibben.comparison.recommending import CONSTANT
-from mckibben.comparison.results import Row
+from mckibben.comparison.row import Row
 from mckibben.comparison.splits import Mask
 from mckibben.comparison.trying import (
     Data,

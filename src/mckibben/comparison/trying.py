@@ -18,7 +18,7 @@ from mckibben.comparison.cluster import outcomes_outside, outer_backend, process
 from mckibben.comparison.free_run import run_free
 from mckibben.comparison.memory_test import memory_test
 from mckibben.comparison.offered import objections
-from mckibben.comparison.results import Row
+from mckibben.comparison.row import Row
 from mckibben.comparison.splits import Fold, Mask, Split
 from mckibben.errors import MckibbenError
 from mckibben.estimators.optimisers.tracker import Progress, whole_searches
@@ -238,6 +238,7 @@ def joined(parts: Sequence[Tried], names: Sequence[str]) -> Tried:
         whole.row,
         validation_rmse=rms_of(parts),
         validation_by_output=dict(zip(names, by_output, strict=False)),
+        squares=tuple(piece for piece in squares if piece is not None),
     )
     return replace(whole, row=row, squares=squares)
 
@@ -245,6 +246,12 @@ def joined(parts: Sequence[Tried], names: Sequence[str]) -> Tried:
 def squares_of(errors: Array) -> list[tuple[float, ...]]:
     """Return the sums of squared errors (n, k) of consecutive pieces."""
     return [tuple((piece**2).sum(axis=0).tolist()) for piece in np.array_split(errors, PIECES)]
+
+
+def counts_of(data: Data) -> list[int]:
+    """Return how many samples every piece of the cross-validation has, in the order of squares."""
+    tested = [int(rows.sum()) for fold in data.folds for rows in fold.test_rows]
+    return [len(piece) for n in tested for piece in np.array_split(np.empty(n), PIECES)]
 
 
 def rms_by_output(parts: Sequence[Tried]) -> list[float]:

@@ -12,7 +12,8 @@ from mckibben.report.drawing import N_COLOURS, POINTS, Drawing, series_colour
 from mckibben.report.shown import Shown, drawn, shown, unique
 
 if TYPE_CHECKING:
-    from mckibben.comparison.results import Leaderboard, Row
+    from mckibben.comparison.results import Leaderboard
+    from mckibben.comparison.row import Row
     from mckibben.studying.study import Study
 
 N_VALUES = 180_000

@@ -33,7 +33,7 @@ def info(
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """List the models, or say what files hold, and what recordings cannot tell before anything is fitted."""
+    """List the models, or say what files hold, and what recordings cannot tell of a muscle."""
     if models:
         _models(as_json)
     elif not files:
@@ -104,9 +104,7 @@ def _untold(
         return str(error)
 
 
-def _recordings(
-    recordings: list[Recording], gaps: tuple[Gap, ...] | str, as_json: bool
-) -> None:
+def _recordings(recordings: list[Recording], gaps: tuple[Gap, ...] | str, as_json: bool) -> None:
     described: list[dict[str, Any]] = [
         {
             "name": recording.name,
@@ -142,6 +140,8 @@ def _recordings(
     if isinstance(gaps, str):
         say(f"What they cannot tell is not known: {gaps}")
         return
-    say("What these recordings cannot tell:" if gaps else "These recordings tell what they need to.")
+    say(
+        "What these recordings cannot tell:" if gaps else "These recordings tell what they need to."
+    )
     for gap in gaps:
         say(f"- {gap}")

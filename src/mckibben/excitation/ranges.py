@@ -81,8 +81,8 @@ def _clipped(seen: Seen, name: str) -> Iterator[Gap]:
         if longest >= CLIPPED:
             yield Gap(
                 "clipped",
-                f"What happens {word} {value(end, seen.unit(name))} cannot be told: {name} is stuck "
-                f"there for up to {counted(longest, 'sample')}, without noise, as a sensor at its limit.",
+                f"What happens {word} {value(end, seen.unit(name))} cannot be told: {name} is "
+                f"stuck there for up to {counted(longest, 'sample')}, without noise, as at a limit.",
                 f"Record with a sensor of a wider range, or keep {name} "
                 f"{'below' if word == 'above' else 'above'} that.",
                 "every model near that end: the time spent there pulls gains and thresholds",

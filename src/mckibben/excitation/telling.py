@@ -89,7 +89,7 @@ def untold(
     if model is not None:
         from mckibben.excitation.parameters import parameters
 
-        gaps += parameters(listed, model)
+        gaps += parameters(listed, model, facts=facts)
     return tuple(sorted(gaps, key=lambda gap: -gap.severity))
 
 

@@ -188,6 +188,9 @@ def study(
             raise
         return replace(so_far, leaderboard=replace(so_far.leaderboard, stopped=True))
     board = so_far.leaderboard
+    if board.best is not None and board.best.block is not None:
+        told = untold(recordings, channels.inputs, channels.outputs, board.best.block, tests=tests)
+        so_far = replace(so_far, untold=told)
     if channels.single:
         so_far = replace(so_far, inverse=invert_best(board, recordings[0]))
     else:

@@ -52,8 +52,8 @@ def _repeats(seen: Seen, name: str) -> bool:
     ]
     if len(pairs) < 2:
         return False
-    apart, _ = cKDTree(pairs).query(pairs, k=2, p=np.inf)
-    return bool(apart[:, 1].min() <= 1.0)
+    known = np.array(pairs)
+    return bool(cKDTree(known).count_neighbors(cKDTree(known), 1.0, p=np.inf) > len(known))
 
 
 def _signature(one: Branch, other: Branch, reach: float) -> list[float]:

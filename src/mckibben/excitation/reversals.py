@@ -83,8 +83,8 @@ def _side(seen: Seen, name: str, above: bool) -> Gap:
     if inside:
         where = f"only {inside} of its {side} turning points {'is' if inside == 1 else 'are'} there"
     elif turns.size:
-        ends = (scale.low + float(turn) * scale.span for turn in (turns.min(), turns.max()))
-        where = f"its {side} turning points are at {between(*ends, unit)}"
+        low, high = (scale.low + float(turn) * scale.span for turn in (turns.min(), turns.max()))
+        where = f"its {side} turning points are at {between(low, high, unit)}"
     else:
         where = f"it has no {side} turning point"
     return Gap(

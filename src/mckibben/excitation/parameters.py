@@ -167,7 +167,7 @@ def _gap(
         f"{what[0].upper()}{what[1:]}: the standard error of the former is {size}."
         if partner
         else f"{what[0].upper()}{what[1:]}: its standard error is {size}.",
-        f"{words}{'' if times == 1 else f', {times} times'}: its standard error would be about "
+        f"{words}{'' if times == 1 else f', {times} times'}, which would bring it to about "
         f"{value(100 * after)} %.",
         f"{meaning}, and what it is used for away from these recordings",
         0.3 + 0.15 * min(2.0, np.log10(error / LOOSE)),

@@ -17,6 +17,9 @@ SAMPLES = 1500
 SHAPE = np.array([0.0, 1.0, 0.0, 1.0, 0.0])
 TURNS = np.array([0.0, 1.0, 0.1, 0.9, 0.2, 0.8, 0.3, 0.7, 0.4, 0.6, 0.5])
 HOLDS = np.array([0.0, 0.3, 0.3, 1.0, 0.7, 0.7, 1.0, 0.3, 0.3, 0.0, 0.7, 0.7])
+WAYS: Array = np.arange(5, dtype=np.float64)
+"""Instants of `SHAPE`, in crossings of the range."""
+
 HELD = 30.0
 """How long a hold is [s]."""
 
@@ -101,7 +104,7 @@ def proposals(
         for factor in (0.2, 5.0):
             speed = value(float(f"{factor * float(speeds[0] or 0.0):.0e}"), f"{unit}/s")
             words = f"Cycle {names}{in_turn} twice over {over} at {speed}"
-            yield made(words, SHAPE, np.arange(5.0) * (cycle / factor), middle)
+            yield made(words, SHAPE, cycle / factor * WAYS, middle)
         times, at = [0.0], 0.0
         for one, other in pairwise(HOLDS):
             at += HELD if one == other else max(0.02 * HELD, 0.2 * cycle * abs(other - one))

@@ -63,7 +63,7 @@ def lag(u: Array, seconds: float, step: float = STEP) -> Array:
 def muscle(u: Array, force: float | Array = 0.0, slow: float = 1.0) -> Array:
     """Return the displacement of a muscle that remembers, lags and gives way."""
     remembered = PI(thresholds=(0.0, 0.15, 0.4), weights=(5.0, 2.0, 1.0)).simulate(u)
-    return remembered + 0.4 * lag(u, slow) - 0.05 * force
+    return remembered + (0.4 if slow < 10 else 3.0) * lag(u, slow) - 0.05 * force
 
 
 def run(
@@ -165,7 +165,7 @@ def nothing_twice() -> list[Recording]:
     rng = np.random.default_rng(0)
     legs = [
         (float(x), float(s), 0.0)
-        for x, s in zip(rng.uniform(0, 4, 12), np.geomspace(0.1, 3, 12), strict=True)
+        for x, s in zip(rng.uniform(0, 4, 24), np.geomspace(0.1, 3, 24), strict=True)
     ]
     u = drive([(4.0, 0.3, 0.0), *legs, (0.0, 0.7, 15.0), (2.0, 0.9, 15.0)])
     return [run(u[: u.size // 2], 50.0), run(u[u.size // 2 :], 150.0)]
@@ -349,19 +349,176 @@ def test_a_test_stand_whose_length_is_held() -> None:
 # -- that what is said is true --------------------------------------------------------------------
 
 
-def spread(
-    columns: Callable[[Recording], Array], runs: Sequence[Recording], seeds: int = 12
-) -> Array:
-    """Return the relative spread over noise of what least squares find of the last column, weight 1."""
-    design = np.vstack([columns(one) for one in runs])
-    rng = np.random.default_rng(0)
-    truth = design.sum(axis=1)
-    found = [
-        np.linalg.lstsq(design, truth + 0.02 * rng.standard_normal(len(truth)), rcond=1e-12)[0][-1]
-        for _ in range(seeds)
+def hysteresis(u: Array) -> Array:
+    """Return columns that any hysteresis without rate is a sum of, closely, with offset and drift."""
+    shapes = [u / 4, (u / 4) ** 2, np.sqrt(np.abs(u / 4)), (u / 4) ** 3]
+    columns = [
+        PI(thresholds=(float(r),), weights=(1.0,)).simulate(shape)
+        for shape in shapes
+        for r in np.linspace(0, 0.5, 12)
     ]
-    return np.std(found)
+    t = np.arange(u.size) / u.size
+    return np.column_stack([*columns, np.ones(u.size), t])
 
 
-def plays(u: Array) -> list[Array]:
-    return [PI(thresholds=(r,), weights=(1.0,)).simulate(u) for r in (0.0, 0.02, 0.2, 0.5)]
+def spread(columns: Sequence[Array], effect: Sequence[Array], seeds: int = 20) -> float:
+    """Return how far apart fits of an effect's size come, relative to it, over realisations of noise.
+
+    ``columns`` are what else is fitted, run by run, and ``effect`` what it is, for a size of 1.
+    """
+    design, wanted = np.vstack(columns), np.concatenate(effect)
+    norms = np.linalg.norm(design, axis=0)
+    left, sizes, _ = np.linalg.svd(design[:, norms > 0] / norms[norms > 0], full_matrices=False)
+    known = left[:, sizes > 1e-7 * sizes[0]]
+    alone = wanted - known @ (known.T @ wanted)
+    rng = np.random.default_rng(0)
+    measured = wanted + 30 * NOISE * rng.standard_normal((seeds, wanted.size))
+    return float(np.std(measured @ alone / max(alone @ alone, 1e-300)))
+
+
+def told(u: Sequence[Array]) -> set[str]:
+    """Return what runs of a muscle alone cannot tell."""
+    return {gap.what for gap in untold([run(one, None) for one in u])}
+
+
+ONE_SPEED = triangle(np.arange(0, 60, STEP), period=10.0, peaks=4.0)
+
+
+def test_rate_dependence_that_is_untold_comes_out_anyhow_and_told_it_does_not() -> None:
+    """A lag of 0.5 s of a twentieth of the gain, beside free hysteresis."""
+    fast, slow = (triangle(np.arange(0, 6 * p, STEP), period=p, peaks=4.0) for p in (2.0, 20.0))
+    for runs, lacking in (([ONE_SPEED], True), ([ONE_SPEED, fast, slow], False)):
+        assert ("rate" in told(runs)) == lacking
+        error = spread([hysteresis(u) for u in runs], [0.4 * lag(u, 0.5) for u in runs])
+        assert error > 0.5 if lacking else error < 0.2
+
+
+def test_creep_that_is_untold_comes_out_anyhow_and_told_it_does_not() -> None:
+    """Creep over 100 s of a twentieth of the gain, beside free hysteresis and lags."""
+    legs = [(level, 1.5, 40.0) for level in (1.2, 4.0, 2.8, 0.0)]
+    for runs, lacking in (([ONE_SPEED], True), ([ONE_SPEED, drive(legs)], False)):
+        assert ("creep" in told(runs)) == lacking
+        beside = [np.column_stack([hysteresis(u), lag(u, 0.5), lag(u, 2.0)]) for u in runs]
+        error = spread(beside, [0.4 * lag(u, 100.0) for u in runs])
+        assert error > 0.5 if lacking else error < 0.2
+
+
+def test_a_load_that_is_untold_comes_out_anyhow_and_told_it_does_not() -> None:
+    u = drive(CYCLES)
+    for forces, lacking in (((50.0, 50.0), True), ((50.0, 150.0), False)):
+        runs = [run(u, force, seed=seed) for seed, force in enumerate(forces)]
+        assert ("load" in whats(runs)) == lacking
+        error = spread([hysteresis(u)] * 2, [0.05 * one["force"] for one in runs])
+        assert error > 0.5 if lacking else error < 0.2
+
+
+def test_coupling_that_is_untold_comes_out_anyhow_and_told_it_does_not() -> None:
+    apart = apart_and_together()
+    for u, lacking in ((np.column_stack([BASE, 0.8 * BASE]), True), (apart, False)):
+        assert ("coupling" in whats(arms(u))) == lacking
+        error = spread([hysteresis(u[:, 0])], [0.3 * muscle(u[:, 1])])
+        assert error > 0.5 if lacking else error < 0.2
+
+
+# -- parameters of a model ------------------------------------------------------------------------
+
+
+def test_a_parameter_that_is_untold_comes_out_anyhow_and_told_it_does_not() -> None:
+    """The time constants of a process, 0.3 s and 30 s, from fast cycles, and with what is proposed."""
+    from mckibben.blocks.dynamic.process_model import ProcessModel
+    from mckibben.registry import load
+
+    fast = triangle(np.arange(0, 20, STEP), period=2.0, peaks=4.0)
+    example = load("estimators", "p2")().fit([run(fast)]).model_
+    assert isinstance(example, ProcessModel)
+
+
+# -- where it is shown ----------------------------------------------------------------------------
+
+
+def test_gaps_come_most_important_first_and_as_json() -> None:
+    gaps = untold([run(ONE_SPEED, None)])
+    severities = [gap.severity for gap in gaps]
+    assert severities == sorted(severities, reverse=True)
+    assert json.loads(json.dumps([gap.to_dict() for gap in gaps]))[0]["what"] == gaps[0].what
+    assert str(gaps[0]) == f"{gaps[0].sentence} {gaps[0].remedy}"
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    speed=st.floats(0.05, 5.0),
+    low=st.floats(0.0, 3.0),
+    span=st.floats(0.5, 4.0),
+    unit=st.sampled_from([1.0, 0.01]),
+)
+def test_what_is_said_of_speed_does_not_depend_on_scale(
+    speed: float, low: float, span: float, unit: float
+) -> None:
+    t = np.arange(0, 8 * span / speed, span / speed / 200)
+    u = low + triangle(t, period=2 * span / speed, peaks=span)
+    one = Recording({"pressure": unit * u, "displacement": unit * muscle(u)}, float(t[1]))
+    (gap,) = (gap for gap in untold([one]) if gap.what == "rate")
+    assert gap.evidence["slow"] == pytest.approx(unit * speed, rel=0.05)
+    assert gap.evidence["fast"] == pytest.approx(unit * speed, rel=0.05)
+
+
+def test_it_is_quick() -> None:
+    u = random_wave(np.arange(100_000) * 0.01, max_frequency=0.5, high=4.0, seed=0)
+    one = run(u, None)
+    untold([one.slice(0, 2000)])
+    started = time.perf_counter()
+    untold([one])
+    assert time.perf_counter() - started < 2.0
+
+
+def test_recordings_that_cannot_be_judged_are_refused() -> None:
+    one = run(ONE_SPEED, None)
+    with pytest.raises(DataError, match="at least one"):
+        untold([])
+    with pytest.raises(DataError, match="voltage"):
+        untold([one], "voltage")
+    with pytest.raises(DataError, match="displacement"):
+        untold([one, one.select(["pressure"])])
+
+
+# -- measured muscles -----------------------------------------------------------------------------
+
+
+def measured(name: str) -> tuple[list[Recording], dict[str, object]]:
+    """Return a set of measured recordings, with its channels."""
+    from mckibben.measured.sets import sets_in
+
+    if not (DATA / name).exists():
+        pytest.skip("the measured recordings are not here")
+    (found,) = sets_in(DATA / name)
+    return found.recordings(), {}
+
+
+@pytest.mark.parametrize(
+    ("name", "inputs", "outputs", "said", "not_said"),
+    [
+        ("festo_dmsp10_static", None, None, {"rate", "minor loops"}, {"repeats", "start", "noise"}),
+        ("festo_dmsp10_levels", None, None, {"sampling"}, {"minor loops", "noise", "hysteresis"}),
+        ("festo_isometric_20mm", None, None, {"isometric", "minor loops"}, {"repeats", "rate"}),
+        ("cavatappi_loads", None, None, {"one-sided loops"}, {"load", "rate", "minor loops"}),
+        ("sma_wing", None, None, {"one-sided loops", "load"}, {"minor loops", "clipped"}),
+        (
+            "soft_arm_three_muscles",
+            ["input_1", "input_2", "input_3"],
+            ["displacement_1", "displacement_2"],
+            {"together"},
+            {"coupling", "resting", "minor loops", "rate"},
+        ),
+        ("bouc_wen_benchmark", "force", "displacement", set(), {"hysteresis", "sampling", "rate"}),
+    ],
+)
+def test_measured_recordings(
+    name: str,
+    inputs: list[str] | None,
+    outputs: list[str] | None,
+    said: set[str],
+    not_said: set[str],
+) -> None:
+    found = set(whats(measured(name)[0], inputs=inputs, outputs=outputs))
+    assert said <= found
+    assert not found & not_said

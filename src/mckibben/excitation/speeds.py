@@ -18,6 +18,9 @@ NONE = 2.0
 ALIKE = 2.0
 """Branches are compared with those at most so many times as long, or speed would stand for size."""
 
+RESTS = 0.25
+"""A hold that lasts this share of a way over the range shows what the output settles to."""
+
 TAIL = 0.05
 """Share of the branches that may be faster, or slower, than what counts."""
 
@@ -68,7 +71,13 @@ def _gap(seen: Seen, name: str, ratio: float, slow: float, fast: float) -> Gap:
     slower, faster = _round(middle / 4), _round(4 * middle)
     span = seen.scales[name].span
     lasts = lasting(2 * span / slower + 6 * span / faster)
-    if ratio < NONE:
+    rests = max((hold.seconds for hold in seen.holds), default=0.0) > RESTS * span / fast
+    if rests:
+        sentence = (
+            f"Rate dependence{of} is told at rest and at {between(slow, fast, unit)} only: there {n} run, "
+            "where they are of like size."
+        )
+    elif ratio < NONE:
         sentence = (
             f"Rate dependence{of} cannot be told: {n} run at {between(slow, fast, unit)}, "
             "where they are of like size."
@@ -83,7 +92,7 @@ def _gap(seen: Seen, name: str, ratio: float, slow: float, fast: float) -> Gap:
         sentence,
         f"Record the same cycles at {value(slower, unit)} and at {value(faster, unit)} ({lasts}).",
         EFFECT,
-        0.8 if ratio < NONE else 0.5,
+        0.35 if rests else 0.8 if ratio < NONE else 0.5,
         {"slow": slow, "fast": fast, "ratio": ratio, "branches": len(seen.branches[name])},
         (name,),
     )

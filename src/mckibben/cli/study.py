@@ -79,6 +79,8 @@ def _say(study: Study, folder: Path) -> None:
     if study.characterization is not None:
         for sentence in study.characterization.sentences:
             say(sentence)
+    for gap in study.untold:
+        say(f"- {gap}")
     say(f"Drawn: {folder / 'report.html'}, which grows with every model fitted.\n", flush=True)
 
 

@@ -18,6 +18,7 @@ from mckibben.comparison.splits import listed
 from mckibben.comparison.standing import Standing
 from mckibben.control import Tracked
 from mckibben.errors import DataError
+from mckibben.excitation import Gap, untold
 from mckibben.recording import Recording
 from mckibben.studying.inverting import InverseCheck, invert_best
 from mckibben.studying.loops import closed_loops, published_rig
@@ -47,6 +48,8 @@ class Study:
         The channel that models are told as the load, where one was named.
     notes : tuple of str
         What was assumed or mended on the way.
+    untold : tuple of Gap
+        What the recordings cannot tell, most important first.
     """
 
     train: tuple[Recording, ...]
@@ -59,6 +62,7 @@ class Study:
     plant: str | None = None
     load: str | None = None
     notes: tuple[str, ...] = ()
+    untold: tuple[Gap, ...] = ()
 
     @property
     def input(self) -> str:
@@ -75,6 +79,7 @@ class Study:
         known = self.characterization
         return {
             "characterization": None if known is None else known.to_dict(),
+            "untold": [gap.to_dict() for gap in self.untold],
             "leaderboard": self.leaderboard.to_dict(),
             "inverse": None if self.inverse is None else self.inverse.to_dict(),
             "tracking": {name: dict(tracked.rmse) for name, tracked in self.loops.items()},
@@ -168,6 +173,7 @@ def study(
         inverse=None,
         load=load,
         notes=(*notes, *plan.notes),
+        untold=untold(recordings, channels.inputs, channels.outputs, tests=tests),
     )
     if found is not None:
         found(so_far)
@@ -182,6 +188,9 @@ def study(
             raise
         return replace(so_far, leaderboard=replace(so_far.leaderboard, stopped=True))
     board = so_far.leaderboard
+    if board.best is not None and board.best.block is not None:
+        told = untold(recordings, channels.inputs, channels.outputs, board.best.block, tests=tests)
+        so_far = replace(so_far, untold=told)
     if channels.single:
         so_far = replace(so_far, inverse=invert_best(board, recordings[0]))
     else:

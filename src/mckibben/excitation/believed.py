@@ -210,7 +210,7 @@ def telling(block: Block) -> list[int]:
 
 def _needed(rig: Rig) -> list[str]:
     measured = [name for name in rig.outputs if name.startswith(("displacement", "force"))]
-    return [*rig.inputs, *measured]
+    return list(dict.fromkeys([*rig.inputs, *measured]))
 
 
 def _of_rig(rig: Rig, driven: Sequence[str]) -> Limits:

@@ -7,7 +7,6 @@ end of one stretch to the beginning of the next.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,7 +16,6 @@ from mckibben.arrays import Array
 from mckibben.blocks.core.block import Block
 from mckibben.estimators.core.uncertainty import DIFFERENCE, LARGEST
 from mckibben.excitation.unmodelled import LONG, Unmodelled
-from mckibben.system.threads import cores
 
 
 class Slopes:
@@ -57,23 +55,13 @@ class Slopes:
     def over(self, inputs: Array, states: Array) -> tuple[Array, Array, Array]:
         """Return outputs (n, m) over a stretch, their slopes (n, m, parameters), and states after."""
         self._inputs[:], self._states[:] = inputs, states
-        workers = min(cores(), len(self._runs))
-        shares = [self._runs[first::workers] for first in range(workers)]
-        if workers == 1:
-            _run(shares[0])
-        else:
-            with ThreadPoolExecutor(workers) as pool:
-                list(pool.map(_run, shares))
+        for run in self._runs:  # too short for threads to be worth their while
+            run()
         base = self._outputs[0].copy()
         with np.errstate(invalid="ignore", over="ignore"):
             slopes = (self._outputs[1:] - base) / DIFFERENCE
         slopes[~(np.abs(slopes) < LARGEST)] = 0.0
         return base, np.moveaxis(slopes, 0, 2), self._states.copy()
-
-
-def _run(runs: Sequence[object]) -> None:
-    for run in runs:
-        run()  # type: ignore[operator]
 
 
 @dataclass(frozen=True)

@@ -34,6 +34,7 @@ from mckibben.excitation.limits import (
 from mckibben.excitation.prospect import Prospect, prospect_of
 from mckibben.recording import Recording
 from mckibben.rigs import Rig, load_rig
+from mckibben.system.threads import one_blas_thread
 
 CANDIDATES = 32
 """Stretches tried at every step."""
@@ -52,6 +53,9 @@ SHARE_OF_WAYS = 0.25
 
 LEARNED = 1.05
 """Factor by which a standard error has to fall for a stretch to be for it."""
+
+MOST_MINUTES = 60.0
+"""Longest plan: longer ones are better made after the first has been recorded."""
 
 Progress = Callable[[float, str], None]
 
@@ -96,6 +100,8 @@ class Plan:
         What the user should know.
     interrupted : bool
         Whether the search was stopped; the plan is then the best until there.
+    goal : str or None
+        Parts of the names of parameters that it is for, rather than predictions.
     """
 
     recording: Recording
@@ -105,7 +111,7 @@ class Plan:
     steps: tuple[Step, ...]
     notes: tuple[str, ...]
     interrupted: bool
-    goal: str | None = None
+    goal: str | None
 
     @property
     def sentence(self) -> str:
@@ -118,10 +124,18 @@ class Plan:
             f"After these {self.recording.duration:.0f} s, predictions of random motion should be off "
             f"by: {', '.join(found)}"
         )
-        named = [one for one in self.parameters if self.goal is not None and self.goal in one.name]
-        learned = named or sorted(self.parameters, key=lambda one: one.after / one.now)[:3]
-        told = [f"{one.name} (from {_share(one.now)} to {_share(one.after)})" for one in learned[:4]]
-        return f"{said}. {'It is for' if named else 'Most is learned of'} {', '.join(told)}."
+        told = [
+            f"{one.name} (standard error from {_share(one.now)} to {_share(one.after)})"
+            for one in self.learned[:3]
+        ]
+        return f"{said}. {'Most is' if self.goal is None else 'It is'} learned of {'; '.join(told)}."
+
+    @property
+    def learned(self) -> list[Parameter]:
+        """The parameters that it is for, or all, those first of which most is learned."""
+        parts = [part.strip() for part in (self.goal or "").split(",")]
+        named = [one for one in self.parameters if any(part in one.name for part in parts)]
+        return sorted(named, key=lambda one: one.after / one.now)
 
     def to_dict(self) -> dict[str, Any]:
         """Return all but the samples, as JSON holds it."""
@@ -194,8 +208,12 @@ def plan(
             "a plan is for recordings, for a rig, or for a muscle",
             remedy="give files, --rig or --muscle (and a muscle without the others)",
         )
-    if not 0 < minutes < np.inf:
-        raise DataError(f"{minutes:g} minutes are impossible", remedy="give --minutes 3")
+    if muscle is not None and model is not None:
+        raise DataError(
+            "a muscle of the library or a data sheet is a model itself", remedy="leave --model out"
+        )
+    if not 0 < minutes <= MOST_MINUTES:
+        raise DataError(f"{minutes:g} minutes are impossible", remedy="give --minutes 3, or up to 60")
     asked = limits or {}
     plant = rig if isinstance(rig, Rig) or rig is None else load_rig(rig)
     if muscle is not None:
@@ -213,8 +231,9 @@ def plan(
     if plant is not None:
         within_hardware(within, plant)
     possible(within, 60 * minutes)
-    prospect = prospect_of(belief, within, 60 * minutes, goal, seed)
-    return _Search(prospect, seed, progress).found(belief, goal)
+    with one_blas_thread():
+        prospect = prospect_of(belief, within, 60 * minutes, goal, seed)
+        return _Search(prospect, seed, progress).found(belief, goal)
 
 
 def possible(limits: Limits, seconds: float) -> None:

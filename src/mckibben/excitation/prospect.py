@@ -16,7 +16,7 @@ from mckibben.excitation.information import Criterion, Known, Noise, Slopes
 from mckibben.excitation.limits import Limits, at_rates, followed
 from mckibben.excitation.unmodelled import LONG, Unmodelled
 
-WORK = 2e5
+WORK = 1e5
 """Samples times parameters of one free run over a plan, by which its sample time is chosen."""
 
 FINEST, COARSEST = 0.01, 0.1

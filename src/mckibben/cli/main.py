@@ -26,6 +26,7 @@ from mckibben.cli.invert import invert
 from mckibben.cli.measured import measured
 from mckibben.cli.muscles import app as muscles_app
 from mckibben.cli.output import InterruptionError, finish, say, visible
+from mckibben.cli.plan import plan
 from mckibben.cli.plot import plot
 from mckibben.cli.reproduce import reproduce
 from mckibben.cli.rig import app as rig_app
@@ -53,6 +54,7 @@ app = typer.Typer(
 for command in (
     *(study, characterize, fit, compare, simulate, invert, track, plot, reproduce, info),
     measured,
+    plan,
 ):
     app.command()(command)
 app.command("check-block")(check_block)

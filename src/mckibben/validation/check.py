@@ -73,7 +73,7 @@ def check(model: Block, recordings: Recording | Sequence[Recording]) -> Validati
         _output(model, runs, tested, every, place) for place in range(len(model.outputs))
     )
     return Validation(
-        model.kind, tuple(run.recording.name for run in runs), outputs, tuple(notes)
+        model.kind, tuple(run.recording.name for run in runs), outputs, tuple(notes), runs
     )
 
 

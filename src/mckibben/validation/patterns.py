@@ -14,6 +14,9 @@ from mckibben.validation.regression import Regression
 BINS = 10
 """Bins of as many samples each."""
 
+PARTS = 6
+"""Parts of an input's range in which branches are compared."""
+
 TOLD = 1.96
 """Standard deviations of a 95 % interval."""
 
@@ -102,18 +105,18 @@ def by_branch(
     every: int,
     regression: Regression,
 ) -> tuple[Bin, ...]:
-    """Return the residual's means on rising and falling branches, in thirds of an input's range."""
+    """Return the residual's means on rising and falling branches, in parts of an input's range."""
     low, high = min(u.min() for u in inputs), max(u.max() for u in inputs)
-    ends = np.linspace(low, high, 4)
+    ends = np.linspace(low, high, PARTS + 1)
     found = []
-    for k, part in enumerate(("low", "middle", "high")):
+    for k in range(PARTS):
         for way, name in ((1, "rising"), (-1, "falling")):
             chosen = [
-                (w * way > 0) & (u >= ends[k]) & ((u < ends[k + 1]) | (k == 2))
+                (w * way > 0) & (u >= ends[k]) & ((u < ends[k + 1]) | (k == PARTS - 1))
                 for u, w in zip(inputs, ways, strict=True)
             ]
             one = _bin(
-                f"{name}, {part}",
+                name,
                 (float(ends[k]), float(ends[k + 1])),
                 residuals,
                 chosen,

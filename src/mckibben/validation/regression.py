@@ -80,16 +80,24 @@ class Regression:
         self._most = int(max(0, min(MOST_ORDER, shortest // APART, spare)))
         self._lagged = _lagged(tables, self._most)
         self._rows = self.n - self._most * len(tables)
-        self._basis = _independent(self._plain[:-1, :-1], range(k))
+        # of the rows that noise is known by: what is only in the first ones would be nothing there
+        self._basis = _independent(self._lagged[0, 0, :-1, :-1], range(k))
         self._partial, self._doubt = self._fitted_noise()
         self.noise = _from_partial(self._partial)
         self._white = _filtered(self._lagged, self.noise)
         rank = self._basis.shape[1]
         self.freedom = max(self._rows - rank - (len(self.noise) - 1), 1)
+        self._tested: dict[tuple[tuple[int, ...], tuple[int, ...]], Tested] = {}
         self._variance = max(self._left(range(k)), 0.0) / self.freedom
 
     def test(self, columns: Columns, beside: Columns = ()) -> Tested:
         """Return how likely noise alone would be followed as well by columns beside others."""
+        key = (tuple(columns), tuple(beside))
+        if key not in self._tested:
+            self._tested[key] = self._test(*key)
+        return self._tested[key]
+
+    def _test(self, columns: Columns, beside: Columns) -> Tested:
         from scipy.special import fdtrc
 
         known = _independent(self._white[:-1, :-1], beside).shape[1]
@@ -245,7 +253,9 @@ def _lagged(tables: Sequence[Array], order: int) -> Array:
 def _filtered(lagged: Array, noise: Array) -> Array:
     """Return the products of columns that a noise model has whitened."""
     p = noise.size
-    return np.asarray(np.einsum("p,q,pqab->ab", noise, noise, lagged[:p, :p], optimize=True))
+    width = lagged.shape[-1]
+    pairs = np.ascontiguousarray(lagged[:p, :p]).reshape(p * p, -1)
+    return np.asarray((np.outer(noise, noise).ravel() @ pairs).reshape(width, width))
 
 
 def _independent(gram: Array, columns: Columns) -> Array:

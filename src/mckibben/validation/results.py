@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from mckibben.validation.crossing import Crossing
 from mckibben.validation.k_step import Ahead
 from mckibben.validation.patterns import Pattern
+from mckibben.validation.residuals import Run
 from mckibben.validation.whiteness import Whiteness
 
 if TYPE_CHECKING:
@@ -97,6 +98,8 @@ class OutputCheck:
         Errors some samples ahead, and free-running.
     n_tests : int
         Tests that the level is shared by.
+    large_steps : bool
+        Whether an input steps far at once.
     fitted_here : bool or None
         Whether the residual is as a fit to these very recordings leaves it; None for unknown.
     """
@@ -193,12 +196,15 @@ class Validation:
     outputs : tuple of OutputCheck
     notes : tuple of str
         What to know of these recordings.
+    runs : tuple of Run
+        The recordings, and what the model makes of them; not in ``to_dict``.
     """
 
     model: str
     recordings: tuple[str, ...]
     outputs: tuple[OutputCheck, ...]
     notes: tuple[str, ...] = ()
+    runs: tuple[Run, ...] = field(default=(), repr=False)
 
     @property
     def right(self) -> bool:

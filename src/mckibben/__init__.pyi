@@ -38,6 +38,7 @@ from .rigs import Rig as Rig
 from .rigs import check_rig as check_rig
 from .rigs import load_rig as load_rig
 from .studying.study import study as study
+from .validation.check import check as check
 from .version import __version__ as __version__
 
 __all__: list[str]

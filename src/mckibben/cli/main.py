@@ -17,6 +17,7 @@ import typer
 
 from mckibben.cli.app import app as workbench
 from mckibben.cli.characterize import characterize
+from mckibben.cli.check import check
 from mckibben.cli.check_block import check_block
 from mckibben.cli.compare import compare
 from mckibben.cli.export import app as export_app
@@ -53,8 +54,7 @@ app = typer.Typer(
 )
 for command in (
     *(study, characterize, fit, compare, simulate, invert, track, plot, reproduce, info),
-    measured,
-    plan,
+    *(check, plan, measured),
 ):
     app.command()(command)
 app.command("check-block")(check_block)

@@ -162,6 +162,10 @@ class Series(Composition):
             low, high = part.passes(low, high)
         return low, high
 
+    def joined(self, parts: Sequence[str]) -> str:
+        """Return what one gives going into the next."""
+        return rf"y = {'['.join(reversed(parts))}[u{']' * len(parts)}"
+
     @classmethod
     def example(cls) -> Self:
         """Return a modified Prandtl-Ishlinskii model: a PI model and a saturating curve."""
@@ -232,6 +236,10 @@ class Parallel(Composition):
         """Lay out the parts on the same signals, and add what they give."""
         all_given = [part.wired(board, given) for part in self.parts]
         return [board.add(terms) for terms in zip(*all_given, strict=True)]
+
+    def joined(self, parts: Sequence[str]) -> str:
+        """Return their sum."""
+        return f"y = {' + '.join(f'{part}[u]' for part in parts)}"
 
     @classmethod
     def example(cls) -> Self:
@@ -314,6 +322,10 @@ class PerChannel(Composition):
         """Return the outputs that every channel can reach whatever happened before."""
         ends = [part.reachable() for part in self.parts]
         return np.concatenate([low for low, _ in ends]), np.concatenate([high for _, high in ends])
+
+    def joined(self, parts: Sequence[str]) -> str:
+        """Return each on its own."""
+        return r",\quad ".join(f"y_{{{k}}} = {part}[u_{{{k}}}]" for k, part in enumerate(parts, 1))
 
     @classmethod
     def example(cls) -> Self:

@@ -18,6 +18,7 @@ from mckibben.arrays import Array
 from mckibben.blocks.core.block import Block, Kernel, Primitive
 from mckibben.blocks.core.fields import STRICT, Channel, Channels, Rows, rows
 from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.core.notation import Notation
 from mckibben.blocks.core.stateless import Stateless
 from mckibben.errors import ModelError
 
@@ -53,6 +54,12 @@ class Coupling(Stateless, Primitive):
     kind: ClassVar[str] = "coupling"
     kernel: ClassVar[Kernel] = coupling_kernel
     parameters: ClassVar[tuple[str, ...]] = ("gains",)
+    notation: ClassVar[Notation] = Notation(
+        r"h_j = \sum_i G_{ij} v_i",
+        gains="G_{ij} [{out1}/{in0}]",
+        driven="v_i",
+        given="h_j",
+    )
 
     gains: Rows
     driven: Channels

@@ -18,6 +18,7 @@ from mckibben.blocks.core.block import Kernel
 from mckibben.blocks.core.fields import DISPLACEMENT, STRICT, ChannelField, Initial, Rule, Vector
 from mckibben.blocks.core.inverse import Invertible
 from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.core.notation import Notation
 from mckibben.blocks.core.refusals import explicit_state, needs_sample_time
 from mckibben.blocks.core.single_channel import SingleChannel
 from mckibben.errors import ModelError
@@ -62,7 +63,7 @@ class Creep(SingleChannel, Invertible):
     compliances : sequence of float, length K
         c_k: creep once it has ended, relative to the immediate response; not negative.
     time_constants : sequence of float, length K
-        tau_k [s], positive.
+        tau_k, how long each creep takes [s]; positive.
     initial : {"first_sample", "virgin", "fitted"}
         Where the elements are before the first sample: at rest at the first input, or at 0, or, on
         recordings whose output is known, where that tells (else at rest at the first input).
@@ -75,6 +76,11 @@ class Creep(SingleChannel, Invertible):
     inverse_kernel: ClassVar[Kernel] = creep_inverse_kernel
     rate_dependent: ClassVar[bool] = True
     parameters: ClassVar[tuple[str, ...]] = ("compliances", "time_constants")
+    notation: ClassVar[Notation] = Notation(
+        r"y = u + \sum_k c_k x_k,\quad \tau_k \dot{x}_k = u - x_k",
+        compliances="c_k",
+        time_constants=r"\tau_k [s]",
+    )
 
     compliances: Vector
     time_constants: Vector

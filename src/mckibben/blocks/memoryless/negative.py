@@ -10,6 +10,7 @@ from mckibben.arrays import Array
 from mckibben.blocks.core.block import Kernel, Primitive
 from mckibben.blocks.core.fields import DISPLACEMENT, STRICT, ChannelField
 from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.core.notation import Notation
 from mckibben.blocks.core.single_channel import Memoryless
 
 
@@ -32,6 +33,9 @@ class Negative(Memoryless, Primitive):
 
     kind: ClassVar[str] = "negative"
     kernel: ClassVar[Kernel] = negative_kernel
+    notation: ClassVar[Notation] = Notation(
+        "y = -u",
+    )
 
     input: ChannelField = DISPLACEMENT
     output: ChannelField = DISPLACEMENT

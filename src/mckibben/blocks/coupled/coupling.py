@@ -18,6 +18,7 @@ from mckibben.arrays import Array
 from mckibben.blocks.core.block import Block, Kernel, Primitive
 from mckibben.blocks.core.fields import STRICT, Channel, Channels, Rows, rows
 from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.core.linear import LinearSystem
 from mckibben.blocks.core.notation import Notation
 from mckibben.blocks.core.stateless import Stateless
 from mckibben.errors import ModelError
@@ -160,6 +161,11 @@ class Coupling(Stateless, Primitive):
         """Return the outputs reached over a box of inputs, each by itself."""
         at_low, at_high = self.matrix.T * low, self.matrix.T * high
         return np.minimum(at_low, at_high).sum(axis=1), np.maximum(at_low, at_high).sum(axis=1)
+
+    def linear(self, sample_time: float | None = None) -> LinearSystem:
+        """Return the gains."""
+        del sample_time
+        return LinearSystem.gain(np.array(self.gains).T)
 
     @classmethod
     def example(cls) -> Self:

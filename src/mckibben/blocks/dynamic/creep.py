@@ -18,6 +18,7 @@ from mckibben.blocks.core.block import Kernel
 from mckibben.blocks.core.fields import DISPLACEMENT, STRICT, ChannelField, Initial, Rule, Vector
 from mckibben.blocks.core.inverse import Invertible
 from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.core.linear import LinearSystem
 from mckibben.blocks.core.notation import Notation
 from mckibben.blocks.core.refusals import explicit_state, needs_sample_time
 from mckibben.blocks.core.single_channel import SingleChannel
@@ -131,6 +132,13 @@ class Creep(SingleChannel, Invertible):
     def inverse_start(self, first: Array, start: Rule) -> Array:
         """Return the elements at rest: where the first output is held, or, virgin, at 0."""
         return self.initial_state(first / (1.0 + np.sum(self.compliances)), start)
+
+    def linear(self, sample_time: float | None = None) -> LinearSystem:
+        """Return the elements, each a state."""
+        decays, c = self.coefficients(sample_time).reshape(2, -1)
+        matrices = (np.diag(decays), (1 - decays)[:, np.newaxis], (c * decays)[np.newaxis])
+        at_once = np.array([[1.0 + c @ (1 - decays)]])
+        return LinearSystem(*matrices, at_once, sample_time, np.zeros(1), np.zeros(1))
 
     @classmethod
     def example(cls) -> Self:

@@ -33,6 +33,7 @@ from mckibben.blocks.core.fields import (
     Vector,
 )
 from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.core.linear import LinearSystem, Polynomials
 from mckibben.blocks.core.notation import Notation, tex
 from mckibben.blocks.core.refusals import explicit_state, needs_sample_time
 from mckibben.blocks.core.single_channel import SingleChannel
@@ -260,7 +261,9 @@ class ProcessModel(LinearStart, SingleChannel, Primitive):
     def equations(self) -> tuple[str, ...]:
         """Return the transfer function of this structure."""
         return (
-            self._transfer("K", "T_z", r"T_w^2 s^2 + 2 \zeta T_w s + 1", "T_{{p,{}}} s + 1", "T_d"),
+            self._transfer(
+                "K", "T_z", r"T_{p,1}^2 s^2 + 2 \zeta T_{p,1} s + 1", "T_{{p,{}}} s + 1", "T_d"
+            ),
         )
 
     def worked(self) -> tuple[str, ...]:
@@ -282,6 +285,43 @@ class ProcessModel(LinearStart, SingleChannel, Primitive):
         above = gain if self.zero_time is None else rf"{gain} ({zero}\,s + 1)"
         late = rf"\, e^{{-{delay}\,s}}" if self.delay else ""
         return rf"\frac{{Y(s) - y_0}}{{U(s) - u_0}} = \frac{{{above}}}{{{below}}}{late}"
+
+    def linear(self, sample_time: float | None = None) -> LinearSystem:
+        """Return the lags behind the past inputs that the dead time and the hold remember."""
+        found = _discretised(self, sample_time)
+        n, m = int(found[0]), int(found[1])
+        now, before = found[4:6]
+        c, first, second, third = found[6 : 6 + 4 * n].reshape(4, n)
+        lags = found[6 + 4 * n :].reshape(n, n)
+        # [x, u of the last m + 2 samples, latest first]
+        size = n + m + 2
+        driven = np.zeros((n, m + 3))  # by the input now, a sample ago and so on
+        driven[:, m], driven[:, m + 1], driven[:, m + 2] = first, second, third
+        at_once = np.zeros(m + 3)
+        at_once[m], at_once[m + 1] = now, before
+        a, b = np.zeros((size, size)), np.zeros((size, 1))
+        a[:n, :n], a[:n, n:], b[:n, 0] = lags, driven[:, 1:], driven[:, 0]
+        a[n + 1 :, n:-1], b[n, 0] = np.eye(m + 1), 1.0
+        given = np.concatenate([c @ lags, c @ driven[:, 1:] + at_once[1:]])[np.newaxis]
+        through = np.array([[c @ driven[:, 0] + at_once[0]]])
+        offsets = np.array([self.input_offset]), np.array([self.output_offset])
+        return LinearSystem(a, b, given, through, sample_time, *offsets)
+
+    def continuous(self) -> Polynomials:
+        """Return the lags and the zero.
+
+        Raises
+        ------
+        ModelError
+            If there is a dead time, which polynomials cannot hold.
+        """
+        if self.delay > 0:
+            raise ModelError(
+                f"{self.kind!r} has a dead time of {self.delay:g} s, which a continuous transfer "
+                "function has no place for. Remedy: give a sample time."
+            )
+        zero = [] if self.zero_time is None else [self.gain * self.zero_time]
+        return Polynomials((*zero, self.gain), tuple(self.denominator().tolist()))
 
     @classmethod
     def example(cls) -> Self:

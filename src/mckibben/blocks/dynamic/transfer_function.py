@@ -30,6 +30,7 @@ from mckibben.blocks.core.fields import (
     Initial,
 )
 from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.core.linear import LinearSystem, Polynomials
 from mckibben.blocks.core.notation import FEW, Notation, summed
 from mckibben.blocks.core.refusals import explicit_state, own_sample_time
 from mckibben.blocks.core.single_channel import SingleChannel
@@ -64,7 +65,8 @@ class TransferFunction(LinearStart, SingleChannel, Primitive):
     Parameters
     ----------
     numerator : sequence of float
-        b_0, b_1, ..., what the input adds at once and samples later; leading zeros are delays. At least one.
+        b_0, b_1, ..., what the input adds at once and samples later; leading zeros are
+        delays. At least one.
     denominator : sequence of float
         f_1, f_2, ..., what of past outputs goes on (the leading 1 is left out); may be empty.
     sample_time : float
@@ -275,6 +277,22 @@ class TransferFunction(LinearStart, SingleChannel, Primitive):
         ]
         modelled = self.noise_deviation is not None or any(len(c) > 1 for c in noise)
         return (f"y_t - y_0 = {' + '.join(told if modelled else told[:1])}",)
+
+    def linear(self, sample_time: float | None = None) -> LinearSystem:
+        """Return the filter, in observable form, without its noise model."""
+        own_sample_time(self.kind, self.sample_time, sample_time or self.sample_time)
+        b, f = self._padded()
+        n = self.n_states
+        a = np.eye(n, k=1)
+        if n:
+            a[:, 0] = -f[1:]
+        return LinearSystem(
+            *(a, (b[1:] - f[1:] * b[0])[:, np.newaxis], np.eye(1, n), b[:1, np.newaxis]),
+            self.sample_time,
+            np.array([self.input_offset]),
+            np.array([self.output_offset]),
+            Polynomials(tuple(b.tolist()), tuple(f.tolist())),
+        )
 
     @classmethod
     def example(cls) -> Self:

@@ -14,6 +14,7 @@ from mckibben.arrays import Array
 from mckibben.blocks.core.block import Kernel, Primitive
 from mckibben.blocks.core.fields import DISPLACEMENT, STRICT, ChannelField
 from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.core.linear import LinearSystem
 from mckibben.blocks.core.notation import Notation, summed
 from mckibben.blocks.core.single_channel import Memoryless
 from mckibben.errors import ModelError
@@ -71,6 +72,11 @@ class Affine(Memoryless, Primitive):
     def worked(self) -> tuple[str, ...]:
         """Return the line with its numbers."""
         return (f"y = {summed([(self.gain, 'u'), (self.offset, '')])}",)
+
+    def linear(self, sample_time: float | None = None) -> LinearSystem:
+        """Return the gain."""
+        del sample_time
+        return LinearSystem.gain(self.gain, self.offset)
 
     @classmethod
     def example(cls) -> Self:

@@ -260,11 +260,8 @@ class ProcessModel(LinearStart, SingleChannel, Primitive):
 
     def equations(self) -> tuple[str, ...]:
         """Return the transfer function of this structure."""
-        return (
-            self._transfer(
-                "K", "T_z", r"T_{p,1}^2 s^2 + 2 \zeta T_{p,1} s + 1", "T_{{p,{}}} s + 1", "T_d"
-            ),
-        )
+        pair = r"T_{p,1}^2 s^2 + 2 \zeta T_{p,1} s + 1"
+        return (self._transfer("K", "T_z", pair, "T_{{p,{}}} s + 1", "T_d"),)
 
     def worked(self) -> tuple[str, ...]:
         """Return the transfer function with its numbers."""

@@ -291,7 +291,7 @@ class TransferFunction(LinearStart, SingleChannel, Primitive):
             self.sample_time,
             np.array([self.input_offset]),
             np.array([self.output_offset]),
-            Polynomials(tuple(b.tolist()), tuple(f.tolist())),
+            Polynomials(tuple(np.trim_zeros(b, "f").tolist()) or (0.0,), tuple(f.tolist())),
         )
 
     @classmethod

@@ -39,9 +39,7 @@ LINEAR = {
             Negative(DISPLACEMENT, DISPLACEMENT),
         )
     ),
-    "parallel": Parallel(
-        (ProcessModel(2.0, (0.3,)), TransferFunction((1.0, 0.5), (-0.7,), STEP))
-    ),
+    "parallel": Parallel((ProcessModel(2.0, (0.3,)), TransferFunction((1.0, 0.5), (-0.7,), STEP))),
 }
 
 
@@ -51,7 +49,7 @@ def driven() -> Array:
 
 def simulated(block: Block, u: Array) -> Array:
     """Return the block's run from rest at the operating point, relative to that."""
-    system = block.linear(STEP)
+    system = block.linear_system(STEP)
     # from the operating point, at rest there
     u0 = float(system.input_offset[0])
     padded = np.concatenate([[u0], u])
@@ -67,7 +65,7 @@ def test_scipy_simulates_the_same(name: str) -> None:
     from scipy.signal import dlsim
 
     block, u = LINEAR[name], driven()
-    u0 = float(block.linear(STEP).input_offset[0])
+    u0 = float(block.linear_system(STEP).input_offset[0])
     found = dlsim(block.to_scipy(STEP), u - u0)[1][:, 0]
     expected = simulated(block, u)
     assert np.abs(found - expected).max() < 1e-10 * np.abs(expected).max()
@@ -77,7 +75,7 @@ def test_scipy_simulates_the_same(name: str) -> None:
 def test_python_control_simulates_the_same(name: str) -> None:
     control = pytest.importorskip("control")
     block, u = LINEAR[name], driven()
-    u0 = float(block.linear(STEP).input_offset[0])
+    u0 = float(block.linear_system(STEP).input_offset[0])
     found = np.squeeze(control.forced_response(block.to_control(STEP), U=u - u0).outputs)
     expected = simulated(block, u)
     assert np.abs(found - expected).max() < 1e-10 * np.abs(expected).max()
@@ -96,7 +94,7 @@ def test_a_continuous_model_comes_as_it_is_written() -> None:
 def test_a_sine_comes_out_as_the_frequency_response_says(name: str) -> None:
     block, frequency = LINEAR[name], 2.0
     t = STEP * np.arange(4000)
-    system = block.linear(STEP)
+    system = block.linear_system(STEP)
     u = system.input_offset[0] + np.sin(2 * np.pi * frequency * t)
     y = np.asarray(block.simulate(u, sample_time=STEP))[-1000:]  # whole periods, at rest
     turned = np.exp(-2j * np.pi * frequency * t[-1000:])
@@ -118,5 +116,3 @@ def test_without_python_control_its_extra_is_named(monkeypatch: pytest.MonkeyPat
     monkeypatch.setitem(__import__("sys").modules, "control", None)
     with pytest.raises(ModelError, match=r"mckibben\[control\]"):
         TransferFunction.example().to_control()
-
-

@@ -163,9 +163,9 @@ class Series(Composition):
             low, high = part.passes(low, high)
         return low, high
 
-    def linear(self, sample_time: float | None = None) -> LinearSystem:
+    def linear_system(self, sample_time: float | None = None) -> LinearSystem:
         """Return the parts one behind the other."""
-        return reduce(LinearSystem.then, [part.linear(sample_time) for part in self.parts])
+        return reduce(LinearSystem.then, [part.linear_system(sample_time) for part in self.parts])
 
     def joined(self, parts: Sequence[str]) -> str:
         """Return what one gives going into the next."""
@@ -242,9 +242,9 @@ class Parallel(Composition):
         all_given = [part.wired(board, given) for part in self.parts]
         return [board.add(terms) for terms in zip(*all_given, strict=True)]
 
-    def linear(self, sample_time: float | None = None) -> LinearSystem:
+    def linear_system(self, sample_time: float | None = None) -> LinearSystem:
         """Return the sum of the parts."""
-        return reduce(LinearSystem.beside, [part.linear(sample_time) for part in self.parts])
+        return reduce(LinearSystem.beside, [part.linear_system(sample_time) for part in self.parts])
 
     def joined(self, parts: Sequence[str]) -> str:
         """Return their sum."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -97,16 +97,15 @@ class LinearSystem:
             return np.broadcast_to(self.d.astype(complex), (len(frequencies), *self.d.shape))
         z = np.exp(2j * np.pi * frequencies * (self.sample_time or 1.0))
         inner = z[:, np.newaxis, np.newaxis] * np.eye(len(self.a)) - self.a
-        found: NDArray[np.complex128] = self.c @ np.linalg.solve(inner, self.b.astype(complex))
-        return found + self.d
+        return np.asarray(self.c @ np.linalg.solve(inner, self.b.astype(complex)) + self.d)
 
 
 class HandsOver(metaclass=Checked):
     """What a block that is linear gives to other tools."""
 
-    kind: str
+    kind: ClassVar[str]
 
-    def linear(self, sample_time: float | None = None) -> LinearSystem:
+    def linear_system(self, sample_time: float | None = None) -> LinearSystem:
         """Return a linear block as a state-space system; its state is 0 at the operating point.
 
         Parameters
@@ -148,16 +147,18 @@ class HandsOver(metaclass=Checked):
         """
         from scipy import signal
 
+        systems: Any = signal
+
         continuous = self.continuous() if sample_time is None else None
         if continuous is not None:
-            return signal.lti(continuous.numerator, continuous.denominator)
-        system = self.linear(sample_time)
+            return systems.lti(continuous.numerator, continuous.denominator)
+        system = self.linear_system(sample_time)
         step: Any = system.sample_time or sample_time or True
         if system.polynomials is not None:
-            return signal.dlti(
+            return systems.dlti(
                 system.polynomials.numerator, system.polynomials.denominator, dt=step
             )
-        return signal.dlti(*_matrices(system), dt=step)
+        return systems.dlti(*_matrices(system), dt=step)
 
     def to_control(self, sample_time: float | None = None) -> StateSpace | TransferFunction:
         """Return a linear model as a system of python-control, as `to_scipy` does.
@@ -181,7 +182,7 @@ class HandsOver(metaclass=Checked):
         continuous = self.continuous() if sample_time is None else None
         if continuous is not None:
             return control.tf(continuous.numerator, continuous.denominator)
-        system = self.linear(sample_time)
+        system = self.linear_system(sample_time)
         step: Any = system.sample_time or sample_time or True
         if system.polynomials is not None:
             return control.tf(system.polynomials.numerator, system.polynomials.denominator, step)

@@ -162,7 +162,7 @@ class Coupling(Stateless, Primitive):
         at_low, at_high = self.matrix.T * low, self.matrix.T * high
         return np.minimum(at_low, at_high).sum(axis=1), np.maximum(at_low, at_high).sum(axis=1)
 
-    def linear(self, sample_time: float | None = None) -> LinearSystem:
+    def linear_system(self, sample_time: float | None = None) -> LinearSystem:
         """Return the gains."""
         del sample_time
         return LinearSystem.gain(np.array(self.gains).T)

@@ -133,7 +133,7 @@ class Creep(SingleChannel, Invertible):
         """Return the elements at rest: where the first output is held, or, virgin, at 0."""
         return self.initial_state(first / (1.0 + np.sum(self.compliances)), start)
 
-    def linear(self, sample_time: float | None = None) -> LinearSystem:
+    def linear_system(self, sample_time: float | None = None) -> LinearSystem:
         """Return the elements, each a state."""
         decays, c = self.coefficients(sample_time).reshape(2, -1)
         matrices = (np.diag(decays), (1 - decays)[:, np.newaxis], (c * decays)[np.newaxis])

@@ -283,7 +283,7 @@ class ProcessModel(LinearStart, SingleChannel, Primitive):
         late = rf"\, e^{{-{delay}\,s}}" if self.delay else ""
         return rf"\frac{{Y(s) - y_0}}{{U(s) - u_0}} = \frac{{{above}}}{{{below}}}{late}"
 
-    def linear(self, sample_time: float | None = None) -> LinearSystem:
+    def linear_system(self, sample_time: float | None = None) -> LinearSystem:
         """Return the lags behind the past inputs that the dead time and the hold remember."""
         found = _discretised(self, sample_time)
         n, m = int(found[0]), int(found[1])

@@ -278,7 +278,7 @@ class TransferFunction(LinearStart, SingleChannel, Primitive):
         modelled = self.noise_deviation is not None or any(len(c) > 1 for c in noise)
         return (f"y_t - y_0 = {' + '.join(told if modelled else told[:1])}",)
 
-    def linear(self, sample_time: float | None = None) -> LinearSystem:
+    def linear_system(self, sample_time: float | None = None) -> LinearSystem:
         """Return the filter, in observable form, without its noise model."""
         own_sample_time(self.kind, self.sample_time, sample_time or self.sample_time)
         b, f = self._padded()

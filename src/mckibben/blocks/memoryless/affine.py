@@ -73,7 +73,7 @@ class Affine(Memoryless, Primitive):
         """Return the line with its numbers."""
         return (f"y = {summed([(self.gain, 'u'), (self.offset, '')])}",)
 
-    def linear(self, sample_time: float | None = None) -> LinearSystem:
+    def linear_system(self, sample_time: float | None = None) -> LinearSystem:
         """Return the gain."""
         del sample_time
         return LinearSystem.gain(self.gain, self.offset)

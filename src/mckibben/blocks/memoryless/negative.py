@@ -45,7 +45,7 @@ class Negative(Memoryless, Primitive):
         """Return the block from output to input."""
         return Negative(self.output, self.input)
 
-    def linear(self, sample_time: float | None = None) -> LinearSystem:
+    def linear_system(self, sample_time: float | None = None) -> LinearSystem:
         """Return a gain of -1."""
         del sample_time
         return LinearSystem.gain(-1.0)

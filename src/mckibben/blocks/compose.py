@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, reduce
 from itertools import pairwise
 from typing import ClassVar, Self
 
@@ -20,6 +20,7 @@ from mckibben.blocks.core.block import Block, Run
 from mckibben.blocks.core.composition import Composition, Parts
 from mckibben.blocks.core.exportable import Board
 from mckibben.blocks.core.fields import STRICT, Channel, Initial
+from mckibben.blocks.core.linear import LinearSystem
 from mckibben.errors import ModelError
 from mckibben.system.compiling import in_turn
 
@@ -162,6 +163,14 @@ class Series(Composition):
             low, high = part.passes(low, high)
         return low, high
 
+    def linear_system(self, sample_time: float | None = None) -> LinearSystem:
+        """Return the parts one behind the other."""
+        return reduce(LinearSystem.then, [part.linear_system(sample_time) for part in self.parts])
+
+    def joined(self, parts: Sequence[str]) -> str:
+        """Return what one gives going into the next."""
+        return rf"y = {'['.join(reversed(parts))}[u{']' * len(parts)}"
+
     @classmethod
     def example(cls) -> Self:
         """Return a modified Prandtl-Ishlinskii model: a PI model and a saturating curve."""
@@ -232,6 +241,14 @@ class Parallel(Composition):
         """Lay out the parts on the same signals, and add what they give."""
         all_given = [part.wired(board, given) for part in self.parts]
         return [board.add(terms) for terms in zip(*all_given, strict=True)]
+
+    def linear_system(self, sample_time: float | None = None) -> LinearSystem:
+        """Return the sum of the parts."""
+        return reduce(LinearSystem.beside, [part.linear_system(sample_time) for part in self.parts])
+
+    def joined(self, parts: Sequence[str]) -> str:
+        """Return their sum."""
+        return f"y = {' + '.join(f'{part}[u]' for part in parts)}"
 
     @classmethod
     def example(cls) -> Self:
@@ -314,6 +331,10 @@ class PerChannel(Composition):
         """Return the outputs that every channel can reach whatever happened before."""
         ends = [part.reachable() for part in self.parts]
         return np.concatenate([low for low, _ in ends]), np.concatenate([high for _, high in ends])
+
+    def joined(self, parts: Sequence[str]) -> str:
+        """Return each on its own."""
+        return r",\quad ".join(f"y_{{{k}}} = {part}[u_{{{k}}}]" for k, part in enumerate(parts, 1))
 
     @classmethod
     def example(cls) -> Self:

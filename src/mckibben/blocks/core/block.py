@@ -19,6 +19,7 @@ from mckibben.arrays import Array
 from mckibben.blocks.core import saving
 from mckibben.blocks.core.exportable import Exportable
 from mckibben.blocks.core.fields import Channel, Initial
+from mckibben.blocks.core.linear import HandsOver
 from mckibben.blocks.core.parametrised import Parametrised
 from mckibben.blocks.core.running import Stream, run_many
 from mckibben.errors import DataError, ModelError
@@ -29,7 +30,7 @@ Run = Callable[[], None]
 Kernel = Callable[..., None]
 
 
-class Block(Exportable, Parametrised):
+class Block(Exportable, Parametrised, HandsOver):
     """An immutable parameter set with dynamics.
 
     Concrete blocks are frozen dataclasses, registered under `kind`. They know their inputs and

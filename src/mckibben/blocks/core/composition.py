@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Callable, Iterable, Sequence
 from typing import Annotated, ClassVar
 
@@ -33,6 +34,15 @@ class Composition(Block):
     together: ClassVar[Callable[[Iterable[float]], float]] = max  # of dead times side by side
 
     parts: tuple[Block, ...]
+
+    def equations(self) -> tuple[str, ...]:
+        """Return how the parts come together: ``y`` of them all, ``u`` going into each."""
+        marks = [f"P_{{{place + 1}}}" for place in range(len(self.parts))]
+        return (self.joined(marks),)
+
+    @abstractmethod
+    def joined(self, parts: Sequence[str]) -> str:
+        """Return in LaTeX what the parts, of these names, make together."""
 
     @property
     def rate_dependent(self) -> bool:  # type: ignore[override]

@@ -220,6 +220,10 @@ class Inverse(Block):
         if complaint:
             warnings.warn(complaint, ModelWarning, stacklevel=4)
 
+    def equations(self) -> tuple[str, ...]:
+        """Return that it solves the equations of the block undone, which follow."""
+        return (r"\hat{u} = P^{-1}[y] \quad\text{such that}\quad P[\hat{u}] = y",)
+
     @classmethod
     def example(cls) -> Self:
         """Return the inverse of a Prandtl-Ishlinskii model."""

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from mckibben.arrays import Array
 from mckibben.blocks.core.checked import Checked
+from mckibben.blocks.core.notation import Notation
 from mckibben.errors import ModelError
 
 
@@ -27,6 +28,22 @@ class Parametrised(metaclass=Checked):
 
     parameters: ClassVar[tuple[str, ...]] = ()
     """Names of the fields, in the order of the vector."""
+
+    notation: ClassVar[Notation] = Notation()
+    """Its equations, and the symbols and units of its numbers."""
+
+    def equations(self) -> tuple[str, ...]:
+        """Return the equations of this structure, in LaTeX; by default those of its class."""
+        return self.notation.equations
+
+    def worked(self) -> tuple[str, ...]:
+        """Return equations with this one's numbers in them, in LaTeX, where they are short; or none."""
+        return ()
+
+    def unit_of(self, field: str, index: tuple[int, ...]) -> str | None:
+        """Return the unit of a number of a field, as `Notation` writes it; None if none is declared."""
+        del index
+        return self.notation.unit(field)
 
     @property
     def n_parameters(self) -> int:

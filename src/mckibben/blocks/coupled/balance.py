@@ -41,6 +41,7 @@ from mckibben.blocks.core.inverse import Invertible
 from mckibben.blocks.core.kernels import kernel
 from mckibben.blocks.core.linear_system import newton_cost
 from mckibben.blocks.core.many_channels import ManyChannels
+from mckibben.blocks.core.notation import Notation
 from mckibben.blocks.core.refusals import explicit_state, needs_sample_time
 from mckibben.blocks.coupled.balance_fields import check_fields
 from mckibben.blocks.coupled.balance_law import NEARLY, NEVER, begin, keep, pressed, settle
@@ -169,6 +170,33 @@ class Balance(ManyChannels, Invertible):
     parameters: ClassVar[tuple[str, ...]] = (
         *("springs", "elasticity", "areas", "friction", "relaxation", "loads"),
         *("damping", "lines", "walls", "grip", "bladders", "pushes", "mass"),
+    )
+    notation: ClassVar[Notation] = Notation(
+        r"p_k A_k(y_k) = \sum_l C_{kl} F_l + \sum_{q} x^q \left(S_{kq0} + \sum_j S_{kqj} "
+        r"y_j\right) + E_k(y_k) + \sum_m h_{km} s_{km} + \sum_l \kappa_{kl} q_{kl} + d_k "
+        r"\dot{y}_k + l_k \left(\frac{A_k}{a_{k0}}\right)^2 \dot{y}_k + m_k \ddot{y}_k",
+        r"A_k(y) = \sum_i a_{ki} (y / L)^i,\quad E_k(y) = b_k y + \sum_{i \ge 2} e_{ki} "
+        "(y / L)^i",
+        r"s_{km} \text{ follows } y_k + w_k p_k \text{ up to } \pm r_m (p_k + p_0),\quad "
+        r"\dot{q}_{kl} = \dot{y}_k - q_{kl} / \tau_l",
+        springs="S_{ki}",
+        elasticity="e_{ki} from 2 [N]",
+        areas="a_{ki} from 0 [N/bar]",
+        friction="h_{km} [N/mm]",
+        relaxation=r"\kappa_{kl} [N/mm]",
+        loads="C_{kl}",
+        damping="d_k [N s/mm]",
+        lines="l_k [N s/mm]",
+        walls="w_k [mm/bar]",
+        limits="r_m [mm/bar]",
+        grip="p_0 [bar]",
+        lags=r"\tau_l [s]",
+        scale="L [mm]",
+        bladders="b_k [N/mm]",
+        pushes="P_k [N]",
+        mass="m_k [N s^2/mm]",
+        driven="y_i",
+        given="p_i",
     )
 
     springs: Rows
@@ -319,6 +347,19 @@ class Balance(ManyChannels, Invertible):
     def inverse_cost(self, sample_time: float | None) -> Cost:
         """Return what steps of Newton's method cost."""
         return newton_cost(4 * self.c_numbers(sample_time).size + len(self.driven) ** 3)
+
+    def unit_of(self, field: str, index: tuple[int, ...]) -> str | None:
+        """Return the unit of a number: forces are in N, or in bar where areas are relative."""
+        declared = super().unit_of(field, index)
+        force = "bar" if self.areas[0][0] == 1.0 and not self.n_loads else "N"
+        if field == "springs":
+            power, place = divmod(index[-1], 1 + len(self.driven))
+            by, degree = divmod(power - 1, self.degree)
+            below = "mm" * (place > 0)
+            if power > 0:
+                below += f"{' ' if below else ''}{self.scheduled[by].unit}^{degree + 1}"
+            return f"{force}/{below.replace('^1', '')}" if below else force
+        return (declared or "").replace("N", force)
 
     @classmethod
     def example(cls) -> Self:

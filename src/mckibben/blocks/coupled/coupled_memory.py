@@ -21,6 +21,7 @@ from mckibben.blocks.core.block import Block, Kernel, Primitive
 from mckibben.blocks.core.fields import STRICT, Channel, Channels, Initial, Rows, Vector
 from mckibben.blocks.core.kernels import kernel
 from mckibben.blocks.core.many_channels import ManyChannels
+from mckibben.blocks.core.notation import Notation
 from mckibben.blocks.core.refusals import explicit_state, needs_sample_time
 from mckibben.errors import ModelError
 
@@ -91,6 +92,15 @@ class CoupledMemory(ManyChannels, Primitive):
     kernel: ClassVar[Kernel] = coupled_memory_kernel
     rate_dependent: ClassVar[bool] = True
     parameters: ClassVar[tuple[str, ...]] = ("readout",)
+    notation: ClassVar[Notation] = Notation(
+        r"\tau_l \dot{x}_{li} = u_i - x_{li},\quad z_{lik} = F_{r_{ik}}[x_{li}]",
+        r"y_j = R_j \cdot \left(1,\; x,\; z,\; x_{1i} x_{1k},\; x_{1i} x_{1k} x_{1q}\right)",
+        lags=r"\tau_l [s]",
+        thresholds="r_{ik} [{in0}]",
+        readout="R_{jk}",
+        driven="u_i",
+        given="y_j",
+    )
 
     lags: Vector
     thresholds: Rows
@@ -158,6 +168,18 @@ class CoupledMemory(ManyChannels, Primitive):
             f"{self.kind!r} has no inverse: its lags cannot be undone within a sample. "
             "Remedy: invert balance or sdchm, or close a loop."
         )
+
+    def unit_of(self, field: str, index: tuple[int, ...]) -> str | None:
+        """Return the unit of a number: a readout is the output per inputs multiplied."""
+        if field != "readout":
+            return super().unit_of(field, index)
+        units = [channel.unit for channel in self.inputs]
+        plays = [unit for unit in units for _ in self.thresholds[0]]
+        per = ["", *units * len(self.lags), *plays * len(self.lags)]
+        for degree in range(2, self.degree + 1):
+            per += [" ".join(many) for many in combinations_with_replacement(units, degree)]
+        given = self.outputs[index[0]].unit
+        return f"{given or '1'}/{per[index[1]]}" if per[index[1]].strip() else given
 
     @classmethod
     def example(cls) -> Self:

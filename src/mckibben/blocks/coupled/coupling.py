@@ -18,6 +18,8 @@ from mckibben.arrays import Array
 from mckibben.blocks.core.block import Block, Kernel, Primitive
 from mckibben.blocks.core.fields import STRICT, Channel, Channels, Rows, rows
 from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.core.linear import LinearSystem
+from mckibben.blocks.core.notation import Notation
 from mckibben.blocks.core.stateless import Stateless
 from mckibben.errors import ModelError
 
@@ -53,6 +55,12 @@ class Coupling(Stateless, Primitive):
     kind: ClassVar[str] = "coupling"
     kernel: ClassVar[Kernel] = coupling_kernel
     parameters: ClassVar[tuple[str, ...]] = ("gains",)
+    notation: ClassVar[Notation] = Notation(
+        r"h_j = \sum_i G_{ij} v_i",
+        gains="G_{ij} [{out1}/{in0}]",
+        driven="v_i",
+        given="h_j",
+    )
 
     gains: Rows
     driven: Channels
@@ -153,6 +161,11 @@ class Coupling(Stateless, Primitive):
         """Return the outputs reached over a box of inputs, each by itself."""
         at_low, at_high = self.matrix.T * low, self.matrix.T * high
         return np.minimum(at_low, at_high).sum(axis=1), np.maximum(at_low, at_high).sum(axis=1)
+
+    def linear_system(self, sample_time: float | None = None) -> LinearSystem:
+        """Return the gains."""
+        del sample_time
+        return LinearSystem.gain(np.array(self.gains).T)
 
     @classmethod
     def example(cls) -> Self:

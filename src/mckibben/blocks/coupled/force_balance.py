@@ -3,20 +3,13 @@
 Every muscle pulls with its pressure times an effective area that falls with its shortening; what
 resists are springs that couple the muscles and stiffen with whatever schedules them (an extensor's
 pressure, a load), and dry friction in its own braid. Divided by the area, that gives the pressure of
-muscle k directly from where the arm is and has been:
+muscle k directly from where the arm is and has been; see its notation, with stop operators s_m,
+elastic-plastic friction elements that break away after a travel r_m. This direction, the compensator,
+is explicit. The other, from pressures to where the arm goes, is solved by Newton's method in every
+sample (its inverse).
 
-    p_k = [sum_q x^q (c_kq + sum_j S_kqj y_j) + e_k(y_k) + sum_m x^q f_kqm s_m[y_k]]
-          / [1 + a_k(y_k) + sum_m h_km s_m[y_k]]
-
-with stop operators s_m, elastic-plastic friction elements that break away after a travel r_m. This
-direction, the compensator, is explicit. The other, from pressures to where the arm goes, is solved
-by Newton's method in every sample (its inverse).
-
-The form is this package's own; friction that depends on travel rather than on pressure follows "A
-Multistate Friction Model for the Compensation of the Asymmetric Hysteresis in the Mechanical Response
-of Pneumatic Artificial Muscles".
-
-No estimator gives it any more, `mckibben.blocks.coupled.balance` does its work: it is here for files.
+The form is this package's own. No estimator gives it any more, `mckibben.blocks.coupled.balance`, which
+names the sources, does its work: it is here for files.
 """
 
 from __future__ import annotations
@@ -49,6 +42,7 @@ from mckibben.blocks.core.inverse import Invertible
 from mckibben.blocks.core.kernels import kernel
 from mckibben.blocks.core.linear_system import eliminate, newton_cost
 from mckibben.blocks.core.many_channels import ManyChannels
+from mckibben.blocks.core.notation import Notation
 from mckibben.blocks.core.parametrised import parameter_vector
 from mckibben.blocks.core.refusals import explicit_state
 from mckibben.errors import ModelError, ModelWarning
@@ -248,6 +242,14 @@ class ForceBalance(ManyChannels, Invertible):
     inverse_path_dependent: ClassVar[bool] = True
     in_scratch: ClassVar[bool] = True
     increasing = ("thresholds",)
+    notation: ClassVar[Notation] = Notation(
+        r"p_k = \frac{\sum_q x^q (c_{kq} + \sum_j S_{kqj} y_j) + e_k(y_k) + \sum_m x^q "
+        r"f_{kqm} s_m[y_k]}{1 + a_k(y_k) + \sum_m h_{km} s_m[y_k]}",
+        thresholds="r_m [mm]",
+        scale="L [mm]",
+        driven="y_i",
+        given="p_i",
+    )
 
     forces: Rows
     areas: Rows

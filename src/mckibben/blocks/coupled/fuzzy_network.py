@@ -32,6 +32,7 @@ from mckibben.blocks.core.inverse import Invertible
 from mckibben.blocks.core.kernels import kernel
 from mckibben.blocks.core.linear_system import eliminate, newton_cost
 from mckibben.blocks.core.many_channels import ManyChannels
+from mckibben.blocks.core.notation import Notation
 from mckibben.blocks.core.stateless import Stateless
 from mckibben.blocks.coupled.fuzzy_rules import answer, contract, sloped_answer
 from mckibben.errors import ModelError
@@ -134,6 +135,15 @@ class FuzzyNetwork(Stateless, ManyChannels, Invertible):
     in_scratch: ClassVar[bool] = True
     of_local_rules: ClassVar[bool] = True
     parameters: ClassVar[tuple[str, ...]] = ("centres", "widths", "consequents")
+    notation: ClassVar[Notation] = Notation(
+        r"y_k = \frac{\sum_r \omega_r\, (P_{rk} \cdot x + c_{rk})}{\sum_r \omega_r},\quad "
+        r"\omega_r = \prod_i \exp\left(-\frac{(x_i - m_{ir})^2}{2 \sigma_{ir}^2}\right)",
+        centres="m_{ij} [{in0}]",
+        widths=r"\sigma_{ij} [{in0}]",
+        consequents="P_i",
+        driven="x_i",
+        given="y_k",
+    )
 
     centres: Rows
     widths: Rows
@@ -254,6 +264,15 @@ class FuzzyNetwork(Stateless, ManyChannels, Invertible):
             f"{int(state[-1])} samples of the reference are out of reach of the network and were "
             "clipped to the nearest that is"
         )
+
+    def unit_of(self, field: str, index: tuple[int, ...]) -> str | None:
+        """Return the unit of a number: a consequent is the output, or that per input."""
+        if field != "consequents":
+            return super().unit_of(field, index)
+        per = [channel.unit for channel in self.inputs]
+        rule, place = divmod(index[-1], len(per) + self.constants)
+        given = self.outputs[rule % len(self.outputs)].unit
+        return f"{given or '1'}/{per[place]}" if place < len(per) and per[place] else given
 
     @classmethod
     def example(cls) -> Self:

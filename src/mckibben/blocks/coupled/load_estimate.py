@@ -23,6 +23,7 @@ from mckibben.blocks.compose import PerChannel, Series
 from mckibben.blocks.core.block import Block, Kernel, Primitive
 from mckibben.blocks.core.fields import STRICT, Channel, Initial
 from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.core.notation import Notation
 from mckibben.blocks.core.refusals import explicit_state
 from mckibben.blocks.core.saving import nested
 from mckibben.blocks.coupled.balance import Balance
@@ -80,6 +81,10 @@ class LoadEstimate(Primitive):
     kernel: ClassVar[Kernel] = load_estimate_kernel
     in_scratch: ClassVar[bool] = True
     parameters: ClassVar[tuple[str, ...]] = ("forward",)
+    notation: ClassVar[Notation] = Notation(
+        r"F = C^{+} \left(p A(y) - \text{springs} - \text{elasticity} - \text{friction} - "
+        r"\text{relaxation} - \text{damping} - \text{inertia}\right)",
+    )
 
     forward: Annotated[InstanceOf[Balance], BeforeValidator(nested)]
 

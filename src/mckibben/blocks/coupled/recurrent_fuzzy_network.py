@@ -31,6 +31,7 @@ from mckibben.blocks.core.exportable import Cost
 from mckibben.blocks.core.fields import STRICT, Channel, Channels, Initial, Rows, Vector
 from mckibben.blocks.core.kernels import kernel
 from mckibben.blocks.core.many_channels import ManyChannels
+from mckibben.blocks.core.notation import Notation
 from mckibben.blocks.core.refusals import explicit_state, own_sample_time
 from mckibben.errors import ModelError
 
@@ -129,6 +130,21 @@ class RecurrentFuzzyNetwork(ManyChannels, Primitive):
     in_scratch: ClassVar[bool] = True
     of_local_rules: ClassVar[bool] = True
     parameters: ClassVar[tuple[str, ...]] = ("centres", "widths", "feedbacks", "consequents")
+    notation: ClassVar[Notation] = Notation(
+        r"y_t = \frac{\sum_r \omega_r\, (P_r \cdot x_t + c_r)}{\sum_r \omega_r},\quad "
+        r"\omega_r = \prod_i O_{ir,t}",
+        r"O_{ij,t} = \exp\left(-\frac{(x_{i,t} - m_{ij} + \theta_{ij} O_{ij,t-1})^2}{2 "
+        r"\sigma_{ij}^2}\right)",
+        r"x_t = (y_{t-1}, \ldots,\; u_t, \ldots,\; s_t, \ldots)",
+        centres="m_{ij}",
+        widths=r"\sigma_{ij}",
+        feedbacks=r"\theta_{ij}",
+        consequents="P_i",
+        own_time="T [s]",
+        driven="u",
+        scheduled="s_i",
+        given="y",
+    )
 
     centres: Rows
     widths: Rows
@@ -232,6 +248,26 @@ class RecurrentFuzzyNetwork(ManyChannels, Primitive):
             f"{self.kind!r} has no inverse: a sample of its input moves its output by next to nothing. "
             "Remedy: invert balance, or close a loop."
         )
+
+    @property
+    def _regressor_units(self) -> list[str]:
+        """The unit of every x: past outputs, the driven input, what schedules."""
+        units = [self.outputs[0].unit] * self.output_lags
+        units += [self.inputs[0].unit] * (1 + self.input_lags)
+        for channel in self.scheduled:
+            units += [channel.unit] * (1 + self.scheduling_lags)
+        return units
+
+    def unit_of(self, field: str, index: tuple[int, ...]) -> str | None:
+        """Return the unit of a number: a consequent is the output, or that per input."""
+        if field in ("centres", "widths", "feedbacks"):
+            return self._regressor_units[index[0]]
+        if field != "consequents":
+            return super().unit_of(field, index)
+        per = self._regressor_units
+        place = index[-1] % (len(per) + 1)
+        given = self.outputs[0].unit
+        return f"{given or '1'}/{per[place]}" if place < len(per) and per[place] else given
 
     @classmethod
     def example(cls) -> Self:

@@ -34,6 +34,7 @@ from mckibben.blocks.core.fields import (
     StoredInitial,
 )
 from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.core.notation import Notation
 from mckibben.blocks.core.solved_inverse import solve_samples
 from mckibben.blocks.differential.flow import flow
 from mckibben.blocks.differential.loop import BoucWenLoop
@@ -117,6 +118,17 @@ class BoucWen(BoucWenLoop):
     kernel: ClassVar[Kernel] = bouc_wen_kernel
     inverse_kernel: ClassVar[Kernel] = bouc_wen_inverse_kernel
     parameters: ClassVar[tuple[str, ...]] = ("polynomial", "weight", "rate", "sigma")
+    notation: ClassVar[Notation] = Notation(
+        r"y = \sum_k c_k x^k + w z,\quad x = \frac{u - m}{s}",
+        r"\frac{dz}{du} = \rho \left(1 - |z|^n \left[\sigma \operatorname{sgn}(z\, du) + "
+        r"1 - \sigma\right]\right)",
+        polynomial="c_k from 0 [{y}]",
+        weight="w [{y}]",
+        rate=r"\rho [1/{u}]",
+        sigma=r"\sigma",
+        centre="m [{u}]",
+        scale="s [{u}]",
+    )
 
     polynomial: Coefficients
     weight: FiniteFloat

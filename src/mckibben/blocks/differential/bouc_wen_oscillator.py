@@ -25,6 +25,7 @@ from mckibben.arrays import Array
 from mckibben.blocks.core.block import Kernel
 from mckibben.blocks.core.fields import DISPLACEMENT, FORCE, STRICT, ChannelField, StoredInitial
 from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.core.notation import Notation
 from mckibben.blocks.differential.oscillator import Oscillator, Positive, oscillate
 from mckibben.blocks.dynamic.repeating import Hold, Substeps
 
@@ -51,15 +52,15 @@ class BoucWenOscillator(Oscillator):
     Parameters
     ----------
     mass : float
-        m [kg]; positive.
+        m, the moving mass [kg]; positive.
     damping : float
-        c [N s/mm]; not negative.
+        c, force by velocity [N s/mm]; not negative.
     stiffness : float
-        k [N/mm]; positive.
+        k, force by displacement [N/mm]; positive.
     slope : float
         Stiffness of the element about z = 0 [N/mm]; positive.
     gamma, delta : float
-        Of the element [1/mm].
+        Shape of the element: how fast it loses its stiffness, on the whole and by direction [1/mm].
     output_offset : float or None
         Added to the displacement [mm]; None for none.
     substeps : int
@@ -78,6 +79,17 @@ class BoucWenOscillator(Oscillator):
     slope_by: ClassVar[Callable[[float, float, Array], float]] = staticmethod(bouc_wen_slope)
     parameters: ClassVar[tuple[str, ...]] = (
         *("mass", "damping", "stiffness", "slope", "gamma", "delta", "output_offset"),
+    )
+    notation: ClassVar[Notation] = Notation(
+        r"m \ddot{q} + c \dot{q} + k q + z = u,\quad y = q + y_0",
+        r"\dot{z} = a \dot{q} - \gamma |\dot{q}| z - \delta \dot{q} |z|",
+        mass="m [kg]",
+        damping="c [N s/mm]",
+        stiffness="k [N/mm]",
+        slope="a [N/mm]",
+        gamma=r"\gamma [1/mm]",
+        delta=r"\delta [1/mm]",
+        output_offset="y_0 [{y}]",
     )
 
     mass: Positive

@@ -34,6 +34,7 @@ from mckibben.blocks.core.fields import (
     StoredInitial,
 )
 from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.core.notation import Notation
 from mckibben.blocks.core.refusals import explicit_state
 from mckibben.blocks.core.single_channel import check_input_range
 from mckibben.blocks.core.solved_inverse import solve_samples
@@ -132,6 +133,16 @@ class Duhem(Loop):
     kernel: ClassVar[Kernel] = duhem_kernel
     inverse_kernel: ClassVar[Kernel] = duhem_inverse_kernel
     parameters: ClassVar[tuple[str, ...]] = ("target", "slope", "alpha")
+    notation: ClassVar[Notation] = Notation(
+        r"\frac{dy}{dx} = \alpha \operatorname{sgn}(dx) \left(f(x) - y\right) + "
+        r"g(x),\quad x = \frac{u - m}{s}",
+        r"f(x) = \sum_k f_k x^k,\quad g(x) = \sum_k g_k x^k",
+        target="f_k from 0 [{y}]",
+        slope="g_k from 0 [{y}]",
+        alpha=r"\alpha",
+        centre="m [{u}]",
+        scale="s [{u}]",
+    )
 
     target: Coefficients
     slope: Coefficients

@@ -32,6 +32,7 @@ from mckibben.blocks.core.fields import (
     Vector,
 )
 from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.core.notation import Notation
 from mckibben.blocks.differential.oscillator import Oscillator, Positive, oscillate
 from mckibben.blocks.dynamic.repeating import Hold, Substeps
 from mckibben.errors import ModelError
@@ -72,11 +73,11 @@ class DuhemOscillator(Oscillator):
     Parameters
     ----------
     mass : float
-        m [kg]; positive.
+        m, the moving mass [kg]; positive.
     damping : float
-        c [N s/mm]; not negative.
+        c, force by velocity [N s/mm]; not negative.
     stiffness : float
-        k [N/mm]; positive.
+        k, force by displacement [N/mm]; positive.
     rising, falling : sequence of float
         Slopes of the element's force by the displacement while that rises, or falls, at every knot
         [N/mm].
@@ -101,6 +102,20 @@ class DuhemOscillator(Oscillator):
     slope_by: ClassVar[Callable[[float, float, Array], float]] = staticmethod(duhem_slope)
     parameters: ClassVar[tuple[str, ...]] = (
         *("mass", "damping", "stiffness", "rising", "falling", "output_offset"),
+    )
+    notation: ClassVar[Notation] = Notation(
+        r"m \ddot{q} + c \dot{q} + k q + z = u,\quad y = q + y_0",
+        r"\dot{z} = \begin{cases} r(z)\, \dot{q} & q \text{ rises} \\ s(z)\, \dot{q} & q "
+        r"\text{ falls} \end{cases}",
+        r"r, s \text{ straight between the knots } \zeta_k,\; r(\zeta_k) = r_k,\; "
+        r"s(\zeta_k) = s_k",
+        mass="m [kg]",
+        damping="c [N s/mm]",
+        stiffness="k [N/mm]",
+        knots=r"\zeta_k [N]",
+        rising="r_k [N/mm]",
+        falling="s_k [N/mm]",
+        output_offset="y_0 [{y}]",
     )
 
     mass: Positive

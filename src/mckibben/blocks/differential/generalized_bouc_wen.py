@@ -36,6 +36,7 @@ from mckibben.blocks.core.fields import (
     Vector,
 )
 from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.core.notation import Notation
 from mckibben.blocks.core.solved_inverse import solve_samples
 from mckibben.blocks.differential.flow import flow
 from mckibben.blocks.differential.loop import BoucWenLoop
@@ -139,6 +140,19 @@ class GeneralizedBoucWen(BoucWenLoop):
     kernel: ClassVar[Kernel] = generalized_bouc_wen_kernel
     inverse_kernel: ClassVar[Kernel] = generalized_bouc_wen_inverse_kernel
     parameters: ClassVar[tuple[str, ...]] = ("polynomial", "weight", "rate", "shape")
+    notation: ClassVar[Notation] = Notation(
+        r"y = \sum_k c_k x^k + w z,\quad x = \frac{u - m}{s}",
+        r"\frac{dz}{du} = \rho \left(1 - |z|^n \psi\right)",
+        r"\psi = \operatorname{sgn}(z\,du) + b_2 \operatorname{sgn}(x\,du) + b_3 "
+        r"\operatorname{sgn}(x z) + b_4 \operatorname{sgn}(du) + b_5 "
+        r"\operatorname{sgn}(z) + b_6 \operatorname{sgn}(x)",
+        polynomial="c_k from 0 [{y}]",
+        weight="w [{y}]",
+        rate=r"\rho [1/{u}]",
+        shape="b_k from 2",
+        centre="m [{u}]",
+        scale="s [{u}]",
+    )
 
     polynomial: Coefficients
     weight: FiniteFloat

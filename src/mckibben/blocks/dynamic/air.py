@@ -38,6 +38,7 @@ from mckibben.blocks.core.fields import (
     StoredInitial,
 )
 from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.core.notation import Notation
 from mckibben.blocks.core.refusals import explicit_state, needs_sample_time
 from mckibben.blocks.core.single_channel import Ranged, check_input_range
 from mckibben.errors import ModelError, ModelWarning
@@ -156,6 +157,20 @@ class Air(Ranged):
         "hysteresis",
         "filling_time",
         "venting_time",
+    )
+    notation: ClassVar[Notation] = Notation(
+        r"\begin{cases} T_f \dot{x} = g_f - x & \text{filling, } g_f = K (u - u_0 - h/2) "
+        r"> x \\ T_v \dot{x} = g_v - x & \text{venting, } g_v = K (u - u_0 + h/2) < x "
+        r"\end{cases}",
+        "y(t) = x(t - T_d)",
+        gain="K [{y}/{u}]",
+        offset="u_0 [{u}]",
+        hysteresis="h [{u}]",
+        filling_time="T_f [s]",
+        venting_time="T_v [s]",
+        dead_time="T_d [s]",
+        ambient=r"p_{\min} [{y}]",
+        supply=r"p_{\max} [{y}]",
     )
 
     gain: Annotated[FiniteFloat, Gt(0)]

@@ -18,6 +18,8 @@ from mckibben.blocks.core.block import Kernel
 from mckibben.blocks.core.fields import DISPLACEMENT, STRICT, ChannelField, Initial, Rule, Vector
 from mckibben.blocks.core.inverse import Invertible
 from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.core.linear import LinearSystem
+from mckibben.blocks.core.notation import Notation
 from mckibben.blocks.core.refusals import explicit_state, needs_sample_time
 from mckibben.blocks.core.single_channel import SingleChannel
 from mckibben.errors import ModelError
@@ -62,7 +64,7 @@ class Creep(SingleChannel, Invertible):
     compliances : sequence of float, length K
         c_k: creep once it has ended, relative to the immediate response; not negative.
     time_constants : sequence of float, length K
-        tau_k [s], positive.
+        tau_k, how long each creep takes [s]; positive.
     initial : {"first_sample", "virgin", "fitted"}
         Where the elements are before the first sample: at rest at the first input, or at 0, or, on
         recordings whose output is known, where that tells (else at rest at the first input).
@@ -75,6 +77,11 @@ class Creep(SingleChannel, Invertible):
     inverse_kernel: ClassVar[Kernel] = creep_inverse_kernel
     rate_dependent: ClassVar[bool] = True
     parameters: ClassVar[tuple[str, ...]] = ("compliances", "time_constants")
+    notation: ClassVar[Notation] = Notation(
+        r"y = u + \sum_k c_k x_k,\quad \tau_k \dot{x}_k = u - x_k",
+        compliances="c_k",
+        time_constants=r"\tau_k [s]",
+    )
 
     compliances: Vector
     time_constants: Vector
@@ -125,6 +132,13 @@ class Creep(SingleChannel, Invertible):
     def inverse_start(self, first: Array, start: Rule) -> Array:
         """Return the elements at rest: where the first output is held, or, virgin, at 0."""
         return self.initial_state(first / (1.0 + np.sum(self.compliances)), start)
+
+    def linear_system(self, sample_time: float | None = None) -> LinearSystem:
+        """Return the elements, each a state."""
+        decays, c = self.coefficients(sample_time).reshape(2, -1)
+        matrices = (np.diag(decays), (1 - decays)[:, np.newaxis], (c * decays)[np.newaxis])
+        at_once = np.array([[1.0 + c @ (1 - decays)]])
+        return LinearSystem(*matrices, at_once, sample_time, np.zeros(1), np.zeros(1))
 
     @classmethod
     def example(cls) -> Self:

@@ -18,6 +18,7 @@ from mckibben.arrays import Array
 from mckibben.blocks.core.block import Kernel
 from mckibben.blocks.core.fields import STRICT, Vector
 from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.core.notation import Notation
 from mckibben.blocks.dynamic.narx import HEAD, Narx, give_output, take_input
 from mckibben.errors import ModelError
 
@@ -74,6 +75,19 @@ class NarxNetwork(Narx):
     kind: ClassVar[str] = "narx-network"
     kernel: ClassVar[Kernel] = narx_network_kernel
     parameters: ClassVar[tuple[str, ...]] = ("bias", "linear", "hidden")
+    notation: ClassVar[Notation] = Notation(
+        r"\bar{y}_t = b + l^\top x_t + \sum_h o_h\, a(w_h^\top x_t + s_h)",
+        r"x_t = (\bar{y}_{t-1}, \ldots, \bar{y}_{t-n},\, \bar{u}_{t-d}, \ldots, "
+        r"\bar{u}_{t-d-m+1},\, F_{r_1}[\bar{u}]_t, \ldots)",
+        r"\bar{u} = (u - u_1) / u_2,\quad \bar{y} = (y - y_1) / y_2",
+        bias="b",
+        linear="l_i",
+        hidden="h_i",
+        thresholds="r_i",
+        input_scale="u_i [{u}]",
+        output_scale="y_i [{y}]",
+        sample_time="T [s]",
+    )
 
     bias: FiniteFloat
     linear: Vector

@@ -16,6 +16,7 @@ from mckibben.arrays import Array
 from mckibben.blocks.core.block import Kernel
 from mckibben.blocks.core.fields import STRICT, Vector, rows
 from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.core.notation import Notation
 from mckibben.blocks.dynamic.narx import HEAD, Narx, give_output, take_input
 from mckibben.errors import ModelError
 
@@ -70,6 +71,17 @@ class NarxPolynomial(Narx):
     kind: ClassVar[str] = "narx-polynomial"
     kernel: ClassVar[Kernel] = narx_polynomial_kernel
     parameters: ClassVar[tuple[str, ...]] = ("weights",)
+    notation: ClassVar[Notation] = Notation(
+        r"\bar{y}_t = \sum_i w_i \prod_{j \in P_i} x_{j,t}",
+        r"x_t = (\bar{y}_{t-1}, \ldots, \bar{y}_{t-n},\, \bar{u}_{t-d}, \ldots, "
+        r"\bar{u}_{t-d-m+1},\, F_{r_1}[\bar{u}]_t, \ldots)",
+        r"\bar{u} = (u - u_1) / u_2,\quad \bar{y} = (y - y_1) / y_2",
+        weights="w_i",
+        thresholds="r_i",
+        input_scale="u_i [{u}]",
+        output_scale="y_i [{y}]",
+        sample_time="T [s]",
+    )
 
     terms: Terms
     weights: Vector

@@ -12,6 +12,7 @@ corner of the delayed input by matrix exponentials.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import lru_cache
 from typing import Annotated, ClassVar, Literal, Self
 
@@ -32,6 +33,8 @@ from mckibben.blocks.core.fields import (
     Vector,
 )
 from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.core.linear import LinearSystem, Polynomials
+from mckibben.blocks.core.notation import Notation, tex
 from mckibben.blocks.core.refusals import explicit_state, needs_sample_time
 from mckibben.blocks.core.single_channel import SingleChannel
 from mckibben.blocks.dynamic.linear_start import LinearStart
@@ -79,13 +82,13 @@ class ProcessModel(LinearStart, SingleChannel, Primitive):
     gain : float
         K, output per input at rest.
     time_constants : sequence of float
-        Tp1, Tp2, Tp3 [s], or Tw alone where there is a damping; positive.
+        Lags Tp1, Tp2, Tp3 [s], or Tw alone where there is a damping; positive.
     damping : float or None
-        zeta, positive; makes the pair of poles of P2U.
+        zeta, damping of the pair of poles, positive; makes the pair of poles of P2U.
     zero_time : float or None
-        Tz [s]; may be negative.
+        Tz, time of the zero [s]; may be negative.
     delay : float
-        Td [s], up to 254 samples; not negative.
+        Td, dead time [s], up to 254 samples; not negative.
     input_offset, output_offset : float
         The operating point.
     hold : {"first", "zero"}
@@ -102,6 +105,15 @@ class ProcessModel(LinearStart, SingleChannel, Primitive):
     kernel: ClassVar[Kernel] = process_model_kernel
     rate_dependent: ClassVar[bool] = True
     filters: ClassVar[bool] = True
+    notation: ClassVar[Notation] = Notation(
+        gain="K [{y}/{u}]",
+        time_constants="T_{p,i} [s]",
+        damping=r"\zeta",
+        zero_time="T_z [s]",
+        delay="T_d [s]",
+        input_offset="u_0 [{u}]",
+        output_offset="y_0 [{y}]",
+    )
 
     gain: FiniteFloat
     time_constants: Vector
@@ -245,6 +257,68 @@ class ProcessModel(LinearStart, SingleChannel, Primitive):
             "a reference would take derivatives of it. Remedy: invert a hysteresis model (cpi, gpi, "
             "mpi), or a transfer-function identified with delay=0."
         )
+
+    def equations(self) -> tuple[str, ...]:
+        """Return the transfer function of this structure."""
+        pair = r"T_{p,1}^2 s^2 + 2 \zeta T_{p,1} s + 1"
+        return (self._transfer("K", "T_z", pair, "T_{{p,{}}} s + 1", "T_d"),)
+
+    def worked(self) -> tuple[str, ...]:
+        """Return the transfer function with its numbers."""
+        a, b = (tex(float(c)) for c in self.denominator()[:2])
+        zero = "" if self.zero_time is None else tex(self.zero_time)
+        names = [f"{tex(t)}\\,s + 1" for t in self.time_constants]
+        pair = rf"{a}\,s^2 + {b}\,s + 1"
+        return (self._transfer(tex(self.gain), zero, pair, names, tex(self.delay)),)
+
+    def _transfer(
+        self, gain: str, zero: str, pair: str, lag: str | Sequence[str], delay: str
+    ) -> str:
+        lags = [
+            lag.format(k + 1) if isinstance(lag, str) else lag[k]
+            for k in range(len(self.time_constants))
+        ]
+        below = pair if self.damping is not None else "".join(rf"({text})" for text in lags)
+        above = gain if self.zero_time is None else rf"{gain} ({zero}\,s + 1)"
+        late = rf"\, e^{{-{delay}\,s}}" if self.delay else ""
+        return rf"\frac{{Y(s) - y_0}}{{U(s) - u_0}} = \frac{{{above}}}{{{below}}}{late}"
+
+    def linear_system(self, sample_time: float | None = None) -> LinearSystem:
+        """Return the lags behind the past inputs that the dead time and the hold remember."""
+        found = _discretised(self, sample_time)
+        n, m = int(found[0]), int(found[1])
+        now, before = found[4:6]
+        c, first, second, third = found[6 : 6 + 4 * n].reshape(4, n)
+        lags = found[6 + 4 * n :].reshape(n, n)
+        # [x, u of the last m + 2 samples, latest first]
+        size = n + m + 2
+        driven = np.zeros((n, m + 3))  # by the input now, a sample ago and so on
+        driven[:, m], driven[:, m + 1], driven[:, m + 2] = first, second, third
+        at_once = np.zeros(m + 3)
+        at_once[m], at_once[m + 1] = now, before
+        a, b = np.zeros((size, size)), np.zeros((size, 1))
+        a[:n, :n], a[:n, n:], b[:n, 0] = lags, driven[:, 1:], driven[:, 0]
+        a[n + 1 :, n:-1], b[n, 0] = np.eye(m + 1), 1.0
+        given = np.concatenate([c @ lags, c @ driven[:, 1:] + at_once[1:]])[np.newaxis]
+        through = np.array([[c @ driven[:, 0] + at_once[0]]])
+        offsets = np.array([self.input_offset]), np.array([self.output_offset])
+        return LinearSystem(a, b, given, through, sample_time, *offsets)
+
+    def continuous(self) -> Polynomials:
+        """Return the lags and the zero.
+
+        Raises
+        ------
+        ModelError
+            If there is a dead time, which polynomials cannot hold.
+        """
+        if self.delay > 0:
+            raise ModelError(
+                f"{self.kind!r} has a dead time of {self.delay:g} s, which a continuous transfer "
+                "function has no place for. Remedy: give a sample time."
+            )
+        zero = [] if self.zero_time is None else [self.gain * self.zero_time]
+        return Polynomials((*zero, self.gain), tuple(self.denominator().tolist()))
 
     @classmethod
     def example(cls) -> Self:

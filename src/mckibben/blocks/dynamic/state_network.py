@@ -34,6 +34,7 @@ from mckibben.blocks.core.fields import (
     StoredInitial,
 )
 from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.core.notation import Notation
 from mckibben.blocks.core.refusals import explicit_state, needs_sample_time
 from mckibben.blocks.core.single_channel import SingleChannel
 from mckibben.blocks.dynamic.repeating import Hold, Repeating, Substeps
@@ -153,6 +154,19 @@ class StateNetwork(Repeating, SingleChannel):
     rate_dependent: ClassVar[bool] = True
     in_scratch: ClassVar[bool] = True
     parameters: ClassVar[tuple[str, ...]] = ("linear", "hidden", "readout")
+    notation: ClassVar[Notation] = Notation(
+        r"\dot{x} = \lambda \left(L v + R \tanh(H v)\right),\quad v = \left(x,\, \frac{u "
+        r"- u_0}{u_s},\, 1\right)",
+        "y = y_0 + y_s x_1",
+        linear="L_{ij}",
+        hidden="H_{ij}",
+        readout="R_{ij}",
+        rate=r"\lambda [1/s]",
+        input_offset="u_0 [{u}]",
+        input_scale="u_s [{u}]",
+        output_offset="y_0 [{y}]",
+        output_scale="y_s [{y}]",
+    )
 
     linear: Rows
     hidden: Rows

@@ -9,6 +9,7 @@ output answers at once (b_0 is not zero) and all zeros of B lie within the unit 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Annotated, ClassVar, Self
 
 import numpy as np
@@ -29,6 +30,8 @@ from mckibben.blocks.core.fields import (
     Initial,
 )
 from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.core.linear import LinearSystem, Polynomials
+from mckibben.blocks.core.notation import FEW, Notation, summed
 from mckibben.blocks.core.refusals import explicit_state, own_sample_time
 from mckibben.blocks.core.single_channel import SingleChannel
 from mckibben.blocks.dynamic.linear_start import LinearStart
@@ -62,9 +65,10 @@ class TransferFunction(LinearStart, SingleChannel, Primitive):
     Parameters
     ----------
     numerator : sequence of float
-        b_0, b_1, ...; leading zeros are delays. At least one.
+        b_0, b_1, ..., what the input adds at once and samples later; leading zeros are
+        delays. At least one.
     denominator : sequence of float
-        f_1, f_2, ... (the leading 1 is left out); may be empty.
+        f_1, f_2, ..., what of past outputs goes on (the leading 1 is left out); may be empty.
     sample_time : float
         Time between samples that it holds for [s]; positive.
     input_offset, output_offset : float
@@ -89,6 +93,18 @@ class TransferFunction(LinearStart, SingleChannel, Primitive):
         "denominator",
         "input_offset",
         "output_offset",
+    )
+    notation: ClassVar[Notation] = Notation(
+        r"y_t - y_0 = \frac{B(q)}{F(q)} (u_t - u_0) + \frac{C(q)}{D(q)} e_t",
+        r"B(q) = \sum_k b_k q^{-k},\quad F(q) = 1 + \sum_k f_k q^{-k}",
+        numerator="b_k from 0 [{y}/{u}]",
+        denominator="f_k",
+        sample_time="T [s]",
+        input_offset="u_0 [{u}]",
+        output_offset="y_0 [{y}]",
+        noise_numerator="c_k",
+        noise_denominator="d_k",
+        noise_deviation=r"\sigma_e [{y}]",
     )
 
     numerator: Coefficients
@@ -249,7 +265,42 @@ class TransferFunction(LinearStart, SingleChannel, Primitive):
             self.input,
         )
 
+    def worked(self) -> tuple[str, ...]:
+        """Return the polynomials with their numbers, where they are short."""
+        own = (self.numerator, (1.0, *self.denominator))
+        noise = ((1.0, *self.noise_numerator), (1.0, *self.noise_denominator))
+        if max(map(len, (*own, *noise))) > FEW:
+            return ()
+        told = [
+            rf"\frac{{{_powers(top)}}}{{{_powers(below)}}}\,{what}"
+            for (top, below), what in ((own, "(u_t - u_0)"), (noise, "e_t"))
+        ]
+        modelled = self.noise_deviation is not None or any(len(c) > 1 for c in noise)
+        return (f"y_t - y_0 = {' + '.join(told if modelled else told[:1])}",)
+
+    def linear_system(self, sample_time: float | None = None) -> LinearSystem:
+        """Return the filter, in observable form, without its noise model."""
+        own_sample_time(self.kind, self.sample_time, sample_time or self.sample_time)
+        b, f = self._padded()
+        n = self.n_states
+        a = np.eye(n, k=1)
+        if n:
+            a[:, 0] = -f[1:]
+        return LinearSystem(
+            *(a, (b[1:] - f[1:] * b[0])[:, np.newaxis], np.eye(1, n), b[:1, np.newaxis]),
+            self.sample_time,
+            np.array([self.input_offset]),
+            np.array([self.output_offset]),
+            Polynomials(tuple(np.trim_zeros(b, "f").tolist()) or (0.0,), tuple(f.tolist())),
+        )
+
     @classmethod
     def example(cls) -> Self:
         """Return a second-order lag with a gain of 6.8 mm/bar, sampled at 100 Hz."""
         return cls((0.9, -0.85, 0.018), (-1.2, 0.21), 0.01, 1.0, 2.0)
+
+
+def _powers(coefficients: Sequence[float]) -> str:
+    return summed(
+        [(c, f"q^{{-{k}}}" if k else "") for k, c in enumerate(coefficients) if c or not k]
+    )

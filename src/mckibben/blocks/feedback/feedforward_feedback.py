@@ -133,6 +133,10 @@ class FeedforwardFeedback(Composition):
         bases = self.compensator.wired(board, [*given[:n], *given[2 * n :]])
         return self.feedback.wired(board, [*given[: 2 * n], *bases])
 
+    def joined(self, parts: Sequence[str]) -> str:
+        """Return the sum of what both give, the feedback from the compensator's references."""
+        return f"p = {parts[0]}[r] + {parts[1]}[r, y]"
+
     @classmethod
     def example(cls) -> Self:
         from mckibben.blocks.coupled.balance import Balance

@@ -23,6 +23,7 @@ from mckibben.blocks.core.block import Block, Kernel, Primitive
 from mckibben.blocks.core.fields import STRICT, Channel, Channels, Initial, Vector
 from mckibben.blocks.core.kernels import kernel
 from mckibben.blocks.core.many_channels import ManyChannels
+from mckibben.blocks.core.notation import Notation
 from mckibben.blocks.core.refusals import explicit_state, needs_sample_time
 from mckibben.errors import ModelError
 
@@ -82,6 +83,18 @@ class PIDFeedback(ManyChannels, Primitive):
     kernel: ClassVar[Kernel] = pid_kernel
     rate_dependent: ClassVar[bool] = True
     parameters: ClassVar[tuple[str, ...]] = ("kp", "ki", "kd")
+    notation: ClassVar[Notation] = Notation(
+        r"p_i = p_{b,i} + k_{p,i} e_i + k_{i,i} \int e_i\, dt - k_{d,i} \dot{y}_i,\quad "
+        "e_i = r_i - y_i",
+        kp="k_{p,i} [bar/mm]",
+        ki="k_{i,i} [bar/mm s]",
+        kd="k_{d,i} [bar s/mm]",
+        filter_time="T [s]",
+        limits=r"p_{\pm,i} [bar]",
+        driven="r_i",
+        scheduled="x_i",
+        given="p_i",
+    )
 
     kp: Vector
     ki: Vector

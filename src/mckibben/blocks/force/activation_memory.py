@@ -33,6 +33,7 @@ from mckibben.blocks.core.fields import (
     Vector,
 )
 from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.core.notation import Notation
 from mckibben.blocks.core.refusals import explicit_state, needs_sample_time
 from mckibben.blocks.force.activation import Activation
 from mckibben.blocks.play_type.memory import named_state
@@ -112,6 +113,24 @@ class ActivationMemory(Activation):
     kind: ClassVar[str] = "activation-memory"
     kernel: ClassVar[Kernel] = activation_memory_kernel
     parameters: ClassVar[tuple[str, ...]] = ("surface", "friction", "viscosity", "relaxation")
+    notation: ClassVar[Notation] = Notation(
+        r"p = \sum_{ij} c_{ij} x^i f^j + \sum_k (a_k + b_k f) S_k[\epsilon] + (d_0 + d_1 "
+        r"f) \dot{\epsilon} + \sum_m (g_m + h_m f)(x_m - x)",
+        r"x = (\epsilon - \epsilon_1) / \epsilon_2,\quad f = (F - F_1) / F_2,\quad "
+        r"S_k[\epsilon] = \epsilon - F_{r_k}[\epsilon],\quad \tau_m \dot{x}_m = x - x_m",
+        surface="c_k [bar]",
+        thresholds="r_k",
+        friction="a_k [bar]",
+        viscosity="d_k from 0 [bar s]",
+        relaxation="g_k [bar]",
+        time_constants=r"\tau_m [s]",
+        input_scale=r"\epsilon_i",
+        force_scale="F_i [N]",
+        rate_time_constant="T [s]",
+        input=r"\epsilon",
+        force="F",
+        output="p",
+    )
 
     surface: Vector
     thresholds: Vector

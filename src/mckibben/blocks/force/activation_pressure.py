@@ -34,6 +34,7 @@ from mckibben.blocks.core.fields import (
     Vector,
 )
 from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.core.notation import Notation
 from mckibben.blocks.core.refusals import explicit_state, needs_sample_time
 from mckibben.blocks.force.activation import Activation
 from mckibben.errors import ModelError
@@ -102,6 +103,22 @@ class ActivationPressure(Activation):
     kind: ClassVar[str] = "activation-pressure"
     kernel: ClassVar[Kernel] = activation_pressure_kernel
     parameters: ClassVar[tuple[str, ...]] = ("contractions", "pressures", "phi", "gamma")
+    notation: ClassVar[Notation] = Notation(
+        r"p = \sum_{k=0}^{3} b_k(F)\, \epsilon^k + \gamma\, \phi(F)\, \dot{\epsilon}",
+        r"\text{the cubic goes through } (\epsilon_j(F),\, y_j(F)),\; j = 1, \ldots, 4,\; "
+        r"\text{each coordinate a cubic of } F",
+        r"\gamma = \gamma_1 \nu + \gamma_2,\quad \phi(F) = \phi_1 F^3 + \phi_2 F^2 + "
+        r"\phi_3 F + \phi_4",
+        contractions=r"\epsilon_k [1/N^3|1/N^2|1/N|1]",
+        pressures="y_k [bar/N^3|bar/N^2|bar/N|bar]",
+        phi=r"\phi_k [bar s/N^3|bar s/N^2|bar s/N|bar s]",
+        gamma=r"\gamma_k [1/Hz|1]",
+        frequency=r"\nu [Hz]",
+        rate_time_constant="T [s]",
+        input=r"\epsilon",
+        force="F",
+        output="p",
+    )
 
     contractions: Vector
     pressures: Vector

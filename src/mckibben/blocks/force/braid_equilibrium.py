@@ -23,6 +23,7 @@ from mckibben.arrays import Array
 from mckibben.blocks.core.block import Kernel
 from mckibben.blocks.core.fields import DISPLACEMENT, PRESSURE, STRICT, ChannelField, Initial
 from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.core.notation import Notation
 from mckibben.blocks.core.single_channel import Memoryless, Ranged
 
 NEWTONS_PER_BAR = 0.1
@@ -132,6 +133,20 @@ class BraidEquilibrium(Memoryless, Ranged):
         "offset",
     )
     initial: ClassVar[Initial] = "first_sample"
+    notation: ClassVar[Notation] = Notation(
+        r"p A \left(a (1 - \epsilon)^2 - b\right) = F + k \epsilon + h \epsilon^3,\quad A "
+        r"= \frac{\pi d^2}{4}",
+        r"a = \frac{3}{\tan^2 \alpha},\quad b = \frac{1}{\sin^2 \alpha},\quad y = l_0 "
+        r"\epsilon + y_0",
+        load="F [N]",
+        stiffness="k [N]",
+        hardening="h [N]",
+        braid_angle=r"\alpha [rad]",
+        rest_length="l_0 [mm]",
+        offset="y_0 [{y}]",
+        diameter="d [mm]",
+        input="p",
+    )
 
     load: Annotated[FiniteFloat, Gt(0)]
     stiffness: Annotated[FiniteFloat, Interval(ge=0)]

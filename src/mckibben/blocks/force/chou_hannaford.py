@@ -19,6 +19,7 @@ from mckibben.arrays import Array
 from mckibben.blocks.core.block import Kernel
 from mckibben.blocks.core.fields import FORCE, LENGTH, PRESSURE, STRICT, ChannelField
 from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.core.notation import Notation
 from mckibben.blocks.force.braid_equilibrium import NEWTONS_PER_BAR
 from mckibben.blocks.force.law import ForceLaw
 
@@ -51,6 +52,15 @@ class ChouHannaford(ForceLaw):
     number: ClassVar[int] = 1
     kernel: ClassVar[Kernel] = chou_hannaford_kernel
     parameters: ClassVar[tuple[str, ...]] = ("thread_length", "turns", "constant")
+    notation: ClassVar[Notation] = Notation(
+        r"f = p\, \frac{3 l^2 - b^2}{4 \pi n^2} + c",
+        thread_length="b [mm]",
+        turns="n",
+        constant="c [N]",
+        input="l",
+        pressure="p",
+        output="f",
+    )
 
     thread_length: Annotated[FiniteFloat, Gt(0)]
     turns: Annotated[FiniteFloat, Gt(0)]

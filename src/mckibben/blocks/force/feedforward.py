@@ -18,6 +18,7 @@ from mckibben.arrays import Array
 from mckibben.blocks.compose import Parallel
 from mckibben.blocks.core.block import Block, Run
 from mckibben.blocks.core.fields import STRICT, Channel, Initial
+from mckibben.blocks.core.notation import Notation
 from mckibben.blocks.core.saving import nested
 from mckibben.blocks.force.law import ForceLaw
 from mckibben.blocks.force.multistate_friction import MultistateFriction
@@ -42,6 +43,10 @@ class ForceFeedforward(Block):
 
     kind: ClassVar[str] = "force-feedforward"
     parameters: ClassVar[tuple[str, ...]] = ("law", "friction")
+    notation: ClassVar[Notation] = Notation(
+        r"p = \frac{f - h(l) - f_h (1 - g_p p_r)}{g(l) + g_p f_h}",
+        r"f = p\, g(l) + h(l) + \left(1 + g_p (p - p_r)\right) f_h[l]",
+    )
 
     law: Annotated[InstanceOf[ForceLaw], BeforeValidator(nested)]
     friction: Annotated[InstanceOf[MultistateFriction] | None, BeforeValidator(nested)] = None

@@ -41,6 +41,7 @@ from mckibben.blocks.core.fields import (
     Vector,
 )
 from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.core.notation import Notation, tex, with_unit
 from mckibben.blocks.core.refusals import explicit_state, needs_sample_time
 from mckibben.blocks.core.single_channel import ScheduledChannel
 from mckibben.errors import ModelError
@@ -141,6 +142,18 @@ class MultistateFriction(ScheduledChannel, Primitive):
     scheduled_by: ClassVar[str] = "pressure"
     kernel: ClassVar[Kernel] = multistate_friction_kernel
     rate_dependent: ClassVar[bool] = True
+    notation: ClassVar[Notation] = Notation(
+        r"f = \left(1 + g_p (p - p_r)\right) \sum_i \operatorname{sat}(F_{c,i},\, k_i x_i "
+        r"+ \sigma_i \dot{l})",
+        r"\dot{x}_i = \frac{\operatorname{sat}(F_{c,i},\, k_i x_i + \sigma_i \dot{l}) - "
+        r"k_i x_i}{\sigma_i},\quad k_i, \sigma_i, F_{c,i} \text{ switch with the sign of "
+        r"} \dot{l}",
+        pressure_gain="g_p [1/bar]",
+        reference_pressure="p_r [bar]",
+        input="l",
+        pressure="p",
+        output="f",
+    )
 
     elements: Annotated[tuple[Direction, ...], BeforeValidator(_directions)]
     values: Vector
@@ -229,6 +242,16 @@ class MultistateFriction(ScheduledChannel, Primitive):
             f"{self.kind!r} has no inverse: while it slips, one force belongs to many lengths. Remedy: "
             "compensate it by ForceFeedforward(law, friction), in closed form."
         )
+
+    def worked(self) -> tuple[str, ...]:
+        """Return the numbers of every element in each direction."""
+        told: dict[str, list[str]] = {}
+        for name, value in zip(self.parameter_names, self.values, strict=False):
+            where, _, quantity = name.partition(": ")
+            symbol, _, unit = quantity.rstrip("]").partition(" [")
+            letter = {"sigma": r"\sigma", "F_c": "F_c"}.get(symbol, symbol)
+            told.setdefault(where, []).append(f"{letter} = {with_unit(tex(value), unit)}")
+        return tuple(rf"\text{{{at}: }}" + r",\quad ".join(lines) for at, lines in told.items())
 
     @classmethod
     def example(cls) -> Self:

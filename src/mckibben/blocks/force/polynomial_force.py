@@ -21,6 +21,7 @@ from mckibben.arrays import Array
 from mckibben.blocks.core.block import Kernel
 from mckibben.blocks.core.fields import FORCE, LENGTH, PRESSURE, STRICT, ChannelField, Vector
 from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.core.notation import Notation
 from mckibben.blocks.force.law import ForceLaw
 from mckibben.blocks.memoryless.reversible import polynomial_at
 from mckibben.errors import ModelError
@@ -59,6 +60,16 @@ class PolynomialForce(ForceLaw):
     number: ClassVar[int] = 0
     kernel: ClassVar[Kernel] = polynomial_force_kernel
     parameters: ClassVar[tuple[str, ...]] = ("per_bar", "elastic")
+    notation: ClassVar[Notation] = Notation(
+        r"f = p \sum_i g_i x^i + \sum_j h_j x^j,\quad x = \frac{l - m}{s}",
+        per_bar="g_i from 0 [N/bar]",
+        elastic="h_j from 0 [N]",
+        centre="m [mm]",
+        scale="s [mm]",
+        input="l",
+        pressure="p",
+        output="f",
+    )
 
     per_bar: Vector
     elastic: Vector

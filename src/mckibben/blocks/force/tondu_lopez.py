@@ -23,6 +23,7 @@ from mckibben.arrays import Array
 from mckibben.blocks.core.block import Kernel
 from mckibben.blocks.core.fields import FORCE, LENGTH, PRESSURE, STRICT, ChannelField
 from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.core.notation import Notation
 from mckibben.blocks.force.braid_equilibrium import NEWTONS_PER_BAR
 from mckibben.blocks.force.law import ForceLaw
 from mckibben.errors import ModelError
@@ -66,6 +67,22 @@ class TonduLopez(ForceLaw):
     number: ClassVar[int] = 2
     kernel: ClassVar[Kernel] = tondu_lopez_kernel
     parameters: ClassVar[tuple[str, ...]] = ("braid_angle", "mu", "kappa", "constant")
+    notation: ClassVar[Notation] = Notation(
+        r"f = \mu(\epsilon)\, A\, p \left(a (1 - \kappa(p) \epsilon)^2 - b\right) + "
+        r"c,\quad \epsilon = 1 - \frac{l}{l_0},\quad A = \frac{\pi d^2}{4}",
+        r"a = \frac{3}{\tan^2 \alpha},\quad b = \frac{1}{\sin^2 \alpha},\quad "
+        r"\mu(\epsilon) = \mu_1 e^{-40 \epsilon} + \mu_2,\quad \kappa(p) = \kappa_1 "
+        r"e^{-p} + \kappa_2",
+        braid_angle=r"\alpha [rad]",
+        mu=r"\mu_i",
+        kappa=r"\kappa_i",
+        constant="c [N]",
+        rest_length="l_0 [mm]",
+        diameter="d [mm]",
+        input="l",
+        pressure="p",
+        output="f",
+    )
 
     rest_length: Annotated[FiniteFloat, Gt(0)]
     diameter: Annotated[FiniteFloat, Gt(0)]

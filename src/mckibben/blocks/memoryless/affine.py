@@ -14,6 +14,8 @@ from mckibben.arrays import Array
 from mckibben.blocks.core.block import Kernel, Primitive
 from mckibben.blocks.core.fields import DISPLACEMENT, STRICT, ChannelField
 from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.core.linear import LinearSystem
+from mckibben.blocks.core.notation import Notation, summed
 from mckibben.blocks.core.single_channel import Memoryless
 from mckibben.errors import ModelError
 
@@ -42,6 +44,11 @@ class Affine(Memoryless, Primitive):
     kind: ClassVar[str] = "affine"
     kernel: ClassVar[Kernel] = affine_kernel
     parameters: ClassVar[tuple[str, ...]] = ("gain", "offset")
+    notation: ClassVar[Notation] = Notation(
+        "y = K u + y_0",
+        gain="K [{y}/{u}]",
+        offset="y_0 [{y}]",
+    )
 
     gain: FiniteFloat
     offset: FiniteFloat = 0.0
@@ -61,6 +68,15 @@ class Affine(Memoryless, Primitive):
                 "'affine' of gain 0 has no inverse. Remedy: give a gain that is not 0."
             )
         return Affine(1 / self.gain, -self.offset / self.gain, self.output, self.input)
+
+    def worked(self) -> tuple[str, ...]:
+        """Return the line with its numbers."""
+        return (f"y = {summed([(self.gain, 'u'), (self.offset, '')])}",)
+
+    def linear_system(self, sample_time: float | None = None) -> LinearSystem:
+        """Return the gain."""
+        del sample_time
+        return LinearSystem.gain(self.gain, self.offset)
 
     @classmethod
     def example(cls) -> Self:

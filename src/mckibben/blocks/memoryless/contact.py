@@ -20,6 +20,7 @@ from mckibben.blocks.core.block import Kernel
 from mckibben.blocks.core.fields import PRESSURE, STRICT, ChannelField, Initial, Rule
 from mckibben.blocks.core.inverse import Invertible
 from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.core.notation import Notation
 from mckibben.blocks.core.single_channel import Memoryless
 
 LOST = 0.95
@@ -75,6 +76,12 @@ class Contact(Memoryless, Invertible):
     inverse_kernel: ClassVar[Kernel] = contact_inverse_kernel
     parameters: ClassVar[tuple[str, ...]] = ("pressure",)
     initial: ClassVar[Initial] = "first_sample"
+    notation: ClassVar[Notation] = Notation(
+        r"y = u - \frac{19}{20}\, c \left(1 - e^{-|u| / c}\right) \operatorname{sgn} u",
+        pressure="c [{u}]",
+        output="y",
+        input="u",
+    )
 
     pressure: Annotated[FiniteFloat, Gt(0)]
     input: ChannelField = PRESSURE

@@ -19,6 +19,7 @@ from mckibben.arrays import Array
 from mckibben.blocks.core.block import Block, Kernel, Primitive
 from mckibben.blocks.core.fields import PRESSURE, STRICT, ChannelField, Initial
 from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.core.notation import Notation
 from mckibben.blocks.core.single_channel import Memoryless
 
 FLOOR = 0.05
@@ -59,6 +60,10 @@ class Logarithm(Memoryless, Primitive):
     kernel: ClassVar[Kernel] = logarithm_kernel
     parameters: ClassVar[tuple[str, ...]] = ("offset",)
     initial: ClassVar[Initial] = "first_sample"
+    notation: ClassVar[Notation] = Notation(
+        r"y = \ln(u + c)",
+        offset="c [{u}]",
+    )
 
     offset: Annotated[FiniteFloat, Ge(0)] = 0.0
     input: ChannelField = PRESSURE
@@ -90,6 +95,10 @@ class Exponential(Memoryless, Primitive):
     kernel: ClassVar[Kernel] = exponential_kernel
     parameters: ClassVar[tuple[str, ...]] = ("offset",)
     initial: ClassVar[Initial] = "first_sample"
+    notation: ClassVar[Notation] = Notation(
+        "y = e^{u} - c",
+        offset="c [{y}]",
+    )
 
     offset: Annotated[FiniteFloat, Ge(0)] = 0.0
     input: ChannelField = PRESSURE

@@ -10,6 +10,8 @@ from mckibben.arrays import Array
 from mckibben.blocks.core.block import Kernel, Primitive
 from mckibben.blocks.core.fields import DISPLACEMENT, STRICT, ChannelField
 from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.core.linear import LinearSystem
+from mckibben.blocks.core.notation import Notation
 from mckibben.blocks.core.single_channel import Memoryless
 
 
@@ -32,6 +34,9 @@ class Negative(Memoryless, Primitive):
 
     kind: ClassVar[str] = "negative"
     kernel: ClassVar[Kernel] = negative_kernel
+    notation: ClassVar[Notation] = Notation(
+        "y = -u",
+    )
 
     input: ChannelField = DISPLACEMENT
     output: ChannelField = DISPLACEMENT
@@ -39,6 +44,11 @@ class Negative(Memoryless, Primitive):
     def inverse(self) -> Negative:
         """Return the block from output to input."""
         return Negative(self.output, self.input)
+
+    def linear_system(self, sample_time: float | None = None) -> LinearSystem:
+        """Return a gain of -1."""
+        del sample_time
+        return LinearSystem.gain(-1.0)
 
     @classmethod
     def example(cls) -> Self:

@@ -15,6 +15,7 @@ from mckibben.arrays import Array
 from mckibben.blocks.core.block import Kernel, Primitive
 from mckibben.blocks.core.fields import DISPLACEMENT, STRICT, ChannelField, Vector
 from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.core.notation import Notation
 from mckibben.blocks.core.single_channel import Memoryless
 from mckibben.blocks.memoryless.interpolation import check_increasing, interpolate
 
@@ -47,6 +48,12 @@ class PiecewiseLinear(Memoryless, Primitive):
     kernel: ClassVar[Kernel] = piecewise_linear_kernel
     increasing = ("knots", "values")
     parameters: ClassVar[tuple[str, ...]] = ("values",)
+    notation: ClassVar[Notation] = Notation(
+        r"y = v_k + (v_{k+1} - v_k) \frac{u - \xi_k}{\xi_{k+1} - \xi_k},\quad \xi_k \le u "
+        r"\le \xi_{k+1}",
+        knots=r"\xi_k [{u}]",
+        values="v_k [{y}]",
+    )
 
     knots: Vector
     values: Vector

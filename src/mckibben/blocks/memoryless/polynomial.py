@@ -24,6 +24,7 @@ from mckibben.blocks.core.fields import (
     Initial,
 )
 from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.core.notation import Notation, summed
 from mckibben.blocks.core.single_channel import Memoryless, Ranged, check_input_range
 from mckibben.errors import ModelError
 
@@ -114,6 +115,12 @@ class Polynomial(Memoryless, Ranged):
     kernel: ClassVar[Kernel] = polynomial_kernel
     inverse_kernel: ClassVar[Kernel] = polynomial_inverse_kernel
     parameters: ClassVar[tuple[str, ...]] = ("polynomial",)
+    notation: ClassVar[Notation] = Notation(
+        r"y = \sum_{k} c_k x^k,\quad x = \frac{u - m}{s}",
+        polynomial="c_k from 0 [{y}]",
+        centre="m [{u}]",
+        scale="s [{u}]",
+    )
 
     polynomial: Coefficients
     centre: FiniteFloat = 0.0
@@ -157,6 +164,12 @@ class Polynomial(Memoryless, Ranged):
     def _arguments(self) -> tuple[float, float]:
         low, high = self.limits
         return (low - self.centre) / self.scale, (high - self.centre) / self.scale
+
+    def worked(self) -> tuple[str, ...]:
+        """Return the polynomial with its numbers."""
+        return (
+            f"y = {summed([(c, f'x^{{{k}}}' if k else '') for k, c in enumerate(self.polynomial)])}",
+        )
 
     @classmethod
     def example(cls) -> Self:

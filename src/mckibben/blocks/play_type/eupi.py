@@ -35,6 +35,7 @@ from mckibben.blocks.core.fields import (
     Vector,
 )
 from mckibben.blocks.core.kernels import kernel, summing_kernel
+from mckibben.blocks.core.notation import Notation
 from mckibben.blocks.core.single_channel import check_input_range
 from mckibben.blocks.core.solved_inverse import Solved, solve_samples
 from mckibben.blocks.play_type.memory import check_thresholds, play_state
@@ -132,6 +133,17 @@ class EUPI(Solved):
         "falling_threshold",
         "polynomial",
         "offset",
+    )
+    notation: ClassVar[Notation] = Notation(
+        r"y = y_0 + \sum_{k} a_k x^k + \sum_i w_i F_i[x],\quad x = u - u_{\min}",
+        r"F_{i,t} = \begin{cases} \max(x_t - r_i,\, F_{i,t-1}) & x \text{ rises} \\ "
+        r"\min(\alpha x_t + \beta r_i,\, F_{i,t-1}) & x \text{ falls} \end{cases}",
+        thresholds="r_i [{u}]",
+        weights="w_i [{y}/{u}]",
+        falling_slope=r"\alpha",
+        falling_threshold=r"\beta",
+        polynomial="a_k [{y}/{u}|{y}/{u}^2|{y}/{u}^3]",
+        offset="y_0 [{y}]",
     )
 
     thresholds: Vector

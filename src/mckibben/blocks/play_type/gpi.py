@@ -39,6 +39,7 @@ from mckibben.blocks.core.fields import (
     Vector,
 )
 from mckibben.blocks.core.kernels import kernel, summing_kernel
+from mckibben.blocks.core.notation import Notation
 from mckibben.blocks.core.refusals import explicit_state
 from mckibben.blocks.core.single_channel import Ranged, check_input_range
 from mckibben.blocks.play_type.envelopes.base import Envelope, nested_envelope
@@ -165,6 +166,13 @@ class GPI(Ranged):
     inverse_remembers = "output"
     increasing = ("thresholds",)
     parameters: ClassVar[tuple[str, ...]] = ("weights", "rising", "falling")
+    notation: ClassVar[Notation] = Notation(
+        r"y = \sum_i x_i w_i",
+        r"w_{i,t} = \begin{cases} \max(\gamma_R(u_t) - r_i,\, w_{i,t-1}) & u \text{ "
+        r"rises} \\ \min(\gamma_L(u_t) + r_i,\, w_{i,t-1}) & u \text{ falls} \end{cases}",
+        thresholds="r_i",
+        weights="x_i [{y}]",
+    )
 
     thresholds: Vector
     weights: Vector

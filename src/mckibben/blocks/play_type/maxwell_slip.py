@@ -34,6 +34,7 @@ from mckibben.blocks.core.fields import (
     Vector,
 )
 from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.core.notation import Notation
 from mckibben.blocks.core.refusals import explicit_state
 from mckibben.blocks.core.single_channel import check_input_range
 from mckibben.blocks.core.solved_inverse import Solved, solve_samples
@@ -149,6 +150,18 @@ class MaxwellSlip(Solved):
         "limit_ratio",
     )
     increasing = ("breakaways",)
+    notation: ClassVar[Notation] = Notation(
+        r"y = \sum_k c_k x^k + \sum_i w_i s_i,\quad x = \frac{u - m}{s}",
+        r"s_{i,t} = \begin{cases} \min(s_{i,t-1} + \Delta u,\, r_i) & u \text{ rises} \\ "
+        r"\max(s_{i,t-1} + \kappa \Delta u,\, -\lambda r_i) & u \text{ falls} \end{cases}",
+        breakaways="r_i [{u}]",
+        weights="w_i [{y}/{u}]",
+        polynomial="c_k from 0 [{y}]",
+        stiffness_ratio=r"\kappa",
+        limit_ratio=r"\lambda",
+        centre="m [{u}]",
+        scale="s [{u}]",
+    )
 
     breakaways: Vector
     weights: Vector

@@ -29,6 +29,7 @@ from mckibben.blocks.core.fields import (
     Vector,
 )
 from mckibben.blocks.core.kernels import kernel, summing_kernel
+from mckibben.blocks.core.notation import FEW, Notation, summed, tex
 from mckibben.blocks.core.single_channel import Ranged, check_input_range
 from mckibben.blocks.play_type.memory import (
     check_invertible_sum,
@@ -102,6 +103,13 @@ class PI(Ranged):
     inverse_remembers = "output"
     increasing = ("thresholds",)
     parameters: ClassVar[tuple[str, ...]] = ("weights", "offset")
+    notation: ClassVar[Notation] = Notation(
+        r"y = y_0 + \sum_i w_i F_{r_i}[u]",
+        r"F_r[u]_t = \min(\max(F_r[u]_{t-1},\, u_t - r),\, u_t + r)",
+        thresholds="r_i [{u}]",
+        weights="w_i [{y}/{u}]",
+        offset="y_0 [{y}]",
+    )
 
     thresholds: Vector
     weights: Vector
@@ -153,6 +161,14 @@ class PI(Ranged):
     def remembered(self, state: Array) -> tuple[float, ...]:
         """Return the output."""
         return (self.offset + np.dot(self.weights, state),)
+
+    def worked(self) -> tuple[str, ...]:
+        """Return the sum with its numbers, where it is short."""
+        if len(self.weights) > FEW:
+            return ()
+        pairs = zip(self.weights, self.thresholds, strict=True)
+        terms = [(w, rf"F_{{{tex(r)}}}[u]" if r else "u") for w, r in pairs]
+        return (f"y = {summed([(self.offset, ''), *terms])}",)
 
     @classmethod
     def example(cls) -> Self:

@@ -26,6 +26,7 @@ from mckibben.blocks.core.fields import (
     StoredInitial,
 )
 from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.core.notation import Notation
 from mckibben.blocks.core.single_channel import SingleChannel
 from mckibben.blocks.play_type.memory import check_thresholds, play_state
 
@@ -71,6 +72,10 @@ class Play(SingleChannel, Primitive):
     kind: ClassVar[str] = "play"
     kernel: ClassVar[Kernel] = play_kernel
     parameters: ClassVar[tuple[str, ...]] = ("threshold",)
+    notation: ClassVar[Notation] = Notation(
+        r"y = F_r[u],\quad F_r[u]_t = \min(\max(F_r[u]_{t-1},\, u_t - r),\, u_t + r)",
+        threshold="r [{u}]",
+    )
 
     threshold: FiniteFloat
     initial: StoredInitial = "first_sample"

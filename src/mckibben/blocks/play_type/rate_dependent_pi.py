@@ -35,6 +35,7 @@ from mckibben.blocks.core.fields import (
     Vector,
 )
 from mckibben.blocks.core.kernels import kernel, summing_kernel
+from mckibben.blocks.core.notation import Notation
 from mckibben.blocks.core.refusals import explicit_state, needs_sample_time
 from mckibben.blocks.core.root import solve_near
 from mckibben.blocks.core.single_channel import Ranged, check_input_range
@@ -140,6 +141,15 @@ class RateDependentPI(Ranged):
     rate_dependent: ClassVar[bool] = True
     increasing = ("thresholds",)
     parameters: ClassVar[tuple[str, ...]] = ("rate_weights", "weights", "offset")
+    notation: ClassVar[Notation] = Notation(
+        r"y = y_0 + \sum_i (d_i + k_i v) F_{r_i}[u],\quad T \dot{v} = \dot{u} - v",
+        r"F_r[u]_t = \min(\max(F_r[u]_{t-1},\, u_t - r),\, u_t + r)",
+        thresholds="r_i [{u}]",
+        rate_weights="k_i [{y} s/{u}^2]",
+        weights="d_i [{y}/{u}]",
+        offset="y_0 [{y}]",
+        rate_time_constant="T [s]",
+    )
 
     thresholds: Vector
     rate_weights: Vector

@@ -29,6 +29,7 @@ from mckibben.blocks.core.fields import (
     Vector,
 )
 from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.core.notation import Notation
 from mckibben.blocks.core.refusals import explicit_state
 from mckibben.blocks.core.solved_inverse import Solved, solve_samples
 from mckibben.blocks.preisach_type.grid import TriangularGrid
@@ -117,6 +118,16 @@ class KrasnoselskiiPokrovskii(TriangularGrid, Solved):
     kernel: ClassVar[Kernel] = krasnoselskii_pokrovskii_kernel
     inverse_kernel: ClassVar[Kernel] = krasnoselskii_pokrovskii_inverse_kernel
     parameters: ClassVar[tuple[str, ...]] = ("weights", "offset")
+    notation: ClassVar[Notation] = Notation(
+        r"y = y_0 + \sum_{j \le i} w_{ij} s_{ij}",
+        r"s_{ij,t} = \begin{cases} \max(s_{ij,t-1},\, \rho_i(u_t)) & u \text{ rises} \\ "
+        r"\min(s_{ij,t-1},\, \rho_j(u_t)) & u \text{ falls} \end{cases}",
+        r"\rho_i(u) = \min\left(\max\left(\frac{u - a_i}{a_{i+1} - a_i},\, 0\right),\, "
+        r"1\right)",
+        levels="a_i [{u}]",
+        weights="w_k [{y}]",
+        offset="y_0 [{y}]",
+    )
 
     levels: Vector
     weights: Vector

@@ -36,6 +36,7 @@ from mckibben.blocks.core.fields import (
     Vector,
 )
 from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.core.notation import Notation
 from mckibben.blocks.core.refusals import explicit_state
 from mckibben.blocks.preisach_type.grid import TriangularGrid
 from mckibben.errors import ModelError
@@ -224,6 +225,14 @@ class Preisach(TriangularGrid):
     kernel: ClassVar[Kernel] = preisach_kernel
     inverse_kernel: ClassVar[Kernel] = preisach_inverse_kernel
     parameters: ClassVar[tuple[str, ...]] = ("weights", "offset")
+    notation: ClassVar[Notation] = Notation(
+        r"y = y_0 + \sum_{j \le i} w_{ij} \left(1 + R_{ij}[u]\right)",
+        r"R_{ij}[u] = +1 \text{ once } u \text{ rose through cell } i,\; -1 \text{ once "
+        "it fell through cell } j",
+        levels="a_i [{u}]",
+        weights="w_k [{y}]",
+        offset="y_0 [{y}]",
+    )
 
     levels: Vector
     weights: Vector

@@ -16,6 +16,7 @@ from pydantic.dataclasses import dataclass
 from mckibben.arrays import Array
 from mckibben.blocks.core.fields import STRICT
 from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.core.notation import Notation
 from mckibben.blocks.play_type.envelopes.base import Envelope, EnvelopeKernel
 from mckibben.errors import ModelError
 
@@ -55,6 +56,12 @@ class Exponential(Envelope):
     value: ClassVar[EnvelopeKernel] = _value
     inverse: ClassVar[EnvelopeKernel] = _inverse
     parameters: ClassVar[tuple[str, ...]] = ("rate", "shift", "offset")
+    notation: ClassVar[Notation] = Notation(
+        r"\gamma(u) = c + \operatorname{sgn}(a) \left(1 - e^{b - a u}\right)",
+        rate="a [1/{u}]",
+        shift="b",
+        offset="c",
+    )
 
     rate: FiniteFloat
     shift: FiniteFloat

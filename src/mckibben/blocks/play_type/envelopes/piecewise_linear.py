@@ -14,6 +14,7 @@ from pydantic.dataclasses import dataclass
 from mckibben.arrays import Array
 from mckibben.blocks.core.fields import STRICT, Vector
 from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.core.notation import Notation
 from mckibben.blocks.memoryless.interpolation import check_increasing, interpolate
 from mckibben.blocks.play_type.envelopes.base import Envelope, EnvelopeKernel
 
@@ -50,6 +51,12 @@ class PiecewiseLinear(Envelope):
     inverse: ClassVar[EnvelopeKernel] = _inverse
     increasing = ("knots", "values")
     parameters: ClassVar[tuple[str, ...]] = ("values",)
+    notation: ClassVar[Notation] = Notation(
+        r"\gamma(u) = v_k + (v_{k+1} - v_k) \frac{u - \xi_k}{\xi_{k+1} - \xi_k},\quad "
+        r"\xi_k \le u \le \xi_{k+1}",
+        knots=r"\xi_k [{u}]",
+        values="v_k",
+    )
 
     knots: Vector
     values: Vector

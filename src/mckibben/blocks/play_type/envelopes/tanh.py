@@ -19,6 +19,7 @@ from pydantic.dataclasses import dataclass
 from mckibben.arrays import Array
 from mckibben.blocks.core.fields import STRICT
 from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.core.notation import Notation
 from mckibben.blocks.play_type.envelopes.base import Envelope, EnvelopeKernel
 
 
@@ -55,6 +56,12 @@ class Tanh(Envelope):
     value: ClassVar[EnvelopeKernel] = _value
     inverse: ClassVar[EnvelopeKernel] = _inverse
     parameters: ClassVar[tuple[str, ...]] = ("slope", "shift", "offset")
+    notation: ClassVar[Notation] = Notation(
+        r"\gamma(u) = \tanh(a u + b) + c",
+        slope="a [1/{u}]",
+        shift="b",
+        offset="c",
+    )
 
     slope: Annotated[FiniteFloat, Gt(0)]
     shift: FiniteFloat

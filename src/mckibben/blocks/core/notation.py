@@ -1,0 +1,184 @@
+"""How a model is written: equations in LaTeX, and the symbol and unit of every number in them.
+
+A block declares both once, beside its fields; what a number means its docstring says already.
+"""
+
+from __future__ import annotations
+
+import inspect
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+
+FEW = 8
+"""Numbers of a vector that are written in one line; more stand in a table."""
+
+MANY = 30
+"""Numbers above which only their shape is written."""
+
+
+class Notation:
+    """Equations and symbols of a class of blocks.
+
+    Parameters
+    ----------
+    *equations : str
+        In LaTeX.
+    **symbols : str
+        For a field of numbers its symbol, ``" from 0"`` where its index does not begin at 1, and its
+        unit in brackets: ``"w_i [{y}/{u}]"``. In units, ``{u}``, ``{y}`` and ``{x}`` are those of the
+        first input, output and scheduling input, ``{in0}`` and ``{out0}`` (``{in1}``, ``{out1}``) those
+        of the channel that the first (second) index counts; units between bars belong to the numbers of
+        a row, over and over. For a field of channels, their symbol.
+    """
+
+    def __init__(self, *equations: str, **symbols: str) -> None:
+        self.equations, self.symbols = equations, symbols
+
+    def symbol(self, field: str) -> str:
+        """Return the symbol of a field; its name where none is declared."""
+        declared = self.symbols.get(field)
+        if declared is None:
+            return rf"\mathrm{{{field.replace('_', chr(92) + ' ')}}}"
+        return re.sub(r"( from \d)?( \[.*\])?$", "", declared)
+
+    def first(self, field: str) -> int:
+        """Return the index of the first of a field's numbers."""
+        found = re.search(r" from (\d)", self.symbols.get(field, ""))
+        return int(found[1]) if found else 1
+
+    def unit(self, field: str) -> str | None:
+        """Return the unit declared, with its placeholders; None where there is none."""
+        declared = self.symbols.get(field)
+        found = None if declared is None else re.search(r" \[(.*)\]$", declared)
+        return ("" if declared is not None else None) if found is None else found[1]
+
+
+@dataclass(frozen=True)
+class Written:
+    """A model, or a part of one, on paper.
+
+    Parameters
+    ----------
+    title : str
+        What it is, in words.
+    equations : tuple of str
+        Its general form, in LaTeX.
+    numbers : tuple of str
+        The same of this model: equations with numbers, and what symbols are, in LaTeX.
+    remark : str
+        What is not written, and why; empty for nothing.
+    parts : tuple of Written
+        What it is made of, in order.
+    """
+
+    title: str
+    equations: tuple[str, ...]
+    numbers: tuple[str, ...] = ()
+    remark: str = ""
+    parts: tuple[Written, ...] = ()
+
+
+def indexed(symbol: str, index: Sequence[int], first: int) -> str:
+    r"""Return a symbol whose last letters below are numbers.
+
+    >>> indexed("w_i", (2,), 1), indexed("S_{kj}", (0, 1), 1), indexed("T_p", (), 1)
+    ('w_{3}', 'S_{1,2}', 'T_p')
+    """
+    if not index:
+        return symbol
+    *outer, last = index
+    numbers = ",".join([*(str(place + 1) for place in outer), str(last + first)])
+    stem, _, below = symbol.rpartition("_")
+    if not stem:
+        return f"{symbol}_{{{numbers}}}"
+    letters = below.strip("{}")
+    kept = letters[: -len(index)].rstrip(",") if len(letters) > len(index) else ""
+    return f"{stem}_{{{kept + ',' if kept else ''}{numbers}}}"
+
+
+def resolved(unit: str, place: int, units: Mapping[str, str]) -> str:
+    """Return a unit of which nothing is left open.
+
+    >>> resolved("{y}/{u}", 0, {"y": "mm", "u": "bar"}), resolved("{y}/{u}", 0, {"y": "mm", "u": "mm"})
+    ('mm/bar', '')
+    >>> resolved("N|N/mm", 3, {}), resolved("1/{u}", 0, {"u": ""})
+    ('N/mm', '')
+    """
+    choices = unit.split("|")
+    text = choices[place % len(choices)]
+    for name, own in units.items():
+        text = text.replace(f"{{{name}}}", own or "1")
+    over, _, under = text.partition("/")
+    over = " ".join(word for word in over.split() if not re.fullmatch(r"1(\^\d)?", word))
+    under = "" if re.fullmatch(r"1(\^\d)?", under) else under
+    if not under or over == under:
+        return over if not under else ""
+    return f"{over or '1'}/{under}"
+
+
+@cache
+def meanings(cls: type) -> dict[str, str]:
+    """Return what docstrings say of every field of a class and of its bases, on one line."""
+    found: dict[str, str] = {}
+    for owner in reversed(cls.__mro__):
+        text = inspect.cleandoc(owner.__dict__.get("__doc__") or "")
+        _, _, section = text.partition("Parameters\n----------\n")
+        section = re.split(r"\n\n?\S+\n-{3,}", section)[0]
+        for entry in re.finditer(
+            r"^(\S[^\n]*?) : [^\n]*\n((?:[ ]{4}[^\n]*\n?|\n)+)", section, re.M
+        ):
+            said = " ".join(entry[2].split())
+            found |= dict.fromkeys(re.split(r",\s*", entry[1]), said)
+    return found
+
+
+def short(meaning: str) -> str:
+    """Return the first sentence of a meaning, without units, which stand beside it.
+
+    >>> short("k, stiffness of the stops [N/mm], not negative. None by default.")
+    'k, stiffness of the stops, not negative'
+    """
+    first = re.split(r"(?<=[^.])\.(?:\s|$)|;\s", meaning, maxsplit=1)[0]
+    return re.sub(r"\s*\[[^\]]*\]", "", first).strip()
+
+
+def tex(value: float, digits: int = 4) -> str:
+    r"""Return a number in LaTeX.
+
+    >>> tex(0.123456), tex(-1.5e-7), tex(2.0)
+    ('0.1235', '-1.5 \\times 10^{-7}', '2')
+    """
+    text = f"{value:.{digits}g}"
+    mantissa, _, exponent = text.partition("e")
+    return rf"{mantissa} \times 10^{{{int(exponent)}}}" if exponent else mantissa
+
+
+def summed(terms: Sequence[tuple[float, str]]) -> str:
+    r"""Return a sum in LaTeX, of numbers times what stands behind each; nothing for no factor.
+
+    >>> summed([(2.0, ""), (-1.5, "x"), (1.0, "y")])
+    '2 - 1.5\\,x + y'
+    """
+    text = ""
+    for value, factor in terms:
+        size = tex(abs(value))
+        size = factor if factor and size == "1" else rf"{size}\,{factor}" if factor else size
+        text += (" - " if value < 0 else " + " if text else "") + size
+    return text.removeprefix(" - ") if not text.startswith(" - ") else f"-{text[3:]}"
+
+
+def unit_tex(unit: str) -> str:
+    r"""Return a unit in LaTeX.
+
+    >>> unit_tex("N s/mm"), unit_tex("1/N^3")
+    ('\\mathrm{N\\,s/mm}', '\\mathrm{1/N^{3}}')
+    """
+    text = re.sub(r"\^(\d)", r"^{\1}", unit).replace(" ", r"\,").replace("%", r"\%")
+    return rf"\mathrm{{{text}}}" if unit else ""
+
+
+def with_unit(text: str, unit: str) -> str:
+    """Return a number in LaTeX with its unit behind it, if it has any."""
+    return rf"{text}\,{unit_tex(unit)}" if unit else text

@@ -1,0 +1,316 @@
+"""Parameters of a fitted model, and how sure each is, where residuals remember too.
+
+Standard errors are those of least squares of the free run under correlated residuals (the sandwich
+P J' R J P, P the inverse of J' J): J holds the free-run sensitivities, and R the covariance of the
+residuals under an autoregression of as many terms as they ask for (Burg's, chosen by BIC). What the fit
+itself has taken out of the residuals is put back, or few long-lived residuals would look too small.
+
+Sources: Ljung, "System Identification", 1999, section 9.5 (misspecified noise); den Haan and Levin, "A
+practitioner's guide to robust covariance matrix estimation", 1997.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mckibben.arrays import Array
+from mckibben.blocks.core.block import Block
+from mckibben.blocks.core.writing import quantities
+from mckibben.errors import ModelError
+from mckibben.estimators.core.uncertainty import DIFFERENCE, LARGEST, inverted, relative_sizes
+from mckibben.recording import Recording
+
+LEVEL = 0.95
+"""Of intervals."""
+
+MOST = 1_500_000
+"""Samples simulated for sensitivities, of all parameters together; of longer recordings the beginnings
+are taken, as if the rest told as much."""
+
+MOST_TERMS = 40
+"""Of an autoregression of residuals."""
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One number of a model.
+
+    Parameters
+    ----------
+    name, symbol : str
+        For people, and in LaTeX.
+    value : float
+    unit : str
+        Empty for none.
+    meaning : str
+        In words.
+    standard_error : float or None
+        In its unit; None where `said` tells why.
+    interval : (float, float) or None
+        In which it lies by 95 %.
+    said : str
+        Why it has no standard error; empty where it has.
+    """
+
+    name: str
+    symbol: str
+    value: float
+    unit: str
+    meaning: str
+    standard_error: float | None
+    interval: tuple[float, float] | None
+    said: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Sureness:
+    """What recordings tell of a model's parameters together.
+
+    Parameters
+    ----------
+    covariance : array, shape (n_parameters, n_parameters)
+        NaN for those not told.
+    said : tuple of str
+        For every parameter, why it is not told; empty where it is.
+    condition : float
+        Of the sensitivities, each parameter scaled by its size.
+    n_effective : float
+        Independent samples that are worth as much as all these, for the mean of an output.
+    terms : tuple of int
+        Of every output, of the autoregression of its residuals.
+    """
+
+    covariance: Array
+    said: tuple[str, ...]
+    condition: float
+    n_effective: float
+    terms: tuple[int, ...]
+
+    @property
+    def half_width(self) -> float:
+        """Half an interval, in standard errors."""
+        from scipy.stats import t
+
+        known = int(np.isfinite(np.diag(self.covariance)).sum())
+        return float(t.ppf(0.5 + LEVEL / 2, max(self.n_effective - known, 1.0)))
+
+
+def residuals(block: Block, recordings: Sequence[Recording]) -> list[Array]:
+    """Return what a model's free run leaves of every recording, measured less modelled, (n, m) each."""
+    names = [channel.name for channel in block.outputs]
+    return [r.matrix(names) - block.simulate(r).matrix(names) for r in recordings]
+
+
+def parameters(block: Block, sure: Sureness) -> tuple[Parameter, ...]:
+    """Return every number of ``block.pack()``, in its order, with what it is and how sure it is."""
+    found = []
+    deviations = np.sqrt(np.diag(sure.covariance))
+    values = block.pack().tolist()
+    for what, value, own, said in zip(
+        quantities(block), values, deviations.tolist(), sure.said, strict=True
+    ):
+        half = own * sure.half_width
+        told = not said
+        found.append(
+            Parameter(
+                what.name,
+                what.symbol,
+                value,
+                what.unit,
+                what.meaning,
+                own if told else None,
+                (value - half, value + half) if told else None,
+                said,
+            )
+        )
+    return tuple(found)
+
+
+def sureness(block: Block, recordings: Sequence[Recording], left: Sequence[Array]) -> Sureness:
+    """Return what recordings tell of a model's parameters.
+
+    Parameters
+    ----------
+    left : sequence of array, shape (n, m)
+        What `residuals` gives.
+    """
+    n_parameters = block.n_parameters
+    covariance = np.full((n_parameters, n_parameters), np.nan)
+    said = [""] * n_parameters
+    values = block.pack()
+    total = sum(map(len, left))
+    share = min(1.0, MOST / max(total * n_parameters, 1))
+    kept = [r.slice(0, max(round(share * len(r)), min(len(r), 50))) for r in recordings]
+    left = [e[: len(r)] for e, r in zip(left, kept, strict=True)]
+    share = sum(map(len, left)) / total
+    models = [autoregression([e[:, j] for e in left]) for j in range(left[0].shape[1])]
+    worth = min(model.worth(sum(map(len, left))) for model in models) / share
+    places, columns = [], []
+    for place in range(n_parameters):
+        if values[place] == 0:
+            said[place] = "exactly 0: at a bound, or left out"
+            continue
+        column = _sensitivity(block, kept, place)
+        if column is None:
+            said[place] = "cannot be moved on its own without breaking the model"
+            continue
+        places.append(place)
+        columns.append(column)
+    terms = tuple(model.coefficients.size for model in models)
+    if not columns or not all(np.isfinite(e).all() for e in left):
+        said = [reason or "the model's output is not finite" for reason in said]
+        return Sureness(covariance, tuple(said), np.inf, worth, terms)
+    condition, own, middle = _sandwich(columns, left, models)
+    told = np.isfinite(np.diag(own))
+    for place, known in zip(places, told.tolist(), strict=True):
+        if not known:
+            said[place] = "not determined by these recordings"
+    if not told.all():
+        columns = [column for column, known in zip(columns, told.tolist(), strict=True) if known]
+        places = [place for place, known in zip(places, told.tolist(), strict=True) if known]
+        if not columns:
+            return Sureness(covariance, tuple(said), condition, worth, terms)
+        _, own, middle = _sandwich(columns, left, models)
+        own = np.nan_to_num(own)
+    sizes = relative_sizes(values)[places]
+    found = share * (own @ middle @ own)  # as if the rest told as much
+    covariance[np.ix_(places, places)] = found * np.outer(sizes, sizes)
+    return Sureness(covariance, tuple(said), condition, worth, terms)
+
+
+def _sensitivity(block: Block, recordings: Sequence[Recording], place: int) -> list[Array] | None:
+    """Return how every run's outputs move with a parameter, in units of its size; None if it cannot."""
+    values = block.pack()
+    size = relative_sizes(values)[place]
+    names = [channel.name for channel in block.outputs]
+    runs = []
+    for way in (1.0, -1.0):
+        moved = values.copy()
+        moved[place] += way * DIFFERENCE * size
+        try:
+            with np.errstate(all="ignore"):
+                other = block.unpack(moved)
+                runs.append([other.simulate(r).matrix(names) for r in recordings])
+        except ModelError:
+            continue
+    if not runs:
+        return None
+    if len(runs) == 2:
+        above, below = runs
+        step = 2 * DIFFERENCE
+    else:
+        above, below, step = (
+            runs[0],
+            [block.simulate(r).matrix(names) for r in recordings],
+            DIFFERENCE,
+        )
+    slopes = [(a - b) / step for a, b in zip(above, below, strict=True)]
+    return slopes if all(np.abs(s).max() < LARGEST for s in slopes) else None
+
+
+def _sandwich(
+    columns: Sequence[list[Array]], left: Sequence[Array], models: Sequence[Autoregression]
+) -> tuple[float, Array, Array]:
+    """Return condition, P and J' R J, outputs weighed by their residuals' sizes."""
+    n_outputs = left[0].shape[1]
+    scale = np.array([np.sqrt(model.variance) or 1.0 for model in models])
+    stacked, tinted = [], []
+    for run in range(len(left)):
+        slopes = np.stack([column[run] for column in columns], axis=2) / scale[:, np.newaxis]
+        stacked.append(slopes.reshape(-1, len(columns)))
+        tinted.append([models[j].tinted(slopes[:, j]) / scale[j] for j in range(n_outputs)])
+    condition, own = inverted(np.concatenate(stacked))
+    shocks = [np.concatenate([m.shocks(e[:, j]) for e in left]) for j, m in enumerate(models)]
+    together = np.corrcoef(shocks) if n_outputs > 1 else np.ones((1, 1))
+    together = np.nan_to_num(together)
+    middle = np.zeros((len(columns), len(columns)))
+    for own_run in tinted:
+        for i in range(n_outputs):
+            for j in range(n_outputs):
+                middle += together[i, j] * (own_run[i].T @ own_run[j])
+    # what the fit has taken out of the residuals, of all that was in them
+    if np.isfinite(own).all():
+        taken = float(np.sum(own * middle)) / sum(map(np.size, left))
+        middle /= max(1.0 - taken, 0.1)
+    return condition, own, middle
+
+
+@dataclass(frozen=True, eq=False)
+class Autoregression:
+    """Residuals as an autoregression: e_t = a_1 e_{t-1} + ... + shock.
+
+    Parameters
+    ----------
+    coefficients : array, shape (k,)
+        a.
+    shock : float
+        Standard deviation of what is new in every sample.
+    variance : float
+        Of the residuals.
+    """
+
+    coefficients: Array
+    shock: float
+    variance: float
+
+    @property
+    def _whitener(self) -> Array:
+        return np.concatenate([[1.0], -self.coefficients])
+
+    def shocks(self, series: Array) -> Array:
+        """Return what is new in every sample of a series."""
+        from scipy.signal import lfilter
+
+        return np.asarray(lfilter(self._whitener, [1.0], series))
+
+    def tinted(self, slopes: Array) -> Array:
+        """Return L' J, shape (n, k), of which the product with itself is J' R J."""
+        from scipy.signal import lfilter
+
+        back = lfilter([1.0], self._whitener, slopes[::-1], axis=0)[::-1]
+        return np.asarray(self.shock * back)
+
+    def worth(self, n: int) -> float:
+        """Return how many independent samples tell as much of the mean as n of these."""
+        if self.variance <= 0:
+            return float(n)
+        memory = (self.shock / float(self._whitener.sum())) ** 2 / self.variance
+        return float(np.clip(n / max(memory, 1e-12), 1.0, n))
+
+
+def autoregression(series: Sequence[Array]) -> Autoregression:
+    """Return the autoregression of pieces of one series, of as many terms as BIC asks for.
+
+    By Burg's method, which is always stable.
+
+    Parameters
+    ----------
+    series : sequence of array, shape (n,)
+    """
+    n = sum(map(len, series))
+    variance = float(np.mean(np.concatenate(series) ** 2)) if n else 0.0
+    forward: list[NDArray[np.float64]] = [np.asarray(e, dtype=np.float64) for e in series]
+    backward = list(forward)
+    best, chosen, shock = n * np.log(max(variance, 1e-300)), np.zeros(0), variance
+    a, power = np.zeros(0), variance
+    for order in range(1, min(MOST_TERMS, n // 10) + 1):
+        ahead = [f[1:] for f in forward]
+        behind = [b[:-1] for b in backward]
+        below = sum(float(f @ f + b @ b) for f, b in zip(ahead, behind, strict=True))
+        if not below > 1e-300:
+            break
+        k = 2 * sum(float(f @ b) for f, b in zip(ahead, behind, strict=True)) / below
+        forward = [f - k * b for f, b in zip(ahead, behind, strict=True)]
+        backward = [b - k * f for f, b in zip(ahead, behind, strict=True)]
+        a = np.append(a - k * a[::-1], k)
+        power *= 1 - k * k
+        if not power > 1e-300:
+            break
+        cost = n * np.log(power) + order * np.log(n)
+        if cost < best:
+            best, chosen, shock = cost, a, power
+    return Autoregression(chosen, float(np.sqrt(max(shock, 0.0))), variance)

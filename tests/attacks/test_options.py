@@ -27,6 +27,7 @@ COMMANDS: dict[str, list[str]] = {
     "compare": ["run.csv", "--test", "two.csv", "--models", "pi", "--jobs", "1"],
     "measured": ["sets", "-o", "out", "--models", "pi", "--jobs", "1"],
     "simulate": ["model.json", "run.csv", "-o", "out.csv"],
+    "calibrate": ["model.json", "two.csv", "-o", "out.json"],
     "invert": ["model.json", "-o", "out.json"],
     "track": ["inverse.json", "--rig", "mas20-hanging", "--reference", "run.csv"],
     "plot": ["run.csv", "-o", "out.png"],

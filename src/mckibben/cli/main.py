@@ -16,6 +16,7 @@ from typing import Annotated, Any
 import typer
 
 from mckibben.cli.app import app as workbench
+from mckibben.cli.calibrate import calibrate
 from mckibben.cli.characterize import characterize
 from mckibben.cli.check_block import check_block
 from mckibben.cli.compare import compare
@@ -51,7 +52,7 @@ app = typer.Typer(
     rich_markup_mode=None,
 )
 for command in (
-    *(study, characterize, fit, compare, simulate, invert, track, plot, reproduce, info),
+    *(study, characterize, fit, compare, calibrate, simulate, invert, track, plot, reproduce, info),
     measured,
 ):
     app.command()(command)

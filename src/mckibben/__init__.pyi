@@ -1,6 +1,7 @@
 """The face of the package: what is here can be had from it, and is imported when it is first used."""
 
 from . import muscles as muscles
+from .blocks.bands.banded import Banded as Banded
 from .blocks.compose import Parallel as Parallel
 from .blocks.compose import PerChannel as PerChannel
 from .blocks.compose import Series as Series
@@ -17,6 +18,7 @@ from .blocks.play_type.pi import PI as PI
 from .blocks.play_type.play import Play as Play
 from .blocks.play_type.rate_dependent_pi import RateDependentPI as RateDependentPI
 from .characterization import characterize as characterize
+from .comparison.calibrating import calibrate as calibrate
 from .comparison.orders import identify as identify
 from .comparison.ranking import compare as compare
 from .errors import DataError as DataError

@@ -28,6 +28,7 @@ COMMANDS: dict[str, list[str]] = {
     "measured": ["sets", "-o", "out", "--models", "pi", "--jobs", "1"],
     "simulate": ["model.json", "run.csv", "-o", "out.csv"],
     "check": ["model.json", "run.csv", "-o", "out"],
+    "calibrate": ["model.json", "two.csv", "-o", "out.json"],
     "invert": ["model.json", "-o", "out.json"],
     "track": ["inverse.json", "--rig", "mas20-hanging", "--reference", "run.csv"],
     "plot": ["run.csv", "-o", "out.png"],

@@ -16,6 +16,7 @@ from typing import Annotated, Any
 import typer
 
 from mckibben.cli.app import app as workbench
+from mckibben.cli.calibrate import calibrate
 from mckibben.cli.characterize import characterize
 from mckibben.cli.check import check
 from mckibben.cli.check_block import check_block
@@ -53,8 +54,8 @@ app = typer.Typer(
     rich_markup_mode=None,
 )
 for command in (
-    *(study, characterize, fit, compare, simulate, invert, track, plot, reproduce, info),
-    *(check, plan, measured),
+    *(study, characterize, fit, compare, check, calibrate, simulate, invert, track, plan, plot),
+    *(reproduce, measured, info),
 ):
     app.command()(command)
 app.command("check-block")(check_block)

@@ -75,8 +75,23 @@ class Found:
     notes: tuple[str, ...]
 
 
-def find_band(model: Block, runs: Sequence[Held], unit: Unit = "auto") -> Found:
+def find_band(
+    model: Block,
+    runs: Sequence[Held],
+    unit: Unit = "auto",
+    shapes: Sequence[Shape] = SHAPES,
+) -> Found:
     """Return the band of a model that missed so much on runs it was not fitted to.
+
+    Parameters
+    ----------
+    model : Block
+    runs : sequence of Held
+        All with the model's inputs and outputs.
+    unit : {"auto", "run", "block"}
+        What is exchangeable.
+    shapes : sequence of Shape
+        What a scale may be made of, from the simplest on; the first alone is the same everywhere.
 
     Raises
     ------
@@ -123,7 +138,7 @@ def find_band(model: Block, runs: Sequence[Held], unit: Unit = "auto") -> Found:
     level = min(LEVEL, n_units / (n_units + 1))
     best, scores, widths = [], [], []
     for errors in np.concatenate(all_missed).T:
-        scale, own_scores, *width = _best(terms, errors, of, apart, n_seen, level)
+        scale, own_scores, *width = _best(terms, errors, of, apart, n_seen, level, shapes)
         best.append(scale)
         scores.append(_quantiles(own_scores, of))
         widths.append(width)
@@ -156,6 +171,7 @@ def _best(
     apart: NDArray[np.intp],
     n_seen: int,
     level: float,
+    shapes: Sequence[Shape],
 ) -> tuple[Scale, Array, float, float]:
     """Return the scale of the narrowest band, its scores, its width over a constant's, and its width.
 
@@ -179,10 +195,10 @@ def _best(
         width = sum(scale.width(terms[here], half) * here.sum() for here, scale in fitted)
         return scores, float(width) / len(errors)
 
-    shape = SHAPES[0]
+    shape = shapes[0]
     scores, constant = tried(shape)
     width = constant
-    for other in SHAPES[1:]:
+    for other in shapes[1:]:
         own, narrower = tried(other)
         if narrower < (1.0 - WORTH) * width:
             shape, scores, width = other, own, narrower

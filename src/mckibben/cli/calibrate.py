@@ -28,7 +28,7 @@ def calibrate(
     files: Files,
     out: Annotated[Path, typer.Option("-o", "--out", help="Model with its band to write (JSON).")],
     reading: Reading,
-    unit: Annotated[
+    exchangeable: Annotated[
         Units,
         typer.Option(
             "--exchangeable",
@@ -57,7 +57,7 @@ def calibrate(
     block = load(model)
     recordings = reading.read(files, None, informative=False)
     known = reading.read(fitted, None, informative=False) if fitted else []
-    banded, found = calibration(block, recordings, unit=unit.value, fitted=known)
+    banded, found = calibration(block, recordings, exchangeable=exchangeable.value, fitted=known)
     banded.save(out)
     band, most = found.band, found.band.units / (found.band.units + 1)
     names = [channel.name for channel in band.given]

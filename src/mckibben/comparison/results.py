@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from mckibben.blocks.core.block import Block
+from mckibben.comparison.banding import TestedBand
 from mckibben.comparison.coverage import OffTraining
 from mckibben.comparison.drift import Drift
 from mckibben.comparison.limits import caution
@@ -19,7 +20,6 @@ from mckibben.metrics import Scores
 
 if TYPE_CHECKING:
     import pandas as pd
-
 
 CHOICES = {
     "cross-validation": ("CV RMSE", "cross-validation on the training side"),
@@ -99,8 +99,10 @@ class Row:
     drift : Drift or None
         The slow part of the error on the test, of the output where it is largest; None of tests without
         time, or too short to tell.
-    block : Block or None
-        The model identified.
+    band : TestedBand or None
+        How its band does on the test, of models that were best when they were done.
+    block, banded : Block or None
+        The model identified, and with that band.
     diagnostics : mapping
         What the estimator says of the fit.
     """
@@ -125,7 +127,9 @@ class Row:
     memory: Memory | None = None
     off_training: OffTraining | None = None
     drift: Drift | None = None
+    band: TestedBand | None = None
     block: Block | None = field(default=None, repr=False)
+    banded: Block | None = field(default=None, repr=False)
     diagnostics: Mapping[str, Any] = field(default_factory=dict, repr=False)
 
     @property
@@ -202,6 +206,7 @@ class Row:
             "memory": None if self.memory is None else asdict(self.memory),
             "off_training": None if self.off_training is None else self.off_training.to_dict(),
             "drift": None if self.drift is None else self.drift.to_dict(),
+            "band": None if self.band is None else self.band.to_dict(),
             "rate_dependent": self.block is not None and bool(self.block.rate_dependent),
             "invertible": self.inverse is not None,
             "caution": self.caution,
@@ -306,12 +311,11 @@ class Leaderboard:
     def of_models(self) -> tuple[str, ...]:
         """What is to be said of models: `off_training`, `drift`, and what the chosen one's fit said."""
         best = self.best
-        noted = () if best is None else best.diagnostics.get("notes", ())
-        return (
-            *self.off_training,
-            *([self.drift] if self.drift else []),
-            *(f"{best.model}: {note}" for note in noted if best is not None),
-        )
+        drift = [self.drift] if self.drift else []
+        if best is None:
+            return (*self.off_training, *drift)
+        said = [*([best.band] if best.band else []), *best.diagnostics.get("notes", ())]
+        return (*self.off_training, *drift, *(f"{best.model}: {each}" for each in said))
 
     @property
     def ranking(self) -> tuple[Row, ...]:

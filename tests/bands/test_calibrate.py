@@ -216,10 +216,6 @@ def test_copies_are_told() -> None:
     assert any("count as two" in str(warning.message) for warning in told)
 
 
-def test_a_band_has_no_inverse_and_is_not_exported(banded: Banded, tmp_path: Path) -> None:
-    from mckibben.export import export_c
-
+def test_a_band_has_no_inverse(banded: Banded) -> None:
     with pytest.raises(ModelError, match="invert the model"):
         banded.inverse()
-    with pytest.raises(ModelError, match="export the model"):
-        export_c(banded, tmp_path / "c", sample_time=STEP)

@@ -82,10 +82,6 @@ def test_bad_input_is_refused(cli: Cli, model: Path, runs: list[Path], tmp_path:
         (["simulate", banded, runs[0], "-o", out, "--interval", "1.5"], "below 1"),
         (["simulate", banded, runs[0], "-o", out, "--interval", "0.5", "--horizon", "3"], "free"),
         (["invert", banded, "-o", out], "invert the model"),
-        (
-            ["export", "c", banded, "-o", tmp_path / "c", "--sample-time", "0.02"],
-            "export the model",
-        ),
         (["calibrate", inverse, runs[0], "-o", tmp_path / "b.json"], "calibrate the model"),
         (["calibrate", model, runs[0], "--fitted", runs[0], "-o", tmp_path / "b.json"], "fitted"),
         (["calibrate", model, model, "-o", tmp_path / "b.json"], "model.json"),

@@ -167,11 +167,8 @@ class Banded(Block):
         self.forward.report(state[: self.forward.n_states])
 
     def wired(self, board: Board, given: Sequence[str]) -> list[str]:
-        """Refuse: what goes on a target is the model."""
-        raise ModelError(
-            "a model with a band is not exported. Remedy: export the model that was calibrated, or "
-            "banded.forward."
-        )
+        """Lay out the model, and the band on what it is given and gives."""
+        return board.call(self.band, [*given, *self.forward.wired(board, given)])
 
     def inverse(self) -> Block:
         """Refuse: a band is of outputs, and an inverse gives inputs."""

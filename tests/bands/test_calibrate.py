@@ -14,7 +14,7 @@ from mckibben import GPI, Banded, DataError, ModelError, ModelWarning, Recording
 from mckibben.bands.finding import find_band
 from mckibben.bands.held import Held, memory_of
 from mckibben.bands.scale import SHAPES
-from mckibben.blocks.bands.band import share_of
+from mckibben.blocks.bands.band import check_level
 from mckibben.signals import random_wave
 
 MODEL = GPI.example()
@@ -150,12 +150,28 @@ def test_beyond_what_calibration_saw_it_widens(banded: Banded) -> None:
 
 
 def test_so_many_runs_allow_so_much() -> None:
-    assert share_of(0.9, 9, "run") == pytest.approx(1.0)
+    check_level(0.9, 9, "run")
     with pytest.raises(ModelError, match=r"at most 88.9 %.*at least 9 runs"):
-        share_of(0.9, 8, "run")
-    shares = [share_of(0.9, n, "run") for n in (9, 19, 99, 9999)]
-    assert shares == sorted(shares, reverse=True)
-    assert shares[-1] == pytest.approx(0.9, abs=1e-3)
+        check_level(0.9, 8, "run")
+
+
+def test_few_units_are_asked_for_more_than_many() -> None:
+    """The score of which 90 % of a normal error are held, as units get more: from above to 1.645."""
+    rng = np.random.default_rng(11)
+    u = np.zeros((10, 1))
+    found = []
+    for n in (9, 40, 2000):
+        reached = []
+        for _ in range(8 if n < 100 else 1):
+            held = [
+                Held(u, u, u + off, np.ones(10, dtype=bool), None) for off in rng.standard_normal(n)
+            ]
+            band = find_band(MODEL, held, "run", SHAPES[:1]).band
+            ends = band.simulate(np.zeros((1, 2)))
+            reached.append(float(ends[0, 2]))
+        found.append(float(np.median(reached)))
+    assert found[0] >= found[1] > 0.95 * found[2]
+    assert found[2] == pytest.approx(1.645, rel=0.06)
 
 
 @pytest.mark.parametrize("level", [0.0, 1.0, -1.0, 7.0, float("nan")])

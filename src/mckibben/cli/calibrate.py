@@ -32,7 +32,7 @@ def calibrate(
         Units,
         typer.Option(
             "--exchangeable",
-            help="What a new run is like: runs, or long blocks of runs. auto: runs from 30 on.",
+            help="What a new run is like: runs, or long blocks of runs. auto: runs from 20 on.",
         ),
     ] = Units.AUTO,
     fitted: Annotated[
@@ -46,7 +46,7 @@ def calibrate(
 ) -> None:
     """Find bands of a model on recordings that it was not fitted to.
 
-    At a level of 0.9 they hold at least 90 % of the samples of a new run that is like these, on average.
+    At a level of 0.9 they hold 90 % of the samples of a new run that is like these, on average.
     simulate model.json FILE --interval 0.9 writes lower and upper ends.
     """
     from mckibben.blocks.core.saving import load

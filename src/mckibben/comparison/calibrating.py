@@ -47,7 +47,7 @@ def calibrate(
         With the model's inputs and outputs, of one sample time, and not those that it was fitted to.
     exchangeable : {"auto", "run", "block"}
         What is exchangeable: runs, or blocks of runs that are long against the memory of the error.
-        By default runs from 30 on, else blocks, and a warning says so.
+        By default runs from 20 on, else blocks, and a warning says so.
     fitted : sequence of Recording, optional
         Those that it was fitted to, to make sure that none is among the recordings.
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from mckibben.arrays import Array
 from mckibben.bands.held import BLOCK, Held, memory_of
 from mckibben.bands.scale import SHAPES, Scale, Shape, Terms, scale_of
-from mckibben.blocks.bands.band import Band, share_of
+from mckibben.blocks.bands.band import Band
 from mckibben.blocks.bands.state_of_motion import look_along
 from mckibben.blocks.core.block import Block
 from mckibben.blocks.core.fields import rows, vector
@@ -27,8 +27,8 @@ Unit = Literal["auto", "run", "block"]
 
 LEVEL = 0.9
 
-MANY = 30
-"""Runs from which they are the units: 90 % then cost a third of what may be missed, for certainty."""
+MANY = 20
+"""Runs from which they are the units; of fewer the largest score of any would bound 90 %."""
 
 WIDTHS = (0.03, 0.1, 0.3)
 """Of plays, as shares of a range: just turned, turned a while ago, in another loop."""
@@ -75,8 +75,23 @@ class Found:
     notes: tuple[str, ...]
 
 
-def find_band(model: Block, runs: Sequence[Held], unit: Unit = "auto") -> Found:
+def find_band(
+    model: Block,
+    runs: Sequence[Held],
+    unit: Unit = "auto",
+    shapes: Sequence[Shape] = SHAPES,
+) -> Found:
     """Return the band of a model that missed so much on runs it was not fitted to.
+
+    Parameters
+    ----------
+    model : Block
+    runs : sequence of Held
+        All with the model's inputs and outputs.
+    unit : {"auto", "run", "block"}
+        What is exchangeable.
+    shapes : sequence of Shape
+        What a scale may be made of, from the simplest on; the first alone is the same everywhere.
 
     Raises
     ------
@@ -123,9 +138,9 @@ def find_band(model: Block, runs: Sequence[Held], unit: Unit = "auto") -> Found:
     level = min(LEVEL, n_units / (n_units + 1))
     best, scores, widths = [], [], []
     for errors in np.concatenate(all_missed).T:
-        scale, own_scores, *width = _best(terms, errors, of, apart, n_seen, level)
+        scale, own_scores, *width = _best(terms, errors, of, apart, n_seen, level, shapes)
         best.append(scale)
-        scores.append(_quantiles(own_scores, of))
+        scores.append(_calibrated(own_scores, of))
         widths.append(width)
     band = Band(
         driving=model.inputs,
@@ -156,13 +171,12 @@ def _best(
     apart: NDArray[np.intp],
     n_seen: int,
     level: float,
+    shapes: Sequence[Shape],
 ) -> tuple[Scale, Array, float, float]:
     """Return the scale of the narrowest band, its scores, its width over a constant's, and its width.
 
     Units, by ``of``, weigh the same; those that ``apart`` numbers alike are left out together.
     """
-    n_units = int(of.max()) + 1
-    share = share_of(level, n_units, "unit")
     n_apart = int(apart.max()) + 1
     part = apart * min(PARTS, n_apart) // n_apart
     every = max(len(errors) // MOST_FITTED, 1)
@@ -175,20 +189,44 @@ def _best(
             scale = scale_of(terms[known], errors[known], apart[known], shape, n_seen)
             scores[here] = scale.scores(terms[here], errors[here])
             fitted.append((here, scale))
-        half = float(_quantiles(scores, of)[int(np.ceil(share * STEPS - 1e-9))])
+        half = float(_quantiles(scores, of)[round(level * STEPS)])
         width = sum(scale.width(terms[here], half) * here.sum() for here, scale in fitted)
         return scores, float(width) / len(errors)
 
-    shape = SHAPES[0]
+    shape = shapes[0]
     scores, constant = tried(shape)
     width = constant
-    for other in SHAPES[1:]:
+    for other in shapes[1:]:
         own, narrower = tried(other)
         if narrower < (1.0 - WORTH) * width:
             shape, scores, width = other, own, narrower
     some = np.arange(0, len(errors), every)
     scale = scale_of(terms[some], errors[some], apart[some], shape, n_seen)
     return scale, scores, width / constant if constant > 0 else 1.0, width
+
+
+def _calibrated(scores: Array, of: NDArray[np.intp]) -> Array:
+    """Return the score that a band at level 0, 1 / STEPS, ... 1 reaches to.
+
+    A quantile that so many units give holds, of another unit, that share on average which it would have
+    held of each of them, had it been found on the rest: more runs than the level are asked of few, or of
+    such that differ as a whole, hardly more of many that are alike. What no unit's rest would have held
+    is given the largest score.
+    """
+    n_units = int(of.max()) + 1
+    reached = _quantiles(scores, of)
+    held = np.empty((n_units, STEPS + 1))
+    for unit in range(n_units):
+        own = np.sort(scores[of == unit])
+        held[unit] = np.searchsorted(own, reached, side="right") / own.size
+    others = (held.sum(axis=0) - held) / (n_units - 1)
+    shares = np.linspace(0.0, 1.0, STEPS + 1)
+    left_out = np.zeros(STEPS + 1)
+    for own, rest in zip(held, others, strict=True):
+        places = np.searchsorted(rest, shares - 1e-9).clip(max=STEPS)
+        left_out += own[places] / n_units
+    left_out = np.maximum.accumulate(left_out)
+    return np.asarray(reached[np.searchsorted(left_out, shares - 1e-9).clip(max=STEPS)])
 
 
 def _quantiles(scores: Array, of: NDArray[np.intp]) -> Array:

@@ -28,11 +28,11 @@ def calibrate(
     files: Files,
     out: Annotated[Path, typer.Option("-o", "--out", help="Model with its band to write (JSON).")],
     reading: Reading,
-    unit: Annotated[
+    exchangeable: Annotated[
         Units,
         typer.Option(
             "--exchangeable",
-            help="What a new run is like: runs, or long blocks of runs. auto: runs from 30 on.",
+            help="What a new run is like: runs, or long blocks of runs. auto: runs from 20 on.",
         ),
     ] = Units.AUTO,
     fitted: Annotated[
@@ -46,7 +46,7 @@ def calibrate(
 ) -> None:
     """Find bands of a model on recordings that it was not fitted to.
 
-    At a level of 0.9 they hold at least 90 % of the samples of a new run that is like these, on average.
+    At a level of 0.9 they hold 90 % of the samples of a new run that is like these, on average.
     simulate model.json FILE --interval 0.9 writes lower and upper ends.
     """
     from mckibben.blocks.core.saving import load
@@ -57,7 +57,7 @@ def calibrate(
     block = load(model)
     recordings = reading.read(files, None, informative=False)
     known = reading.read(fitted, None, informative=False) if fitted else []
-    banded, found = calibration(block, recordings, unit=unit.value, fitted=known)
+    banded, found = calibration(block, recordings, exchangeable=exchangeable.value, fitted=known)
     banded.save(out)
     band, most = found.band, found.band.units / (found.band.units + 1)
     names = [channel.name for channel in band.given]

@@ -28,7 +28,7 @@ def calibrate(
     model: Block,
     recordings: Recording | Sequence[Recording],
     *,
-    unit: Unit = "auto",
+    exchangeable: Unit = "auto",
     fitted: Sequence[Recording] = (),
 ) -> Banded:
     """Return a model with bands that hold on new runs, if these are like the recordings.
@@ -45,9 +45,9 @@ def calibrate(
         A forward model, perhaps with a band, which is then found anew.
     recordings : Recording or sequence of Recording
         With the model's inputs and outputs, of one sample time, and not those that it was fitted to.
-    unit : {"auto", "run", "block"}
+    exchangeable : {"auto", "run", "block"}
         What is exchangeable: runs, or blocks of runs that are long against the memory of the error.
-        By default runs from 30 on, else blocks, and a warning says so.
+        By default runs from 20 on, else blocks, and a warning says so.
     fitted : sequence of Recording, optional
         Those that it was fitted to, to make sure that none is among the recordings.
 
@@ -78,7 +78,7 @@ def calibrate(
     ['pressure', 'displacement', 'displacement_lower', 'displacement_upper']
     """
     runs = [recordings] if isinstance(recordings, Recording) else list(recordings)
-    banded, found = calibration(model, runs, unit=unit, fitted=fitted)
+    banded, found = calibration(model, runs, exchangeable=exchangeable, fitted=fitted)
     for note in found.notes:
         warnings.warn(note, ModelWarning, stacklevel=2)
     return banded
@@ -88,7 +88,7 @@ def calibration(
     model: Block,
     recordings: Sequence[Recording],
     *,
-    unit: Unit = "auto",
+    exchangeable: Unit = "auto",
     fitted: Sequence[Recording] = (),
 ) -> tuple[Banded, Found]:
     """Return a model with its band, and what is to be said of it; see `calibrate`."""
@@ -124,7 +124,7 @@ def calibration(
             )
     _check_apart(fitted, recordings, inputs, outputs)
     held = [held_of(model, recording, outputs) for recording in recordings]
-    found = find_band(model, held, unit)
+    found = find_band(model, held, exchangeable)
     return Banded(model, found.band), found
 
 
@@ -152,15 +152,15 @@ def _check_apart(
         second = recordings[shared.second - len(fitted)]
         if shared.first < len(fitted):
             raise DataError(
-                f"the model was fitted to {100 * shared.share:.0f} % of its motion, and misses less there "
-                "than elsewhere",
+                f"the model was fitted to {100 * shared.share:.0f} % of its motion, and misses less "
+                "there than elsewhere",
                 file=second.source,
                 remedy="calibrate on recordings that it was not fitted to",
             )
         warnings.warn(
             f"{second.name} and {recordings[shared.first - len(fitted)].name} are the same for "
-            f"{100 * shared.share:.0f} % of their motion, and count as two. Remedy: drop one, if it is a "
-            "copy.",
+            f"{100 * shared.share:.0f} % of their motion, and count as two. Remedy: drop one, if it is "
+            "a copy.",
             ModelWarning,
             stacklevel=4,
         )

@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from mckibben.arrays import Array
+from mckibben.comparison.banding import tested_band
 from mckibben.comparison.bootstrap import BlockBootstrap, differences, interval, skill_of
 from mckibben.comparison.channels import Names
 from mckibben.comparison.choosing import Choice, choice_of
@@ -254,7 +255,8 @@ def ranked(
             whole = joined(
                 [piece for _, piece in sorted(pieces[model].items())], data.channels.outputs
             )
-            finished[model] = _with_skill(whole, plan)
+            whole = _with_skill(whole, plan)
+            finished[model] = _with_band(whole, finished, plan)
             row = finished[model].row
             if row is not None and row.sound:  # a failure may be the machine's, not the model's
                 item = remaining[model]
@@ -275,6 +277,20 @@ def _with_skill(tried: Tried, plan: Plan) -> Tried:
     ]
     skill, least = skill_of([one for one, _ in pairs], [other for _, other in pairs], plan.seed)
     return replace(tried, row=replace(row, skill=skill, skill_least=least))
+
+
+def _with_band(tried: Tried, others: Mapping[str, Tried], plan: Plan) -> Tried:
+    """Return what came of a model with its band, where it is the best until now; it may be chosen."""
+    row, held = tried.row, tried.held
+    tried = replace(tried, held=())  # they are large
+    if row is None or not row.sound or row.block is None:
+        return tried
+    if any(o.row is not None and o.row.sound and o.row.order < row.order for o in others.values()):
+        return tried
+    found = tested_band(row.block, held, tried.outputs, plan.data)
+    if found is None:
+        return tried
+    return replace(tried, row=replace(row, banded=found[0], band=found[1]))
 
 
 def _ranking(

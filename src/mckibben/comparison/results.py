@@ -133,13 +133,16 @@ class Leaderboard:
     def of_models(self) -> tuple[str, ...]:
         """What is to be said: `choice`, `off_training`, `drift`, and of the chosen one's fit."""
         best = self.best
-        price = "" if self.choice is None or best is None else self.choice.said(self.unit)
-        noted = () if best is None else best.diagnostics.get("notes", ())
+        drift = [self.drift] if self.drift else []
+        if best is None:
+            return (*self.off_training, *drift)
+        price = [] if self.choice is None else [self.choice.said(self.unit)]
+        said = [*([best.band] if best.band else []), *best.diagnostics.get("notes", ())]
         return (
-            *([price] if price else []),
+            *filter(None, price),
             *self.off_training,
-            *([self.drift] if self.drift else []),
-            *(f"{best.model}: {note}" for note in noted if best is not None),
+            *drift,
+            *(f"{best.model}: {each}" for each in said),
         )
 
     @property

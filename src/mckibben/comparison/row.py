@@ -10,6 +10,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from mckibben.blocks.core.block import Block
+from mckibben.comparison.banding import TestedBand
 from mckibben.comparison.coverage import OffTraining
 from mckibben.comparison.drift import Drift
 from mckibben.comparison.limits import caution
@@ -88,8 +89,10 @@ class Row:
     drift : Drift or None
         The slow part of the error on the test, of the output where it is largest; None of tests without
         time, or too short to tell.
-    block : Block or None
-        The model identified.
+    band : TestedBand or None
+        How its band does on the test, of models that were best when they were done.
+    block, banded : Block or None
+        The model identified, and with that band.
     diagnostics : mapping
         What the estimator says of the fit.
     """
@@ -115,7 +118,9 @@ class Row:
     memory: Memory | None = None
     off_training: OffTraining | None = None
     drift: Drift | None = None
+    band: TestedBand | None = None
     block: Block | None = field(default=None, repr=False)
+    banded: Block | None = field(default=None, repr=False)
     diagnostics: Mapping[str, Any] = field(default_factory=dict, repr=False)
 
     @property
@@ -199,6 +204,7 @@ class Row:
             "memory": None if self.memory is None else asdict(self.memory),
             "off_training": None if self.off_training is None else self.off_training.to_dict(),
             "drift": None if self.drift is None else self.drift.to_dict(),
+            "band": None if self.band is None else self.band.to_dict(),
             "rate_dependent": self.block is not None and bool(self.block.rate_dependent),
             "invertible": self.inverse is not None,
             "caution": self.caution,

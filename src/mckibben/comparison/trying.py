@@ -12,6 +12,7 @@ import numpy as np
 
 from mckibben import registry
 from mckibben.arrays import Array
+from mckibben.bands.held import Held
 from mckibben.blocks.core.block import Block
 from mckibben.comparison.channels import Channels
 from mckibben.comparison.cluster import outcomes_outside, outer_backend, processes_outside
@@ -118,6 +119,8 @@ class Tried:
         Samples in them.
     invalid : str or None
         Why a fold could not be fitted.
+    held : tuple of Held
+        What the cross-validation's models gave on what they were not fitted to.
     """
 
     row: Row | None = None
@@ -125,6 +128,7 @@ class Tried:
     squares: tuple[tuple[float, ...] | None, ...] = ()
     count: int = 0
     invalid: str | None = None
+    held: tuple[Held, ...] = ()
 
 
 def parts_of(name: str, item: Item, n_folds: int, split: bool) -> list[Part]:
@@ -240,7 +244,8 @@ def joined(parts: Sequence[Tried], names: Sequence[str]) -> Tried:
         validation_by_output=dict(zip(names, by_output, strict=False)),
         squares=tuple(piece for piece in squares if piece is not None),
     )
-    return replace(whole, row=row, squares=squares)
+    held = tuple(one for tried in parts for one in tried.held)
+    return replace(whole, row=row, squares=squares, held=held)
 
 
 def squares_of(errors: Array) -> list[tuple[float, ...]]:
@@ -323,6 +328,7 @@ def _try(data: Data, part: Part, tell: Callable[..., None]) -> Tried:
             )
 
     squares: list[tuple[float, ...] | None] = []
+    held: list[Held] = []
     count, invalid = 0, None
 
     def validate(block: Block, fold: Fold) -> None:
@@ -333,7 +339,10 @@ def _try(data: Data, part: Part, tell: Callable[..., None]) -> Tried:
             known = [pair for pair in fitted_to if pair[0] is recording]
             own, own_rows = [r for r, _ in known], [kept for _, kept in known]
             modelled = run_free(block, recording, names, own, own_rows)
-            errors = (modelled - recording.matrix(names))[rows]
+            measured, step = recording.matrix(names), recording.sample_time
+            driving = recording.matrix(channel.name for channel in block.inputs)
+            held.append(Held(driving, modelled, measured, rows, step))
+            errors = (modelled - measured)[rows]
             squares.extend(squares_of(errors))
             count += len(errors)
 
@@ -350,7 +359,7 @@ def _try(data: Data, part: Part, tell: Callable[..., None]) -> Tried:
     except MckibbenError as error:  # a part of the data may be too little where all of it is enough
         invalid = str(error)
     if not part.whole:
-        return Tried(squares=tuple(squares), count=count, invalid=invalid)
+        return Tried(None, (), tuple(squares), count, invalid, tuple(held))
     started = time.perf_counter()
     learned = split.train if item.only is None else (split.train[item.only],)
     estimator = fitted(learned, None, tell)
@@ -375,7 +384,7 @@ def _try(data: Data, part: Part, tell: Callable[..., None]) -> Tried:
         block=block,
         diagnostics=diagnostics,
     )
-    return Tried(row, outputs, tuple(squares), count, invalid)
+    return Tried(row, outputs, tuple(squares), count, invalid, tuple(held))
 
 
 def _is_whole(fold: Fold, split: Split) -> bool:

@@ -4,7 +4,7 @@
 
 where y is modelled, z is what `mckibben.blocks.bands.state_of_motion` sees, m what the model misses on
 average there, log s how much it misses, both sums of weights times z and times bells round places in z;
-q the quantile of the scores of calibration that the level asks for, and w = 1, or more beyond the ranges
+q what the level asks for, and w = 1, or more beyond the ranges
 that calibration saw. How m, s and q are found is told in `mckibben.bands`.
 """
 
@@ -121,7 +121,7 @@ class Band(Primitive):
     limits : rows, shape (outputs, 4)
         Least and largest shift, least and largest logarithm of the scale.
     scores : rows, shape (outputs, any)
-        Quantiles of the scores of calibration at evenly spaced shares from 0 to 1.
+        What the half width is in scales, at evenly spaced levels from 0 to 1.
     units : int
         How many exchangeable runs, or blocks of runs, calibration had.
     unit : {"run", "block"}
@@ -178,7 +178,7 @@ class Band(Primitive):
             raise ModelError("the scores of a band do not rise. Remedy: calibrate again.")
         if any(a > b or c > d for a, b, c, d in self.limits):
             raise ModelError("the limits of a band are not in order. Remedy: calibrate again.")
-        share_of(self.level, self.units, self.unit)
+        check_level(self.level, self.units, self.unit)
 
     @property
     def _n_seen(self) -> int:
@@ -218,8 +218,7 @@ class Band(Primitive):
         """Return the numbers that the kernel reads, at this level."""
         step = needs_sample_time(self.kind, sample_time) if self.times else 1.0
         keeps = np.exp(-step / np.array(self.times))
-        share = share_of(self.level, self.units, self.unit)
-        places = [int(np.ceil(share * (len(row) - 1) - 1e-9)) for row in self.scores]
+        places = [int(np.ceil(self.level * (len(row) - 1) - 1e-9)) for row in self.scores]
         head = [len(self.driving), len(self.given), len(self.widths), len(self.times)]
         return np.concatenate(
             [
@@ -267,21 +266,19 @@ class Band(Primitive):
         )
 
 
-def share_of(level: float, units: int, unit: str) -> float:
-    """Return the share of the scores of calibration that a band holds at a level.
+def check_level(level: float, units: int, unit: str) -> None:
+    """Refuse a level that is none, or that so few exchangeable units do not allow.
 
-    Of a new unit, exchangeable with those of calibration, it then misses no more than 1 - level on
-    average: it could be missed whole, which is one of so many and one.
+    A new one is as likely as each of them to be missed most, and nothing bounds by how much.
 
     Raises
     ------
     ModelError
-        On a level that is none, or that so few units do not allow.
+        Naming the highest level there is, and how many units the one asked for needs.
     """
     if not 0.0 < level < 1.0:
         raise ModelError(f"the level is {level:g}. Remedy: give one above 0 and below 1, as 0.9.")
-    missed = ((1.0 - level) * (units + 1) - 1.0) / units
-    if missed < -1e-12:
+    if level > units / (units + 1) + 1e-12:
         most, needed = (
             numeral(100 * units / (units + 1), 3),
             int(np.ceil(level / (1.0 - level) - 1e-9)),
@@ -291,4 +288,3 @@ def share_of(level: float, units: int, unit: str) -> float:
             f"{numeral(100 * level, 4)} % are asked for. Remedy: ask for less, or calibrate on at least "
             f"{needed} {unit}s."
         )
-    return min(1.0 - missed, 1.0)

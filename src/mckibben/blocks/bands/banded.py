@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Annotated, ClassVar, Self
 
@@ -12,6 +13,7 @@ from pydantic.dataclasses import dataclass
 from mckibben.arrays import Array
 from mckibben.blocks.bands.band import Band
 from mckibben.blocks.core.block import Block, Run
+from mckibben.blocks.core.exportable import Board
 from mckibben.blocks.core.fields import STRICT, Channel, Initial
 from mckibben.blocks.core.refusals import explicit_state
 from mckibben.blocks.core.saving import nested
@@ -164,12 +166,9 @@ class Banded(Block):
         """Pass on what the model has to say."""
         self.forward.report(state[: self.forward.n_states])
 
-    def c_numbers(self, sample_time: float | None) -> Array:
-        """Refuse: what goes on a target is the model."""
-        raise ModelError(
-            "a model with a band is not exported. Remedy: export the model that was calibrated, or "
-            "banded.forward."
-        )
+    def wired(self, board: Board, given: Sequence[str]) -> list[str]:
+        """Lay out the model, and the band on what it is given and gives."""
+        return board.call(self.band, [*given, *self.forward.wired(board, given)])
 
     def inverse(self) -> Block:
         """Refuse: a band is of outputs, and an inverse gives inputs."""

@@ -34,22 +34,23 @@ def holds(seen: Seen) -> Iterator[Gap]:
     """Give that creep may be slower than runs without holds, or holds, tell."""
     if not seen.timed or not seen.moving:
         return
-    longest = max(seen.holds, key=lambda hold: hold.seconds, default=None)
-    held = 0.0 if longest is None else longest.seconds
+    held = max((hold.seconds for hold in seen.holds), default=0.0)
     told = max(PER_RUN * seen.duration, PER_HOLD * held)
-    moved, name = 0.0, seen.outputs[0]
-    if longest is not None:
-        moved, name = max((_left(seen, longest, output), output) for output in seen.outputs)
+    long = [hold for hold in seen.holds if hold.seconds >= 0.5 * held]
+    moved, name = max(
+        ((_left(seen, hold, output), output) for hold in long for output in seen.outputs),
+        default=(0.0, ""),
+    )
     if told >= (SLOWEST if moved > 0 else SLOW):
         return
-    if longest is None or PER_HOLD * held <= PER_RUN * seen.duration:
+    if PER_HOLD * held <= PER_RUN * seen.duration:
         kept = "no hold is longer than " + value(held, "s") if held else "no input is ever held"
         why = f"{kept}, and no recording is longer than {value(seen.duration, 's')}"
     else:
         why = f"no hold is longer than {value(held, 's')}"
     if moved > 0:
         way = value(moved * seen.scales[name].span, seen.unit(name))
-        why = f"in the longest hold {name} still moves {way} over the last {value(held / 2, 's')}"
+        why = f"in the second half of a hold of {value(held, 's')} {name} still moves {way}"
     yield Gap(
         "creep",
         f"Creep slower than about {lasting(told)} cannot be told: {why}.",

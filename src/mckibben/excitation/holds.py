@@ -24,6 +24,9 @@ PER_RUN = 0.5
 MOVES_ON = 0.005
 """Share of its range by which an output that still moves does so in the second half of a hold."""
 
+SETTLED = 3.0
+"""Lags of valves and air are over by then: what still moves later creeps [s]."""
+
 CLEAR = 4.0
 """Standard errors of a mean that movement stands out by."""
 
@@ -36,10 +39,14 @@ def holds(seen: Seen) -> Iterator[Gap]:
         return
     held = max((hold.seconds for hold in seen.holds), default=0.0)
     told = max(PER_RUN * seen.duration, PER_HOLD * held)
-    long = [hold for hold in seen.holds if hold.seconds >= 0.5 * held]
-    moved, name = max(
-        ((_left(seen, hold, output), output) for hold in long for output in seen.outputs),
-        default=(0.0, ""),
+    long = [hold for hold in seen.holds if hold.seconds >= max(SETTLED, 0.5 * held)]
+    moved, lasted, name = max(
+        (
+            (_left(seen, hold, output), hold.seconds, output)
+            for hold in long
+            for output in seen.outputs
+        ),
+        default=(0.0, 0.0, ""),
     )
     if told >= (SLOWEST if moved > 0 else SLOW):
         return
@@ -50,7 +57,7 @@ def holds(seen: Seen) -> Iterator[Gap]:
         why = f"no hold is longer than {value(held, 's')}"
     if moved > 0:
         way = value(moved * seen.scales[name].span, seen.unit(name))
-        why = f"in the second half of a hold of {value(held, 's')} {name} still moves {way}"
+        why = f"in the second half of a hold of {value(lasted, 's')} {name} still moves {way}"
     yield Gap(
         "creep",
         f"Creep slower than about {lasting(told)} cannot be told: {why}.",

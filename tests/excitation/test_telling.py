@@ -13,11 +13,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
+from scipy.optimize import least_squares
 
 from mckibben import PI, DataError, Recording
 from mckibben.blocks.dynamic.process_model import ProcessModel
 from mckibben.excitation import untold
-from mckibben.registry import load
 from mckibben.signals import random_wave, triangle
 
 Array = NDArray[np.float64]
@@ -434,25 +434,32 @@ def processed(u: Array, seed: int) -> Recording:
     return Recording({"pressure": u, "displacement": y + noise}, STEP)
 
 
+def refitted(runs: Sequence[Recording]) -> Array:
+    """Return the logarithms of slow and fast time constant that fit best, by another's search."""
+
+    def residual(theta: Array) -> Array:
+        gain, offset, *times = np.exp(theta)
+        model = ProcessModel(gain=gain, time_constants=tuple(times), output_offset=offset)
+        return np.concatenate([model.simulate(r)["displacement"] - r["displacement"] for r in runs])
+
+    start = np.log([8.0, 2.0, 60.0, 0.3])
+    return np.asarray(
+        least_squares(residual, start, bounds=(start - 3, start + 3), max_nfev=30).x[2:]
+    )
+
+
 def test_parameters_that_are_untold_come_out_anyhow_and_told_they_do_not() -> None:
     short = drive([(4.0, 4.0, 0.0), (1.0, 4.0, 0.0)] * 2)
-    long = drive([(4.0, 4.0, 60.0), (1.0, 4.0, 60.0)])
+    long = drive([(4.0, 4.0, 40.0), (1.0, 4.0, 40.0)])
     for runs, lacking in (([short], True), ([short, long], False)):
         gaps = untold([processed(u, 0) for u in runs], model=PROCESS)
         said = [gap.sentence for gap in gaps if gap.what == "parameters"]
         assert any("ime constants 1" in sentence for sentence in said) == lacking
         assert not any("ime constants 2" in sentence for sentence in said)
-        found = np.array(
-            [
-                load("estimators", "p2")()
-                .fit([processed(u, seed) for u in runs])
-                .model_.time_constants
-                for seed in range(8)
-            ]
-        )
-        slow, fast = np.std(found, axis=0) / np.median(found, axis=0)
+        found = np.array([refitted([processed(u, seed) for u in runs]) for seed in range(4)])
+        slow, fast = np.std(found, axis=0)
         assert fast < 0.2
-        assert slow > 0.3 if lacking else slow < 0.1
+        assert slow > 0.4 if lacking else slow < 0.1
 
 
 def test_a_model_that_the_recordings_do_not_fit_is_refused() -> None:

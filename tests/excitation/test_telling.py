@@ -503,6 +503,23 @@ def test_what_is_said_of_speed_does_not_depend_on_scale(
     assert gap.evidence["fast"] == pytest.approx(unit * speed, rel=0.05)
 
 
+@settings(max_examples=60, deadline=None)
+@given(data=st.data(), n=st.integers(10, 80), two=st.booleans(), timed=st.booleans())
+def test_whatever_is_recorded_something_or_nothing_is_said(
+    data: st.DataObject, n: int, two: bool, timed: bool
+) -> None:
+    values = st.lists(st.sampled_from([0.0, 0.5, 1.0, -2.0, 1e6]), min_size=n, max_size=n)
+    names = ["pressure_1", "displacement_1"] + ["pressure_2", "displacement_2"] * two
+    beside = data.draw(st.sampled_from([[], ["force"], ["pressure_extensor"]]))
+    channels = {name: data.draw(values) for name in (*names, *beside)}
+    first = Recording(channels, 0.1)
+    second = Recording(channels, 0.1 if timed else None)
+    for gap in untold([first, second]):
+        assert gap.sentence.endswith(".")
+        assert 0 < gap.severity <= 1
+        assert "nan" not in str(gap)
+
+
 def test_it_is_quick() -> None:
     u = random_wave(np.arange(100_000) * 0.01, max_frequency=0.5, high=4.0, seed=0)
     one = run(u, None)

@@ -79,7 +79,7 @@ def untold(
     >>> pressure = triangle(np.arange(4001) / 100, period=10.0, peaks=4.0)
     >>> run = Recording({"pressure": pressure, "displacement": 3 * pressure}, 0.01)
     >>> print(untold([run])[0].sentence)
-    Rate dependence cannot be told: all 8 branches run at 0.8 bar/s, where they are of like size.
+    Rate dependence cannot be told: 8 branches run at 0.8 bar/s, where they are of like size.
     """
     listed = [recordings] if isinstance(recordings, Recording) else list(recordings)
     if not listed:

@@ -87,6 +87,9 @@ def _say(study: Study, folder: Path) -> None:
 def _conclude(study: Study, folder: Path) -> None:
     print_leaderboard(study.leaderboard)
     say()
+    for gap in study.untold:
+        if gap.what == "parameters":
+            say(f"- {gap}")
     check = study.inverse
     if check is not None and check.reachable is not None:
         low, high = check.reachable

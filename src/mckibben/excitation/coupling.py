@@ -8,6 +8,7 @@ from itertools import combinations
 import numpy as np
 
 from mckibben.arrays import Array
+from mckibben.comparison.coverage import COVERED, coverage_of
 from mckibben.excitation.gap import Gap, between, lasting, listing, value
 from mckibben.excitation.seen import Seen
 
@@ -19,9 +20,6 @@ OFF = 0.1
 
 TOGETHER = 0.02
 """Share of the samples in which inputs must be off their rest together, to have been seen so."""
-
-COVERED = 0.25
-"""Share of the inputs' joint range from which it is called covered."""
 
 MOST = 20_000
 """Samples looked at."""
@@ -119,8 +117,6 @@ def _rests(shares: Array) -> Array:
 
 
 def _covered(seen: Seen) -> float | None:
-    from mckibben.comparison.coverage import coverage_of
-
     found = coverage_of(seen.recordings, (), seen.moving)
     return None if found is None else found.covered
 

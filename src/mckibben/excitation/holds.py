@@ -24,6 +24,9 @@ PER_RUN = 0.5
 MOVES_ON = 0.005
 """Share of its range by which an output that still moves does so in the second half of a hold."""
 
+SETTLED = 3.0
+"""Lags of valves and air are over by then: what still moves later creeps [s]."""
+
 CLEAR = 4.0
 """Standard errors of a mean that movement stands out by."""
 
@@ -34,22 +37,27 @@ def holds(seen: Seen) -> Iterator[Gap]:
     """Give that creep may be slower than runs without holds, or holds, tell."""
     if not seen.timed or not seen.moving:
         return
-    longest = max(seen.holds, key=lambda hold: hold.seconds, default=None)
-    held = 0.0 if longest is None else longest.seconds
+    held = max((hold.seconds for hold in seen.holds), default=0.0)
     told = max(PER_RUN * seen.duration, PER_HOLD * held)
-    moved, name = 0.0, seen.outputs[0]
-    if longest is not None:
-        moved, name = max((_left(seen, longest, output), output) for output in seen.outputs)
+    long = [hold for hold in seen.holds if hold.seconds >= max(SETTLED, 0.5 * held)]
+    moved, lasted, name = max(
+        (
+            (_left(seen, hold, output), hold.seconds, output)
+            for hold in long
+            for output in seen.outputs
+        ),
+        default=(0.0, 0.0, ""),
+    )
     if told >= (SLOWEST if moved > 0 else SLOW):
         return
-    if longest is None or PER_HOLD * held <= PER_RUN * seen.duration:
+    if PER_HOLD * held <= PER_RUN * seen.duration:
         kept = "no hold is longer than " + value(held, "s") if held else "no input is ever held"
         why = f"{kept}, and no recording is longer than {value(seen.duration, 's')}"
     else:
         why = f"no hold is longer than {value(held, 's')}"
     if moved > 0:
         way = value(moved * seen.scales[name].span, seen.unit(name))
-        why = f"in the longest hold {name} still moves {way} over the last {value(held / 2, 's')}"
+        why = f"in the second half of a hold of {value(lasted, 's')} {name} still moves {way}"
     yield Gap(
         "creep",
         f"Creep slower than about {lasting(told)} cannot be told: {why}.",

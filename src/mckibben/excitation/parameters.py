@@ -36,6 +36,9 @@ FEW = 3
 """Numbers of a vector up to which each means something; of longer ones, such as the coefficients of a
 polynomial, the best known combination is judged."""
 
+LONGEST = 1200.0
+"""How long that may take in all [s]."""
+
 KNOWN_BEFORE = 0.01
 """Precision with which any parameter is known beforehand: to within a hundred times its size."""
 
@@ -44,6 +47,9 @@ MOST = 20_000
 
 MANY = 150
 """Parameters above which a model is a network, or a table."""
+
+ROUNDING = 1e-6
+"""Error of a model, as a share of what it should give, below which it has none."""
 
 TOLD = 4
 """Groups of parameters that are spoken of at most."""
@@ -98,7 +104,7 @@ def parameters(
             known = np.isfinite(slopes).all(axis=0) & (np.abs(slopes).max(axis=0) < LARGEST)
             free = [place for place, good in zip(free, known, strict=True) if good]
             slopes = slopes[:, known]
-            variance = _variance(target - base, len(free))
+            variance = _variance(target, target - base, len(free))
             told = slopes.T @ slopes / variance
             runs = _runs(model, data, facts)
             more = [
@@ -146,27 +152,27 @@ def _gap(
     if error <= LOOSE:
         return None
     enough = [
-        (times * len(run.inputs) * (run.sample_time or 1.0), times, run.words, after)
+        (times * _seconds(run), times, run.words, after)
         for run, extra in more
         for times in TIMES
-        if (after := standard_error(told + times * extra, places)) <= LOOSE
+        if times * _seconds(run) <= LONGEST
+        and (after := standard_error(told + times * extra, places)) <= LOOSE
     ]
     if not enough:
         return None
     _, times, words, after = min(enough)
-    meaning = meanings.get(name, name)
+    meaning = meanings.get(name, f"“{name}”")
     partner = _partner(told, places, model, free)
     size = "more than ten times its size" if error > 10 else f"{value(100 * error)} % of its size"
-    if partner is not None:
-        partner = meanings.get(partner, partner)
-        what = f"{meaning} and {partner} of the model can be told only together"
-    else:
-        what = f"{meaning} of the model cannot be told"
+    sentence = (
+        f"Of the model fitted, {meaning} cannot be told: its standard error is {size}."
+        if partner is None
+        else f"Of the model fitted, {meaning} and {meanings.get(partner, f'“{partner}”')} can be told "
+        f"only together: the standard error of the former is {size}."
+    )
     return Gap(
         "parameters",
-        f"{what[0].upper()}{what[1:]}: the standard error of the former is {size}."
-        if partner
-        else f"{what[0].upper()}{what[1:]}: its standard error is {size}.",
+        sentence,
         f"{words}{'' if times == 1 else f', {times} times'}, which would bring it to about "
         f"{value(100 * after)} %.",
         f"{meaning}, and what it is used for away from these recordings",
@@ -174,6 +180,11 @@ def _gap(
         {"standard_error": error, "after": after},
         (),
     )
+
+
+def _seconds(run: Proposal) -> float:
+    """Return how long a run takes [s]; 0 without time."""
+    return len(run.inputs) * (run.sample_time or 0.0)
 
 
 def _partner(told: Array, places: list[int], model: Block, free: Sequence[int]) -> str | None:
@@ -207,14 +218,15 @@ def _groups(names: Sequence[str], free: Sequence[int]) -> dict[str, list[int]]:
     return groups
 
 
-def _variance(residual: Array, n_free: int) -> float:
+def _variance(target: Array, residual: Array, n_free: int) -> float:
     """Return what one sample's noise would be if it alone were as uncertain as the residual is.
 
     Residuals that hang together tell less: as many times as an autoregression of their first lag says.
+    None is taken to be smaller than rounding.
     """
     power = float(residual @ residual) / max(residual.size - n_free, 1)
-    if power == 0:
-        return 1e-300
+    if power <= ROUNDING**2 * float(np.var(target)):
+        return ROUNDING**2 * float(np.var(target))
     lag = float(residual[1:] @ residual[:-1] / (residual @ residual))
     return power * min((1 + lag) / max(1 - lag, 1e-9), residual.size / 10) if lag > 0 else power
 

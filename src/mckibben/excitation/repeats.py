@@ -46,7 +46,7 @@ def _repeats(seen: Seen, name: str) -> bool:
 
     reach = ALIKE * seen.scales[name].span
     pairs = [
-        _signature(one, other, reach)
+        _signature(one, other, reach, seen.timed)
         for one, other in pairwise(seen.branches[name])
         if abs(one.end - other.start) <= reach
     ]
@@ -56,8 +56,8 @@ def _repeats(seen: Seen, name: str) -> bool:
     return bool(cKDTree(known).count_neighbors(cKDTree(known), 1.0, p=np.inf) > len(known))
 
 
-def _signature(one: Branch, other: Branch, reach: float) -> list[float]:
+def _signature(one: Branch, other: Branch, reach: float, timed: bool) -> list[float]:
     """Return levels and speeds, as multiples of what they may differ by."""
-    speeds = [branch.slow for branch in (one, other) if branch.slow is not None]
+    speeds = [branch.slow for branch in (one, other) if timed and branch.slow is not None]
     levels = [level / reach for level in (one.start, one.end, other.end)]
     return levels + [float(np.log(speed) / np.log(SPEED)) for speed in speeds]

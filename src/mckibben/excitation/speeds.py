@@ -74,8 +74,8 @@ def _gap(seen: Seen, name: str, ratio: float, slow: float, fast: float) -> Gap:
     rests = max((hold.seconds for hold in seen.holds), default=0.0) > RESTS * span / fast
     if rests:
         sentence = (
-            f"Rate dependence{of} is told at rest and at {between(slow, fast, unit)} only: there {n} run, "
-            "where they are of like size."
+            f"Rate dependence{of} is told at rest and at {between(slow, fast, unit)} only: there "
+            f"{n} run, where they are of like size."
         )
     elif ratio < NONE:
         sentence = (

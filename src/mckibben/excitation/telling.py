@@ -18,6 +18,7 @@ from mckibben.excitation.sampling import sampling
 from mckibben.excitation.seen import Seen, seen
 from mckibben.excitation.speeds import speeds
 from mckibben.recording import Recording
+from mckibben.system.threads import one_blas_thread
 
 if TYPE_CHECKING:
     from mckibben.blocks.core.block import Block
@@ -78,18 +79,19 @@ def untold(
     >>> pressure = triangle(np.arange(4001) / 100, period=10.0, peaks=4.0)
     >>> run = Recording({"pressure": pressure, "displacement": 3 * pressure}, 0.01)
     >>> print(untold([run])[0].sentence)
-    Rate dependence cannot be told: all 8 branches run at 0.8 bar/s, where they are of like size.
+    Rate dependence cannot be told: 8 branches run at 0.8 bar/s, where they are of like size.
     """
     listed = [recordings] if isinstance(recordings, Recording) else list(recordings)
     if not listed:
         raise DataError("there are no recordings to judge", remedy="give at least one")
     driven, given = channels(listed, inputs, outputs)
-    facts = seen(listed, driven, given, tests)
-    gaps = [*_still(facts), *(one for check in CHECKS for one in _merged(check(facts)))]
-    if model is not None:
-        from mckibben.excitation.parameters import parameters
+    with one_blas_thread():
+        facts = seen(listed, driven, given, tests)
+        gaps = [*_still(facts), *(one for check in CHECKS for one in _merged(check(facts)))]
+        if model is not None:
+            from mckibben.excitation.parameters import parameters
 
-        gaps += parameters(listed, model, facts=facts)
+            gaps += parameters(listed, model, facts=facts)
     return tuple(sorted(gaps, key=lambda gap: -gap.severity))
 
 

@@ -1,10 +1,10 @@
 """How much recording time plans save: the papers' protocols against planned motion of half the time.
 
-    python benchmarks/planning.py [--seeds 3] [--only rail,...] [--sigma]
+    python benchmarks/planning.py [--seeds 3] [--only rail,...]
 
-Of every seed: a pilot of random motion takes a share of the time, a model is fitted to it, and the rest is
-planned from it; nothing of the plant's own numbers is used. Random motion as long stands beside. The same
-model is fitted to all, and runs free over random motion held out.
+Of every seed: a pilot of random motion takes a share of the time, a model is fitted to it, and the rest
+is planned from it; nothing of the plant's own numbers is used. Random motion as long stands beside. The
+same model is fitted to all, and runs free over random motion held out.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ HELD_OUT = 120.0
 class Plant:
     """What is recorded, and how the papers do it.
 
-    ``paper`` gives its recordings, by seed, and how long they take in all [s].
+    ``paper`` gives its recordings, by seed.
     """
 
     name: str
@@ -48,6 +48,7 @@ class Plant:
     paper: Callable[[int], list[Recording]]
     outputs: tuple[str, ...]
     settings: dict[str, Any] = field(default_factory=dict)
+    rig: str | None = None
 
 
 def coarser(recording: Recording, step: float) -> Recording:
@@ -58,7 +59,13 @@ def coarser(recording: Recording, step: float) -> Recording:
 
 
 def on_rig(
-    name: str, paper: str, runs: Sequence[str], step: float, model: str, asked: Any = None, **how: Any
+    name: str,
+    paper: str,
+    runs: Sequence[str],
+    step: float,
+    model: str,
+    asked: Any = None,
+    **how: Any,
 ) -> Plant:
     """Return a virtual rig as a plant, with the runs of its paper that take up to about 200 s."""
     rig = load_rig(name)
@@ -80,13 +87,13 @@ def on_rig(
             found.append(whole.slice(round(given.lead / (whole.sample_time or 1.0)), len(whole)))
         return found
 
-    return Plant(name, model, step, limits, run, papers, tuple(moves), how)
+    return Plant(name, model, step, limits, run, papers, tuple(moves), how, name)
 
 
 def bouc_wen(commands: Recording, seed: int, settings: dict[str, float]) -> Recording:
-    """A muscle of other physics: Bouc-Wen hysteresis whose width grows with pressure, log creep, a lag.
+    """Run a muscle of other physics: Bouc-Wen hysteresis that grows with pressure, creep, and a lag.
 
-    Pressure in, displacement out; a cubic characteristic, nothing of which is a balance of forces.
+    Pressure in, displacement out; an S-shaped characteristic, nothing of which is a balance of forces.
     """
     fine = 0.002
     time_ = np.arange(0.0, (commands.duration or 0.0) + fine / 2, fine)
@@ -178,16 +185,13 @@ def random_run(plant: Plant, seconds: float, seed: int, noise: int) -> Recording
     rest = at_rates(plant.limits)[3]
     rng, n = np.random.default_rng(seed), round(seconds / plant.step)
     targets = random_plan(plant.limits, 1, n, plant.step, rng)[0].targets
-    return recorded(
-        plant, commanded(plant, followed(targets, rest, plant.limits, plant.step), plant.step), noise
-    )
+    path = np.vstack([rest, followed(targets, rest, plant.limits, plant.step)])
+    return recorded(plant, commanded(plant, path, plant.step), noise)
 
 
 def recorded(plant: Plant, commands: Recording, seed: int) -> Recording:
     """Record commands from where they start."""
-    start = {
-        f"start.{name}": float(samples[0]) for name, samples in commands.channels.items()
-    }
+    start = {f"start.{name}": limit.rest for name, limit in plant.limits.items()}
     return plant.run(commands, seed, start)
 
 
@@ -220,17 +224,18 @@ def compared(plant: Plant, seeds: int) -> None:
         half = 0.5 * whole
         held_out = random_run(plant, HELD_OUT, 1000 + seed, 2000 + seed)
         pilot = random_run(plant, PILOT * half, seed, 3000 + seed)
+        first = fitted(plant, [pilot])
+        asked = {name: (one.low, one.high, one.rate) for name, one in plant.limits.items()}
+        left = (1 - PILOT) * half
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            first = fitted(plant, [pilot])
-            asked = {name: (one.low, one.high, one.rate) for name, one in plant.limits.items()}
             next_ = plan(
-                [pilot], model=first, minutes=(1 - PILOT) * half / 60, limits=asked, seed=seed
+                [pilot], rig=plant.rig, model=first, minutes=left / 60, limits=asked, seed=seed
             )
         commands = coarser(next_.recording, plant.step)
         planned = [pilot, recorded(plant, commands, 4000 + seed)]
         took = time.perf_counter() - began
-        random = [pilot, random_run(plant, (1 - PILOT) * half, 500 + seed, 4000 + seed)]
+        random = [pilot, random_run(plant, left, 500 + seed, 4000 + seed)]
         row = [missed(plant, fitted(plant, one), held_out) for one in (paper, planned, random)]
         used = sum(one.duration or 0.0 for one in planned)
         rows.append(row)

@@ -31,6 +31,7 @@ COMMANDS: dict[str, list[str]] = {
     "calibrate": ["model.json", "two.csv", "-o", "out.json"],
     "invert": ["model.json", "-o", "out.json"],
     "track": ["inverse.json", "--rig", "mas20-hanging", "--reference", "run.csv"],
+    "plan": ["run.csv", "--model", "model.json", "--minutes", "0.5", "-o", "out.csv"],
     "plot": ["run.csv", "-o", "out.png"],
     "reproduce": ["multistate", "--quick", "--jobs", "1"],
     "info": ["run.csv"],

@@ -124,4 +124,6 @@ def _how_to_record(found: Any, rig: str | None, out: Path) -> str:
         for name, samples in found.recording.channels.items()
         if abs(samples[0] - resting[name]) > 0
     ]
-    return f"; record it with: mckibben rig run {rig} --inputs {out}{''.join(moved)} -o recorded.csv"
+    return (
+        f"; record it with: mckibben rig run {rig} --inputs {out}{''.join(moved)} -o recorded.csv"
+    )

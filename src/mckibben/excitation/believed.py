@@ -1,9 +1,9 @@
-"""What is believed before a plan: a model, what of it is known, what it leaves, and what may be driven."""
+"""What is believed before a plan: a model, what of it is known, and what may be driven."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -38,6 +38,8 @@ TWIN_TIME, TWIN_STEP = 60.0, 0.05
 LOADED = 0.3
 """Share of a muscle's largest pull that it is loaded with, where nobody says."""
 
+GRAVITY = 9.81
+
 CROSSING = 2.0
 """Time in which a muscle's pressure or load crosses its range [s]."""
 
@@ -67,6 +69,8 @@ class Belief:
         What the library says of the muscle.
     step : float
         Sample time of the recording to make [s].
+    driven : sequence of str, optional
+        Channels that can be commanded; by default all that have limits.
     notes : sequence of str
         What the user should know.
     """
@@ -76,7 +80,8 @@ class Belief:
     recordings: tuple[Recording, ...] = ()
     prior: Prior | None = None
     step: float = 0.01
-    notes: tuple[str, ...] = field(default=())
+    driven: tuple[str, ...] | None = None
+    notes: tuple[str, ...] = ()
 
     def known_before(self, places: Sequence[int]) -> Array:
         """Return the precision that the library gives the parameters, in units of their sizes."""
@@ -151,38 +156,43 @@ def from_rig(rig: Rig, model: str | Block | None, asked: Limits, seed: int) -> B
         start = np.array([limit.rest for limit in asked.values()])
         commands = followed(targets, start, asked, TWIN_STEP)
         channels = dict(zip(asked, commands.T, strict=True))
-        resting = rig.changed(
-            {f"start.{name}": limit.rest for name, limit in asked.items()}
-        )
+        resting = rig.changed({f"start.{name}": limit.rest for name, limit in asked.items()})
         block = _fitted([resting.run(Recording(channels, TWIN_STEP), seed)], model, rig, seed)
     _of_rig(rig, [channel.name for channel in block.inputs])
     note = f"nothing is recorded: what {rig.name} says of itself is taken for likely, not for known"
     return Belief(block, asked, step=max(rig.sample_time, 0.01), notes=(note,))
 
 
-def from_muscle(given: str | Path) -> Belief:
-    """Return the belief of a muscle of the library, or of a data sheet."""
+def from_muscle(given: str | Path, rig: Rig | None) -> Belief:
+    """Return the belief of a muscle of the library, or of a data sheet, in a rig if one is named."""
     prior = prior_of(given)
     if Path(given).suffix != ".toml":
         like = load(given)
     else:
+        left_out = prior.sheet.without or ()
+        muscles = [muscle for muscle in all_muscles() if muscle.name not in left_out]
         here = prior.sheet.shape
-        like = min(all_muscles(), key=lambda one: float(np.sum((one.sheet.shape - here) ** 2)))
-    balance = scaled(like.balance, like.sheet, prior.sheet)
-    block = balance.inverse()
-    limits = {}
+        like = min(muscles, key=lambda one: float(np.sum((one.sheet.shape - here) ** 2)))
+    block = scaled(like.balance, like.sheet, prior.sheet).inverse()
+    highest = {"bar": prior.sheet.max_pressure_bar, "N": LOADED * prior.sheet.force}
+    limits = {} if rig is None else limits_of_rig(rig)
+    driven = None if rig is None else rig.inputs
     for channel in block.inputs:
-        high = prior.sheet.max_pressure_bar
-        if channel.unit == "N":
-            high = LOADED * prior.sheet.force
-        elif channel.unit != "bar":
+        if channel.name in limits:
+            continue
+        if rig is not None and channel.unit == "N":  # what hangs on it
+            load_ = GRAVITY * float(rig.known().get("payload_kg", 0.0))
+            limits[channel.name] = Limit(load_, load_, 1.0, load_)
+        elif rig is None and channel.unit in highest:
+            high = highest[channel.unit]
+            limits[channel.name] = Limit(0.0, high, high / CROSSING, 0.0)
+        else:
             raise ModelError(
-                f"{like.name!r} is driven by {channel.name}, which a data sheet does not limit. "
+                f"{like.name!r} is driven by {channel.name}, of which nothing is known here. "
                 "Remedy: plan from recordings."
             )
-        limits[channel.name] = Limit(0.0, high, high / CROSSING, 0.0)
     note = f"nothing is recorded: what the library says, nearest {like.name}, is taken for likely"
-    return Belief(block, limits, prior=prior, notes=(note,))
+    return Belief(block, limits, prior=prior, driven=driven, notes=(note,))
 
 
 def telling(block: Block) -> list[int]:

@@ -43,10 +43,14 @@ Program = Callable[[float, float, float, int, float, np.random.Generator], Array
 
 def _level(low: float, high: float, rng: np.random.Generator) -> float:
     """Return a level; the ends, where much is known only from there, are as likely as all between."""
-    return float(np.clip(rng.uniform(low - 0.25 * (high - low), high + 0.25 * (high - low)), low, high))
+    return float(
+        np.clip(rng.uniform(low - 0.25 * (high - low), high + 0.25 * (high - low)), low, high)
+    )
 
 
-def _held(here: float, low: float, high: float, n: int, step: float, rng: np.random.Generator) -> Array:
+def _held(
+    here: float, low: float, high: float, n: int, step: float, rng: np.random.Generator
+) -> Array:
     del here, step
     return np.full(n, _level(low, high, rng))
 

@@ -17,6 +17,9 @@ from mckibben.blocks.core.block import Block
 from mckibben.estimators.core.uncertainty import DIFFERENCE, LARGEST
 from mckibben.excitation.unmodelled import LONG, Unmodelled
 
+ROUNDING = 1e-10
+"""Of precisions, over their own size."""
+
 
 class Slopes:
     """How a block's free-running outputs move with its parameters, in units of their sizes.
@@ -179,7 +182,7 @@ class Criterion:
         return replace(self, weights=weights, shape=shape)
 
     def errors(self, known: Known) -> tuple[float, float]:
-        """Return expected variances over the ranges squared: of parameters (geometric mean), of shape."""
+        """Return expected variances over the ranges: of parameters (geometric mean), and of shape."""
         logs = [
             np.log(max(variance(precision, weight), 1e-300))
             for precision, weight in zip(known.members, self.weights, strict=True)
@@ -195,12 +198,19 @@ class Criterion:
         return sum(self.errors(known))
 
 
+def covariance(precision: Array) -> Array:
+    """Return what a precision leaves, to rounding of parameters that act nearly alike."""
+    size = np.sqrt(np.diag(precision))
+    scaled = precision / np.outer(size, size) + ROUNDING * np.eye(size.size)
+    whole: Array = cho_solve(cho_factor(scaled), np.eye(size.size))
+    return whole / np.outer(size, size)
+
+
 def variance(precision: Array, weight: Array) -> float:
     """Return the weighted sum of the variances that a precision leaves."""
-    return float(np.trace(cho_solve(cho_factor(precision), weight)))
+    return float(np.sum(covariance(precision) * weight))
 
 
 def standard_errors(precision: Array) -> Array:
     """Return the deviations that a precision leaves, shape (parameters,)."""
-    whole = cho_solve(cho_factor(precision), np.eye(len(precision)))
-    return np.asarray(np.sqrt(np.diag(whole)))
+    return np.asarray(np.sqrt(np.diag(covariance(precision))))

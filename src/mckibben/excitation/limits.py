@@ -102,7 +102,7 @@ def narrowed(limits: Limits, asked: Mapping[str, Sequence[float | None]]) -> Lim
                 remedy=f"give them for {', '.join(limits)}",
             )
         own, unit = limits[name], standard_unit(name) or ""
-        low, high, rate = [*given, *[None] * (3 - len(given))]
+        low, high, rate = (*given, None, None, None)[:3]
         low, high = own.low if low is None else low, own.high if high is None else high
         rate = own.rate if rate is None else rate
         if not (math.isfinite(low) and math.isfinite(high) and low <= high):

@@ -41,8 +41,11 @@ MEMBERS, APART = 3, 0.3
 """Likely sets of parameters, and how far one is from the likeliest at most, of its value."""
 
 NOISE, MEMORY, LEFT = 0.003, 0.2, 0.01
-"""Where nothing is recorded: noise and what the model leaves, over the range, and over what time noise is
-alike [s]."""
+"""Where nothing is recorded: noise over the range, and over what time it is alike [s]. What a model
+leaves at least, over the range."""
+
+EXACT = 1e-5
+"""Error over the range below which recordings are the model's own."""
 
 MOST_SAMPLES = 20_000
 """Of recordings, to know what they tell."""
@@ -185,9 +188,7 @@ def _outputs(
     return outputs
 
 
-def _spans(
-    block: Block, reference: list[Array], rest: Array, columns: Array, step: float
-) -> Array:
+def _spans(block: Block, reference: list[Array], rest: Array, columns: Array, step: float) -> Array:
     """Return the ranges of a model's outputs.
 
     Raises
@@ -243,13 +244,14 @@ def _recorded(
     for output, span in enumerate(spans.tolist()):
         own = [error[:, output] for error in errors]
         power = float(np.mean(np.concatenate(own) ** 2))
-        alone = noise_of(own) ** 2
-        density[output] = max(alone * float(np.mean(steps)), 1e-12 * span**2)
+        alone = noise_of(own) ** 2 if power > (EXACT * span) ** 2 else power
+        density[output] = max(alone * float(np.mean(steps)), (EXACT * span) ** 2)
         left += max(power * (1.0 - power / max(alone, power)), 0.0) / span**2 / spans.size
     for by, step in zip(gathered, steps, strict=True):
         rows = (by * np.sqrt(step / density)[:, np.newaxis]).reshape(-1, p)
         precision += rows.T @ rows
-    return Noise(density, float(np.sqrt(left))), precision, shape
+    # a model fitted to little leaves little of that, and more of what comes
+    return Noise(density, max(float(np.sqrt(left)), LEFT)), precision, shape
 
 
 def _wide(weight: Array) -> Array:

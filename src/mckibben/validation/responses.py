@@ -270,7 +270,7 @@ def _describing_function(
             answers[row, column] = _answer(block, i, j, medians, about, half, one)
     said = ""
     if not rows:
-        alone = f" in which {', '.join(others)} rest" if others else ""
+        alone = f" while nothing else moves ({', '.join(others)})" if others else ""
         said = f"the recordings hold no whole cycle of {given.name}{alone}"
     return DescribingFunction(
         *(given, wanted, amplitude, rate, np.abs(answers), np.degrees(np.angle(answers))),

@@ -30,7 +30,6 @@ from mckibben.blocks.core.fields import (
     Initial,
 )
 from mckibben.blocks.core.kernels import kernel
-from mckibben.blocks.core.linear import LinearSystem, Polynomials
 from mckibben.blocks.core.notation import FEW, Notation, summed
 from mckibben.blocks.core.refusals import explicit_state, own_sample_time
 from mckibben.blocks.core.single_channel import SingleChannel
@@ -271,28 +270,11 @@ class TransferFunction(LinearStart, SingleChannel, Primitive):
         noise = ((1.0, *self.noise_numerator), (1.0, *self.noise_denominator))
         if max(map(len, (*own, *noise))) > FEW:
             return ()
-        told = [
-            rf"\frac{{{_powers(top)}}}{{{_powers(below)}}}\,{what}"
-            for (top, below), what in ((own, "(u_t - u_0)"), (noise, "e_t"))
-        ]
-        modelled = self.noise_deviation is not None or any(len(c) > 1 for c in noise)
-        return (f"y_t - y_0 = {' + '.join(told if modelled else told[:1])}",)
-
-    def linear_system(self, sample_time: float | None = None) -> LinearSystem:
-        """Return the filter, in observable form, without its noise model."""
-        own_sample_time(self.kind, self.sample_time, sample_time or self.sample_time)
-        b, f = self._padded()
-        n = self.n_states
-        a = np.eye(n, k=1)
-        if n:
-            a[:, 0] = -f[1:]
-        return LinearSystem(
-            *(a, (b[1:] - f[1:] * b[0])[:, np.newaxis], np.eye(1, n), b[:1, np.newaxis]),
-            self.sample_time,
-            np.array([self.input_offset]),
-            np.array([self.output_offset]),
-            Polynomials(tuple(np.trim_zeros(b, "f").tolist()) or (0.0,), tuple(f.tolist())),
-        )
+        top, below = map(_powers, own)
+        text = rf"y_t - y_0 = \frac{{{top}}}{{{below}}}\,(u_t - u_0)"
+        if max(map(len, noise)) > 1:
+            text += rf" + \frac{{{_powers(noise[0])}}}{{{_powers(noise[1])}}}\,e_t"
+        return (text,)
 
     @classmethod
     def example(cls) -> Self:

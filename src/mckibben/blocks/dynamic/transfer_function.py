@@ -30,6 +30,7 @@ from mckibben.blocks.core.fields import (
     Initial,
 )
 from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.core.linear import LinearSystem, Polynomials
 from mckibben.blocks.core.notation import FEW, Notation, summed
 from mckibben.blocks.core.refusals import explicit_state, own_sample_time
 from mckibben.blocks.core.single_channel import SingleChannel
@@ -262,6 +263,22 @@ class TransferFunction(LinearStart, SingleChannel, Primitive):
             self.initial if isinstance(self.initial, str) else "first_sample",
             self.output,
             self.input,
+        )
+
+    def linear_system(self, sample_time: float | None = None) -> LinearSystem:
+        """Return the filter, in observable form, without its noise model."""
+        own_sample_time(self.kind, self.sample_time, sample_time or self.sample_time)
+        b, f = self._padded()
+        n = self.n_states
+        a = np.eye(n, k=1)
+        if n:
+            a[:, 0] = -f[1:]
+        return LinearSystem(
+            *(a, (b[1:] - f[1:] * b[0])[:, np.newaxis], np.eye(1, n), b[:1, np.newaxis]),
+            self.sample_time,
+            np.array([self.input_offset]),
+            np.array([self.output_offset]),
+            Polynomials(tuple(np.trim_zeros(b, "f").tolist()) or (0.0,), tuple(f.tolist())),
         )
 
     def worked(self) -> tuple[str, ...]:

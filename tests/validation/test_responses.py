@@ -156,9 +156,10 @@ def _least_squares(block: TransferFunction, u: Array, y: Array) -> TransferFunct
     def at(x: Array) -> TransferFunction:
         return block.unpack([*x, 0.0, 0.0])
 
-    found = least_squares(
-        lambda x: np.asarray(at(x).simulate(u, sample_time=STEP)) - y, block.pack()[:3]
-    )
+    def left(x: Array) -> Array:
+        return np.asarray(at(x).simulate(u, sample_time=STEP)) - y
+
+    found = least_squares(left, block.pack()[:3])
     return at(found.x)
 
 

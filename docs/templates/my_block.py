@@ -31,6 +31,7 @@ from mckibben.blocks.core.fields import (
     StoredInitial,
 )
 from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.core.notation import Notation
 from mckibben.blocks.core.single_channel import Ranged, check_input_range
 from mckibben.blocks.play_type.memory import play_state
 from mckibben.errors import ModelError
@@ -110,6 +111,14 @@ class ElasticPlastic(Ranged):
     # --- What the parameter vector is made of, and, as here it is all that the kernel reads, its
     # --- coefficients; else override coefficients().
     parameters: ClassVar[tuple[str, ...]] = ("gain", "weight", "threshold")
+    # --- How it is written: equations in LaTeX, then the symbol and unit of every number in them. What
+    # --- a number means, the docstring above says; both together make the tables of parameters.
+    notation: ClassVar[Notation] = Notation(
+        r"y = g u + w E_r[u],\quad E_r[u] = u - F_r[u]",
+        gain="g [{y}/{u}]",
+        weight="w [{y}/{u}]",
+        threshold="r [{u}]",
+    )
     # --- Where time matters: rate_dependent: ClassVar[bool] = True, and coefficients() turns the
     # --- sample time into what the kernel needs; see blocks/play_type/rate_dependent_pi.py.
 

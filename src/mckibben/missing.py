@@ -20,6 +20,7 @@ from mckibben import registry
 from mckibben.blocks.core.block import Block, Primitive
 from mckibben.blocks.core.composition import Composition
 from mckibben.blocks.core.inverse import Invertible
+from mckibben.blocks.core.writing import quantities
 from mckibben.blocks.laws.check import LAWS
 from mckibben.blocks.laws.trial import Trial
 from mckibben.comparison.limits import limits
@@ -253,6 +254,16 @@ def _documented(block: Block) -> Finding:
     return Finding("documentation", "there", module.strip().splitlines()[0])
 
 
+def _notation(block: Block) -> Finding:
+    """Look for equations, and for a unit of every number."""
+    what = "equations and units"
+    silent = sorted({one for one in block.parameters if block.notation.unit(one) is None})
+    if not block.equations() or (silent and not isinstance(block, Composition)):
+        said = "equations" if not block.equations() else f"the unit of {', '.join(silent)}"
+        return Finding(what, "missing", f"{said}, in `notation`")
+    return Finding(what, "there", f"{len(block.equations())} and {len(quantities(block))}")
+
+
 def _tests(block: Block) -> Finding:
     """Look for the plain loop of the kernel, in the tests of the folder that this is run in."""
     twins = Path("tests", "twins.py")
@@ -266,4 +277,4 @@ def _tests(block: Block) -> Finding:
     )
 
 
-LOOKS = (_inverse, _parameters, _c, _cost, _single, _estimators, _documented, _tests)
+LOOKS = (_inverse, _parameters, _c, _cost, _single, _estimators, _documented, _notation, _tests)

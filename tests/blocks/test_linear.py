@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -53,9 +55,8 @@ def simulated(block: Block, u: Array) -> Array:
     # from the operating point, at rest there
     u0 = float(system.input_offset[0])
     padded = np.concatenate([[u0], u])
-    start = "first_sample"
     return (
-        np.asarray(block.simulate(padded, sample_time=STEP, initial=start))[1:]
+        np.asarray(block.simulate(padded, sample_time=STEP, initial="first_sample"))[1:]
         - system.output_offset[0]
     )
 
@@ -66,7 +67,8 @@ def test_scipy_simulates_the_same(name: str) -> None:
 
     block, u = LINEAR[name], driven()
     u0 = float(block.linear_system(STEP).input_offset[0])
-    found = dlsim(block.to_scipy(STEP), u - u0)[1][:, 0]
+    system: Any = block.to_scipy(STEP)
+    found = dlsim(system, u - u0)[1][:, 0]
     expected = simulated(block, u)
     assert np.abs(found - expected).max() < 1e-10 * np.abs(expected).max()
 

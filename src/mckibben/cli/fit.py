@@ -72,6 +72,7 @@ def fit(
     channels by name: pressure_1 ..., displacement_1 ..., and pressure_extensor where there is one.
     """
     from mckibben import registry
+    from mckibben.blocks.core.writing import quantities
     from mckibben.comparison.offered import settings_of
     from mckibben.outputs import claim_model
 
@@ -108,9 +109,9 @@ def fit(
     outputs = estimator.model_.outputs
     unit_name = outputs[0].unit
     by_output = {c.name: e for c, e in zip(outputs, found.rmse_by_output, strict=True)}
-    names = estimator.model_.parameter_names
+    numbers = quantities(estimator.model_)
     notes = [*found.notes, *_unasked(input, estimator.model_, recordings[0])]
-    undetermined = [names[place] for place in estimator.undetermined()]
+    undetermined = [numbers[place].name for place in estimator.undetermined()]
     if as_json:
         print_json(
             {
@@ -126,6 +127,8 @@ def fit(
                 "interrupted": found.interrupted,
                 "condition": found.condition,
                 "parameters": estimator.model_.pack().tolist(),
+                "parameter_names": [one.name for one in numbers],
+                "parameter_units": [one.unit for one in numbers],
                 "standard_errors": list(found.standard_errors),
                 "at_bounds": list(found.at_bounds),
                 "undetermined": undetermined,

@@ -96,6 +96,8 @@ class Panel:
         Whether to draw the line y = 0.
     categories : tuple of str
         Words for y = 0, 1, ... from the top down, instead of numbers.
+    logarithmic : {"", "x", "xy"}
+        Which axes are.
     """
 
     x_label: str
@@ -106,6 +108,7 @@ class Panel:
     marks: tuple[Mark, ...] = ()
     zero: bool = False
     categories: tuple[str, ...] = ()
+    logarithmic: Literal["", "x", "xy"] = ""
 
 
 @dataclass(frozen=True)

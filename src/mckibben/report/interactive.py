@@ -72,11 +72,13 @@ def _plot(panels: tuple[Panel, ...]) -> Json:
             "anchor": y,
             "rangemode": "tozero" if panel.categories else "normal",
             "showticklabels": last,
+            **({"type": "log"} if "x" in panel.logarithmic else {}),
             **({"matches": "x"} if row else {}),
         }
         layout[f"yaxis{y[1:]}"] = _axis(panel.y_label) | {
             "domain": [bottom, min(bottom + height, 1.0)],
             "zeroline": panel.zero,
+            **({"type": "log"} if "y" in panel.logarithmic else {}),
             **_ticks(panel),
         }
         named = [_trace(curve, x, y) for curve in panel.curves]

@@ -179,6 +179,11 @@ def _panel(axis: Axes, panel: Panel, bottom: bool) -> None:
             textcoords="offset points",
             fontsize=6,
         )
+    for letter in panel.logarithmic:
+        axis.set(**{f"{letter}scale": "log"})
+        scale = axis.xaxis if letter == "x" else axis.yaxis
+        scale.set_major_formatter("{x:g}")  # powers of ten would be set as mathematics
+        scale.set_minor_formatter("")
     if bottom:
         axis.set_xlabel(verbatim(panel.x_label))
     axis.set_ylabel(verbatim(panel.y_label))

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from mckibben.numerals import typeset
 from mckibben.report import interactive, wording
+from mckibben.report.mathematics import mathml
 
 if TYPE_CHECKING:
     from jinja2 import Template
@@ -66,6 +67,7 @@ def template(name: str) -> Template:
         "number": wording.number,
         "percent": wording.percent,
         "typeset": typeset,
+        "mathml": mathml,
     }
     environment.policies["json.dumps_kwargs"] = {"allow_nan": False, "separators": (",", ":")}
     return environment.get_template(name)

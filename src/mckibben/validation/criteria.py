@@ -78,7 +78,7 @@ def criteria(
         if ahead is not None:
             return _without(
                 none,
-                "the residuals one step ahead are not white: try higher orders of the noise model",
+                "the residuals one step ahead are not white: try higher orders",
             )
         return _without(
             none,

@@ -34,6 +34,12 @@ are taken, as if the rest told as much."""
 MOST_TERMS = 40
 """Of an autoregression of residuals."""
 
+NOTHING = 1e-9
+"""Share of its size below which a parameter is 0."""
+
+UNFELT = 1e-6
+"""Share of the most felt parameter's sensitivity below which one is not felt."""
+
 
 @dataclass(frozen=True)
 class Parameter:
@@ -141,7 +147,8 @@ def sureness(block: Block, recordings: Sequence[Recording], left: Sequence[Array
     n_parameters = block.n_parameters
     covariance = np.full((n_parameters, n_parameters), np.nan)
     said = [""] * n_parameters
-    values = block.pack()
+    values, names = block.pack(), block.parameter_names
+    sizes = relative_sizes(values)
     total = sum(map(len, left))
     share = min(1.0, MOST / max(total * n_parameters, 1))
     kept = [r.slice(0, max(round(share * len(r)), min(len(r), 50))) for r in recordings]
@@ -151,8 +158,11 @@ def sureness(block: Block, recordings: Sequence[Recording], left: Sequence[Array
     worth = min(model.worth(sum(map(len, left))) for model in models) / share
     places, columns = [], []
     for place in range(n_parameters):
-        if values[place] == 0:
-            said[place] = "exactly 0: at a bound, or left out"
+        if names[place].endswith("input offset"):
+            said[place] = "chosen: the point about which the model is linear"
+            continue
+        if abs(values[place]) <= NOTHING * sizes[place]:
+            said[place] = "0: at a bound, or left out"
             continue
         column = _sensitivity(block, kept, place)
         if column is None:
@@ -166,9 +176,11 @@ def sureness(block: Block, recordings: Sequence[Recording], left: Sequence[Array
         return Sureness(covariance, tuple(said), np.inf, worth, terms)
     condition, own, middle = _sandwich(columns, left, models)
     told = np.isfinite(np.diag(own))
-    for place, known in zip(places, told.tolist(), strict=True):
+    moved = np.array([max(float(np.abs(s).max(initial=0.0)) for s in column) for column in columns])
+    for place, known, felt in zip(places, told.tolist(), moved / moved.max(), strict=True):
         if not known:
-            said[place] = "not determined by these recordings"
+            alone = "only together with others" if felt > UNFELT else "it moves nothing in them"
+            said[place] = f"not determined by these recordings: {alone}"
     if not told.all():
         columns = [column for column, known in zip(columns, told.tolist(), strict=True) if known]
         places = [place for place, known in zip(places, told.tolist(), strict=True) if known]
@@ -176,9 +188,8 @@ def sureness(block: Block, recordings: Sequence[Recording], left: Sequence[Array
             return Sureness(covariance, tuple(said), condition, worth, terms)
         _, own, middle = _sandwich(columns, left, models)
         own = np.nan_to_num(own)
-    sizes = relative_sizes(values)[places]
     found = share * (own @ middle @ own)  # as if the rest told as much
-    covariance[np.ix_(places, places)] = found * np.outer(sizes, sizes)
+    covariance[np.ix_(places, places)] = found * np.outer(sizes[places], sizes[places])
     return Sureness(covariance, tuple(said), condition, worth, terms)
 
 

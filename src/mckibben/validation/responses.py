@@ -48,6 +48,9 @@ STILL = 0.1
 FEWEST = 8
 """Samples of a cycle."""
 
+BEYOND = 1e30
+"""Outputs beyond which a model has left all sense."""
+
 
 @dataclass(frozen=True, eq=False)
 class FrequencyResponse:
@@ -270,7 +273,7 @@ def _describing_function(
             answers[row, column] = _answer(block, i, j, medians, about, half, one)
     said = ""
     if not rows:
-        alone = f" in which {', '.join(others)} rest" if others else ""
+        alone = f" while nothing else moves ({', '.join(others)})" if others else ""
         said = f"the recordings hold no whole cycle of {given.name}{alone}"
     return DescribingFunction(
         *(given, wanted, amplitude, rate, np.abs(answers), np.degrees(np.angle(answers))),
@@ -323,7 +326,7 @@ def _answer(
         return complex(np.nan)
     last = slice((PERIODS - 1) * n, None)
     answer = found.reshape(len(inputs), -1)[last, j]
-    if not np.isfinite(answer).all():
+    if not np.abs(answer).max() < BEYOND:
         return complex(np.nan)
     return first_harmonic(answer) / first_harmonic(inputs[last, i])
 

@@ -190,7 +190,7 @@ def _channels(part: Parametrised) -> Iterator[str]:
         symbol = part.notation.symbols.get(field, default)
         for place, channel in enumerate(several):
             letter = indexed(symbol, (place,), 1) if len(several) > 1 else symbol
-            name = channel.name.replace("_", r"\_")
+            name = re.sub(r"[\\{}$&#^~%]", " ", channel.name).replace("_", r"\_")
             unit = rf"\,[{unit_tex(channel.unit)}]" if channel.unit else ""
             told.append(rf"{letter}\text{{: {name}}}{unit}")
     if told:

@@ -265,19 +265,6 @@ class TransferFunction(LinearStart, SingleChannel, Primitive):
             self.input,
         )
 
-    def worked(self) -> tuple[str, ...]:
-        """Return the polynomials with their numbers, where they are short."""
-        own = (self.numerator, (1.0, *self.denominator))
-        noise = ((1.0, *self.noise_numerator), (1.0, *self.noise_denominator))
-        if max(map(len, (*own, *noise))) > FEW:
-            return ()
-        told = [
-            rf"\frac{{{_powers(top)}}}{{{_powers(below)}}}\,{what}"
-            for (top, below), what in ((own, "(u_t - u_0)"), (noise, "e_t"))
-        ]
-        modelled = self.noise_deviation is not None or any(len(c) > 1 for c in noise)
-        return (f"y_t - y_0 = {' + '.join(told if modelled else told[:1])}",)
-
     def linear_system(self, sample_time: float | None = None) -> LinearSystem:
         """Return the filter, in observable form, without its noise model."""
         own_sample_time(self.kind, self.sample_time, sample_time or self.sample_time)
@@ -293,6 +280,18 @@ class TransferFunction(LinearStart, SingleChannel, Primitive):
             np.array([self.output_offset]),
             Polynomials(tuple(np.trim_zeros(b, "f").tolist()) or (0.0,), tuple(f.tolist())),
         )
+
+    def worked(self) -> tuple[str, ...]:
+        """Return the polynomials with their numbers, where they are short."""
+        own = (self.numerator, (1.0, *self.denominator))
+        noise = ((1.0, *self.noise_numerator), (1.0, *self.noise_denominator))
+        if max(map(len, (*own, *noise))) > FEW:
+            return ()
+        top, below = map(_powers, own)
+        text = rf"y_t - y_0 = \frac{{{top}}}{{{below}}}\,(u_t - u_0)"
+        if max(map(len, noise)) > 1:
+            text += rf" + \frac{{{_powers(noise[0])}}}{{{_powers(noise[1])}}}\,e_t"
+        return (text,)
 
     @classmethod
     def example(cls) -> Self:

@@ -167,9 +167,8 @@ class Polynomial(Memoryless, Ranged):
 
     def worked(self) -> tuple[str, ...]:
         """Return the polynomial with its numbers."""
-        return (
-            f"y = {summed([(c, f'x^{{{k}}}' if k else '') for k, c in enumerate(self.polynomial)])}",
-        )
+        powers = ["", "x", *(f"x^{{{k}}}" for k in range(2, len(self.polynomial)))]
+        return (f"y = {summed(list(zip(self.polynomial, powers, strict=False)))}",)
 
     @classmethod
     def example(cls) -> Self:

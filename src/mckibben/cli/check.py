@@ -21,7 +21,7 @@ def check(
     force: Force = False,
     as_json: Json = False,
 ) -> None:
-    """Say whether a saved model is right on recordings, and what it misses: validation.json, report.html.
+    """Say whether a saved model is right on recordings, and what it misses, in words and on a page.
 
     The model runs free. What it leaves is tested for being noise that follows nothing recorded: no
     input, load, rate or branch (hysteresis that is left), no hold (creep), no time (drift).
@@ -43,7 +43,10 @@ def check(
     wanted = [channel.name for channel in (*block.inputs, *block.outputs)]
     recordings = reading.read(found_files, list(dict.fromkeys(wanted)), informative=False)
     found = find(block, recordings)
-    told = found.to_dict() | {"model_file": str(model), "notes_of_reading": notes_by_file(recordings)}
+    told = found.to_dict() | {
+        "model_file": str(model),
+        "notes_of_reading": notes_by_file(recordings),
+    }
     results.write_text("validation.json", to_json(told) + "\n")
     results.write_text("report.html", check_page(found, str(model)))
     if as_json:

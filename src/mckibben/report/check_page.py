@@ -33,7 +33,9 @@ def check_page(found: Validation, model_file: str) -> str:
     runs = [run for run in found.runs if run in longest]
     figures: dict[str, list[list[interactive.Json]]] = {}
     for place, one in enumerate(found.outputs[:MOST_OUTPUTS]):
-        figures[f"autocorrelation-{place}"] = [interactive.plots(check_subjects.autocorrelation(one))]
+        figures[f"autocorrelation-{place}"] = [
+            interactive.plots(check_subjects.autocorrelation(one))
+        ]
         if one.crossings:
             figures[f"crossings-{place}"] = [interactive.plots(check_subjects.crossings(one))]
         panels = [interactive.plots(check_subjects.pattern(one, each))[0] for each in one.patterns]

@@ -34,7 +34,7 @@ FORGOTTEN = np.exp(-1.0)
 
 
 def check(model: Block, recordings: Recording | Sequence[Recording]) -> Validation:
-    """Check a model on recordings: is it right, and if not, what does it miss?
+    """Say whether a model is right on recordings, and what it misses if it is not.
 
     The model runs free, from an honest start of its memory. What it leaves is tested for being white;
     for following inputs, now and before, the modelled output, rates, loads, the branch (hysteresis that

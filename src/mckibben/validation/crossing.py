@@ -63,15 +63,13 @@ def crossing(
     regression: Regression,
     p_value: float | None,
 ) -> Crossing:
-    """Return how a residual goes along with an input; both are means over blocks of ``every`` samples."""
+    """Return how a residual goes along with an input, both means over blocks of ``every`` samples."""
     most = max(1, min(MOST, int(np.median([len(r) for r in residuals])) // SHORTEST))
     lags = range(-most, most + 1)
     changes = [np.diff(u, prepend=u[:1]) for u in inputs]
     along, band = _correlations(residuals, inputs, lags, regression)
     after, other = _correlations(residuals, changes, lags, regression)
-    return Crossing(
-        channel, tuple(every * lag for lag in lags), along, after, band, other, p_value
-    )
+    return Crossing(channel, tuple(every * lag for lag in lags), along, after, band, other, p_value)
 
 
 def _correlations(

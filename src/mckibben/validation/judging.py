@@ -23,10 +23,10 @@ LEVELLED = ("curve", "load", "drift", "hysteresis", "output")
 """Groups that have a level of their own, so that an offset beside them says nothing more."""
 
 INDIRECT = ("crossing", "output", "runs")
-"""Groups that are said only where no other explains as much by more than `FURTHER`."""
+"""Groups that follow several defects, each a little, so that they are said where no other is certain."""
 
-FURTHER = 1.15
-"""Times as much as a plainer group."""
+MUCH = 0.1
+"""Share from which such a group is worth a word."""
 
 
 def asked(
@@ -64,11 +64,11 @@ def missing(
     while left:
         tried = [(_found(regression, g, known, every, squares, n), g) for g in left]
         certain = [
-            pair for pair in tried if pair[0].p_value <= LEVEL / n_tests and pair[0].share >= NOTABLE
+            pair for pair in tried if pair[0].p_value <= LEVEL / n_tests and _notable(pair[0])
         ]
         if not certain:
             break
-        best, group = max(certain, key=lambda pair: _weight(*pair))
+        best, group = max(certain, key=lambda pair: (pair[0].kind not in INDIRECT, pair[0].share))
         chosen.append(best)
         known = (*known, *group.columns)
         left.remove(group)
@@ -103,8 +103,8 @@ def _one_after_another(
     return tuple(sorted(found, key=lambda one: -one.share))
 
 
-def _weight(found: Finding, group: Group) -> float:
-    return found.share / (FURTHER if group.kind in INDIRECT else 1.0)
+def _notable(found: Finding) -> bool:
+    return found.share >= (MUCH if found.kind in INDIRECT else NOTABLE)
 
 
 def _found(
@@ -119,7 +119,9 @@ def _found(
     tested = regression.test(group.columns, beside)
     explained = every * regression.explained(group.columns, beside)
     coefficient = None
-    if group.kind in SINGLE:
+    if group.delay:
+        coefficient = -float(group.delay)
+    elif group.kind in SINGLE:
         coefficient = float(regression.coefficients([*beside, *group.columns])[len(beside)])
     return Finding(
         group.kind,

@@ -1,4 +1,4 @@
-"""Regression of a residual on what it may depend on, under noise whose samples depend on their neighbours.
+"""Regression of a residual on what it may depend on, under noise whose neighbours are alike.
 
 Noise is autoregressive. Its coefficients are those of the greatest restricted likelihood beside *all*
 columns, so that neither what the columns explain nor the freedom that they take makes it look smoother
@@ -79,14 +79,14 @@ class Regression:
         spare = (self.n - k) // (2 * APART)
         self._most = int(max(0, min(MOST_ORDER, shortest // APART, spare)))
         self._lagged = _lagged(tables, self._most)
-        self._rows = self.n - self._most * len(tables)
+        self.rows = self.n - self._most * len(tables)
         # of the rows that noise is known by: what is only in the first ones would be nothing there
         self._basis = _independent(self._lagged[0, 0, :-1, :-1], range(k))
         self._partial, self._doubt = self._fitted_noise()
         self.noise = _from_partial(self._partial)
         self._white = _filtered(self._lagged, self.noise)
         rank = self._basis.shape[1]
-        self.freedom = max(self._rows - rank - (len(self.noise) - 1), 1)
+        self.freedom = max(self.rows - rank - (len(self.noise) - 1), 1)
         self._tested: dict[tuple[tuple[int, ...], tuple[int, ...]], Tested] = {}
         self._variance = max(self._left(range(k)), 0.0) / self.freedom
 
@@ -174,14 +174,14 @@ class Regression:
         small = np.einsum("ai,pqab,bj->pqij", change, self._lagged, change, optimize=True)
 
         def cost(partial: Array) -> float:
-            return _restricted(_filtered(small, _from_partial(partial)), self._rows)
+            return _restricted(_filtered(small, _from_partial(partial)), self.rows)
 
         start = np.empty(0)
         price, best = cost(start), start
         for order in range(1, self._most + 1):
             done = minimize(cost, np.append(start, 0.0), method="BFGS", options={"gtol": 1e-3})
             start = np.clip(done.x, -LIMIT, LIMIT)
-            new = cost(start) + order * float(np.log(self._rows))
+            new = cost(start) + order * float(np.log(self.rows))
             if new < price:
                 price, best = new, start
             elif order > best.size + 1:
@@ -278,4 +278,3 @@ def _left(gram: Array, columns: Columns) -> float:
     basis = _independent(gram[:-1, :-1], columns)
     along = basis.T @ gram[:-1, -1]
     return float(gram[-1, -1] - along @ along)
-

@@ -102,9 +102,7 @@ def runs_of(block: Block, recordings: Sequence[Recording]) -> tuple[Run, ...]:
                 f"the output of {block.kind!r} is not finite on {recording.name}. "
                 "Remedy: this model does not suit these data; identify it again."
             )
-        found.append(
-            Run(recording, recording.matrix(inputs), recording.matrix(outputs), modelled)
-        )
+        found.append(Run(recording, recording.matrix(inputs), recording.matrix(outputs), modelled))
     return tuple(found)
 
 

@@ -48,6 +48,9 @@ LAGS = (1, 2, 4, 8)
 SHARE = 6
 """Blocks to a column at least."""
 
+MOST_DELAY, LONGER = 50, 8
+"""Samples that outputs are shifted by at most, and the shortest recording as a multiple of that."""
+
 
 @dataclass(frozen=True)
 class Group:
@@ -64,12 +67,15 @@ class Group:
         Where they stand.
     beside : tuple of int
         What the residual may follow without this group being at fault.
+    delay : int
+        Of a lag: whole samples by which the modelled output is best shifted; 0 for less than one.
     """
 
     kind: str
     channel: str
     columns: tuple[int, ...]
     beside: tuple[int, ...] = ()
+    delay: int = 0
 
 
 @dataclass(frozen=True)
@@ -136,7 +142,9 @@ def suspects(block: Block, runs: Sequence[Run], output: int, every: int) -> Susp
         if k in moving:
             memory = [averaged(_memory(x), every) for x in scaled[k]]
             maker.add("hysteresis", names[k], memory, (*constant, *curve))
-    maker.add("lag", "", [_slope(run.modelled[:, output], every) for run in runs], constant)
+    delay = _delay(runs, output)
+    lagging = [_lagging(run.modelled[:, output], delay, every) for run in runs]
+    maker.add("lag", "", lagging, constant, delay)
     maker.add("drift", "", _trends(blocks), constant)
     large = False
     for k in moving:
@@ -153,7 +161,9 @@ def suspects(block: Block, runs: Sequence[Run], output: int, every: int) -> Susp
     maker.add("output", "", _hats(modelled, FEWER), constant)
     if len(runs) > 1:
         own = np.eye(len(runs))[:, 1:]
-        maker.add("runs", "", [np.tile(own[i], (size, 1)) for i, size in enumerate(blocks)], constant)
+        maker.add(
+            "runs", "", [np.tile(own[i], (size, 1)) for i, size in enumerate(blocks)], constant
+        )
     return Suspects(every, maker.tables(), tuple(maker.groups), large)
 
 
@@ -167,14 +177,19 @@ class _Maker:
         self.groups: list[Group] = []
 
     def add(
-        self, kind: str, channel: str, parts: Sequence[Array], beside: tuple[int, ...] = ()
+        self,
+        kind: str,
+        channel: str,
+        parts: Sequence[Array],
+        beside: tuple[int, ...] = (),
+        delay: int = 0,
     ) -> tuple[int, ...]:
         width = parts[0].shape[1]
         if self._count + width > max(self._room, 1):
             return ()
         columns = tuple(range(self._count, self._count + width))
         self._count += width
-        self.groups.append(Group(kind, channel, columns, beside))
+        self.groups.append(Group(kind, channel, columns, beside, delay))
         for own, part in zip(self._parts, parts, strict=True):
             own.append(part)
         return columns
@@ -276,15 +291,33 @@ def _shifted(x: Array) -> Array:
     )
 
 
-def _slope(modelled: Array, every: int) -> Array:
-    """Return how fast the modelled output moves, per sample, means over blocks; and how that changes."""
-    slope = averaged(np.gradient(modelled), every)
-    return np.column_stack([slope, np.gradient(slope)])
+def _delay(runs: Sequence[Run], output: int) -> int:
+    """Return by how many samples the modelled output is best shifted."""
+    most = min(MOST_DELAY, min(len(run.inputs) for run in runs) // LONGER)
+    pairs = [(run.measured[:, output], run.modelled[:, output]) for run in runs]
+
+    def left(delay: int) -> float:
+        total = 0.0
+        for y, modelled in pairs:
+            # the same samples at every delay
+            kept = slice(most, len(y) - most)
+            total += float(np.sum((y[kept] - modelled[most - delay : len(y) - most - delay]) ** 2))
+        return total
+
+    return min(range(-most, most + 1), key=lambda delay: (left(delay), abs(delay)))
+
+
+def _lagging(modelled: Array, delay: int, every: int) -> Array:
+    """Return how fast the modelled output moves; and how far it is from itself when it is delayed."""
+    slope = np.gradient(modelled)
+    if delay == 0:
+        return averaged(slope[:, np.newaxis], every)
+    shifted = np.roll(modelled, delay)
+    shifted[slice(delay) if delay > 0 else slice(delay, None)] = modelled[0 if delay > 0 else -1]
+    return averaged(np.column_stack([slope, shifted - modelled]), every)
 
 
 def _trends(lengths: Sequence[int]) -> list[Array]:
     """Return slow functions of time: a line and a parabola that begin with every recording."""
     longest = max(lengths)
-    return [
-        np.column_stack([t := np.arange(n) / longest, t**2]) for n in lengths
-    ]
+    return [np.column_stack([t := np.arange(n) / longest, t**2]) for n in lengths]

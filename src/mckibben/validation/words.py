@@ -9,6 +9,8 @@ from mckibben.numerals import numeral
 if TYPE_CHECKING:
     from mckibben.validation.results import Finding, OutputCheck, Validation
 
+NOTHING = "Nothing is found wrong with the model"
+
 FEW = 2
 """Things missed up to which a model is right but for them."""
 
@@ -43,7 +45,9 @@ def sentences(one: OutputCheck) -> list[str]:
 def _branches(one: OutputCheck, p: float) -> str:
     """Return whether hysteresis is left in the residual."""
     if p > LEVEL:
-        return f"At equal inputs, the residual is the same on rising and falling branches ({_p(p)})."
+        return (
+            f"At equal inputs, the residual is the same on rising and falling branches ({_p(p)})."
+        )
     said = f"At equal inputs, the residual differs between rising and falling branches ({_p(p)})"
     if any(each.kind == "hysteresis" for each in one.missing):
         return f"{said}."
@@ -71,7 +75,7 @@ def phrase(one: OutputCheck, finding: Finding) -> str:
         "speed": f"the effect of the speed of {by}",
         "creep": f"creep after {'large steps' if one.large_steps else 'movements'} of {by}",
         "drift": "drift over time",
-        "output": f"the scale of {one.output}",
+        "output": f"the shape of the curve over modelled {one.output}",
         "crossing": f"what {by} did shortly before",
     }[finding.kind]
 
@@ -84,17 +88,16 @@ def _verdict(one: OutputCheck) -> str:
             if one.resolution > 0
             else "it is rounding"
         )
-        return f"Nothing is found wrong with the model: what it leaves, {size} RMS, says nothing, for {why}"
+        return f"{NOTHING}: what it leaves, {size} RMS, says nothing, for {why}"
     if one.missing:
         things = _listed([phrase(one, each) for each in one.missing])
         missed = sum(each.size**2 for each in one.missing) ** 0.5
         small = len(one.missing) <= FEW and missed <= WRONG * one.span
         return f"The model is right but for {things}" if small else f"The model misses {things}"
     if one.white:
-        return f"Nothing is found wrong with the model: what it leaves, {size} RMS, is white noise"
+        return f"{NOTHING}: what it leaves, {size} RMS, is white noise"
     return (
-        f"Nothing is found wrong with the model: what it leaves, {size} RMS, follows nothing recorded, "
-        "though it is not white"
+        f"{NOTHING}: what it leaves, {size} RMS, follows nothing recorded, though it is not white"
     )
 
 
@@ -124,13 +127,13 @@ def _rest(one: OutputCheck) -> str:
     if one.noise_time <= SLOW:
         return f"{forgets}, as noise that a sensor's filter has smoothed."
     return (
-        f"{forgets}. Slow noise is like that, and so is what no channel here tells of: a disturbance, or "
-        "a state that neither the model nor these tests have."
+        f"{forgets}. Slow noise is like that, and so is what no channel here tells of: a disturbance, "
+        "or a state that neither the model nor these tests have."
     )
 
 
 def _p(value: float) -> str:
-    return f"p < {SURE:g}" if value < SURE else f"p = {numeral(value, 2)}"
+    return "p < 0.000001" if value < SURE else f"p = {numeral(value, 2)}"
 
 
 def _listed(words: list[str]) -> str:

@@ -19,6 +19,7 @@ from mckibben.comparison.choosing import Choice, choice_of
 from mckibben.comparison.coverage import OffTraining
 from mckibben.comparison.drift import Drift, Stretch, drift_of
 from mckibben.comparison.kept import Kept
+from mckibben.comparison.pieces import counts_of
 from mckibben.comparison.planning import N_FOLDS, Plan, Settings, plan_of
 from mckibben.comparison.recommending import CONSTANT
 from mckibben.comparison.results import CHOICES, Leaderboard
@@ -26,7 +27,6 @@ from mckibben.comparison.row import Row
 from mckibben.comparison.standing import Standing
 from mckibben.comparison.trying import (
     Tried,
-    counts_of,
     effort_of,
     errors_on_test,
     joined,
@@ -344,7 +344,7 @@ def _choice(rows: Sequence[Row], plan: Plan) -> Choice | None:
         if row.order[:2] == rows[0].order[:2] and (row.skill_least is None or row.skill_least > 0)
     ]
     squares = {row.model: row.squares for row in rivals if row.squares}
-    return choice_of(squares, counts_of(plan.data), plan.seed)
+    return choice_of(squares, counts_of(plan.data.folds), plan.seed)
 
 
 def _off_training(row: Row, outputs: Sequence[Array], plan: Plan) -> OffTraining | None:

@@ -19,6 +19,7 @@ from mckibben.comparison.cluster import outcomes_outside, outer_backend, process
 from mckibben.comparison.free_run import run_free
 from mckibben.comparison.memory_test import memory_test
 from mckibben.comparison.offered import objections
+from mckibben.comparison.pieces import PIECES, squares_of
 from mckibben.comparison.row import Row
 from mckibben.comparison.splits import Fold, Mask, Split
 from mckibben.errors import MckibbenError
@@ -30,9 +31,6 @@ from mckibben.system.threads import cores
 from mckibben.system.workers import Outcome, WorkerError
 
 TIMED_SAMPLES = 20_000
-
-PIECES = 8
-"""Blocks that the errors on a recording of the cross-validation are summed in, so that models pair."""
 
 WORTH_A_PROCESS = 4.0
 """Seconds of work below which starting processes takes longer than it saves."""
@@ -246,17 +244,6 @@ def joined(parts: Sequence[Tried], names: Sequence[str]) -> Tried:
     )
     held = tuple(one for tried in parts for one in tried.held)
     return replace(whole, row=row, squares=squares, held=held)
-
-
-def squares_of(errors: Array) -> list[tuple[float, ...]]:
-    """Return the sums of squared errors (n, k) of consecutive pieces."""
-    return [tuple((piece**2).sum(axis=0).tolist()) for piece in np.array_split(errors, PIECES)]
-
-
-def counts_of(data: Data) -> list[int]:
-    """Return how many samples every piece of the cross-validation has, in the order of squares."""
-    tested = [int(rows.sum()) for fold in data.folds for rows in fold.test_rows]
-    return [len(piece) for n in tested for piece in np.array_split(np.empty(n), PIECES)]
 
 
 def rms_by_output(parts: Sequence[Tried]) -> list[float]:

@@ -20,8 +20,10 @@ from mckibben.control import Tracked
 from mckibben.errors import DataError
 from mckibben.excitation import Gap, untold
 from mckibben.recording import Recording
+from mckibben.studying.checking import check_on_test
 from mckibben.studying.inverting import InverseCheck, invert_best
 from mckibben.studying.loops import closed_loops, published_rig
+from mckibben.validation.results import Validation
 
 
 @dataclass(frozen=True)
@@ -50,6 +52,8 @@ class Study:
         What was assumed or mended on the way.
     untold : tuple of Gap
         What the recordings cannot tell, most important first.
+    check : Validation, str or None
+        What the chosen model misses on the test, or why that cannot be told; None without a choice.
     """
 
     train: tuple[Recording, ...]
@@ -63,6 +67,7 @@ class Study:
     load: str | None = None
     notes: tuple[str, ...] = ()
     untold: tuple[Gap, ...] = ()
+    check: Validation | str | None = None
 
     @property
     def input(self) -> str:
@@ -80,6 +85,7 @@ class Study:
         return {
             "characterization": None if known is None else known.to_dict(),
             "untold": [gap.to_dict() for gap in self.untold],
+            "check": self.check.to_dict() if isinstance(self.check, Validation) else self.check,
             "leaderboard": self.leaderboard.to_dict(),
             "inverse": None if self.inverse is None else self.inverse.to_dict(),
             "tracking": {name: dict(tracked.rmse) for name, tracked in self.loops.items()},
@@ -189,8 +195,13 @@ def study(
         return replace(so_far, leaderboard=replace(so_far.leaderboard, stopped=True))
     board = so_far.leaderboard
     if board.best is not None and board.best.block is not None:
-        told = untold(recordings, channels.inputs, channels.outputs, board.best.block, tests=tests)
-        so_far = replace(so_far, untold=told)
+        block, split, names = board.best.block, plan.data.split, channels.outputs
+        on_test = so_far.predictions[board.best.model][len(split.train) :]
+        so_far = replace(
+            so_far,
+            untold=untold(recordings, channels.inputs, names, block, tests=tests),
+            check=check_on_test(block, split, on_test, names),
+        )
     if channels.single:
         so_far = replace(so_far, inverse=invert_best(board, recordings[0]))
     else:

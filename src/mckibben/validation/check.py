@@ -62,7 +62,11 @@ def check(model: Block, recordings: Recording | Sequence[Recording]) -> Validati
         Where the model's output is not finite.
     """
     given = [recordings] if isinstance(recordings, Recording) else list(recordings)
-    runs = runs_of(model, given)
+    return check_runs(model, runs_of(model, given))
+
+
+def check_runs(model: Block, runs: Sequence[Run]) -> Validation:
+    """Check a model by what it made of recordings, running free; see `check`."""
     every = block_length(model, runs)
     tested = [run for run in runs if len(run.inputs) // every >= FEWEST_BLOCKS] or list(runs)
     notes = []
@@ -73,7 +77,7 @@ def check(model: Block, recordings: Recording | Sequence[Recording]) -> Validati
         _output(model, runs, tested, every, place) for place in range(len(model.outputs))
     )
     return Validation(
-        model.kind, tuple(run.recording.name for run in runs), outputs, tuple(notes), runs
+        model.kind, tuple(run.recording.name for run in runs), outputs, tuple(notes), tuple(runs)
     )
 
 

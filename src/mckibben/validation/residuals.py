@@ -63,6 +63,25 @@ def runs_of(block: Block, recordings: Sequence[Recording]) -> tuple[Run, ...]:
     ModelError
         Where the model's output is not finite.
     """
+    check_usable(block, recordings)
+    inputs = [channel.name for channel in block.inputs]
+    outputs = [channel.name for channel in block.outputs]
+    found = []
+    for recording in recordings:
+        with warnings.catch_warnings(), np.errstate(all="ignore"):
+            warnings.simplefilter("ignore", RuntimeWarning)
+            modelled = _modelled(block, recording, outputs, recordings)
+        if not np.isfinite(modelled).all():
+            raise ModelError(
+                f"the output of {block.kind!r} is not finite on {recording.name}. "
+                "Remedy: this model does not suit these data; identify it again."
+            )
+        found.append(Run(recording, recording.matrix(inputs), recording.matrix(outputs), modelled))
+    return tuple(found)
+
+
+def check_usable(block: Block, recordings: Sequence[Recording]) -> None:
+    """Refuse recordings that tell nothing of a model; see `runs_of`."""
     if not recordings:
         raise DataError("there is no recording to check the model on", remedy="give at least one")
     inputs = [channel.name for channel in block.inputs]
@@ -92,18 +111,6 @@ def runs_of(block: Block, recordings: Sequence[Recording]) -> tuple[Run, ...]:
                 channel=name,
                 remedy="record while it moves, or name another column with --column",
             )
-    found = []
-    for recording in recordings:
-        with warnings.catch_warnings(), np.errstate(all="ignore"):
-            warnings.simplefilter("ignore", RuntimeWarning)
-            modelled = _modelled(block, recording, outputs, recordings)
-        if not np.isfinite(modelled).all():
-            raise ModelError(
-                f"the output of {block.kind!r} is not finite on {recording.name}. "
-                "Remedy: this model does not suit these data; identify it again."
-            )
-        found.append(Run(recording, recording.matrix(inputs), recording.matrix(outputs), modelled))
-    return tuple(found)
 
 
 def _modelled(

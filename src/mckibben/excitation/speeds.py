@@ -16,7 +16,7 @@ ONE = 1.2
 """Ratio of speeds that are one speed."""
 
 NONE = 2.0
-"""Ratio of speeds that tells nothing: it is within what loops themselves differ by."""
+"""Ratio of speeds that tells next to nothing."""
 
 ALIKE = 2.0
 """Branches are compared with those at most so many times as long, or speed would stand for size."""

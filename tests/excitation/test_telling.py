@@ -511,7 +511,7 @@ def test_whatever_is_recorded_something_or_nothing_is_said(
     values = st.lists(st.sampled_from([0.0, 0.5, 1.0, -2.0, 1e6]), min_size=n, max_size=n)
     names = ["pressure_1", "displacement_1"] + ["pressure_2", "displacement_2"] * two
     beside = data.draw(st.sampled_from([[], ["force"], ["pressure_extensor"]]))
-    channels = {name: data.draw(values) for name in (*names, *beside)}
+    channels = {name: np.array(data.draw(values)) for name in (*names, *beside)}
     first = Recording(channels, 0.1)
     second = Recording(channels, 0.1 if timed else None)
     for gap in untold([first, second]):

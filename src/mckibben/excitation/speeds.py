@@ -12,8 +12,11 @@ from mckibben.excitation.seen import Branch, Seen
 ENOUGH = 5.0
 """Ratio of speeds that tells what depends on rate over some decades."""
 
+ONE = 1.2
+"""Ratio of speeds that are one speed."""
+
 NONE = 2.0
-"""Ratio of speeds that tells nothing: it is within what loops themselves differ by."""
+"""Ratio of speeds that tells next to nothing."""
 
 ALIKE = 2.0
 """Branches are compared with those at most so many times as long, or speed would stand for size."""
@@ -71,6 +74,7 @@ def _gap(seen: Seen, name: str, ratio: float, slow: float, fast: float) -> Gap:
     slower, faster = _round(middle / 4), _round(4 * middle)
     span = seen.scales[name].span
     lasts = lasting(2 * span / slower + 6 * span / faster)
+    can = "cannot" if ratio < ONE else "can hardly"
     rests = max((hold.seconds for hold in seen.holds), default=0.0) > RESTS * span / fast
     if rests:
         sentence = (
@@ -79,7 +83,7 @@ def _gap(seen: Seen, name: str, ratio: float, slow: float, fast: float) -> Gap:
         )
     elif ratio < NONE:
         sentence = (
-            f"Rate dependence{of} cannot be told: {n} run at {between(slow, fast, unit)}, "
+            f"Rate dependence{of} {can} be told: {n} run at {between(slow, fast, unit)}, "
             "where they are of like size."
         )
     else:

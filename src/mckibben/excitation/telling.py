@@ -127,7 +127,7 @@ def channels(
                 f"it is not among its channels, {', '.join(recording.channels)}",
                 file=recording.source,
                 channel=absent[0],
-                remedy="name inputs and outputs, or give recordings with the same channels",
+                remedy="name them with --input and --output, or give recordings with the same channels",
             )
     return driven, given
 

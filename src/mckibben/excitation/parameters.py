@@ -12,6 +12,7 @@ import numpy as np
 from mckibben.arrays import Array
 from mckibben.blocks.core.block import Block
 from mckibben.blocks.core.running import run_many
+from mckibben.blocks.core.writing import quantities
 from mckibben.errors import MckibbenError
 from mckibben.estimators.core.checking import training_data
 from mckibben.estimators.core.data import TrainingData
@@ -61,7 +62,6 @@ ALIKE = 0.9
 def parameters(
     recordings: Sequence[Recording],
     model: Block,
-    meanings: Mapping[str, str] | None = None,
     facts: Seen | None = None,
 ) -> list[Gap]:
     """Return which parameters of a model recordings leave open, each with the run that would tell it.
@@ -74,8 +74,6 @@ def parameters(
     recordings : sequence of Recording
     model : Block
         Its error on the recordings counts as noise, correlated as it is.
-    meanings : mapping of str to str, optional
-        What a parameter is, by its name among `parameter_names`; default the name itself.
     facts : Seen, optional
         Of the recordings, for usual speeds.
 
@@ -113,11 +111,9 @@ def parameters(
             ]
     except MckibbenError:
         return []
-    gaps = [
-        gap
-        for name, places in _groups(model.parameter_names, free).items()
-        if (gap := _gap(name, places, told, more, model, free, meanings or {}))
-    ]
+    groups = _groups(model, free)
+    meanings = _meanings(model, groups, free)
+    gaps = [gap for name in groups if (gap := _gap(name, groups, told, more, meanings))]
     return sorted(gaps, key=lambda gap: -gap.severity)[:TOLD]
 
 
@@ -141,13 +137,12 @@ def standard_error(told: Array, places: Sequence[int]) -> float:
 
 def _gap(
     name: str,
-    places: list[int],
+    groups: Mapping[str, list[int]],
     told: Array,
     more: Sequence[tuple[Proposal, Array]],
-    model: Block,
-    free: Sequence[int],
     meanings: Mapping[str, str],
 ) -> Gap | None:
+    places = groups[name]
     error = standard_error(told, places)
     if error <= LOOSE:
         return None
@@ -161,13 +156,13 @@ def _gap(
     if not enough:
         return None
     _, times, words, after = min(enough)
-    meaning = meanings.get(name, f"“{name}”")
-    partner = _partner(told, places, model, free)
+    meaning = meanings[name]
+    partner = _partner(told, name, groups)
     size = "more than ten times its size" if error > 10 else f"{value(100 * error)} % of its size"
     sentence = (
         f"Of the model fitted, {meaning} cannot be told: its standard error is {size}."
         if partner is None
-        else f"Of the model fitted, {meaning} and {meanings.get(partner, f'“{partner}”')} can be told "
+        else f"Of the model fitted, {meaning} and {meanings[partner]} can be told "
         f"only together: the standard error of the former is {size}."
     )
     return Gap(
@@ -175,7 +170,7 @@ def _gap(
         sentence,
         f"{words}{'' if times == 1 else f', {times} times'}, which would bring it to about "
         f"{value(100 * after)} %.",
-        f"{meaning}, and what it is used for away from these recordings",
+        f"“{name}”, and what it is used for away from these recordings",
         0.3 + 0.15 * min(2.0, np.log10(error / LOOSE)),
         {"standard_error": error, "after": after},
         (),
@@ -187,14 +182,14 @@ def _seconds(run: Proposal) -> float:
     return len(run.inputs) * (run.sample_time or 0.0)
 
 
-def _partner(told: Array, places: list[int], model: Block, free: Sequence[int]) -> str | None:
+def _partner(told: Array, own_name: str, groups: Mapping[str, list[int]]) -> str | None:
     """Return the other group of parameters that moves the output alike, if one does."""
-    found = (0.0, "")
+    found, places = (0.0, ""), groups[own_name]
     own = told[np.ix_(places, places)]
     if np.trace(own) == 0:
         return None
-    for name, others in _groups(model.parameter_names, free).items():
-        if others != places:
+    for name, others in groups.items():
+        if name != own_name:
             across = told[np.ix_(others, places)]
             ridge = 1e-9 * np.trace(told) * np.eye(len(others))
             same = across.T @ np.linalg.solve(told[np.ix_(others, others)] + ridge, across)
@@ -202,8 +197,9 @@ def _partner(told: Array, places: list[int], model: Block, free: Sequence[int]) 
     return found[1] if found[0] > ALIKE else None
 
 
-def _groups(names: Sequence[str], free: Sequence[int]) -> dict[str, list[int]]:
+def _groups(model: Block, free: Sequence[int]) -> dict[str, list[int]]:
     """Return what is judged as a whole: name -> places among the free parameters."""
+    names = [quantity.name for quantity in quantities(model)]
     fields: dict[str, list[int]] = {}
     for place, index in enumerate(free):
         fields.setdefault(re.sub(r"( \d+)+$", "", names[index]), []).append(place)
@@ -216,6 +212,16 @@ def _groups(names: Sequence[str], free: Sequence[int]) -> dict[str, list[int]]:
                 name = names[free[place]]
                 groups[f"{name} ({free[place] + 1})" if name in groups else name] = [place]
     return groups
+
+
+def _meanings(model: Block, groups: Mapping[str, list[int]], free: Sequence[int]) -> dict[str, str]:
+    """Return what every group is, in words, its name first."""
+    every = quantities(model)
+    told = {name: every[free[places[0]]].meaning for name, places in groups.items()}
+    return {
+        name: f"“{name}” ({meaning[0].lower()}{meaning[1:]})" if meaning else f"“{name}”"
+        for name, meaning in told.items()
+    }
 
 
 def _variance(target: Array, residual: Array, n_free: int) -> float:

@@ -8,6 +8,7 @@ import numpy as np
 
 from mckibben.arrays import Array
 from mckibben.blocks.core.block import Block
+from mckibben.blocks.core.writing import quantities
 from mckibben.errors import DataError, ModelError
 from mckibben.estimators.coupled.balance_prior import noise_of
 from mckibben.excitation.believed import Belief, telling
@@ -101,7 +102,8 @@ def prospect_of(
     """
     block, rng = belief.block, np.random.default_rng(seed + 1)
     places = telling(block)
-    names = tuple(block.parameter_names[place] for place in places)
+    every = quantities(block)
+    names = tuple(every[place].name for place in places)
     wanted = _wanted(names, goal)
     step = block.sample_time or min(
         max(belief.step, seconds * len(places) / WORK, FINEST), COARSEST

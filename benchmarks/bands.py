@@ -132,9 +132,8 @@ def rigs() -> Iterator[str]:
 def measured(folder: Path) -> Iterator[str]:
     """Yield a row a set of recordings, and model."""
     found = {one.name: one.recordings() for one in sets_in(folder)}
-    for kind in ("gpi", "balance"):
-        pieces = cut(found["festo_dmsp10_levels"], 7)
-        yield turned(f"DMSP-10, levels, sevenths, `{kind}`", kind, pieces, {})
+    pieces = cut(found["festo_dmsp10_levels"], 7)
+    yield turned("DMSP-10, levels, sevenths, `gpi`", "gpi", pieces, {})
     pieces = cut([r for r in found["cavatappi_loads"] if r.name.startswith("sample3")], 4)
     yield turned("Cavatappi, sample 3, quarters, `balance`", "balance", pieces, {})
     for muscle in ("12cm", "30cm"):

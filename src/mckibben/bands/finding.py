@@ -33,7 +33,7 @@ MANY = 20
 WIDTHS = (0.03, 0.1, 0.3)
 """Of plays, as shares of a range: just turned, turned a while ago, in another loop."""
 
-N_TIMES, SHORTEST, LONGEST = 4, 2.0, 8.0
+N_TIMES, SHORTEST, LONGEST = 4, 2.0, 2.0
 """Lags, the shortest in samples, and how often the longest fits into the longest run."""
 
 MOST_FITTED = 8000

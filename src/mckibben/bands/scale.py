@@ -19,7 +19,9 @@ from mckibben.blocks.bands.band import FARTHEST
 RIDGES = (1e-4, 1e-3, 1e-2, 1e-1, 1.0, 1e3)
 """Of weights, per sample."""
 
-N_BELLS = 100
+N_BELLS, SHARPNESS = 100, 2.0
+"""Bells, and how sharp they are, per squared deviation of all that is seen; by cross-validation."""
+
 FLOOR = 0.1
 """Of the median miss, below which misses count as alike."""
 
@@ -69,7 +71,7 @@ class Terms:
         spread = np.where(spread > 1e-9, spread, 1.0)
         places = np.unique(np.linspace(0, len(seen) - 1, N_BELLS).astype(int))
         bells = ((seen[places] - mean) / spread).clip(-FARTHEST, FARTHEST)
-        return cls(mean, spread, bells, 1.0 / seen.shape[1])
+        return cls(mean, spread, bells, SHARPNESS / seen.shape[1])
 
     def __call__(self, seen: Array) -> Array:
         """Return 1, what is seen, and bells, shape (n, 1 + s + b)."""

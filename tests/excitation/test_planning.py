@@ -181,7 +181,9 @@ def test_what_is_driven_is_known_from_recordings() -> None:
 
 
 def test_features_remember_over_parts() -> None:
-    known = Unmodelled.of(np.array([0.0]), np.array([4.0]), np.random.default_rng(0))
+    known = Unmodelled.of(
+        np.array([0.0]), np.array([4.0]), np.array([2.0]), np.random.default_rng(0)
+    )
     commands = random_motion(200, STEP, 0.0, 4.0, 0.5, np.random.default_rng(1))[:, np.newaxis]
     start = known.start(commands[0])
     whole, _ = known.features(commands, start, STEP)

@@ -114,7 +114,7 @@ def stretches(
     found = []
     for number in range(count):
         kind = list(PROGRAMS)[number % len(PROGRAMS)]
-        speed = float(rng.choice(SPEEDS, p=(0.6, 0.25, 0.15))) if kind != "random motion" else 1.0
+        speed = float(rng.choice(SPEEDS, p=(0.4, 0.4, 0.2))) if kind != "random motion" else 1.0
         way = rng.random()
         alone = rng.choice(names) if len(names) > 1 and way < 0.35 else None
         targets = np.tile(here, (n, 1))

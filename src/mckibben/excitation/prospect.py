@@ -118,10 +118,10 @@ def prospect_of(
             f"{seconds:g} s are too short for a plan: what moves has to come back to rest, too",
             remedy=f"give --minutes {np.ceil(least / 6) / 10:g} or more",
         )
-    low, high, _, rest = at_rates(limits)
+    low, high, rate, rest = at_rates(limits)
     driven = list(limits)
     columns = np.array([driven.index(channel.name) for channel in block.inputs])
-    unmodelled = Unmodelled.of(low, high, rng)
+    unmodelled = Unmodelled.of(low, high, rate, rng)
     reference = _reference(limits, length, step, rng)
     spans = _spans(block, reference, rest, columns, step)
     noise, recorded, shape = _recorded(belief, places, limits, columns, unmodelled, spans)

@@ -2,9 +2,9 @@
 
     python benchmarks/standard_errors.py [SEEDS]
 
-Of a PI model, a linear model and a PI model that creeps, each fitted anew to every seed's noise by a search
-that is none of the package's. Beside the intervals of descriptions stand those as if residuals were
-independent.
+Of a PI model, a linear model and a PI model that creeps, each fitted anew to every seed's noise by a
+search that is none of the package's. Beside the intervals of descriptions stand those as if residuals
+were independent.
 """
 
 from __future__ import annotations

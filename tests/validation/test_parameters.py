@@ -84,10 +84,10 @@ def covered(block: Block, u: Array, memory: float, seeds: int) -> tuple[int, int
 
 
 MODELS: dict[str, tuple[Block, Input, int]] = {
-    "pi": (PI(THRESHOLDS, (3.0, 1.5, 1.0, 0.5), 2.0), wave, 60),
+    "pi": (PI(THRESHOLDS, (3.0, 1.5, 0.9, 0.5), 2.0), wave, 60),
     "oe": (TransferFunction((0.9, -0.55), (-1.2, 0.25), STEP, 0.0, 2.0), steps, 60),
     "cpi": (
-        Series((PI(THRESHOLDS, (3.0, 1.5, 1.0, 0.5), 2.0), Creep((0.08, 0.1), (1.5, 12.0)))),
+        Series((PI(THRESHOLDS, (3.0, 1.5, 0.9, 0.5), 2.0), Creep((0.08, 0.1), (1.5, 12.0)))),
         wave,
         10,
     ),
@@ -121,7 +121,7 @@ def test_what_is_not_determined_is_said_and_has_no_number() -> None:
     u = np.minimum(wave(), 2.0) * 0.1  # too little to move the operator of threshold 1.5
     block = MODELS["pi"][0]
     y = np.asarray(block.simulate(u, initial="virgin")) + noise(1, 0.0)
-    still = PI(THRESHOLDS, (3.0, 1.5, 1.0, 0.5), 2.0, initial="virgin")
+    still = PI(THRESHOLDS, (3.0, 1.5, 0.9, 0.5), 2.0, initial="virgin")
     recording = Recording({"pressure": u, "displacement": y}, STEP)
     sure = sureness(still, [recording], residuals(still, [recording]))
     found = parameters(still, sure)
@@ -136,7 +136,7 @@ def test_what_only_a_sum_tells_is_told_apart_from_what_nothing_tells() -> None:
     from mckibben.blocks.memoryless.affine import Affine
 
     u = wave()
-    pi = Series((PI.example(), Affine(3.0, 1.0, DISPLACEMENT, DISPLACEMENT)))
+    pi = Series((MODELS["pi"][0], Affine(3.0, 1.5, DISPLACEMENT, DISPLACEMENT)))
     y = np.asarray(pi.simulate(u)) + noise(1, 0.0)
     recording = Recording({"pressure": u, "displacement": y}, STEP)
     sure = sureness(pi, [recording], residuals(pi, [recording]))
@@ -150,6 +150,20 @@ def test_a_parameter_at_its_bound_has_no_error() -> None:
     recording = Recording({"pressure": u, "displacement": y}, STEP)
     found = parameters(block, sureness(block, [recording], residuals(block, [recording])))
     assert [one.said[:1] for one in found] == ["", "0", "0", "", ""]
+
+
+def test_what_is_exactly_1_is_a_choice() -> None:
+    """As the area to which all forces of a balance are relative: it frees the others."""
+    from mckibben.blocks.core.fields import DISPLACEMENT
+    from mckibben.blocks.memoryless.affine import Affine
+
+    u = wave()
+    block = Series((MODELS["pi"][0], Affine(1.0, 0.0, DISPLACEMENT, DISPLACEMENT)))
+    y = np.asarray(block.simulate(u)) + noise(1, 0.0)
+    recording = Recording({"pressure": u, "displacement": y}, STEP)
+    found = parameters(block, sureness(block, [recording], residuals(block, [recording])))
+    assert [one.said[:9] for one in found[-2:]] == ["exactly 1", "0: at a b"]
+    assert all(one.standard_error is not None for one in found[:-2])
 
 
 def test_of_long_recordings_a_share_stands_for_the_whole() -> None:

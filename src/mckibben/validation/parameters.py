@@ -12,6 +12,7 @@ practitioner's guide to robust covariance matrix estimation", 1997.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,13 +24,17 @@ from mckibben.blocks.core.writing import quantities
 from mckibben.errors import ModelError
 from mckibben.estimators.core.uncertainty import DIFFERENCE, LARGEST, inverted, relative_sizes
 from mckibben.recording import Recording
+from mckibben.system.threads import cores
 
 LEVEL = 0.95
 """Of intervals."""
 
-MOST = 1_500_000
-"""Samples simulated for sensitivities, of all parameters together; of longer recordings the beginnings
-are taken, as if the rest told as much."""
+MOST, MOST_OPERATIONS = 3_000_000, 200_000_000
+"""Samples simulated for sensitivities, of all parameters together, and operations of models that are
+solved; of longer recordings the beginnings are taken, as if the rest told as much."""
+
+SOLVED = 10
+"""Operations of a step, for every parameter, above which a model is solved rather than computed."""
 
 MOST_TERMS = 40
 """Of an autoregression of residuals."""
@@ -150,36 +155,45 @@ def sureness(block: Block, recordings: Sequence[Recording], left: Sequence[Array
     values, names = block.pack(), block.parameter_names
     sizes = relative_sizes(values)
     total = sum(map(len, left))
-    share = min(1.0, MOST / max(total * n_parameters, 1))
+    steps = max(total * n_parameters, 1)
+    share = min(1.0, MOST / steps, MOST_OPERATIONS / (steps * _operations(block, recordings[0])))
     kept = [r.slice(0, max(round(share * len(r)), min(len(r), 50))) for r in recordings]
     left = [e[: len(r)] for e, r in zip(left, kept, strict=True)]
     share = sum(map(len, left)) / total
     models = [autoregression([e[:, j] for e in left]) for j in range(left[0].shape[1])]
     worth = min(model.worth(sum(map(len, left))) for model in models) / share
-    places, columns = [], []
+    places: list[int] = []
+    columns: list[list[Array]] = []
     for place in range(n_parameters):
         if names[place].endswith("input offset"):
             said[place] = "chosen: the point about which the model is linear"
-            continue
-        if abs(values[place]) <= NOTHING * sizes[place]:
+        elif abs(values[place]) <= NOTHING * sizes[place]:
             said[place] = "0: at a bound, or left out"
-            continue
-        column = _sensitivity(block, kept, place)
+        elif values[place] == 1:
+            said[place] = "exactly 1: chosen, as what others are relative to"
+        else:
+            places.append(place)
+    given = [channel.name for channel in block.outputs]
+    base = [block.simulate(r).matrix(given) for r in kept]  # anew: a start may be fitted
+    with ThreadPoolExecutor(cores()) as pool:
+        moved = list(pool.map(lambda place: _sensitivity(block, kept, base, place), places))
+    for place, column in zip(places, moved, strict=True):
         if column is None:
             said[place] = "cannot be moved on its own without breaking the model"
-            continue
-        places.append(place)
-        columns.append(column)
+        else:
+            columns.append(column)
+    places = [place for place in places if not said[place]]
     terms = tuple(model.coefficients.size for model in models)
     if not columns or not all(np.isfinite(e).all() for e in left):
         said = [reason or "the model's output is not finite" for reason in said]
         return Sureness(covariance, tuple(said), np.inf, worth, terms)
     condition, own, middle = _sandwich(columns, left, models)
     told = np.isfinite(np.diag(own))
-    moved = np.array([max(float(np.abs(s).max(initial=0.0)) for s in column) for column in columns])
-    for place, known, felt in zip(places, told.tolist(), moved / moved.max(), strict=True):
+    felt = [max(float(np.abs(slopes).max()) for slopes in column) for column in columns]
+    for place, known, own_felt in zip(places, told.tolist(), felt, strict=True):
         if not known:
-            alone = "only together with others" if felt > UNFELT else "it moves nothing in them"
+            apart = own_felt > UNFELT * max(felt)
+            alone = "only together with others" if apart else "it moves nothing in them"
             said[place] = f"not determined by these recordings: {alone}"
     if not told.all():
         columns = [column for column, known in zip(columns, told.tolist(), strict=True) if known]
@@ -193,34 +207,44 @@ def sureness(block: Block, recordings: Sequence[Recording], left: Sequence[Array
     return Sureness(covariance, tuple(said), condition, worth, terms)
 
 
-def _sensitivity(block: Block, recordings: Sequence[Recording], place: int) -> list[Array] | None:
-    """Return how every run's outputs move with a parameter, in units of its size; None if it cannot."""
+def _operations(block: Block, recording: Recording) -> float:
+    """Return what a step costs, where solving it costs far more than a pass over the numbers; else 1."""
+    parts: Sequence[Block] = getattr(block, "parts", ())
+    if parts:
+        return sum(_operations(part, recording) for part in parts)
+    try:
+        usual = block.cost(recording.sample_time).usual
+    except ModelError:
+        return 1.0
+    return float(usual) if usual > SOLVED * block.n_parameters else 1.0
+
+
+def _sensitivity(
+    block: Block, recordings: Sequence[Recording], base: Sequence[Array], place: int
+) -> list[Array] | None:
+    """Return how every run's outputs move with a parameter, in units of its size; None if it cannot.
+
+    Parameters
+    ----------
+    base : sequence of array, shape (n, m)
+        Outputs where it does not move.
+    """
     values = block.pack()
     size = relative_sizes(values)[place]
     names = [channel.name for channel in block.outputs]
-    runs = []
-    for way in (1.0, -1.0):
+    for step in (DIFFERENCE, -DIFFERENCE):
         moved = values.copy()
-        moved[place] += way * DIFFERENCE * size
+        moved[place] += step * size
         try:
             with np.errstate(all="ignore"):
                 other = block.unpack(moved)
-                runs.append([other.simulate(r).matrix(names) for r in recordings])
-        except ModelError:
+                runs = [other.simulate(r).matrix(names) for r in recordings]
+        except ModelError:  # the other way may be open
             continue
-    if not runs:
-        return None
-    if len(runs) == 2:
-        above, below = runs
-        step = 2 * DIFFERENCE
-    else:
-        above, below, step = (
-            runs[0],
-            [block.simulate(r).matrix(names) for r in recordings],
-            DIFFERENCE,
-        )
-    slopes = [(a - b) / step for a, b in zip(above, below, strict=True)]
-    return slopes if all(np.abs(s).max() < LARGEST for s in slopes) else None
+        slopes = [(run - at) / step for run, at in zip(runs, base, strict=True)]
+        if all(np.abs(slope).max() < LARGEST for slope in slopes):
+            return slopes
+    return None
 
 
 def _sandwich(

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING, Any
 
 from mckibben.blocks.core.notation import (
@@ -51,7 +52,12 @@ class Quantity:
 
 def quantities(block: Block) -> tuple[Quantity, ...]:
     """Return what every number of ``block.pack()`` is, in its order."""
-    return tuple(_quantities(block, "", channel_units(block)))
+    found = list(_quantities(block, "", channel_units(block)))
+    alike = Counter(one.name for _, one in found)
+    return tuple(
+        replace(one, name=prefix + one.name) if alike[one.name] > 1 else one
+        for prefix, one in found
+    )
 
 
 def channel_units(part: Parametrised) -> Units:
@@ -81,17 +87,14 @@ def unit_of(part: Parametrised, field: str, index: tuple[int, ...], units: Units
     return resolved(own, index[-1] if index else 0, units)
 
 
-def _quantities(part: Parametrised, prefix: str, units: Units) -> Iterator[Quantity]:
+def _quantities(part: Parametrised, prefix: str, units: Units) -> Iterator[tuple[str, Quantity]]:
+    """Give every number, each behind the names of the parts that it is in."""
     units = channel_units(part) or units
     names = iter(part.parameter_names)
     if not part.parameters:
         for place, name in enumerate(names):
-            yield Quantity(
-                prefix + name,
-                indexed(r"\theta_i", (place,), 1),
-                part.unit_of("", (place,)) or "",
-                "",
-            )
+            unit = part.unit_of("", (place,)) or ""
+            yield prefix, Quantity(name, indexed(r"\theta_i", (place,), 1), unit, "")
         return
     said = meanings(type(part))
     for field in part.parameters:
@@ -105,10 +108,10 @@ def _quantities(part: Parametrised, prefix: str, units: Units) -> Iterator[Quant
                 continue
             name = next(names)
             bracket = re.search(r" \[([^\]]*)\]$", name)
-            unit = bracket[1] if bracket else unit_of(part, field, index, units)
+            unit = bracket[1] if bracket else unit_of(part, field, index, units) or ""
             symbol = indexed(part.notation.symbol(field), index, part.notation.first(field))
             name = name[: bracket.start()] if bracket else name
-            yield Quantity(prefix + name, symbol, unit or "", meaning)
+            yield prefix, Quantity(name, symbol, unit, meaning)
 
 
 def _called(part: Parametrised, field: str, index: tuple[int, ...], value: Parametrised) -> str:

@@ -351,7 +351,7 @@ class Balance(ManyChannels, Invertible):
     def unit_of(self, field: str, index: tuple[int, ...]) -> str | None:
         """Return the unit of a number: forces are in N, or in bar where areas are relative."""
         declared = super().unit_of(field, index)
-        force = "bar" if self.areas[0][0] == 1.0 and not self.n_loads else "N"
+        force = "bar" if self.areas[0][0] == 1.0 else "N"
         if field == "springs":
             power, place = divmod(index[-1], 1 + len(self.driven))
             by, degree = divmod(power - 1, self.degree)
@@ -359,6 +359,8 @@ class Balance(ManyChannels, Invertible):
             if power > 0:
                 below += f"{' ' if below else ''}{self.scheduled[by].unit}^{degree + 1}"
             return f"{force}/{below.replace('^1', '')}" if below else force
+        if field == "loads":
+            return f"{force}/{self.scheduled[index[-1] - self.n_loads].unit}"
         return (declared or "").replace("N", force)
 
     @classmethod

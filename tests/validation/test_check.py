@@ -81,7 +81,7 @@ MISSED: dict[str, tuple[Callable[[int], Array], Callable[[Array, Array], Array],
     "offset": (cycles, lambda u, y: y + 0.4, "an offset of 0.4"),
     "drift": (cycles, lambda u, y: y + np.linspace(0, 1, u.size), "drift over time"),
     "delay": (cycles, lambda u, y: late(y, 10), "a delay, about 0."),
-    "curve": (cycles, lambda u, y: y + 0.15 * (u - 2.5) ** 2, "the shape of the curve"),
+    "curve": (cycles, lambda u, y: y + 0.15 * (u - 2.5) ** 2, "the gain or shape of the curve"),
     "creep": (held, lambda u, y: y - 0.4 * creeping(u), "creep after large steps"),
 }
 

@@ -2,7 +2,7 @@
 
     python benchmarks/validation.py --seeds 400
 
-`right-white`, `right-coloured`: true models (PI, GPI, rate-dependent PI, a linear one), inputs (triangle,
+`right-white`, `right-coloured`: true models (PI, GPI, rate-dependent PI, linear), inputs (triangle,
 decaying triangle, random, multisine, random levels, steps), lengths, noise that is white or has a
 memory. Share of seeds in which the tests reject at 1 %: whiteness (white noise only), branches, inputs
 now and before; and how often the verdict names anything at all. A right test has 0.5 to 1.5 % in 400

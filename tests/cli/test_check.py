@@ -8,7 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mckibben import PI, Recording, write
+from mckibben import PI, PerChannel, Recording, check, write
+from mckibben.blocks.core.fields import Channel
+from mckibben.report.check_page import check_page
 from mckibben.signals import triangle
 from tests.attacks.commands import call
 
@@ -65,3 +67,28 @@ def test_bad_input_leaves_with_one_sentence(files: Path) -> None:
         assert refused.code == 2
         assert "Remedy" in refused.err
         assert "Traceback" not in refused.err
+
+
+def test_every_output_has_its_part_of_the_page() -> None:
+    parts = tuple(
+        PI(
+            TRUE.thresholds,
+            TRUE.weights,
+            input=Channel(f"pressure_{k}", "bar"),
+            output=Channel(f"displacement_{k}", "mm"),
+        )
+        for k in (1, 2)
+    )
+    time = np.arange(0, 30, 0.02)
+    channels = {f"pressure_{k}": triangle(time, 4.0 + k, [5.0, 3.0]) for k in (1, 2)}
+    for k in (1, 2):
+        noise = np.random.default_rng(k).standard_normal(time.size)
+        channels[f"displacement_{k}"] = TRUE.simulate(channels[f"pressure_{k}"]) + 0.1 * noise
+    runs = [Recording(channels, 0.02, meta={"name": name}) for name in ("first", "<b>second")]
+    found = check(PerChannel(parts), runs)
+    page = check_page(found, "model.json")
+    for place, output in enumerate(("displacement_1", "displacement_2")):
+        assert f'<section id="output-{place}">' in page
+        assert f"What it leaves of {output}" in page
+    assert "&lt;b&gt;second" in page
+    assert "<b>second" not in page

@@ -81,7 +81,7 @@ MISSED: dict[str, tuple[Callable[[int], Array], Callable[[Array, Array], Array],
     "offset": (cycles, lambda u, y: y + 0.4, "an offset of 0.4"),
     "drift": (cycles, lambda u, y: y + np.linspace(0, 1, u.size), "drift over time"),
     "delay": (cycles, lambda u, y: late(y, 10), "a delay, about 0."),
-    "curve": (cycles, lambda u, y: y + 0.15 * (u - 2.5) ** 2, "the shape of the curve"),
+    "curve": (cycles, lambda u, y: y + 0.15 * (u - 2.5) ** 2, "the gain or shape of the curve"),
     "creep": (held, lambda u, y: y - 0.4 * creeping(u), "creep after large steps"),
 }
 
@@ -232,3 +232,20 @@ def test_a_fit_to_the_very_recording_is_not_accused() -> None:
 
 def test_the_face_has_it() -> None:
     assert mckibben.check is check
+
+
+def test_recordings_without_time_and_of_one_rise_are_checked() -> None:
+    u = np.linspace(0, 5, 1000)
+    untimed = Recording(
+        {"pressure": u, "displacement": TRUE.simulate(u) + 0.1 * noise(1000, 0.0, 1)}
+    )
+    found = check(TRUE, untimed)
+    assert found.right
+    assert found.outputs[0].ahead[0].seconds is None
+
+
+def test_a_run_too_short_beside_the_others_is_said_to_be_left_out() -> None:
+    short = run(TRUE, 12, 2).with_meta(name="scrap")
+    found = check(TRUE, [run(TRUE, 5000, 1), short])
+    assert found.right
+    assert "left out of most: scrap" in found.notes[0]

@@ -100,8 +100,6 @@ class OutputCheck:
         Tests that the level is shared by.
     large_steps : bool
         Whether an input steps far at once.
-    fitted_here : bool or None
-        Whether the residual is as a fit to these very recordings leaves it; None for unknown.
     """
 
     output: str
@@ -123,7 +121,6 @@ class OutputCheck:
     ahead: tuple[Ahead, ...]
     n_tests: int
     large_steps: bool
-    fitted_here: bool | None = None
 
     @property
     def white(self) -> bool:
@@ -166,7 +163,6 @@ class OutputCheck:
             "n_tests": self.n_tests,
             "p_whiteness": self.whiteness.p_value,
             "p_branch": self.p_branch,
-            "fitted_here": self.fitted_here,
             "suspects": [one.to_dict() for one in self.suspects],
             "whiteness": self.whiteness.to_dict(),
             "crossings": [one.to_dict() for one in self.crossings],

@@ -98,10 +98,6 @@ class Suspects:
     groups: tuple[Group, ...]
     large_steps: bool
 
-    def blocks(self, samples: Array) -> Array:
-        """Return means over the blocks of a recording; see `averaged`."""
-        return averaged(samples, self.every)
-
     def of(self, kind: str, channel: str = "") -> Group | None:
         """Return a group, or None."""
         found = (g for g in self.groups if g.kind == kind and channel in ("", g.channel))
@@ -124,12 +120,11 @@ def suspects(block: Block, runs: Sequence[Run], output: int, every: int) -> Susp
         if (low := min(float(run.inputs[:, k].min()) for run in runs))
         < (high := max(float(run.inputs[:, k].max()) for run in runs))
     }
-    n = sum(len(run.inputs) // every for run in runs)
-    maker = _Maker(runs, every)
     blocks = [len(run.inputs) // every for run in runs]
+    maker = _Maker(blocks)
     constant = maker.add("offset", "", [np.ones((size, 1)) for size in blocks])
     knots = KNOTS if len(spans) == 1 else FEWER
-    knots = int(np.clip(n // (6 * SHARE * len(spans)), 4, knots))
+    knots = int(np.clip(sum(blocks) // (6 * SHARE * len(spans)), 4, knots))
     scaled = {
         k: [2 * (run.inputs[:, k] - low) / (high - low) - 1 for run in runs]
         for k, (low, high) in spans.items()
@@ -170,9 +165,9 @@ def suspects(block: Block, runs: Sequence[Run], output: int, every: int) -> Susp
 class _Maker:
     """Columns put side by side, group by group, while there are blocks for them."""
 
-    def __init__(self, runs: Sequence[Run], every: int) -> None:
-        self._parts: list[list[Array]] = [[] for _ in runs]
-        self._room = sum(len(run.inputs) // every for run in runs) // SHARE
+    def __init__(self, blocks: Sequence[int]) -> None:
+        self._parts: list[list[Array]] = [[] for _ in blocks]
+        self._room = sum(blocks) // SHARE
         self._count = 0
         self.groups: list[Group] = []
 

@@ -58,16 +58,13 @@ class Whiteness:
         return asdict(self)
 
 
-def whiteness(residuals: Sequence[Array], taken: float = 0.0) -> Whiteness:
+def whiteness(residuals: Sequence[Array]) -> Whiteness:
     """Return the autocorrelation of a residual, and whether it is that of white noise.
 
     Parameters
     ----------
     residuals : sequence of array, shape (n,)
         Of every recording.
-    taken : float
-        Parameters that were fitted to these residuals: a fit takes from every lag what slow noise of
-        as many dimensions has.
     """
     from scipy.special import chdtrc
 
@@ -82,8 +79,8 @@ def whiteness(residuals: Sequence[Array], taken: float = 0.0) -> Whiteness:
         for r in left:
             if len(r) > lag:
                 products = r[lag:] * r[:-lag]
-                # the mean and a fit were taken off: what noise itself would give is below zero
-                expected = -(1.0 + taken) * len(products) / n * power / n
+                # the mean was taken off: what noise itself would give is below zero
+                expected = -len(products) / n * power / n
                 found[lag - 1] += products.sum() - expected
                 scatter[lag - 1] += products @ products
     tested = min(TESTED, most, n // TO_A_LAG)

@@ -68,7 +68,7 @@ def phrase(one: OutputCheck, finding: Finding) -> str:
     return {
         "offset": f"an offset of {numeral(finding.coefficient, 2)} {one.unit}".rstrip(),
         "runs": "offsets that differ from run to run",
-        "curve": f"the shape of the curve over {by}",
+        "curve": f"the gain or shape of the curve over {by}",
         "load": f"the effect of {by}",
         "hysteresis": f"hysteresis over {by} that is left",
         "lag": f"{'a delay' if late > 0 else 'too much delay'}, about {numeral(abs(late), 2)}{unit}",

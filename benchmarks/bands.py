@@ -89,7 +89,7 @@ def random_runs(name: str) -> list[Recording]:
             )
         made = rig.run(Recording(commands, rig.sample_time), seed=seed)
         thinned = {channel: values[::every] for channel, values in made.channels.items()}
-        found.append(Recording(thinned, every * made.sample_time, dict(made.units)))
+        found.append(Recording(thinned, every * (made.sample_time or 0.0), dict(made.units)))
     return found
 
 

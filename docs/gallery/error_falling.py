@@ -16,6 +16,7 @@ time = np.arange(0, 60, STEP)
 
 
 def recorded(pressure: np.ndarray, seed: int) -> mckibben.Recording:
+    """Return a run of the virtual muscle."""
     return rig.run(mckibben.Recording({"pressure": pressure}, STEP), seed=seed)
 
 

@@ -85,8 +85,8 @@ def test_every_output_has_its_part_of_the_page() -> None:
         noise = np.random.default_rng(k).standard_normal(time.size)
         channels[f"displacement_{k}"] = TRUE.simulate(channels[f"pressure_{k}"]) + 0.1 * noise
     runs = [Recording(channels, 0.02, meta={"name": name}) for name in ("first", "<b>second")]
-    found = check(PerChannel(parts), runs)
-    page = check_page(found, "model.json")
+    model = PerChannel(parts)
+    page = check_page(check(model, runs), describe(model, runs), "model.json")
     for place, output in enumerate(("displacement_1", "displacement_2")):
         assert f'<section id="output-{place}">' in page
         assert f"What it leaves of {output}" in page

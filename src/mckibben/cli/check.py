@@ -34,6 +34,7 @@ def check(
     from mckibben.report.check_page import check_page
     from mckibben.system.atomic import to_json
     from mckibben.validation.check import check as find
+    from mckibben.validation.describing import describe
 
     folder = make_folder(out)
     *_, found_files = expanded([], list(files))
@@ -43,12 +44,14 @@ def check(
     wanted = [channel.name for channel in (*block.inputs, *block.outputs)]
     recordings = reading.read(found_files, list(dict.fromkeys(wanted)), informative=False)
     found = find(block, recordings)
+    description = describe(block, recordings)
     told = found.to_dict() | {
+        "description": description.to_dict(),
         "model_file": str(model),
         "notes_of_reading": notes_by_file(recordings),
     }
     results.write_text("validation.json", to_json(told) + "\n")
-    results.write_text("report.html", check_page(found, str(model)))
+    results.write_text("report.html", check_page(found, description, str(model)))
     if as_json:
         print_json({"folder": str(folder)} | told)
         return

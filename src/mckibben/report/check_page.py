@@ -4,11 +4,19 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from mckibben.report import check_subjects, interactive, subjects, templating, wording
+from mckibben.report import (
+    check_subjects,
+    description_subjects,
+    interactive,
+    subjects,
+    templating,
+    wording,
+)
 from mckibben.validation.results import LEVEL
 from mckibben.validation.words import phrase
 
 if TYPE_CHECKING:
+    from mckibben.validation.describing import ModelDescription
     from mckibben.validation.results import Validation
 
 MOST_RECORDINGS = 4
@@ -20,12 +28,14 @@ MOST_OUTPUTS = 6
 MODEL = "model"
 
 
-def check_page(found: Validation, model_file: str) -> str:
+def check_page(found: Validation, description: ModelDescription, model_file: str) -> str:
     """Return a check as HTML.
 
     Parameters
     ----------
     found : Validation
+    description : ModelDescription
+        Of the same model, on the same recordings.
     model_file : str
         Where the model was read from, to say so.
     """
@@ -51,8 +61,9 @@ def check_page(found: Validation, model_file: str) -> str:
             figures[f"residuals-{place}"].append(interactive.plots(drawing))
     return templating.page(
         "check.html.j2",
-        figures,
+        figures | description_subjects.figures(description),
         found=found,
+        description=description,
         model_file=model_file,
         drawn=runs,
         phrase=phrase,

@@ -10,6 +10,7 @@ from mckibben.recording import notes_by_file, reading_notes
 from mckibben.report import (
     answers,
     check_subjects,
+    description_subjects,
     interactive,
     model_subjects,
     subjects,
@@ -85,6 +86,7 @@ def page(study: Study) -> str:
         wording=wording,
         answers=answers,
         checked=checked(study),
+        description=study.description,
     )
 
 
@@ -126,6 +128,8 @@ def _figures(study: Study, pictured: tuple[Shown, ...]) -> tuple[Plots, str]:
     if any(any(model_subjects.operator_sums(block)) for block in blocks.values()):
         drawing = model_subjects.weights(blocks)
         figures["weights"], left_out = [interactive.plots(drawing)], drawing.note
+    if study.description is not None:
+        figures |= description_subjects.figures(study.description)
     for one in checked(study):
         patterns = [
             interactive.plots(check_subjects.pattern(one, each))[0] for each in one.patterns

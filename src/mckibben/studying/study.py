@@ -23,6 +23,7 @@ from mckibben.recording import Recording
 from mckibben.studying.checking import check_on_test
 from mckibben.studying.inverting import InverseCheck, invert_best
 from mckibben.studying.loops import closed_loops, published_rig
+from mckibben.validation.describing import ModelDescription, describe
 from mckibben.validation.results import Validation
 
 
@@ -54,6 +55,8 @@ class Study:
         What the recordings cannot tell, most important first.
     check : Validation, str or None
         What the chosen model misses on the test, or why that cannot be told; None without a choice.
+    description : ModelDescription or None
+        What the chosen model is: equations, parameters and how sure they are, how it answers.
     """
 
     train: tuple[Recording, ...]
@@ -68,6 +71,7 @@ class Study:
     notes: tuple[str, ...] = ()
     untold: tuple[Gap, ...] = ()
     check: Validation | str | None = None
+    description: ModelDescription | None = field(default=None, repr=False)
 
     @property
     def input(self) -> str:
@@ -86,6 +90,7 @@ class Study:
             "characterization": None if known is None else known.to_dict(),
             "untold": [gap.to_dict() for gap in self.untold],
             "check": self.check.to_dict() if isinstance(self.check, Validation) else self.check,
+            "description": None if self.description is None else self.description.to_dict(),
             "leaderboard": self.leaderboard.to_dict(),
             "inverse": None if self.inverse is None else self.inverse.to_dict(),
             "tracking": {name: dict(tracked.rmse) for name, tracked in self.loops.items()},
@@ -201,6 +206,7 @@ def study(
             so_far,
             untold=untold(recordings, channels.inputs, names, block, tests=tests),
             check=check_on_test(block, split, on_test, names),
+            description=describe(block, split.train),
         )
     if channels.single:
         so_far = replace(so_far, inverse=invert_best(board, recordings[0]))

@@ -12,6 +12,7 @@ from mckibben import PI, PerChannel, Recording, check, write
 from mckibben.blocks.core.fields import Channel
 from mckibben.report.check_page import check_page
 from mckibben.signals import triangle
+from mckibben.validation.describing import describe
 from tests.attacks.commands import call
 
 TRUE = PI(thresholds=(0.0, 0.3, 0.6), weights=(3.0, 1.0, 0.7))

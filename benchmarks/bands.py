@@ -14,7 +14,7 @@ from __future__ import annotations
 import argparse
 import warnings
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -171,7 +171,7 @@ def turned(name: str, kind: str, runs: Sequence[Recording], settings: dict[str, 
         for part in range(PARTS):
             new = rest[part::PARTS]
             known = [run for place, run in enumerate(rest) if place % PARTS != part]
-            held += missed(known, new)[1]
+            held += [replace(run, by=part) for run in missed(known, new)[1]]
         model, asked = missed(rest, [test])
         found = [find_band(model, held, shapes=shapes) for shapes in (SHAPES, SHAPES[:1])]
         level = 100 * found[0].level

@@ -123,8 +123,10 @@ def find_band(
         all_missed.append(errors[run.counts])
     of = np.unique(np.concatenate(units_of), return_inverse=True)[1]
     n_units = int(of.max()) + 1
-    # what is like in a whole run is foreseen in a block of it, and in no new run
-    apart = np.repeat(np.arange(len(runs)), [e.shape[0] for e in all_missed])
+    # what is like in a whole run, or of one model, is foreseen in a part of it, and in no new one
+    models = [run.by for run in runs]
+    alike = models if len(set(models)) > 1 else range(len(runs))
+    apart = np.repeat(np.array(alike), [e.shape[0] for e in all_missed])
     apart = of if len(runs) == 1 else np.unique(apart, return_inverse=True)[1]
     if n_units < 2:
         raise DataError(

@@ -29,6 +29,9 @@ class Held:
         Samples that are scored.
     sample_time : float or None
         [s].
+    by : int
+        Which model's outputs these are, where a cross-validation has several: what one misses in common
+        tells nothing of the next.
     """
 
     inputs: Array
@@ -36,6 +39,7 @@ class Held:
     measured: Array
     counts: NDArray[np.bool_]
     sample_time: float | None
+    by: int = 0
 
 
 def memory_of(errors: list[Array]) -> float:

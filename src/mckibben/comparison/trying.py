@@ -320,6 +320,7 @@ def _try(data: Data, part: Part, tell: Callable[..., None]) -> Tried:
 
     def validate(block: Block, fold: Fold) -> None:
         nonlocal count
+        place = next(k for k, other in enumerate(data.folds) if other is fold)
         # a single recording is fitted and tested on samples of its own
         fitted_to = list(zip(fold.train, fold.train_rows, strict=True))
         for recording, rows in zip(fold.test, fold.test_rows, strict=True):
@@ -328,7 +329,7 @@ def _try(data: Data, part: Part, tell: Callable[..., None]) -> Tried:
             modelled = run_free(block, recording, names, own, own_rows)
             measured, step = recording.matrix(names), recording.sample_time
             driving = recording.matrix(channel.name for channel in block.inputs)
-            held.append(Held(driving, modelled, measured, rows, step))
+            held.append(Held(driving, modelled, measured, rows, step, place))
             errors = (modelled - measured)[rows]
             squares.extend(squares_of(errors))
             count += len(errors)

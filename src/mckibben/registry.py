@@ -30,6 +30,8 @@ PLUGINS: dict[str, dict[str, str | Preset]] = {
         "affine": "mckibben.blocks.memoryless.affine:Affine",
         "air": "mckibben.blocks.dynamic.air:Air",
         "balance": "mckibben.blocks.coupled.balance:Balance",
+        "band": "mckibben.blocks.bands.band:Band",
+        "banded": "mckibben.blocks.bands.banded:Banded",
         "bouc-wen": "mckibben.blocks.differential.bouc_wen:BoucWen",
         "bouc-wen-oscillator": (
             "mckibben.blocks.differential.bouc_wen_oscillator:BoucWenOscillator"

@@ -81,6 +81,8 @@ def test_what_is_there_is_shown(tmp_path: Path) -> None:
         await user.should_see(marker="recording-run")
         user.find(marker="tab-look").click()
         await user.should_see("What the muscle does")
+        await user.should_see("What these recordings cannot tell")
+        await user.should_see("no input is ever held", retries=100)
         await user.should_see(marker="loop-plot")
         user.find(marker="tab-models").click()
         await user.should_see(marker="leaderboard")

@@ -11,6 +11,7 @@ import pytest
 from numpy.typing import NDArray
 
 from mckibben import ModelWarning
+from mckibben.blocks.bands.state_of_motion import look_along
 from mckibben.blocks.core.fields import vector
 from mckibben.blocks.core.linear_system import eliminate
 from mckibben.blocks.core.root import solve_near
@@ -33,7 +34,7 @@ from mckibben.estimators.coupled.balance_starts import begin_at
 from mckibben.estimators.coupled.recurrent_fit import remembered
 from mckibben.registry import load
 from mckibben.system.compiling import Deferred
-from tests.twins import TWINS
+from tests.twins import TWINS, motion_seen
 
 Array = NDArray[np.float64]
 
@@ -488,3 +489,16 @@ def test_air_holds_between_its_goals_and_goes_as_far_as_it_can() -> None:
     assert pressure[:14].tolist() == [pressure[0]] * 14  # held, then late
     expected = TWINS["air"](air, command[:, np.newaxis].tolist(), 0.01)
     np.testing.assert_allclose(pressure[:, np.newaxis], expected, atol=1e-12)
+
+
+def test_what_a_band_is_fitted_to_is_what_it_sees() -> None:
+    samples = path([-0.5, 0.0, -1.0], [5.5, 2.0, 41.0])
+    ends, widths, keeps = (
+        np.array([[0.0, 0.1, 0.0], [5.0, 1.9, 40.0]]),
+        np.array([0.1, 0.3]),
+        np.array([0.9]),
+    )
+    found = np.empty((len(samples), 3 + 2 * 3))
+    look_along(samples, ends.ravel(), widths, keeps, 2, found)
+    expected, _ = motion_seen(ends.tolist(), widths.tolist(), keeps.tolist(), 2, samples.tolist())
+    np.testing.assert_allclose(found, expected, atol=1e-12)

@@ -140,6 +140,8 @@ def test_info_lists_models_and_tells_about_files(
     assert {"pi", "mpi", "rdpi", "gpi", "eupi"} <= set(listed)
     assert listed["gpi"]["settings"]["n_operators"] == 10
     assert json.loads(cli("info", model, "--json").out)["kind"] == "gpi"
-    (recording,) = json.loads(cli("info", files[0], "--json").out)
+    told = json.loads(cli("info", files[0], "--json").out)
+    (recording,) = told["recordings"]
+    assert "rate" in {gap["what"] for gap in told["untold"]}
     assert recording["channels"]["pressure"]["unit"] == "bar"
     assert cli("info", "--models").code == cli("info", model).code == 0

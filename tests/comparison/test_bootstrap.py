@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from mckibben.comparison.bootstrap import BlockBootstrap, interval
+from mckibben.comparison.bootstrap import BlockBootstrap, differences, interval
 
 
 def naive_rmse(errors: np.ndarray, n: int, seed: int, resamples: int) -> np.ndarray:
@@ -52,3 +52,29 @@ def test_blocks_stay_inside_their_recording() -> None:
 @pytest.mark.parametrize("n", [1, 2, 3])
 def test_short_recordings_work(n: int) -> None:
     assert np.isfinite(BlockBootstrap([n], 0).rmse(np.ones(n))).all()
+
+
+def test_intervals_of_all_differences_hold_at_once() -> None:
+    """Of ten models equally good, none is told apart in 95 % of the tests; one at a time, more are."""
+    at_once, one_by_one = [], []
+    for seed in range(200):
+        rng = np.random.default_rng(seed)
+        errors = rng.standard_normal((10, 900))
+        bootstrap = BlockBootstrap([900], seed)
+        samples = np.array([bootstrap.rmse(one) for one in errors])
+        values = np.sqrt((errors**2).mean(axis=1))
+        ends = np.array(differences(samples, values, 0))[1:]
+        at_once.append(((ends[:, 0] <= 0) & (ends[:, 1] >= 0)).all())
+        pairs = np.array([interval(one - samples[0]) for one in samples[1:]])
+        one_by_one.append(((pairs[:, 0] <= 0) & (pairs[:, 1] >= 0)).all())
+    assert 0.9 <= np.mean(at_once) <= 0.995
+    assert np.mean(one_by_one) < np.mean(at_once) - 0.1
+
+
+def test_a_worse_model_is_told_apart_and_the_chosen_one_differs_from_itself_by_nothing() -> None:
+    errors = np.random.default_rng(3).standard_normal(900)
+    bootstrap = BlockBootstrap([900], 0)
+    samples = np.array([bootstrap.rmse(errors), bootstrap.rmse(1.5 * errors)])
+    first, second = differences(samples, np.array([1.0, 1.5]) * np.std(errors), 0)
+    assert first == (0.0, 0.0)
+    assert second[0] > 0

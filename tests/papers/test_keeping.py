@@ -10,7 +10,7 @@ import pytest
 
 from mckibben import GPI, PIEstimator, Recording
 from mckibben.comparison.kept import Kept
-from mckibben.comparison.results import Row
+from mckibben.comparison.row import Row
 from mckibben.estimators.core.estimator import Estimator
 from mckibben.metrics import score
 from mckibben.papers.keeping import fitted, recorded

@@ -16,7 +16,8 @@ from mckibben.blocks.play_type.gpi import GPI
 from mckibben.blocks.play_type.pi import PI
 from mckibben.blocks.play_type.rate_dependent_pi import RateDependentPI
 from mckibben.characterization import characterize
-from mckibben.comparison.results import Leaderboard, Memory, Row
+from mckibben.comparison.results import Leaderboard
+from mckibben.comparison.row import Memory, Row
 from mckibben.metrics import score
 from mckibben.recording import Recording
 from mckibben.studying.inverting import InverseCheck, check_inverse

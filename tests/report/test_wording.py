@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mckibben.comparison.results import Memory
+from mckibben.comparison.row import Memory
 from mckibben.report.wording import (
     commands,
     duration,
@@ -70,8 +70,10 @@ def test_models_that_tie_with_the_best_are_named() -> None:
     rows = list(found.leaderboard.rows)
     rows[1] = replace(rows[1], difference_interval=(-0.1, 0.1))
     tied = replace(found, leaderboard=replace(found.leaderboard, rows=tuple(rows)))
-    assert "mpi cannot be told apart" in " ".join(verdict(tied))
-    assert "told apart" not in " ".join(verdict(found))
+    assert "Level with it on the test data, as far as they can tell: mpi." in " ".join(
+        verdict(tied)
+    )
+    assert "Level with it" not in " ".join(verdict(found))
 
 
 def test_next_steps_answer_what_is_wrong() -> None:

@@ -3,37 +3,46 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from mckibben.cli.grouping import spread
-from mckibben.cli.options import Json, Reading
+from mckibben.cli.options import Inputs, Json, Outputs, Reading
 from mckibben.cli.output import print_json, print_table, say
 from mckibben.errors import DataError
+
+if TYPE_CHECKING:
+    from mckibben.excitation import Gap
+    from mckibben.recording import Recording
 
 
 @spread
 def info(
     reading: Reading,
-    file: Annotated[
-        Path | None, typer.Argument(help="A recording, or a model saved as JSON.")
+    files: Annotated[
+        list[Path] | None,
+        typer.Argument(metavar="FILES...", help="Recordings, or a model saved as JSON."),
     ] = None,
     models: Annotated[bool, typer.Option("--models", help="List the models and settings.")] = False,
+    inputs: Inputs = None,
+    outputs: Outputs = None,
+    model: Annotated[
+        Path | None,
+        typer.Option("--model", help="Model, as JSON: which of its parameters the files tell."),
+    ] = None,
     as_json: Json = False,
 ) -> None:
-    """List the models, or say what a recording or a model file holds."""
+    """List the models, or say what files hold, and what recordings cannot tell of a muscle."""
     if models:
         _models(as_json)
-    elif file is None:
+    elif not files:
         raise DataError("there is nothing to tell about", remedy="give a file, or --models")
-    elif file.suffix.lower() == ".json":
-        _model(file, as_json)
+    elif len(files) == 1 and files[0].suffix.lower() == ".json":
+        _model(files[0], as_json)
     else:
-        _recordings(
-            reading.read([file], None, informative=False),
-            as_json,
-        )
+        recordings = reading.read(files, None, informative=False)
+        _recordings(recordings, _untold(recordings, inputs, outputs, model), as_json)
 
 
 def _models(as_json: bool) -> None:
@@ -77,8 +86,26 @@ def _model(file: Path, as_json: bool) -> None:
     print_table(["", "value"], [[key, str(value)] for key, value in described.items()])
 
 
-def _recordings(recordings: list[Any], as_json: bool) -> None:
-    described = [
+def _untold(
+    recordings: list[Recording],
+    inputs: list[str] | None,
+    outputs: list[str] | None,
+    model: Path | None,
+) -> tuple[Gap, ...] | str:
+    """Return what recordings cannot tell, or, if nothing was asked by name, why that cannot be said."""
+    from mckibben.blocks.core.saving import load
+    from mckibben.excitation import untold
+
+    try:
+        return untold(recordings, inputs, outputs, None if model is None else load(model))
+    except DataError as error:
+        if inputs or outputs or model:
+            raise
+        return str(error)
+
+
+def _recordings(recordings: list[Recording], gaps: tuple[Gap, ...] | str, as_json: bool) -> None:
+    described: list[dict[str, Any]] = [
         {
             "name": recording.name,
             "n_samples": recording.n_samples,
@@ -97,7 +124,8 @@ def _recordings(recordings: list[Any], as_json: bool) -> None:
         for recording in recordings
     ]
     if as_json:
-        print_json(described)
+        told = gaps if isinstance(gaps, str) else [gap.to_dict() for gap in gaps]
+        print_json({"recordings": described, "untold": told})
         return
     for recording in recordings:
         say(str(recording))
@@ -108,3 +136,12 @@ def _recordings(recordings: list[Any], as_json: bool) -> None:
         print_table(["channel", "unit", "lowest", "highest"], rows)
         for note in recording.notes:
             say(f"Note: {note}")
+    say()
+    if isinstance(gaps, str):
+        say(f"What they cannot tell is not known: {gaps}")
+        return
+    say(
+        "What these recordings cannot tell:" if gaps else "These recordings tell what they need to."
+    )
+    for gap in gaps:
+        say(f"- {gap}")

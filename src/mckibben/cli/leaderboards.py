@@ -52,11 +52,14 @@ def print_leaderboard(board: Leaderboard) -> None:
     for row in board.ranking:
         if row.test is not None:
             given = row.to_dict()
-            name = row.model + ("*" if row.caution else "")
+            level = " ≈" if row.model in board.level else ""
+            name = row.model + level + ("*" if row.caution else "")
             rows.append([name, *(column.text(given) for column in columns)])
     say(f"Split: {board.split}.")
     print_table(["model", *(column.label for column in columns)], rows)
     say("All run free. Rank: by test RMSE. Gap between branches kept: 100 % is right, 0 forgets.")
+    if board.level:
+        say("≈ level with the chosen model: the interval of the difference on the test holds 0.")
     if board.constant is not None and board.rows:
         say("constant: the mean of the training output, which every model has to beat.")
     if board.chosen:

@@ -16,7 +16,9 @@ from typing import Annotated, Any
 import typer
 
 from mckibben.cli.app import app as workbench
+from mckibben.cli.calibrate import calibrate
 from mckibben.cli.characterize import characterize
+from mckibben.cli.check import check
 from mckibben.cli.check_block import check_block
 from mckibben.cli.compare import compare
 from mckibben.cli.export import app as export_app
@@ -26,6 +28,7 @@ from mckibben.cli.invert import invert
 from mckibben.cli.measured import measured
 from mckibben.cli.muscles import app as muscles_app
 from mckibben.cli.output import InterruptionError, finish, say, visible
+from mckibben.cli.plan import plan
 from mckibben.cli.plot import plot
 from mckibben.cli.reproduce import reproduce
 from mckibben.cli.rig import app as rig_app
@@ -51,8 +54,8 @@ app = typer.Typer(
     rich_markup_mode=None,
 )
 for command in (
-    *(study, characterize, fit, compare, simulate, invert, track, plot, reproduce, info),
-    measured,
+    *(study, characterize, fit, compare, check, calibrate, simulate, invert, track, plan, plot),
+    *(reproduce, measured, info),
 ):
     app.command()(command)
 app.command("check-block")(check_block)

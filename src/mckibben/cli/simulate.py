@@ -14,7 +14,7 @@ from mckibben.cli.options import (
     Reading,
 )
 from mckibben.cli.output import print_json, say
-from mckibben.errors import DataError
+from mckibben.errors import DataError, ModelError
 from mckibben.numerals import numeral
 
 
@@ -35,6 +35,13 @@ def simulate(
         int | None,
         typer.Option(help="Predict so many samples ahead from measured outputs, instead of free."),
     ] = None,
+    interval: Annotated[
+        float | None,
+        typer.Option(
+            metavar="LEVEL",
+            help="Of a calibrated model: also lower and upper ends that hold this share, as 0.9.",
+        ),
+    ] = None,
     force: Force = False,
     as_json: Json = False,
 ) -> None:
@@ -45,6 +52,7 @@ def simulate(
     """
     from dataclasses import asdict
 
+    from mckibben.bands.beyond import beyond_calibrated
     from mckibben.blocks.core.saving import load
     from mckibben.blocks.coupled.known import beyond_known
     from mckibben.files import write
@@ -52,7 +60,9 @@ def simulate(
     from mckibben.outputs import claim_recording
 
     claim_recording(out, inputs=[model, file], force=force)
-    block = load(model)
+    banded, block = _parted(load(model), interval)
+    if banded is not None and horizon is not None:
+        raise ModelError("bands are of free runs. Remedy: leave --horizon or --interval out.")
     wanted = [channel.name for channel in block.inputs]
     recordings = reading.read([file], wanted, informative=False)
     if len(recordings) > 1:
@@ -63,24 +73,43 @@ def simulate(
         )
     (recording,) = recordings
     if horizon is None:
-        modelled = block.simulate(recording, initial=_initial(initial, block, recording))
+        start = _initial(initial, block, recording)
+        modelled = (banded or block).simulate(recording, initial=start)
     else:
         modelled = _predicted(block, recording, horizon)
     notes = beyond_known(block, recording)
     result = recording.select(wanted)
+    if banded is not None:
+        samples = modelled.matrix(channel.name for channel in banded.band.inputs)
+        notes += beyond_calibrated(banded.band, samples, recording.name)
     metrics: dict[str, dict[str, float]] = {}
     for channel in block.outputs:
         name = f"{channel.name}_model"
         result = result.with_channels({name: channel.unit}, **{name: modelled[channel.name]})
+        ends = [f"{channel.name}_{end}" for end in ("lower", "upper")] if banded else []
+        for end in ends:
+            result = result.with_channels({end: channel.unit}, **{end: modelled[end]})
         if channel.name in recording and channel.name not in wanted:
             measured = recording[channel.name]
             result = result.with_channels(
                 {channel.name: recording.units[channel.name]}, **{channel.name: measured}
             )
             metrics[channel.name] = asdict(score(measured, modelled[channel.name]))
+            if ends:
+                lower, upper = (modelled[end] for end in ends)
+                inside = (lower <= measured) & (measured <= upper)
+                metrics[channel.name] |= {
+                    "coverage": float(inside.mean()),
+                    "band_width": float((upper - lower).mean()),
+                }
     write(result.with_meta(model=str(model)), out)
     if as_json:
-        head = {"file": str(out), "n_samples": len(result), "horizon": horizon}
+        head = {
+            "file": str(out),
+            "n_samples": len(result),
+            "horizon": horizon,
+            "interval": interval,
+        }
         print_json(head | {"metrics": metrics, "notes": notes})
         return
     for name, figures in metrics.items():
@@ -89,14 +118,33 @@ def simulate(
             f"RMSE {numeral(figures['rmse'], 4)}, MAE {numeral(figures['mae'], 4)}, worst "
             f"{numeral(figures['max_error'], 4)} {recording.units[name]}, R² {numeral(figures['r2'], 5)}"
         )
+        if interval is not None:
+            say(
+                f"{name}: {numeral(100 * figures['coverage'], 3)} % of the samples lie in the band for "
+                f"{numeral(100 * interval, 3)} %, {numeral(figures['band_width'], 3)} "
+                f"{recording.units[name]} wide on average"
+            )
     for note in notes:
         say(f"Note: {note}")
     say(f"Written: {out}")
 
 
+def _parted(block: Any, interval: float | None) -> tuple[Any, Any]:
+    """Return the model with its band, if one is asked for, and the model."""
+    from mckibben.blocks.bands.banded import Banded
+
+    if interval is None:
+        return None, block.forward if isinstance(block, Banded) else block
+    if not isinstance(block, Banded):
+        raise ModelError(
+            "this model has no band. Remedy: calibrate it on recordings that it was not fitted to: "
+            "mckibben calibrate model.json FILES -o banded.json."
+        )
+    return block.at(interval), block.forward
+
+
 def _predicted(block: Any, recording: Any, horizon: int) -> Any:
     from mckibben.blocks.dynamic.transfer_function import TransferFunction
-    from mckibben.errors import ModelError
 
     if not isinstance(block, TransferFunction):
         raise ModelError(

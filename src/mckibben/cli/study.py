@@ -79,12 +79,17 @@ def _say(study: Study, folder: Path) -> None:
     if study.characterization is not None:
         for sentence in study.characterization.sentences:
             say(sentence)
+    for gap in study.untold:
+        say(f"- {gap}")
     say(f"Drawn: {folder / 'report.html'}, which grows with every model fitted.\n", flush=True)
 
 
 def _conclude(study: Study, folder: Path) -> None:
     print_leaderboard(study.leaderboard)
     say()
+    for gap in study.untold:
+        if gap.what == "parameters":
+            say(f"- {gap}")
     check = study.inverse
     if check is not None and check.reachable is not None:
         low, high = check.reachable

@@ -80,3 +80,30 @@ def interval(samples: Array) -> tuple[float, float]:
     """Return the central 95 % of resampled figures."""
     low, high = np.quantile(samples, [0.025, 0.975])
     return float(low), float(high)
+
+
+def differences(samples: Array, values: Array, chosen: int) -> list[tuple[float, float]]:
+    """Return intervals of the differences of figures to a chosen one, which hold all at once in 95 %.
+
+    Their half widths are one multiple of each difference's own standard deviation, that which the
+    largest of all deviations of a resample exceeds in 5 % (the method of single-step max-t).
+
+    Parameters
+    ----------
+    samples : array, shape (k, RESAMPLES)
+        Resampled figures of k models, on the same blocks.
+    values : array, shape (k,)
+        The figures.
+    chosen : int
+        Place of the one that all are compared with; its own interval is 0 to 0.
+    """
+    apart, found = samples - samples[chosen], values - values[chosen]
+    deviation = apart.std(axis=1)
+    told = deviation > 1e-12 * np.abs(values)
+    multiple = 0.0
+    if told.any():
+        strayed = np.abs(apart[told] - apart[told].mean(axis=1, keepdims=True))
+        largest = (strayed / deviation[told, np.newaxis]).max(axis=0)
+        multiple = float(np.quantile(largest, 0.95))
+    half = multiple * deviation
+    return [(float(d - h), float(d + h)) for d, h in zip(found, half, strict=True)]

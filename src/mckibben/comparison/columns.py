@@ -82,6 +82,12 @@ def columns_of(
         Column("chosen", CHOICES[chosen_by][0], unit, on_train if by_fit else validated),
         Column("test", "test RMSE", unit, _inside("test", "rmse")),
         Column("interval", "95 % interval", unit, _inside("test", "rmse_interval")),
+        Column(
+            "difference",
+            "less the chosen’s",
+            unit,
+            _inside("test", "difference_to_chosen_interval"),
+        ),
         *of_each,
         Column("rank", "rank", "", _inside("test", "rank")),
         *(() if by_fit else (Column("train", CHOICES["fit"][0], unit, on_train),)),

@@ -8,8 +8,9 @@ from dataclasses import replace
 import numpy as np
 
 from mckibben.arrays import Array
+from mckibben.comparison.pieces import squares_of
 from mckibben.comparison.recommending import CONSTANT
-from mckibben.comparison.results import Row
+from mckibben.comparison.row import Row
 from mckibben.comparison.splits import Mask
 from mckibben.comparison.trying import (
     Data,
@@ -17,7 +18,6 @@ from mckibben.comparison.trying import (
     rms_by_output,
     rms_of,
     scores_of,
-    squares_of,
 )
 from mckibben.recording import Recording
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from mckibben.arrays import Array
 from mckibben.blocks.core.block import Block
-from mckibben.comparison.results import Memory
+from mckibben.comparison.row import Memory
 from mckibben.errors import MckibbenError
 from mckibben.recording import Recording
 from mckibben.signals import branches

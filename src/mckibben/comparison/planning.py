@@ -16,7 +16,8 @@ from mckibben.comparison.constant import constant_of
 from mckibben.comparison.coverage import Coverage, coverage_of
 from mckibben.comparison.kept import Kept, source
 from mckibben.comparison.offered import objections
-from mckibben.comparison.results import Leaderboard, Row
+from mckibben.comparison.results import Leaderboard
+from mckibben.comparison.row import Row
 from mckibben.comparison.shared_stretches import TESTED, told
 from mckibben.comparison.splits import given_split, held_out, listed, validation_folds
 from mckibben.comparison.trying import Data, Item, Tried

@@ -12,14 +12,18 @@ from pathlib import Path
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.comparison.bootstrap import BlockBootstrap, interval, skill_of
+from mckibben.comparison.banding import tested_band
+from mckibben.comparison.bootstrap import BlockBootstrap, differences, interval, skill_of
 from mckibben.comparison.channels import Names
+from mckibben.comparison.choosing import Choice, choice_of
 from mckibben.comparison.coverage import OffTraining
 from mckibben.comparison.drift import Drift, Stretch, drift_of
 from mckibben.comparison.kept import Kept
+from mckibben.comparison.pieces import counts_of
 from mckibben.comparison.planning import N_FOLDS, Plan, Settings, plan_of
 from mckibben.comparison.recommending import CONSTANT
-from mckibben.comparison.results import CHOICES, Leaderboard, Row
+from mckibben.comparison.results import CHOICES, Leaderboard
+from mckibben.comparison.row import Row
 from mckibben.comparison.standing import Standing
 from mckibben.comparison.trying import (
     Tried,
@@ -251,7 +255,8 @@ def ranked(
             whole = joined(
                 [piece for _, piece in sorted(pieces[model].items())], data.channels.outputs
             )
-            finished[model] = _with_skill(whole, plan)
+            whole = _with_skill(whole, plan)
+            finished[model] = _with_band(whole, finished, plan)
             row = finished[model].row
             if row is not None and row.sound:  # a failure may be the machine's, not the model's
                 item = remaining[model]
@@ -274,6 +279,20 @@ def _with_skill(tried: Tried, plan: Plan) -> Tried:
     return replace(tried, row=replace(row, skill=skill, skill_least=least))
 
 
+def _with_band(tried: Tried, others: Mapping[str, Tried], plan: Plan) -> Tried:
+    """Return what came of a model with its band, where it is the best until now; it may be chosen."""
+    row, held = tried.row, tried.held
+    tried = replace(tried, held=())  # they are large
+    if row is None or not row.sound or row.block is None:
+        return tried
+    if any(o.row is not None and o.row.sound and o.row.order < row.order for o in others.values()):
+        return tried
+    found = tested_band(row.block, held, tried.outputs, plan.data)
+    if found is None:
+        return tried
+    return replace(tried, row=replace(row, banded=found[0], band=found[1]))
+
+
 def _ranking(
     plan: Plan,
     finished: Mapping[str, Tried],
@@ -292,7 +311,6 @@ def _ranking(
             row,
             test_rank=1 + by_test.index(_rmse(row)),
             rmse_interval=interval(samples),
-            difference_interval=interval(samples - done[0][1]),
             off_training=_off_training(row, finished[row.model].outputs, plan),
             drift=drift(row.model),
         )
@@ -301,16 +319,32 @@ def _ranking(
     failed = [t.row for t in finished.values() if t.row is not None and t.row.test is None]
     failed.sort(key=lambda row: row.model)
     outputs = {row.model: finished[row.model].outputs for row in rows}
-    board = plan.board([*rows, *failed])
-    if done and plan.constant.row is not None:
-        samples = resampled(CONSTANT, plan.constant)
-        constant = replace(
-            plan.constant.row,
-            rmse_interval=interval(samples),
-            difference_interval=interval(samples - done[0][1]),
-        )
-        board = replace(board, constant=constant)
+    constant = plan.constant.row
+    if not rows or constant is None:
+        return Ranking(plan.board([*rows, *failed]), outputs)
+    samples = [*(samples for _, samples in done), resampled(CONSTANT, plan.constant)]
+    constant = replace(constant, rmse_interval=interval(samples[-1]))
+    best = plan.board(rows).best or rows[0]
+    apart = differences(
+        np.array(samples), np.array([_rmse(row) for row in (*rows, constant)]), rows.index(best)
+    )
+    *rows, constant = (
+        replace(row, difference_interval=ends)
+        for row, ends in zip((*rows, constant), apart, strict=True)
+    )
+    board = replace(plan.board([*rows, *failed]), constant=constant, choice=_choice(rows, plan))
     return Ranking(board, outputs)
+
+
+def _choice(rows: Sequence[Row], plan: Plan) -> Choice | None:
+    """Return the choice among the models that could have been chosen beside the first."""
+    rivals = [
+        row
+        for row in rows
+        if row.order[:2] == rows[0].order[:2] and (row.skill_least is None or row.skill_least > 0)
+    ]
+    squares = {row.model: row.squares for row in rivals if row.squares}
+    return choice_of(squares, counts_of(plan.data.folds), plan.seed)
 
 
 def _off_training(row: Row, outputs: Sequence[Array], plan: Plan) -> OffTraining | None:

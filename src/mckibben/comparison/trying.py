@@ -12,13 +12,15 @@ import numpy as np
 
 from mckibben import registry
 from mckibben.arrays import Array
+from mckibben.bands.held import Held
 from mckibben.blocks.core.block import Block
 from mckibben.comparison.channels import Channels
 from mckibben.comparison.cluster import outcomes_outside, outer_backend, processes_outside
 from mckibben.comparison.free_run import run_free
 from mckibben.comparison.memory_test import memory_test
 from mckibben.comparison.offered import objections
-from mckibben.comparison.results import Row
+from mckibben.comparison.pieces import PIECES, squares_of
+from mckibben.comparison.row import Row
 from mckibben.comparison.splits import Fold, Mask, Split
 from mckibben.errors import MckibbenError
 from mckibben.estimators.optimisers.tracker import Progress, whole_searches
@@ -29,9 +31,6 @@ from mckibben.system.threads import cores
 from mckibben.system.workers import Outcome, WorkerError
 
 TIMED_SAMPLES = 20_000
-
-PIECES = 8
-"""Blocks that the errors on a recording of the cross-validation are summed in, so that models pair."""
 
 WORTH_A_PROCESS = 4.0
 """Seconds of work below which starting processes takes longer than it saves."""
@@ -118,6 +117,8 @@ class Tried:
         Samples in them.
     invalid : str or None
         Why a fold could not be fitted.
+    held : tuple of Held
+        What the cross-validation's models gave on what they were not fitted to.
     """
 
     row: Row | None = None
@@ -125,6 +126,7 @@ class Tried:
     squares: tuple[tuple[float, ...] | None, ...] = ()
     count: int = 0
     invalid: str | None = None
+    held: tuple[Held, ...] = ()
 
 
 def parts_of(name: str, item: Item, n_folds: int, split: bool) -> list[Part]:
@@ -238,13 +240,10 @@ def joined(parts: Sequence[Tried], names: Sequence[str]) -> Tried:
         whole.row,
         validation_rmse=rms_of(parts),
         validation_by_output=dict(zip(names, by_output, strict=False)),
+        squares=tuple(piece for piece in squares if piece is not None),
     )
-    return replace(whole, row=row, squares=squares)
-
-
-def squares_of(errors: Array) -> list[tuple[float, ...]]:
-    """Return the sums of squared errors (n, k) of consecutive pieces."""
-    return [tuple((piece**2).sum(axis=0).tolist()) for piece in np.array_split(errors, PIECES)]
+    held = tuple(one for tried in parts for one in tried.held)
+    return replace(whole, row=row, squares=squares, held=held)
 
 
 def rms_by_output(parts: Sequence[Tried]) -> list[float]:
@@ -316,6 +315,7 @@ def _try(data: Data, part: Part, tell: Callable[..., None]) -> Tried:
             )
 
     squares: list[tuple[float, ...] | None] = []
+    held: list[Held] = []
     count, invalid = 0, None
 
     def validate(block: Block, fold: Fold) -> None:
@@ -326,7 +326,10 @@ def _try(data: Data, part: Part, tell: Callable[..., None]) -> Tried:
             known = [pair for pair in fitted_to if pair[0] is recording]
             own, own_rows = [r for r, _ in known], [kept for _, kept in known]
             modelled = run_free(block, recording, names, own, own_rows)
-            errors = (modelled - recording.matrix(names))[rows]
+            measured, step = recording.matrix(names), recording.sample_time
+            driving = recording.matrix(channel.name for channel in block.inputs)
+            held.append(Held(driving, modelled, measured, rows, step))
+            errors = (modelled - measured)[rows]
             squares.extend(squares_of(errors))
             count += len(errors)
 
@@ -343,7 +346,7 @@ def _try(data: Data, part: Part, tell: Callable[..., None]) -> Tried:
     except MckibbenError as error:  # a part of the data may be too little where all of it is enough
         invalid = str(error)
     if not part.whole:
-        return Tried(squares=tuple(squares), count=count, invalid=invalid)
+        return Tried(None, (), tuple(squares), count, invalid, tuple(held))
     started = time.perf_counter()
     learned = split.train if item.only is None else (split.train[item.only],)
     estimator = fitted(learned, None, tell)
@@ -368,7 +371,7 @@ def _try(data: Data, part: Part, tell: Callable[..., None]) -> Tried:
         block=block,
         diagnostics=diagnostics,
     )
-    return Tried(row, outputs, tuple(squares), count, invalid)
+    return Tried(row, outputs, tuple(squares), count, invalid, tuple(held))
 
 
 def _is_whole(fold: Fold, split: Split) -> bool:

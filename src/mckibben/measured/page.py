@@ -9,7 +9,8 @@ import numpy as np
 import pandas as pd
 
 from mckibben.comparison.columns import columns_of_board
-from mckibben.comparison.results import Leaderboard, Row
+from mckibben.comparison.results import Leaderboard
+from mckibben.comparison.row import Row
 from mckibben.measured.running import Outcome
 from mckibben.numerals import numeral
 

@@ -7,16 +7,29 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mckibben.recording import notes_by_file, reading_notes
-from mckibben.report import interactive, model_subjects, subjects, templating, wording
+from mckibben.report import (
+    answers,
+    check_subjects,
+    interactive,
+    model_subjects,
+    subjects,
+    templating,
+    wording,
+)
 from mckibben.report.drawing import N_COLOURS, POINTS, Drawing, series_colour
 from mckibben.report.shown import Shown, drawn, shown, unique
 
 if TYPE_CHECKING:
-    from mckibben.comparison.results import Leaderboard, Row
+    from mckibben.comparison.results import Leaderboard
+    from mckibben.comparison.row import Row
     from mckibben.studying.study import Study
+    from mckibben.validation.results import OutputCheck
 
 N_VALUES = 180_000
 """Numbers in all plots together, so that the file stays under 6 MB beside plotly.js."""
+
+MOST_CHECKED = 3
+"""Outputs whose residuals have figures of their own."""
 
 FEWEST_POINTS = 400
 """Points left to a curve at least, however many curves there are."""
@@ -70,6 +83,8 @@ def page(study: Study) -> str:
         reading=notes_by_file(measured),
         notes=[note for note in study.notes if note not in reading_notes(measured)],
         wording=wording,
+        answers=answers,
+        checked=checked(study),
     )
 
 
@@ -111,6 +126,13 @@ def _figures(study: Study, pictured: tuple[Shown, ...]) -> tuple[Plots, str]:
     if any(any(model_subjects.operator_sums(block)) for block in blocks.values()):
         drawing = model_subjects.weights(blocks)
         figures["weights"], left_out = [interactive.plots(drawing)], drawing.note
+    for one in checked(study):
+        patterns = [
+            interactive.plots(check_subjects.pattern(one, each))[0] for each in one.patterns
+        ]
+        figures[f"patterns {one.output}"] = [patterns]
+        drawing = check_subjects.autocorrelation(one)
+        figures[f"autocorrelation {one.output}"] = [interactive.plots(drawing)]
     if study.inverse is not None and study.inverse.reachable is not None:
         timed = study.train[0].sample_time is not None
         figures["inverse"] = [interactive.plots(model_subjects.inverse_check(study.inverse, timed))]
@@ -118,6 +140,11 @@ def _figures(study: Study, pictured: tuple[Shown, ...]) -> tuple[Plots, str]:
         drawing = model_subjects.tracking(study.loops, name, points)
         figures[f"tracking {name}"] = [interactive.plots(drawing)]
     return figures, left_out
+
+
+def checked(study: Study) -> tuple[OutputCheck, ...]:
+    """Return what the chosen model leaves of the first outputs, where that was checked."""
+    return () if isinstance(study.check, str | None) else study.check.outputs[:MOST_CHECKED]
 
 
 def _models(board: Leaderboard) -> list[dict[str, str]]:

@@ -12,7 +12,8 @@ from mckibben import registry
 from mckibben.numerals import numeral, typeset
 
 if TYPE_CHECKING:
-    from mckibben.comparison.results import Leaderboard, Row
+    from mckibben.comparison.results import Leaderboard
+    from mckibben.comparison.row import Row
     from mckibben.recording import Recording
     from mckibben.studying.study import Study
 
@@ -77,11 +78,9 @@ def verdict(study: Study) -> list[str]:
         f"off by {number(best.test.rmse)} {board.unit} RMSE{between}, {share} of the measured range; "
         f"at worst by {number(best.test.max_error)} {board.unit}.",
     ]
-    tied = [row.model for row in board.rows if row is not best and _ties(row)]
-    if tied:
+    if board.level:
         sentences.append(
-            f"On the test data {_listed(tied)} cannot be told apart from it: their interval of the "
-            "difference contains 0."
+            f"Level with it on the test data, as far as they can tell: {_listed(board.level)}."
         )
     if best.caution is not None:
         sentences.append(
@@ -232,11 +231,6 @@ def versions() -> dict[str, str]:
 def _files(recordings: Sequence[Recording]) -> list[str]:
     sources = [recording.source or f"{recording.name}.csv" for recording in recordings]
     return [shlex.quote(source) for source in dict.fromkeys(sources)]
-
-
-def _ties(row: Row) -> bool:
-    interval = row.difference_interval
-    return row.reason is None and interval is not None and bool(interval[0] <= 0 <= interval[1])
 
 
 def _listed(names: Sequence[str]) -> str:

@@ -18,9 +18,12 @@ from mckibben.comparison.splits import listed
 from mckibben.comparison.standing import Standing
 from mckibben.control import Tracked
 from mckibben.errors import DataError
+from mckibben.excitation import Gap, untold
 from mckibben.recording import Recording
+from mckibben.studying.checking import check_on_test
 from mckibben.studying.inverting import InverseCheck, invert_best
 from mckibben.studying.loops import closed_loops, published_rig
+from mckibben.validation.results import Validation
 
 
 @dataclass(frozen=True)
@@ -47,6 +50,10 @@ class Study:
         The channel that models are told as the load, where one was named.
     notes : tuple of str
         What was assumed or mended on the way.
+    untold : tuple of Gap
+        What the recordings cannot tell, most important first.
+    check : Validation, str or None
+        What the chosen model misses on the test, or why that cannot be told; None without a choice.
     """
 
     train: tuple[Recording, ...]
@@ -59,6 +66,8 @@ class Study:
     plant: str | None = None
     load: str | None = None
     notes: tuple[str, ...] = ()
+    untold: tuple[Gap, ...] = ()
+    check: Validation | str | None = None
 
     @property
     def input(self) -> str:
@@ -75,6 +84,8 @@ class Study:
         known = self.characterization
         return {
             "characterization": None if known is None else known.to_dict(),
+            "untold": [gap.to_dict() for gap in self.untold],
+            "check": self.check.to_dict() if isinstance(self.check, Validation) else self.check,
             "leaderboard": self.leaderboard.to_dict(),
             "inverse": None if self.inverse is None else self.inverse.to_dict(),
             "tracking": {name: dict(tracked.rmse) for name, tracked in self.loops.items()},
@@ -168,6 +179,7 @@ def study(
         inverse=None,
         load=load,
         notes=(*notes, *plan.notes),
+        untold=untold(recordings, channels.inputs, channels.outputs, tests=tests),
     )
     if found is not None:
         found(so_far)
@@ -182,6 +194,14 @@ def study(
             raise
         return replace(so_far, leaderboard=replace(so_far.leaderboard, stopped=True))
     board = so_far.leaderboard
+    if board.best is not None and board.best.block is not None:
+        block, split, names = board.best.block, plan.data.split, channels.outputs
+        on_test = so_far.predictions[board.best.model][len(split.train) :]
+        so_far = replace(
+            so_far,
+            untold=untold(recordings, channels.inputs, names, block, tests=tests),
+            check=check_on_test(block, split, on_test, names),
+        )
     if channels.single:
         so_far = replace(so_far, inverse=invert_best(board, recordings[0]))
     else:

@@ -34,6 +34,7 @@ def build(desk: Desk) -> None:
                 _plots(desk, chosen)
             with ui.column().classes("min-w-72 flex-[2]"):
                 _words(desk)
+                _untold(desk)
 
     desk.when("recordings", shown.refresh)
     desk.when("channels", shown.refresh)
@@ -151,5 +152,35 @@ def _words(desk: Desk) -> None:
             )
             call = f"mckibben.characterize(recordings, {desk.input!r}, {desk.output!r})"
             desk.did("characterized the recordings", call)
+
+    ui.timer(0.05, guarded(find), once=True)
+
+
+def _untold(desk: Desk) -> None:
+    from mckibben.excitation import untold
+
+    ui.label("What these recordings cannot tell").classes("text-lg")
+    place = named(ui.column().classes("w-full"), "untold")
+
+    async def find() -> None:
+        train, test = desk.workspace.with_role("train"), desk.workspace.with_role("test")
+        try:
+            gaps = await asyncio.to_thread(
+                untold, train or test, desk.input, desk.output, tests=test if train else ()
+            )
+        except MckibbenError as error:
+            with place:
+                ui.label(str(error)).classes("text-negative")
+            return
+        with place:
+            if not gaps:
+                ui.label("Nothing that a model would need.")
+            for gap in gaps:
+                ui.label(gap.sentence)
+                ui.label(gap.remedy).classes("text-caption pl-4")
+            desk.did(
+                "asked what the recordings cannot tell",
+                f"mckibben.untold(train, {desk.input!r}, {desk.output!r}, tests=test)",
+            )
 
     ui.timer(0.05, guarded(find), once=True)

@@ -16,7 +16,8 @@ from mckibben.blocks.play_type.pi import PI
 from mckibben.comparison.columns import columns_of_board
 from mckibben.comparison.kept import Kept
 from mckibben.comparison.ranking import compare
-from mckibben.comparison.results import CHOICES, Leaderboard, Row
+from mckibben.comparison.results import CHOICES, Leaderboard
+from mckibben.comparison.row import Row
 from mckibben.errors import MckibbenError, ModelError
 from mckibben.estimators.core.affine_match import affine_match
 from mckibben.estimators.core.estimator import Estimator

@@ -1,0 +1,285 @@
+"""A band found: units that are exchangeable, a scale by state, and the quantiles of scores.
+
+Scores are of units that the scale does not know (in turn), so that they are like those of a new run.
+Which scale is used is by how narrow the band is there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mckibben.arrays import Array
+from mckibben.bands.held import BLOCK, Held, memory_of
+from mckibben.bands.scale import SHAPES, Scale, Shape, Terms, scale_of
+from mckibben.blocks.bands.band import Band
+from mckibben.blocks.bands.state_of_motion import look_along
+from mckibben.blocks.core.block import Block
+from mckibben.blocks.core.fields import rows, vector
+from mckibben.errors import DataError
+from mckibben.numerals import numeral
+
+Unit = Literal["auto", "run", "block"]
+
+LEVEL = 0.9
+
+MANY = 20
+"""Runs from which they are the units; of fewer the largest score of any would bound 90 %."""
+
+WIDTHS = (0.03, 0.1, 0.3)
+"""Of plays, as shares of a range: just turned, turned a while ago, in another loop."""
+
+N_TIMES, SHORTEST, LONGEST = 4, 2.0, 2.0
+"""Lags, the shortest in samples, and how often the longest fits into the longest run."""
+
+MOST_FITTED = 8000
+"""Samples that a scale is fitted to, and as many that are scored at a time."""
+
+STEPS = 1000
+"""Of the table of quantiles."""
+
+PARTS = 5
+"""That the units are left out in."""
+
+WORTH = 0.02
+"""Share of the width that a less simple scale must save."""
+
+
+@dataclass(frozen=True)
+class Found:
+    """A band, and what is to be said of it.
+
+    Parameters
+    ----------
+    band : Band
+    memory : float
+        Samples that errors stay alike for.
+    widths : tuple of float
+        Of every output, mean width at ``level`` on units left out, over that of a constant band.
+    mean_widths : tuple of float
+        The same in the output's unit.
+    level : float
+        Of the widths: `LEVEL`, or the highest that the units allow.
+    notes : tuple of str
+    """
+
+    band: Band
+    memory: float
+    widths: tuple[float, ...]
+    mean_widths: tuple[float, ...]
+    level: float
+    notes: tuple[str, ...]
+
+
+def find_band(
+    model: Block,
+    runs: Sequence[Held],
+    unit: Unit = "auto",
+    shapes: Sequence[Shape] = SHAPES,
+) -> Found:
+    """Return the band of a model that missed so much on runs it was not fitted to.
+
+    Parameters
+    ----------
+    model : Block
+    runs : sequence of Held
+        All with the model's inputs and outputs.
+    unit : {"auto", "run", "block"}
+        What is exchangeable.
+    shapes : sequence of Shape
+        What a scale may be made of, from the simplest on; the first alone is the same everywhere.
+
+    Raises
+    ------
+    DataError
+        Where errors stay alike for so long that the runs hold fewer than two units.
+    """
+    missed = [run.measured - run.modelled for run in runs]
+    memory = max(
+        memory_of(
+            [
+                e[run.counts, k] - e[run.counts, k].mean()
+                for e, run in zip(missed, runs, strict=True)
+            ]
+        )
+        for k in range(missed[0].shape[1])
+    )
+    which, units, note = _units(runs, memory, unit)
+    ends = _ends(np.concatenate([np.hstack([run.inputs, run.modelled]) for run in runs]))
+    times = _times(runs)
+    seen, units_of, all_missed = [], [], []
+    for run, errors, own in zip(runs, missed, units, strict=True):
+        samples = np.ascontiguousarray(np.hstack([run.inputs, run.modelled]))
+        n_driving, n_x = run.inputs.shape[1], samples.shape[1]
+        keeps = np.exp(-(run.sample_time or 1.0) / np.array(times))
+        found = np.empty((len(samples), n_x + n_driving * (len(WIDTHS) + keeps.size)))
+        look_along(samples, ends.ravel(), np.array(WIDTHS), keeps, n_driving, found)
+        seen.append(found[run.counts])
+        units_of.append(own[run.counts])
+        all_missed.append(errors[run.counts])
+    of = np.unique(np.concatenate(units_of), return_inverse=True)[1]
+    n_units = int(of.max()) + 1
+    # what is like in a whole run is foreseen in a block of it, and in no new run
+    apart = np.repeat(np.arange(len(runs)), [e.shape[0] for e in all_missed])
+    apart = of if len(runs) == 1 else np.unique(apart, return_inverse=True)[1]
+    if n_units < 2:
+        raise DataError(
+            f"errors stay alike for {numeral(memory, 3)} samples, and {of.size} are too few for two "
+            "blocks that differ",
+            remedy="calibrate on more, or longer, recordings",
+        )
+    shown = np.concatenate(seen)
+    made = Terms.of(shown)
+    terms, n_seen = made(shown), shown.shape[1]
+    level = min(LEVEL, n_units / (n_units + 1))
+    best, scores, widths = [], [], []
+    for errors in np.concatenate(all_missed).T:
+        scale, own_scores, *width = _best(terms, errors, of, apart, n_seen, level, shapes)
+        best.append(scale)
+        scores.append(_calibrated(own_scores, of))
+        widths.append(width)
+    band = Band(
+        driving=model.inputs,
+        given=model.outputs,
+        ends=rows(ends),
+        widths=WIDTHS,
+        times=times,
+        mean=vector(made.mean),
+        spread=vector(made.spread),
+        bells=rows(made.bells),
+        sharpness=made.sharpness,
+        shift=rows(np.array([scale.shift for scale in best])),
+        log_scale=rows(np.array([scale.log_scale for scale in best])),
+        limits=rows(np.array([scale.limits for scale in best])),
+        scores=rows(np.array(scores)),
+        units=n_units,
+        unit=which,
+        level=level,
+    )
+    narrower, mean = zip(*widths, strict=True)
+    return Found(band, memory, narrower, mean, level, (note,) if note else ())
+
+
+def _best(
+    terms: Array,
+    errors: Array,
+    of: NDArray[np.intp],
+    apart: NDArray[np.intp],
+    n_seen: int,
+    level: float,
+    shapes: Sequence[Shape],
+) -> tuple[Scale, Array, float, float]:
+    """Return the scale of the narrowest band, its scores, its width over a constant's, and its width.
+
+    Units, by ``of``, weigh the same; those that ``apart`` numbers alike are left out together.
+    """
+    n_apart = int(apart.max()) + 1
+    part = apart * min(PARTS, n_apart) // n_apart
+    every = max(len(errors) // MOST_FITTED, 1)
+
+    def tried(shape: Shape) -> tuple[Array, float]:
+        scores, fitted = np.empty(len(errors)), []
+        for place in range(int(part.max()) + 1):
+            here = part == place
+            known = np.flatnonzero(~here)[::every]
+            scale = scale_of(terms[known], errors[known], apart[known], shape, n_seen)
+            scores[here] = scale.scores(terms[here], errors[here])
+            fitted.append((here, scale))
+        half = float(_quantiles(scores, of)[round(level * STEPS)])
+        width = sum(scale.width(terms[here], half) * here.sum() for here, scale in fitted)
+        return scores, float(width) / len(errors)
+
+    shape = shapes[0]
+    scores, constant = tried(shape)
+    width = constant
+    for other in shapes[1:]:
+        own, narrower = tried(other)
+        if narrower < (1.0 - WORTH) * width:
+            shape, scores, width = other, own, narrower
+    some = np.arange(0, len(errors), every)
+    scale = scale_of(terms[some], errors[some], apart[some], shape, n_seen)
+    return scale, scores, width / constant if constant > 0 else 1.0, width
+
+
+def _calibrated(scores: Array, of: NDArray[np.intp]) -> Array:
+    """Return the score that a band at level 0, 1 / STEPS, ... 1 reaches to.
+
+    A quantile that so many units give holds, of another unit, that share on average which it would have
+    held of each of them, had it been found on the rest: more runs than the level are asked of few, or of
+    such that differ as a whole, hardly more of many that are alike. What no unit's rest would have held
+    is given the largest score.
+    """
+    n_units = int(of.max()) + 1
+    reached = _quantiles(scores, of)
+    held = np.empty((n_units, STEPS + 1))
+    for unit in range(n_units):
+        own = np.sort(scores[of == unit])
+        held[unit] = np.searchsorted(own, reached, side="right") / own.size
+    others = (held.sum(axis=0) - held) / (n_units - 1)
+    shares = np.linspace(0.0, 1.0, STEPS + 1)
+    left_out = np.zeros(STEPS + 1)
+    for own, rest in zip(held, others, strict=True):
+        places = np.searchsorted(rest, shares - 1e-9).clip(max=STEPS)
+        left_out += own[places] / n_units
+    left_out = np.maximum.accumulate(left_out)
+    return np.asarray(reached[np.searchsorted(left_out, shares - 1e-9).clip(max=STEPS)])
+
+
+def _quantiles(scores: Array, of: NDArray[np.intp]) -> Array:
+    """Return quantiles of scores, where every unit weighs the same, at shares 0, 1 / STEPS, ... 1."""
+    order = np.argsort(scores)
+    weights = 1.0 / np.bincount(of)[of[order]]
+    share = np.cumsum(weights) / weights.sum()
+    wanted = np.linspace(0.0, 1.0, STEPS + 1)
+    places = np.searchsorted(share, wanted - 1e-9).clip(max=scores.size - 1)
+    return np.asarray(scores[order][places])
+
+
+def _units(
+    runs: Sequence[Held], memory: float, unit: Unit
+) -> tuple[Literal["run", "block"], list[NDArray[np.intp]], str]:
+    """Return what is exchangeable, which unit every sample of every run is of, and what to say."""
+    lengths = [len(run.inputs) for run in runs]
+    longest = max(int(np.ceil(BLOCK * memory)), 1)
+    pieces = [max(length // longest, 1) for length in lengths]
+    as_runs = unit == "run" or (unit == "auto" and (len(runs) >= MANY or sum(pieces) == len(runs)))
+    if as_runs:
+        pieces = [1] * len(runs)
+    units, count, note = [], 0, ""
+    for length, n in zip(lengths, pieces, strict=True):
+        units.append(count + np.arange(length) * n // length)
+        count += n
+    if not as_runs:
+        note = (
+            f"{len(runs)} run(s) are few: {count} blocks of them, each {numeral(BLOCK, 2)} memories of "
+            "the error or longer, count as exchangeable instead, so what differs from run to run is not "
+            f"in the band. Remedy: calibrate on {MANY} runs or more"
+        )
+    elif unit != "run" and len(runs) < MANY and min(lengths) < BLOCK * memory:
+        note = (
+            f"errors stay alike for {numeral(memory, 3)} samples, about as long as runs last, so each "
+            "run counts once"
+        )
+    return ("run" if as_runs else "block"), units, note
+
+
+def _ends(samples: Array) -> Array:
+    """Return the lowest and highest of every channel, shape (2, channels); of one held, near it."""
+    low, high = samples.min(axis=0), samples.max(axis=0)
+    near = np.where(high > low, 0.0, 0.025 * np.abs(low) + 1e-3)
+    return np.array([low - near, high + near])
+
+
+def _times(runs: Sequence[Held]) -> tuple[float, ...]:
+    """Return time constants of lags that the runs can tell of; none without time."""
+    if any(run.sample_time is None for run in runs):
+        return ()
+    step = max(run.sample_time or 0.0 for run in runs)
+    longest = max(len(run.inputs) * (run.sample_time or 0.0) for run in runs) / LONGEST
+    if longest <= SHORTEST * step:
+        return ()
+    return vector(np.geomspace(SHORTEST * step, longest, N_TIMES))

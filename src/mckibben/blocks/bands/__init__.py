@@ -1,0 +1,1 @@
+"""Blocks that say how far off a model may be."""

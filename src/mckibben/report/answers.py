@@ -1,0 +1,70 @@
+"""What a person asks who has a model: is it right, how far off may it be, what to record next."""
+
+from __future__ import annotations
+
+import shlex
+from typing import TYPE_CHECKING
+
+from mckibben.report.wording import number, output_range, percent
+from mckibben.validation.results import Validation
+
+if TYPE_CHECKING:
+    from mckibben.studying.study import Study
+
+MOST = 2
+"""Things said of each."""
+
+MINUTES = 3
+"""Of the plan that is proposed."""
+
+
+def right(study: Study) -> list[str]:
+    """Return whether the chosen model is right, the most important first."""
+    best, check = study.leaderboard.best, study.check
+    if best is None:
+        return ["No model is chosen, so there is nothing to check."]
+    if check is None:
+        return ["The chosen model is checked when all are fitted."]
+    if not isinstance(check, Validation):
+        return [f"That cannot be told: {check}"]
+    return [check.verdict, *check.sentences[:MOST]]
+
+
+def how_far(study: Study) -> list[str]:
+    """Return how far off the chosen model may be on a new run."""
+    board = study.leaderboard
+    best = board.best
+    if best is None or best.test is None:
+        return ["No model is chosen."]
+    largest = f"At worst it was off by {number(best.test.max_error)} {board.unit} on the test."
+    band = best.band
+    if band is None:
+        share = percent(best.test.rmse / output_range(study))
+        return [
+            f"On the test it is off by {number(best.test.rmse)} {board.unit} RMSE, {share} of the "
+            "range. For a band around it: mckibben calibrate, on runs that it was not fitted to.",
+            largest,
+        ]
+    said = []
+    for name, width in band.width.items():
+        of = f"{name} is" if len(band.width) > 1 else "the muscle is"
+        said.append(
+            f"Expect that in {percent(band.level, 3)} of the samples of a new run {of} within about "
+            f"±{number(width / 2, 2)} {board.unit}, narrower and wider by the state of motion; on the "
+            f"test {percent(band.coverage[name], 3)} were inside its band."
+        )
+    return [*said, largest]
+
+
+def record_next(study: Study) -> list[str]:
+    """Return which runs would tell most of what is not known yet."""
+    gaps = [f"{gap.sentence} {gap.remedy}" for gap in study.untold[:MOST]]
+    if not gaps:
+        gaps = ["Nothing that these recordings could tell of a muscle is missing from them."]
+    files = dict.fromkeys(one.source for one in study.train if one.source)
+    if files and study.leaderboard.best is not None:
+        named = " ".join(shlex.quote(str(file)) for file in files)
+        gaps.append(
+            f"The motion that tells most: mckibben plan {named} --minutes {MINUTES} -o next.csv"
+        )
+    return gaps

@@ -1,0 +1,61 @@
+"""The page of a check: one HTML file that needs nothing but itself."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from mckibben.report import check_subjects, interactive, subjects, templating, wording
+from mckibben.validation.results import LEVEL
+from mckibben.validation.words import phrase
+
+if TYPE_CHECKING:
+    from mckibben.validation.results import Validation
+
+MOST_RECORDINGS = 4
+"""Recordings with figures of their own: the longest."""
+
+MOST_OUTPUTS = 6
+"""Outputs with figures of their own; the others have their numbers."""
+
+MODEL = "model"
+
+
+def check_page(found: Validation, model_file: str) -> str:
+    """Return a check as HTML.
+
+    Parameters
+    ----------
+    found : Validation
+    model_file : str
+        Where the model was read from, to say so.
+    """
+    longest = sorted(found.runs, key=lambda run: -len(run.inputs))[:MOST_RECORDINGS]
+    runs = [run for run in found.runs if run in longest]
+    figures: dict[str, list[list[interactive.Json]]] = {}
+    for place, one in enumerate(found.outputs[:MOST_OUTPUTS]):
+        figures[f"autocorrelation-{place}"] = [
+            interactive.plots(check_subjects.autocorrelation(one))
+        ]
+        if one.crossings:
+            figures[f"crossings-{place}"] = [interactive.plots(check_subjects.crossings(one))]
+        panels = [interactive.plots(check_subjects.pattern(one, each))[0] for each in one.patterns]
+        figures[f"patterns-{place}"] = [panels]
+        first = one.crossings[0].channel if one.crossings else ""
+        figures[f"fit-{place}"], figures[f"residuals-{place}"] = [], []
+        for run in runs:
+            outputs = {MODEL: run.modelled[:, place]}
+            about = (run.recording, one.output, outputs)
+            figures[f"fit-{place}"].append(interactive.plots(subjects.fit_over_time(*about)))
+            given = first or next(iter(run.recording.channels))
+            drawing = subjects.residuals(run.recording, given, one.output, outputs)
+            figures[f"residuals-{place}"].append(interactive.plots(drawing))
+    return templating.page(
+        "check.html.j2",
+        figures,
+        found=found,
+        model_file=model_file,
+        drawn=runs,
+        phrase=phrase,
+        level=LEVEL,
+        versions=wording.versions(),
+    )

@@ -1,0 +1,45 @@
+"""Is the chosen model right? What it leaves of the test, at the samples that are scored."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from mckibben.arrays import Array
+from mckibben.blocks.core.block import Block
+from mckibben.comparison.splits import Split
+from mckibben.errors import DataError
+from mckibben.validation.check import check_runs
+from mckibben.validation.residuals import Run, check_usable
+from mckibben.validation.results import Validation
+
+
+def check_on_test(
+    model: Block, split: Split, modelled: Sequence[Array], outputs: Sequence[str]
+) -> Validation | str:
+    """Return what a model misses on the test, or why that cannot be told.
+
+    Parameters
+    ----------
+    modelled : sequence of array, shape (n, k)
+        Free-running outputs on every test recording.
+    outputs : sequence of str
+        Their names.
+    """
+    places = [list(outputs).index(channel.name) for channel in model.outputs]
+    runs = []
+    for recording, rows, found in zip(split.test, split.test_rows, modelled, strict=True):
+        scored = np.flatnonzero(rows)
+        if not scored.size:
+            continue
+        start, stop = int(scored[0]), int(scored[-1]) + 1
+        kept = recording.slice(start, stop)
+        inputs = kept.matrix(channel.name for channel in model.inputs)
+        measured = kept.matrix(channel.name for channel in model.outputs)
+        runs.append(Run(kept, inputs, measured, found[start:stop, places]))
+    try:
+        check_usable(model, [run.recording for run in runs])
+        return check_runs(model, runs)
+    except DataError as error:
+        return str(error)

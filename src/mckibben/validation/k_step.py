@@ -1,0 +1,79 @@
+"""Errors some samples ahead of what was measured last, beside those of the free run."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from mckibben.arrays import Array
+from mckibben.blocks.core.block import Block
+from mckibben.blocks.dynamic.transfer_function import TransferFunction
+from mckibben.validation.residuals import Run
+
+AHEAD = (1, 10, 100)
+"""Samples ahead."""
+
+PREDICTED = "predicted by the model's own noise model from outputs measured until then"
+CORRECTED = "free run, shifted by what it was off when last measured"
+FREE = "free run: nothing measured but the inputs is used"
+
+SHARE = 4
+"""Part of the longest recording, as one over it, that is looked ahead at most."""
+
+
+@dataclass(frozen=True)
+class Ahead:
+    """The error of an output some samples ahead.
+
+    Parameters
+    ----------
+    samples : int or None
+        How many; None for the free run.
+    seconds : float or None
+        The same as time.
+    rmse : float
+        Of the model.
+    held : float or None
+        Of a forecast that the output stays as it was measured last, to compare with.
+    how : str
+        What the model is told.
+    """
+
+    samples: int | None
+    seconds: float | None
+    rmse: float
+    held: float | None
+    how: str
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return it for JSON."""
+        return asdict(self)
+
+
+def errors_ahead(block: Block, runs: Sequence[Run], output: int) -> tuple[Ahead, ...]:
+    """Return errors 1, 10 and 100 samples ahead, and free-running ones."""
+    step = runs[0].recording.sample_time
+    longest = max(len(run.inputs) for run in runs)
+    found = []
+    for samples in (k for k in AHEAD if k <= longest // SHARE):
+        errors, held = [], []
+        for run in (run for run in runs if len(run.inputs) > samples):
+            measured, left = run.measured[:, output], run.residual[:, output]
+            held.append(measured[samples:] - measured[:-samples])
+            if isinstance(block, TransferFunction):
+                predicted = block.predict(run.recording, samples)[block.outputs[output].name]
+                errors.append((measured - predicted)[samples:])
+            else:
+                errors.append(left[samples:] - left[:-samples])
+        how = PREDICTED if isinstance(block, TransferFunction) else CORRECTED
+        seconds = None if step is None else samples * step
+        found.append(Ahead(samples, seconds, _rms(errors), _rms(held), how))
+    free = Ahead(None, None, _rms([run.residual[:, output] for run in runs]), None, FREE)
+    return (*found, free)
+
+
+def _rms(errors: Sequence[Array]) -> float:
+    return float(np.sqrt(np.mean(np.concatenate(errors) ** 2)))

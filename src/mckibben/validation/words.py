@@ -1,0 +1,146 @@
+"""A check in words: whether the model is right, what it misses, and what is left after that."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from mckibben.numerals import numeral
+
+if TYPE_CHECKING:
+    from mckibben.validation.results import Finding, OutputCheck, Validation
+
+NOTHING = "Nothing is found wrong with the model"
+
+FEW = 2
+"""Things missed up to which a model is right but for them."""
+
+WRONG = 0.05
+"""Share of the range that what is missed may be for that."""
+
+SLOW = 3.0
+"""Samples that noise of a filtered sensor remembers at most."""
+
+SURE = 1e-6
+"""p-values below are not told any closer."""
+
+
+def verdict(found: Validation) -> str:
+    """Return whether a model is right, and what it misses, in one sentence."""
+    if len(found.outputs) == 1:
+        return f"{_verdict(found.outputs[0])}."
+    if found.right:
+        return f"{_verdict(found.outputs[0])}; so for all {len(found.outputs)} outputs."
+    return "; ".join(f"{one.output}: {_lower(_verdict(one))}" for one in found.outputs) + "."
+
+
+def sentences(one: OutputCheck) -> list[str]:
+    """Return what is to be known of an output beside the verdict, the most important first."""
+    said = [_told(one, each) for each in one.missing] if not one.exact else []
+    said.append(_rest(one))
+    if one.p_branch is not None and not one.exact:
+        said.append(_branches(one, one.p_branch))
+    return said
+
+
+def _branches(one: OutputCheck, p: float) -> str:
+    """Return whether hysteresis is left in the residual."""
+    if p > LEVEL:
+        return (
+            f"At equal inputs, the residual is the same on rising and falling branches ({_p(p)})."
+        )
+    said = f"At equal inputs, the residual differs between rising and falling branches ({_p(p)})"
+    if any(each.kind == "hysteresis" for each in one.missing):
+        return f"{said}."
+    why = "what is missed brings that about" if one.missing else "by chance, among so many tests"
+    return f"{said}: {why}."
+
+
+LEVEL = 0.01
+"""Of the single test of branches, as it is told."""
+
+
+def phrase(one: OutputCheck, finding: Finding) -> str:
+    """Return what a model misses, as what comes after "but for"."""
+    by = finding.channel
+    step = one.sample_time or 1.0
+    unit = " s" if one.sample_time else " samples"
+    late = -(finding.coefficient or 0.0) * step
+    return {
+        "offset": f"an offset of {numeral(finding.coefficient, 2)} {one.unit}".rstrip(),
+        "runs": "offsets that differ from run to run",
+        "curve": f"the gain or shape of the curve over {by}",
+        "load": f"the effect of {by}",
+        "hysteresis": f"hysteresis over {by} that is left",
+        "lag": f"{'a delay' if late > 0 else 'too much delay'}, about {numeral(abs(late), 2)}{unit}",
+        "speed": f"the effect of the speed of {by}",
+        "creep": f"creep after {'large steps' if one.large_steps else 'movements'} of {by}",
+        "drift": "drift over time",
+        "output": f"the shape of the curve over modelled {one.output}",
+        "crossing": f"what {by} did shortly before",
+    }[finding.kind]
+
+
+def _verdict(one: OutputCheck) -> str:
+    size = f"{numeral(one.rmse, 2)} {one.unit}".rstrip()
+    if one.exact:
+        why = (
+            f"it is within the steps of the sensor, {numeral(one.resolution, 2)} {one.unit}".rstrip()
+            if one.resolution > 0
+            else "it is rounding"
+        )
+        return f"{NOTHING}: what it leaves, {size} RMS, says nothing, for {why}"
+    if one.missing:
+        things = _listed([phrase(one, each) for each in one.missing])
+        missed = sum(each.size**2 for each in one.missing) ** 0.5
+        small = len(one.missing) <= FEW and missed <= WRONG * one.span
+        return f"The model is right but for {things}" if small else f"The model misses {things}"
+    if one.white:
+        return f"{NOTHING}: what it leaves, {size} RMS, is white noise"
+    return (
+        f"{NOTHING}: what it leaves, {size} RMS, follows nothing recorded, though it is not white"
+    )
+
+
+def _told(one: OutputCheck, finding: Finding) -> str:
+    what = phrase(one, finding)
+    return (
+        f"{what[0].upper()}{what[1:]}: {numeral(100 * finding.share, 2)} % of the residual's variance, "
+        f"{numeral(finding.size, 2)} {one.unit} RMS, {numeral(100 * finding.size / one.span, 2)} % of "
+        f"the range ({_p(finding.p_value)})."
+    )
+
+
+def _rest(one: OutputCheck) -> str:
+    """Return what the residual is like as noise, and where that may come from."""
+    if one.exact:
+        return "No test is made of what a sensor cannot show."
+    p = one.whiteness.p_value
+    if p is None:
+        return "The recordings are too short to tell whether the residual is white."
+    if one.white:
+        return f"Its {one.whiteness.n_tested} first autocorrelations are those of white noise ({_p(p)})."
+    forgets = (
+        f"The residual is not white ({_p(p)}): it forgets within {round(one.noise_time)} samples"
+    )
+    if one.missing:
+        return f"{forgets}, which is to be expected of what is missed."
+    if one.noise_time <= SLOW:
+        return f"{forgets}, as noise that a sensor's filter has smoothed."
+    return (
+        f"{forgets}. Slow noise is like that, and so is what no channel here tells of: a disturbance, "
+        "or a state that neither the model nor these tests have."
+    )
+
+
+def _p(value: float) -> str:
+    return "p < 0.000001" if value < SURE else f"p = {numeral(value, 2)}"
+
+
+def _listed(words: list[str]) -> str:
+    if len(words) == 1:
+        return words[0]
+    return f"{', '.join(words[:-1])} and {words[-1]}"
+
+
+def _lower(text: str) -> str:
+    return text[0].lower() + text[1:]

@@ -1,0 +1,94 @@
+"""mckibben check: words, validation.json and a page; errors that say what to do."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mckibben import PI, PerChannel, Recording, check, write
+from mckibben.blocks.core.fields import Channel
+from mckibben.report.check_page import check_page
+from mckibben.signals import triangle
+from tests.attacks.commands import call
+
+TRUE = PI(thresholds=(0.0, 0.3, 0.6), weights=(3.0, 1.0, 0.7))
+
+
+@pytest.fixture
+def files(tmp_path: Path) -> Path:
+    u = triangle(np.arange(0, 40, 0.02), 5.0, [5.0, 3.0, 4.0])
+    noise = np.random.default_rng(0).standard_normal(u.size)
+    y = TRUE.simulate(u) + 0.1 * noise
+    write(Recording({"pressure": u, "displacement": y}, 0.02), tmp_path / "run.csv")
+    write(Recording({"pressure": u, "displacement": y + 0.3}, 0.02), tmp_path / "off.csv")
+    TRUE.save(tmp_path / "model.json")
+    return tmp_path
+
+
+def test_a_check_leaves_words_numbers_and_a_page(files: Path) -> None:
+    done = call("check", files / "model.json", files / "run.csv", "-o", files / "out")
+    assert done.code == 0, done.err
+    assert done.out.startswith("Nothing is found wrong with the model")
+    told = json.loads((files / "out" / "validation.json").read_text())
+    assert told["right"]
+    assert told["outputs"][0]["p_whiteness"] > 0.0005
+    page = (files / "out" / "report.html").read_text()
+    assert told["verdict"].split(":")[0] in page
+    assert "<script src" not in page
+    again = call("check", files / "model.json", files / "off.csv", "-o", files / "out", "--json")
+    assert again.code == 0, again.err
+    told = json.loads(again.out)
+    assert told["verdict"].startswith("The model is right but for an offset of 0.3")
+    assert told["outputs"][0]["missing"][0]["kind"] == "offset"
+
+
+def test_what_was_not_written_by_it_stays(files: Path) -> None:
+    folder = files / "out"
+    folder.mkdir()
+    (folder / "report.html").write_text("mine")
+    refused = call("check", files / "model.json", files / "run.csv", "-o", folder)
+    assert refused.code == 2
+    assert "--force" in refused.err
+    assert (folder / "report.html").read_text() == "mine"
+
+
+def test_bad_input_leaves_with_one_sentence(files: Path) -> None:
+    lacking = files / "lacking.csv"
+    lacking.write_text("time,pressure\n" + "".join(f"{k * 0.02},{k % 50}\n" for k in range(200)))
+    for words in (
+        ("check", files / "model.json", lacking, "-o", files / "out"),
+        ("check", files / "run.csv", files / "run.csv", "-o", files / "out"),
+        ("check", files / "model.json", files / "none.csv", "-o", files / "out"),
+    ):
+        refused = call(*words)
+        assert refused.code == 2
+        assert "Remedy" in refused.err
+        assert "Traceback" not in refused.err
+
+
+def test_every_output_has_its_part_of_the_page() -> None:
+    parts = tuple(
+        PI(
+            TRUE.thresholds,
+            TRUE.weights,
+            input=Channel(f"pressure_{k}", "bar"),
+            output=Channel(f"displacement_{k}", "mm"),
+        )
+        for k in (1, 2)
+    )
+    time = np.arange(0, 30, 0.02)
+    channels = {f"pressure_{k}": triangle(time, 4.0 + k, [5.0, 3.0]) for k in (1, 2)}
+    for k in (1, 2):
+        noise = np.random.default_rng(k).standard_normal(time.size)
+        channels[f"displacement_{k}"] = TRUE.simulate(channels[f"pressure_{k}"]) + 0.1 * noise
+    runs = [Recording(channels, 0.02, meta={"name": name}) for name in ("first", "<b>second")]
+    found = check(PerChannel(parts), runs)
+    page = check_page(found, "model.json")
+    for place, output in enumerate(("displacement_1", "displacement_2")):
+        assert f'<section id="output-{place}">' in page
+        assert f"What it leaves of {output}" in page
+    assert "&lt;b&gt;second" in page
+    assert "<b>second" not in page

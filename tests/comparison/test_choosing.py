@@ -1,0 +1,76 @@
+import numpy as np
+
+from mckibben.comparison.choosing import Choice, choice_of
+
+SIZES = [100] * 32
+
+
+def squares(rng: np.random.Generator, scale: float) -> list[tuple[float]]:
+    """Return squared errors of 32 pieces whose sizes differ as those of real motions do."""
+    return [(100 * scale**2 * float(rng.gamma(2.0, 0.5)),) for _ in SIZES]
+
+
+def rmse(pieces: list[tuple[float]]) -> float:
+    return float(np.sqrt(sum(piece for (piece,) in pieces) / sum(SIZES)))
+
+
+def test_what_is_to_be_expected_is_what_comes_of_the_choice() -> None:
+    """Twenty models that are equally good: the least error is too low, what is expected is not."""
+    least, expected = [], []
+    for seed in range(200):
+        rng = np.random.default_rng(seed)
+        models = {f"m{k}": squares(rng, 1.0) for k in range(20)}
+        choice = choice_of(models, SIZES, seed)
+        assert choice is not None
+        least.append(choice.error)
+        expected.append(choice.expected)
+    assert np.mean(least) < 0.9
+    assert abs(np.mean(expected) - 1.0) < 0.06
+
+
+def test_a_clear_choice_costs_next_to_nothing() -> None:
+    rng = np.random.default_rng(0)
+    models = {"good": squares(rng, 0.2), "bad": squares(rng, 1.0), "worse": squares(rng, 2.0)}
+    choice = choice_of(models, SIZES, 0)
+    assert choice is not None
+    assert choice.error == rmse(models["good"])
+    assert choice.expected / choice.error < 1.03
+    assert choice.picked == {"good": 1.0}
+
+
+def test_two_of_a_kind_share_the_resamples() -> None:
+    rng = np.random.default_rng(1)
+    one, other = squares(rng, 1.0), squares(rng, 1.0)
+    choice = choice_of({"a": one, "b": other, "far": squares(rng, 3.0)}, SIZES, 0)
+    assert choice is not None
+    assert set(choice.picked) <= {"a", "b"}
+    assert abs(sum(choice.picked.values()) - 1) < 1e-12
+    assert next(iter(choice.picked.values())) == max(choice.picked.values())
+
+
+def test_the_mean_over_outputs_chooses() -> None:
+    pieces = [(1.0, 100.0)] * 32
+    choice = choice_of({"a": pieces, "b": [(4.0, 64.0)] * 32}, [1] * 32, 0)
+    assert choice is not None
+    assert choice.error == (2.0 + 8.0) / 2
+    assert choice.picked == {"b": 1.0}
+
+
+def test_one_model_or_few_pieces_are_no_choice() -> None:
+    assert choice_of({"a": [(1.0,)] * 8}, [10] * 8, 0) is None
+    assert choice_of({"a": [(1.0,)] * 3, "b": [(2.0,)] * 3}, [10] * 3, 0) is None
+
+
+def test_empty_pieces_do_no_harm() -> None:
+    pieces = [(1.0,), (0.0,)] * 8
+    choice = choice_of({"a": pieces, "b": [(2.0,), (0.0,)] * 8}, [10, 0] * 8, 0)
+    assert choice is not None
+    assert np.isfinite(choice.expected)
+
+
+def test_it_is_said_in_words() -> None:
+    words = Choice(3, {"gpi": 0.9, "mpi": 0.1}, 0.5, 0.52).said("mm")
+    assert "among 3" in words
+    assert "0.500 mm" in words
+    assert "4.0 %" in words
+    assert "gpi in 90 %" in words

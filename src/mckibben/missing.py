@@ -20,7 +20,7 @@ from mckibben import registry
 from mckibben.blocks.core.block import Block, Primitive
 from mckibben.blocks.core.composition import Composition
 from mckibben.blocks.core.inverse import Invertible
-from mckibben.blocks.core.writing import quantities
+from mckibben.blocks.core.writing import quantities, undeclared
 from mckibben.blocks.laws.check import LAWS
 from mckibben.blocks.laws.trial import Trial
 from mckibben.comparison.limits import limits
@@ -257,8 +257,8 @@ def _documented(block: Block) -> Finding:
 def _notation(block: Block) -> Finding:
     """Look for equations, and for a unit of every number."""
     what = "equations and units"
-    silent = sorted({one for one in block.parameters if block.notation.unit(one) is None})
-    if not block.equations() or (silent and not isinstance(block, Composition)):
+    silent = undeclared(block)
+    if not block.equations() or silent:
         said = "equations" if not block.equations() else f"the unit of {', '.join(silent)}"
         return Finding(what, "missing", f"{said}, in `notation`")
     return Finding(what, "there", f"{len(block.equations())} and {len(quantities(block))}")

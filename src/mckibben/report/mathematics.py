@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from html import escape
+from html import unescape
 from typing import TYPE_CHECKING, Literal
+from xml.etree.ElementTree import tostring
 
 if TYPE_CHECKING:
     from markupsafe import Markup
@@ -17,11 +18,15 @@ def mathml(latex: str, display: Literal["block", "inline"] = "block") -> Markup:
     >>> "<mfrac>" in mathml(r"y = \frac{u}{2}")
     True
     """
-    from latex2mathml.converter import convert
+    from latex2mathml.converter import convert_to_element
     from markupsafe import Markup
 
     try:
-        found = convert(latex, display=display).replace(r"\_", "_")
+        equation = convert_to_element(latex, display=display)
     except Exception:  # of many kinds, none of which is worth a report
-        found = f"<code>{escape(latex)}</code>"
-    return Markup(found)  # the converter has escaped all text
+        return Markup("<code>{}</code>").format(latex)
+    for (
+        element
+    ) in equation.iter():  # its texts hold entities; channels of files may be named like tags
+        element.text = unescape(element.text or "").replace(r"\_", "_")
+    return Markup(tostring(equation, encoding="unicode"))

@@ -1,9 +1,9 @@
 """Parameters of a fitted model, and how sure each is, where residuals remember too.
 
 Standard errors are those of least squares of the free run under correlated residuals (the sandwich
-P J' R J P, P the inverse of J' J): J holds the free-run sensitivities, and R the covariance of the
-residuals under an autoregression of as many terms as they ask for (Burg's, chosen by BIC). What the fit
-itself has taken out of the residuals is put back, or few long-lived residuals would look too small.
+P J' R J P, P the pseudo-inverse of J' J): J holds the free-run sensitivities, and R the covariance of
+the residuals under an autoregression of as many terms as they ask for (Burg's, chosen by BIC). What the
+fit itself has taken out of the residuals is put back, or few long-lived ones would look too small.
 
 Sources: Ljung, "System Identification", 1999, section 9.5 (misspecified noise); den Haan and Levin, "A
 practitioner's guide to robust covariance matrix estimation", 1997.
@@ -22,7 +22,7 @@ from mckibben.arrays import Array
 from mckibben.blocks.core.block import Block
 from mckibben.blocks.core.writing import quantities
 from mckibben.errors import ModelError
-from mckibben.estimators.core.uncertainty import DIFFERENCE, LARGEST, inverted, relative_sizes
+from mckibben.estimators.core.uncertainty import DIFFERENCE, LARGEST, relative_sizes
 from mckibben.recording import Recording
 from mckibben.system.threads import cores
 
@@ -41,6 +41,10 @@ MOST_TERMS = 40
 
 NOTHING = 1e-9
 """Share of its size below which a parameter is 0."""
+
+LEAST, DETERMINED = 1e-6, 0.99
+"""Share of the largest singular value of sensitivities that tells anything; share of a parameter's own
+direction that must be told."""
 
 UNFELT = 1e-6
 """Share of the most felt parameter's sensitivity below which one is not felt."""
@@ -187,23 +191,18 @@ def sureness(block: Block, recordings: Sequence[Recording], left: Sequence[Array
     if not columns or not all(np.isfinite(e).all() for e in left):
         said = [reason or "the model's output is not finite" for reason in said]
         return Sureness(covariance, tuple(said), np.inf, worth, terms)
-    condition, own, middle = _sandwich(columns, left, models)
-    told = np.isfinite(np.diag(own))
+    condition, own, told, middle = _sandwich(columns, left, models)
     felt = [max(float(np.abs(slopes).max()) for slopes in column) for column in columns]
     for place, known, own_felt in zip(places, told.tolist(), felt, strict=True):
         if not known:
             apart = own_felt > UNFELT * max(felt)
             alone = "only together with others" if apart else "it moves nothing in them"
             said[place] = f"not determined by these recordings: {alone}"
-    if not told.all():
-        columns = [column for column, known in zip(columns, told.tolist(), strict=True) if known]
-        places = [place for place, known in zip(places, told.tolist(), strict=True) if known]
-        if not columns:
-            return Sureness(covariance, tuple(said), condition, worth, terms)
-        _, own, middle = _sandwich(columns, left, models)
-        own = np.nan_to_num(own)
-    found = share * (own @ middle @ own)  # as if the rest told as much
-    covariance[np.ix_(places, places)] = found * np.outer(sizes[places], sizes[places])
+    found = (share * (own @ middle @ own))[np.ix_(told, told)]  # as if the rest told as much
+    known_places = np.array(places)[told]
+    covariance[np.ix_(known_places, known_places)] = found * np.multiply.outer(
+        sizes[known_places], sizes[known_places]
+    )
     return Sureness(covariance, tuple(said), condition, worth, terms)
 
 
@@ -249,8 +248,8 @@ def _sensitivity(
 
 def _sandwich(
     columns: Sequence[list[Array]], left: Sequence[Array], models: Sequence[Autoregression]
-) -> tuple[float, Array, Array]:
-    """Return condition, P and J' R J, outputs weighed by their residuals' sizes."""
+) -> tuple[float, Array, NDArray[np.bool_], Array]:
+    """Return condition, P, what it determines, and J' R J, outputs weighed by their residuals' sizes."""
     n_outputs = left[0].shape[1]
     scale = np.array([np.sqrt(model.variance) or 1.0 for model in models])
     stacked, tinted = [], []
@@ -258,7 +257,7 @@ def _sandwich(
         slopes = np.stack([column[run] for column in columns], axis=2) / scale[:, np.newaxis]
         stacked.append(slopes.reshape(-1, len(columns)))
         tinted.append([models[j].tinted(slopes[:, j]) / scale[j] for j in range(n_outputs)])
-    condition, own = inverted(np.concatenate(stacked))
+    condition, own, told = _inverted(np.concatenate(stacked))
     shocks = [np.concatenate([m.shocks(e[:, j]) for e in left]) for j, m in enumerate(models)]
     together = np.corrcoef(shocks) if n_outputs > 1 else np.ones((1, 1))
     together = np.nan_to_num(together)
@@ -268,10 +267,18 @@ def _sandwich(
             for j in range(n_outputs):
                 middle += together[i, j] * (own_run[i].T @ own_run[j])
     # what the fit has taken out of the residuals, of all that was in them
-    if np.isfinite(own).all():
-        taken = float(np.sum(own * middle)) / sum(map(np.size, left))
-        middle /= max(1.0 - taken, 0.1)
-    return condition, own, middle
+    taken = float(np.sum(own * middle)) / sum(map(np.size, left))
+    middle /= max(1.0 - taken, 0.1)
+    return condition, own, told, middle
+
+
+def _inverted(slopes: Array) -> tuple[float, Array, NDArray[np.bool_]]:
+    """Return the condition of slopes, (n, k), their products' pseudo-inverse, and what is told."""
+    singular, right = np.linalg.svd(slopes, full_matrices=False)[1:]
+    condition = float(singular[0] / singular[-1]) if singular[-1] > 0 else np.inf
+    kept = singular > LEAST * singular[0]
+    inverse = (right[kept].T / singular[kept] ** 2) @ right[kept]
+    return condition, inverse, 1 - (right[~kept] ** 2).sum(axis=0) > DETERMINED
 
 
 @dataclass(frozen=True, eq=False)

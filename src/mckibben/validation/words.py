@@ -17,6 +17,12 @@ FEW = 2
 WRONG = 0.05
 """Share of the range that what is missed may be for that."""
 
+SLIGHT = 0.01
+"""Share of the range below which what is missed matters to few."""
+
+NAMED = 3
+"""Things missed that the verdict names."""
+
 SLOW = 3.0
 """Samples that noise of a filtered sensor remembers at most."""
 
@@ -90,10 +96,18 @@ def _verdict(one: OutputCheck) -> str:
         )
         return f"{NOTHING}: what it leaves, {size} RMS, says nothing, for {why}"
     if one.missing:
-        things = _listed([phrase(one, each) for each in one.missing])
-        missed = sum(each.size**2 for each in one.missing) ** 0.5
-        small = len(one.missing) <= FEW and missed <= WRONG * one.span
-        return f"The model is right but for {things}" if small else f"The model misses {things}"
+        named = [phrase(one, each) for each in one.missing[:NAMED]]
+        lesser = len(one.missing) - NAMED
+        if lesser > 0:
+            named.append("one lesser thing" if lesser == 1 else f"{lesser} lesser things")
+        things = _listed(named)
+        missed = sum(each.size**2 for each in one.missing) ** 0.5 / one.span
+        if len(one.missing) <= FEW and missed <= WRONG:
+            return f"The model is right but for {things}"
+        if missed <= SLIGHT:
+            share = numeral(100 * missed, 2)
+            return f"The model is right to about {share} % of the range, by which it misses {things}"
+        return f"The model misses {things}"
     if one.white:
         return f"{NOTHING}: what it leaves, {size} RMS, is white noise"
     return (

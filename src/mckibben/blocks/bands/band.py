@@ -21,6 +21,7 @@ from mckibben.blocks.bands.state_of_motion import look
 from mckibben.blocks.core.block import Kernel, Primitive
 from mckibben.blocks.core.fields import STRICT, Channel, Channels, Initial, Rows, Vector
 from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.core.notation import Notation
 from mckibben.blocks.core.refusals import explicit_state, needs_sample_time
 from mckibben.errors import ModelError
 from mckibben.numerals import numeral
@@ -134,6 +135,12 @@ class Band(Primitive):
     kernel: ClassVar[Kernel] = band_kernel
     in_scratch: ClassVar[bool] = True
     parameters: ClassVar[tuple[str, ...]] = ("shift", "log_scale")
+    notation: ClassVar[Notation] = Notation(
+        r"y^{\pm} = \begin{cases} \max(y,\, y + m + q s w) \\ \min(y,\, y + m - q s w) \end{cases}",
+        r"m = M \cdot (1,\, z,\, \beta(z)),\quad \ln s = S \cdot (1,\, z,\, \beta(z))",
+        shift="M_{jk} [{out0}]",
+        log_scale="S_{jk}",
+    )
 
     driving: Channels
     given: Channels

@@ -15,6 +15,7 @@ from mckibben.blocks.bands.band import Band
 from mckibben.blocks.core.block import Block, Run
 from mckibben.blocks.core.exportable import Board
 from mckibben.blocks.core.fields import STRICT, Channel, Initial
+from mckibben.blocks.core.notation import Notation
 from mckibben.blocks.core.refusals import explicit_state
 from mckibben.blocks.core.saving import nested
 from mckibben.errors import ModelError
@@ -44,6 +45,7 @@ class Banded(Block):
 
     kind: ClassVar[str] = "banded"
     parameters: ClassVar[tuple[str, ...]] = ("forward", "band")
+    notation: ClassVar[Notation] = Notation(r"y = P[u],\quad (y^{-},\, y^{+}) = \text{band}[u, y]")
 
     forward: Annotated[InstanceOf[Block], BeforeValidator(nested)]
     band: Annotated[InstanceOf[Band], BeforeValidator(nested)]

@@ -17,6 +17,9 @@ from mckibben.comparison.shared_stretches import GRAVE, shared_stretches
 from mckibben.errors import DataError, ModelError, ModelWarning
 from mckibben.recording import Recording
 
+COMMANDS = ("pressure", "voltage")
+"""Channels that drive a muscle: a model of these is a compensator."""
+
 FEWEST = 20
 """Samples of a run that anything is told by."""
 
@@ -93,7 +96,7 @@ def calibration(
 ) -> tuple[Banded, Found]:
     """Return a model with its band, and what is to be said of it; see `calibrate`."""
     model = model.forward if isinstance(model, Banded) else model
-    if isinstance(model, Inverse):
+    if isinstance(model, Inverse) and model.outputs[0].name.startswith(COMMANDS):
         raise ModelError(
             f"{model.title!r} gives inputs, and bands are of outputs. Remedy: calibrate the model that "
             "was inverted."

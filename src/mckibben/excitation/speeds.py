@@ -27,6 +27,9 @@ RESTS = 0.25
 TAIL = 0.05
 """Share of the branches that may be faster, or slower, than what counts."""
 
+FEWEST = 2
+"""Branches of like size that tell of speed."""
+
 EFFECT = (
     "damping, lags and dead times (balance, rdpi, oe, process models), and how errors grow away from "
     "these speeds"
@@ -58,6 +61,8 @@ def ratio_of(branches: Sequence[Branch]) -> tuple[float, float, float]:
     best = (0.0, 0.0, 0.0)
     for least in np.unique(np.quantile(travel, np.linspace(0, 1, 40), method="lower")):
         like = (travel >= 0.999 * least) & (travel <= ALIKE * least)
+        if like.sum() < min(FEWEST, travel.size):  # such as the way to where the motion begins
+            continue
         low = float(np.quantile(slow[like], TAIL, method="higher" if like.sum() > 20 else "lower"))
         high = float(
             np.quantile(fast[like], 1 - TAIL, method="lower" if like.sum() > 20 else "higher")

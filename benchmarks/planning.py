@@ -255,9 +255,9 @@ def compared(plant: Plant, seeds: int) -> None:
 def friction_told(elements: Any, repeats: int) -> None:
     """Print standard errors of sigma before and after a plan for it, and the spread of estimates.
 
-    Before is the isobaric cycle from which the paper identifies its friction, at 2 mm/s; the plan is
-    90 s at the same pressure, at up to 20 mm/s. Both are recorded anew, with other noise, for every
-    repeat.
+    Before is the isobaric cycle from which the paper identifies its friction, at 2 mm/s; the plan is 90
+    seconds at the same pressure, at up to 20 mm/s. Both are recorded anew for every repeat, with other
+    noise.
     """
     rig = load_rig("mas10-test-stand")
     made = {one.name: one for one in protocol("multistate-friction").runs}["isobaric-4bar"]

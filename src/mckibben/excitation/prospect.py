@@ -20,7 +20,7 @@ from mckibben.excitation.unmodelled import LONG, Unmodelled
 WORK = 1e5
 """Samples times parameters of one free run over a plan, by which its sample time is chosen."""
 
-FINEST, COARSEST = 0.01, 0.1
+FINEST, COARSEST = 0.02, 0.1
 """Sample times of plans [s]."""
 
 STRETCHES, SHORTEST, LONGEST = 25, 3.0, 10.0

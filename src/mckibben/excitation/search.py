@@ -20,13 +20,13 @@ from mckibben.excitation.plans import Parameter, Plan, Step
 from mckibben.excitation.prospect import Prospect
 from mckibben.recording import Recording
 
-CANDIDATES = 32
-"""Stretches tried at every step."""
+CANDIDATES, FEWER, QUICK = 32, 16, 50
+"""Stretches tried at every step: most, least, and up to how many parameters the most are tried."""
 
 BASELINES = 3
 """Plans of random motion that are tried whole."""
 
-EXCHANGES = 1.5
+EXCHANGES = 1.0
 """Stretches tried again in the end, over how many there are."""
 
 CALM = 1.0
@@ -88,6 +88,7 @@ class Search:
         design, run, interrupted = plans[0], self.run(plans[0], before, origin), False
         random_known = run[-1][1]
         done: list[Stretch] = []
+        count = max(min(CANDIDATES, CANDIDATES * QUICK // len(prospect.names)), FEWER)
         try:
             for other in plans[1:]:
                 design, run = self.better(design, run, other, self.run(other, before, origin))
@@ -99,7 +100,7 @@ class Search:
                     prospect.limits,
                     prospect.length,
                     prospect.step,
-                    CANDIDATES,
+                    count,
                     self.rng,
                 )
                 tried += [other[number] for other in plans]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
 from typing import TYPE_CHECKING
 
 from mckibben.report.wording import number, output_range, percent
@@ -13,9 +12,6 @@ if TYPE_CHECKING:
 
 MOST = 2
 """Things said of each."""
-
-MINUTES = 3
-"""Of the plan that is proposed."""
 
 
 def right(study: Study) -> list[str]:
@@ -49,9 +45,9 @@ def how_far(study: Study) -> list[str]:
     for name, width in band.width.items():
         of = f"{name} is" if len(band.width) > 1 else "the muscle is"
         said.append(
-            f"Expect that in {percent(band.level, 3)} of the samples of a new run {of} within about "
+            f"Expect that in {percent(band.level)} of the samples of a new run {of} within about "
             f"±{number(width / 2, 2)} {board.unit}, narrower and wider by the state of motion; on the "
-            f"test {percent(band.coverage[name], 3)} were inside its band."
+            f"test {percent(band.coverage[name])} were inside its band."
         )
     return [*said, largest]
 
@@ -61,10 +57,6 @@ def record_next(study: Study) -> list[str]:
     gaps = [f"{gap.sentence} {gap.remedy}" for gap in study.untold[:MOST]]
     if not gaps:
         gaps = ["Nothing that these recordings could tell of a muscle is missing from them."]
-    files = dict.fromkeys(one.source for one in study.train if one.source)
-    if files and study.leaderboard.best is not None:
-        named = " ".join(shlex.quote(str(file)) for file in files)
-        gaps.append(
-            f"The motion that tells most: mckibben plan {named} --minutes {MINUTES} -o next.csv"
-        )
+    if study.leaderboard.best is not None:
+        gaps.append("mckibben plan finds the motion that tells most; its command is at the end.")
     return gaps

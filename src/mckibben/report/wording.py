@@ -27,6 +27,10 @@ MISLEADING = 0.05
 """RMSE over range from which the chosen model is said to miss something."""
 
 
+MINUTES = 3
+"""Of the plan that is proposed."""
+
+
 def number(value: float | None, digits: int = 3) -> str:
     """Return a number to so many significant digits, as it is printed.
 
@@ -201,6 +205,12 @@ def commands(study: Study) -> list[tuple[str, str]]:
                 f"Fit {model} to whole recordings",
                 f"mckibben fit {model} {' '.join(train)} {channels} --seed {board.seed} "
                 f"-o {model}.json",
+            )
+        )
+        lines.append(
+            (
+                f"Plan {MINUTES} minutes that tell most of what is not known yet",
+                f"mckibben plan {' '.join(train)} --minutes {MINUTES} -o next.csv",
             )
         )
         lines.append(

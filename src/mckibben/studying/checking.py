@@ -42,4 +42,4 @@ def check_on_test(
         check_usable(model, [run.recording for run in runs])
         return check_runs(model, runs)
     except DataError as error:
-        return str(error)
+        return f"{error.problem}. Remedy: {error.remedy}."

@@ -106,7 +106,9 @@ def _verdict(one: OutputCheck) -> str:
             return f"The model is right but for {things}"
         if missed <= SLIGHT:
             share = numeral(100 * missed, 2)
-            return f"The model is right to about {share} % of the range, by which it misses {things}"
+            return (
+                f"The model is right to about {share} % of the range, by which it misses {things}"
+            )
         return f"The model misses {things}"
     if one.white:
         return f"{NOTHING}: what it leaves, {size} RMS, is white noise"

@@ -9,7 +9,7 @@ import numpy as np
 
 from mckibben.bands.finding import Found, Unit, find_band
 from mckibben.bands.held import Held
-from mckibben.blocks.bands.banded import Banded
+from mckibben.blocks.bands.banded import Banded, inside
 from mckibben.blocks.core.block import Block
 from mckibben.blocks.core.inverse import Inverse
 from mckibben.comparison.free_run import run_free
@@ -95,7 +95,7 @@ def calibration(
     fitted: Sequence[Recording] = (),
 ) -> tuple[Banded, Found]:
     """Return a model with its band, and what is to be said of it; see `calibrate`."""
-    model = model.forward if isinstance(model, Banded) else model
+    model = inside(model)
     if isinstance(model, Inverse) and model.outputs[0].name.startswith(COMMANDS):
         raise ModelError(
             f"{model.title!r} gives inputs, and bands are of outputs. Remedy: calibrate the model that "

@@ -163,6 +163,42 @@ def told(
     return tuple(said)
 
 
+def refuse_copies(
+    to: str, recordings: Sequence[Recording], inputs: Sequence[str], outputs: Sequence[str]
+) -> None:
+    """Refuse recordings some of whose samples would count twice.
+
+    Parameters
+    ----------
+    to : str
+        What they are for, as a verb.
+
+    Raises
+    ------
+    DataError
+        If two share more than a little.
+    """
+    for shared in shared_stretches(recordings, inputs, outputs):
+        if shared.share >= GRAVE:
+            raise DataError(
+                _sentence(shared, [(to, recording) for recording in recordings]),
+                file=recordings[shared.second].source,
+                remedy="drop the copy, or cut the stretch out of one of them",
+            )
+
+
+def without_copies(
+    recordings: Sequence[Recording], inputs: Sequence[str], outputs: Sequence[str]
+) -> list[Recording]:
+    """Return recordings without those that are, but for a little, in one before them."""
+    copies = {
+        shared.second
+        for shared in shared_stretches(recordings, inputs, outputs)
+        if shared.share > 1 - GRAVE
+    }
+    return [one for place, one in enumerate(recordings) if place not in copies]
+
+
 def _sentence(shared: Shared, listed: Sequence[tuple[str, Recording]]) -> str:
     (role, one), (other_role, other) = listed[shared.first], listed[shared.second]
     unit = "samples" if other.sample_time is None else "s"

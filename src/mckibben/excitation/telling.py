@@ -6,9 +6,12 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from mckibben.blocks.bands.banded import inside
+from mckibben.comparison.shared_stretches import without_copies
+from mckibben.comparison.splits import listed
 from mckibben.errors import DataError
 from mckibben.excitation.coupling import coupling
-from mckibben.excitation.gap import Gap, listing
+from mckibben.excitation.gap import Gap
 from mckibben.excitation.holds import holds
 from mckibben.excitation.loads import loads
 from mckibben.excitation.ranges import ranges
@@ -23,6 +26,9 @@ from mckibben.system.threads import one_blas_thread
 if TYPE_CHECKING:
     from mckibben.blocks.core.block import Block
     from mckibben.comparison.channels import Names
+
+FEWEST = 10
+"""Samples of a recording."""
 
 CHECKS: tuple[Callable[[Seen], Iterator[Gap]], ...] = (
     coupling,
@@ -81,17 +87,25 @@ def untold(
     >>> print(untold([run])[0].sentence)
     Rate dependence cannot be told: 8 branches run at 0.8 bar/s, where they are of like size.
     """
-    listed = [recordings] if isinstance(recordings, Recording) else list(recordings)
-    if not listed:
+    every = listed(recordings)
+    if not every:
         raise DataError("there are no recordings to judge", remedy="give at least one")
-    driven, given = channels(listed, inputs, outputs)
+    driven, given = channels(every, inputs, outputs)
+    for recording in every:
+        if len(recording) < FEWEST:
+            raise DataError(
+                f"{len(recording)} samples tell nothing",
+                file=recording.source,
+                remedy=f"give recordings of {FEWEST} samples or more",
+            )
+    kept = without_copies(every, driven, given)
     with one_blas_thread():
-        facts = seen(listed, driven, given, tests)
+        facts = seen(kept, driven, given, listed(tests))
         gaps = [*_still(facts), *(one for check in CHECKS for one in _merged(check(facts)))]
         if model is not None:
             from mckibben.excitation.parameters import parameters
 
-            gaps += parameters(listed, model, facts=facts)
+            gaps += parameters(kept, inside(model), facts=facts)
     return tuple(sorted(gaps, key=lambda gap: -gap.severity))
 
 

@@ -7,7 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from mckibben.arrays import Array
+from mckibben.blocks.bands.banded import inside
 from mckibben.blocks.core.block import Block
+from mckibben.comparison.splits import listed
 from mckibben.recording import Recording
 from mckibben.signals.reversals import noise_level, reversals
 from mckibben.validation import judging
@@ -57,12 +59,13 @@ def check(model: Block, recordings: Recording | Sequence[Recording]) -> Validati
     Raises
     ------
     DataError
-        On recordings that lack channels, are too short or constant, or differ in sample time.
+        On recordings that lack channels, are too short or constant, differ in sample time, or are the
+        same in part.
     ModelError
-        Where the model's output is not finite.
+        Where the model's output is not finite, or runs away.
     """
-    given = [recordings] if isinstance(recordings, Recording) else list(recordings)
-    return check_runs(model, runs_of(model, given))
+    model = inside(model)
+    return check_runs(model, runs_of(model, listed(recordings)))
 
 
 def check_runs(model: Block, runs: Sequence[Run]) -> Validation:
@@ -114,6 +117,7 @@ def _output(
         n_samples=n,
         sample_time=runs[0].recording.sample_time,
         span=span,
+        deviation=float(np.std(np.concatenate(measured))),
         rmse=float(np.sqrt(squares / n)),
         sensor_noise=float(np.median(known)) if known else None,
         resolution=_resolution(measured),

@@ -11,6 +11,7 @@ import numpy as np
 from mckibben.arrays import Array
 from mckibben.blocks.core.block import Block
 from mckibben.comparison.free_run import PERIODIC, measured_start, run_free
+from mckibben.comparison.shared_stretches import refuse_copies
 from mckibben.errors import DataError, ModelError
 from mckibben.recording import Recording
 
@@ -22,6 +23,9 @@ SHORTEST = 10
 
 SHIFTS = (-2.0, -1.0, -0.5, 0.5, 1.0, 2.0)
 """Root mean squares of the residual by which the first measured output may be off."""
+
+AWAY = 1e3
+"""Ranges of the measured output by which a model that is off has run away."""
 
 SAME_TIME = 1e-6
 """Relative difference up to which sample times are equal."""
@@ -66,17 +70,19 @@ def runs_of(block: Block, recordings: Sequence[Recording]) -> tuple[Run, ...]:
     check_usable(block, recordings)
     inputs = [channel.name for channel in block.inputs]
     outputs = [channel.name for channel in block.outputs]
+    refuse_copies("check", recordings, inputs, outputs)
     found = []
     for recording in recordings:
         with warnings.catch_warnings(), np.errstate(all="ignore"):
             warnings.simplefilter("ignore", RuntimeWarning)
             modelled = _modelled(block, recording, outputs, recordings)
-        if not np.isfinite(modelled).all():
+        measured = recording.matrix(outputs)
+        if not (np.abs(modelled - measured) <= AWAY * np.ptp(measured, axis=0)).all():
             raise ModelError(
-                f"the output of {block.kind!r} is not finite on {recording.name}. "
+                f"the output of {block.kind!r} runs away on {recording.name}. "
                 "Remedy: this model does not suit these data; identify it again."
             )
-        found.append(Run(recording, recording.matrix(inputs), recording.matrix(outputs), modelled))
+        found.append(Run(recording, recording.matrix(inputs), measured, modelled))
     return tuple(found)
 
 

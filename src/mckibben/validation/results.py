@@ -72,6 +72,8 @@ class OutputCheck:
         [s].
     span : float
         Range of the measured output.
+    deviation : float
+        Of the measured output from its mean, root mean square.
     rmse : float
         Of the free run.
     sensor_noise : float or None
@@ -107,6 +109,7 @@ class OutputCheck:
     n_samples: int
     sample_time: float | None
     span: float
+    deviation: float
     rmse: float
     sensor_noise: float | None
     resolution: float
@@ -139,9 +142,14 @@ class OutputCheck:
         return self.rmse <= max(ROUNDING * self.span, STEP * self.resolution)
 
     @property
+    def useless(self) -> bool:
+        """Whether the mean of the measured output would be off by less."""
+        return self.rmse >= self.deviation
+
+    @property
     def right(self) -> bool:
         """Whether nothing is found that the model misses."""
-        return self.exact or not self.missing
+        return self.exact or not (self.missing or self.useless)
 
     def to_dict(self) -> dict[str, Any]:
         """Return it for JSON."""
@@ -153,6 +161,7 @@ class OutputCheck:
             "n_samples": self.n_samples,
             "sample_time": self.sample_time,
             "range": self.span,
+            "deviation": self.deviation,
             "rmse": self.rmse,
             "sensor_noise": self.sensor_noise,
             "resolution": self.resolution,

@@ -95,6 +95,11 @@ def _verdict(one: OutputCheck) -> str:
             else "it is rounding"
         )
         return f"{NOTHING}: what it leaves, {size} RMS, says nothing, for {why}"
+    if one.useless:
+        return (
+            f"The model is of no use here: it is off by {size} RMS, the mean of {one.output} "
+            f"by {numeral(one.deviation, 2)}"
+        )
     if one.missing:
         named = [phrase(one, each) for each in one.missing[:NAMED]]
         lesser = len(one.missing) - NAMED

@@ -183,3 +183,8 @@ class Banded(Block):
     def example(cls) -> Self:
         """Return a Prandtl-Ishlinskii model with a band."""
         return cls(load("blocks", "pi").example(), Band.example())
+
+
+def inside(model: Block) -> Block:
+    """Return the model of one with a band; any other as it is."""
+    return model.forward if isinstance(model, Banded) else model

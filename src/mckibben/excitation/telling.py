@@ -11,7 +11,7 @@ from mckibben.comparison.shared_stretches import without_copies
 from mckibben.comparison.splits import listed
 from mckibben.errors import DataError
 from mckibben.excitation.coupling import coupling
-from mckibben.excitation.gap import Gap
+from mckibben.excitation.gap import Gap, listing
 from mckibben.excitation.holds import holds
 from mckibben.excitation.loads import loads
 from mckibben.excitation.ranges import ranges

@@ -80,12 +80,13 @@ def test_every_output_has_its_part_of_the_page() -> None:
         )
         for k in (1, 2)
     )
-    time = np.arange(0, 30, 0.02)
-    channels = {f"pressure_{k}": triangle(time, 4.0 + k, [5.0, 3.0]) for k in (1, 2)}
-    for k in (1, 2):
-        noise = np.random.default_rng(k).standard_normal(time.size)
-        channels[f"displacement_{k}"] = TRUE.simulate(channels[f"pressure_{k}"]) + 0.1 * noise
-    runs = [Recording(channels, 0.02, meta={"name": name}) for name in ("first", "<b>second")]
+    time, runs = np.arange(0, 30, 0.02), []
+    for seed, name in enumerate(("first", "<b>second")):
+        channels = {f"pressure_{k}": triangle(time, 4.0 + k, [5.0, 3.0]) for k in (1, 2)}
+        for k in (1, 2):
+            noise = np.random.default_rng([k, seed]).standard_normal(time.size)
+            channels[f"displacement_{k}"] = TRUE.simulate(channels[f"pressure_{k}"]) + 0.1 * noise
+        runs.append(Recording(channels, 0.02, meta={"name": name}))
     model = PerChannel(parts)
     page = check_page(check(model, runs), describe(model, runs), "model.json")
     for place, output in enumerate(("displacement_1", "displacement_2")):

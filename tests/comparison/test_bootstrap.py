@@ -1,26 +1,28 @@
 import numpy as np
 import pytest
+from scipy.signal import lfilter
+from scipy.stats import t as student
 
 from mckibben.comparison.bootstrap import BlockBootstrap, differences, interval
+from mckibben.comparison.resampling import Resampling
 
 
-def naive_rmse(errors: np.ndarray, n: int, seed: int, resamples: int) -> np.ndarray:
-    """Draw the same blocks one after another and take the RMSE of each resample."""
+def naive_rmse(errors: np.ndarray, n: int, seed: int) -> np.ndarray:
+    """Draw the same blocks one after another and take the RMSE of each resample, spread as by t."""
     block = int(np.ceil(np.sqrt(n)))
     count = int(np.ceil(n / block))
     starts = np.random.default_rng(seed).integers(0, n - block + 1, (1000, count))
-    return np.array(
-        [
-            np.sqrt(np.mean(np.concatenate([errors[s : s + block] for s in row]) ** 2))
-            for row in starts[:resamples]
-        ]
-    )
+    drawn = [np.concatenate([errors[s : s + block] for s in row]) for row in starts]
+    found = np.array([np.sqrt(np.mean(one**2)) for one in drawn])
+    blocks = n / block
+    wider = student.ppf(0.975, blocks - 1) / 1.96 * np.sqrt(blocks / (blocks - 1))
+    return found.mean() + wider * (found - found.mean())
 
 
 def test_resamples_equal_the_naive_ones() -> None:
     errors = np.random.default_rng(1).standard_normal(200)
     ours = BlockBootstrap([200], seed=7).rmse(errors)
-    np.testing.assert_allclose(ours[:50], naive_rmse(errors, 200, 7, 50), rtol=1e-12)
+    np.testing.assert_allclose(ours, naive_rmse(errors, 200, 7), rtol=1e-12)
 
 
 def test_interval_covers_the_error_of_dependent_samples() -> None:
@@ -78,3 +80,19 @@ def test_a_worse_model_is_told_apart_and_the_chosen_one_differs_from_itself_by_n
     first, second = differences(samples, np.array([1.0, 1.5]) * np.std(errors), 0)
     assert first == (0.0, 0.0)
     assert second[0] > 0
+
+
+def test_blocks_grow_with_the_memory_of_errors() -> None:
+    """Of ten models equally good whose errors remember, hardly any is told apart."""
+    level = []
+    for seed in range(60):
+        rng = np.random.default_rng(seed)
+        errors = {
+            f"m{k}": lfilter([np.sqrt(1 - 0.99**2)], [1, -0.99], rng.standard_normal(3000))[:, None]
+            for k in range(10)
+        }
+        found = Resampling([3000], seed).of(errors, "constant", np.ones((3000, 1)))
+        values = np.array([np.sqrt((one**2).mean()) for one in errors.values()])
+        ends = np.array(differences(np.array([found[m] for m in errors]), values, 0))[1:]
+        level.append(((ends[:, 0] <= 0) & (ends[:, 1] >= 0)).all())
+    assert np.mean(level) > 0.8

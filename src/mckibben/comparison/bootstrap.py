@@ -6,15 +6,26 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import stdtrit
 
 from mckibben.arrays import Array
 from mckibben.signals.checking import generator
 
 RESAMPLES = 1000
 
+BEST = 1.1447
+"""Of the best length of blocks, over the cube root of what the autoregression says."""
+
+GAUSS = 1.96
+"""Deviations in which 95 % lie."""
+
 
 class BlockBootstrap:
     """Resamples of blocks of consecutive samples, the same for every model, so that they pair.
+
+    Blocks are as long as is best for an autoregression of that memory (Andrews, Econometrica 59, 1991),
+    rounded up to doublings of the square root of the samples. Where that leaves few blocks, resamples
+    are spread as Student's t is wider than Gauss.
 
     Parameters
     ----------
@@ -22,18 +33,24 @@ class BlockBootstrap:
         Scored samples of every test recording; blocks never cross from one into the next.
     seed : int
         Of the resampling.
+    memory : float
+        Samples for which squared errors stay alike: 1 for white ones; see `doublings`.
     """
 
-    def __init__(self, lengths: Sequence[int], seed: int) -> None:
+    def __init__(self, lengths: Sequence[int], seed: int, memory: float = 1.0) -> None:
         rng = generator(seed)
         self._parts: list[tuple[int, int, int, NDArray[np.intp]]] = []
-        offset = 0
+        offset, n_blocks = 0, 0.0
         for n in lengths:
-            block = max(int(np.ceil(np.sqrt(n))), 1)
+            block = max(int(np.ceil(np.sqrt(n))), 1) << doublings(n, memory)
+            block = min(block, max(n // 2, 1))
             count = int(np.ceil(n / block))
             starts = rng.integers(0, n - block + 1, (RESAMPLES, count))
             self._parts.append((offset, n, block, starts))
             offset += n
+            n_blocks += n / block
+        freedom = max(n_blocks - 1, 1.0)
+        self._wider = float(stdtrit(freedom, 0.975) / GAUSS * np.sqrt(n_blocks / freedom))
 
     def rmse(self, errors: Array) -> Array:
         """Return the RMSE of every resample, shape (RESAMPLES,); of several outputs their mean.
@@ -51,7 +68,15 @@ class BlockBootstrap:
             squares = np.concatenate([[0.0], np.cumsum(errors[offset : offset + n] ** 2)])
             total += (squares[starts + block] - squares[starts]).sum(axis=1)
             count += block * starts.shape[1]
-        return np.sqrt(total / count)
+        found = np.sqrt(total / count)
+        middle = found.mean()
+        return np.maximum(middle + self._wider * (found - middle), 0.0)
+
+
+def doublings(n: int, memory: float) -> int:
+    """Return how often blocks of the square root of n samples are doubled, for errors of a memory."""
+    wanted = BEST * (memory**2 * n / 4) ** (1 / 3)
+    return max(int(np.ceil(np.log2(wanted / np.sqrt(n)))), 0) if n > 1 else 0
 
 
 def skill_of(squares: Sequence[float], constant: Sequence[float], seed: int) -> tuple[float, float]:

@@ -13,7 +13,7 @@ import numpy as np
 
 from mckibben.arrays import Array
 from mckibben.comparison.banding import tested_band
-from mckibben.comparison.bootstrap import BlockBootstrap, differences, interval, skill_of
+from mckibben.comparison.bootstrap import differences, interval, skill_of
 from mckibben.comparison.channels import Names
 from mckibben.comparison.choosing import Choice, choice_of
 from mckibben.comparison.coverage import OffTraining
@@ -22,6 +22,7 @@ from mckibben.comparison.kept import Kept
 from mckibben.comparison.pieces import counts_of
 from mckibben.comparison.planning import N_FOLDS, Plan, Settings, plan_of
 from mckibben.comparison.recommending import CONSTANT
+from mckibben.comparison.resampling import Resampling
 from mckibben.comparison.results import CHOICES, Leaderboard
 from mckibben.comparison.row import Row
 from mckibben.comparison.standing import Standing
@@ -211,21 +212,15 @@ def ranked(
         for name, item in remaining.items()
         for part in parts_of(name, item, len(data.folds), workers > 1 and efforts[name] > large)
     ]
-    bootstrap = BlockBootstrap(plan.n_scored, plan.seed)
+    resampling = Resampling(plan.n_scored, plan.seed)
     begun: list[str] = []
-    samples: dict[str, Array] = {}
-
-    def resampled(model: str, tried: Tried) -> Array:
-        if model not in samples:  # once a model, however often the ranking is made
-            samples[model] = bootstrap.rmse(errors_on_test(tried.outputs, data))
-        return samples[model]
 
     @cache
     def drift(model: str) -> Drift | None:
         return _drift(finished[model].outputs, plan)
 
     def current() -> Ranking:
-        return _ranking(plan, finished, resampled, drift)
+        return _ranking(plan, finished, resampling, drift)
 
     def tell() -> None:
         if progress is not None:
@@ -296,25 +291,28 @@ def _with_band(tried: Tried, others: Mapping[str, Tried], plan: Plan) -> Tried:
 def _ranking(
     plan: Plan,
     finished: Mapping[str, Tried],
-    resampled: Callable[[str, Tried], Array],
+    resampling: Resampling,
     drift: Callable[[str], Drift | None],
 ) -> Ranking:
-    done = [
-        (tried.row, resampled(model, tried))
+    tested = {
+        model: tried
         for model, tried in finished.items()
         if tried.row is not None and tried.row.test is not None
-    ]
-    done.sort(key=lambda item: item[0].order)
-    by_test = sorted(_rmse(row) for row, _ in done)
+    }
+    errors = {model: errors_on_test(tried.outputs, plan.data) for model, tried in tested.items()}
+    own = errors_on_test(plan.constant.outputs, plan.data)
+    samples = resampling.of(errors, CONSTANT, own)
+    done = sorted((t.row for t in tested.values() if t.row is not None), key=lambda row: row.order)
+    by_test = sorted(map(_rmse, done))
     rows = [
         replace(
             row,
             test_rank=1 + by_test.index(_rmse(row)),
-            rmse_interval=interval(samples),
+            rmse_interval=interval(samples[row.model]),
             off_training=_off_training(row, finished[row.model].outputs, plan),
             drift=drift(row.model),
         )
-        for row, samples in done
+        for row in done
     ]
     failed = [t.row for t in finished.values() if t.row is not None and t.row.test is None]
     failed.sort(key=lambda row: row.model)
@@ -322,15 +320,16 @@ def _ranking(
     constant = plan.constant.row
     if not rows or constant is None:
         return Ranking(plan.board([*rows, *failed]), outputs)
-    samples = [*(samples for _, samples in done), resampled(CONSTANT, plan.constant)]
-    constant = replace(constant, rmse_interval=interval(samples[-1]))
+    constant = replace(constant, rmse_interval=interval(samples[CONSTANT]))
     best = plan.board(rows).best or rows[0]
+    every = (*rows, constant)
     apart = differences(
-        np.array(samples), np.array([_rmse(row) for row in (*rows, constant)]), rows.index(best)
+        np.array([samples[row.model] for row in every]),
+        np.array([_rmse(row) for row in every]),
+        rows.index(best),
     )
     *rows, constant = (
-        replace(row, difference_interval=ends)
-        for row, ends in zip((*rows, constant), apart, strict=True)
+        replace(row, difference_interval=ends) for row, ends in zip(every, apart, strict=True)
     )
     board = replace(plan.board([*rows, *failed]), constant=constant, choice=_choice(rows, plan))
     return Ranking(board, outputs)

@@ -109,6 +109,7 @@ def test_study_writes_everything(cli: Cli, files: tuple[Path, Path], tmp_path: P
     written = {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
     assert written == {
         *("report.html", "characterization.json", "inverse.json"),
+        *("validation.json", "banded.json"),
         *("leaderboard.csv", "leaderboard.json", "results.sha256"),
         *("models/pi.json", "models/gpi.json"),
     }

@@ -224,10 +224,32 @@ def test_a_test_that_goes_further() -> None:
     assert whats(pair(COMPLETE), tests=[run(drive([(3.9, 1.0, 0.0), (0.1, 1.0, 0.0)]))]) == []
 
 
-def test_what_is_allowed_may_go_further() -> None:
-    known = [one.with_meta(limits={"pressure": [0.0, 6.0]}) for one in pair(COMPLETE)]
-    (gap,) = untold(known)
-    assert (gap.what, gap.evidence["high"]) == ("range", 6.0)
+def test_copies_tell_nothing_more() -> None:
+    one = pair(COMPLETE)[0]
+    assert untold([one, one]) == untold([one])
+
+
+def test_a_muscle_that_is_held_is_judged_by_its_force() -> None:
+    (one, other) = pair(COMPLETE)
+    held = [
+        Recording(
+            {
+                "pressure": r["pressure"],
+                "displacement": np.full(len(r), d),
+                "force": r["displacement"],
+            },
+            r.sample_time,
+        )
+        for r, d in ((one, 0.0), (other, 10.0))
+    ]
+    assert "steps of that size" not in " ".join(gap.sentence for gap in untold(held))
+    assert "force" not in " ".join(gap.what for gap in untold(held))
+
+
+def test_a_model_without_parameters_that_tell_is_said() -> None:
+    many = PI(tuple(np.linspace(0, 3, 200)), (0.01,) * 200)
+    (gap,) = [gap for gap in untold(pair(COMPLETE), model=many) if gap.what == "parameters"]
+    assert "cannot be said" in gap.sentence
 
 
 def test_levels_recorded_once_each_hide_the_way_between() -> None:

@@ -85,11 +85,15 @@ def _say(study: Study, folder: Path) -> None:
 
 
 def _conclude(study: Study, folder: Path) -> None:
+    from mckibben.report.answers import answers
+
     print_leaderboard(study.leaderboard)
     say()
     for gap in study.untold:
         if gap.what == "parameters":
             say(f"- {gap}")
+    for question, answer in answers(study):
+        say(f"{question} {answer[0]}")
     check = study.inverse
     if check is not None and check.reachable is not None:
         low, high = check.reachable
@@ -110,7 +114,12 @@ def _conclude(study: Study, folder: Path) -> None:
     for name, tracked in study.loops.items():
         errors = ", ".join(numeral(error, 2) for error in tracked.rmse.values())
         say(f"Following a measured motion on {study.plant}: {name}, RMSE {errors} mm.")
-    say(
-        f"Written: {folder / 'report.html'}, leaderboard.csv, leaderboard.json, models"
-        + ("" if study.inverse is None else ", inverse.json")
-    )
+    best = study.leaderboard.best
+    written = [
+        str(folder / "report.html"),
+        *("leaderboard.csv", "leaderboard.json", "models"),
+        *([] if best is None else ["validation.json"]),
+        *([] if best is None or best.banded is None else ["banded.json"]),
+        *([] if study.inverse is None else ["inverse.json"]),
+    ]
+    say(f"Written: {', '.join(written)}")

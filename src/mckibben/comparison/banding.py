@@ -64,13 +64,14 @@ class TestedBand:
             f"{numeral(self.constant_width[name], 2)})"
             for name, width in self.width.items()
         ]
-        unlike = min(self.coverage.values()) < self.level - UNLIKE
+        short = min(self.coverage.values()) < self.level - UNLIKE
         return (
-            f"its band for {numeral(100 * self.level, 3)} %, from {self.units} {self.unit}s of the "
-            f"cross-validation, holds on the test: {', '.join(each)}"
+            f"of the test's samples, its band for {numeral(100 * self.level, 3)} %, from {self.units} "
+            f"{self.unit}s of the cross-validation, holds {', '.join(each)}"
             + (
-                "; the test is unlike training: calibrate on runs like those to come"
-                if unlike
+                "; do not rely on it: what was held out in training is not like the test. Remedy: "
+                "calibrate it on runs like those to come"
+                if short
                 else ""
             )
         )

@@ -92,7 +92,7 @@ def parameters(
     # what is exactly 0 ended at its bound, and what is exactly 1 is a norm
     free = np.flatnonzero((theta != 0) & (theta != 1)).tolist()
     if not 0 < len(free) <= MANY:
-        return []
+        return [_unknown(f"it has {len(free)} that are free, which say nothing one by one")]
     sizes = relative_sizes(theta)
     try:
         with warnings.catch_warnings(), np.errstate(all="ignore"):
@@ -109,12 +109,25 @@ def parameters(
                 (run, _information(model, free, sizes, run) * _weight(run, data) / variance)
                 for run in runs
             ]
-    except MckibbenError:
-        return []
+    except MckibbenError as error:
+        return [_unknown(str(error).rstrip("."))]
+    if not free:
+        return [_unknown("its output does not move with them, or is not finite")]
     groups = _groups(model, free)
     meanings = _meanings(model, groups, free)
     gaps = [gap for name in groups if (gap := _gap(name, groups, told, more, meanings))]
     return sorted(gaps, key=lambda gap: -gap.severity)[:TOLD]
+
+
+def _unknown(why: str) -> Gap:
+    """Return that nothing is known of a model's parameters."""
+    return Gap(
+        "parameters",
+        f"Which parameters of the model these recordings tell cannot be said: {why}.",
+        "Check the model on a run that it was not fitted to (mckibben check).",
+        "how sure each parameter is",
+        0.05,
+    )
 
 
 def standard_error(told: Array, places: Sequence[int]) -> float:

@@ -12,7 +12,7 @@ from mckibben.excitation.gap import Gap, between, counted, listing, value
 from mckibben.excitation.seen import Seen
 
 BEYOND = 0.05
-"""Share of the range by which a test, or what is allowed, must go beyond it."""
+"""Share of the range by which a test must go beyond it."""
 
 CLIPPED = 10
 """Samples in a row at exactly the largest value, of a channel with noise, from which it is clipped."""
@@ -22,9 +22,6 @@ MOST = 100_000
 
 UNKNOWN_START = 0.25
 """Share of the samples before the input first comes to an end of its range, at which memory is known."""
-
-LIMITS = "limits"
-"""Entry of ``meta``: what a channel may be, as pairs of lowest and highest."""
 
 
 def ranges(seen: Seen) -> Iterator[Gap]:
@@ -39,18 +36,10 @@ def ranges(seen: Seen) -> Iterator[Gap]:
 
 def _beyond(seen: Seen, name: str) -> Iterator[Gap]:
     scale, unit = seen.scales[name], seen.unit(name)
-    wanted = [
-        (float(r[name].min()), float(r[name].max()), "the test") for r in seen.tests if name in r
-    ]
-    for recording in seen.recordings:
-        limits = recording.meta.get(LIMITS)
-        if isinstance(limits, dict) and name in limits:
-            low, high = limits[name]
-            wanted.append((float(low), float(high), "what is allowed"))
-    if not wanted:
+    tests = [recording[name] for recording in seen.tests if name in recording]
+    if not tests:
         return
-    low, who_low = min((low, who) for low, _, who in wanted)
-    high, who_high = max((high, who) for _, high, who in wanted)
+    low, high = min(float(u.min()) for u in tests), max(float(u.max()) for u in tests)
     over, under = high - scale.high, scale.low - low
     if max(over, under) <= BEYOND * scale.span:
         return
@@ -59,8 +48,7 @@ def _beyond(seen: Seen, name: str) -> Iterator[Gap]:
     yield Gap(
         "range",
         f"What the muscle does at {listing(ends)} cannot be told: {name} stays within "
-        f"{between(scale.low, scale.high, unit)}, and {who_high if over > under else who_low} goes "
-        "beyond.",
+        f"{between(scale.low, scale.high, unit)}, and the test goes beyond.",
         f"Record cycles of {name} over {between(min(low, scale.low), max(high, scale.high), unit)}.",
         "every model: none is known beyond what it was fitted to",
         0.85,

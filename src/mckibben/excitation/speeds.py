@@ -43,7 +43,7 @@ def speeds(seen: Seen) -> Iterator[Gap]:
     for name in seen.moving:
         if len(seen.branches[name]) > 1:
             ratio, slow, fast = ratio_of(seen.branches[name])
-            if ratio < ENOUGH:
+            if 0 < ratio < ENOUGH:
                 yield _gap(seen, name, ratio, slow, fast)
 
 
@@ -67,7 +67,8 @@ def ratio_of(branches: Sequence[Branch]) -> tuple[float, float, float]:
         high = float(
             np.quantile(fast[like], 1 - TAIL, method="lower" if like.sum() > 20 else "higher")
         )
-        best = max(best, (high / low, low, high))
+        if low > 0:
+            best = max(best, (high / low, low, high))
     return best
 
 

@@ -6,6 +6,8 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from mckibben.blocks.bands.banded import inside
 from mckibben.comparison.shared_stretches import without_copies
 from mckibben.comparison.splits import listed
@@ -131,7 +133,7 @@ def channels(
         and "voltage" in first
     ):
         driven = ("voltage",)
-    if outputs is None and given == ("displacement",) and "displacement" not in first:
+    if outputs is None and given == ("displacement",) and _held(recordings, "displacement"):
         given = tuple(name for name in ("force", "length") if name in first)[:1] or given
         if inputs is None and given == ("force",) and "length" in first:
             driven = (*driven, "length")
@@ -144,6 +146,14 @@ def channels(
                 remedy="name them with --input and --output, or give recordings with the same channels",
             )
     return driven, given
+
+
+def _held(recordings: Sequence[Recording], name: str) -> bool:
+    """Tell whether a channel is absent, or held in every recording while force moves."""
+    if name not in recordings[0]:
+        return True
+    held = all(name in one and np.ptp(one[name]) == 0 for one in recordings)
+    return held and all("force" in one and np.ptp(one["force"]) > 0 for one in recordings)
 
 
 def _merged(gaps: Iterable[Gap]) -> Iterator[Gap]:

@@ -14,6 +14,10 @@ MOST = 2
 """Things said of each."""
 
 
+SHORT = 0.03
+"""By which a band may hold less of the test than it should, unsaid."""
+
+
 def right(study: Study) -> list[str]:
     """Return whether the chosen model is right, the most important first."""
     best, check = study.leaderboard.best, study.check
@@ -43,12 +47,22 @@ def how_far(study: Study) -> list[str]:
         ]
     said = []
     for name, width in band.width.items():
-        of = f"{name} is" if len(band.width) > 1 else "the muscle is"
-        said.append(
-            f"Expect that in {percent(band.level)} of the samples of a new run {of} within about "
-            f"±{number(width / 2, 2)} {board.unit}, narrower and wider by the state of motion; on the "
-            f"test {percent(band.coverage[name])} were inside its band."
-        )
+        of = f"{name} was" if len(band.width) > 1 else "the muscle was"
+        inside, asked = percent(band.coverage[name]), percent(band.level)
+        scaled = width < 0.95 * band.constant_width[name]
+        by = ", narrower and wider by the state of motion" if scaled else ""
+        around = f"within about ±{number(width / 2, 2)} {board.unit} of the model{by}"
+        if band.coverage[name] < band.level - SHORT:
+            said.append(
+                f"Further than its errors in cross-validation say: a band for {asked} of the samples "
+                f"held {inside} of the test, where {of} to be {around}. Calibrate it on runs like "
+                "those to come: mckibben calibrate."
+            )
+        else:
+            said.append(
+                f"In {inside} of the test's samples {of} {around}, a band for {asked}. Expect the like "
+                "of runs like the test."
+            )
     return [*said, largest]
 
 
@@ -60,3 +74,12 @@ def record_next(study: Study) -> list[str]:
     if study.leaderboard.best is not None:
         gaps.append("mckibben plan finds the motion that tells most; its command is at the end.")
     return gaps
+
+
+def answers(study: Study) -> tuple[tuple[str, list[str]], ...]:
+    """Return the three questions, each with what is told."""
+    return (
+        ("Is it right?", right(study)),
+        ("How far off may it be?", how_far(study)),
+        ("What to record next?", record_next(study)),
+    )

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 
 from mckibben.recording import notes_by_file, reading_notes
 from mckibben.report import (
-    answers,
     check_subjects,
     description_subjects,
     interactive,
@@ -17,6 +16,7 @@ from mckibben.report import (
     templating,
     wording,
 )
+from mckibben.report.answers import answers
 from mckibben.report.drawing import N_COLOURS, POINTS, Drawing, series_colour
 from mckibben.report.shown import Shown, drawn, shown, unique
 
@@ -84,7 +84,7 @@ def page(study: Study) -> str:
         reading=notes_by_file(measured),
         notes=[note for note in study.notes if note not in reading_notes(measured)],
         wording=wording,
-        answers=answers,
+        answers=answers(study),
         checked=checked(study),
         description=study.description,
     )

@@ -34,7 +34,13 @@ def model_file(model: str) -> str:
 
 def study_files(models: Iterable[str]) -> list[str]:
     """Return the files that a study of these models may write."""
-    rest = ("report.html", "characterization.json", "inverse.json")
+    rest = (
+        "report.html",
+        "characterization.json",
+        "inverse.json",
+        "validation.json",
+        "banded.json",
+    )
     return [*LEADERBOARD, *rest, *map(model_file, models)]
 
 
@@ -74,6 +80,13 @@ class StudyFolder:
         write_leaderboard(board, self._results)
         if study.inverse is not None:
             write("inverse.json", to_text(study.inverse.inverse))
+        best = board.best
+        if best is not None and not board.pending:
+            told = study.to_dict()
+            kept = {name: told[name] for name in ("check", "description", "untold")}
+            write("validation.json", to_json(kept) + "\n")
+            if best.banded is not None:
+                write("banded.json", to_text(best.banded))
         started = time.monotonic()
         if last or not board.pending or started >= self._next_page:
             write("report.html", page(study))

@@ -226,6 +226,13 @@ def commands(study: Study) -> list[tuple[str, str]]:
                 "mckibben simulate inverse.json reference.csv -o feedforward.csv",
             )
         )
+    if board.best is not None and board.best.banded is not None:
+        lines.append(
+            (
+                f"{board.output} with the ends of its band, on another {board.input}",
+                "mckibben simulate banded.json new.csv --interval 0.9 -o modelled.csv",
+            )
+        )
     return lines
 
 

@@ -11,14 +11,11 @@ from mckibben.bands.finding import Found, Unit, find_band
 from mckibben.bands.held import Held
 from mckibben.blocks.bands.banded import Banded
 from mckibben.blocks.core.block import Block
-from mckibben.blocks.core.inverse import Inverse
+from mckibben.blocks.core.commanding import commands
 from mckibben.comparison.free_run import run_free
 from mckibben.comparison.shared_stretches import GRAVE, shared_stretches
 from mckibben.errors import DataError, ModelError, ModelWarning
 from mckibben.recording import Recording
-
-COMMANDS = ("pressure", "voltage")
-"""Channels that drive a muscle: a model of these is a compensator."""
 
 FEWEST = 20
 """Samples of a run that anything is told by."""
@@ -96,7 +93,7 @@ def calibration(
 ) -> tuple[Banded, Found]:
     """Return a model with its band, and what is to be said of it; see `calibrate`."""
     model = model.forward if isinstance(model, Banded) else model
-    if isinstance(model, Inverse) and model.outputs[0].name.startswith(COMMANDS):
+    if commands(model):
         raise ModelError(
             f"{model.title!r} gives inputs, and bands are of outputs. Remedy: calibrate the model that "
             "was inverted."

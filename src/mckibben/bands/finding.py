@@ -197,13 +197,12 @@ def _best(
         # scores are of scales that know less: what these save, the one that is used must save, too
         return whole, scores, max(float(width) / len(errors), whole.width(terms, half))
 
-    *best, constant = tried(shapes[0])
+    scale, scores, constant = tried(shapes[0])
     width = constant
     for shape in shapes[1:]:
-        *other, narrower = tried(shape)
+        other, own, narrower = tried(shape)
         if narrower < (1.0 - WORTH) * width:
-            best, width = other, narrower
-    scale, scores = best
+            scale, scores, width = other, own, narrower
     return scale, scores, width / constant if constant > 0 else 1.0, width
 
 

@@ -22,6 +22,7 @@ from mckibben.blocks.core.block import Block
 from mckibben.blocks.core.fields import rows, vector
 from mckibben.errors import DataError
 from mckibben.numerals import numeral
+from mckibben.system.threads import one_blas_thread
 
 Unit = Literal["auto", "run", "block"]
 
@@ -75,6 +76,7 @@ class Found:
     notes: tuple[str, ...]
 
 
+@one_blas_thread()
 def find_band(
     model: Block,
     runs: Sequence[Held],

@@ -12,9 +12,10 @@ from scipy.stats import binom
 
 from mckibben import GPI, Banded, DataError, ModelError, ModelWarning, Recording, calibrate, load
 from mckibben.bands.finding import find_band
-from mckibben.bands.held import Held, memory_of
-from mckibben.bands.scale import SHAPES
+from mckibben.bands.held import Held, memory_of, off_as_a_whole
+from mckibben.bands.scale import SHAPES, Terms, scale_of
 from mckibben.blocks.bands.band import check_level
+from mckibben.blocks.core.fields import Channel
 from mckibben.signals import random_wave
 
 MODEL = GPI.example()
@@ -198,6 +199,62 @@ def test_few_runs_are_cut_into_blocks_and_that_is_said() -> None:
     assert banded.band.unit == "block"
     assert banded.band.units > 5
     assert quietly(MODEL, [noisy(seed) for seed in range(5)], exchangeable="run").band.units == 5
+
+
+def test_runs_are_told_from_blocks_that_differ_no_more_than_chance() -> None:
+    rng = np.random.default_rng(8)
+    pieces, trials = [4] * 6, 300
+    alike = sum(
+        off_as_a_whole([rng.standard_normal(80) for _ in pieces], pieces) for _ in range(trials)
+    )
+    assert alike <= binom.ppf(0.999, trials, 0.01)
+    off = [rng.standard_normal(80) + 2.0 * k for k in range(6)]
+    assert off_as_a_whole(off, pieces)
+    assert not off_as_a_whole(off, [1] * 6)
+    assert not off_as_a_whole(off[:1], [4])
+
+
+def test_runs_off_as_a_whole_count_once_each() -> None:
+    runs = [noisy(seed) for seed in range(5)]
+    offs = np.arange(5.0)
+    runs = [
+        Recording({**run.channels, "displacement": run["displacement"] + off}, STEP)
+        for run, off in zip(runs, offs, strict=True)
+    ]
+    with pytest.warns(ModelWarning, match=r"off as a whole .* 83.3 %"):
+        banded = calibrate(MODEL, runs)
+    assert (banded.band.unit, banded.band.units) == ("run", 5)
+    assert quietly(MODEL, runs, exchangeable="block").band.units > 5
+
+
+def test_a_scale_is_one_on_average_however_much_is_missed() -> None:
+    rng = np.random.default_rng(2)
+    seen = rng.uniform(0.0, 1.0, (400, 2))
+    terms, units = Terms.of(seen)(seen), np.arange(400) // 40
+    missed = rng.standard_normal(400) * (0.1 + seen[:, 0])
+    for shape in SHAPES[:2]:
+        small, large = (
+            scale_of(terms, size * missed, units, shape, 2, terms.mean(axis=0)).at(terms)[1]
+            for size in (1.0, 100.0)
+        )
+        assert large == pytest.approx(small, rel=1e-9)
+        assert np.log(small).mean() == pytest.approx(0.0, abs=0.02)
+
+
+def test_a_model_that_is_solved_for_displacement_is_calibrated() -> None:
+    """Not every inverse is a compensator."""
+    forces = replace(MODEL, input=MODEL.output, output=Channel("force", "N"))
+    runs = []
+    for seed in range(6):
+        y = random_wave(STEP * np.arange(150), 0.3, 5.0, seed=seed)
+        off = 0.1 * np.random.default_rng(seed).standard_normal(150)
+        runs.append(
+            Recording({"displacement": y + off, "force": forces.simulate(y)}, STEP, {"force": "N"})
+        )
+    banded = quietly(forces.inverse(), runs)
+    assert inside(banded, runs[0]).mean() > 0.8
+    with pytest.raises(ModelError, match="calibrate the model"):
+        quietly(MODEL.inverse(), runs)
 
 
 def test_what_it_cannot_calibrate_on_is_refused() -> None:

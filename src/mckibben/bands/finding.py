@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mckibben.arrays import Array
-from mckibben.bands.held import BLOCK, Held, memory_of
+from mckibben.bands.held import BLOCK, Held, memory_of, off_as_a_whole
 from mckibben.bands.scale import SHAPES, Scale, Shape, Terms, scale_of
 from mckibben.blocks.bands.band import Band
 from mckibben.blocks.bands.state_of_motion import look_along
@@ -22,6 +22,7 @@ from mckibben.blocks.core.block import Block
 from mckibben.blocks.core.fields import rows, vector
 from mckibben.errors import DataError
 from mckibben.numerals import numeral
+from mckibben.system.threads import one_blas_thread
 
 Unit = Literal["auto", "run", "block"]
 
@@ -75,6 +76,7 @@ class Found:
     notes: tuple[str, ...]
 
 
+@one_blas_thread()
 def find_band(
     model: Block,
     runs: Sequence[Held],
@@ -99,16 +101,12 @@ def find_band(
         Where errors stay alike for so long that the runs hold fewer than two units.
     """
     missed = [run.measured - run.modelled for run in runs]
-    memory = max(
-        memory_of(
-            [
-                e[run.counts, k] - e[run.counts, k].mean()
-                for e, run in zip(missed, runs, strict=True)
-            ]
-        )
+    by_output = [
+        [e[run.counts, k] for e, run in zip(missed, runs, strict=True)]
         for k in range(missed[0].shape[1])
-    )
-    which, units, note = _units(runs, memory, unit)
+    ]
+    memory = max(map(memory_of, by_output))
+    which, units, note = _units(runs, by_output, memory, unit)
     ends = _ends(np.concatenate([np.hstack([run.inputs, run.modelled]) for run in runs]))
     times = _times(runs)
     seen, units_of, all_missed = [], [], []
@@ -180,30 +178,33 @@ def _best(
     Units, by ``of``, weigh the same; those that ``apart`` numbers alike are left out together.
     """
     n_apart = int(apart.max()) + 1
-    part = apart * min(PARTS, n_apart) // n_apart
+    part, typical = apart * min(PARTS, n_apart) // n_apart, terms.mean(axis=0)
     every = max(len(errors) // MOST_FITTED, 1)
 
-    def tried(shape: Shape) -> tuple[Array, float]:
-        scores, fitted = np.empty(len(errors)), []
+    some = np.arange(0, len(errors), every)
+
+    def scale_on(known: NDArray[np.intp], shape: Shape) -> Scale:
+        return scale_of(terms[known], errors[known], apart[known], shape, n_seen, typical)
+
+    def tried(shape: Shape) -> tuple[Scale, Array, float]:
+        scores, width = np.empty(len(errors)), 0.0
+        whole, fitted = scale_on(some, shape), []
         for place in range(int(part.max()) + 1):
             here = part == place
-            known = np.flatnonzero(~here)[::every]
-            scale = scale_of(terms[known], errors[known], apart[known], shape, n_seen)
+            scale = scale_on(np.flatnonzero(~here)[::every], shape)
             scores[here] = scale.scores(terms[here], errors[here])
             fitted.append((here, scale))
         half = float(_quantiles(scores, of)[round(level * STEPS)])
         width = sum(scale.width(terms[here], half) * here.sum() for here, scale in fitted)
-        return scores, float(width) / len(errors)
+        # scores are of scales that know less: what these save, the one that is used must save, too
+        return whole, scores, max(float(width) / len(errors), whole.width(terms, half))
 
-    shape = shapes[0]
-    scores, constant = tried(shape)
+    scale, scores, constant = tried(shapes[0])
     width = constant
-    for other in shapes[1:]:
-        own, narrower = tried(other)
+    for shape in shapes[1:]:
+        other, own, narrower = tried(shape)
         if narrower < (1.0 - WORTH) * width:
-            shape, scores, width = other, own, narrower
-    some = np.arange(0, len(errors), every)
-    scale = scale_of(terms[some], errors[some], apart[some], shape, n_seen)
+            scale, scores, width = other, own, narrower
     return scale, scores, width / constant if constant > 0 else 1.0, width
 
 
@@ -242,13 +243,19 @@ def _quantiles(scores: Array, of: NDArray[np.intp]) -> Array:
 
 
 def _units(
-    runs: Sequence[Held], memory: float, unit: Unit
+    runs: Sequence[Held], errors: Sequence[list[Array]], memory: float, unit: Unit
 ) -> tuple[Literal["run", "block"], list[NDArray[np.intp]], str]:
-    """Return what is exchangeable, which unit every sample of every run is of, and what to say."""
+    """Return what is exchangeable, which unit every sample of every run is of, and what to say.
+
+    ``errors`` are of every output, those of every run that count.
+    """
     lengths = [len(run.inputs) for run in runs]
     longest = max(int(np.ceil(BLOCK * memory)), 1)
     pieces = [max(length // longest, 1) for length in lengths]
-    as_runs = unit == "run" or (unit == "auto" and (len(runs) >= MANY or sum(pieces) == len(runs)))
+    few = unit == "auto" and len(runs) < MANY
+    apart = few and any(off_as_a_whole(of_runs, pieces) for of_runs in errors)
+    single = unit == "auto" and (len(runs) >= MANY or sum(pieces) == len(runs))
+    as_runs = unit == "run" or single or apart
     if as_runs:
         pieces = [1] * len(runs)
     units, count, note = [], 0, ""
@@ -260,6 +267,12 @@ def _units(
             f"{len(runs)} run(s) are few: {count} blocks of them, each {numeral(BLOCK, 2)} memories of "
             "the error or longer, count as exchangeable instead, so what differs from run to run is not "
             f"in the band. Remedy: calibrate on {MANY} runs or more"
+        )
+    elif apart:
+        note = (
+            f"{len(runs)} runs are off as a whole by more than blocks of one differ, so each run "
+            f"counts once, which allows up to {numeral(100 * len(runs) / (len(runs) + 1), 3)} %. "
+            "Remedy: calibrate on more runs"
         )
     elif unit != "run" and len(runs) < MANY and min(lengths) < BLOCK * memory:
         note = (

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import f as f_distribution
 
 from mckibben.arrays import Array
 
@@ -14,6 +15,9 @@ BLOCK = 2.0
 
 DOWN_TO = 0.05
 """Autocorrelation that counts as none."""
+
+CHANCE = 0.01
+"""Of taking blocks of a run for alike that are not."""
 
 
 @dataclass(frozen=True)
@@ -64,3 +68,24 @@ def memory_of(errors: list[Array]) -> float:
     low = np.flatnonzero(alike < DOWN_TO)
     until = int(low[0]) if low.size else longest
     return float(1.0 + 2.0 * alike[1:until].clip(max=1.0).sum())
+
+
+def off_as_a_whole(errors: list[Array], pieces: list[int]) -> bool:
+    """Tell whether errors (n,) of runs differ from run to run by more than so many blocks of each do.
+
+    By analysis of variance of the blocks' means. Then a run's blocks are no more news than one, however
+    many there are.
+    """
+    means = [
+        np.array([block.mean() for block in np.array_split(e, n)])
+        for e, n in zip(errors, pieces, strict=True)
+    ]
+    among, within = len(means) - 1, sum(pieces) - len(means)
+    if among < 1 or within < 1:
+        return False
+    grand = np.concatenate(means).mean()
+    between = sum(own.size * (own.mean() - grand) ** 2 for own in means) / among
+    inside = sum(float(((own - own.mean()) ** 2).sum()) for own in means) / within
+    return (
+        bool(f_distribution.sf(between / inside, among, within) < CHANCE) if inside > 0 else False
+    )

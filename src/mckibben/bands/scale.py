@@ -110,9 +110,18 @@ class Scale:
 
 
 def scale_of(
-    terms: Array, missed: Array, units: NDArray[np.intp], shape: Shape, n_seen: int
+    terms: Array,
+    missed: Array,
+    units: NDArray[np.intp],
+    shape: Shape,
+    n_seen: int,
+    typical: Array,
 ) -> Scale:
     """Return the scale that misses (n,) ask for.
+
+    It is 1 at ``typical`` terms: it tells where more is missed, and the scores how much. Else runs that
+    miss more than those a scale was found on would have it widen the band twice: by their scores, and
+    again in the scale that knows them.
 
     Parameters
     ----------
@@ -122,6 +131,8 @@ def scale_of(
         Which run, or block, a sample is of: weights are tried on some that they do not know.
     shape : Shape
         What it may be made of.
+    typical : array, shape (t,)
+        Mean of all terms there are, also of units left out.
     """
     used = terms.shape[1] if shape.bells else 1 + n_seen
     given, part = terms[:, :used], _parts(units)
@@ -132,9 +143,9 @@ def scale_of(
     size = np.abs(left)
     floor = FLOOR * float(np.median(size)) or float(size.mean()) or 1.0
     log_scale = np.zeros(terms.shape[1])
-    log_scale[0] = np.log(floor / FLOOR)
     if shape.scale:
         log_scale[:used], _ = _ridge(given, np.log(size + floor), part)
+        log_scale[0] -= typical @ log_scale
     m, s = terms @ shift, terms @ log_scale
     low, high = np.quantile(s, [0.01, 0.999])
     limits = (float(m.min()), float(m.max()), float(low), float(high))

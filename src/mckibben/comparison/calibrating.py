@@ -11,14 +11,11 @@ from mckibben.bands.finding import Found, Unit, find_band
 from mckibben.bands.held import Held
 from mckibben.blocks.bands.banded import Banded, inside
 from mckibben.blocks.core.block import Block
-from mckibben.blocks.core.inverse import Inverse
+from mckibben.blocks.core.commanding import commands
 from mckibben.comparison.free_run import run_free
 from mckibben.comparison.shared_stretches import GRAVE, shared_stretches
 from mckibben.errors import DataError, ModelError, ModelWarning
 from mckibben.recording import Recording
-
-COMMANDS = ("pressure", "voltage")
-"""Channels that drive a muscle: a model of these is a compensator."""
 
 FEWEST = 20
 """Samples of a run that anything is told by."""
@@ -95,8 +92,13 @@ def calibration(
     fitted: Sequence[Recording] = (),
 ) -> tuple[Banded, Found]:
     """Return a model with its band, and what is to be said of it; see `calibrate`."""
+<<<<<<< HEAD
     model = inside(model)
     if isinstance(model, Inverse) and model.outputs[0].name.startswith(COMMANDS):
+=======
+    model = model.forward if isinstance(model, Banded) else model
+    if commands(model):
+>>>>>>> cb5fa6448affda82465540e3caa7f333e5af52d3
         raise ModelError(
             f"{model.title!r} gives inputs, and bands are of outputs. Remedy: calibrate the model that "
             "was inverted."

@@ -10,8 +10,7 @@ from typing import Any
 import numpy as np
 
 from mckibben.blocks.core.block import Block
-from mckibben.blocks.core.composition import Composition
-from mckibben.blocks.core.inverse import Inverse
+from mckibben.blocks.core.commanding import commands
 from mckibben.blocks.core.notation import Written
 from mckibben.blocks.core.writing import written
 from mckibben.errors import DataError, ModelWarning
@@ -27,9 +26,6 @@ from mckibben.validation.responses import (
 
 MOST_PARAMETERS = 300
 """Above which none means anything alone."""
-
-COMMANDS = ("pressure", "voltage")
-"""Channels that drive a muscle."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,16 +130,9 @@ def _senseless(block: Block) -> str:
         return "the model has no parameters"
     if block.n_parameters > MOST_PARAMETERS:
         return f"of {block.n_parameters} parameters none means anything alone"
-    if _undoes(block) and block.outputs[0].name.startswith(COMMANDS):
+    if commands(block):
         return "an inverse has the numbers of the model that it undoes, which were fitted there"
     return ""
-
-
-def _undoes(block: Block) -> bool:
-    """Tell whether a block is an inverse, or holds one."""
-    if isinstance(block, Composition):
-        return any(map(_undoes, block.parts))
-    return isinstance(block, Inverse)
 
 
 def _unsure(block: Block, reason: str) -> Sureness:

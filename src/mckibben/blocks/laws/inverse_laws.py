@@ -11,8 +11,7 @@ import numpy as np
 
 from mckibben.arrays import Array
 from mckibben.blocks.core.block import Block
-from mckibben.blocks.core.composition import Composition
-from mckibben.blocks.core.inverse import Inverse
+from mckibben.blocks.core.commanding import undoes
 from mckibben.blocks.core.single_channel import Ranged
 from mckibben.blocks.laws.trial import MARGIN, Trial, narrowed, through, wander
 from mckibben.errors import ModelError, ModelWarning
@@ -37,7 +36,7 @@ def inverts(trial: Trial) -> None:
     trial.agree(again, trial.outputs, 1e-12, "the inverse of the inverse is the block")
     _tracks(trial, inverse, trial.outputs)
     low, high = block.reachable()
-    if np.isfinite([*low, *high]).all() and not _undoes(block):
+    if np.isfinite([*low, *high]).all() and not undoes(block):
         references = wander(*narrowed(low, high), trial.rng, trial.pace)
         _tracks(trial, inverse, references)
         _recovers(trial, inverse, low, high)
@@ -85,16 +84,6 @@ def _recovers(trial: Trial, inverse: Block, low: Array, high: Array) -> None:
     inside = (np.abs(references - middle) <= (0.5 - MARGIN) * span).all(axis=1)
     law = "after a reference out of reach, the inverse is exact again"
     trial.agree(outputs[inside], references[inside], EXACT, law)
-
-
-def _undoes(block: Block) -> bool:
-    """Tell whether a block is itself an inverse, which reaches only what its forward block wants.
-
-    Where the forward block holds, as generalised operators do between their envelopes, many inputs
-    give one output, and the inverse gives one of them.
-    """
-    parts = block.parts if isinstance(block, Composition) else ()
-    return isinstance(block, Inverse) or any(_undoes(part) for part in parts)
 
 
 def _state_after(block: Block, inputs: Array, sample_time: float) -> list[float]:

@@ -1,0 +1,25 @@
+"""What gives commands instead of motion: compensators, which undo a model."""
+
+from __future__ import annotations
+
+from mckibben.blocks.core.block import Block
+from mckibben.blocks.core.composition import Composition
+from mckibben.blocks.core.inverse import Inverse
+
+COMMANDS = ("pressure", "voltage")
+"""How channels that drive a muscle are called."""
+
+
+def undoes(block: Block) -> bool:
+    """Tell whether a block is an inverse, or holds one: it reaches only what the block undone wants."""
+    if isinstance(block, Composition):
+        return any(map(undoes, block.parts))
+    return isinstance(block, Inverse)
+
+
+def commands(block: Block) -> bool:
+    """Tell whether a block undoes another and gives what drives a muscle.
+
+    Not every inverse does: a forward model solved from a law of forces is one, and gives a displacement.
+    """
+    return undoes(block) and block.outputs[0].name.startswith(COMMANDS)

@@ -40,6 +40,9 @@ N_TIMES, SHORTEST, LONGEST = 4, 2.0, 2.0
 MOST_FITTED = 8000
 """Samples that a scale is fitted to, and as many that are scored at a time."""
 
+HELD, NEAR = 0.02, 0.1
+"""Shares of the widest range of a unit: what moves by less is held, and near it is as good as there."""
+
 STEPS = 1000
 """Of the table of quantiles."""
 
@@ -107,7 +110,10 @@ def find_band(
     ]
     memory = max(map(memory_of, by_output))
     which, units, note = _units(runs, by_output, memory, unit)
-    ends = _ends(np.concatenate([np.hstack([run.inputs, run.modelled]) for run in runs]))
+    ends = _ends(
+        np.concatenate([np.hstack([run.inputs, run.modelled]) for run in runs]),
+        [channel.unit for channel in (*model.inputs, *model.outputs)],
+    )
     times = _times(runs)
     seen, units_of, all_missed = [], [], []
     for run, errors, own in zip(runs, missed, units, strict=True):
@@ -126,6 +132,11 @@ def find_band(
     alike = models if len(set(models)) > 1 else range(len(runs))
     apart = np.repeat(np.array(alike), [e.shape[0] for e in all_missed])
     apart = of if len(runs) == 1 else np.unique(apart, return_inverse=True)[1]
+    if n_units < 2 and unit == "run":
+        raise DataError(
+            "one run tells nothing of another",
+            remedy="calibrate on two or more, or count blocks of it (--exchangeable block)",
+        )
     if n_units < 2:
         raise DataError(
             f"errors stay alike for {numeral(memory, 3)} samples, and {of.size} are too few for two "
@@ -229,7 +240,10 @@ def _calibrated(scores: Array, of: NDArray[np.intp]) -> Array:
         places = np.searchsorted(rest, shares - 1e-9).clip(max=STEPS)
         left_out += own[places] / n_units
     left_out = np.maximum.accumulate(left_out)
-    return np.asarray(reached[np.searchsorted(left_out, shares - 1e-9).clip(max=STEPS)])
+    first = np.searchsorted(left_out, shares - 1e-9).clip(max=STEPS)
+    # of quantiles whose rests hold alike, as those between two units do, the widest
+    last = np.searchsorted(left_out, left_out[first] + 1e-9, side="right") - 1
+    return np.asarray(reached[last])
 
 
 def _quantiles(scores: Array, of: NDArray[np.intp]) -> Array:
@@ -282,10 +296,18 @@ def _units(
     return ("run" if as_runs else "block"), units, note
 
 
-def _ends(samples: Array) -> Array:
-    """Return the lowest and highest of every channel, shape (2, channels); of one held, near it."""
+def _ends(samples: Array, units: Sequence[str]) -> Array:
+    """Return the lowest and highest of every channel, shape (2, channels); of one held, near it.
+
+    A channel that moves by little of what others of its unit do is held, but for its sensor's noise.
+    """
     low, high = samples.min(axis=0), samples.max(axis=0)
-    near = np.where(high > low, 0.0, 0.025 * np.abs(low) + 1e-3)
+    spans = high - low
+    widest = np.array(
+        [max(s for s, other in zip(spans, units, strict=True) if other == unit) for unit in units]
+    )
+    held = spans <= HELD * widest
+    near = np.where(held, np.maximum(0.025 * np.abs(low) + 1e-3, NEAR * widest), 0.0)
     return np.array([low - near, high + near])
 
 

@@ -22,6 +22,10 @@ class Units(StrEnum):
     BLOCK = "block"
 
 
+USUAL, USUAL_UNITS = 0.9, 9
+"""The level that most ask for, and how many units allow it."""
+
+
 @spread
 def calibrate(
     model: Annotated[Path, typer.Argument(help="Model file (JSON).")],
@@ -61,6 +65,13 @@ def calibrate(
     banded.save(out)
     band, most = found.band, found.band.units / (found.band.units + 1)
     names = [channel.name for channel in band.given]
+    notes = list(found.notes)
+    if not known:
+        notes.append(
+            "whether the model was fitted to these recordings is not known; --fitted FILE makes sure"
+        )
+    if most < USUAL:
+        notes.append(f"a level of 90 % takes {USUAL_UNITS} of them: record more")
     narrower = dict(zip(names, found.widths, strict=True))
     if as_json:
         print_json(
@@ -73,7 +84,7 @@ def calibrate(
                 "width": dict(zip(names, found.mean_widths, strict=True)),
                 "width_over_constant": narrower,
                 "memory": found.memory,
-                "notes": list(found.notes),
+                "notes": notes,
             }
         )
         return
@@ -85,6 +96,6 @@ def calibrate(
             f"{channel.unit} wide on average on runs left out, {numeral(narrower[channel.name], 2)} of "
             "one that is the same everywhere."
         )
-    for note in found.notes:
+    for note in notes:
         say(f"Note: {note}.")
     say(f"Written: {out}")

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Any
 
+import numpy as np
 import typer
 
 from mckibben.cli.grouping import spread
@@ -80,6 +81,8 @@ def simulate(
     notes = beyond_known(block, recording)
     result = recording.select(wanted)
     if banded is not None:
+        if initial == "model" and all(c.name in recording for c in block.outputs):
+            notes += _started_elsewhere(block, recording)
         samples = modelled.matrix(channel.name for channel in banded.band.inputs)
         notes += beyond_calibrated(banded.band, samples, recording.name)
     metrics: dict[str, dict[str, float]] = {}
@@ -127,6 +130,20 @@ def simulate(
     for note in notes:
         say(f"Note: {note}")
     say(f"Written: {out}")
+
+
+def _started_elsewhere(block: Any, recording: Any) -> list[str]:
+    """Return that a run does not begin as the model does, while its band knows how it begins."""
+    from mckibben.comparison.free_run import measured_start
+
+    names = [channel.name for channel in block.outputs]
+    own = block.initial_state(recording.matrix(c.name for c in block.inputs)[0])
+    if np.array_equal(measured_start(block, recording, names), own):
+        return []
+    return [
+        "the run does not begin as the model does by itself; the band is for --initial measured, which "
+        "starts it as explains what was measured first"
+    ]
 
 
 def _parted(block: Any, interval: float | None) -> tuple[Any, Any]:

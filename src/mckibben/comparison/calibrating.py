@@ -12,15 +12,16 @@ from mckibben.bands.held import Held
 from mckibben.blocks.bands.banded import Banded, inside
 from mckibben.blocks.core.block import Block
 from mckibben.blocks.core.commanding import commands
-from mckibben.comparison.free_run import run_free
-from mckibben.comparison.shared_stretches import GRAVE, shared_stretches
+from mckibben.comparison.free_run import refuse_runaway, run_free
+from mckibben.comparison.shared_stretches import GRAVE, refuse_copies, shared_stretches
+from mckibben.comparison.splits import listed
 from mckibben.errors import DataError, ModelError, ModelWarning
 from mckibben.recording import Recording
 
 FEWEST = 20
 """Samples of a run that anything is told by."""
 
-EVEN = 1e-6
+EVEN = 1e-3
 """Relative difference of sample times that are the same."""
 
 
@@ -34,8 +35,9 @@ def calibrate(
     """Return a model with bands that hold on new runs, if these are like the recordings.
 
     The model runs free over each recording, and what it misses bounds what it misses next (conformal
-    prediction): of a new run that is exchangeable with these, the band at a level holds at least so many
-    of its samples on average. It is shifted and scaled by the state of motion: how far from the last
+    prediction): of a new run that is exchangeable with these, the band at a level holds about so many of
+    its samples on average, if its memory begins as theirs do: at rest, or as explains what is measured
+    first. It is shifted and scaled by the state of motion: how far from the last
     reversals, how fast, how far along its range, under which load. ``banded.at(0.9)`` chooses the
     level; n runs allow n / (n + 1).
 
@@ -77,8 +79,8 @@ def calibrate(
     >>> list(mckibben.calibrate(model, runs).at(0.8).simulate(runs[0]).channels)
     ['pressure', 'displacement', 'displacement_lower', 'displacement_upper']
     """
-    runs = [recordings] if isinstance(recordings, Recording) else list(recordings)
-    banded, found = calibration(model, runs, exchangeable=exchangeable, fitted=fitted)
+    runs = listed(recordings)
+    banded, found = calibration(model, runs, exchangeable=exchangeable, fitted=listed(fitted))
     for note in found.notes:
         warnings.warn(note, ModelWarning, stacklevel=2)
     return banded
@@ -92,13 +94,8 @@ def calibration(
     fitted: Sequence[Recording] = (),
 ) -> tuple[Banded, Found]:
     """Return a model with its band, and what is to be said of it; see `calibrate`."""
-<<<<<<< HEAD
     model = inside(model)
-    if isinstance(model, Inverse) and model.outputs[0].name.startswith(COMMANDS):
-=======
-    model = model.forward if isinstance(model, Banded) else model
     if commands(model):
->>>>>>> cb5fa6448affda82465540e3caa7f333e5af52d3
         raise ModelError(
             f"{model.title!r} gives inputs, and bands are of outputs. Remedy: calibrate the model that "
             "was inverted."
@@ -127,6 +124,14 @@ def calibration(
                 file=recording.source,
                 remedy=f"calibrate on recordings of {FEWEST} samples or more",
             )
+    for name in outputs:
+        if all(np.ptp(recording[name]) == 0 for recording in recordings):
+            raise DataError(
+                "the output is constant, as of a sensor that is stuck",
+                file=recordings[0].source,
+                channel=name,
+                remedy="record while it moves, or name another column with --column",
+            )
     _check_apart(fitted, recordings, inputs, outputs)
     held = [held_of(model, recording, outputs) for recording in recordings]
     found = find_band(model, held, exchangeable)
@@ -150,7 +155,7 @@ def _check_apart(
     inputs: Sequence[str],
     outputs: Sequence[str],
 ) -> None:
-    """Refuse recordings that the model was fitted to, and warn of those given twice."""
+    """Refuse recordings that the model was fitted to, or that are the same in part."""
     for shared in shared_stretches([*fitted, *recordings], inputs, outputs):
         if shared.share < GRAVE or shared.second < len(fitted):
             continue
@@ -162,23 +167,19 @@ def _check_apart(
                 file=second.source,
                 remedy="calibrate on recordings that it was not fitted to",
             )
-        warnings.warn(
-            f"{second.name} and {recordings[shared.first - len(fitted)].name} are the same for "
-            f"{100 * shared.share:.0f} % of their motion, and count as two. Remedy: drop one, if it is "
-            "a copy.",
-            ModelWarning,
-            stacklevel=4,
-        )
+    refuse_copies("calibrate", recordings, inputs, outputs)
 
 
 def held_of(model: Block, recording: Recording, outputs: Sequence[str]) -> Held:
     """Return a model's free run over a recording; the first sample, which starts it, does not count."""
     counts = np.ones(len(recording), dtype=bool)
     counts[0] = False
+    modelled, measured = run_free(model, recording, outputs), recording.matrix(outputs)
+    refuse_runaway(model, recording, modelled, measured)
     return Held(
         inputs=recording.matrix(channel.name for channel in model.inputs),
-        modelled=run_free(model, recording, outputs),
-        measured=recording.matrix(outputs),
+        modelled=modelled,
+        measured=measured,
         counts=counts,
         sample_time=recording.sample_time,
     )

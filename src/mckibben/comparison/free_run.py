@@ -14,11 +14,14 @@ from mckibben.blocks.dynamic.creep_start import begun_places, begun_state
 from mckibben.blocks.dynamic.linear_start import LinearStart
 from mckibben.blocks.dynamic.repeating import Repeating
 from mckibben.comparison.splits import Mask, predecessor
-from mckibben.errors import ModelWarning
+from mckibben.errors import ModelError, ModelWarning
 from mckibben.recording import Recording
 
 PERIODIC = "periodic"
 """In the ``meta`` of a recording that is one period of a motion which repeats itself."""
+
+AWAY = 1e3
+"""Ranges of the measured output by which a model that is off has run away."""
 
 SETTLING = 256
 """Samples for which the first input is held after the peak before it, so that rates die away."""
@@ -70,6 +73,20 @@ def run_free(
         )
     found = block.simulate(recording, initial=start.tolist()).matrix(outputs)
     return found[:, 0] if isinstance(output, str) else found
+
+
+def refuse_runaway(block: Block, recording: Recording, modelled: Array, measured: Array) -> None:
+    """Refuse a model whose outputs (n, k) run away from what is measured.
+
+    Raises
+    ------
+    ModelError
+    """
+    if not (np.abs(modelled - measured) <= AWAY * np.ptp(measured, axis=0)).all():
+        raise ModelError(
+            f"the output of {block.kind!r} runs away on {recording.name}. "
+            "Remedy: this model does not suit these data; identify it again."
+        )
 
 
 def _repeated(block: Block, recording: Recording, outputs: Sequence[str]) -> Array:

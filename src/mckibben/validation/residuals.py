@@ -10,9 +10,9 @@ import numpy as np
 
 from mckibben.arrays import Array
 from mckibben.blocks.core.block import Block
-from mckibben.comparison.free_run import PERIODIC, measured_start, run_free
+from mckibben.comparison.free_run import PERIODIC, measured_start, refuse_runaway, run_free
 from mckibben.comparison.shared_stretches import refuse_copies
-from mckibben.errors import DataError, ModelError
+from mckibben.errors import DataError
 from mckibben.recording import Recording
 
 FEWEST = 60
@@ -24,10 +24,7 @@ SHORTEST = 10
 SHIFTS = (-2.0, -1.0, -0.5, 0.5, 1.0, 2.0)
 """Root mean squares of the residual by which the first measured output may be off."""
 
-AWAY = 1e3
-"""Ranges of the measured output by which a model that is off has run away."""
-
-SAME_TIME = 1e-6
+SAME_TIME = 1e-3
 """Relative difference up to which sample times are equal."""
 
 
@@ -77,11 +74,7 @@ def runs_of(block: Block, recordings: Sequence[Recording]) -> tuple[Run, ...]:
             warnings.simplefilter("ignore", RuntimeWarning)
             modelled = _modelled(block, recording, outputs, recordings)
         measured = recording.matrix(outputs)
-        if not (np.abs(modelled - measured) <= AWAY * np.ptp(measured, axis=0)).all():
-            raise ModelError(
-                f"the output of {block.kind!r} runs away on {recording.name}. "
-                "Remedy: this model does not suit these data; identify it again."
-            )
+        refuse_runaway(block, recording, modelled, measured)
         found.append(Run(recording, recording.matrix(inputs), measured, modelled))
     return tuple(found)
 

@@ -27,9 +27,6 @@ LATE, SHORT = 2.0, 0.3
 WIDTH = 0.15
 """Of the play that tells how they came, of the range."""
 
-LONG = 1.0
-"""Time that tells at one place as much as is to be known [s]."""
-
 
 @dataclass(frozen=True)
 class Unmodelled:

@@ -199,7 +199,7 @@ class Search:
         for number, stretch in enumerate(design):
             gain = past[number] / past[number + 1]
             order = [place for place in np.argsort(-gain).tolist() if gain[place] > LEARNED][:2]
-            why = ", ".join(names[place] for place in order) or "motion where little has been"
+            why = ", ".join(names[place] for place in order) or "motion like what is predicted"
             if stretch.what == "back to rest":
                 why = "to end at rest"
             steps.append(Step(number * seconds, (number + 1) * seconds, stretch.what, why))

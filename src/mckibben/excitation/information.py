@@ -104,6 +104,11 @@ class Known:
         pairs = zip(self.members, other.members, strict=True)
         return Known(tuple(a + b for a, b in pairs), self.pulls + other.pulls)
 
+    def without(self, other: Known) -> Known:
+        """Return what is told beside another, of which it is the sum."""
+        pairs = zip(self.members, other.members, strict=True)
+        return Known(tuple(a - b for a, b in pairs), self.pulls - other.pulls)
+
     def of_first(self) -> Known:
         """Return what is known if the first member is taken for true."""
         return Known(self.members[:1], self.pulls)
@@ -218,7 +223,7 @@ class Criterion:
 
 
 def crossed(slopes: Array, features: Array, weights: Array) -> Array:
-    """Return products of slopes (n, m, parameters), weighted by output, and features, summed over time."""
+    """Return sums over time of slopes (n, m, parameters), weighted by output, times features."""
     found: Array = np.moveaxis(slopes * weights[:, np.newaxis], 0, 2) @ features
     return found
 

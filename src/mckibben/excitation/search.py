@@ -1,7 +1,7 @@
 """The search for a plan: stretches chosen one after another, then exchanged one by one.
 
-Each is the best of many given what recordings and the stretches before it tell. Random motion is among
-what is chosen from, in whole and in parts, so that by its own measure a plan is never worse.
+Each is the best of many given what recordings and the stretches before it tell, and what random motion
+would after it. That is among what is chosen from, too, so that by its own measure a plan is never worse.
 """
 
 from __future__ import annotations
@@ -129,9 +129,10 @@ class Search:
                     self.rng,
                 )
                 tried += [other[number] for other in plans]
-                done.append(self.best(tried, known, place, first=number == 0))
+                then = run[-1][1].without(run[number][1])
+                done.append(self.best(tried, known.and_also(then), place, first=number == 0))
                 ((_, known, place),) = self.run(done, known, place, number)
-                self.tell(0.75 * (number + 1) / n, score(known))
+                self.tell(0.75 * (number + 1) / n, score(known.and_also(then)))
             chosen = done + home
             design, run = self.better(design, run, chosen, self.run(chosen, before, origin))
             for number in range(n - n_last):

@@ -164,11 +164,11 @@ class Criterion:
         """Return what a stretch of commands tells, and the place after."""
         inputs = np.ascontiguousarray(commands[:, self.columns])
         sure = np.sqrt(self.step / self.noise.density)
-        told, states = [], []
+        told: list[Array] = []
+        states: list[Array] = []
         for member, before in zip(self.members, place.states, strict=False):
             _, slopes, after = member.over(inputs, before)
-            if not told:
-                first = slopes
+            first = slopes if not told else first
             rows = (slopes * sure[:, np.newaxis]).reshape(-1, slopes.shape[2])
             told.append(rows.T @ rows)
             states.append(after)

@@ -168,7 +168,8 @@ class Criterion:
         states: list[Array] = []
         for member, before in zip(self.members, place.states, strict=False):
             _, slopes, after = member.over(inputs, before)
-            first = slopes if not told else first
+            if not told:
+                first = slopes
             rows = (slopes * sure[:, np.newaxis]).reshape(-1, slopes.shape[2])
             told.append(rows.T @ rows)
             states.append(after)

@@ -75,6 +75,30 @@ def test_the_impossible_is_refused(
     assert not out.exists()
 
 
+SHEET = """
+diameter_mm = 20.0
+rest_length_mm = 200.0
+max_force_N = 1500.0
+max_pressure_bar = 6.0
+"""
+
+
+@pytest.mark.parametrize("muscle", ["rail", "sheet.toml"])
+def test_a_muscle_or_its_data_sheet_is_enough(
+    cli: Cli, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, muscle: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("sheet.toml").write_text(SHEET)
+    told = cli("plan", "--muscle", muscle, "--minutes", "0.5", "--json", "-o", "next.csv")
+    assert told.code == 0, told.err
+    found = json.loads(told.out)
+    assert "the library" in found["notes"][0]
+    error = found["errors"]["displacement"]
+    assert error["after"] < 0.8 * error["now"]
+    (commands,) = read("next.csv", informative=False)
+    assert np.ptp(commands["pressure"]) > 0.5 * commands["pressure"].max()
+
+
 def test_nothing_to_plan_from_is_refused(cli: Cli, tmp_path: Path) -> None:
     told = cli("plan", "-o", tmp_path / "next.csv")
     assert told.code == 2

@@ -11,8 +11,9 @@ from mckibben import PI, Recording, load_rig
 from mckibben.blocks.core.block import Block
 from mckibben.blocks.force.multistate_friction import MultistateFriction
 from mckibben.errors import DataError, ModelError
+from mckibben.excitation.believed import from_recordings
 from mckibben.excitation.candidates import random_motion, stretches
-from mckibben.excitation.information import Slopes, covariance, standard_errors
+from mckibben.excitation.information import Criterion, Noise, Slopes, covariance, standard_errors
 from mckibben.excitation.limits import (
     Limit,
     followed,
@@ -23,6 +24,8 @@ from mckibben.excitation.limits import (
 )
 from mckibben.excitation.planning import plan
 from mckibben.excitation.plans import Plan
+from mckibben.excitation.prospect import prospect_of
+from mckibben.excitation.search import CANDIDATES, FEWEST, WORK, Search
 from mckibben.excitation.unmodelled import Unmodelled
 
 LIMITS = {"pressure": Limit(0.5, 4.0, 1.5, 0.5)}
@@ -178,6 +181,57 @@ def test_what_is_driven_is_known_from_recordings() -> None:
     found = limits_of_recordings([slow_sine(8.0)], ["pressure"])["pressure"]
     assert (found.low, found.high) == pytest.approx((0.5, 4.0), abs=1e-3)
     assert found.rate == pytest.approx(3.5 * np.pi / 8.0, rel=0.02)
+
+
+def test_a_wrong_model_is_pulled_as_least_squares_pulls_it() -> None:
+    """The expected bias is the mean square of misfits of fits to random functions (Monte Carlo)."""
+    block, rng = PI.example(), np.random.default_rng(5)
+    unmodelled = Unmodelled.of(np.array([0.5]), np.array([4.0]), np.array([1.5]), rng)
+    slopes = Slopes(block, [0, 1, 2], STEP, 800)
+    start = np.array([0.5])
+
+    def motion(low: float, high: float) -> np.ndarray:
+        path = random_motion(800, STEP, low, high, 0.5, rng)[:, np.newaxis]
+        return followed(path, start, LIMITS, STEP)
+
+    wide, narrow = motion(0.5, 4.0), motion(0.5, 1.5)
+    spans = np.array([2.0])
+    noise = Noise(np.array([1e-6]), 0.02)
+    criterion = Criterion((slopes,), unmodelled, noise, STEP, spans, np.array([0]))
+    criterion = criterion.weighed_by([wide], criterion.start(start))
+    matrix, known = {}, {}
+    for name, commands in (("wide", wide), ("narrow", narrow)):
+        told, _ = criterion.over(commands, criterion.start(start))
+        known[name] = criterion.errors(told)[1]
+        _, own, _ = slopes.over(commands, slopes.start(start))
+        features, _ = unmodelled.features(commands, unmodelled.start(start), STEP)
+        matrix[name] = own[:, 0, :] / spans, noise.left * features
+    aim, left = matrix["wide"]
+    for name, (own, pulled) in matrix.items():
+        aside = np.linalg.lstsq(own, pulled, rcond=None)[0]
+        drawn = rng.standard_normal((left.shape[1], 2000))
+        misfit = np.mean(((left - aim @ aside) @ drawn) ** 2)
+        assert known[name] == pytest.approx(misfit, rel=0.1)
+    assert known["narrow"] > known["wide"]
+
+
+def test_the_work_of_a_search_does_not_grow_with_the_time() -> None:
+    recorded = run_of(PI.example(), slow_sine(8.0), 0)
+    belief = from_recordings([recorded], PI.example(), None, 0)
+    within = narrowed(belief.limits, {"pressure": (0.5, 4.0, 1.5)})
+    search = Search(prospect_of(belief, within, 60.0, None, 0), 0, None)
+    search.spent = round(0.9 * WORK)
+    assert search.affordable(20) == FEWEST
+    search.spent = round(1e-4 * WORK)
+    assert search.affordable(20) == CANDIDATES
+
+
+def test_models_without_anything_to_tell_are_refused() -> None:
+    silent = PI.example()
+    silent = silent.unpack(np.zeros_like(silent.pack()))
+    recorded = run_of(PI.example(), slow_sine(8.0), 0)
+    with pytest.raises(ModelError, match=r"no parameters that .* Remedy: plan with"):
+        plan(recorded, model=silent, minutes=1.0)
 
 
 def test_features_remember_over_parts() -> None:

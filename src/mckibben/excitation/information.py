@@ -15,7 +15,7 @@ from scipy.linalg import cho_factor, cho_solve
 from mckibben.arrays import Array
 from mckibben.blocks.core.block import Block
 from mckibben.estimators.core.uncertainty import DIFFERENCE, LARGEST
-from mckibben.excitation.unmodelled import LONG, Unmodelled
+from mckibben.excitation.unmodelled import Unmodelled
 
 ROUNDING = 1e-10
 """Of precisions, over their own size."""
@@ -86,21 +86,32 @@ class Noise:
 
 @dataclass(frozen=True)
 class Known:
-    """What is known: precisions of the parameters, of every member, and of the unmodelled.
+    """What is known: precisions of the parameters, of every member, and what pulls them aside.
 
     Parameters
     ----------
     members : sequence of arrays, shape (parameters, parameters)
-    unmodelled : array, shape (features, features)
+    pulls : array, shape (m, parameters, features)
+        How features of what is unmodelled, in ranges of each output, pull the likeliest parameters: over
+        the precision they are what least squares makes of them.
     """
 
     members: tuple[Array, ...]
-    unmodelled: Array
+    pulls: Array
 
     def and_also(self, other: Known) -> Known:
         """Return what both tell."""
         pairs = zip(self.members, other.members, strict=True)
-        return Known(tuple(a + b for a, b in pairs), self.unmodelled + other.unmodelled)
+        return Known(tuple(a + b for a, b in pairs), self.pulls + other.pulls)
+
+    def without(self, other: Known) -> Known:
+        """Return what is told beside another, of which it is the sum."""
+        pairs = zip(self.members, other.members, strict=True)
+        return Known(tuple(a - b for a, b in pairs), self.pulls - other.pulls)
+
+    def of_first(self) -> Known:
+        """Return what is known if the first member is taken for true."""
+        return Known(self.members[:1], self.pulls)
 
 
 @dataclass(frozen=True)
@@ -128,8 +139,8 @@ class Criterion:
         Ranges of the outputs.
     weights : sequence of arrays, shape (parameters, parameters)
         Of every member, how parameters' errors matter.
-    shape : array, shape (features, features)
-        How errors of the unmodelled matter.
+    shared : array, shape (m, parameters, features)
+        How the unmodelled looks like parameters where it matters; None where it does not matter.
     columns : array of int
         Which of the driven channels each of the block's inputs is.
     """
@@ -141,7 +152,7 @@ class Criterion:
     spans: Array
     columns: Array
     weights: Sequence[Array] = ()
-    shape: Array | None = None
+    shared: Array | None = None
 
     def start(self, command: Array) -> Place:
         """Return the place where all rests under a command."""
@@ -153,49 +164,69 @@ class Criterion:
         """Return what a stretch of commands tells, and the place after."""
         inputs = np.ascontiguousarray(commands[:, self.columns])
         sure = np.sqrt(self.step / self.noise.density)
-        told, states = [], []
-        for member, before in zip(self.members, place.states, strict=True):
+        told: list[Array] = []
+        states: list[Array] = []
+        for member, before in zip(self.members, place.states, strict=False):
             _, slopes, after = member.over(inputs, before)
+            if not told:
+                first = slopes
             rows = (slopes * sure[:, np.newaxis]).reshape(-1, slopes.shape[2])
             told.append(rows.T @ rows)
             states.append(after)
         features, memory = self.unmodelled.features(commands, place.memory, self.step)
-        of_shape = self.step / LONG * features.T @ features
-        return Known(tuple(told), of_shape), Place(commands[-1], tuple(states), memory)
+        pulls = crossed(first, features, self.step * self.spans / self.noise.density)
+        return Known(tuple(told), pulls), Place(commands[-1], tuple(states), memory)
+
+    def of_first(self) -> Criterion:
+        """Return the criterion that takes the first member for true."""
+        return replace(self, members=self.members[:1], weights=self.weights[:1])
 
     def weighed_by(self, stretches: Sequence[Array], place: Place) -> Criterion:
         """Return the criterion that weighs errors by what they do over some motion."""
         per_span = 1.0 / self.spans
         weights: list[Array] = [np.zeros((0, 0))] * len(self.members)
-        shape, states, memory = np.zeros((0, 0)), list(place.states), place.memory
-        n = sum(len(commands) for commands in stretches)
+        states, memory, shared = list(place.states), place.memory, np.zeros(())
+        n = sum(len(commands) for commands in stretches) * per_span.size
         for number, commands in enumerate(stretches):
             inputs = np.ascontiguousarray(commands[:, self.columns])
+            features, memory = self.unmodelled.features(commands, memory, self.step)
             for i, member in enumerate(self.members):
                 _, slopes, states[i] = member.over(inputs, states[i])
                 rows = (slopes * per_span[:, np.newaxis]).reshape(-1, slopes.shape[2])
-                part = rows.T @ rows / (n * per_span.size)
+                part = rows.T @ rows / n
                 weights[i] = part if number == 0 else weights[i] + part
-            features, memory = self.unmodelled.features(commands, memory, self.step)
-            part = features.T @ features / n
-            shape = part if number == 0 else shape + part
-        return replace(self, weights=weights, shape=shape)
+                if i == 0:
+                    shared = shared + crossed(slopes, features, per_span / n)
+        return replace(self, weights=weights, shared=shared)
 
     def errors(self, known: Known) -> tuple[float, float]:
-        """Return expected variances over the ranges: of parameters (geometric mean), and of shape."""
+        """Return expected variances over the ranges: of parameters (geometric mean), and of shape.
+
+        What is unmodelled pulls parameters to where the motion has been, so that they fit worse
+        elsewhere: the bias of Box and Draper's designs, which is least where motion is like that over
+        which the model is to predict.
+        """
+        left = [covariance(precision) for precision in known.members]
         logs = [
-            np.log(max(variance(precision, weight), 1e-300))
-            for precision, weight in zip(known.members, self.weights, strict=True)
+            np.log(max(float(np.sum(one * weight)), 1e-300))
+            for one, weight in zip(left, self.weights, strict=True)
         ]
-        shape = 0.0
-        if self.shape is not None and self.noise.left > 0:
-            whole = known.unmodelled + np.eye(len(known.unmodelled))
-            shape = self.noise.left**2 * variance(whole, self.shape)
-        return float(np.exp(np.mean(logs))), shape
+        bias = 0.0
+        if self.shared is not None:
+            pulled = left[0] @ known.pulls
+            apart = pulled * (self.weights[0] @ pulled) - 2 * pulled * self.shared
+            bias = self.noise.left**2 * max(1.0 + float(apart.sum()), 0.0)
+        return float(np.exp(np.mean(logs))), bias
 
     def __call__(self, known: Known) -> float:
         """Return what is to be made small."""
         return sum(self.errors(known))
+
+
+def crossed(slopes: Array, features: Array, weights: Array) -> Array:
+    """Return sums over time of slopes (n, m, parameters), weighted by output, times features."""
+    found: Array = np.moveaxis(slopes * weights[:, np.newaxis], 0, 2) @ features
+    return found
 
 
 def covariance(precision: Array) -> Array:
@@ -204,11 +235,6 @@ def covariance(precision: Array) -> Array:
     scaled = precision / np.outer(size, size) + ROUNDING * np.eye(size.size)
     whole: Array = cho_solve(cho_factor(scaled), np.eye(size.size))
     return whole / np.outer(size, size)
-
-
-def variance(precision: Array, weight: Array) -> float:
-    """Return the weighted sum of the variances that a precision leaves."""
-    return float(np.sum(covariance(precision) * weight))
 
 
 def standard_errors(precision: Array) -> Array:

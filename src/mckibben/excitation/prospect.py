@@ -13,11 +13,11 @@ from mckibben.errors import DataError, ModelError
 from mckibben.estimators.coupled.balance_prior import noise_of
 from mckibben.excitation.believed import Belief, telling
 from mckibben.excitation.candidates import random_plan
-from mckibben.excitation.information import Criterion, Known, Noise, Slopes
+from mckibben.excitation.information import Criterion, Known, Noise, Slopes, crossed
 from mckibben.excitation.limits import Limits, at_rates, followed
-from mckibben.excitation.unmodelled import LONG, Unmodelled
+from mckibben.excitation.unmodelled import Unmodelled
 
-WORK = 1e5
+WORK = 5e4
 """Samples times parameters of one free run over a plan, by which its sample time is chosen."""
 
 FINEST, COARSEST = 0.02, 0.1
@@ -41,7 +41,7 @@ WIDEST = 3.0
 MEMBERS, APART = 3, 0.3
 """Likely sets of parameters, and how far one is from the likeliest at most, of its value."""
 
-NOISE, MEMORY, LEFT = 0.003, 0.2, 0.01
+NOISE, MEMORY, LEFT = 0.003, 0.2, 0.02
 """Where nothing is recorded: noise over the range, and over what time it is alike [s]. What a model
 leaves at least, over the range."""
 
@@ -124,7 +124,7 @@ def prospect_of(
     unmodelled = Unmodelled.of(low, high, rate, rng)
     reference = _reference(limits, length, step, rng)
     spans = _spans(block, reference, rest, columns, step)
-    noise, recorded, shape = _recorded(belief, places, limits, columns, unmodelled, spans)
+    noise, recorded, pulls = _recorded(belief, places, limits, columns, unmodelled, spans)
     first = Criterion(
         (Slopes(block, places, step, length),), unmodelled, noise, step, spans, columns
     )
@@ -135,10 +135,10 @@ def prospect_of(
     members = tuple(Slopes(one, places, step, length) for one in blocks)
     motion = replace(first, members=members)
     motion = motion.weighed_by(reference, motion.start(rest))
-    known = Known(tuple(told + _wide(weight) for weight in motion.weights), shape)
+    known = Known(tuple(told + _wide(weight) for weight in motion.weights), pulls)
     criterion = motion
     if wanted is not None:
-        criterion = replace(motion, weights=[np.diag(wanted)] * len(members), shape=None)
+        criterion = replace(motion, weights=[np.diag(wanted)] * len(members), shared=None)
     return Prospect(
         criterion,
         motion,
@@ -216,14 +216,14 @@ def _recorded(
     unmodelled: Unmodelled,
     spans: Array,
 ) -> tuple[Noise, Array, Array]:
-    """Return the noise of recordings, the precision that they give, and that of the unmodelled."""
+    """Return the noise of recordings, the precision that they give, and how they pull parameters."""
     p, k = len(places), unmodelled.phases.size
-    precision, shape = np.zeros((p, p)), np.zeros((k, k))
+    precision, pulls = np.zeros((p, p)), np.zeros((spans.size, p, k))
     if not belief.recordings:
-        return Noise(MEMORY * (NOISE * spans) ** 2, LEFT), precision, shape
+        return Noise(MEMORY * (NOISE * spans) ** 2, LEFT), precision, pulls
     block, rest = belief.block, at_rates(limits)[3]
     every_sample = sum(len(recording) for recording in belief.recordings)
-    gathered, errors, steps = [], [], []
+    gathered, seen, errors, steps = [], [], [], []
     for recording in belief.recordings:
         every = 1 if block.sample_time else max(-(-every_sample // MOST_SAMPLES), 1)
         step = every * float(recording.sample_time or 1.0)
@@ -241,7 +241,7 @@ def _recorded(
         errors.append(measured - base)
         steps.append(step)
         features, _ = unmodelled.features(commands, unmodelled.start(commands[0]), step)
-        shape += step / LONG * features.T @ features
+        seen.append(features)
     density, left = np.empty(spans.size), 0.0
     for output, span in enumerate(spans.tolist()):
         own = [error[:, output] for error in errors]
@@ -249,11 +249,12 @@ def _recorded(
         alone = noise_of(own) ** 2 if power > (EXACT * span) ** 2 else power
         density[output] = max(alone * float(np.mean(steps)), (EXACT * span) ** 2)
         left += max(power * (1.0 - power / max(alone, power)), 0.0) / span**2 / spans.size
-    for by, step in zip(gathered, steps, strict=True):
+    for by, features, step in zip(gathered, seen, steps, strict=True):
         rows = (by * np.sqrt(step / density)[:, np.newaxis]).reshape(-1, p)
         precision += rows.T @ rows
+        pulls += crossed(by, features, step * spans / density)
     # a model fitted to little leaves little of that, and more of what comes
-    return Noise(density, max(float(np.sqrt(left)), LEFT)), precision, shape
+    return Noise(density, max(float(np.sqrt(left)), LEFT)), precision, pulls
 
 
 def _wide(weight: Array) -> Array:

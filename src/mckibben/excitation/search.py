@@ -1,7 +1,7 @@
 """The search for a plan: stretches chosen one after another, then exchanged one by one.
 
-Each is the best of many given what recordings and the stretches before it tell. Random motion is among
-what is chosen from, in whole and in parts, so that by its own measure a plan is never worse.
+Each is the best of many given what recordings and the stretches before it tell, and what random motion
+would after it. That is among what is chosen from, too, so that by its own measure a plan is never worse.
 """
 
 from __future__ import annotations
@@ -14,20 +14,24 @@ import numpy as np
 from mckibben.arrays import Array
 from mckibben.excitation.believed import Belief
 from mckibben.excitation.candidates import Stretch, random_plan, stretches
-from mckibben.excitation.information import Known, Place, standard_errors
+from mckibben.excitation.information import Criterion, Known, Place, standard_errors
 from mckibben.excitation.limits import at_rates, followed, slower
 from mckibben.excitation.plans import Parameter, Plan, Step
 from mckibben.excitation.prospect import Prospect
 from mckibben.recording import Recording
 
-CANDIDATES, FEWER, QUICK = 32, 16, 50
-"""Stretches tried at every step: most, least, and up to how many parameters the most are tried."""
+WORK = 1.2e8
+"""Samples times states of free runs that a search may take: about a quarter of a minute of one core, and
+the same plan on any."""
 
-BASELINES = 3
+CANDIDATES, FEWEST = 32, 12
+"""Stretches tried at every step: most, and least where the work is not enough for more."""
+
+KEPT = 3
+"""How many of them, the best for the likeliest parameters, are tried with all that are likely."""
+
+BASELINES = 2
 """Plans of random motion that are tried whole."""
-
-EXCHANGES = 1.0
-"""Stretches tried again in the end, over how many there are."""
 
 CALM = 1.0
 """Time at rest before motion begins [s]."""
@@ -46,6 +50,8 @@ class Search:
         self.prospect, self.progress = prospect, progress
         self.rng = np.random.default_rng(seed)
         self.rest = at_rates(prospect.limits)[3]
+        self.criterion, self.likeliest = prospect.criterion, prospect.criterion.of_first()
+        self.spent = 0
 
     def path(self, stretch: Stretch, start: Array, *, first: bool) -> Array:
         """Return the commands of a stretch, from where the last one ended."""
@@ -63,10 +69,29 @@ class Search:
         found = []
         for number, stretch in enumerate(design[first:], start=first):
             commands = self.path(stretch, place.command, first=number == 0)
-            told, place = self.prospect.criterion.over(commands, place)
-            known = known.and_also(told)
+            known, place = self.after(self.criterion, commands, known, place)
             found.append((commands, known, place))
         return found
+
+    def after(
+        self, criterion: Criterion, commands: Array, known: Known, place: Place
+    ) -> tuple[Known, Place]:
+        """Return what is known and the place after commands, and count the work."""
+        told, place = criterion.over(commands, place)
+        self.spent += len(commands) * sum(states.size for states in place.states)
+        return known.and_also(told), place
+
+    def best(self, tried: Sequence[Stretch], known: Known, place: Place, *, first: bool) -> Stretch:
+        """Return the stretch that leaves least, of those that do so for the likeliest parameters."""
+        paths = [self.path(stretch, place.command, first=first) for stretch in tried]
+
+        def left(criterion: Criterion, number: int, known: Known) -> float:
+            return criterion(self.after(criterion, paths[number], known, place)[0])
+
+        likely = known.of_first()
+        values = [left(self.likeliest, number, likely) for number in range(len(tried))]
+        kept = np.argsort(values, kind="stable")[:KEPT].tolist()
+        return tried[min(kept, key=lambda number: left(self.criterion, number, known))]
 
     def tell(self, share: float, score: float) -> None:
         """Tell of progress."""
@@ -76,7 +101,7 @@ class Search:
 
     def found(self, belief: Belief, goal: str | None) -> Plan:
         """Return the best plan."""
-        prospect, score = self.prospect, self.prospect.criterion
+        prospect, score = self.prospect, self.criterion
         before, origin = prospect.known, score.start(self.rest)
         n, n_last = prospect.n_stretches, prospect.n_last
         home = [Stretch("back to rest", np.tile(self.rest, (prospect.length, 1)))] * n_last
@@ -88,11 +113,11 @@ class Search:
         design, run, interrupted = plans[0], self.run(plans[0], before, origin), False
         random_known = run[-1][1]
         done: list[Stretch] = []
-        count = max(min(CANDIDATES, CANDIDATES * QUICK // len(prospect.names)), FEWER)
         try:
             for other in plans[1:]:
                 design, run = self.better(design, run, other, self.run(other, before, origin))
             random_known = run[-1][1]
+            count = self.affordable(n)
             known, place = before, origin
             for number in range(n - n_last):
                 tried = stretches(
@@ -104,31 +129,36 @@ class Search:
                     self.rng,
                 )
                 tried += [other[number] for other in plans]
-                best, least = tried[0], np.inf
-                for stretch in tried:
-                    commands = self.path(stretch, place.command, first=number == 0)
-                    told, after = score.over(commands, place)
-                    value = score(known.and_also(told))
-                    if value < least:
-                        best, least, then = stretch, value, (known.and_also(told), after)
-                done.append(best)
-                known, place = then
-                self.tell(0.75 * (number + 1) / n, least)
+                then = run[-1][1].without(run[number][1])
+                done.append(self.best(tried, known.and_also(then), place, first=number == 0))
+                ((_, known, place),) = self.run(done, known, place, number)
+                self.tell(0.75 * (number + 1) / n, score(known.and_also(then)))
             chosen = done + home
             design, run = self.better(design, run, chosen, self.run(chosen, before, origin))
-            tries = round(EXCHANGES * (n - n_last))
-            for number in range(tries):
+            for number in range(n - n_last):
+                if self.spent > WORK:
+                    break
                 design, run = self.exchanged(design, run, before, origin)
-                self.tell(0.75 + 0.25 * (number + 1) / tries, score(run[-1][1]))
+                self.tell(0.75 + 0.25 * (number + 1) / (n - n_last), score(run[-1][1]))
         except KeyboardInterrupt:
             interrupted = True
             half = [*done, *plans[0][len(done) :]]
             design, run = self.better(design, run, half, self.run(half, before, origin))
         return self.told(belief, design, run, random_known, goal, interrupted=interrupted)
 
+    def affordable(self, n: int) -> int:
+        """Return how many stretches may be tried at each of n steps, after the plans of random motion.
+
+        As much work again is left for exchanges.
+        """
+        members = len(self.criterion.members)
+        one = self.spent / (BASELINES * n * members)
+        count = int(0.5 * (WORK - self.spent) / (n * one)) - (KEPT + 1) * members - BASELINES
+        return min(max(count, FEWEST), CANDIDATES)
+
     def better(self, design: Any, run: Any, other: Any, other_run: Any) -> tuple[Any, Any]:
         """Return the better of two plans."""
-        score = self.prospect.criterion
+        score = self.criterion
         return (other, other_run) if score(other_run[-1][1]) < score(run[-1][1]) else (design, run)
 
     def exchanged(
@@ -170,7 +200,7 @@ class Search:
         for number, stretch in enumerate(design):
             gain = past[number] / past[number + 1]
             order = [place for place in np.argsort(-gain).tolist() if gain[place] > LEARNED][:2]
-            why = ", ".join(names[place] for place in order) or "motion where little has been"
+            why = ", ".join(names[place] for place in order) or "motion like what is predicted"
             if stretch.what == "back to rest":
                 why = "to end at rest"
             steps.append(Step(number * seconds, (number + 1) * seconds, stretch.what, why))

@@ -1,9 +1,9 @@
-"""What no parameter says: how far motion has been where a model's own shape may be wrong.
+"""What no parameter says: what a model's own shape leaves, and how it pulls parameters aside.
 
 A model leaves something, which is taken for a smooth random function of where inputs are, where they
-have been of late, and how they came there (a Gaussian process by random features). Where motion has not
-been, it is not known. So a plan does not hold still at the few places that would tell the parameters
-of a model that is true, because none is.
+have been of late, and how they came there (a Gaussian process by random features). Least squares takes
+it for parameters where it looks like them. So a plan does not stay at the few places that would tell the
+parameters of a model that is true, because none is: what is fitted there predicts badly elsewhere.
 """
 
 from __future__ import annotations
@@ -26,9 +26,6 @@ LATE, SHORT = 2.0, 0.3
 
 WIDTH = 0.15
 """Of the play that tells how they came, of the range."""
-
-LONG = 1.0
-"""Time that tells at one place as much as is to be known [s]."""
 
 
 @dataclass(frozen=True)

@@ -144,8 +144,8 @@ def sureness(block: Block, recordings: Sequence[Recording], left: Sequence[Array
     """
     n_parameters = block.n_parameters
     covariance = np.full((n_parameters, n_parameters), np.nan)
-    said = [""] * n_parameters
-    values, names = block.pack(), block.parameter_names
+    said = fixed(block)
+    values = block.pack()
     sizes = relative_sizes(values)
     total = sum(map(len, left))
     steps = max(total * n_parameters, 1)
@@ -155,17 +155,8 @@ def sureness(block: Block, recordings: Sequence[Recording], left: Sequence[Array
     share = sum(map(len, left)) / total
     models = autoregressions(left)
     worth = min(model.worth(sum(map(len, left))) for model in models) / share
-    places: list[int] = []
+    places = [place for place in range(n_parameters) if not said[place]]
     columns: list[list[Array]] = []
-    for place in range(n_parameters):
-        if names[place].endswith("input offset"):
-            said[place] = "chosen: the point about which the model is linear"
-        elif abs(values[place]) <= NOTHING * sizes[place]:
-            said[place] = "0: at a bound, or left out"
-        elif values[place] == 1:
-            said[place] = "exactly 1: chosen, as what others are relative to"
-        else:
-            places.append(place)
     given = [channel.name for channel in block.outputs]
     base = [block.simulate(r).matrix(given) for r in kept]  # anew: a start may be fitted
     with ThreadPoolExecutor(cores()) as pool:
@@ -181,6 +172,12 @@ def sureness(block: Block, recordings: Sequence[Recording], left: Sequence[Array
         said = [reason or "the model's output is not finite" for reason in said]
         return Sureness(covariance, tuple(said), np.inf, worth, terms)
     moves = [np.stack([column[run] for column in columns], axis=2) for run in range(len(left))]
+    if worth < 1 + len(places):
+        short = (
+            f"{len(places)} parameters cannot be told from about {worth:.0f} independent samples"
+        )
+        said = [reason or short for reason in said]
+        return Sureness(covariance, tuple(said), np.inf, worth, terms)
     condition, found, told = sandwich(moves, left, models)
     felt = [max(float(np.abs(slopes).max()) for slopes in column) for column in columns]
     for place, known, own_felt in zip(places, told.tolist(), felt, strict=True):
@@ -194,6 +191,23 @@ def sureness(block: Block, recordings: Sequence[Recording], left: Sequence[Array
         sizes[known_places], sizes[known_places]
     )
     return Sureness(covariance, tuple(said), condition, worth, terms)
+
+
+def fixed(block: Block) -> list[str]:
+    """Return for every parameter why no fit finds it: chosen, or at a bound; empty where one does."""
+    values, found = block.pack(), []
+    for name, value, size in zip(
+        block.parameter_names, values, relative_sizes(values), strict=True
+    ):
+        if name.endswith("input offset"):
+            found.append("chosen: the point about which the model is linear")
+        elif abs(value) <= NOTHING * size:
+            found.append("0: at a bound, or left out")
+        elif value == 1:
+            found.append("exactly 1: chosen, as what others are relative to")
+        else:
+            found.append("")
+    return found
 
 
 def _operations(block: Block, recording: Recording) -> float:

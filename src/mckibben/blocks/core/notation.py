@@ -173,9 +173,11 @@ def unit_tex(unit: str) -> str:
     r"""Return a unit in LaTeX.
 
     >>> unit_tex("N s/mm"), unit_tex("1/N^3")
-    ('\\mathrm{N\\,s/mm}', '\\mathrm{1/N^{3}}')
+    ('\\mathrm{N\\;s/mm}', '\\mathrm{1/N^{3}}')
     """
-    text = re.sub(r"\^(\d)", r"^{\1}", unit).replace(" ", r"\,").replace("%", r"\%")
+    text = re.sub(r"[\\{}$&#~_]|\^(?!\d)", " ", unit)  # files name units too: text, not LaTeX
+    text = re.sub(r"\^(\d+)", r"^{\1}", " ".join(text.split()))
+    text = text.replace(" ", r"\;").replace("%", r"\%")
     return rf"\mathrm{{{text}}}" if unit else ""
 
 

@@ -44,7 +44,7 @@ def test_equations_parameters_and_plots_are_there() -> None:
     assert text.count("<math") > 5
     assert "not given: the free run&#39;s residuals are correlated" in text
     for one in found.parameters:
-        assert f'<th scope="row">{one.name}</th>' in text
+        assert f'<th scope="row" class="unit">{one.name}</th>' in text
         assert one.unit in text
     assert 'data-figure="response displacement"' in text
     assert "Hysteresis is late" in text

@@ -15,7 +15,8 @@ from mckibben.blocks.compose import Series
 from mckibben.blocks.core.block import Block
 from mckibben.blocks.dynamic.creep import Creep
 from mckibben.blocks.dynamic.transfer_function import TransferFunction
-from mckibben.validation.parameters import autoregression, parameters, residuals, sureness
+from mckibben.estimators.core.autoregression import autoregression
+from mckibben.validation.parameters import parameters, residuals, sureness
 
 STEP, SAMPLES = 0.05, 3000
 
@@ -141,6 +142,48 @@ def test_what_only_a_sum_tells_is_told_apart_from_what_nothing_tells() -> None:
     recording = Recording({"pressure": u, "displacement": y}, STEP)
     sure = sureness(pi, [recording], residuals(pi, [recording]))
     assert all(said.endswith("only together with others") for said in sure.said)
+
+
+def test_what_is_told_beside_what_only_a_sum_tells_scatters_as_said() -> None:
+    """Of y = a z(u) + (b + c) u, z a creeping part, a is as unsure as with b + c free, not known."""
+    from mckibben.blocks.compose import Parallel
+    from mckibben.blocks.core.fields import DISPLACEMENT, PRESSURE
+    from mckibben.blocks.memoryless.affine import Affine
+
+    line = Affine(1.5, 0.0, PRESSURE, DISPLACEMENT)
+    block = Parallel((PI((0.3,), (3.0,), 0.0), line, Affine(0.7, 0.0, PRESSURE, DISPLACEMENT)))
+    u = wave()
+    clean = np.asarray(block.simulate(u))
+    play = (clean - 2.2 * u) / 3.0
+    found, said = [], []
+    for seed in range(60):
+        y = clean + noise(seed, 0.8)
+        a, both = np.linalg.lstsq(np.column_stack([play, u]), y, rcond=None)[0]
+        values = block.pack()
+        values[block.parameter_names.index("weights 1")] = a
+        values[values == 1.5] = both - 0.7
+        model = block.unpack(values)
+        recording = Recording({"pressure": u, "displacement": y}, STEP)
+        sure = sureness(model, [recording], residuals(model, [recording]))
+        own = parameters(model, sure)[block.parameter_names.index("weights 1")]
+        assert own.standard_error is not None
+        found.append(a)
+        said.append(own.standard_error)
+    assert 0.75 < np.mean(said) / np.std(found) < 1.3
+
+
+@pytest.mark.parametrize("memory", [0.0, 0.9])
+def test_fits_and_descriptions_say_the_same(memory: float) -> None:
+    from mckibben.estimators.play_type.pi import PIEstimator
+
+    block, u = MODELS["pi"][0], wave()
+    y = np.asarray(block.simulate(u)) + noise(1, memory)
+    recording = Recording({"pressure": u, "displacement": y}, STEP)
+    fit = PIEstimator(thresholds=THRESHOLDS).fit(recording)
+    model = fit.fitted
+    sure = sureness(model, [recording], residuals(model, [recording]))
+    told = np.sqrt(np.diag(sure.covariance))
+    np.testing.assert_allclose(fit.diagnostics_.standard_errors, told, rtol=0.02)
 
 
 def test_a_parameter_at_its_bound_has_no_error() -> None:

@@ -44,7 +44,7 @@ def check(
     wanted = [channel.name for channel in (*block.inputs, *block.outputs)]
     recordings = reading.read(found_files, list(dict.fromkeys(wanted)), informative=False)
     found = find(block, recordings)
-    description = describe(block, recordings)
+    description = describe(block, recordings, fitted=False)
     told = found.to_dict() | {
         "description": description.to_dict(),
         "model_file": str(model),

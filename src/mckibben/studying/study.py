@@ -206,7 +206,7 @@ def study(
             so_far,
             untold=untold(recordings, channels.inputs, names, block, tests=tests),
             check=check_on_test(block, split, on_test, names),
-            description=describe(block, split.train),
+            description=describe(block, split.train, fitted=True),
         )
     if channels.single:
         so_far = replace(so_far, inverse=invert_best(board, recordings[0]))

@@ -13,14 +13,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.blocks.compose import Series
 from mckibben.blocks.core.block import Block
-from mckibben.blocks.dynamic.transfer_function import TransferFunction
-from mckibben.blocks.memoryless.negative import Negative
 from mckibben.recording import Recording
-
-LAGS = 20
-"""Of the test for whiteness."""
+from mckibben.validation.k_step import linear, predicted
+from mckibben.validation.parameters import fixed
+from mckibben.validation.whiteness import whiteness
 
 SURE = 0.01
 """Level at which residuals are not white."""
@@ -35,7 +32,7 @@ class Criteria:
     aic, bic, fpe : float or None
         None where they mean nothing; the last in squared units of the outputs, multiplied.
     n_samples, n_parameters : int
-        That they count.
+        That they count; numbers that are chosen or at a bound are none.
     of : str
         Which residuals they are of.
     said : str
@@ -52,7 +49,11 @@ class Criteria:
 
 
 def criteria(
-    block: Block, recordings: Sequence[Recording], left: Sequence[Array], n_effective: float
+    block: Block,
+    recordings: Sequence[Recording],
+    left: Sequence[Array],
+    n_effective: float,
+    fitted: bool = True,
 ) -> Criteria:
     """Return the criteria of a model on recordings.
 
@@ -62,8 +63,10 @@ def criteria(
         Residuals of the free run.
     n_effective : float
         Independent samples that these are worth.
+    fitted : bool
+        Whether the model was fitted to these recordings: of others there are no criteria.
     """
-    n_parameters = int(np.count_nonzero(block.pack()))
+    n_parameters = fixed(block).count("")
     ahead = _one_step(block, recordings)
     if ahead is not None:
         left, noise = ahead
@@ -72,9 +75,13 @@ def criteria(
     together = np.concatenate(left)
     n = len(together)
     none = Criteria(None, None, None, n, n_parameters, of)
-    if n <= n_parameters + LAGS or not np.isfinite(together).all():
+    if not fitted:
+        return _without(
+            none, "they judge a model by the recordings that it was fitted to, not by others"
+        )
+    if n <= n_parameters or not np.isfinite(together).all() or (white := _white(left)) is None:
         return _without(none, "there are too few samples, or the model's output is not finite")
-    if min(_whiteness(left)) < SURE:
+    if not white:
         if ahead is not None:
             return _without(
                 none,
@@ -107,35 +114,16 @@ def _without(criteria: Criteria, said: str) -> Criteria:
 
 def _one_step(block: Block, recordings: Sequence[Recording]) -> tuple[list[Array], int] | None:
     """Return errors one step ahead and how many numbers the noise model has; None of other models."""
-    turned = 1.0
-    if isinstance(block, Series) and len(block.parts) == 2 and isinstance(block.parts[1], Negative):
-        block, turned = block.parts[0], -1.0
-    if not isinstance(block, TransferFunction):
+    found = linear(block)
+    if found is None:
         return None
-    name = block.output.name
-    found = []
-    for recording in recordings:
-        measured = turned * recording[name]
-        risen = recording.with_channels({name: recording.units[name]}, **{name: measured})
-        found.append((measured - block.predict(risen)[name])[:, np.newaxis])
-    return found, len(block.noise_numerator) + len(block.noise_denominator)
+    name, model = block.outputs[0].name, found[0]
+    left = [(r[name] - predicted(block, r, 1))[:, np.newaxis] for r in recordings]
+    return left, len(model.noise_numerator) + len(model.noise_denominator)
 
 
-def _whiteness(left: Sequence[Array]) -> list[float]:
-    """Return the p-value of Ljung and Box's test of every output, over all runs together."""
-    from scipy.stats import chi2
-
-    found = []
-    for j in range(left[0].shape[1]):
-        series = [e[:, j] for e in left if len(e) > LAGS]
-        n = sum(map(len, series))
-        power = sum(float(e @ e) for e in series)
-        if not power > 0:
-            found.append(1.0)
-            continue
-        statistic = 0.0
-        for lag in range(1, LAGS + 1):
-            r = sum(float(e[lag:] @ e[:-lag]) for e in series) / power
-            statistic += r * r / (n - lag)
-        found.append(float(chi2.sf(n * (n + 2) * statistic, LAGS)))
-    return found
+def _white(left: Sequence[Array]) -> bool | None:
+    """Return whether the residuals of every output are white; None of too few to tell."""
+    found = [whiteness([e[:, j] for e in left]).p_value for j in range(left[0].shape[1])]
+    known = [p for p in found if p is not None]
+    return None if len(known) < len(found) else min(known) * len(known) >= SURE

@@ -50,6 +50,10 @@ class ModelDescription:
         Of all others.
     notes : tuple of str
         What makes no sense of this model, or was cut short.
+    recordings : tuple of str
+        Names of those that all this rests on.
+    fitted : bool
+        Whether the model was fitted to them.
     """
 
     written: Written
@@ -60,6 +64,8 @@ class ModelDescription:
     frequency_responses: tuple[FrequencyResponse, ...]
     describing_functions: tuple[DescribingFunction, ...]
     notes: tuple[str, ...]
+    recordings: tuple[str, ...]
+    fitted: bool
 
     def to_dict(self) -> dict[str, Any]:
         """Return it as a JSON-ready dict; what is not known is None."""
@@ -68,7 +74,11 @@ class ModelDescription:
 
 
 def describe(
-    block: Block, recordings: Sequence[Recording], output: str | None = None
+    block: Block,
+    recordings: Sequence[Recording],
+    output: str | None = None,
+    *,
+    fitted: bool = True,
 ) -> ModelDescription:
     """Describe a fitted model on recordings, usually those it was fitted to.
 
@@ -83,6 +93,9 @@ def describe(
         With its inputs and outputs.
     output : str, optional
         The only output to show responses of; default all.
+    fitted : bool
+        Whether the model was fitted to these recordings. If not, standard errors are those that a fit
+        to them would have, and there are no criteria.
 
     Returns
     -------
@@ -107,7 +120,7 @@ def describe(
         sure = sureness(block, recordings, left) if not reason else _unsure(block, reason)
         responses = frequency_responses(block, recordings, sure.covariance, sure.half_width, output)
         loops = () if responses else describing_functions(block, recordings, output)
-        found = criteria(block, recordings, left, sure.n_effective)
+        found = criteria(block, recordings, left, sure.n_effective, fitted)
     notes = [f"Standard errors are not given: {reason}."] if reason else []
     notes += [
         f"The loops of {one.output.name} are not compared: {one.said}." for one in loops if one.said
@@ -121,6 +134,8 @@ def describe(
         responses,
         loops,
         tuple(notes),
+        tuple(recording.name for recording in recordings),
+        fitted,
     )
 
 

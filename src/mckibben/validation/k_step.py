@@ -9,8 +9,11 @@ from typing import Any
 import numpy as np
 
 from mckibben.arrays import Array
+from mckibben.blocks.compose import Series
 from mckibben.blocks.core.block import Block
 from mckibben.blocks.dynamic.transfer_function import TransferFunction
+from mckibben.blocks.memoryless.negative import Negative
+from mckibben.recording import Recording
 from mckibben.validation.residuals import Run
 
 AHEAD = (1, 10, 100)
@@ -63,16 +66,38 @@ def errors_ahead(block: Block, runs: Sequence[Run], output: int) -> tuple[Ahead,
         for run in (run for run in runs if len(run.inputs) > samples):
             measured, left = run.measured[:, output], run.residual[:, output]
             held.append(measured[samples:] - measured[:-samples])
-            if isinstance(block, TransferFunction):
-                predicted = block.predict(run.recording, samples)[block.outputs[output].name]
-                errors.append((measured - predicted)[samples:])
+            foreseen = predicted(block, run.recording, samples)
+            if foreseen is not None:
+                errors.append((measured - foreseen)[samples:])
             else:
                 errors.append(left[samples:] - left[:-samples])
-        how = PREDICTED if isinstance(block, TransferFunction) else CORRECTED
+        how = CORRECTED if linear(block) is None else PREDICTED
         seconds = None if step is None else samples * step
         found.append(Ahead(samples, seconds, _rms(errors), _rms(held), how))
     free = Ahead(None, None, _rms([run.residual[:, output] for run in runs]), None, FREE)
     return (*found, free)
+
+
+def linear(block: Block) -> tuple[TransferFunction, float] | None:
+    """Return the linear model that a block is, and by what its output is multiplied; None of others."""
+    if isinstance(block, TransferFunction):
+        return block, 1.0
+    if isinstance(block, Series) and len(block.parts) == 2 and isinstance(block.parts[1], Negative):
+        found = linear(block.parts[0])
+        return None if found is None else (found[0], -found[1])
+    return None
+
+
+def predicted(block: Block, recording: Recording, samples: int) -> Array | None:
+    """Return a linear model's output so many samples ahead, shape (n,); None of other models."""
+    found = linear(block)
+    if found is None:
+        return None
+    model, sign = found
+    name, given = model.output.name, block.outputs[0].name
+    units = {name: recording.units[given]}
+    turned = recording.with_channels(units, **{name: sign * recording[given]})
+    return np.asarray(sign * model.predict(turned, samples)[name])
 
 
 def _rms(errors: Sequence[Array]) -> float:

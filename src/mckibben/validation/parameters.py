@@ -1,13 +1,4 @@
-"""Parameters of a fitted model, and how sure each is, where residuals remember too.
-
-Standard errors are those of least squares of the free run under correlated residuals (the sandwich
-P J' R J P, P the pseudo-inverse of J' J): J holds the free-run sensitivities, and R the covariance of
-the residuals under an autoregression of as many terms as they ask for (Burg's, chosen by BIC). What the
-fit itself has taken out of the residuals is put back, or few long-lived ones would look too small.
-
-Sources: Ljung, "System Identification", 1999, section 9.5 (misspecified noise); den Haan and Levin, "A
-practitioner's guide to robust covariance matrix estimation", 1997.
-"""
+"""Parameters of a fitted model, and how sure each is, where residuals remember too."""
 
 from __future__ import annotations
 
@@ -16,13 +7,18 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mckibben.arrays import Array
 from mckibben.blocks.core.block import Block
 from mckibben.blocks.core.writing import quantities
 from mckibben.errors import ModelError
-from mckibben.estimators.core.uncertainty import DIFFERENCE, LARGEST, relative_sizes
+from mckibben.estimators.core.uncertainty import (
+    DIFFERENCE,
+    LARGEST,
+    autoregressions,
+    relative_sizes,
+    sandwich,
+)
 from mckibben.recording import Recording
 from mckibben.system.threads import cores
 
@@ -36,15 +32,8 @@ solved; of longer recordings the beginnings are taken, as if the rest told as mu
 SOLVED = 10
 """Operations of a step, for every parameter, above which a model is solved rather than computed."""
 
-MOST_TERMS = 40
-"""Of an autoregression of residuals."""
-
 NOTHING = 1e-9
 """Share of its size below which a parameter is 0."""
-
-LEAST, DETERMINED = 1e-6, 0.99
-"""Share of the largest singular value of sensitivities that tells anything; share of a parameter's own
-direction that must be told."""
 
 UNFELT = 1e-6
 """Share of the most felt parameter's sensitivity below which one is not felt."""
@@ -155,8 +144,8 @@ def sureness(block: Block, recordings: Sequence[Recording], left: Sequence[Array
     """
     n_parameters = block.n_parameters
     covariance = np.full((n_parameters, n_parameters), np.nan)
-    said = [""] * n_parameters
-    values, names = block.pack(), block.parameter_names
+    said = fixed(block)
+    values = block.pack()
     sizes = relative_sizes(values)
     total = sum(map(len, left))
     steps = max(total * n_parameters, 1)
@@ -164,19 +153,10 @@ def sureness(block: Block, recordings: Sequence[Recording], left: Sequence[Array
     kept = [r.slice(0, max(round(share * len(r)), min(len(r), 50))) for r in recordings]
     left = [e[: len(r)] for e, r in zip(left, kept, strict=True)]
     share = sum(map(len, left)) / total
-    models = [autoregression([e[:, j] for e in left]) for j in range(left[0].shape[1])]
+    models = autoregressions(left)
     worth = min(model.worth(sum(map(len, left))) for model in models) / share
-    places: list[int] = []
+    places = [place for place in range(n_parameters) if not said[place]]
     columns: list[list[Array]] = []
-    for place in range(n_parameters):
-        if names[place].endswith("input offset"):
-            said[place] = "chosen: the point about which the model is linear"
-        elif abs(values[place]) <= NOTHING * sizes[place]:
-            said[place] = "0: at a bound, or left out"
-        elif values[place] == 1:
-            said[place] = "exactly 1: chosen, as what others are relative to"
-        else:
-            places.append(place)
     given = [channel.name for channel in block.outputs]
     base = [block.simulate(r).matrix(given) for r in kept]  # anew: a start may be fitted
     with ThreadPoolExecutor(cores()) as pool:
@@ -191,19 +171,43 @@ def sureness(block: Block, recordings: Sequence[Recording], left: Sequence[Array
     if not columns or not all(np.isfinite(e).all() for e in left):
         said = [reason or "the model's output is not finite" for reason in said]
         return Sureness(covariance, tuple(said), np.inf, worth, terms)
-    condition, own, told, middle = _sandwich(columns, left, models)
+    moves = [np.stack([column[run] for column in columns], axis=2) for run in range(len(left))]
+    if worth < 1 + len(places):
+        short = (
+            f"{len(places)} parameters cannot be told from about {worth:.0f} independent samples"
+        )
+        said = [reason or short for reason in said]
+        return Sureness(covariance, tuple(said), np.inf, worth, terms)
+    condition, found, told = sandwich(moves, left, models)
     felt = [max(float(np.abs(slopes).max()) for slopes in column) for column in columns]
     for place, known, own_felt in zip(places, told.tolist(), felt, strict=True):
         if not known:
             apart = own_felt > UNFELT * max(felt)
             alone = "only together with others" if apart else "it moves nothing in them"
             said[place] = f"not determined by these recordings: {alone}"
-    found = (share * (own @ middle @ own))[np.ix_(told, told)]  # as if the rest told as much
+    found = share * found[np.ix_(told, told)]  # as if the rest told as much
     known_places = np.array(places)[told]
     covariance[np.ix_(known_places, known_places)] = found * np.multiply.outer(
         sizes[known_places], sizes[known_places]
     )
     return Sureness(covariance, tuple(said), condition, worth, terms)
+
+
+def fixed(block: Block) -> list[str]:
+    """Return for every parameter why no fit finds it: chosen, or at a bound; empty where one does."""
+    values, found = block.pack(), []
+    for name, value, size in zip(
+        block.parameter_names, values, relative_sizes(values), strict=True
+    ):
+        if name.endswith("input offset"):
+            found.append("chosen: the point about which the model is linear")
+        elif abs(value) <= NOTHING * size:
+            found.append("0: at a bound, or left out")
+        elif value == 1:
+            found.append("exactly 1: chosen, as what others are relative to")
+        else:
+            found.append("")
+    return found
 
 
 def _operations(block: Block, recording: Recording) -> float:
@@ -244,115 +248,3 @@ def _sensitivity(
         if all(np.abs(slope).max() < LARGEST for slope in slopes):
             return slopes
     return None
-
-
-def _sandwich(
-    columns: Sequence[list[Array]], left: Sequence[Array], models: Sequence[Autoregression]
-) -> tuple[float, Array, NDArray[np.bool_], Array]:
-    """Return condition, P, what it determines, and J' R J, outputs weighed by their residuals' sizes."""
-    n_outputs = left[0].shape[1]
-    scale = np.array([np.sqrt(model.variance) or 1.0 for model in models])
-    stacked, tinted = [], []
-    for run in range(len(left)):
-        slopes = np.stack([column[run] for column in columns], axis=2) / scale[:, np.newaxis]
-        stacked.append(slopes.reshape(-1, len(columns)))
-        tinted.append([models[j].tinted(slopes[:, j]) / scale[j] for j in range(n_outputs)])
-    condition, own, told = _inverted(np.concatenate(stacked))
-    shocks = [np.concatenate([m.shocks(e[:, j]) for e in left]) for j, m in enumerate(models)]
-    together = np.corrcoef(shocks) if n_outputs > 1 else np.ones((1, 1))
-    together = np.nan_to_num(together)
-    middle = np.zeros((len(columns), len(columns)))
-    for own_run in tinted:
-        for i in range(n_outputs):
-            for j in range(n_outputs):
-                middle += together[i, j] * (own_run[i].T @ own_run[j])
-    # what the fit has taken out of the residuals, of all that was in them
-    taken = float(np.sum(own * middle)) / sum(map(np.size, left))
-    middle /= max(1.0 - taken, 0.1)
-    return condition, own, told, middle
-
-
-def _inverted(slopes: Array) -> tuple[float, Array, NDArray[np.bool_]]:
-    """Return the condition of slopes, (n, k), their products' pseudo-inverse, and what is told."""
-    singular, right = np.linalg.svd(slopes, full_matrices=False)[1:]
-    condition = float(singular[0] / singular[-1]) if singular[-1] > 0 else np.inf
-    kept = singular > LEAST * singular[0]
-    inverse = (right[kept].T / singular[kept] ** 2) @ right[kept]
-    return condition, inverse, 1 - (right[~kept] ** 2).sum(axis=0) > DETERMINED
-
-
-@dataclass(frozen=True, eq=False)
-class Autoregression:
-    """Residuals as an autoregression: e_t = a_1 e_{t-1} + ... + shock.
-
-    Parameters
-    ----------
-    coefficients : array, shape (k,)
-        a.
-    shock : float
-        Standard deviation of what is new in every sample.
-    variance : float
-        Of the residuals.
-    """
-
-    coefficients: Array
-    shock: float
-    variance: float
-
-    @property
-    def _whitener(self) -> Array:
-        return np.concatenate([[1.0], -self.coefficients])
-
-    def shocks(self, series: Array) -> Array:
-        """Return what is new in every sample of a series."""
-        from scipy.signal import lfilter
-
-        return np.asarray(lfilter(self._whitener, [1.0], series))
-
-    def tinted(self, slopes: Array) -> Array:
-        """Return L' J, shape (n, k), of which the product with itself is J' R J."""
-        from scipy.signal import lfilter
-
-        back = lfilter([1.0], self._whitener, slopes[::-1], axis=0)[::-1]
-        return np.asarray(self.shock * back)
-
-    def worth(self, n: int) -> float:
-        """Return how many independent samples tell as much of the mean as n of these."""
-        if self.variance <= 0:
-            return float(n)
-        memory = (self.shock / float(self._whitener.sum())) ** 2 / self.variance
-        return float(np.clip(n / max(memory, 1e-12), 1.0, n))
-
-
-def autoregression(series: Sequence[Array]) -> Autoregression:
-    """Return the autoregression of pieces of one series, of as many terms as BIC asks for.
-
-    By Burg's method, which is always stable.
-
-    Parameters
-    ----------
-    series : sequence of array, shape (n,)
-    """
-    n = sum(map(len, series))
-    variance = float(np.mean(np.concatenate(series) ** 2)) if n else 0.0
-    forward: list[NDArray[np.float64]] = [np.asarray(e, dtype=np.float64) for e in series]
-    backward = list(forward)
-    best, chosen, shock = n * np.log(max(variance, 1e-300)), np.zeros(0), variance
-    a, power = np.zeros(0), variance
-    for order in range(1, min(MOST_TERMS, n // 10) + 1):
-        ahead = [f[1:] for f in forward]
-        behind = [b[:-1] for b in backward]
-        below = sum(float(f @ f + b @ b) for f, b in zip(ahead, behind, strict=True))
-        if not below > 1e-300:
-            break
-        k = 2 * sum(float(f @ b) for f, b in zip(ahead, behind, strict=True)) / below
-        forward = [f - k * b for f, b in zip(ahead, behind, strict=True)]
-        backward = [b - k * f for f, b in zip(ahead, behind, strict=True)]
-        a = np.append(a - k * a[::-1], k)
-        power *= 1 - k * k
-        if not power > 1e-300:
-            break
-        cost = n * np.log(power) + order * np.log(n)
-        if cost < best:
-            best, chosen, shock = cost, a, power
-    return Autoregression(chosen, float(np.sqrt(max(shock, 0.0))), variance)

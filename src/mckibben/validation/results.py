@@ -267,6 +267,5 @@ class Validation:
             "verdict": self.verdict,
             "sentences": self.sentences,
             "notes": list(self.notes),
-            # what describes the model itself (parameters, equations, criteria) is to stand here
             "outputs": [one.to_dict() for one in self.outputs],
         }

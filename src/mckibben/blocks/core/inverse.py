@@ -19,6 +19,7 @@ from mckibben.arrays import Array
 from mckibben.blocks.core.block import Block, Kernel, Primitive, Run
 from mckibben.blocks.core.exportable import Cost
 from mckibben.blocks.core.fields import STRICT, Channel, Initial, Rule
+from mckibben.blocks.core.notation import indexed, lettered
 from mckibben.blocks.core.refusals import explicit_state
 from mckibben.blocks.core.saving import nested
 from mckibben.errors import ModelError, ModelWarning
@@ -223,6 +224,15 @@ class Inverse(Block):
     def equations(self) -> tuple[str, ...]:
         """Return that it solves the equations of the block undone, which follow."""
         return (r"\hat{u} = P^{-1}[y] \quad\text{such that}\quad P[\hat{u}] = y",)
+
+    def worked(self) -> tuple[str, ...]:
+        """Return which channels go in and come out; P is the block that follows."""
+        letters = []
+        for letter, channels in (("y", self.forward.outputs), (r"\hat{u}", self.outputs)):
+            for place, channel in enumerate(channels):
+                own = indexed(letter, (place,), 1) if len(channels) > 1 else letter
+                letters.append(lettered(own, channel.name, channel.unit))
+        return (r",\quad ".join([*letters, r"P\text{: the model below}"]),)
 
     @classmethod
     def example(cls) -> Self:

@@ -140,7 +140,7 @@ def short(meaning: str) -> str:
     >>> short("k, stiffness of the stops [N/mm], not negative. None by default.")
     'k, stiffness of the stops, not negative'
     """
-    first = re.split(r"(?<=[^.])\.(?:\s|$)|;\s", meaning, maxsplit=1)[0]
+    first = re.split(r"(?<=[^.])\.(?:\s|$)|;\s", meaning.replace("`", ""), maxsplit=1)[0]
     return re.sub(r"\s*\[[^\]]*\]", "", first).strip()
 
 
@@ -173,10 +173,22 @@ def unit_tex(unit: str) -> str:
     r"""Return a unit in LaTeX.
 
     >>> unit_tex("N s/mm"), unit_tex("1/N^3")
-    ('\\mathrm{N\\,s/mm}', '\\mathrm{1/N^{3}}')
+    ('\\mathrm{N\\;s/mm}', '\\mathrm{1/N^{3}}')
     """
-    text = re.sub(r"\^(\d)", r"^{\1}", unit).replace(" ", r"\,").replace("%", r"\%")
+    text = re.sub(r"[\\{}$&#~_]|\^(?!\d)", " ", unit)  # files name units too: text, not LaTeX
+    text = re.sub(r"\^(\d+)", r"^{\1}", " ".join(text.split()))
+    text = text.replace(" ", r"\;").replace("%", r"\%")
     return rf"\mathrm{{{text}}}" if unit else ""
+
+
+def lettered(letter: str, name: str, unit: str) -> str:
+    r"""Return what the letter of a channel stands for.
+
+    >>> lettered("u", "pressure_1", "bar")
+    'u\\text{: pressure\\_1}\\,[\\mathrm{bar}]'
+    """
+    name = re.sub(r"[\\{}$&#^~%]", " ", name).replace("_", r"\_")
+    return rf"{letter}\text{{: {name}}}" + (rf"\,[{unit_tex(unit)}]" if unit else "")
 
 
 def with_unit(text: str, unit: str) -> str:

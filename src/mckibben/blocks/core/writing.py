@@ -13,6 +13,7 @@ from mckibben.blocks.core.notation import (
     MANY,
     Written,
     indexed,
+    lettered,
     meanings,
     resolved,
     short,
@@ -205,9 +206,7 @@ def _channels(part: Parametrised) -> Iterator[str]:
         symbol = part.notation.symbols.get(field, default)
         for place, channel in enumerate(several):
             letter = indexed(symbol, (place,), 1) if len(several) > 1 else symbol
-            name = re.sub(r"[\\{}$&#^~%]", " ", channel.name).replace("_", r"\_")
-            unit = rf"\,[{unit_tex(channel.unit)}]" if channel.unit else ""
-            told.append(rf"{letter}\text{{: {name}}}{unit}")
+            told.append(lettered(letter, channel.name, channel.unit))
     if told:
         yield r",\quad ".join(told)
 

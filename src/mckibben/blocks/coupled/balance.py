@@ -43,6 +43,7 @@ from mckibben.blocks.core.linear_system import newton_cost
 from mckibben.blocks.core.many_channels import ManyChannels
 from mckibben.blocks.core.notation import Notation
 from mckibben.blocks.core.refusals import explicit_state, needs_sample_time
+from mckibben.blocks.coupled.balance_equations import balance_of_forces
 from mckibben.blocks.coupled.balance_fields import check_fields
 from mckibben.blocks.coupled.balance_law import NEARLY, NEVER, begin, keep, pressed, settle
 from mckibben.blocks.coupled.balance_terms import AT_REST, FROM_REST, IN_TIME
@@ -109,16 +110,16 @@ class Balance(ManyChannels, Invertible):
     Parameters
     ----------
     springs : sequence of n sequences of float
-        Of every muscle, for every power of what schedules: a constant [N] and the springs to all
-        displacements [N/mm].
+        A constant force [N], then springs to all displacements [N/mm], of every muscle and for
+        every power of what schedules.
     elasticity : sequence of n sequences of float
         Coefficients of (y / scale)^2 and up [N].
     areas : sequence of n sequences of float
         Coefficients of (y / scale)^0 and up [N/bar]; the first is positive.
     friction : sequence of n sequences of float
-        Of every muscle, stiffness of its stops [N/mm], not negative.
+        Stiffness of the stops of every muscle [N/mm], not negative.
     relaxation : sequence of n sequences of float
-        Of every muscle, stiffness of what relaxes [N/mm], not negative.
+        Stiffness of what relaxes, of every muscle [N/mm], not negative.
     loads : sequence of n sequences of float
         How much of every load pulls at a muscle, usually 1.
     damping : sequence of n float
@@ -132,7 +133,7 @@ class Balance(ManyChannels, Invertible):
         Travel at which every stop breaks away, of pressure above that at which it holds nothing
         [mm/bar], increasing.
     grip : float
-        Pressure below zero at which stops hold nothing [bar]: they break away at ``limits (p + grip)``.
+        Pressure below zero at which stops hold nothing [bar]; they break away at ``limits (p + grip)``.
     lags : sequence of float
         Time constants of what relaxes [s].
     hull : sequence of n pairs of float
@@ -172,13 +173,8 @@ class Balance(ManyChannels, Invertible):
         *("damping", "lines", "walls", "grip", "bladders", "pushes", "mass"),
     )
     notation: ClassVar[Notation] = Notation(
-        r"p_k A_k(y_k) = \sum_l C_{kl} F_l + \sum_{q} x^q \left(S_{kq0} + \sum_j S_{kqj} "
-        r"y_j\right) + E_k(y_k) + \sum_m h_{km} s_{km} + \sum_l \kappa_{kl} q_{kl} + d_k "
-        r"\dot{y}_k + l_k \left(\frac{A_k}{a_{k0}}\right)^2 \dot{y}_k + m_k \ddot{y}_k",
         r"A_k(y) = \sum_i a_{ki} (y / L)^i,\quad E_k(y) = b_k y + \sum_{i \ge 2} e_{ki} "
         "(y / L)^i",
-        r"s_{km} \text{ follows } y_k + w_k p_k \text{ up to } \pm r_m (p_k + p_0),\quad "
-        r"\dot{q}_{kl} = \dot{y}_k - q_{kl} / \tau_l",
         springs="S_{ki}",
         elasticity="e_{ki} from 2 [N]",
         areas="a_{ki} from 0 [N/bar]",
@@ -228,6 +224,10 @@ class Balance(ManyChannels, Invertible):
     def __post_init__(self) -> None:
         self.check_channels()
         check_fields(self)
+
+    def equations(self) -> tuple[str, ...]:
+        """Return the balance of forces, without what this one lacks; then area and elasticity."""
+        return balance_of_forces(self)
 
     @property
     def n_loads(self) -> int:

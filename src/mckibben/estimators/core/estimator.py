@@ -55,8 +55,8 @@ class Diagnostics:
     at_bounds : tuple of int
         Parameters, by their place in ``model_.pack()``, that ended at a bound.
     standard_errors : tuple of float
-        One a parameter, as if residuals were independent; NaN for those at bounds or that the data
-        do not determine.
+        One a parameter, for residuals that remember; NaN for those at bounds or that the data do
+        not determine.
     covariance : array, shape (n_parameters, n_parameters)
         The same, NaN likewise.
     peaks : tuple of float or None

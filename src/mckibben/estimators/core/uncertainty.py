@@ -1,21 +1,36 @@
-"""What recordings tell of a block's parameters: condition and covariance, from how outputs move."""
+"""What recordings tell of a block's parameters: condition and covariance, from how outputs move.
+
+Covariances are those of least squares of the free run where residuals remember (the sandwich
+P J' R J P, P the pseudo-inverse of J' J): J holds the free-run sensitivities, and R the covariance of
+the residuals under an autoregression of as many terms as they ask for (Burg's, chosen by BIC). What the
+fit itself has taken out of the residuals is put back, or few long-lived ones would look too small.
+
+Sources: Ljung, "System Identification", 1999, section 9.5 (misspecified noise); den Haan and Levin, "A
+practitioner's guide to robust covariance matrix estimation", 1997.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mckibben.arrays import Array
 from mckibben.blocks.core.block import Block
 from mckibben.blocks.core.running import run_many
-from mckibben.estimators.core.data import TrainingData
+from mckibben.estimators.core.autoregression import Autoregression, autoregression
+from mckibben.estimators.core.data import Run, TrainingData
 
 LARGEST = 1e150
 """Sensitivity that still is one: its square is a number."""
 
 DIFFERENCE = 1e-6
 """Step of finite differences, relative to the size of a parameter."""
+
+LEAST, DETERMINED = 1e-6, 0.99
+"""Share of the largest singular value of sensitivities that tells anything; share of a parameter's own
+direction that must be told."""
 
 
 def simulate_all(blocks: Sequence[Block], data: TrainingData) -> Array:
@@ -38,28 +53,105 @@ def covariance_of(
 ) -> tuple[float, Array]:
     """Return the condition of the parameters that are free, and the covariance of all.
 
-    From finite differences of the free-running output on a share of the samples. Parameters that
-    are fixed, or that the data do not determine, have NaN; so have those at which the output
-    overflows, and all of a model whose own output does.
+    From finite differences of the free-running output. Parameters that are fixed, or that the data do
+    not determine, have NaN; so have those at which the output overflows, and all of a model whose own
+    output does.
     """
     parameters = block.pack()
     covariance = np.full((parameters.size, parameters.size), np.nan)
     free = [index for index in range(parameters.size) if index not in fixed]
     if not free:
         return np.inf, covariance
-    thin = data.thinned(max(2000, 4 * parameters.size))
     sizes = relative_sizes(parameters)
     with np.errstate(over="ignore", invalid="ignore"):
-        slopes = sensitivities(block, free, sizes[free], lambda blocks: simulate_all(blocks, thin))
+        slopes = sensitivities(block, free, sizes[free], lambda blocks: simulate_all(blocks, data))
         power = float(residual @ residual)
     finite = np.isfinite(slopes).all(axis=0) & (np.abs(slopes).max(axis=0, initial=0.0) < LARGEST)
     if not finite.any() or not np.isfinite(power):
         return np.inf, covariance
-    condition, own = inverted(slopes[:, finite])
+    condition, own = told_by_runs(slopes[:, finite], residual, data.runs)
     places = np.array(free)[finite]
-    variance = power / max(residual.size - len(free), 1) * len(slopes) / residual.size
-    covariance[np.ix_(places, places)] = variance * own * np.outer(sizes[places], sizes[places])
+    covariance[np.ix_(places, places)] = own * np.outer(sizes[places], sizes[places])
     return condition if finite.all() else np.inf, covariance
+
+
+def told_by_runs(slopes: Array, residual: Array, runs: Sequence[Run]) -> tuple[float, Array]:
+    """Return the condition of slopes and the covariance that they and residuals make.
+
+    Parameters
+    ----------
+    slopes : array, shape (n, k)
+        At the samples that count, as `TrainingData.target`.
+    residual : array, shape (n,)
+        Likewise.
+    """
+    moves, left, place = [], [], 0
+    for run in runs:
+        n_outputs = run.outputs.shape[1]
+        stop = place + int(run.counts.sum()) * n_outputs
+        wide = np.zeros((run.counts.size, n_outputs, slopes.shape[1]))
+        wide[run.counts] = slopes[place:stop].reshape(-1, n_outputs, slopes.shape[1])
+        own = np.full((run.counts.size, n_outputs), np.nan)
+        own[run.counts] = residual[place:stop].reshape(-1, n_outputs)
+        moves.append(wide)
+        left.append(own)
+        place = stop
+    if not (np.isfinite(slopes).all() and np.isfinite(residual).all()):
+        return np.inf, np.full(2 * slopes.shape[1:], np.nan)
+    models = autoregressions(left)
+    condition, covariance, told = sandwich(moves, left, models)
+    return condition, blanked(covariance, told)
+
+
+def autoregressions(left: Sequence[Array]) -> list[Autoregression]:
+    """Return that of every output, of residuals of runs, (n, m); NaN where samples do not count."""
+    return [
+        autoregression([part for e in left for part in _pieces(e[:, j])])
+        for j in range(left[0].shape[1])
+    ]
+
+
+def sandwich(
+    moves: Sequence[Array], left: Sequence[Array], models: Sequence[Autoregression]
+) -> tuple[float, Array, NDArray[np.bool_]]:
+    """Return the condition of slopes, the covariance that they make, and which of them it is told of.
+
+    The pseudo-inverse leaves out directions that nothing tells, so that a parameter beside two of which
+    only the sum is told is as unsure as it is with their sum free.
+
+    Parameters
+    ----------
+    moves : sequence of array, shape (n, m, k)
+        Slopes of every run, 0 where samples do not count.
+    left : sequence of array, shape (n, m)
+        Residuals, NaN there.
+    models : sequence of Autoregression, length m
+    """
+    n_outputs, k = moves[0].shape[1:]
+    scale = np.array([np.sqrt(model.variance) or 1.0 for model in models])
+    weighed = [slopes / scale[:, np.newaxis] for slopes in moves]
+    condition, own, told = pseudo_inverse(np.concatenate([w.reshape(-1, k) for w in weighed]))
+    shocks = [
+        np.concatenate([m.shocks(np.nan_to_num(e[:, j])) for e in left])
+        for j, m in enumerate(models)
+    ]
+    together = np.nan_to_num(np.corrcoef(shocks)) if n_outputs > 1 else np.ones((1, 1))
+    middle = np.zeros((k, k))
+    for slopes in weighed:
+        tinted = [models[j].tinted(slopes[:, j]) / scale[j] for j in range(n_outputs)]
+        for i in range(n_outputs):
+            for j in range(n_outputs):
+                middle += together[i, j] * (tinted[i].T @ tinted[j])
+    # what the fit has taken out of the residuals, of all that was in them
+    taken = float(np.sum(own * middle)) / sum(int(np.isfinite(e).sum()) for e in left)
+    return condition, own @ middle @ own / max(1.0 - taken, 0.1), told
+
+
+def _pieces(series: Array) -> list[Array]:
+    """Return the stretches of a series without NaN."""
+    finite = np.isfinite(series)
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], finite, [False]])))
+    return [series[start:stop] for start, stop in edges.reshape(-1, 2).tolist()]
 
 
 def relative_sizes(parameters: Array) -> Array:
@@ -96,11 +188,21 @@ def inverted(slopes: Array) -> tuple[float, Array]:
 
     Rows and columns of what the slopes do not determine are NaN.
     """
-    singular, right = np.linalg.svd(slopes, full_matrices=False)[1:]
+    condition, inverse, told = pseudo_inverse(slopes)
+    return condition, blanked(inverse, told)
+
+
+def pseudo_inverse(slopes: Array) -> tuple[float, Array, NDArray[np.bool_]]:
+    """Return the condition of slopes, (n, k), their products' pseudo-inverse, and what is told."""
+    singular, right = np.linalg.svd(np.linalg.qr(slopes, mode="r"), full_matrices=False)[1:]
     condition = float(singular[0] / singular[-1]) if singular[-1] > 0 else np.inf
-    kept = singular > 1e-6 * singular[0]
+    kept = singular > LEAST * singular[0]
     inverse = (right[kept].T / singular[kept] ** 2) @ right[kept]
-    determined = 1 - (right[~kept] ** 2).sum(axis=0) > 0.99
-    inverse[~determined] = np.nan
-    inverse[:, ~determined] = np.nan
-    return condition, inverse
+    return condition, inverse, 1 - (right[~kept] ** 2).sum(axis=0) > DETERMINED
+
+
+def blanked(covariance: Array, told: NDArray[np.bool_]) -> Array:
+    """Return a covariance with NaN for what is not told."""
+    covariance = covariance.copy()
+    covariance[~told] = covariance[:, ~told] = np.nan
+    return covariance

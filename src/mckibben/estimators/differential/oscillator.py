@@ -22,7 +22,7 @@ from mckibben.blocks.differential.oscillator import Oscillator
 from mckibben.errors import DataError, ModelError
 from mckibben.estimators.core.data import TrainingData
 from mckibben.estimators.core.single import SingleEstimator
-from mckibben.estimators.core.uncertainty import inverted, relative_sizes
+from mckibben.estimators.core.uncertainty import relative_sizes, told_by_runs
 from mckibben.estimators.differential.oscillator_runs import FreeRuns, Way
 from mckibben.estimators.dynamic.linear_oscillator import MOST_SUBSTEPS, linear_oscillator
 from mckibben.estimators.dynamic.paths import averaged, paths
@@ -179,6 +179,6 @@ class OscillatorEstimator(SingleEstimator):
         theta = search.coordinates(block)
         search.errors(theta)
         size = relative_sizes(block.pack())
-        condition, inverse = inverted(search.slopes(theta) / search.scale(block) * size)
-        variance = float(residual @ residual) / max(residual.size - size.size, 1)
-        return condition, variance * inverse * np.outer(size, size)
+        slopes = search.slopes(theta) / search.scale(block) * size
+        condition, own = told_by_runs(slopes, residual, data.runs)
+        return condition, own * np.outer(size, size)

@@ -23,7 +23,7 @@ from mckibben.blocks.dynamic.state_network import StateNetwork
 from mckibben.errors import DataError, ModelError
 from mckibben.estimators.core.data import TrainingData
 from mckibben.estimators.core.single import SingleEstimator
-from mckibben.estimators.core.uncertainty import inverted, relative_sizes
+from mckibben.estimators.core.uncertainty import relative_sizes, told_by_runs
 from mckibben.estimators.dynamic.linear_oscillator import (
     MOST_SUBSTEPS,
     Linear,
@@ -160,12 +160,10 @@ class StateNetworkEstimator(SingleEstimator):
         network = cast("StateNetwork", block)
         merged = averaged(data) if self.periodic else data
         search = self.search(network, merged, Tracker())
-        search.errors(network.pack())
+        left = search.errors(network.pack())
         size = relative_sizes(network.pack())
-        condition, inverse = inverted(search.slopes(network.pack()) * size)
-        power = float(residual @ residual) / max(residual.size - size.size, 1)
-        repeats = residual.size / merged.target.size
-        return condition, power / repeats * inverse * np.outer(size, size)
+        condition, own = told_by_runs(search.slopes(network.pack()) * size, left, merged.runs)
+        return condition, own * np.outer(size, size)
 
 
 class NetworkRuns:

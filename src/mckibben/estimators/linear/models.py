@@ -14,8 +14,8 @@ from mckibben.blocks.core.block import Block
 from mckibben.blocks.core.fields import vector
 from mckibben.blocks.dynamic.transfer_function import TransferFunction
 from mckibben.errors import DataError, ModelError
-from mckibben.estimators.core.data import Run, TrainingData
-from mckibben.estimators.core.uncertainty import inverted
+from mckibben.estimators.core.data import TrainingData
+from mckibben.estimators.core.uncertainty import inverted, told_by_runs
 from mckibben.estimators.linear.polynomials import Orders, Polynomials
 from mckibben.estimators.linear.prediction_error import (
     arx,
@@ -23,7 +23,7 @@ from mckibben.estimators.linear.prediction_error import (
     minimise,
     starting_points,
 )
-from mckibben.estimators.linear.starts import LinearEstimator, meat
+from mckibben.estimators.linear.starts import LinearEstimator
 from mckibben.estimators.optimisers.tracker import Tracker
 
 Order = Annotated[int, Interval(ge=0, le=20)]
@@ -146,7 +146,8 @@ class PredictionErrorEstimator(LinearEstimator):
         freedom = max(e.size - orders.size - orders.poles * len(runs), 1)
         self._covariance = float(e @ e) / freedom * inverse / np.outer(size, size)
         if orders.f and not orders.c + orders.d:
-            self._covariance = self._robust(runs, slopes / size, e, freedom, inverse, size)
+            coloured = told_by_runs(slopes / size, e, runs)[1]
+            self._covariance = coloured / np.outer(size, size)
         self.noise_ = Noise(
             (1.0, *vector(p.c)),
             (1.0, *vector(p.poles if orders.a else p.d)),
@@ -175,29 +176,6 @@ class PredictionErrorEstimator(LinearEstimator):
                 "Remedy: use other orders, or output-error (oe), which is kept stable."
             )
         return block, data
-
-    def _robust(
-        self,
-        runs: Sequence[Run],
-        slopes: Array,
-        e: Array,
-        freedom: int,
-        inverse: Array,
-        size: Array,
-    ) -> Array:
-        """Return the covariance under coloured residuals."""
-        moves, residuals, place = [], [], 0
-        for run in runs:
-            n = int(run.counts.sum())
-            wide, left = np.zeros((run.u.size, slopes.shape[1])), np.zeros(run.u.size)
-            wide[run.counts], left[run.counts] = slopes[place : place + n], e[place : place + n]
-            moves.append(wide)
-            residuals.append(left)
-            place += n
-        own = np.nan_to_num(inverse)
-        own = own @ meat(moves, residuals, freedom) @ own / np.outer(size, size)
-        own[np.isnan(inverse)] = np.nan
-        return np.asarray(own)
 
     def uncertainty(
         self, block: Block, data: TrainingData, residual: Array, at_bounds: Sequence[int]

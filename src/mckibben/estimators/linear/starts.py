@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from typing import Literal, Self
 
@@ -15,16 +15,13 @@ from mckibben.blocks.dynamic.linear_start import LinearStart
 from mckibben.estimators.core.data import Mask, Run, TrainingData
 from mckibben.estimators.core.single import SingleEstimator
 from mckibben.estimators.core.uncertainty import (
-    inverted,
     relative_sizes,
     sensitivities,
     simulate_all,
+    told_by_runs,
 )
 from mckibben.estimators.optimisers.tracker import Progress
 from mckibben.recording import Recording
-
-LONGEST = 30
-"""Order of the autoregression that describes coloured residuals, at most."""
 
 
 @dataclass(kw_only=True, repr=False, eq=False)
@@ -87,30 +84,17 @@ class LinearEstimator(SingleEstimator):
         """Return the condition and covariance of what was found by free-run errors; NaN where fixed.
 
         The derivatives are those with every start solved for. Residuals may be coloured, and are taken
-        not to depend on the input: (J'J)^-1 J' S J (J'J)^-1, where S is that of an autoregression.
+        not to depend on the input; see `uncertainty`.
         """
         values = block.pack()
         covariance = np.full((values.size, values.size), np.nan)
         free = [place for place in range(values.size) if place not in fixed]
         sizes = relative_sizes(values)
-        moves, residuals = [], []
-        for run in data.runs:
-            one = replace(data, runs=(run,))
-            slopes = np.zeros((run.u.size, len(free)))
-            slopes[run.counts] = sensitivities(
-                block, free, sizes[free], partial(self.free_runs, data=one)
-            )
-            left = np.where(run.counts, run.y, 0.0)
-            left[run.counts] -= self.free_runs([block], one)[0]
-            moves.append(slopes)
-            residuals.append(left)
-        if not np.isfinite(np.concatenate(moves)).all():
+        slopes = sensitivities(block, free, sizes[free], partial(self.free_runs, data=data))
+        if not np.isfinite(slopes).all():
             return np.inf, covariance
-        condition, inverse = inverted(np.concatenate(moves))
-        coloured = meat(moves, residuals, data.target.size - len(free))
-        own = np.nan_to_num(inverse)
-        own = own @ coloured @ own
-        own[np.isnan(inverse)] = np.nan
+        residual = data.target - self.free_runs([block], data)[0]
+        condition, own = told_by_runs(slopes, residual, data.runs)
         covariance[np.ix_(free, free)] = own * np.outer(sizes[free], sizes[free])
         return condition, covariance
 
@@ -122,43 +106,3 @@ def started(block: Block, run: Run) -> Array:
     state = block.fitted_state(inputs, run.y, run.sample_time, run.counts)
     block.bind(run.sample_time, state, inputs, outputs)()
     return outputs[:, 0]
-
-
-def meat(moves: Sequence[Array], residuals: Sequence[Array], freedom: int) -> Array:
-    """Return J' S J for residuals of an autoregression whose order Schwarz's criterion chooses.
-
-    Parameters
-    ----------
-    moves : sequence of array, shape (n, k)
-        Derivatives over every run, zero where samples do not count.
-    residuals : sequence of array, shape (n,)
-        Likewise.
-    freedom : int
-        Samples less parameters.
-    """
-    from scipy.linalg import solve_toeplitz
-    from scipy.signal import lfilter
-
-    n = sum(e.size for e in residuals)
-    counted = freedom + moves[0].shape[1]
-    power = sum(float(e @ e) for e in residuals)
-    k = moves[0].shape[1]
-    if power <= 0.0:
-        return np.zeros((k, k))
-    longest = min(LONGEST, n // 20)
-    r = np.array(
-        [sum(float(e[: e.size - lag] @ e[lag:]) for e in residuals) for lag in range(longest + 1)]
-    )
-    best, chosen, variance = counted * np.log(r[0]), np.empty(0), r[0]
-    for order in range(1, longest + 1):
-        a = solve_toeplitz(r[:order], r[1 : order + 1])
-        left = float(r[0] - a @ r[1 : order + 1])
-        if left <= 0.0:
-            break
-        cost = counted * np.log(left) + order * np.log(counted)
-        if cost < best:
-            best, chosen, variance = cost, a, left
-    # J' S J is the power of J filtered backwards by what makes the residuals of white noise
-    filtered = [lfilter([1.0], [1.0, *-chosen], x[::-1], axis=0) for x in moves]
-    whole = sum((x.T @ x for x in filtered), np.zeros((k, k)))
-    return np.asarray(whole * variance / max(freedom, 1))

@@ -97,7 +97,11 @@ def test_every_output_has_its_part_of_the_page() -> None:
     for k in (1, 2):
         noise = np.random.default_rng(k).standard_normal(time.size)
         channels[f"displacement_{k}"] = TRUE.simulate(channels[f"pressure_{k}"]) + 0.1 * noise
-    runs = [Recording(channels, 0.02, meta={"name": name}) for name in ("first", "<b>second")]
+    back = {name: values[::-1].copy() for name, values in channels.items()}
+    runs = [
+        Recording(values, 0.02, meta={"name": name})
+        for name, values in (("first", channels), ("<b>second", back))
+    ]
     model = PerChannel(parts)
     page = check_page(check(model, runs), describe(model, runs), "model.json")
     for place, output in enumerate(("displacement_1", "displacement_2")):

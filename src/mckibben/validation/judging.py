@@ -41,7 +41,7 @@ LOOPS = ("hysteresis", "speed", "lag")
 ALIKE = 0.9
 """Share of what one of them explains that another explains too, from which both are asked for."""
 
-FEWEST = 20.0
+FEWEST = 40.0
 """Independent samples that say as much as all do, below which tests do not hold their level."""
 
 FIRM = 0.05
@@ -184,7 +184,7 @@ def _one_after_another(
             explained = regression.explained(own, known)
         if one.kind in LEVELLED:
             explained, whole = explained + whole, 0.0
-        known = (*known, *own)
+        known = tuple(dict.fromkeys((*known, *own)))
         squared = every * explained
         share = min(squared / squares, 1.0)
         found.append(replace(one, share=share, size=(squared / n) ** 0.5))

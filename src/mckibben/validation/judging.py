@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from mckibben.validation.regression import Regression
-from mckibben.validation.results import LEVEL, Finding
+from mckibben.validation.results import FEWEST, LEVEL, Finding
 from mckibben.validation.suspects import Group
 
 NOTABLE = 0.02
@@ -41,11 +41,8 @@ LOOPS = ("hysteresis", "speed", "lag")
 ALIKE = 0.9
 """Share of what one of them explains that another explains too, from which both are asked for."""
 
-FEWEST = 40.0
-"""Independent samples that say as much as all do, below which tests do not hold their level."""
-
 FIRM = 0.05
-"""Part of the level that is asked for where there are fewer."""
+"""Part of the level that is asked for where there are fewer independent samples than `FEWEST`."""
 
 
 def asked(

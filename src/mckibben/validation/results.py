@@ -18,6 +18,9 @@ if TYPE_CHECKING:
 LEVEL = 0.01
 """How often a right model is said to miss something, all tests of all outputs together."""
 
+FEWEST = 40.0
+"""Independent samples that say as much as all do, below which tests do not hold their level."""
+
 
 @dataclass(frozen=True)
 class Finding:

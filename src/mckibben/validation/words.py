@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from mckibben.numerals import numeral
-from mckibben.validation.judging import FEWEST
 
 if TYPE_CHECKING:
     from mckibben.validation.results import Finding, OutputCheck, Validation
@@ -39,6 +38,8 @@ def verdict(found: Validation) -> str:
 
 def sentences(one: OutputCheck) -> list[str]:
     """Return what is to be known of an output beside the verdict, the most important first."""
+    from mckibben.validation.results import FEWEST
+
     size = f"{numeral(one.rmse, 2)} {one.unit}".rstrip()
     said = [f"It is off by {size} RMS, {_percent(one.rmse / one.span)} of the range, running free."]
     if not one.exact:

@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 
 from mckibben import Recording, load_rig
+from mckibben.blocks.core.writing import quantities
 from mckibben.excitation.candidates import random_plan
 from mckibben.excitation.limits import Limit, Limits, at_rates, followed, limits_of_rig, narrowed
 from mckibben.excitation.planning import plan
@@ -279,7 +280,7 @@ def friction_told(elements: Any, repeats: int) -> None:
             again = coarser(rig.changed(start).run(next_.recording, 1000 + repeat), 0.02)
             before.append(estimator.fit([cycle(2000 + repeat)]).model_.pack())
             found.append(estimator.fit([cycle(2000 + repeat), again]).model_.pack())
-    names = first.parameter_names
+    names = [quantity.name for quantity in quantities(first)]
     for one in next_.learned:
         place = names.index(one.name)
         was, now = (np.array(values)[:, place] for values in (before, found))

@@ -125,6 +125,7 @@ CASES = [
     *(("pi", given, 2000, 1) for given in ("decaying", "levels", "steps")),
     ("gpi", "triangle", 600, 1),
     ("pi", "random", 500, 4),
+    ("pi", "triangle", 200, 1),
 ]
 """Model, input, samples, recordings."""
 

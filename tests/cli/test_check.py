@@ -70,6 +70,18 @@ def test_bad_input_leaves_with_one_sentence(files: Path) -> None:
         assert "Traceback" not in refused.err
 
 
+def test_a_recording_in_the_place_of_the_model_is_told(files: Path) -> None:
+    swapped = (files / "run.csv", files / "model.json")
+    for words in (
+        ("check", *swapped, "-o", files / "out"),
+        ("simulate", *swapped, "-o", files / "out.csv"),
+        ("calibrate", *swapped, "-o", files / "out.json"),
+    ):
+        refused = call(*words)
+        assert refused.code == 2
+        assert "this is a recording. Remedy: the model comes first" in refused.err
+
+
 def test_every_output_has_its_part_of_the_page() -> None:
     parts = tuple(
         PI(

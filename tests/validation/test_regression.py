@@ -45,8 +45,8 @@ def test_its_level_holds_whatever_the_noise_remembers(
             (noise(n, alike, 100 * k + 7919 * seed), columns(n)) for k, n in enumerate(lengths)
         ]
         hits += Regression(pieces).test([1, 2, 3], [0]).p_value <= 0.05
-    # of a right test more than this come once in two thousand times
-    assert hits <= stats.binom.isf(5e-4, SEEDS, 0.05)
+    low, high = stats.binom.interval(0.99, SEEDS, 0.05)
+    assert low <= hits <= high
 
 
 def test_noise_is_found_beside_what_it_is_hidden_by() -> None:
@@ -54,6 +54,14 @@ def test_noise_is_found_beside_what_it_is_hidden_by() -> None:
     found = Regression([(noise(5000, 0.8, 3) + 5 * x[:, 1] - 2 * x[:, 4], x)])
     assert found.noise[1] == pytest.approx(-0.8, abs=0.05)
     assert found.coefficients(range(7))[[1, 4]] == pytest.approx([5, -2], abs=0.3)
+
+
+def test_independent_samples_are_those_that_know_a_mean_as_well() -> None:
+    n, x = 20000, columns(20000)
+    found = Regression([(noise(n, 0.8, 0), x)]).independent
+    # of an autoregression of first order: (1 - 0.8) / (1 + 0.8) of them
+    assert found == pytest.approx(n / 9, rel=0.1)
+    assert Regression([(noise(n, 0.0, 0), x)]).independent == pytest.approx(n, rel=0.1)
 
 
 def test_a_column_twice_is_once() -> None:

@@ -41,7 +41,7 @@ WIDEST = 3.0
 MEMBERS, APART = 3, 0.3
 """Likely sets of parameters, and how far one is from the likeliest at most, of its value."""
 
-NOISE, MEMORY, LEFT = 0.003, 0.2, 0.02
+NOISE, MEMORY, LEFT = 0.003, 0.2, 0.01
 """Where nothing is recorded: noise over the range, and over what time it is alike [s]. What a model
 leaves at least, over the range."""
 

@@ -39,13 +39,15 @@ def crossings(one: OutputCheck) -> Drawing:
         ):
             edge = np.full(2, band)
             ends = lags[[0, -1]]
-            curves = (
-                Curve(ends, edge, "99 % of noise", "input", "fine"),
-                Curve(ends, -edge, "", "input", "fine"),
-                Curve(lags, np.array(values), f"with {what}", "series-1"),
-            )
+            curves = [Curve(lags, np.array(values), f"with {what}", "series-1")]
+            # no correlation is beyond 1, so such a band would only squeeze the figure
+            if band < 1:
+                curves += [
+                    Curve(ends, edge, "99 % of noise", "input", "fine"),
+                    Curve(ends, -edge, "", "input", "fine"),
+                ]
             label = "residual later by [samples]"
-            panels.append(Panel(label, "cross-correlation", curves, zero=True))
+            panels.append(Panel(label, "cross-correlation", tuple(curves), zero=True))
     return Drawing(tuple(panels), columns=2)
 
 

@@ -108,9 +108,12 @@ def _output(
         if own.name not in model.scheduling and np.ptp(run.inputs[:, k]) > 0
         for length in np.diff(reversals(run.inputs[:, k]))
     ]
-    white = whiteness([e * 0.0 if exact else e for e in residuals])
+    memory = _memory(residuals)
+    white = whiteness([e * 0.0 if exact else e for e in residuals], 3 * memory)
     levels = [noise_level(y, span) for y in measured if len(y) > 1]
     known = [level for level in levels if np.isfinite(level)]
+    asked = judging.asked(regression, found.groups, *about)
+    missing = () if exact else judging.missing(regression, found.groups, *about, n_tests)
     return OutputCheck(
         output=channel.name,
         unit=channel.unit,
@@ -124,9 +127,11 @@ def _output(
         whiteness=white,
         crossings=_crossings(model, tested, left, found, regression),
         patterns=_patterns(model, tested, left, found, regression, place),
-        suspects=judging.asked(regression, found.groups, *about),
-        missing=() if exact else judging.missing(regression, found.groups, *about, n_tests),
-        noise_time=_memory(residuals),
+        suspects=asked,
+        missing=missing,
+        slow=() if exact else judging.slow(asked, missing, n_tests),
+        noise_time=memory,
+        independent=regression.independent,
         branch_length=float(np.median(lengths)) if lengths else float(n),
         every=every,
         ahead=errors_ahead(model, runs, place),

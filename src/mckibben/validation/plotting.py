@@ -53,7 +53,10 @@ def _autocorrelation(axis: Axes, one: OutputCheck) -> None:
 def _crossing(axis: Axes, one: OutputCheck) -> None:
     for found in one.crossings:
         (line,) = axis.plot(found.lags, found.with_input, label=found.channel)
-        axis.axhspan(-found.band, found.band, color=line.get_color(), alpha=0.15)
+        if found.band < 1:
+            axis.axhspan(-found.band, found.band, color=line.get_color(), alpha=0.15)
+        else:
+            line.set_label(f"{found.channel} (99 % band beyond ±1)")
     axis.set(xlabel="residual later by [samples]", ylabel="correlation with inputs")
     if one.crossings:
         axis.legend(frameon=False)

@@ -34,6 +34,9 @@ STEP = 0.02
 LEAST_CURVATURE = 0.1
 """Of the likelihood, so that what the data do not tell has a large error and no infinite one."""
 
+FLAT = 0.1
+"""Slope of minus twice the logarithm of the likelihood up to which it is at its least."""
+
 TINY = 1e-300
 
 IMPOSSIBLE = 1e9
@@ -89,6 +92,7 @@ class Regression:
         self.freedom = max(self.rows - rank - (len(self.noise) - 1), 1)
         self._tested: dict[tuple[tuple[int, ...], tuple[int, ...]], Tested] = {}
         self._variance = max(self._left(range(k)), 0.0) / self.freedom
+        self.independent = self._independent_samples()
 
     def test(self, columns: Columns, beside: Columns = ()) -> Tested:
         """Return how likely noise alone would be followed as well by columns beside others."""
@@ -161,6 +165,15 @@ class Regression:
     def _left(self, columns: Columns) -> float:
         return _left(self._white, columns)
 
+    def _independent_samples(self) -> float:
+        """Return how many samples without memory would know a level as well."""
+        # of unit innovations: variance over the spectrum at frequency zero
+        power = np.ones(1)
+        for value in np.tanh(self._partial):
+            power = power / (1 - value**2)
+        at_zero = 1.0 / float(self.noise.sum()) ** 2
+        return float(self.n * min(1.0, float(power[0]) / at_zero))
+
     def _fitted_noise(self) -> tuple[Array, Array]:
         """Return what the noise's partial correlations are the tanh of, and its covariance.
 
@@ -179,7 +192,11 @@ class Regression:
         start = np.empty(0)
         price, best = cost(start), start
         for order in range(1, self._most + 1):
-            done = minimize(cost, np.append(start, 0.0), method="BFGS", options={"gtol": 1e-3})
+            begun = np.append(start, 0.0)
+            done = minimize(cost, begun, method="BFGS", options={"gtol": 1e-3})
+            if not done.success and np.abs(done.jac).max() > FLAT:
+                again = minimize(cost, begun, method="Nelder-Mead", options={"fatol": 1e-3})
+                done = min(done, again, key=lambda one: float(one.fun))
             start = np.clip(done.x, -LIMIT, LIMIT)
             new = cost(start) + order * float(np.log(self.rows))
             if new < price:

@@ -40,12 +40,16 @@ class Run:
         What the model is told.
     measured, modelled : array, shape (n, m)
         Outputs; the model runs free.
+    start_chosen : bool
+        Whether its memory starts from that of a few starts which leaves least of the whole recording;
+        else as a leaderboard has it.
     """
 
     recording: Recording
     inputs: Array
     measured: Array
     modelled: Array
+    start_chosen: bool = False
 
     @property
     def residual(self) -> Array:
@@ -75,7 +79,8 @@ def runs_of(block: Block, recordings: Sequence[Recording]) -> tuple[Run, ...]:
             modelled = _modelled(block, recording, outputs, recordings)
         measured = recording.matrix(outputs)
         refuse_runaway(block, recording, modelled, measured)
-        found.append(Run(recording, recording.matrix(inputs), measured, modelled))
+        chosen = block.n_states > 0 and not recording.meta.get(PERIODIC)
+        found.append(Run(recording, recording.matrix(inputs), measured, modelled, chosen))
     return tuple(found)
 
 

@@ -18,6 +18,9 @@ if TYPE_CHECKING:
 LEVEL = 0.01
 """How often a right model is said to miss something, all tests of all outputs together."""
 
+FEWEST = 40.0
+"""Independent samples that say as much as all do, below which tests do not hold their level."""
+
 
 @dataclass(frozen=True)
 class Finding:
@@ -37,6 +40,8 @@ class Finding:
         The same as a root mean square, unit of the output.
     coefficient : float or None
         Of what has a single one: the offset, or the delay in samples.
+    or_kinds : tuple of str
+        What it may be as well, for these recordings do not tell them apart.
     """
 
     kind: str
@@ -45,6 +50,7 @@ class Finding:
     share: float
     size: float
     coefficient: float | None = None
+    or_kinds: tuple[str, ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
         """Return it for JSON."""
@@ -55,6 +61,7 @@ class Finding:
             "share": self.share,
             "size": self.size,
             "coefficient": self.coefficient,
+            "or_kinds": list(self.or_kinds),
         }
 
 
@@ -90,8 +97,12 @@ class OutputCheck:
         All that was asked, each by itself.
     missing : tuple of Finding
         What the model misses, most important first; each beside those before.
+    slow : tuple of Finding
+        Level and trend that explain much, but that noise as slow as the residual may bring about.
     noise_time : float
         Samples after which noise has forgotten all but a third.
+    independent : float
+        Independent samples that say as much of a level as all do.
     branch_length : float
         Samples of an input's usual branch.
     every : int
@@ -118,7 +129,9 @@ class OutputCheck:
     patterns: tuple[Pattern, ...]
     suspects: tuple[Finding, ...]
     missing: tuple[Finding, ...]
+    slow: tuple[Finding, ...]
     noise_time: float
+    independent: float
     branch_length: float
     every: int
     ahead: tuple[Ahead, ...]
@@ -168,6 +181,7 @@ class OutputCheck:
             "right": self.right,
             "sentences": sentences(self),
             "missing": [one.to_dict() for one in self.missing],
+            "slow": [one.to_dict() for one in self.slow],
             "level": LEVEL,
             "n_tests": self.n_tests,
             "p_whiteness": self.whiteness.p_value,
@@ -177,6 +191,7 @@ class OutputCheck:
             "crossings": [one.to_dict() for one in self.crossings],
             "patterns": [one.to_dict() for one in self.patterns],
             "errors_ahead": [one.to_dict() for one in self.ahead],
+            "independent_samples": self.independent,
             "samples_to_a_block": self.every,
         }
 

@@ -22,7 +22,7 @@ TO_A_LAG = 20
 """Samples to a lag that is tested at least, of all recordings."""
 
 SHOWN = 50
-"""Lags that are drawn at most."""
+"""Lags that are drawn one by one at most, and as many thinned ones beyond."""
 
 PAIRS = 5
 """Pairs of samples of one recording to a lag at least, as a multiple of the lag."""
@@ -58,38 +58,45 @@ class Whiteness:
         return asdict(self)
 
 
-def whiteness(residuals: Sequence[Array]) -> Whiteness:
+def whiteness(residuals: Sequence[Array], reach: float = 0.0) -> Whiteness:
     """Return the autocorrelation of a residual, and whether it is that of white noise.
 
     Parameters
     ----------
     residuals : sequence of array, shape (n,)
         Of every recording.
+    reach : float
+        Samples up to which lags are returned, thinned beyond the first ones, where there are as many.
     """
     from scipy.special import chdtrc
 
     longest = max(map(len, residuals))
-    most = min(SHOWN, longest // (PAIRS + 1))
+    room = longest // (PAIRS + 1)
+    most = min(SHOWN, room)
+    last = int(np.clip(reach, most, max(room, most)))
+    lags = np.arange(1, most + 1)
+    if most:
+        lags = np.union1d(lags, np.geomspace(most, last, SHOWN).astype(int))
     n = sum(map(len, residuals))
     mean = sum(float(r.sum()) for r in residuals) / n
     left = [r - mean for r in residuals]
     power = sum(float(r @ r) for r in left)
-    found, scatter = np.zeros(most), np.zeros(most)
-    for lag in range(1, most + 1):
+    found, scatter = np.zeros(lags.size), np.zeros(lags.size)
+    for place, lag in enumerate(lags.tolist()):
         for r in left:
             if len(r) > lag:
                 products = r[lag:] * r[:-lag]
                 # the mean was taken off: what noise itself would give is below zero
                 expected = -len(products) / n * power / n
-                found[lag - 1] += products.sum() - expected
-                scatter[lag - 1] += products @ products
+                found[place] += products.sum() - expected
+                scatter[place] += products @ products
     tested = min(TESTED, most, n // TO_A_LAG)
     safe = np.sqrt(np.where(scatter > 0, scatter, 1.0))
     ratio = np.where(scatter > 0, found / safe, 0.0)
     p_value = float(chdtrc(tested, float(np.sum(ratio[:tested] ** 2)))) if tested else None
     size = power if power > 0 else 1.0
     return Whiteness(
-        tuple(range(1, most + 1)),
+        tuple(lags.tolist()),
         tuple((found / size).tolist()),
         tuple((BAND * safe * (scatter > 0) / size).tolist()),
         tested,

@@ -14,11 +14,8 @@ NOTHING = "Nothing is found wrong with the model"
 FEW = 2
 """Things missed up to which a model is right but for them."""
 
-WRONG = 0.05
-"""Share of the range that what is missed may be for that."""
-
-SLIGHT = 0.01
-"""Share of the range below which what is missed matters to few."""
+SMALL = 0.02
+"""Share of the range up to which what is missed is small, root mean square."""
 
 NAMED = 3
 """Things missed that the verdict names."""
@@ -41,8 +38,20 @@ def verdict(found: Validation) -> str:
 
 def sentences(one: OutputCheck) -> list[str]:
     """Return what is to be known of an output beside the verdict, the most important first."""
-    said = [_told(one, each) for each in one.missing] if not one.exact else []
+    from mckibben.validation.results import FEWEST
+
+    size = f"{numeral(one.rmse, 2)} {one.unit}".rstrip()
+    said = [f"It is off by {size} RMS, {_percent(one.rmse / one.span)} of the range, running free."]
+    if not one.exact:
+        said += [_told(one, each) for each in one.missing]
+        said += [_slow(one)] if one.slow else []
     said.append(_rest(one))
+    if one.independent < FEWEST:
+        said.append(
+            f"Noise remembers so long that these recordings hold only about {one.independent:.0f} "
+            f"independent samples; with fewer than {FEWEST:.0f}, only what is very certain is named. "
+            "Record for longer to tell more."
+        )
     if one.p_branch is not None and not one.exact:
         said.append(_branches(one, one.p_branch))
     return said
@@ -55,7 +64,7 @@ def _branches(one: OutputCheck, p: float) -> str:
             f"At equal inputs, the residual is the same on rising and falling branches ({_p(p)})."
         )
     said = f"At equal inputs, the residual differs between rising and falling branches ({_p(p)})"
-    if any(each.kind == "hysteresis" for each in one.missing):
+    if any("hysteresis" in _kinds(each) for each in one.missing):
         return f"{said}."
     why = "what is missed brings that about" if one.missing else "by chance, among so many tests"
     return f"{said}: {why}."
@@ -67,6 +76,14 @@ LEVEL = 0.01
 
 def phrase(one: OutputCheck, finding: Finding) -> str:
     """Return what a model misses, as what comes after "but for"."""
+    if finding.or_kinds:
+        kinds = {"hysteresis": "hysteresis", "speed": "speed", "lag": "delay"}
+        names = [name for kind, name in kinds.items() if kind in _kinds(finding)]
+        either = f"{', '.join(names[:-1])} or {names[-1]}"
+        by = finding.channel or next(
+            each.channel for each in one.suspects if each.kind in finding.or_kinds and each.channel
+        )
+        return f"{either} of {by} (these recordings cannot tell them apart)"
     by = finding.channel
     step = one.sample_time or 1.0
     unit = " s" if one.sample_time else " samples"
@@ -84,6 +101,10 @@ def phrase(one: OutputCheck, finding: Finding) -> str:
         "output": f"the shape of the curve over modelled {one.output}",
         "crossing": f"what {by} did shortly before",
     }[finding.kind]
+
+
+def _kinds(finding: Finding) -> tuple[str, ...]:
+    return (finding.kind, *finding.or_kinds)
 
 
 def _verdict(one: OutputCheck) -> str:
@@ -106,15 +127,19 @@ def _verdict(one: OutputCheck) -> str:
         if lesser > 0:
             named.append("one lesser thing" if lesser == 1 else f"{lesser} lesser things")
         things = _listed(named)
-        missed = sum(each.size**2 for each in one.missing) ** 0.5 / one.span
-        if len(one.missing) <= FEW and missed <= WRONG:
-            return f"The model is right but for {things}"
-        if missed <= SLIGHT:
-            share = numeral(100 * missed, 2)
-            return (
-                f"The model is right to about {share} % of the range, by which it misses {things}"
+        share = sum(each.size**2 for each in one.missing) ** 0.5 / one.span
+        if share > SMALL:
+            told = f"The model is wrong by {_percent(share)} of the range: it misses {things}"
+        elif len(one.missing) <= FEW:
+            told = f"The model is right but for {things}, {_percent(share)} of the range"
+        else:
+            told = (
+                f"The model is right to {_percent(share)} of the range, by which it misses {things}"
             )
-        return f"The model misses {things}"
+        apart = [phrase(one, each) for each in one.slow]
+        if sum(each.share for each in one.slow) > sum(each.share for each in one.missing):
+            told += f"; more of the residual, {size} RMS in all, is {_listed(apart)}, or slow noise"
+        return told
     if one.white:
         return f"{NOTHING}: what it leaves, {size} RMS, is white noise"
     return (
@@ -126,8 +151,20 @@ def _told(one: OutputCheck, finding: Finding) -> str:
     what = phrase(one, finding)
     return (
         f"{what[0].upper()}{what[1:]}: {numeral(100 * finding.share, 2)} % of the residual's variance, "
-        f"{numeral(finding.size, 2)} {one.unit} RMS, {numeral(100 * finding.size / one.span, 2)} % of "
+        f"{numeral(finding.size, 2)} {one.unit} RMS, {_percent(finding.size / one.span)} of "
         f"the range ({_p(finding.p_value)})."
+    )
+
+
+def _slow(one: OutputCheck) -> str:
+    """Return what level and trend make of the residual, where noise may bring them about."""
+    parts = [
+        f"{phrase(one, each)}, {_percent(each.share)} ({_p(each.p_value)})" for each in one.slow
+    ]
+    said = _listed(parts)
+    return (
+        f"{said[0].upper()}{said[1:]} of the residual's variance: noise as slow as this may bring that "
+        "about, so these recordings do not tell whether it is the model's."
     )
 
 
@@ -155,6 +192,10 @@ def _rest(one: OutputCheck) -> str:
 
 def _p(value: float) -> str:
     return "p < 0.000001" if value < SURE else f"p = {numeral(value, 2)}"
+
+
+def _percent(share: float) -> str:
+    return f"{numeral(100 * share, 2)} %"
 
 
 def _listed(words: list[str]) -> str:

@@ -31,6 +31,12 @@ LARGEST_FILE = 64 * 2**20
 MOST_PARTS = 5000
 """Blocks and what is in them that a model may describe, so that reading a large file ends soon."""
 
+RECORDED = (
+    *(".csv", ".tsv", ".txt", ".dat", ".parquet", ".mat", ".h5", ".hdf5", ".tdms", ".xlsx"),
+    *(".bag", ".mcap", ".db3"),
+)
+"""Endings of recordings' names."""
+
 _described: ContextVar[Iterator[int]] = ContextVar("described")
 
 
@@ -134,13 +140,22 @@ def load(path: str | Path) -> Block:
         text = read_text(path, most=LARGEST_FILE)
         return from_dict(json.loads(text, parse_constant=_refuse, object_pairs_hook=_unique))
     except DataError as error:
-        raise ModelError(str(error)) from None
+        raise ModelError(_recording(path) or str(error)) from None
     except (ValueError, RecursionError) as error:
+        if told := _recording(path):
+            raise ModelError(told) from None
         raise ModelError(
             f"{path}: not readable as a model ({str(error)[:200]}). Remedy: save the model again."
         ) from None
     except ModelError as error:
         raise ModelError(f"{path}: {error}") from None
+
+
+def _recording(path: Path) -> str:
+    """Return what to say of a file that is no JSON, if it is there and named as a recording."""
+    if path.suffix.lower() not in RECORDED or not path.is_file():
+        return ""
+    return f"{path}: this is a recording. Remedy: the model comes first, then recordings."
 
 
 def _tuples(value: Any) -> Any:

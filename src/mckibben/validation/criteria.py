@@ -118,7 +118,8 @@ def _one_step(block: Block, recordings: Sequence[Recording]) -> tuple[list[Array
     if found is None:
         return None
     name, model = block.outputs[0].name, found[0]
-    left = [(r[name] - predicted(block, r, 1))[:, np.newaxis] for r in recordings]
+    ahead = [(r[name], predicted(block, r, 1)) for r in recordings]
+    left = [(y - one)[:, np.newaxis] for y, one in ahead if one is not None]
     return left, len(model.noise_numerator) + len(model.noise_denominator)
 
 

@@ -31,7 +31,7 @@ from mckibben.signals import random_wave, triangle
 from mckibben.signals.steps import random_steps
 from mckibben.system.threads import one_blas_thread
 from mckibben.validation.check import check
-from mckibben.validation.results import LEVEL
+from mckibben.validation.level import LEVEL
 
 Array = NDArray[np.float64]
 

@@ -31,6 +31,7 @@ from .estimators.play_type.gpi import GPIEstimator as GPIEstimator
 from .estimators.play_type.mpi import MPIEstimator as MPIEstimator
 from .estimators.play_type.pi import PIEstimator as PIEstimator
 from .estimators.play_type.rdpi import RDPIEstimator as RDPIEstimator
+from .excitation.planning import plan as plan
 from .excitation.telling import untold as untold
 from .files import read as read
 from .files import write as write

@@ -12,7 +12,7 @@ from mckibben.report import (
     templating,
     wording,
 )
-from mckibben.validation.results import LEVEL
+from mckibben.validation.level import LEVEL
 from mckibben.validation.words import phrase
 
 if TYPE_CHECKING:

@@ -9,8 +9,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+from mckibben.validation.level import FEWEST, LEVEL
 from mckibben.validation.regression import Regression
-from mckibben.validation.results import FEWEST, LEVEL, Finding
+from mckibben.validation.results import Finding
 from mckibben.validation.suspects import Group
 
 NOTABLE = 0.02

@@ -8,18 +8,13 @@ from typing import TYPE_CHECKING, Any
 
 from mckibben.validation.crossing import Crossing
 from mckibben.validation.k_step import Ahead
+from mckibben.validation.level import LEVEL
 from mckibben.validation.patterns import Pattern
 from mckibben.validation.residuals import Run
 from mckibben.validation.whiteness import Whiteness
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-
-LEVEL = 0.01
-"""How often a right model is said to miss something, all tests of all outputs together."""
-
-FEWEST = 40.0
-"""Independent samples that say as much as all do, below which tests do not hold their level."""
 
 
 @dataclass(frozen=True)

@@ -38,7 +38,7 @@ def verdict(found: Validation) -> str:
 
 def sentences(one: OutputCheck) -> list[str]:
     """Return what is to be known of an output beside the verdict, the most important first."""
-    from mckibben.validation.results import FEWEST
+    from mckibben.validation.level import FEWEST
 
     size = f"{numeral(one.rmse, 2)} {one.unit}".rstrip()
     said = [f"It is off by {size} RMS, {_percent(one.rmse / one.span)} of the range, running free."]

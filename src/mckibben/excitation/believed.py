@@ -11,7 +11,9 @@ import numpy as np
 
 from mckibben import registry
 from mckibben.arrays import Array
+from mckibben.blocks.bands.banded import inside
 from mckibben.blocks.core.block import Block
+from mckibben.comparison.shared_stretches import refuse_copies
 from mckibben.errors import DataError, ModelError
 from mckibben.excitation.candidates import random_plan
 from mckibben.excitation.limits import (
@@ -126,9 +128,12 @@ def from_recordings(
                     file=recording.source,
                     remedy="give recordings of this rig, or leave --rig out",
                 )
-    block = model if isinstance(model, Block) else _fitted(recordings, model, rig, seed)
-    names = [channel.name for channel in (*block.inputs, *block.outputs)]
+    block = inside(model) if isinstance(model, Block) else _fitted(recordings, model, rig, seed)
+    inputs = [channel.name for channel in block.inputs]
+    outputs = [channel.name for channel in block.outputs]
+    names = [*inputs, *outputs]
     fitting = tuple(r for r in recordings if all(name in r for name in names))
+    refuse_copies("plan", fitting, inputs, outputs)
     if not fitting:
         raise DataError(
             f"no recording has all of {', '.join(names)}, which the model needs",

@@ -23,6 +23,13 @@ SHARE_AT_ZERO = 0.02
 """Share of its range by which a measured pressure may be below nothing."""
 
 
+VACUUM, IMPLAUSIBLE = -1.1, 50.0
+"""Pressures that no muscle is driven below, or above [bar]."""
+
+BEYOND = 0.1
+"""Share of its range by which a command may go beyond recordings, unsaid."""
+
+
 @dataclass(frozen=True)
 class Limit:
     """What one channel may do.
@@ -111,6 +118,12 @@ def narrowed(limits: Limits, asked: Mapping[str, Sequence[float | None]]) -> Lim
                 channel=name,
                 remedy=f"give the lower one first, for instance {name}={own.low:g}:{own.high:g}",
             )
+        if unit == "bar" and not VACUUM <= low <= high <= IMPLAUSIBLE:
+            raise DataError(
+                f"the limits {low:g} to {high:g} bar are no muscle's",
+                channel=name,
+                remedy=f"give what your valve and muscle bear, for instance {name}=0:6",
+            )
         if not 0 < rate < math.inf:
             raise DataError(
                 f"nothing moves at {rate:g} {unit}/s",
@@ -119,6 +132,21 @@ def narrowed(limits: Limits, asked: Mapping[str, Sequence[float | None]]) -> Lim
             )
         found[name] = Limit(low, high, rate, min(max(own.rest, low), high))
     return found
+
+
+def beyond(limits: Limits, recorded: Limits) -> list[str]:
+    """Return in words which limits go further than recordings do, so that errors there are guesses."""
+    said = []
+    for name, limit in limits.items():
+        own = recorded[name]
+        margin = BEYOND * own.span
+        if limit.low < own.low - margin or limit.high > own.high + margin:
+            unit = standard_unit(name) or ""
+            said.append(
+                f"{name} goes from {limit.low:g} to {limit.high:g} {unit}, in the recordings from "
+                f"{own.low:.3g} to {own.high:.3g}: what is expected beyond is extrapolated"
+            )
+    return said
 
 
 def within_hardware(limits: Limits, rig: Rig) -> None:

@@ -6,17 +6,22 @@ parameters), averaged over a few likely sets of parameters, given what recording
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+
 from mckibben.blocks.core.block import Block
-from mckibben.errors import DataError
+from mckibben.comparison.splits import listed
+from mckibben.errors import DataError, ModelError
 from mckibben.excitation.believed import from_muscle, from_recordings, from_rig
-from mckibben.excitation.limits import Limits, limits_of_rig, narrowed, within_hardware
+from mckibben.excitation.limits import Limits, beyond, limits_of_rig, narrowed, within_hardware
 from mckibben.excitation.plans import Plan
 from mckibben.excitation.prospect import prospect_of
 from mckibben.excitation.search import Progress, Search
-from mckibben.recording import Recording
+from mckibben.recording import Recording, standard_unit
 from mckibben.rigs import Rig, load_rig
 from mckibben.signals.checking import generator
 from mckibben.system.threads import one_blas_thread
@@ -72,8 +77,8 @@ def plan(
     ModelError
         On models that no plan can be made with, or a goal that names no parameter.
     """
-    listed = [recordings] if isinstance(recordings, Recording) else list(recordings)
-    if (muscle is not None and listed) or not (listed or rig is not None or muscle is not None):
+    recorded = listed(recordings)
+    if (muscle is not None and recorded) or not (recorded or rig is not None or muscle is not None):
         raise DataError(
             "a plan is from recordings, or from a rig, a muscle or both",
             remedy="give files, --rig or --muscle, but no --muscle with files, which tell of theirs",
@@ -92,9 +97,12 @@ def plan(
     if muscle is not None:
         belief = from_muscle(muscle, plant)
         within = narrowed(belief.limits, asked)
-    elif listed:
-        belief = from_recordings(listed, model, plant, seed)
+    elif recorded:
+        belief = from_recordings(recorded, model, plant, seed)
         within = narrowed(belief.limits, asked)
+        if plant is None:
+            notes = (*belief.notes, *beyond(within, belief.limits))
+            belief = replace(belief, notes=notes)
     else:
         assert plant is not None
         within = narrowed(limits_of_rig(plant), asked)
@@ -104,9 +112,15 @@ def plan(
     if plant is not None:
         within_hardware({name: within[name] for name in plant.inputs if name in within}, plant)
     possible(within, 60 * minutes)
-    with one_blas_thread():
-        prospect = prospect_of(belief, within, 60 * minutes, goal, seed)
-        return Search(prospect, seed, progress).found(belief, goal)
+    try:
+        with one_blas_thread():
+            prospect = prospect_of(belief, within, 60 * minutes, goal, seed)
+            return Search(prospect, seed, progress).found(belief, goal)
+    except (ArithmeticError, np.linalg.LinAlgError) as error:
+        raise ModelError(
+            f"{belief.block.kind!r} does not run free within these limits ({error}). "
+            "Remedy: identify it again, or plan with another --model."
+        ) from None
 
 
 def possible(limits: Limits, seconds: float) -> None:
@@ -122,11 +136,21 @@ def possible(limits: Limits, seconds: float) -> None:
             f"none of {', '.join(limits)} may move", remedy="give wider limits with --limits"
         )
     for name, limit in limits.items():
-        way = limit.span / limit.rate
+        way, unit = limit.span / limit.rate, standard_unit(name) or ""
         if way > SHARE_OF_WAYS * seconds:
             raise DataError(
-                f"at {limit.rate:.3g} a second, {name} takes {way:.3g} s from end to end, which "
-                f"is too much of {seconds:g} s",
-                remedy=f"give --minutes {way / SHARE_OF_WAYS / 60:.2g} or more, a higher rate, or "
+                f"at {limit.rate:.3g} {unit}/s, {name} takes {way:.3g} s from end to end, which is too "
+                f"much of {seconds:g} s",
+                remedy=f"give --minutes {_up(way / SHARE_OF_WAYS / 60)} or more, a higher rate, or "
                 "limits closer together",
             )
+
+
+def _up(minutes: float) -> str:
+    """Return minutes rounded up to two digits.
+
+    >>> _up(0.7533), _up(12.01)
+    ('0.76', '13')
+    """
+    grain = 10.0 ** (math.floor(math.log10(minutes)) - 1)
+    return f"{math.ceil(minutes / grain - 1e-9) * grain:.2g}"

@@ -42,6 +42,8 @@ class Plan:
         By output, expected errors of free-running predictions now and after, in its unit.
     random : dict
         The same after as much random motion.
+    units : dict
+        Of outputs.
     steps : tuple of Step
         Which part is for what.
     notes : tuple of str
@@ -56,6 +58,7 @@ class Plan:
     parameters: tuple[Parameter, ...]
     errors: dict[str, tuple[float, float]]
     random: dict[str, float]
+    units: dict[str, str]
     steps: tuple[Step, ...]
     notes: tuple[str, ...]
     interrupted: bool
@@ -66,11 +69,12 @@ class Plan:
         """What it is good for, in words."""
         found = []
         for name, (now, after) in self.errors.items():
-            unit = "N" if name.startswith("force") else "mm"
-            found.append(f"{name} {after:.3g} {unit} instead of {now:.3g}")
+            found.append(
+                f"{name} {after:.3g} {self.units[name]}".strip() + f" instead of {now:.3g}"
+            )
         said = (
-            f"After these {self.recording.duration:.0f} s, predictions of random motion should be off "
-            f"by: {', '.join(found)}"
+            f"After these {self.recording.duration:.0f} s, predictions of random motion should be off, "
+            f"as far as the model's form is right, by: {', '.join(found)}"
         )
         told = [
             f"{one.name} (standard error from {_share(one.now)} to {_share(one.after)})"

@@ -221,6 +221,7 @@ class Search:
             parameters,
             {name: (before * span, after * span) for name, span in spans.items()},
             {name: random * span for name, span in spans.items()},
+            {channel.name: channel.unit for channel in belief.block.outputs},
             tuple(steps),
             belief.notes,
             interrupted,

@@ -50,7 +50,7 @@ def test_malformed_files_leave_with_a_remedy_and_nothing_lost(
         (["compare", "FILE", "--models", "pi,what"], "no estimator named 'what'"),
         (["compare", "FILE", "--models", ","], "no models"),
         (["study", "FILE", "-o", "FILE"], "a file of that name"),
-        (["simulate", "FILE", "FILE", "-o", "x.csv"], "not readable as a model"),
+        (["simulate", "FILE", "FILE", "-o", "x.csv"], "this is a recording"),
         (["simulate", "nowhere.json", "FILE", "-o", "x.csv"], "nowhere.json"),
         (["invert", "nowhere.json", "-o", "x.json"], "nowhere.json"),
         (["plot", "FILE", "-o", "x.bmp"], "bmp"),

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import f as f_distribution
+from scipy.special import fdtrc
 
 from mckibben.arrays import Array
 
@@ -77,15 +77,14 @@ def off_as_a_whole(errors: list[Array], pieces: list[int]) -> bool:
     many there are.
     """
     means = [
-        np.array([block.mean() for block in np.array_split(e, n)])
+        np.array([block.mean() for block in np.array_split(e, min(n, e.size))])
         for e, n in zip(errors, pieces, strict=True)
+        if e.size
     ]
-    among, within = len(means) - 1, sum(pieces) - len(means)
+    among, within = len(means) - 1, sum(map(len, means)) - len(means)
     if among < 1 or within < 1:
         return False
     grand = np.concatenate(means).mean()
     between = sum(own.size * (own.mean() - grand) ** 2 for own in means) / among
     inside = sum(float(((own - own.mean()) ** 2).sum()) for own in means) / within
-    return (
-        bool(f_distribution.sf(between / inside, among, within) < CHANCE) if inside > 0 else False
-    )
+    return inside > 0 and bool(fdtrc(among, within, between / inside) < CHANCE)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Any
 
-import numpy as np
 import typer
 
 from mckibben.cli.grouping import spread
@@ -134,6 +133,8 @@ def simulate(
 
 def _started_elsewhere(block: Any, recording: Any) -> list[str]:
     """Return that a run does not begin as the model does, while its band knows how it begins."""
+    import numpy as np
+
     from mckibben.comparison.free_run import measured_start
 
     names = [channel.name for channel in block.outputs]

@@ -329,7 +329,11 @@ def _ranking(
         rows.index(best),
     )
     *rows, constant = (
-        replace(row, difference_interval=ends) for row, ends in zip(every, apart, strict=True)
+        # others have a band if they were the best when they were done, which is chance
+        replace(
+            row if row is best else replace(row, band=None, banded=None), difference_interval=ends
+        )
+        for row, ends in zip(every, apart, strict=True)
     )
     board = replace(plan.board([*rows, *failed]), constant=constant, choice=_choice(rows, plan))
     return Ranking(board, outputs)

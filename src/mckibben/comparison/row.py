@@ -90,7 +90,7 @@ class Row:
         The slow part of the error on the test, of the output where it is largest; None of tests without
         time, or too short to tell.
     band : TestedBand or None
-        How its band does on the test, of models that were best when they were done.
+        How its band does on the test, of the chosen model.
     block, banded : Block or None
         The model identified, and with that band.
     diagnostics : mapping

@@ -156,18 +156,17 @@ def _check_apart(
     outputs: Sequence[str],
 ) -> None:
     """Refuse recordings that the model was fitted to, or that are the same in part."""
+    refuse_copies("calibrate", recordings, inputs, outputs)
+    if not fitted:
+        return
     for shared in shared_stretches([*fitted, *recordings], inputs, outputs):
-        if shared.share < GRAVE or shared.second < len(fitted):
-            continue
-        second = recordings[shared.second - len(fitted)]
-        if shared.first < len(fitted):
+        if shared.share >= GRAVE and shared.first < len(fitted) <= shared.second:
             raise DataError(
                 f"the model was fitted to {100 * shared.share:.0f} % of its motion, and misses less "
                 "there than elsewhere",
-                file=second.source,
+                file=recordings[shared.second - len(fitted)].source,
                 remedy="calibrate on recordings that it was not fitted to",
             )
-    refuse_copies("calibrate", recordings, inputs, outputs)
 
 
 def held_of(model: Block, recording: Recording, outputs: Sequence[str]) -> Held:

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from mckibben.excitation.gap import Gap, counted, value
-from mckibben.excitation.seen import Seen, some
+from mckibben.excitation.seen import Seen, scatter, some
 
 FEWEST = 8
 """Samples below which a branch has no shape."""
@@ -115,12 +115,9 @@ def _noise(seen: Seen, name: str) -> float:
     for recording in some(seen.recordings):
         if len(recording) < 32:
             continue
-        one, two = (float(np.median(np.abs(np.diff(recording[name][::k], 3)))) for k in (1, 2))
-        follows = max(
-            float(np.median(np.abs(np.diff(recording[u], 3)))) / seen.scales[u].span
-            for u in seen.moving
-        )
-        noisy = two < 1.5 * one and one / seen.scales[name].span > CLEARLY * follows
+        one, is_noise = scatter(recording[name])
+        follows = max(scatter(recording[u])[0] / seen.scales[u].span for u in seen.moving)
+        noisy = is_noise and one / seen.scales[name].span > CLEARLY * follows
         found.append(one / (0.6745 * np.sqrt(20.0)) if noisy else 0.0)
     return float(np.median(found)) if found else 0.0
 

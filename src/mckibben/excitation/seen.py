@@ -199,16 +199,21 @@ def some(recordings: Sequence[Recording]) -> Sequence[Recording]:
     return recordings[:: -(-len(recordings) // MOST_LOOKED_AT)]
 
 
-def white(signal: Array, span: float) -> float:
-    """Return the standard deviation of the white noise on a signal; 0 where it is motion that scatters.
+def scatter(signal: Array) -> tuple[float, bool]:
+    """Return the median size of third differences of a signal, and whether noise makes them.
 
-    Third differences of white noise scatter as much over two samples as over one; of motion, more.
+    Those of white noise scatter as much over two samples as over one; of motion, more.
     """
+    one, two = (float(np.median(np.abs(np.diff(signal[::k], 3)))) for k in (1, 2))
+    return one, two < 1.5 * one
+
+
+def white(signal: Array, span: float) -> float:
+    """Return the standard deviation of the white noise on a signal; 0 where motion scatters."""
     if signal.size < 32:
         return 0.0
     level = noise_level(signal, span)
-    one, two = (float(np.median(np.abs(np.diff(signal[::k], 3)))) for k in (1, 2))
-    return float(level) if np.isfinite(level) and two < 1.5 * one else 0.0
+    return float(level) if np.isfinite(level) and scatter(signal)[1] else 0.0
 
 
 def _scale(recordings: Sequence[Recording], channel: str) -> Scale:

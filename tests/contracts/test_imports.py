@@ -29,7 +29,7 @@ LAYERS = (
     {"blocks"},
     {"muscles"},
     {"estimators", "export", "stream", "outputs"},
-    {"control"},
+    {"control", "simulators", "ros"},
     {"bands"},
     {"comparison"},
     {"validation", "excitation"},

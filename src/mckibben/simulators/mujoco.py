@@ -22,14 +22,9 @@ import numpy as np
 from mckibben.arrays import Array
 from mckibben.blocks.core.block import Block
 from mckibben.errors import DataError, ModelError
+from mckibben.simulators.compiled import CompiledMuscle, callback, install
+from mckibben.simulators.installed import mujoco
 from mckibben.simulators.pulling import Pulling, pulling
-
-try:
-    import mujoco
-except ImportError as missing:
-    raise DataError(
-        "muscles in MuJoCo need the package mujoco", remedy="pip install 'mckibben[mujoco]'"
-    ) from missing
 
 NOTHING, FIRST, KEPT = 0.0, 1.0, 2.0
 """What a memory holds: nothing yet, the first sample that may still be another, or the past."""
@@ -67,7 +62,9 @@ class Muscle:
     pulls_only: bool = True
 
 
-def with_muscles(spec: mujoco.MjSpec, muscles: Mapping[str, Muscle]) -> mujoco.MjModel:
+def with_muscles(
+    spec: mujoco.MjSpec, muscles: Mapping[str, Muscle], *, compiled: bool = False
+) -> mujoco.MjModel:
     """Return the model of a specification whose tendons have muscles.
 
     Parameters
@@ -76,6 +73,9 @@ def with_muscles(spec: mujoco.MjSpec, muscles: Mapping[str, Muscle]) -> mujoco.M
         Each muscle becomes an actuator of its tendon's name; the memory is added to ``nuserdata``.
     muscles : mapping of str to Muscle
         By the names of tendons.
+    compiled : bool
+        Whether they run as exported C, at the specification's time step and no other; needs a C
+        compiler. Muscles of a process are all of one kind.
 
     Returns
     -------
@@ -91,17 +91,24 @@ def with_muscles(spec: mujoco.MjSpec, muscles: Mapping[str, Muscle]) -> mujoco.M
     """
     for name, muscle in muscles.items():
         pull, number = pulling(muscle.model), next(_numbers)
-        add_actuator(spec, name, muscle, number, pull.block.n_states)
-        _attached[number] = _Attached(muscle, pull)
+        size = pull.block.n_states
+        if compiled:
+            found = CompiledMuscle(pull, spec.option.timestep)
+            found.told(number, zero=muscle.zero, pulls_only=muscle.pulls_only)
+            size = found.size
+        else:
+            _attached[number] = _Attached(muscle, pull)
+        add_actuator(spec, name, muscle, number, size)
     before = mujoco.get_mjcb_act_bias()
     mujoco.set_mjcb_act_bias(None)  # MuJoCo tries a model out before Python may see it
     try:
         model = spec.compile()
     finally:
         mujoco.set_mjcb_act_bias(before)
-    if before is not _bias:
-        _others[:] = [before]
-        mujoco.set_mjcb_act_bias(_bias)
+    if compiled:
+        install(callback())
+    else:
+        install(_bias)
     return model
 
 
@@ -174,15 +181,13 @@ class _Attached:
 
 _attached: dict[int, _Attached] = {}
 _numbers = count(1)
-_others: list[Any] = []
-"""The callback of others, which is asked for their actuators."""
 
 
 def _bias(m: mujoco.MjModel, d: mujoco.MjData, actuator: int) -> float:
     number, place = m.actuator_biasprm[actuator, :2]
     muscle = _attached.get(int(number))
     if muscle is None:
-        return sum(float(others(m, d, actuator)) for others in _others if others is not None)
+        return 0.0
     if m.opt.integrator == mujoco.mjtIntegrator.mjINT_RK4:
         raise ModelError(
             "muscles that remember step once a sample, RK4 four times. Remedy: choose the integrator "

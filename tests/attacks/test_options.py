@@ -32,6 +32,10 @@ COMMANDS: dict[str, list[str]] = {
     "invert": ["model.json", "-o", "out.json"],
     "track": ["inverse.json", "--rig", "mas20-hanging", "--reference", "run.csv"],
     "plan": ["run.csv", "--model", "model.json", "--minutes", "0.5", "-o", "out.csv"],
+    "ros": [
+        *("inverse.json", "--reference", "reference", "--pressure", "pressure", "--highest", "6"),
+        *("--duration", "0.05", "-o", "out.mcap"),
+    ],
     "plot": ["run.csv", "-o", "out.png"],
     "reproduce": ["multistate", "--quick", "--jobs", "1"],
     "info": ["run.csv"],
@@ -68,6 +72,7 @@ HARMLESS = {
     ("track", "--slew", "1e300"),
     ("export c", "--sample-time", "1e300"),
     ("export fmu", "--sample-time", "1e300"),
+    ("ros", "--lowest", "-1"),
 }
 """Strange, and no error."""
 

@@ -32,6 +32,7 @@ from mckibben.cli.plan import plan
 from mckibben.cli.plot import plot
 from mckibben.cli.reproduce import reproduce
 from mckibben.cli.rig import app as rig_app
+from mckibben.cli.ros import ros
 from mckibben.cli.simulate import simulate
 from mckibben.cli.study import study
 from mckibben.cli.track import track
@@ -55,7 +56,7 @@ app = typer.Typer(
 )
 for command in (
     *(study, characterize, fit, compare, check, calibrate, simulate, invert, track, plan, plot),
-    *(reproduce, measured, info),
+    *(reproduce, measured, info, ros),
 ):
     app.command()(command)
 app.command("check-block")(check_block)

@@ -3,9 +3,9 @@
     pip install 'mckibben[mujoco]'
     python examples/antagonistic_joint.py docs/pictures/antagonistic_joint.png
 
-Two muscles pull at a pulley, one against the other; their pressures go up and down by turns, slowly, about
-a common one. With any fitted model that tells a force (``mckibben fit balance`` on recordings with a
-measured force), give it as a second argument; the muscle here is one of the library.
+Two muscles pull at a pulley, one against the other; their pressures go up and down by turns about a
+common one, or the forearm is moved by hand. The muscle is one of the library; give your own model as a
+second argument (``mckibben fit balance`` on recordings with a measured force).
 """
 
 import sys

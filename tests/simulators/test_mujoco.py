@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -108,7 +109,7 @@ def test_friction_takes_energy_and_never_gives_any(pressure: float) -> None:
     tops = [abs(part).max() for part in np.split(told[:, 0] - told[-500:, 0].mean(), 6)]
     assert work[-1] < -10.0  # N mm
     assert np.ptp(told[-500:, 0]) < 0.2 * np.ptp(told[:500, 0])
-    assert all(after <= before for before, after in zip(tops, tops[1:], strict=False))
+    assert all(after <= before for before, after in pairwise(tops))
 
 
 def test_halving_the_step_brings_the_motion_nearer() -> None:

@@ -76,7 +76,10 @@ def ros(
         reference=topic(reference, reference_type),
         measured=topic(measured, measured_type) if measured is not None else None,
         pressure=topic(pressure, pressure_type),
-        **{"highest": highest, "lowest": lowest, "safe": safe, "timeout": timeout},
+        highest=highest,
+        lowest=lowest,
+        safe=safe,
+        timeout=timeout,
         period=1 / rate,
         record=out,
     )

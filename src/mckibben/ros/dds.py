@@ -90,7 +90,8 @@ class Topics:
             self._participant = DomainParticipant(domain)
         except DDSException as error:
             raise DataError(
-                f"DDS does not start ({error})", remedy="see that the network is up, or its configuration"
+                f"DDS does not start ({error})",
+                remedy="see that the network is up, or its configuration",
             ) from None
 
     def _topic(self, name: str, kind: Kind) -> Any:

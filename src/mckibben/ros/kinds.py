@@ -137,9 +137,10 @@ def topic_named(name: str) -> str:
         If ROS 2 has no topic of that name.
     """
     words = name.removeprefix("/").split("/")
-    sound = all(
-        word.isascii() and word.isidentifier() and "__" not in word for word in words
-    ) and len(name) < 200
+    sound = (
+        all(word.isascii() and word.isidentifier() and "__" not in word for word in words)
+        and len(name) < 200
+    )
     if not sound:
         raise DataError(
             f"{name!r} is no topic of ROS 2",

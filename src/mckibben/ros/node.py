@@ -201,7 +201,9 @@ class Node:
         self._mouth.speak(pressures, when)
         return pressures
 
-    def run(self, turns: Iterable[object], clock: Callable[[], float], day: Callable[[], int]) -> None:
+    def run(
+        self, turns: Iterable[object], clock: Callable[[], float], day: Callable[[], int]
+    ) -> None:
         """Step at every turn; when it ends, however it does, say the safe pressure."""
         try:
             for _ in turns:
@@ -273,9 +275,7 @@ class _Ear(_Recorded):
 class _Mouth(_Recorded):
     """The topic that is spoken to."""
 
-    def __init__(
-        self, transport: Transport, topic: Topic, channels: tuple[Channel, ...]
-    ) -> None:
+    def __init__(self, transport: Transport, topic: Topic, channels: tuple[Channel, ...]) -> None:
         super().__init__(topic, channels)
         self._to = transport.publish(topic.name, self.kind)
 

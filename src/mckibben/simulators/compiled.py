@@ -79,7 +79,10 @@ class CompiledMuscle:
         """Tell the callback of it."""
         pull = self._pull
         told = _Told(
-            *(ctypes.cast(self._library[name], ctypes.c_void_p) for name in ("mck_start", "mck_step")),
+            *(
+                ctypes.cast(self._library[name], ctypes.c_void_p)
+                for name in ("mck_start", "mck_step")
+            ),
             *(self.size, pull.along, pull.pressure, pull.shortening, pulls_only),
             *(pull.share, zero, self._time),
         )
@@ -100,7 +103,9 @@ def _library() -> ctypes.CDLL:
         package = Path(mujoco.__file__).parent
         engine = next(iter(sorted(package.glob("libmujoco*"))), None)
         if engine is None:
-            raise ModelError("MuJoCo's library is not in its package. Remedy: use muscles in Python.")
+            raise ModelError(
+                "MuJoCo's library is not in its package. Remedy: use muscles in Python."
+            )
         with tempfile.TemporaryDirectory() as place:
             library = Path(place) / "actuator.so"
             source = Path(__file__).parent / "c" / "actuator.c"

@@ -1,9 +1,9 @@
 """Fitted muscles as actuators of MuJoCo: tendons that pull with the force of a model, memory and all.
 
-`with_muscles` gives each named tendon of a specification an actuator whose control is the muscle's pressure
-in bar and whose force is the model's. What a muscle remembers (where friction has crept to, what
-relaxes) stands in ``mjData.userdata``: `mj_resetData` resets it, copies and saved states carry it, and
-simulations of one model do not disturb one another.
+`with_muscles` gives each named tendon of a specification an actuator whose control is the muscle's
+pressure in bar and whose force is the model's. What a muscle remembers (where friction has crept to,
+what relaxes) stands in ``mjData.userdata``: `mj_resetData` resets it, copies and saved states carry it,
+and simulations of one model do not disturb one another.
 
 MuJoCo may ask for forces more often than it steps. Every answer starts from the memory before the
 step, and becomes the memory only when time has moved on: asking twice changes nothing.
@@ -112,9 +112,7 @@ def with_muscles(
     return model
 
 
-def add_actuator(
-    spec: mujoco.MjSpec, name: str, muscle: Muscle, number: int, size: int
-) -> None:
+def add_actuator(spec: mujoco.MjSpec, name: str, muscle: Muscle, number: int, size: int) -> None:
     """Add the actuator of a muscle, which knows its number and where its memory of some size is."""
     if spec.tendon(name) is None:
         known = ", ".join(sorted(tendon.name for tendon in spec.tendons)) or "none"
@@ -154,7 +152,9 @@ class _Attached:
         self._run: Callable[[], None]
         self._lock = Lock()
 
-    def force(self, memory: Array, time: float, step: float, length: float, pressure: float) -> float:
+    def force(
+        self, memory: Array, time: float, step: float, length: float, pressure: float
+    ) -> float:
         """Return what the tendon is pulled with [N], negative as MuJoCo counts, and bring the memory."""
         pull, n = self._pull, self._state.size
         with self._lock:

@@ -44,6 +44,7 @@ COMMANDS: dict[str, list[str]] = {
     "app": ["workspace", "--no-show"],
     "export c": ["model.json", "-o", "out"],
     "export fmu": ["model.json", "-o", "out.fmu", "--platforms", "none"],
+    "export ros2": ["inverse.json", "-o", "out"],
     "rig list": [],
     "rig show": ["rail"],
     "rig run": ["rail", "-o", "out.csv", "--signal", "constant:value=1", "--duration", "1"],
@@ -72,6 +73,7 @@ HARMLESS = {
     ("track", "--slew", "1e300"),
     ("export c", "--sample-time", "1e300"),
     ("export fmu", "--sample-time", "1e300"),
+    ("export ros2", "--sample-time", "1e300"),
     ("ros", "--lowest", "-1"),
 }
 """Strange, and no error."""

@@ -1,4 +1,4 @@
-"""mckibben export: a model as C99, or as an FMU."""
+"""mckibben export: a model as C99, as an FMU, or as a package of ROS 2."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 app = typer.Typer(
     name="export",
-    help="A model as code for elsewhere: c, fmu.",
+    help="A model as code for elsewhere: c, fmu, ros2.",
     no_args_is_help=True,
     add_completion=False,
     rich_markup_mode=None,
@@ -165,3 +165,31 @@ def export_fmu(
     for path in built:
         say(f"Library: {path}")
     say(f"Written: {out} (FMI {fmi.value})")
+
+
+@app.command("ros2")
+def export_ros2(
+    model: Model,
+    out: Annotated[Path, typer.Option("-o", "--out", metavar="DIR", help="Folder to write.")],
+    name: Name = None,
+    sample_time: SampleTime = None,
+    inverse: Inverse = False,
+    overwrite: Overwrite = False,
+    as_json: Json = False,
+) -> None:
+    """Write a package of ROS 2: a chainable controller of ros2_control around the model's C."""
+    from mckibben.export import export_ros2 as write_package
+    from mckibben.export.folders import refuse_folder
+    from mckibben.export.naming import name_from
+    from mckibben.outputs import refuse_inputs
+
+    refuse_inputs(out, [model])
+    refuse_folder(out, overwrite=overwrite)
+    chosen = name or name_from(model).lower()
+    block = _loaded(model, inverse)
+    write_package(block, out, name=chosen, sample_time=sample_time, overwrite=overwrite)
+    files = sorted(path.relative_to(out).as_posix() for path in out.rglob("*") if path.is_file())
+    if as_json:
+        print_json({"folder": str(out), "name": chosen, "files": files})
+        return
+    say(f"Written: {out} ({len(files)} files; start with {out / 'README.md'})")

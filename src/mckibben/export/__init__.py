@@ -1,6 +1,7 @@
-"""Models as code for elsewhere: C99 for microcontrollers, FMUs for simulators."""
+"""Models as code for elsewhere: C99 for microcontrollers, FMUs for simulators, packages of ROS 2."""
 
 from __future__ import annotations
 
 from mckibben.export.c.project import export_c as export_c
 from mckibben.export.fmu.unit import export_fmu as export_fmu
+from mckibben.export.ros2.package import export_ros2 as export_ros2

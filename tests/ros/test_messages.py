@@ -138,7 +138,7 @@ def test_a_cut_recording_has_lost_its_end_alone(tmp_path: Path) -> None:
     (tmp_path / "cut.mcap").write_bytes(data[: len(data) // 2])
     with (tmp_path / "cut.mcap").open("rb") as file:
         records = stream.StreamReader(file).records
-        taken = []
+        taken: list[str] = []
         with contextlib.suppress(EOFError, ValueError, exceptions.McapError):
             taken.extend(type(record).__name__ for record in records)
     assert taken.count("Message") > 20

@@ -92,6 +92,7 @@ def test_a_late_reference_is_held_and_silence_is_safe() -> None:
     """Up to the time-out the last reference stands; then it is safe, and memory begins anew."""
     lines = Lines()
     one = node(lines, safe=0.5, timeout=0.105)
+    said: dict[int, tuple[float, ...]]
     said = {k: (wave(k),) for k in [*range(1, 60), *range(100, 150)]}
     given = run(one, lines, said, 150)
     stream = INVERSE.stream(PERIOD)
@@ -250,6 +251,7 @@ def test_another_process_is_heard_in_the_bytes_of_ros() -> None:
         speaker.wait()
         if wire is not None:
             wire.close()
+    assert found is not None
     assert found.data == 3.25
     if wire is not None:
         at = packets.find(struct.pack("<d", 3.25))
@@ -264,7 +266,7 @@ def test_from_the_command_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
     monkeypatch.chdir(tmp_path)
     INVERSE.save("inverse.json")
     words = ["ros", "inverse.json", "--reference", "r", "--pressure", "p", "--highest", "6"]
-    words += ["--domain", DOMAIN, "--duration", "0.1", "--safe", "0.5"]
+    words += ["--domain", str(DOMAIN), "--duration", "0.1", "--safe", "0.5"]
     result = call(*words, "-o", "run.mcap", "--json")
     assert result.code == 0, result.err
     assert '"refused": 0' in result.out

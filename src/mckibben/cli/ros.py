@@ -47,6 +47,7 @@ def ros(
 ) -> None:
     """Run a compensator as a node of ROS 2, over Cyclone DDS, without ROS."""
     import math
+    import signal
     import time
     from contextlib import suppress
 
@@ -84,8 +85,13 @@ def ros(
         record=out,
     )
     turns = FixedRate(1 / rate, math.inf if duration is None else duration)
-    with suppress(KeyboardInterrupt):
-        node.run(turns, time.monotonic, time.time_ns)
+    # as Ctrl-C: whoever ends it, the last pressure is the safe one
+    before = signal.signal(signal.SIGTERM, signal.default_int_handler)
+    try:
+        with suppress(KeyboardInterrupt):
+            node.run(turns, time.monotonic, time.time_ns)
+    finally:
+        signal.signal(signal.SIGTERM, before)
     kept = turns.deadlines
     if as_json:
         print_json(

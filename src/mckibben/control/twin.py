@@ -55,8 +55,8 @@ class Twin:
         From pressures, or commands, and what is held, to displacements or a force. With a band
         (`mckibben.calibrate`), outputs scatter as that says.
     limits : mapping of str to (float, float), optional
-        Lowest and highest pressure [bar], or command, by input; default what the model was identified on,
-        as far as it knows. Commands beyond are clipped.
+        Lowest and highest pressure [bar], or command, by input; default what the model was identified
+        on, as far as it knows. Commands beyond are clipped.
     held : mapping of str to float, optional
         Inputs that nothing drives, such as a load [N], a length [mm] or an extensor's pressure [bar].
         What a reference gives comes first.
@@ -107,8 +107,8 @@ class Twin:
         if own is not None and abs(self.sample_time - own) > 1e-9 * own:
             raise ModelError(
                 f"{self.forward.title!r} is a model of steps of {own:g} s, and a loop of "
-                f"{self.sample_time:g} s is closed on it. Remedy: give a reference at {own:g} s "
-                "(--rate), or a model that takes any sample time."
+                f"{self.sample_time:g} s is closed on it. Remedy: resample the reference to that, "
+                "or take a model of any sample time."
             )
         self.held = dict(held or {})
         given = {name: Ends(*map(float, ends)) for name, ends in (limits or {}).items()}
@@ -146,9 +146,8 @@ class Twin:
         """
         if name not in self._limits:
             raise ModelError(
-                f"{self.forward.title!r} does not say from where to where its {name} may go. Remedy: say "
-                f"it (--limits {name}=LOW:HIGH; in Python limits={{{name!r}: (low, high)}}), or calibrate "
-                "it, for a band knows."
+                f"{self.forward.title!r} does not say how far its {name} may go. Remedy: say it "
+                f"(--limits {name}=LOW:HIGH, or limits={{{name!r}: (low, high)}}), or calibrate it."
             )
         return self._limits[name]
 

@@ -159,7 +159,7 @@ def track(
         )
     notes += without.notes
     if out is not None:
-        write(found.recording, out)
+        write(without.beside(found.recording), out)
     if controller_out is not None and isinstance(chosen, Block):
         chosen.save(controller_out)
     if as_json:

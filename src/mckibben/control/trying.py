@@ -33,6 +33,16 @@ class Before:
     tracked: Tracked | None
     notes: tuple[str, ...]
 
+    def beside(self, recording: Recording) -> Recording:
+        """Return a loop's recording with what no compensation gave, as ``uncompensated_...``."""
+        if self.tracked is None:
+            return recording
+        units, without = recording.units, self.tracked.recording
+        return recording.with_channels(
+            {f"uncompensated_{name}": units[name] for name in self.tracked.rmse},
+            **{f"uncompensated_{name}": without[name] for name in self.tracked.rmse},
+        )
+
 
 def before(compensator: Block, plant: Plant, reference: Recording, **settings: Any) -> Before:
     """Let a plant follow a reference without compensation, and look whether a compensator is of it.

@@ -130,11 +130,24 @@ def uncompensated(plant: Plant, reference: Recording, rise: Recording) -> Static
             f"{len(driven)} commands move {len(followed)} displacements, so no command is read off a "
             "curve. Remedy: compare with PID (--controller pid)."
         )
-    return StaticMap([_curve(rise[u], rise[y], y) for u, y in zip(driven, followed, strict=True)])
+    return StaticMap([curve(rise[u], rise[y], y) for u, y in zip(driven, followed, strict=True)])
 
 
-def _curve(command: Array, moved: Array, name: str) -> tuple[Array, Array]:
-    """Return a monotone curve: what is moved, rising, and the command there."""
+def curve(command: Array, moved: Array, name: str) -> tuple[Array, Array]:
+    """Return a monotone curve of a slow rise: what is moved, rising, and the command there.
+
+    Parameters
+    ----------
+    command, moved : array, shape (n,)
+        Of the rise.
+    name : str
+        Of what is moved.
+
+    Raises
+    ------
+    ModelError
+        If nothing moves.
+    """
     falls = moved[-1] < moved[0]
     smooth = np.asarray(isotonic_regression(moved, increasing=not falls).x)
     if falls:

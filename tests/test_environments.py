@@ -134,3 +134,33 @@ def test_settings_load_and_pictures() -> None:
 def test_impossible_options_are_refused(options: dict[str, Any], match: str) -> None:
     with pytest.raises(DataError, match=f"{match}.*Remedy"):
         environments.Tracking(**options)
+
+
+def test_a_twin_of_ones_own_muscle_is_an_environment() -> None:
+    from mckibben.blocks.bands.band import Band
+    from mckibben.blocks.bands.banded import Banded
+    from mckibben.blocks.play_type.pi import PI
+    from mckibben.control import Twin
+
+    inverse = PI.example().inverse()
+
+    def errors(twin: Twin, seed: int) -> Any:
+        env = environments.Tracking(plant=twin, duration=4.0, preview=1)
+        stream = inverse.stream()
+
+        def act(seen: np.ndarray, info: dict[str, Any]) -> np.ndarray:
+            ahead = float(env._wanted[len(env._done), 0])  # what is due at the next step
+            return np.array(2.0 * stream.step(ahead) / 5.0 - 1.0)
+
+        return np.array([float(info["error"][0]) for _, _, info in episode(env, act, seed)])
+
+    bare, scattering = Twin(PI.example()), Twin(Banded(PI.example(), Band.example()))
+    check_env(environments.Tracking(plant=scattering, duration=1.0), skip_render_check=True)
+    assert np.abs(errors(bare, 1)[20:]).max() < 1e-6  # once the start is forgotten
+    first, again, other = (errors(scattering, seed) for seed in (1, 1, 2))
+    np.testing.assert_array_equal(first, again)
+    assert not np.array_equal(first, other)
+    assert first.std() > 0.05
+    for given, words in (({"spread": 0.1}, "spread"), ({"load": 5.0}, "load")):
+        with pytest.raises(DataError, match=words):
+            environments.Tracking(plant=bare, **given)

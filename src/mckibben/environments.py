@@ -1,4 +1,4 @@
-"""Gymnasium environments: follow a reference with a virtual rig.
+"""Gymnasium environments: follow a reference with a virtual rig, or with a model of one's own muscle.
 
 Importing this module registers ``mckibben/RIG-vVERSION`` for every published rig that measures
 displacement (Towers et al., "Gymnasium: A Standard Interface for Reinforcement Learning
@@ -33,6 +33,7 @@ except ImportError as missing:
     ) from missing
 
 if TYPE_CHECKING:
+    from mckibben.control import Twin
     from mckibben.recording import Recording
     from mckibben.rigs import Rig
 
@@ -52,15 +53,16 @@ SPREAD_PARAMETERS = ("muscle.c10", "muscle.friction.contracting", "muscle.fricti
 
 
 class Tracking(gymnasium.Env[Vector, Vector]):
-    """Make a rig's displacement follow a reference.
+    """Make the displacement of a rig, or of a model, follow a reference.
 
     The reference is what the same rig did under hidden random commands, and so can be followed.
 
     Action, shape (commands,), within -1 and 1: each pressure or voltage, from the lowest to the
     highest that the hardware lets through, held for a control step.
 
-    Observation, all near -1 to 1: displacement(s) over stroke; pressure(s) over the highest
-    command; the reference(s) over stroke, now and ``preview`` steps ahead; the last action.
+    Observation, all near -1 to 1: displacement(s) over stroke; pressure(s), where they are measured,
+    over the highest command; the reference(s) over stroke, now and ``preview`` steps ahead; the last
+    action.
 
     Reward: minus the mean absolute error over stroke, minus ``effort`` times the mean square of the
     change of action.
@@ -91,6 +93,10 @@ class Tracking(gymnasium.Env[Vector, Vector]):
         Parameters of the rig to change, as `mckibben.Rig.changed` takes them.
     render_mode : {None, "rgb_array"}
         With the second, `render` draws the episode so far.
+    plant : Twin, optional
+        A fitted model instead of a rig, `mckibben.control.Twin`: what is no pressure stays as that holds
+        it. With a band it scatters, otherwise in every episode; ``spread`` is of rigs alone, and
+        ``settings`` are those of `Twin.changed`.
 
     Raises
     ------
@@ -113,12 +119,22 @@ class Tracking(gymnasium.Env[Vector, Vector]):
         spread: float = 0.0,
         settings: Mapping[str, Any] | None = None,
         render_mode: str | None = None,
+        plant: Twin | None = None,
     ) -> None:
         from mckibben.rigs import load_rig
 
-        plant = load_rig(rig) if isinstance(rig, str | Path) else rig
-        if control_time is None:
-            control_time = max(0.02, plant.sample_time)
+        chosen: Rig | Twin
+        self._spreading: Rig | None = None
+        if plant is None:
+            chosen = load_rig(rig) if isinstance(rig, str | Path) else rig
+            if control_time is None:
+                control_time = max(0.02, chosen.sample_time)
+            self._spreading = chosen if spread else None
+        else:
+            _demand(not spread, "spread", spread, "0 with a plant, whose band scatters")
+            _demand(not load, "load", load, "0 with a plant, and held={'force': ...} to the plant")
+            chosen = plant
+            control_time = chosen.sample_time if control_time is None else control_time
         _demand(0 < control_time <= 1, "control_time", control_time, "0 to 1 s")
         _demand(2 * control_time <= duration <= 1e4, "duration", duration, "2 steps to 10000 s")
         _demand(preview in range(1001), "preview", preview, "a whole number from 0 to 1000")
@@ -131,15 +147,23 @@ class Tracking(gymnasium.Env[Vector, Vector]):
             "random-wave, irregular-triangle or sine",
         )
         _demand(render_mode in (None, "rgb_array"), "render_mode", render_mode, "rgb_array or none")
-        self._plant = plant.changed({**(settings or {}), "sample_time": control_time})
+        changes = {**(settings or {}), "sample_time": control_time}
+        self._plant: Rig | Twin = chosen.changed(changes)
+        if self._spreading is not None:
+            self._spreading = self._spreading.changed(changes)
         outputs = self._plant.outputs
         self._moves = [i for i, name in enumerate(outputs) if name.startswith("displacement")]
         self._bars = [i for i, name in enumerate(outputs) if name.startswith("pressure")]
         if not self._moves:
             raise DataError(
-                f"the rig {plant.name!r} measures no displacement", remedy="choose another rig"
+                f"the rig {chosen.name!r} measures no displacement", remedy="choose another rig"
             )
-        self._commands = [name for name in self._plant.inputs if name != "force"]
+        held = () if plant is None else plant.held
+        self._commands = [
+            name
+            for name in self._plant.inputs
+            if name.startswith(("pressure", "voltage")) and name not in held
+        ]
         limits = [self._plant.limits(name) for name in self._commands]
         self._low = np.array([limit.low for limit in limits])
         self._high = np.array([limit.high for limit in limits])
@@ -237,10 +261,11 @@ class Tracking(gymnasium.Env[Vector, Vector]):
             "pressure": measured[self._bars],
         }
 
-    def _varied(self) -> Rig:
-        if not self._spread:
+    def _varied(self) -> Rig | Twin:
+        rig = self._spreading
+        if rig is None:
             return self._plant
-        fields = self._plant.model_dump()
+        fields = rig.model_dump()
         settings: dict[str, Any] = {}
         for path in SPREAD_PARAMETERS:
             value: Any = fields
@@ -252,9 +277,9 @@ class Tracking(gymnasium.Env[Vector, Vector]):
                 if isinstance(value, list | tuple)
                 else factor * value
             )
-        return self._plant.changed(settings)
+        return rig.changed(settings)
 
-    def _hidden_run(self, plant: Rig) -> Array:
+    def _hidden_run(self, plant: Rig | Twin) -> Array:
         """Return what a rig does under hidden commands [mm], shape (samples, displacements)."""
         from mckibben.signals import irregular_triangle, random_wave, sine
 
@@ -286,7 +311,7 @@ class Tracking(gymnasium.Env[Vector, Vector]):
         }
         return float(np.ptp(self._ideal(self._plant, waves), axis=0).max())
 
-    def _ideal(self, plant: Rig, waves: Mapping[str, Array]) -> Array:
+    def _ideal(self, plant: Rig | Twin, waves: Mapping[str, Array]) -> Array:
         from mckibben.recording import Recording
 
         channels = dict(waves)

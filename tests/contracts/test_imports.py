@@ -25,11 +25,11 @@ LAYERS = (
     {"recording", "signals", "metrics", "characterization"},
     {"files"},
     {"rigs"},
-    {"environments"},
     {"blocks"},
     {"muscles"},
     {"estimators", "export", "stream", "outputs"},
     {"control", "simulators", "ros"},
+    {"environments"},
     {"bands"},
     {"comparison"},
     {"validation", "excitation"},
@@ -62,8 +62,10 @@ STANDS_ON = {
         "system",
     },
     "stream": {"stream", "blocks", "arrays", "errors"},
-    "control": {"control", "blocks", "recording", "signals", "arrays", "errors", "registry"},
-    "environments": {"environments", "rigs", "recording", "signals", "arrays", "errors"},
+    "control": {
+        *("control", "blocks", "recording", "signals", "arrays", "errors", "registry", "numerals"),
+    },
+    "environments": {"environments", "control", "rigs", "recording", "signals", "arrays", "errors"},
 }
 """What some members may import and no more: a rig's physics knows nothing of models."""
 

@@ -105,9 +105,12 @@ class Followed(Kept):
 
     model: Text
     rig: Text = ""
+    plant: Text = ""
     controller: Text = ""
     rmse: dict[str, Number] = {}
     largest: dict[str, Number] = {}
+    uncompensated: dict[str, Number] = {}
+    notes: list[Text] = []
     clipped: Count | None = None
     step_us: Number = None
 

@@ -41,6 +41,8 @@ def fit(workspace: Workspace, given: dict[str, Any], tell: Tell) -> str:
         raise ModelError(row.reason or "it gave no model. Remedy: try other settings.")
     name = str(given["name"])
     row.block.save(workspace.path("models", f"{name}.json"))
+    if row.banded is not None:  # with which it can stand where a plant stands
+        row.banded.save(workspace.path("models", f"{name}-banded.json"))
     result = row.to_dict() | {
         "input": board.input,
         "output": board.output,
@@ -61,31 +63,43 @@ def fit(workspace: Workspace, given: dict[str, Any], tell: Tell) -> str:
 
 
 def loop(workspace: Workspace, given: dict[str, Any], tell: Tell) -> str:
-    """Let a controller follow a reference on a virtual rig, and keep the recording."""
+    """Let a controller follow a reference on a model or a virtual rig, and keep the recording."""
     from mckibben.blocks.core.block import Block
-    from mckibben.control import control_law, track, tune_pid
+    from mckibben.control import before, control_law, track, tune_pid
     from mckibben.files import read, write
     from mckibben.rigs import load_rig
 
-    inverse = workspace.model(given["model"]).inverse()
-    rig = load_rig(given["rig"])
+    inverse, own = workspace.model(given["model"]).inverse(), given.get("plant")
+    plant = workspace.twin(own) if own else load_rig(given["rig"])
     (reference,) = read(workspace.path("runs", given["reference"]), informative=False)
     kind = given["controller"]
     step = reference.sample_time or 0.02
-    controller = control_law(kind, inverse, lambda: tune_pid(rig, sample_time=step))
-    found = track(controller, rig, reference, progress=lambda share: tell(share, float("nan")))
+    controller = control_law(kind, inverse, lambda: tune_pid(plant, sample_time=step))
+    found = track(
+        controller, plant, reference, progress=lambda share: tell(0.5 * share, float("nan"))
+    )
+    without = before(
+        inverse,
+        plant,
+        reference,
+        progress=lambda share: tell(0.5 + 0.5 * share, float("nan")),
+    )
     name = str(given["name"])
-    write(found.recording.with_meta(name=name), workspace.path("runs", f"{name}.csv"))
+    recording = without.beside(found.recording).with_meta(name=name)
+    write(recording, workspace.path("runs", f"{name}.csv"))
     errors = {channel: float(value) for channel, value in found.rmse.items()}
     workspace.write_json(
         "runs",
         name,
         {
             "model": given["model"],
-            "rig": given["rig"],
+            "rig": given.get("rig") or "",
+            "plant": own or "",
             "controller": kind,
             "rmse": errors,
             "largest": {channel: float(value) for channel, value in found.largest.items()},
+            "uncompensated": {} if without.tracked is None else dict(without.tracked.rmse),
+            "notes": list(without.notes),
             "clipped": int(found.clipped),
             "step_us": 1e6 * float(found.step_time[0]),
             "call": given.get("call", ""),

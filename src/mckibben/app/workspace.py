@@ -19,6 +19,7 @@ from mckibben.system.atomic import replacing
 
 if TYPE_CHECKING:  # loaded when they are first used, so that the page is there at once
     from mckibben.blocks.core.block import Block
+    from mckibben.control import Twin
     from mckibben.recording import Recording
 
 Role = Literal["train", "test", "unused"]
@@ -286,6 +287,44 @@ class Workspace(Folder):
         with suppress(MckibbenError):
             return self._inverses.get(self.path("models", f"{name}.json"), make)
         return False
+
+    def twin(self, name: str) -> Twin:
+        """Return a model as a plant; where it does not know its limits, they are those recorded.
+
+        Raises
+        ------
+        MckibbenError
+            If it cannot be one.
+        """
+        from mckibben.control import Twin
+        from mckibben.control.identified import known_ranges
+
+        model, limits = self.model(name), {}
+        for channel in model.inputs:
+            runs = [run[channel.name] for run in self.readable() if channel.name in run]
+            if runs and channel.name not in known_ranges(model):
+                ends = min(float(u.min()) for u in runs), max(float(u.max()) for u in runs)
+                if ends[0] < ends[1]:
+                    limits[channel.name] = ends
+        return Twin(model, limits=limits, name=name)
+
+    def plants(self, inverted: str) -> list[str]:
+        """Return the models that a model's compensator can be tried on.
+
+        Those of another kind first, for on its own model a compensator proves nothing; then its own with
+        a band, and bare.
+        """
+        undone = self.model(inverted)
+        found = []
+        for name in self.models():
+            with suppress(MckibbenError):
+                twin = self.twin(name)
+                if twin.inputs == tuple(c.name for c in undone.inputs) and twin.outputs == tuple(
+                    c.name for c in undone.outputs
+                ):
+                    twin.limits(twin.inputs[0])
+                    found.append((twin.forward == undone, not twin.scatters, name))
+        return [name for *_, name in sorted(found)]
 
     def warm(self) -> None:
         """Read what has changed; what is read is then at hand, for pages that must not wait."""

@@ -170,6 +170,7 @@ def find_band(
         units=n_units,
         unit=which,
         level=level,
+        memory=memory * (max(run.sample_time or 0.0 for run in runs) if times else 1.0),
     )
     narrower, mean = zip(*widths, strict=True)
     return Found(band, memory, narrower, mean, level, (note,) if note else ())

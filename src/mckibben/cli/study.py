@@ -111,6 +111,11 @@ def _conclude(study: Study, folder: Path) -> None:
         say("No inverse is written, since no model is recommended.")
     elif not study.leaderboard.stopped:
         say("No model here has an inverse.")
+    if check is not None and check.uncompensated_error is not None:
+        say(
+            f"Without compensation, {study.input} read off one slow rise, that is "
+            f"{numeral(100 * check.uncompensated_error, 2)} %. On the muscle, the model's comes on top."
+        )
     for name, tracked in study.loops.items():
         errors = ", ".join(numeral(error, 2) for error in tracked.rmse.values())
         say(f"Following a measured motion on {study.plant}: {name}, RMSE {errors} mm.")

@@ -1,4 +1,4 @@
-"""mckibben track: close a loop on a virtual rig."""
+"""mckibben track: close a loop on a virtual rig, or on a model of one's own muscle."""
 
 from __future__ import annotations
 
@@ -15,19 +15,38 @@ from mckibben.numerals import numeral
 
 if TYPE_CHECKING:
     from mckibben.blocks.core.block import Block
+    from mckibben.control.loop import Plant, Tracked
     from mckibben.recording import Recording
-    from mckibben.rigs import Rig
 
 COMMAND = "command_"
 
 
 def track(
     compensator: Annotated[Path, typer.Argument(help="Inverse, from mckibben invert (JSON).")],
-    rig: Annotated[str, typer.Option("--rig", help="Rig, by name or file; see rig list.")],
     reference: Annotated[
         Path,
         typer.Option("--reference", metavar="FILE", help="Displacements, or force, to follow."),
     ],
+    rig: Annotated[
+        str | None,
+        typer.Option("--rig", metavar="NAME|FILE", help="Virtual rig to try it on; see rig list."),
+    ] = None,
+    twin: Annotated[
+        Path | None,
+        typer.Option(
+            "--plant",
+            metavar="MODEL",
+            help="Model of your own muscle to try it on (JSON) instead; with a band, it scatters.",
+        ),
+    ] = None,
+    limits: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--limits",
+            metavar="CHANNEL=LOW:HIGH",
+            help="Of --plant, where the model does not say, as pressure=0:6; repeatable.",
+        ),
+    ] = None,
     controller: Annotated[
         str,
         typer.Option(
@@ -64,25 +83,27 @@ def track(
     force: Force = False,
     as_json: Json = False,
 ) -> None:
-    """Let a compensator, or a controller with it, follow a reference on a virtual rig."""
+    """Let a compensator, or a controller with it, follow a reference on a virtual rig, or on a model.
+
+    Beside it stands what no compensation does: pressures read off one slow rise of the same plant.
+    """
     from mckibben.blocks.core.block import Block
     from mckibben.blocks.core.saving import load
     from mckibben.blocks.coupled.known import beyond_known
     from mckibben.blocks.feedback.feedforward_feedback import FeedforwardFeedback
-    from mckibben.control import control_law, dead_time_undone, tune_pid
+    from mckibben.control import UNCOMPENSATED, before, control_law, dead_time_undone, tune_pid
     from mckibben.control import track as close
     from mckibben.files import write
     from mckibben.outputs import claim_model, claim_recording
-    from mckibben.rigs import load_rig
 
-    inputs = [compensator, reference, Path(rig)]
+    inputs = [compensator, reference, *([Path(rig)] if rig else []), *([twin] if twin else [])]
     if out is not None:
         claim_recording(out, inputs=inputs, force=force)
         inputs.append(out)
     if controller_out is not None:
         claim_model(controller_out, inputs=inputs, force=force)
     block = load(compensator)
-    plant = load_rig(rig)
+    plant = _plant(rig, twin, limits or [])
     runs = Reading(column, unit, rate, Gaps.ERROR).read([reference], None, informative=False)
     wanted = runs[0]
     _fits(block, plant, wanted)
@@ -121,20 +142,36 @@ def track(
             slew=slew,
             preview=preview,
             seed=seed,
-            progress=lambda share: tell(share, ""),
+            progress=lambda share: tell(0.5 * share, ""),
         )
+        without = before(
+            block,
+            plant,
+            wanted,
+            approach=approach,
+            settle=settle,
+            pressure_loop=pressure_loop and not commanded,
+            noise=noise,
+            delay=delay,
+            slew=slew,
+            seed=seed,
+            progress=lambda share: tell(0.5 + 0.5 * share, ""),
+        )
+    notes += without.notes
     if out is not None:
-        write(found.recording, out)
+        write(without.beside(found.recording), out)
     if controller_out is not None and isinstance(chosen, Block):
         chosen.save(controller_out)
     if as_json:
         print_json(
             {
                 "controller": controller,
+                "plant": {"name": plant.name, "virtual_rig": twin is None},
                 "rmse": dict(found.rmse),
                 "largest": dict(found.largest),
                 "clipped": found.clipped,
                 "clipping_cost": found.clipping_cost,
+                "uncompensated": _figures(without.tracked),
                 "step_time": {"median": found.step_time[0], "p99.9": found.step_time[1]},
                 "file": None if out is None else str(out),
                 "controller_file": None if controller_out is None else str(controller_out),
@@ -142,11 +179,17 @@ def track(
             }
         )
         return
+    ways = [(controller, found), (UNCOMPENSATED, without.tracked)]
     rows = [
-        [name, numeral(found.rmse[name], 3), numeral(found.largest[name], 3)] for name in found.rmse
+        [name, way, numeral(one.rmse[name], 3), numeral(one.largest[name], 3)]
+        for name in found.rmse
+        for way, one in ways
+        if one is not None
     ]
     measure = wanted.units[next(iter(found.rmse))]
-    print_table(["followed", f"RMSE [{measure}]", f"largest [{measure}]"], rows)
+    print_table(["followed", "by", f"RMSE [{measure}]", f"largest [{measure}]"], rows)
+    if twin is None:
+        say(f"On the virtual rig {plant.name}; --plant model.json tries it on your own muscle.")
     if found.clipped >= len(found.recording):
         say("Pressures were at a limit throughout: the reference is out of reach.")
     elif found.clipped:
@@ -165,18 +208,58 @@ def track(
         say(f"Written: {out}")
 
 
+def _plant(rig: str | None, twin: Path | None, limits: list[str]) -> Plant:
+    """Return what the loop is closed on."""
+    from mckibben.blocks.core.saving import load
+    from mckibben.control import Twin
+    from mckibben.excitation.limits import parsed
+    from mckibben.rigs import load_rig
+
+    if (rig is None) == (twin is None):
+        raise DataError(
+            "the compensator is tried on one plant",
+            remedy="give --plant model.json, a model of your own muscle, or --rig NAME",
+        )
+    if twin is None:
+        if limits:
+            raise DataError("a rig has limits of its own", remedy="leave --limits out")
+        return load_rig(str(rig))
+    given = {}
+    for channel, numbers in parsed(limits).items():
+        low, high, *rest = numbers
+        if low is None or high is None or rest:
+            raise DataError(
+                "limits of a plant are two numbers",
+                channel=channel,
+                remedy=f"write --limits {channel}=LOW:HIGH; --slew says how fast pressures change",
+            )
+        given[channel] = (low, high)
+    return Twin(load(twin), limits=given, name=twin.stem)
+
+
+def _figures(tracked: Tracked | None) -> dict[str, object] | None:
+    """Return what no compensation gives, for JSON."""
+    if tracked is None:
+        return None
+    return {
+        "rmse": dict(tracked.rmse),
+        "largest": dict(tracked.largest),
+        "clipped": tracked.clipped,
+    }
+
+
 def _driven(block: Block) -> list[str]:
     """Return the inputs of a plant that a compensator drives; commands are recorded under such names."""
     return [channel.name.removeprefix(COMMAND) for channel in block.outputs]
 
 
-def _fits(block: Block, plant: Rig, reference: Recording) -> None:
+def _fits(block: Block, plant: Plant, reference: Recording) -> None:
     """Refuse a model in place of an inverse, and references without what the inverse needs."""
     for name in _driven(block):
         if name not in plant.inputs:
             raise DataError(
                 f"the compensator gives {name!r}, which does not drive {plant.name!r}",
-                remedy="give what mckibben invert wrote, and the rig that the model is of",
+                remedy="give what mckibben invert wrote, and a rig or model of such a muscle",
             )
     for channel in block.inputs:
         if channel.name not in reference:

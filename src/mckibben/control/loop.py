@@ -153,15 +153,7 @@ def track(
     preview = controller.preview if preview is None else preview
     further = samples_ahead(preview, step) - 1  # than the next step's, which is given anyway
     rng = generator(seed)
-    measured_too = [name for name in plant.outputs if name in reference]
-    followed = [name for name in measured_too if name.startswith("displ")]
-    followed = followed or [name for name in measured_too if name == "force"]
-    if not followed:
-        raise DataError(
-            f"it has no displacement or force that {plant.name!r} measures",
-            file=reference.source,
-            remedy=f"give channels among {', '.join(plant.outputs)}",
-        )
+    followed = followed_by(plant, reference)
     driven, held = _roles(plant, reference)
     starts = {f"start.{name}": float(reference[name][0]) for name in held}
     changed = plant.changed({"sample_time": step, **starts})
@@ -252,6 +244,26 @@ def _check(
             raise ModelError(f"{name} is {value}. Remedy: give 0 to {most:g} {unit}.")
     if slew is not None and not 0 < slew < np.inf:
         raise ModelError(f"slew is {slew}. Remedy: give a positive number, in bar/s.")
+
+
+def followed_by(plant: Plant, reference: Recording) -> list[str]:
+    """Return the displacements, or the force, of a reference that a plant measures.
+
+    Raises
+    ------
+    DataError
+        If there are none.
+    """
+    measured_too = [name for name in plant.outputs if name in reference]
+    followed = [name for name in measured_too if name.startswith("displ")]
+    followed = followed or [name for name in measured_too if name == "force"]
+    if not followed:
+        raise DataError(
+            f"it has no displacement or force that {plant.name!r} measures",
+            file=reference.source,
+            remedy=f"give channels among {', '.join(plant.outputs)}",
+        )
+    return followed
 
 
 def _roles(plant: Plant, reference: Recording) -> tuple[list[str], list[str]]:

@@ -137,6 +137,8 @@ def inverse_check(check: InverseCheck, timed: bool = True) -> Drawing:
     label = "time [s]" if timed else "sample"
     t = check.time
     error = over_time(t, check.output - check.reference)
+    plain = check.uncompensated
+    without = [] if plain is None else [over_time(t, plain)]
     return Drawing(
         (
             Panel(
@@ -144,6 +146,7 @@ def inverse_check(check: InverseCheck, timed: bool = True) -> Drawing:
                 axis_label(wanted.name, wanted.unit),
                 (
                     Curve(*over_time(t, check.reference), "reference", style="broad"),
+                    *(Curve(*each, "no compensation", "series-2") for each in without),
                     Curve(*over_time(t, check.output), "model behind its inverse", "series-1"),
                 ),
             ),

@@ -12,10 +12,14 @@ from mckibben.arrays import Array
 from mckibben.blocks.core.block import Block
 from mckibben.comparison.recommending import acceptable
 from mckibben.comparison.results import Leaderboard
-from mckibben.errors import ModelError, ModelWarning
+from mckibben.control.uncompensated import RISE, curve
+from mckibben.errors import MckibbenError, ModelError, ModelWarning
 from mckibben.recording import Recording
 
 CHECK_SAMPLES = 2000
+
+MOST_RISE = 20_000
+"""Samples of a slow rise, and as many without time."""
 
 FOLLOWED = 1e-6
 """Largest error of an inverse that counts as one, relative to the reachable range."""
@@ -44,6 +48,11 @@ class InverseCheck:
         Outputs reachable whatever happened before; None where nothing is known of that.
     error : float
         Largest difference between reference and output, relative to that range, or to the reference's.
+    uncompensated : array, shape of ``output``, or None
+        What the model does without the inverse, its inputs read off its own slow rise
+        (`mckibben.control.uncompensated`); None where inputs and outputs do not pair.
+    uncompensated_error : float or None
+        As ``error``.
     """
 
     model: str
@@ -54,11 +63,14 @@ class InverseCheck:
     time: Array
     reachable: tuple[float, float] | None
     error: float
+    uncompensated: Array | None = None
+    uncompensated_error: float | None = None
 
     def to_dict(self) -> dict[str, Any]:
         """Return which model is inverted, and how well."""
         reachable = None if self.reachable is None else list(self.reachable)
-        return {"model": self.model, "error": self.error, "reachable": reachable}
+        found = {"model": self.model, "error": self.error, "reachable": reachable}
+        return found | {"uncompensated_error": self.uncompensated_error}
 
 
 def invert_best(board: Leaderboard, recording: Recording) -> InverseCheck | None:
@@ -124,6 +136,8 @@ def check_inverse(model: str, block: Block, recording: Recording) -> InverseChec
     output = block.simulate(pressure, sample_time=step)
     error = float(np.abs(output - reference).max() / (high - low))
     _followed(model, error, FOLLOWED)
+    plain = _without(block, recording, reference[:, np.newaxis], step)
+    plain = None if plain is None else plain[:, 0]
     return InverseCheck(
         model=model,
         inverse=inverse,
@@ -133,6 +147,10 @@ def check_inverse(model: str, block: Block, recording: Recording) -> InverseChec
         time=np.arange(CHECK_SAMPLES, dtype=np.float64) * (1.0 if step is None else step),
         reachable=(low, high),
         error=error,
+        uncompensated=plain,
+        uncompensated_error=(
+            None if plain is None else float(np.abs(plain - reference).max() / (high - low))
+        ),
     )
 
 
@@ -160,6 +178,7 @@ def _check_on_motion(
         output = block.simulate(driven).matrix(names)
     reference = recording.matrix(names)
     span = np.maximum(np.ptp(reference, axis=0), np.finfo(float).tiny)
+    plain = _without(block, recording, reference, recording.sample_time)
     return InverseCheck(
         model=model,
         inverse=inverse,
@@ -169,4 +188,42 @@ def _check_on_motion(
         time=recording.time,
         reachable=None,
         error=float((np.abs(output - reference) / span).max()),
+        uncompensated=plain,
+        uncompensated_error=(
+            None if plain is None else float((np.abs(plain - reference) / span).max())
+        ),
     )
+
+
+def _without(
+    block: Block, recording: Recording, reference: Array, step: float | None
+) -> Array | None:
+    """Return what a model does where its inputs are read off its own slow rise, shape (n, outputs).
+
+    Inputs rise from the lowest to the highest recorded, with what schedules as the recording begins.
+    """
+    n_driven = len(block.inputs) - len(block.scheduling)
+    if n_driven != len(block.outputs) or any(c.name not in recording for c in block.inputs):
+        return None
+    recorded = recording.matrix(channel.name for channel in block.inputs)
+    rise = np.tile(recorded[0], (MOST_RISE if step is None else _steps(step), 1))
+    low, high = recorded[:, :n_driven].min(axis=0), recorded[:, :n_driven].max(axis=0)
+    rise[:, :n_driven] = np.linspace(low, high, len(rise))
+    given = np.tile(recorded[0], (len(reference), 1))
+    if len(recorded) == len(reference):
+        given[:] = recorded
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ModelWarning)
+        try:
+            risen = block.simulate(rise, sample_time=step).reshape(len(rise), -1)
+            for k, channel in enumerate(block.outputs):
+                places, commands = curve(rise[:, k], risen[:, k], channel.name)
+                given[:, k] = np.interp(reference[:, k], places, commands)
+            found = block.simulate(given, sample_time=step).reshape(len(given), -1)
+        except MckibbenError:
+            return None
+    return found if np.isfinite(found).all() else None
+
+
+def _steps(step: float) -> int:
+    return min(max(round(RISE / step), 2), MOST_RISE)

@@ -1,4 +1,4 @@
-"""Loops closed on a virtual rig with what a comparison found: every inverse, PID, and both."""
+"""Loops closed on a virtual rig with what a comparison found: nothing, every inverse, PID, and both."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from contextlib import suppress
 import numpy as np
 
 from mckibben.comparison.results import Leaderboard
-from mckibben.control import Tracked, control_law, track, tune_pid
+from mckibben.control import UNCOMPENSATED, Tracked, before, control_law, track, tune_pid
 from mckibben.errors import MckibbenError
 from mckibben.recording import Recording
 from mckibben.rigs import load_rig
@@ -32,7 +32,9 @@ def published_rig(recordings: Sequence[Recording]) -> str | None:
 def closed_loops(
     board: Leaderboard, chosen: str, plant: str, tests: Sequence[Recording], seed: int
 ) -> dict[str, Tracked]:
-    """Return what came of following a measured motion with every inverse, with PID, and with both.
+    """Return what came of following a measured motion without compensation, and with what there is.
+
+    That is every inverse, PID, and both together.
 
     Nothing is chosen by it. An inverse that fails is left out; its model is in the leaderboard.
     There are none where inverses give pressures, and the rig takes volts.
@@ -59,6 +61,9 @@ def closed_loops(
     laws = [(f"{model} inverse", "feedforward", model) for model in inverses]
     laws += [("PID", "pid", chosen), (f"{chosen} inverse + PID", "feedforward-pid", chosen)]
     found: dict[str, Tracked] = {}
+    without = before(inverses[chosen], rig, reference, approach=5.0, seed=seed).tracked
+    if without is not None:
+        found[UNCOMPENSATED] = without
     for name, law, model in laws:
         with suppress(MckibbenError):
             controller = control_law(law, inverses[model], lambda: pid)

@@ -1,4 +1,4 @@
-"""Compensate: a wished-for motion, what can be reached, the pressures, and a closed loop on a rig."""
+"""Compensate: a wished-for motion, what can be reached, the pressures, and a closed loop on a plant."""
 
 from __future__ import annotations
 
@@ -20,6 +20,12 @@ from mckibben.errors import DataError, MckibbenError
 from mckibben.files import read, write
 from mckibben.recording import Recording
 from mckibben.report import wording
+
+OWN = "model "
+"""Before the names of models among those of plants."""
+
+UNCOMPENSATED = "uncompensated_displacement"
+"""What a run's recording calls what no compensation gave."""
 
 WIDTH, HEIGHT = 600, 220
 """Of the place to draw in [px]."""
@@ -269,9 +275,18 @@ def _loops(desk: Desk, model: str, reference: str) -> None:
         if [c for c in rig.inputs if c.startswith("pressure")] == ["pressure"]
         and "displacement" in rig.outputs
     ]
-    ui.label("Closed loop on a virtual rig").classes("text-lg")
+    plants = desk.workspace.plants(model)
+    offered = {f"{OWN}{name}": f"{name}, a model of yours" for name in plants}
+    offered |= {name: f"{name}, a virtual rig" for name in rigs}
+    ui.label("Closed loop").classes("text-lg")
+    ui.label(
+        "On another model of your muscle, fitted under Models; a rig is somebody else's muscle."
+    ).classes("text-xs opacity-70")
     with ui.row().classes("items-end"):
-        rig = named(ui.select(rigs, value=rigs[0], label="Rig").classes("min-w-48"), "loop-rig")
+        plant = named(
+            ui.select(offered, value=next(iter(offered)), label="Plant").classes("min-w-64"),
+            "loop-plant",
+        )
         kinds = named(
             ui.select(
                 {name: (getdoc(law) or name).rstrip(".") for name, law in laws.items()},
@@ -283,14 +298,18 @@ def _loops(desk: Desk, model: str, reference: str) -> None:
         )
 
         async def start() -> None:
-            if not rig.value or not kinds.value:
-                tell("Choose a rig and a controller.")
+            if not plant.value or not kinds.value:
+                tell("Choose a plant and a controller.")
+            own = str(plant.value).removeprefix(OWN) if str(plant.value).startswith(OWN) else None
+            there = {"rig": plant.value} if own is None else {"plant": own}
+            on = f"load_rig({plant.value!r})" if own is None else f"Twin(load('models/{own}.json'))"
             for kind in kinds.value:
                 name = f"{model}-{kind}"
-                call = f"track({kind} of {model!r}, load_rig({rig.value!r}), reference)"
+                call = f"track({kind} of {model!r}, {on}, reference)"
                 desk.jobs.submit(
                     "loop",
-                    {"model": model, "controller": kind, "rig": rig.value, "reference": reference}
+                    {"model": model, "controller": kind, "reference": reference}
+                    | there
                     | {"name": name, "call": call},
                 )
                 desk.did(f"closed the loop: {name}", call)
@@ -302,19 +321,25 @@ def _loops(desk: Desk, model: str, reference: str) -> None:
     def shown() -> None:
         runs = desk.workspace.runs(model)
         rows: list[dict[str, Any]] = [
-            {"name": name, "controller": run.controller, "rig": run.rig}
-            | {"rmse": _listed(run.rmse), "largest": _listed(run.largest), "clipped": run.clipped}
+            {"name": name, "controller": run.controller, "plant": run.plant or run.rig}
+            | {"rmse": _listed(run.rmse), "without": _listed(run.uncompensated)}
+            | {"largest": _listed(run.largest), "clipped": run.clipped}
             | {"step": wording.number(run.step_us, 2)}
             for name, run in runs.items()
         ]
         if not rows:
             return
-        labels = ("Run", "Controller", "Rig", "RMSE [mm]", "Largest [mm]", "Clipped", "Step [µs]")
+        labels = (
+            *("Run", "Controller", "Plant", "RMSE [mm]", "RMSE without compensation [mm]"),
+            *("Largest [mm]", "Clipped", "Step [µs]"),
+        )
         columns = [
             {"name": key, "field": key, "label": label, "align": "left"}
             for key, label in zip(rows[0], labels, strict=True)
         ]
         named(ui.table(rows=rows, columns=columns, row_key="name").props("dense flat"), "runs")
+        for note in dict.fromkeys(note for run in runs.values() for note in run.notes):
+            named(ui.label(note).classes("text-warning"), "loop-note")
         curves: list[tuple[str, Array, Array, str]] = []
         for place, name in enumerate(list(runs)[-4:]):
             try:
@@ -324,6 +349,9 @@ def _loops(desk: Desk, model: str, reference: str) -> None:
                 continue
             if not curves:
                 curves.append(("reference", run_.time, wished, "measured"))
+                if UNCOMPENSATED in run_:
+                    plain = run_[UNCOMPENSATED]
+                    curves.append(("no compensation", run_.time, plain, "input"))
             curves.append((name, run_.time, followed, f"series-{place + 1}"))
         if curves:
             named(

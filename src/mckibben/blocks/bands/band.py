@@ -13,7 +13,7 @@ from __future__ import annotations
 from typing import Annotated, ClassVar, Literal, Self
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
@@ -129,6 +129,10 @@ class Band(Primitive):
         Which of them.
     level : float
         Share of samples of a new run that the band is to hold, between 0 and units / (units + 1).
+    memory : float
+        How long misses stay alike, the integral of their autocorrelation [s], or in samples where there
+        are no ``times``; 0 where it is not known. The band does not depend on it; what is drawn from it
+        does (`mckibben.control.Twin`).
     """
 
     kind: ClassVar[str] = "band"
@@ -158,6 +162,7 @@ class Band(Primitive):
     units: Annotated[int, Field(ge=1)]
     unit: Literal["run", "block"] = "run"
     level: float = 0.9
+    memory: Annotated[FiniteFloat, Field(ge=0)] = 0.0
 
     def __post_init__(self) -> None:
         n_x, n_seen, n_given = len(self.driving) + len(self.given), self._n_seen, len(self.given)

@@ -1,0 +1,144 @@
+"""Whether a compensator is of the plant it is tried on: another muscle, or the very model it undoes."""
+
+from __future__ import annotations
+
+import warnings
+from contextlib import suppress
+
+import numpy as np
+
+from mckibben.blocks.bands.banded import inside
+from mckibben.blocks.compose import Parallel
+from mckibben.blocks.core.block import Block
+from mckibben.blocks.feedback.feedforward_feedback import FeedforwardFeedback
+from mckibben.blocks.force.feedforward import ForceFeedforward
+from mckibben.control.identified import known_ranges
+from mckibben.control.loop import Plant
+from mckibben.control.twin import Twin, plain
+from mckibben.errors import MckibbenError, ModelError, ModelWarning
+from mckibben.numerals import numeral
+from mckibben.recording import Recording
+
+APART = 0.25
+"""Share of a model's stroke by which a plant's slow rise begins or ends elsewhere that is another
+muscle: specimens of a type, temperatures and loads differ by less, the next size by more."""
+
+BEYOND = 0.05
+"""Share of a range of pressure beyond which it is left."""
+
+REMEDY = (
+    "Remedy: try it on a model of your own muscle (--plant model.json), or on a rig of its size"
+)
+
+
+def undone(compensator: Block) -> Block | None:
+    """Return the model that a compensator undoes; None where it undoes none, as PID does."""
+    if isinstance(compensator, FeedforwardFeedback):
+        return undone(compensator.compensator)
+    if isinstance(compensator, ForceFeedforward):
+        law, friction = compensator.law, compensator.friction
+        return law if friction is None else Parallel((law, friction))
+    with suppress(ModelError):
+        return compensator.inverse()
+    return None
+
+
+def of_itself(model: Block | None, plant: Plant) -> bool:
+    """Tell whether a plant is the very model that a compensator undoes."""
+    return (
+        model is not None
+        and isinstance(plant, Twin)
+        and inside(model).to_dict() == plant.forward.to_dict()
+    )
+
+
+def doubts(compensator: Block, plant: Plant, rise: Recording) -> list[str]:
+    """Return what speaks against taking what a compensator does on a plant for what it does on a muscle.
+
+    Parameters
+    ----------
+    compensator : Block
+    plant : Plant
+    rise : Recording
+        What the plant does while its commands rise slowly, from `mckibben.control.slow_rise`.
+
+    Returns
+    -------
+    list of str
+        A sentence each, with its remedy.
+    """
+    model = undone(compensator)
+    if model is None:
+        return []
+    if of_itself(model, plant):
+        if isinstance(plant, Twin) and plant.scatters:
+            return [
+                "the plant is the very model that the compensator undoes, with its band: errors without "
+                "feedback are draws from the band, and nothing else is told but limits, rates and what "
+                "feedback adds"
+            ]
+        return [
+            "the plant is the very model that the compensator undoes, which makes it right by "
+            "construction: this tells of limits and rates, and nothing of the muscle. Remedy: try it on "
+            "another model of the muscle, or give this one the band of recordings held back (mckibben "
+            "calibrate model.json FILES -o banded.json; --plant banded.json)"
+        ]
+    return [*_pressures(model, plant, rise), *_strokes(model, plant, rise)]
+
+
+def _pressures(model: Block, plant: Plant, rise: Recording) -> list[str]:
+    """Tell of commands that a model was identified at, and that the plant does not let through."""
+    notes = []
+    for channel in model.inputs:
+        name, known = plain(channel.name), known_ranges(model).get(channel.name)
+        if known is None or name not in rise or not np.ptp(rise[name]):
+            continue
+        (low, high), limits = known, plant.limits(name)
+        reach = BEYOND * (high - low)
+        if high > limits.high + reach or low < limits.low - reach:
+            notes.append(
+                f"the compensator is of {name} from {_span(low, high)} {channel.unit}, and {plant.name} "
+                f"takes {_span(limits.low, limits.high)}: it may be of another muscle. {REMEDY}"
+            )
+    return notes
+
+
+def _strokes(model: Block, plant: Plant, rise: Recording) -> list[str]:
+    """Tell where a plant's slow rise begins or ends elsewhere than the model's."""
+    if any(plain(channel.name) not in rise for channel in model.inputs):
+        return []
+    known, within = known_ranges(model), np.ones(len(rise), dtype=bool)
+    given = {channel.name: rise[plain(channel.name)] for channel in model.inputs}
+    driven = [name for name, values in given.items() if np.ptp(values) > 0]
+    for name in driven:
+        low, high = known.get(name, (-np.inf, np.inf))
+        within &= (given[name] >= low) & (given[name] <= high)
+    if not within.any():
+        return []
+    units = {channel.name: channel.unit for channel in model.inputs}
+    shared = {name: values[within] for name, values in given.items()}
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ModelWarning)
+        try:
+            expected = model.simulate(Recording(shared, rise.sample_time, units))
+        except MckibbenError:  # what fails here fails in the loop, which says why
+            return []
+    notes = []
+    ends = ", ".join(
+        f"{plain(name)} {_span(*shared[name][[0, -1]])} {units[name]}" for name in driven
+    )
+    for channel in model.outputs:
+        if channel.name not in rise:
+            continue
+        ours, theirs = rise[channel.name][within][[0, -1]], expected[channel.name][[0, -1]]
+        if np.abs(ours - theirs).max() > APART * abs(theirs[1] - theirs[0]):
+            notes.append(
+                f"in a slow rise ({ends}), {channel.name} of {plant.name} goes from {_span(*ours)} "
+                f"{channel.unit}, and of the compensator's model from {_span(*theirs)}: it may be of "
+                f"another muscle. {REMEDY}"
+            )
+    return notes
+
+
+def _span(low: float, high: float) -> str:
+    return f"{numeral(float(low), 3)} to {numeral(float(high), 3)}"

@@ -1,0 +1,312 @@
+"""A twin: a fitted model where a plant stands, scattering as its band says.
+
+    y[t] = P[u][t] + m(z) + s(z) w sign(g[t]) Q(|g[t]|),   g[t + 1] = r g[t] + sqrt(1 - r²) n[t]
+
+where P is the model; m, s, w and z are its band's (`mckibben.blocks.bands.band`), Q gives the score that
+the share of |g| below it reaches, and n is white and normal. So the band at any level holds that share
+of the samples, or more, and r keeps them alike for as long as the misses were that calibration saw.
+Without a band nothing scatters, and outputs are those of ``model.simulate``, to the bit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from math import erf, sqrt
+from typing import Any, NamedTuple, Self
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from mckibben.arrays import Array
+from mckibben.blocks.bands.band import Band
+from mckibben.blocks.bands.banded import Banded, inside
+from mckibben.blocks.core.block import Block
+from mckibben.blocks.core.commanding import COMMANDS as DRIVES
+from mckibben.blocks.core.commanding import commands
+from mckibben.blocks.core.running import Stream
+from mckibben.control.identified import known_ranges
+from mckibben.errors import DataError, ModelError
+from mckibben.recording import Recording
+from mckibben.signals.checking import generator
+
+COMMAND = "command_"
+"""What commands are called in recordings, and not on plants."""
+
+
+def plain(name: str) -> str:
+    """Return what a plant calls a channel."""
+    return name.removeprefix(COMMAND)
+
+
+class Ends(NamedTuple):
+    """Lowest and highest of a channel."""
+
+    low: float
+    high: float
+
+
+class Twin:
+    """A fitted model as a plant, on which a compensator can be tried as on a rig.
+
+    Parameters
+    ----------
+    model : Block
+        From pressures, or commands, and what is held, to displacements or a force. With a band
+        (`mckibben.calibrate`), outputs scatter as that says.
+    limits : mapping of str to (float, float), optional
+        Lowest and highest pressure [bar], or command, by input; default what the model was identified
+        on, as far as it knows. Commands beyond are clipped.
+    held : mapping of str to float, optional
+        Inputs that nothing drives, such as a load [N], a length [mm] or an extensor's pressure [bar].
+        What a reference gives comes first.
+    sample_time : float, optional
+        Time that a command is held [s]; default the model's own, or 0.02 s.
+    name : str
+        In tables and recordings.
+
+    Raises
+    ------
+    ModelError
+        If the model gives neither displacement nor force, or does not take the sample time.
+    DataError
+        On limits or held values of what is no input, or out of order.
+
+    Examples
+    --------
+    >>> from mckibben import PI
+    >>> from mckibben.control import Twin
+    >>> twin = Twin(PI.example())
+    >>> first = twin.reset()
+    >>> moved = twin.step({"pressure": 3.0})
+    >>> bool(moved[0] == PI.example().simulate([0.0, 3.0])[1])
+    True
+    """
+
+    def __init__(
+        self,
+        model: Block,
+        *,
+        limits: Mapping[str, tuple[float, float]] | None = None,
+        held: Mapping[str, float] | None = None,
+        sample_time: float | None = None,
+        name: str = "twin",
+    ) -> None:
+        self.model, self.name = model, name
+        self.forward = inside(model)
+        outputs = tuple(channel.name for channel in self.forward.outputs)
+        if commands(self.forward) or not all(o.startswith(("displ", "force")) for o in outputs):
+            raise ModelError(
+                f"{self.forward.title!r} gives {', '.join(outputs)}, and loops follow displacements or "
+                "a force. Remedy: give the model of a muscle, not its inverse."
+            )
+        self.outputs = outputs
+        self.inputs = tuple(plain(c.name) for c in self.forward.inputs)
+        own = self.forward.sample_time
+        self.sample_time = float(sample_time or own or 0.02)
+        if own is not None and abs(self.sample_time - own) > 1e-9 * own:
+            raise ModelError(
+                f"{self.forward.title!r} is a model of steps of {own:g} s, and a loop of "
+                f"{self.sample_time:g} s is closed on it. Remedy: resample the reference to that, "
+                "or take a model of any sample time."
+            )
+        self.held = dict(held or {})
+        given = {name: Ends(*map(float, ends)) for name, ends in (limits or {}).items()}
+        for channel in (*given, *self.held):
+            if channel not in self.inputs:
+                raise DataError(
+                    f"{self.forward.title!r} has no such input; it has {', '.join(self.inputs)}",
+                    channel=channel,
+                    remedy="name one of these",
+                )
+        for channel, (low, high) in given.items():
+            if not -np.inf < low < high < np.inf:
+                raise DataError(
+                    f"limits are {low:g} to {high:g}", channel=channel, remedy="give low, then high"
+                )
+        self._given = given
+        known = {plain(n): Ends(*e) for n, e in known_ranges(model).items()}
+        self._limits = known | given
+        self._rest = np.empty(0)
+        self._stream: Stream | None = None
+        self._scatter: _Scatter | None = None
+
+    @property
+    def scatters(self) -> bool:
+        """Whether it has a band."""
+        return isinstance(self.model, Banded)
+
+    def limits(self, name: str) -> Ends:
+        """Return the lowest and highest of an input.
+
+        Raises
+        ------
+        ModelError
+            If neither the model nor its user says.
+        """
+        if name not in self._limits:
+            raise ModelError(
+                f"{self.forward.title!r} does not say how far its {name} may go. Remedy: say it "
+                f"(--limits {name}=LOW:HIGH, or limits={{{name!r}: (low, high)}}), or calibrate it."
+            )
+        return self._limits[name]
+
+    def changed(self, settings: Mapping[str, Any]) -> Self:
+        """Return the same twin with another ``sample_time``, or with ``start.NAME`` of inputs held.
+
+        Raises
+        ------
+        DataError
+            On other settings.
+        ModelError
+            If the model does not take the sample time.
+        """
+        held, step = dict(self.held), self.sample_time
+        for setting, value in settings.items():
+            if setting == "sample_time":
+                step = float(value)
+            elif setting.startswith("start."):
+                held[setting.removeprefix("start.")] = float(value)
+            else:
+                raise DataError(
+                    f"a twin has no setting {setting!r}", remedy="give sample_time, or start.NAME"
+                )
+        return type(self)(
+            self.model, limits=self._given, held=held, sample_time=step, name=self.name
+        )
+
+    def reset(self, seed: int = 0) -> Array:
+        """Bring it to rest, lowest commands and all else as held, and return the first measurement."""
+        self._begin(seed)
+        return self._measured(self._at_rest())
+
+    def step(self, action: ArrayLike | Mapping[str, float]) -> Array:
+        """Hold commands for one sample time and return the next measurement, shape (outputs,).
+
+        Parameters
+        ----------
+        action : array_like, shape (inputs,), or mapping
+            One number an input, in their order; or by name, others staying at rest.
+
+        Raises
+        ------
+        DataError
+            Before `reset`, or on unknown channels or another number of them.
+        ModelError
+            If the model runs away.
+        """
+        if self._stream is None:
+            raise DataError("the twin is not running", remedy="call reset() first")
+        if isinstance(action, Mapping):
+            row = self._rest.copy()
+            for name, value in action.items():
+                if name not in self.inputs:
+                    raise DataError(
+                        "the twin has no such input", channel=name, remedy=", ".join(self.inputs)
+                    )
+                row[self.inputs.index(name)] = value
+        else:
+            row = np.array(action, dtype=np.float64)
+            if row.shape != self._rest.shape:
+                raise DataError(
+                    f"an action has shape {row.shape}", remedy=f"give {', '.join(self.inputs)}"
+                )
+        return self._measured(self._limited(row))
+
+    def run(self, inputs: Recording, seed: int = 0, *, ideal: bool = False) -> Recording:
+        """Run it over a recording of its inputs, as ``model.simulate`` does, with its scatter.
+
+        Parameters
+        ----------
+        inputs : Recording
+            With time; inputs that it lacks are held.
+        seed : int
+            Of the scatter.
+        ideal : bool
+            Without scatter.
+        """
+        twin = self.changed({"sample_time": inputs.sample_time or self.sample_time})
+        twin._begin(seed, ideal=ideal)
+        columns = [
+            inputs[name] if name in inputs else np.full(len(inputs), twin._resting(name))
+            for name in twin.inputs
+        ]
+        found = np.array([twin._measured(twin._limited(row)) for row in np.column_stack(columns)])
+        given = dict(zip(twin.inputs, columns, strict=True))
+        return Recording(
+            given | dict(zip(twin.outputs, found.T, strict=True)),
+            twin.sample_time,
+            start_time=inputs.start_time,
+            meta={"plant": twin.name},
+        )
+
+    def _begin(self, seed: int, *, ideal: bool = False) -> None:
+        rng = generator(seed)
+        self._scatter = None
+        if isinstance(self.model, Banded) and not ideal:
+            self._scatter = _Scatter(self.model.band, self.sample_time, rng)
+            self._stream = Banded(self.forward, self._scatter.wide).stream(self.sample_time)
+        else:
+            self._stream = self.forward.stream(self.sample_time)
+
+    def _at_rest(self) -> Array:
+        self._rest = np.array([self._resting(name) for name in self.inputs])
+        return self._rest
+
+    def _resting(self, name: str) -> float:
+        if name in self.held:
+            return self.held[name]
+        if not name.startswith(DRIVES):
+            raise DataError(
+                "the plant's model needs it, and nothing says what it is",
+                channel=name,
+                remedy=f"add the column to the reference, or say it (held={{{name!r}: ...}})",
+            )
+        return self.limits(name).low
+
+    def _limited(self, row: Array) -> Array:
+        """Clip commands to what the hardware lets through."""
+        for place, name in enumerate(self.inputs):
+            if name.startswith(DRIVES) and name in self._limits and name not in self.held:
+                row[place] = min(max(row[place], self._limits[name].low), self._limits[name].high)
+        return row
+
+    def _measured(self, row: Array) -> Array:
+        assert self._stream is not None
+        found = self._stream.step(row)
+        if self._stream.status != Stream.GOOD:
+            raise ModelError(
+                f"{self.forward.title!r} gives no finite output at {', '.join(f'{x:g}' for x in row)}. "
+                "Remedy: stay where it was identified, or identify it again."
+            )
+        return found.copy() if self._scatter is None else self._scatter.on(found)
+
+
+class _Scatter:
+    """What is drawn beside a model's outputs.
+
+    The band's shift and scale are read off one so wide that neither end is cut off at the model.
+    """
+
+    def __init__(self, band: Band, sample_time: float, rng: np.random.Generator) -> None:
+        shifts, logs = np.array(band.limits)[:, :2], np.array(band.limits)[:, 2]
+        self._times = 1.0 + 2.0 * float((np.abs(shifts).max(axis=1) / np.exp(logs)).max())
+        n = len(band.given)
+        self.wide = replace(band, scores=((self._times, self._times),) * n, level=0.5)
+        self._scores = [np.array(row) for row in band.scores]
+        self._levels = [np.linspace(0.0, 1.0, row.size) for row in self._scores]
+        samples = band.memory / (sample_time if band.times else 1.0)
+        self._keeps = max((samples - 1.0) / (samples + 1.0), 0.0)
+        self._rng, self._now = rng, rng.standard_normal(n)
+
+    def on(self, found: Array) -> Array:
+        """Return a sample of outputs with what is drawn, and move on."""
+        y, lower, upper = found.reshape(-1, 3).T
+        shift, scale = 0.5 * (lower + upper) - y, 0.5 * (upper - lower) / self._times
+        scores = [
+            np.copysign(np.interp(erf(abs(g) / sqrt(2.0)), levels, row), g)
+            for g, levels, row in zip(self._now.tolist(), self._levels, self._scores, strict=True)
+        ]
+        fresh = sqrt(1.0 - self._keeps**2) * self._rng.standard_normal(self._now.size)
+        self._now = self._keeps * self._now + fresh
+        return np.asarray(y + shift + scale * np.array(scores))

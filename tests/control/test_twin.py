@@ -1,0 +1,262 @@
+"""Twins: a fitted model where a plant stands, with the scatter of its band."""
+
+from __future__ import annotations
+
+import json
+import re
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from mckibben import PI, Banded, DataError, ModelError, Recording, Series, load_rig, write
+from mckibben.blocks.bands.band import Band
+from mckibben.blocks.core.block import Block
+from mckibben.blocks.feedback.pid import PIDFeedback
+from mckibben.control import Twin, before, track, tune_pid
+from mckibben.registry import load as registered
+from mckibben.registry import names
+from tests.cli.conftest import Cli
+from tests.cli.conftest import cli as cli  # a fixture
+
+MODEL = PI.example()
+LOW, HIGH = (float(end[0]) for end in MODEL.reachable())
+STEP = 0.02
+SCORES = tuple(np.linspace(0.0, 1.0, 1001) ** 2 * 3.0)
+
+
+def band(memory: float = 0.0, **changes: Any) -> Band:
+    return replace(Band.example(), scores=(SCORES,), memory=memory, **changes)
+
+
+def wave(n: int = 1500) -> Recording:
+    t = np.arange(n) * STEP
+    middle, half = 0.5 * (LOW + HIGH), 0.35 * (HIGH - LOW)
+    return Recording({"displacement": middle + half * np.sin(2 * np.pi * t / 10)}, STEP)
+
+
+def pressures(n: int = 2000) -> Recording:
+    t = np.arange(n) * STEP
+    return Recording({"pressure": 2.5 - 2.4 * np.cos(0.7 * t) * np.cos(0.11 * t)}, STEP)
+
+
+def plants() -> list[Block]:
+    """All examples of blocks that can stand where a muscle stands."""
+    found = []
+    for name in names("blocks"):
+        block = registered("blocks", name).example()
+        moves = all(c.name.startswith(("displacement", "force")) for c in block.outputs)
+        drives = any(c.name.startswith(("pressure", "voltage")) for c in block.inputs)
+        if moves and drives and name not in ("banded", "band", "inverse", "load-estimate"):
+            found.append(block)
+    return found
+
+
+@pytest.mark.parametrize("block", plants(), ids=lambda block: block.kind)
+def test_without_a_band_a_twin_is_simulate_to_the_bit(block: Block) -> None:
+    limits, held = {}, {}
+    for channel in block.inputs:
+        if channel.name.startswith(("pressure", "voltage")):
+            limits[channel.name] = (0.5, 4.5)
+        else:
+            held[channel.name] = {"length": 4.0}.get(channel.name, 2.0)
+    twin = Twin(block, limits=limits, held=held, sample_time=block.sample_time)
+    rest = [0.5 if name in limits else held[name] for name in twin.inputs]
+    rng = np.random.default_rng(1)
+    rows = np.array(
+        [rest, *([held.get(n, rng.uniform(0.5, 4.5)) for n in twin.inputs] for _ in range(60))]
+    )
+    measured = [twin.reset(seed=3), *(twin.step(row) for row in rows[1:])]
+    alone = block.simulate(rows, sample_time=twin.sample_time)
+    np.testing.assert_array_equal(np.array(measured), alone)
+    recording = Recording(dict(zip(twin.inputs, rows.T, strict=True)), twin.sample_time)
+    ran = twin.run(recording)
+    np.testing.assert_array_equal(ran.matrix(twin.outputs), alone)
+
+
+def test_a_band_at_any_level_holds_that_share_of_what_is_drawn() -> None:
+    banded, given = Banded(MODEL, band()), pressures(4000)
+    drawn = Twin(banded).run(given, seed=1)["displacement"]
+    shares = []
+    for level in (0.5, 0.8, 0.9):
+        ends = banded.at(level).simulate(given)
+        inside = (ends["displacement_lower"] <= drawn) & (drawn <= ends["displacement_upper"])
+        shares.append(float(inside.mean()))
+    # a band reaches to the model where that lies outside shift and scale, and so holds a little more
+    assert np.all(np.array(shares) - (0.5, 0.8, 0.9) > -0.025), shares
+    unshifted = Banded(MODEL, band(limits=((0.0, 0.0, -3.0, 1.0),)))
+    drawn = Twin(unshifted).run(given, seed=1)["displacement"]
+    for level in (0.5, 0.8, 0.9):
+        ends = unshifted.at(level).simulate(given)
+        inside = (ends["displacement_lower"] <= drawn) & (drawn <= ends["displacement_upper"])
+        assert float(inside.mean()) == pytest.approx(level, abs=0.025)
+
+
+def test_scatter_stays_alike_as_long_as_misses_did() -> None:
+    held = Recording({"pressure": np.full(20_000, 3.0)}, STEP)
+    ideal = Twin(MODEL).run(held)["displacement"]
+    for memory in (0.0, 0.5, 2.0):
+        errors = Twin(Banded(MODEL, band(memory))).run(held, seed=2)["displacement"] - ideal
+        errors = errors - errors.mean()
+        lags = np.array([errors[k:] @ errors[: len(errors) - k] for k in range(400)]) / (
+            errors @ errors
+        )
+        none = int(np.argmax(lags < 0.05))
+        integral = STEP * (1.0 + 2.0 * lags[1:none].sum())
+        assert integral == pytest.approx(max(memory, STEP), rel=0.3)
+
+
+def test_seeds_of_scatter_mean_something() -> None:
+    twin, given = Twin(Banded(MODEL, band(0.5))), pressures(200)
+    first, again, other = (twin.run(given, seed=seed)["displacement"] for seed in (1, 1, 2))
+    np.testing.assert_array_equal(first, again)
+    assert not np.array_equal(first, other)
+    np.testing.assert_array_equal(
+        twin.run(given, ideal=True)["displacement"], MODEL.simulate(given)["displacement"]
+    )
+    loops = [track(MODEL.inverse(), twin, wave(300), seed=seed, approach=1.0) for seed in (4, 4, 5)]
+    errors = [loop.rmse["displacement"] for loop in loops]
+    assert errors[0] == errors[1] != errors[2]
+
+
+def test_a_compensator_beats_no_compensation_and_says_where_it_proves_nothing() -> None:
+    twin, reference = Twin(MODEL), wave()
+    with_it = track(MODEL.inverse(), twin, reference)
+    without = before(MODEL.inverse(), twin, reference)
+    assert with_it.rmse["displacement"] < 1e-9 * (HIGH - LOW)
+    assert without.tracked is not None
+    assert without.tracked.rmse["displacement"] > 0.02 * (HIGH - LOW)
+    (note,) = without.notes
+    assert re.search(r"very model.*right by construction.*Remedy: .*another model", note)
+    banded = before(MODEL.inverse(), Twin(Banded(MODEL, band())), reference)
+    assert "draws from the band" in " ".join(banded.notes)
+
+
+def test_what_has_no_hysteresis_needs_no_compensation() -> None:
+    straight = PI((0.0,), ((HIGH - LOW) / 5.0,), LOW, (0.0, 5.0))
+    found = before(straight.inverse(), Twin(straight), wave(500))
+    assert found.tracked is not None
+    assert found.tracked.rmse["displacement"] < 1e-6
+
+
+@pytest.mark.parametrize(
+    ("size", "pressure", "words"),
+    [(1.0, 5.0, ""), (1.1, 5.0, ""), (2.0, 5.0, "in a slow rise"), (1.0, 3.0, "takes 0 to 3")],
+)
+def test_a_plant_of_other_dimensions_is_told(size: float, pressure: float, words: str) -> None:
+    """A specimen 10 % off is one's own muscle; one of twice the stroke, or another range, is not."""
+    weights = tuple(size * weight * 1.001 for weight in MODEL.weights)
+    plant = Twin(replace(MODEL, weights=weights), limits={"pressure": (0.0, pressure)})
+    notes = " ".join(before(MODEL.inverse(), plant, wave(300), approach=1.0).notes)
+    assert (words in notes) if words else not notes
+
+
+def test_several_muscles_of_a_twin_are_tracked_together() -> None:
+    model = registered("blocks", "per-channel").example()
+    twin = Twin(model)
+    t = np.arange(500) * STEP
+    motion = {}
+    for k, (low, high) in enumerate(zip(*model.reachable(), strict=True)):
+        motion[f"displacement_{k + 1}"] = 0.5 * (low + high) + 0.4 * (high - low) * np.sin(t + k)
+    wanted = Recording(motion, STEP)
+    found = track(model.inverse(), twin, wanted, approach=2.0)
+    assert max(found.rmse.values()) < 1e-9
+    without = before(model.inverse(), twin, wanted, approach=2.0).tracked
+    assert without is not None
+    assert min(without.rmse.values()) > 0.1
+
+
+def test_pid_is_tuned_on_a_twin() -> None:
+    lagging = Series((MODEL, registered("blocks", "creep").example()))
+    pid = tune_pid(Twin(lagging), sample_time=STEP)
+    assert isinstance(pid, PIDFeedback)
+    assert track(pid, Twin(lagging), wave()).rmse["displacement"] < 0.2 * (HIGH - LOW)
+
+
+def test_bad_twins_are_refused() -> None:
+    with pytest.raises(ModelError, match=r"gives pressure.*not its inverse"):
+        Twin(MODEL.inverse())
+    with pytest.raises(DataError, match="no such input"):
+        Twin(MODEL, limits={"voltage": (0, 1)})
+    with pytest.raises(DataError, match="low, then high"):
+        Twin(MODEL, limits={"pressure": (3, 1)})
+    with pytest.raises(DataError, match="no setting 'payload'"):
+        Twin(MODEL).changed({"payload": 3.0})
+    with pytest.raises(DataError, match=r"call reset\(\) first"):
+        Twin(MODEL).step([1.0])
+    unbounded = Twin(replace(MODEL, input_range=None))
+    with pytest.raises(ModelError, match="how far its pressure may go"):
+        unbounded.reset()
+    discrete = registered("blocks", "transfer-function").example()
+    with pytest.raises(ModelError, match=r"steps of 0.01 s.*resample"):
+        Twin(discrete, sample_time=0.02)
+    assert Twin(discrete).sample_time == 0.01
+    law = registered("blocks", "tondu-lopez").example()
+    with pytest.raises(DataError, match=r"channel 'length'.*held"):
+        Twin(law, limits={"pressure": (0.0, 4.0)}).reset()
+
+
+def test_a_compensator_is_tried_on_ones_own_muscle(cli: Cli, tmp_path: Path) -> None:
+    inverse, model, other = (tmp_path / f"{name}.json" for name in ("inverse", "model", "other"))
+    MODEL.inverse().save(inverse)
+    Banded(MODEL, band()).save(model)
+    replace(MODEL, weights=tuple(3 * weight for weight in MODEL.weights)).save(other)
+    write(wave(400), tmp_path / "wished.csv")
+    asked = ["--reference", tmp_path / "wished.csv", "--approach", 1]
+    result = cli("track", inverse, "--plant", model, *asked, "--json")
+    assert result.code == 0, result.err
+    found = json.loads(result.out)
+    assert found["plant"] == {"name": "model", "virtual_rig": False}
+    assert found["rmse"]["displacement"] > 0.01
+    assert found["uncompensated"]["rmse"]["displacement"] > found["rmse"]["displacement"]
+    assert "draws from the band" in found["notes"][0]
+    result = cli("track", inverse, "--plant", other, *asked)
+    assert result.code == 0, result.err
+    said = " ".join(result.out.split())
+    assert "no compensation" in said
+    assert "it may be of another muscle" in said
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ([], "tried on one plant"),
+        (["--plant", "model.json", "--rig", "mas20-hanging"], "tried on one plant"),
+        (["--rig", "mas20-hanging", "--limits", "pressure=0:3"], "limits of its own"),
+        (["--plant", "model.json", "--limits", "pressure=0:3:1"], "two numbers"),
+        (["--plant", "model.json", "--limits", "pressure=3:0"], "low, then high"),
+        (["--plant", "model.json", "--limits", "voltage=0:3"], "no such input"),
+        (["--plant", "inverse.json"], "not its inverse"),
+        (["--plant", "absent.json"], "absent.json"),
+        (["--plant", "discrete.json"], "steps of 0.01 s"),
+        (["--plant", "model.json", "--seed", "-1"], "seed"),
+    ],
+)
+def test_bad_plants_are_one_sentence(
+    cli: Cli, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, options: list[str], words: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    MODEL.save("model.json")
+    MODEL.inverse().save("inverse.json")
+    registered("blocks", "transfer-function").example().save("discrete.json")
+    write(wave(100), tmp_path / "wished.csv")
+    result = cli("track", "inverse.json", "--reference", "wished.csv", *options)
+    assert result.code == 2
+    assert words in " ".join(result.err.split())
+    assert "Traceback" not in result.err
+
+
+def test_an_unpaired_plant_says_why_nothing_stands_beside() -> None:
+    block = registered("blocks", "coupled-memory").example()
+    twin = Twin(block, limits={"pressure_1": (0, 4), "pressure_2": (0, 4)})
+    wanted = Recording({"displacement_1": np.full(50, 3.0)}, STEP)
+    found = before(MODEL.inverse(), twin, wanted, approach=0.2)
+    assert found.tracked is None
+    assert "2 commands move 1 displacements" in " ".join(found.notes)
+
+
+def test_rigs_stand_beside_no_compensation_too() -> None:
+    found = before(MODEL.inverse(), load_rig("rail").changed({}), wave(100), approach=0.5)
+    assert found.tracked is not None

@@ -18,7 +18,7 @@ from mckibben.comparison.free_run import measured_start
 from mckibben.errors import ModelWarning
 from mckibben.recording import Recording
 from mckibben.studying.log import COMMAND, REFERENCE, Loop, scored
-from mckibben.studying.shifts import HALF, Delay, dead_time, most_samples, shifted
+from mckibben.studying.shifts import EARLY, Delay, dead_time, most_samples, shifted
 
 SAME = 0.01
 """Of the range, root mean square: up to it, commands are what the compensator gives."""
@@ -111,11 +111,11 @@ def chain(loop: Loop, log: Recording) -> Chain:
         late, dead = meant, np.zeros(len(names))
         if wanted is not None and judged_by:
             shifts = [dead_time(w, p, step) for w, p in zip(wanted.T, measured.T, strict=True)]
-            dead = np.array([s if s - half > HALF else 0.0 for s, half, _ in shifts])
+            dead = np.array([s if s - half > EARLY else 0.0 for s, half, _ in shifts])
             late = np.column_stack([shifted(w, d) for w, d in zip(wanted.T, dead, strict=True)])
             delays = [
-                Delay(f"{name} after {judged_by}", s * step, _interval(s, half, step), lag * step)
-                for name, (s, half, lag) in zip(names, shifts, strict=True)
+                Delay(f"{name} after {judged_by}", s * step, _interval(s, half, d, step), lag * step)
+                for name, (s, half, lag), d in zip(names, shifts, dead, strict=True)
                 if np.isfinite(half)
             ]
         own, moved = through(meant, start)[:, places], through(late, start)[:, places]
@@ -162,8 +162,8 @@ def chain(loop: Loop, log: Recording) -> Chain:
     )
 
 
-def _interval(samples: float, half: float, step: float) -> tuple[float, float]:
-    return (max(samples - half, 0.0) * step, (samples + half) * step)
+def _interval(samples: float, half: float, dead: float, step: float) -> tuple[float, float]:
+    return (max(samples - half, 0.0) * step if dead else 0.0, (samples + half) * step)
 
 
 def _start(loop: Loop, given: Recording) -> list[float]:
@@ -259,7 +259,9 @@ def _wanted(
 
     Of the two, what they follow closer: an inner loop of pressure sends commands that overdo.
     """
-    found = [(kind, w) for kind, w in (("compensator", asked), ("command", sent)) if w is not None]
+    found = [] if asked is None else [("compensator", asked)]
+    if sent is not None:  # it may be logged beside what was measured before it
+        found += [("command", sent), ("command", shifted(sent, 1))]
     if not found:
         return None, ""
     kind, wanted = min(found, key=lambda pair: float(np.mean((pair[1] - measured) ** 2)))

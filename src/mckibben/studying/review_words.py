@@ -68,7 +68,10 @@ def sentences(review: Review) -> list[str]:
         found += [
             f"{about}{_cause(one, cause)}." for cause in one.causes if abs(cause.share) >= NOTABLE
         ]
-    found += [f"{_delay(delay)}." for delay in delays(review)]
+    late = [delay for delay in delays(review) if delay.certain]
+    found += [f"{_delay(delay)}." for delay in late]
+    if not late:
+        found.append(_none_late(delays(review)))
     if review.refit is not None:
         found.append(review.refit if isinstance(review.refit, str) else refit(review.refit))
     return found
@@ -92,6 +95,13 @@ def _delay(delay: Delay) -> str:
     lag = f", beside a lag of {numeral(1000 * delay.lag, 2)} ms" if delay.lag > 0 else ""
     between = "" if low == high else f" (95 %: {low} to {high})"
     return f"{said} by {numeral(1000 * delay.seconds, 2)} ms{between}{lag}"
+
+
+def _none_late(tried: Sequence[Delay]) -> str:
+    if not tried:
+        return "No delay can be told from this log."
+    said = [f"{d.where} by {numeral(1000 * d.interval[1], 2)} ms at most" for d in tried]
+    return f"No delay is certain: {', '.join(said)} (95 %)."
 
 
 def refit(found: Refit) -> str:
@@ -163,8 +173,8 @@ def notes(review: Review, loop: Loop) -> tuple[str, ...]:
         )
     elif review.judged_by == "compensator" and not any("command" in d.where for d in review.delays):
         found.append(
-            "Pressures are compared with what the compensator gives for the reference, which they "
-            "follow closer than the commands, if any are logged."
+            "Measured pressures are compared with what the compensator gives for the reference, not "
+            "with commands: there are none, or an inner loop of pressure makes them overdo."
         )
     return tuple(found)
 

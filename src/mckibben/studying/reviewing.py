@@ -53,7 +53,7 @@ class Followed:
     missing : tuple of str
         What the model misses, in words, most important first.
     time, reference, measured : array, shape (n,)
-        At the scored samples of all logs.
+        At the scored samples of all logs, which follow one another.
     """
 
     output: str
@@ -268,7 +268,7 @@ def _followed(
         causes=(),
         delays=() if late is None else (late,),
         missing=tuple(review_words.missing(one)),
-        time=np.concatenate([c.log.time[c.rows] for c in chains]),
+        time=_time(chains),
         reference=reference,
         measured=measured,
     )
@@ -281,11 +281,16 @@ def _missed(
 ) -> dict[str, Array]:
     """Return what the model misses of one output, split by what it follows; the rest is noise."""
     residual = np.concatenate([run.residual[:, place] for run in runs])
-    columns: dict[str, list[int]] = {"model": list(_columns(table, "offset", ""))}
-    for each in one.missing:
+    level = list(_columns(table, "offset", ""))
+    columns: dict[str, list[int]] = {}
+    for each in (*one.missing, *(slow for slow in one.slow if slow.kind == "drift")):
         if each.kind != "offset":
+            # a curve and a drift have a level of their own, and share it where there are both
             kind = CAUSE_OF.get(each.kind, "model")
-            columns.setdefault(kind, []).extend(_columns(table, each.kind, each.channel))
+            columns.setdefault(kind, [] if kind == "delay" else [*level])
+            columns[kind].extend(_columns(table, each.kind, each.channel))
+    if not columns.keys() & {"model", "drift"}:
+        columns["model"] = level
     whole = np.concatenate(table.tables)
     averages = np.concatenate([averaged(r.residual[:, place], table.every) for r in runs])
     found = explained(averages, {kind: whole[:, own] for kind, own in columns.items()})
@@ -331,8 +336,9 @@ def _delay(
     pieces = []
     for run, moved, part in zip(runs, late, table.tables, strict=True):
         left = averaged(run.measured[:, place] - moved, table.every)
-        slope = averaged(-np.gradient(moved), table.every)
-        pieces.append((left, np.column_stack([part[:, others], slope])))
+        # a gain that is wrong is no delay, however the loop bends
+        beside = averaged(np.column_stack([moved, -np.gradient(moved)]), table.every)
+        pieces.append((left, np.column_stack([part[:, others], beside])))
     whole = np.concatenate([columns for _, columns in pieces])
     weights = np.linalg.pinv(whole, rcond=1e-9)[-1]
     more = float(weights @ np.concatenate([left for left, _ in pieces]))
@@ -344,6 +350,14 @@ def _delay(
         samples * step,
         ((samples - NORMAL * sure) * step, (samples + NORMAL * sure) * step),
     )
+
+
+def _time(chains: Sequence[Chain]) -> Array:
+    """Return the time of the scored samples [s]; of several logs, as if one followed the other."""
+    if len(chains) == 1:
+        return np.asarray(chains[0].log.time[chains[0].rows])
+    steps = [np.full(int(c.rows.sum()), c.log.sample_time) for c in chains]
+    return np.asarray(np.cumsum(np.concatenate(steps)))
 
 
 def _rms(values: Array) -> float:

@@ -24,8 +24,8 @@ LOOKED_AT = 20_000
 BLOCKS, STUDENT = 20, 2.09
 """Blocks whose sums tell how sure a dead time is, and Student's quantile of 95 % for so many."""
 
-HALF = 0.5
-"""Samples from which a dead time is one."""
+EARLY = 1.0
+"""Samples by which a command may be logged before it acts; a longer dead time is one."""
 
 STEP = 0.05
 """Samples by which dead time and lag are moved to see what that changes."""
@@ -106,12 +106,14 @@ def dead_time(wanted: Array, got: Array, step: float) -> tuple[float, float, flo
     late = np.unique(np.round(np.concatenate([[0], np.geomspace(1, most, 16)])))
     lags = np.concatenate([[0.0], np.geomspace(0.5, most, 12)])
     grid = [(float(np.sum(left(np.array([d, t])) ** 2)), d, t) for d in late for t in lags]
-    _, *start = min(grid)
     bounds = ([0.0, 0.0], [float(most), 4.0 * most])
-    inside = np.clip(start, 1e-3, np.array(bounds[1]) - 1e-3)
-    found = least_squares(left, inside, bounds=bounds, diff_step=STEP, x_scale=[1.0, 1.0]).x
-    if float(np.sum(left(found) ** 2)) > min(grid)[0]:
-        found = np.array(start, dtype=float)
+    # a lag between those of the grid looks like a dead time, so a start without one is tried too
+    tried = [min(grid), min(point for point in grid if point[1] == 0)]
+    for _, *start in tuple(tried):
+        begun = np.clip(start, 1e-3, np.array(bounds[1]) - 1e-3)
+        place = least_squares(left, begun, bounds=bounds, diff_step=STEP).x
+        tried.append((float(np.sum(left(place) ** 2)), *map(float, place)))
+    found = np.array(min(tried)[1:])
     slopes = [
         (left(found + move) - left(np.maximum(found - move, 0))) / np.sum(move + np.minimum(move, found))
         for move in np.diag([STEP, STEP])

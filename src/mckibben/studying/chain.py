@@ -18,10 +18,13 @@ from mckibben.comparison.free_run import measured_start
 from mckibben.errors import ModelWarning
 from mckibben.recording import Recording
 from mckibben.studying.log import COMMAND, REFERENCE, Loop, scored
-from mckibben.studying.shifts import EARLY, Delay, dead_time, most_samples, shifted
+from mckibben.studying.shifts import EARLY, Delay, dead_time, lagged, most_samples, shifted
 
 SAME = 0.01
 """Of the range, root mean square: up to it, commands are what the compensator gives."""
+
+EQUAL = 1e-3
+"""Of the deviation, likewise: beyond it, something else is in the commands."""
 
 HELD = 3
 """Samples in a row at an extreme from which a command is at a limit."""
@@ -78,6 +81,7 @@ def chain(loop: Loop, log: Recording) -> Chain:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ModelWarning)
         wished = log.matrix(REFERENCE + name for name in loop.outputs)
+        span = np.maximum(np.ptp(wished, axis=0), np.finfo(float).tiny)
         places = [[c.name for c in model.outputs].index(name) for name in loop.outputs]
         sent, asked = _sent(log, names), _asked(loop, log)
         low, high = _rails(sent, asked, wished)
@@ -107,46 +111,48 @@ def chain(loop: Loop, log: Recording) -> Chain:
             limits |= (np.abs(np.clip(asked, low, high) - asked) > ROUNDING).any(axis=1)
         delays = []
         meant = measured if wanted is None else wanted
-        from_rest = through(meant)
-        late, dead = meant, np.zeros(len(names))
-        if wanted is not None and judged_by:
-            shifts = [dead_time(w, p, step) for w, p in zip(wanted.T, measured.T, strict=True)]
+        dead = lags = np.zeros(len(names))
+        if judged_by:
+            shifts = [dead_time(w, p, step) for w, p in zip(meant.T, measured.T, strict=True)]
             dead = np.array([s if s - half > EARLY else 0.0 for s, half, _ in shifts])
-            late = np.column_stack([shifted(w, d) for w, d in zip(wanted.T, dead, strict=True)])
+            lags = np.array([lag for _, _, lag in shifts])
             delays = [
                 Delay(f"{name} after {judged_by}", s * step, _interval(s, half, d, step), lag * step)
                 for name, (s, half, lag), d in zip(names, shifts, dead, strict=True)
                 if np.isfinite(half)
             ]
-        own, moved = through(meant, start)[:, places], through(late, start)[:, places]
+        base, unanswered = meant, measured
+        if allowed is not None and judged_by != "compensator":
+            # as the pressures would have been without feedback, through the same actuator
+            base = allowed
+            unanswered = measured - _acted(meant, dead, lags) + _acted(allowed, dead, lags)
+        late = _acted(base, dead, np.zeros(len(names)))
+        open_loop, own, moved = (through(p, start)[:, places] for p in (unanswered, base, late))
+        from_rest = through(base)[:, places]
+        answer = modelled[:, places] - open_loop
+        foreseen = from_rest - wished
         links = {
-            "actuator": modelled[:, places] - moved,
+            "actuator": open_loop - moved,
             "delay": moved - own,
-            "model": own - from_rest[:, places],  # of how its memory was at the start
+            "model": own - from_rest,  # of how its memory was at the start
         }
-        foreseen = from_rest[:, places] - wished
-        predicted = foreseen
-        feedback = False
         if lead < 0:
             delays.append(Delay("command after reference", -lead * step, (-lead * step,) * 2))
-        if allowed is None or asked is None:
+            tardy = shifted(wished, -lead) - wished
+            links["delay"], answer = links["delay"] + tardy, answer - tardy
+        if asked is None:
             links["limits"] = foreseen * limits[:, np.newaxis]
-            links["feedback"] = foreseen - links["limits"]
+            links["feedback"] = answer + foreseen - links["limits"]
         else:
-            free, clipped = through(asked)[:, places], through(allowed)[:, places]
-            predicted = clipped - wished
-            reach = free - wished
-            span = np.maximum(np.ptp(wished, axis=0), np.finfo(float).tiny)
+            reach = through(asked)[:, places] - wished
             limits |= loop.exact & (np.abs(reach) > SAME * span).any(axis=1)
             links["compensator"] = reach * (not loop.exact)
-            links["limits"] = predicted - links["compensator"]
-            rest = from_rest[:, places] - clipped
-            tardy = (shifted(wished, -lead) - wished) if lead < 0 else np.zeros_like(wished)
-            if judged_by != "compensator":
-                links["delay"] = links["delay"] + tardy
-                links["feedback"] = rest - tardy
-                spread = np.sqrt(np.mean((rest - tardy) ** 2, axis=0))
-                feedback = bool((spread > SAME * span).any())
+            links["limits"] = foreseen - links["compensator"]
+            links["feedback"] = answer
+        feedback = timed is not None
+        if timed is not None and allowed is not None:
+            differs = np.sqrt(np.mean((timed - allowed)[1:] ** 2, axis=0))
+            feedback = bool((differs > EQUAL * np.std(allowed, axis=0)).any())
     rows = scored(log)
     return Chain(
         log=log,
@@ -154,12 +160,18 @@ def chain(loop: Loop, log: Recording) -> Chain:
         rows=rows,
         modelled=modelled,
         links=links,
-        predicted=predicted,
+        predicted=foreseen,
         delays=tuple(delays),
         clipped=int(np.sum(limits & rows)),
         judged_by=judged_by,
         feedback=feedback,
     )
+
+
+def _acted(pressures: Array, dead: Array, lags: Array) -> Array:
+    """Return what comes of pressures through dead times and lags [samples]."""
+    columns = zip(pressures.T, dead, lags, strict=True)
+    return np.column_stack([lagged(shifted(p, d), lag) for p, d, lag in columns])
 
 
 def _interval(samples: float, half: float, dead: float, step: float) -> tuple[float, float]:
@@ -247,7 +259,7 @@ def _lead(sent: Array, asked: Array, step: float) -> int:
 
     best = min(range(-most, most + 1), key=lambda lead: (left(lead), abs(lead)))
     size = float(np.std(asked[inner]))
-    return best if left(best) < 0.5 * left(0) or left(best) <= SAME * size else 0
+    return best if left(best) <= SAME * size else 0  # feedback, too, may be ahead
 
 
 def _wanted(
@@ -259,12 +271,13 @@ def _wanted(
 
     Of the two, what they follow closer: an inner loop of pressure sends commands that overdo.
     """
-    found = [] if asked is None else [("compensator", asked)]
-    if sent is not None:  # it may be logged beside what was measured before it
-        found += [("command", sent), ("command", shifted(sent, 1))]
-    if not found:
-        return None, ""
-    kind, wanted = min(found, key=lambda pair: float(np.mean((pair[1] - measured) ** 2)))
-    if sent is not None and asked is not None and np.allclose(sent, asked, atol=1e-6):
-        kind = "command"
+    if sent is None:
+        return asked, "" if asked is None else "compensator"
+    if asked is None:
+        return sent, "command"
+    if np.sqrt(np.mean((sent - asked) ** 2)) <= SAME * np.std(asked):
+        return sent, "command"
+    # a command may be logged beside what was measured before it acted
+    tried = [("compensator", asked), ("command", sent), ("command", shifted(sent, EARLY))]
+    kind, wanted = min(tried, key=lambda pair: float(np.mean((pair[1] - measured) ** 2)))
     return wanted, kind

@@ -152,7 +152,7 @@ def told(one: Followed, check: OutputCheck, chains: Sequence[Chain]) -> dict[str
         "drift": "what the model misses changes slowly over the log",
         "limits": f"{clipped} of {n} samples are at a limit of pressure, or their reference is out of "
         "reach",
-        "feedback": "pressures asked for are others than model and compensator say",
+        "feedback": "what it asks for is not what the model would need, or comes too late",
         "compensator": "it is not the inverse of this model",
     }
 
@@ -160,11 +160,12 @@ def told(one: Followed, check: OutputCheck, chains: Sequence[Chain]) -> dict[str
 def notes(review: Review, loop: Loop) -> tuple[str, ...]:
     """Return what to know of a log before believing what is said of it."""
     found = []
-    if review.feedback or (not loop.known and review.judged_by != "compensator"):
+    if review.feedback or not loop.known:
         found.append(
-            "This loop had feedback, or may have had: it answers noise and faults with pressure, so that "
-            "the model's part looks smaller or larger than it is, and a model fitted to this log is "
-            "biased. An open-loop run of the same motion tells more."
+            "Commands are others than a compensator alone gives, as with feedback. Feedback answers "
+            "noise and faults with pressure, so that the model's part may look smaller or larger than "
+            "it is, and a model fitted to this log may be biased. An open-loop run of the same motion "
+            "tells more."
         )
     if not review.judged_by:
         found.append(

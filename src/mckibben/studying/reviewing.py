@@ -16,6 +16,7 @@ from mckibben.recording import Recording
 from mckibben.studying import review_words
 from mckibben.studying.causes import Cause, explained, shares
 from mckibben.studying.chain import Chain, chain
+from mckibben.studying.closed import closed
 from mckibben.studying.log import Loop, has_reference, loop_of
 from mckibben.studying.refitting import Refit, refitted
 from mckibben.studying.shifts import Delay, shifted
@@ -273,6 +274,8 @@ def _followed(
         measured=measured,
     )
     told = review_words.told(partial, one, chains)
+    if len(chains) == 1 and any(c.feedback for c in chains):
+        signals = closed(signals) or signals
     return replace(partial, causes=shares(signals, told))
 
 

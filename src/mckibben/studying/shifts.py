@@ -27,6 +27,9 @@ BLOCKS, STUDENT = 20, 2.09
 EARLY = 1.0
 """Samples by which a command may be logged before it acts; a longer dead time is one."""
 
+SHORTEST_LAG = 1e-3
+"""Samples below which a lag is none."""
+
 STEP = 0.05
 """Samples by which dead time and lag are moved to see what that changes."""
 
@@ -74,6 +77,14 @@ def shifted(x: Array, samples: float) -> Array:
     high = np.minimum(low + 1, len(x) - 1)
     share = (at - low).reshape(-1, *[1] * (x.ndim - 1))
     return np.asarray(x[low] * (1 - share) + x[high] * share)
+
+
+def lagged(x: Array, samples: float) -> Array:
+    """Return a signal through a first-order lag of a time constant, shape (n,), at rest before it."""
+    from scipy.signal import lfilter
+
+    keep = np.exp(-1 / samples) if samples > SHORTEST_LAG else 0.0
+    return np.asarray(lfilter([1 - keep], [1.0, -keep], x, zi=[keep * x[0]])[0])
 
 
 def most_samples(n: int, step: float) -> int:
@@ -128,11 +139,7 @@ def dead_time(wanted: Array, got: Array, step: float) -> tuple[float, float, flo
 
 
 def _left(wanted: Array, got: Array, late: float, lag: float) -> Array:
-    from scipy.signal import lfilter
-
-    x = shifted(wanted, late)
-    keep = np.exp(-1 / lag) if lag > 1e-3 else 0.0
-    x = lfilter([1 - keep], [1.0, -keep], x, zi=[keep * x[0]])[0]
+    x = lagged(shifted(wanted, late), lag)
     x = x - x.mean()
     about = got - got.mean()
     return np.asarray(about - _on(x, about))

@@ -1,4 +1,4 @@
-"""Figures of a log looked back on: what was wished for, what came, and what the difference is made of."""
+"""Figures of a log looked back on: what was wished for, what came, and what the error is made of."""
 
 from __future__ import annotations
 

@@ -1,9 +1,9 @@
 """Causes of an error, each with its share, so that the shares add up to the whole.
 
-The error is a sum of signals, one to a cause. The share of a cause is the mean, over all orders in which
-causes are put right one after the other, of what that takes away from the mean square: its Shapley value.
-Of a sum of signals this is the mean of the cause's signal times the error, over the error's mean square;
-it is negative where a cause works against the others.
+The error is a sum of signals, one to a cause. The share of a cause is the mean, over all orders in
+which causes are put right one after the other, of what that takes away from the mean square: its
+Shapley value. Of a sum of signals this is the mean of the cause's signal times the error, over the
+error's mean square; it is negative where a cause works against the others.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """From what was wished for to what was measured: the error as a sum, link by link.
 
 With M the model, running free, the error is what the model misses of the measured pressures (y − M[p]),
-and what these do otherwise than the wanted ones (M[p] − M[w]), and what the wanted ones do otherwise than
-was wished for (M[w] − r).
+what feedback does to these (M[p] − M[q]), what they do otherwise than the wanted ones (M[q] − M[w]), and
+what the wanted ones do otherwise than was wished for (M[w] − r).
 """
 
 from __future__ import annotations
@@ -117,7 +117,9 @@ def chain(loop: Loop, log: Recording) -> Chain:
             dead = np.array([s if s - half > EARLY else 0.0 for s, half, _ in shifts])
             lags = np.array([lag for _, _, lag in shifts])
             delays = [
-                Delay(f"{name} after {judged_by}", s * step, _interval(s, half, d, step), lag * step)
+                Delay(
+                    f"{name} after {judged_by}", s * step, _interval(s, half, d, step), lag * step
+                )
                 for name, (s, half, lag), d in zip(names, shifts, dead, strict=True)
                 if np.isfinite(half)
             ]

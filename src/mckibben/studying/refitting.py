@@ -204,4 +204,3 @@ def _covered(old: Block, recordings: Sequence[Recording], name: str) -> float:
     low = max(min(float(one[name].min()) for one in recordings), known[0])
     high = min(max(float(one[name].max()) for one in recordings), known[1])
     return max(high - low, 0.0) / (known[1] - known[0])
-

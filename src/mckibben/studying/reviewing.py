@@ -1,4 +1,4 @@
-"""Back from a robot's log: predicted error against achieved error, and where the difference comes from."""
+"""Back from a robot's log: predicted against achieved error, and where the difference comes from."""
 
 from __future__ import annotations
 
@@ -279,9 +279,7 @@ def _followed(
     return replace(partial, causes=shares(signals, told))
 
 
-def _missed(
-    table: Suspects, runs: Sequence[Run], one: OutputCheck, place: int
-) -> dict[str, Array]:
+def _missed(table: Suspects, runs: Sequence[Run], one: OutputCheck, place: int) -> dict[str, Array]:
     """Return what the model misses of one output, split by what it follows; the rest is noise."""
     residual = np.concatenate([run.residual[:, place] for run in runs])
     level = list(_columns(table, "offset", ""))
@@ -321,9 +319,7 @@ def _spread(blocks: Array, n: int, every: int) -> Array:
     return np.asarray(np.interp(np.arange(n), middles, blocks))
 
 
-def _delay(
-    table: Suspects, runs: Sequence[Run], one: OutputCheck, place: int
-) -> Delay | None:
+def _delay(table: Suspects, runs: Sequence[Run], one: OutputCheck, place: int) -> Delay | None:
     """Return how much later measured motion is than modelled motion, beside what else is missed."""
     group, step = table.of("lag"), one.sample_time
     if group is None or step is None or one.exact:
@@ -365,4 +361,3 @@ def _time(chains: Sequence[Chain]) -> Array:
 
 def _rms(values: Array) -> float:
     return float(np.sqrt(np.mean(values**2)))
-

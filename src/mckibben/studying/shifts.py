@@ -112,7 +112,8 @@ def dead_time(wanted: Array, got: Array, step: float) -> tuple[float, float, flo
         return 0.0, float("inf"), 0.0
 
     def left(place: Array) -> Array:
-        return _left(wanted, got, float(place[0]), float(place[1]))
+        # what was on its way when the log began is not known
+        return _left(wanted, got, float(place[0]), float(place[1]), most)
 
     late = np.unique(np.round(np.concatenate([[0], np.geomspace(1, most, 16)])))
     lags = np.concatenate([[0.0], np.geomspace(0.5, most, 12)])
@@ -126,7 +127,8 @@ def dead_time(wanted: Array, got: Array, step: float) -> tuple[float, float, flo
         tried.append((float(np.sum(left(place) ** 2)), *map(float, place)))
     found = np.array(min(tried)[1:])
     slopes = [
-        (left(found + move) - left(np.maximum(found - move, 0))) / np.sum(move + np.minimum(move, found))
+        (left(found + move) - left(np.maximum(found - move, 0)))
+        / np.sum(move + np.minimum(move, found))
         for move in np.diag([STEP, STEP])
     ]
     own = slopes[0] - _on(slopes[1], slopes[0]) if found[1] > STEP else slopes[0]
@@ -138,10 +140,10 @@ def dead_time(wanted: Array, got: Array, step: float) -> tuple[float, float, flo
     return float(found[0]), float(half), float(found[1])
 
 
-def _left(wanted: Array, got: Array, late: float, lag: float) -> Array:
-    x = lagged(shifted(wanted, late), lag)
+def _left(wanted: Array, got: Array, late: float, lag: float, start: int) -> Array:
+    x = lagged(shifted(wanted, late), lag)[start:]
     x = x - x.mean()
-    about = got - got.mean()
+    about = got[start:] - got[start:].mean()
     return np.asarray(about - _on(x, about))
 
 

@@ -161,6 +161,9 @@ def study(
         On recordings that cannot be used.
     """
     recordings, tests = listed(train), listed(test)
+    reviewed = None
+    if model is not None or compensator is not None:
+        reviewed = review([*recordings, *tests], model=model, compensator=compensator, seed=seed)
     plan = plan_of(
         recordings,
         tests,
@@ -195,11 +198,7 @@ def study(
         load=load,
         notes=(*notes, *plan.notes),
         untold=untold(recordings, channels.inputs, channels.outputs, tests=tests),
-        review=(
-            None
-            if model is None and compensator is None
-            else review([*recordings, *tests], model=model, compensator=compensator, seed=seed)
-        ),
+        review=reviewed,
     )
     if found is not None:
         found(so_far)

@@ -62,7 +62,7 @@ class Helped(Controller):
         return np.array([self._stream.step(self._last)[0] + KP * error + self._sum])
 
 
-def logged(seed: int = 0, feedback: bool = False, **faults: float) -> tuple[Recording, float]:
+def logged(seed: int = 0, *, feedback: bool = False, **faults: float) -> tuple[Recording, float]:
     """Return the log of a loop with faults, and the RMSE that the loop itself reckoned."""
     plant = Faulty(MUSCLE, **faults)  # type: ignore[arg-type]
     controller = Helped() if feedback else MUSCLE.inverse()
@@ -90,7 +90,7 @@ def test_the_cause_that_was_put_in_is_named_first(cause: str, seed: int) -> None
 
 @pytest.mark.parametrize("cause", ["noise", "model", "actuator", "delay"])
 def test_behind_feedback_the_cause_is_named_too(cause: str) -> None:
-    log, _ = logged(0, True, **FAULTS[cause])
+    log, _ = logged(0, feedback=True, **FAULTS[cause])
     found = review(log, model=MUSCLE, refit=False)
     shares = {c.kind: c.share for c in found.outputs[0].causes}
     assert max(shares, key=lambda kind: shares[kind]) == cause

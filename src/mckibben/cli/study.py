@@ -55,11 +55,7 @@ def study(
 
     folder = make_folder(out)
     with stoppable(folder):
-        ran = {
-            name: saved(path)
-            for name, path in (("model", model), ("compensator", compensator))
-            if path is not None
-        }
+        ran = [None if path is None else saved(path) for path in (model, compensator)]
         given = [path for path in (model, compensator) if path is not None]
         begun = asked.begin(files, reading, folder, study_files, beside=given)
         from mckibben.recording import notes_by_file
@@ -77,7 +73,8 @@ def study(
             done = find(
                 *begun.recordings,
                 **begun.given,
-                **ran,
+                model=ran[0],
+                compensator=ran[1],
                 rig=rig,
                 progress=told(tell, "inverting and drawing"),
                 found=found,

@@ -1,8 +1,8 @@
 """From what was wished for to what was measured: the error as a sum, link by link.
 
-With M the model, running free, the error is what the model misses of the measured pressures (y − M[p]),
-what feedback does to these (M[p] − M[q]), what they do otherwise than the wanted ones (M[q] − M[w]), and
-what the wanted ones do otherwise than was wished for (M[w] − r).
+With M the model, running free, the error is what the model misses of the measured pressures
+(y − M[p]), what feedback does to these (M[p] − M[q]), what they do otherwise than the wanted ones
+(M[q] − M[w]), and what the wanted ones do otherwise than was wished for (M[w] − r).
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from mckibben.arrays import Array
 from mckibben.comparison.free_run import measured_start
 from mckibben.errors import ModelWarning
 from mckibben.recording import Recording
+from mckibben.studying.closed import TAPS
 from mckibben.studying.log import COMMAND, REFERENCE, Loop, scored
 from mckibben.studying.shifts import EARLY, Delay, dead_time, lagged, most_samples, shifted
 
@@ -97,13 +98,16 @@ def chain(loop: Loop, log: Recording) -> Chain:
 
         def through(pressures: Array, begun: list[float] | None = None) -> Array:
             driven = given.with_channels(**dict(zip(names, pressures.T, strict=True)))
-            initial = {} if begun is None else {"initial": begun}
             outputs = [channel.name for channel in model.outputs]
-            return model.simulate(driven, **initial).matrix(outputs)
+            return model.simulate(driven, initial=begun).matrix(outputs)
 
         measured = given.matrix(names)
         modelled = through(measured, start)
-        wanted, judged_by = (measured, "") if blind else _wanted(measured, timed, allowed)
+        wanted, judged_by = (
+            (measured, "")
+            if blind
+            else _wanted(measured, timed, allowed, log.matrix(loop.outputs) - wished)
+        )
         limits = np.zeros(len(log), dtype=bool)
         if sent is not None:
             limits |= _at_rails(sent, low, high)
@@ -265,21 +269,30 @@ def _lead(sent: Array, asked: Array, step: float) -> int:
 
 
 def _wanted(
-    measured: Array,
-    sent: Array | None,
-    asked: Array | None,
+    measured: Array, sent: Array | None, asked: Array | None, error: Array
 ) -> tuple[Array | None, str]:
     """Return what measured pressures were to follow: commands, or what the compensator gives.
 
-    Of the two, what they follow closer: an inner loop of pressure sends commands that overdo.
+    What the compensator gives, where commands go beyond it to make pressures follow: an inner loop
+    of pressure overdoes them.
     """
     if sent is None:
         return asked, "" if asked is None else "compensator"
-    if asked is None:
+    if asked is None or np.sqrt(np.mean((sent - asked) ** 2)) <= SAME * np.std(asked):
         return sent, "command"
-    if np.sqrt(np.mean((sent - asked) ** 2)) <= SAME * np.std(asked):
-        return sent, "command"
+    inner = asked[1:] - measured[:-1]
+    if _unanswered(sent, asked, inner) < _unanswered(sent, asked, error[:-1]):
+        return asked, "compensator"
     # a command may be logged beside what was measured before it acted
-    tried = [("compensator", asked), ("command", sent), ("command", shifted(sent, EARLY))]
-    kind, wanted = min(tried, key=lambda pair: float(np.mean((pair[1] - measured) ** 2)))
-    return wanted, kind
+    late = shifted(sent, EARLY)
+    return min((sent, late), key=lambda one: float(np.mean((one - measured) ** 2))), "command"
+
+
+def _unanswered(sent: Array, asked: Array, errors: Array) -> float:
+    """Return what is left of commands when they answer errors now, before, and in sum."""
+    past = [shifted(errors, k) for k in range(TAPS)]
+    ones = np.ones((len(errors), 1))
+    table = np.concatenate([*past, np.cumsum(errors, axis=0), asked[1:], asked[:-1], ones], axis=1)
+    table = table / np.maximum(np.sqrt(np.mean(table**2, axis=0)), np.finfo(float).tiny)
+    left = sent[:-1] - table @ np.linalg.lstsq(table, sent[:-1], rcond=1e-12)[0]
+    return float(np.sum(left**2))

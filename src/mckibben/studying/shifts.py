@@ -123,8 +123,8 @@ def dead_time(wanted: Array, got: Array, step: float) -> tuple[float, float, flo
     tried = [min(grid), min(point for point in grid if point[1] == 0)]
     for _, *start in tuple(tried):
         begun = np.clip(start, 1e-3, np.array(bounds[1]) - 1e-3)
-        place = least_squares(left, begun, bounds=bounds, diff_step=STEP).x
-        tried.append((float(np.sum(left(place) ** 2)), *map(float, place)))
+        place = least_squares(left, begun, bounds=bounds, diff_step=[STEP, STEP]).x
+        tried.append((float(np.sum(left(place) ** 2)), float(place[0]), float(place[1])))
     found = np.array(min(tried)[1:])
     slopes = [
         (left(found + move) - left(np.maximum(found - move, 0)))

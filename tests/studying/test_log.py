@@ -78,7 +78,7 @@ def first(log: Recording, **known: object) -> Followed:
 @pytest.mark.parametrize("seed", [0, 1])
 @pytest.mark.parametrize("cause", FAULTS)
 def test_the_cause_that_was_put_in_is_named_first(cause: str, seed: int) -> None:
-    log, rmse = logged(seed, **FAULTS[cause])
+    log, rmse = logged(seed, **FAULTS[cause])  # type: ignore[arg-type]
     found = first(log, compensator=MUSCLE.inverse())
     assert found.causes[0].kind == cause
     assert found.causes[0].share > 0.9

@@ -131,7 +131,7 @@ def missing(one: OutputCheck) -> list[str]:
 
 def told(one: Followed, check: OutputCheck, chains: Sequence[Chain]) -> dict[str, str]:
     """Return what each cause is."""
-    model = ", ".join(one.missing[:MOST]) or "how its memory was at the start, and its level"
+    model = ", ".join(one.missing[:MOST]) or "the level, and how its memory was at the start"
     if abs(one.gain - 1) > OFF and any(each.kind in ("curve", "output") for each in check.missing):
         model += f"; measured motion is {numeral(one.gain, 3)} times the modelled"
     lagging = [d for c in chains for d in c.delays if d.lag > 0 or d.seconds > 0]
@@ -160,22 +160,28 @@ def told(one: Followed, check: OutputCheck, chains: Sequence[Chain]) -> dict[str
 def notes(review: Review, loop: Loop) -> tuple[str, ...]:
     """Return what to know of a log before believing what is said of it."""
     found = []
-    if review.feedback or not loop.known:
-        found.append(
-            "Commands are others than a compensator alone gives, as with feedback. Feedback answers "
-            "noise and faults with pressure, so that the model's part may look smaller or larger than "
-            "it is, and a model fitted to this log may be biased. An open-loop run of the same motion "
-            "tells more."
-        )
     if not review.judged_by:
         found.append(
             "Commanded and measured pressures are not both logged, so the actuator's part is in what "
             "the model misses."
         )
-    elif review.judged_by == "compensator" and not any("command" in d.where for d in review.delays):
+    elif review.judged_by == "compensator" and review.feedback:
         found.append(
-            "Measured pressures are compared with what the compensator gives for the reference, not "
-            "with commands: there are none, or an inner loop of pressure makes them overdo."
+            "Commands go beyond what the compensator gives as an inner loop of pressure makes them, so "
+            "measured pressures are compared with the compensator's; if motion is fed back too, its "
+            "part is told as the actuator's."
+        )
+    elif review.judged_by == "compensator":
+        found.append(
+            "No commands are logged, so measured pressures are compared with what the compensator "
+            "gives for the reference, as if there was no feedback."
+        )
+    if (review.feedback and review.judged_by != "compensator") or not loop.known:
+        found.append(
+            "Commands are others than a compensator alone gives, as with feedback. Feedback answers "
+            "noise and faults with pressure, so that the model's part may look smaller or larger than "
+            "it is, and a model fitted to this log may be biased. An open-loop run of the same motion "
+            "tells more."
         )
     return tuple(found)
 

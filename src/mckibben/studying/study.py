@@ -162,8 +162,8 @@ def study(
     """
     recordings, tests = listed(train), listed(test)
     reviewed = None
-    if model is not None or compensator is not None:
-        reviewed = review([*recordings, *tests], model=model, compensator=compensator, seed=seed)
+    if model is not None or compensator is not None:  # the test is not for a refit to see
+        reviewed = review(recordings, model=model, compensator=compensator, seed=seed)
     plan = plan_of(
         recordings,
         tests,

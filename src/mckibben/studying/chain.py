@@ -97,6 +97,8 @@ def chain(loop: Loop, log: Recording) -> Chain:
         start = _start(loop, given)
 
         def through(pressures: Array, begun: list[float] | None = None) -> Array:
+            if begun is not None:  # whatever came after, the muscle was there at first
+                pressures = np.concatenate([given.matrix(names)[:1], pressures[1:]])
             driven = given.with_channels(**dict(zip(names, pressures.T, strict=True)))
             outputs = [channel.name for channel in model.outputs]
             return model.simulate(driven, initial=begun).matrix(outputs)

@@ -40,6 +40,7 @@ from .report import write_report as write_report
 from .rigs import Rig as Rig
 from .rigs import check_rig as check_rig
 from .rigs import load_rig as load_rig
+from .studying.reviewing import review as review
 from .studying.study import study as study
 from .validation.check import check as check
 from .version import __version__ as __version__

@@ -58,6 +58,7 @@ class Asked:
         reading: Reading,
         folder: Path | None,
         written: Callable[[Sequence[str]], Iterable[str]],
+        beside: Sequence[Path] = (),
     ) -> Begun:
         """Check what is asked, claim what will be written by the models' names, and read the files."""
         from mckibben import registry
@@ -74,7 +75,7 @@ class Asked:
         sorted_files = expanded(list(files), self.test or [])
         results = None
         if folder is not None:
-            inputs = [file for some in sorted_files for file in some]
+            inputs = [*beside, *(file for some in sorted_files for file in some)]
             results = Results(folder, inputs=inputs, force=self.force)
             results.claim(list(written(names)))
         train, checks, tests = reading.read_all(sorted_files, self.input, self.output, self.load)

@@ -30,6 +30,13 @@ def study(
     rig: Annotated[
         str | None, typer.Option("--rig", help="Several muscles: rig to close a loop on.")
     ] = None,
+    compensator: Annotated[
+        Path | None,
+        typer.Option(help="A loop's log: the inverse that ran, to say why it was off."),
+    ] = None,
+    model: Annotated[
+        Path | None, typer.Option(help="A loop's log: the model that ran, or its inverse did.")
+    ] = None,
 ) -> None:
     """Say what the muscle does, choose a model by cross-validation, test, invert, and write a report.
 
@@ -38,12 +45,19 @@ def study(
     A folder stands for all recordings in it. Recordings of several muscles (pressure_1 ...,
     displacement_1 ...) get models that couple them, and a closed loop on a virtual rig. With --load
     force, models that are told the load are ranked against one model for every load.
+
+    With --compensator or --model, recordings with a reference (reference_displacement, setpoint, ...)
+    are logs of a loop: what error was predicted, what was achieved, and what of it is due to model,
+    actuator, delay, noise, drift and limits; and the same kind of model refitted to them (refit.json).
     """
+    from mckibben.blocks.core.saving import load as saved
     from mckibben.report.results_folder import study_files
 
     folder = make_folder(out)
     with stoppable(folder):
-        begun = asked.begin(files, reading, folder, study_files)
+        ran = [None if path is None else saved(path) for path in (model, compensator)]
+        given = [path for path in (model, compensator) if path is not None]
+        begun = asked.begin(files, reading, folder, study_files, beside=given)
         from mckibben.recording import notes_by_file
         from mckibben.report import StudyFolder
         from mckibben.studying.study import study as find
@@ -59,6 +73,8 @@ def study(
             done = find(
                 *begun.recordings,
                 **begun.given,
+                model=ran[0],
+                compensator=ran[1],
                 rig=rig,
                 progress=told(tell, "inverting and drawing"),
                 found=found,
@@ -75,12 +91,20 @@ def study(
 
 
 def _say(study: Study, folder: Path) -> None:
-    """Print what the muscle does, before any model is fitted."""
+    """Print what the muscle and a loop do, before any model is fitted."""
+    from mckibben.studying.refitting import Refit
+
     if study.characterization is not None:
         for sentence in study.characterization.sentences:
             say(sentence)
     for gap in study.untold:
         say(f"- {gap}")
+    if study.review is not None:
+        say()
+        say(str(study.review))
+        if isinstance(study.review.refit, Refit):
+            say(f"Written: {folder / 'refit.json'}")
+        say()
     say(f"Drawn: {folder / 'report.html'}, which grows with every model fitted.\n", flush=True)
 
 
@@ -126,5 +150,6 @@ def _conclude(study: Study, folder: Path) -> None:
         *([] if best is None else ["validation.json"]),
         *([] if best is None or best.banded is None else ["banded.json"]),
         *([] if study.inverse is None else ["inverse.json"]),
+        *([] if study.review is None else ["review.json"]),
     ]
     say(f"Written: {', '.join(written)}")

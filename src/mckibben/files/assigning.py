@@ -15,6 +15,9 @@ from mckibben.files.table import Column, Table
 
 _LISTED = 30
 
+ROLES = ("reference_", "command_")
+"""What names of a loop's channels begin with."""
+
 
 def assign(table: Table, request: Request, path: Path) -> tuple[dict[str, Column], list[str]]:
     """Return the column of every channel, in the order of the file, and the columns left out.
@@ -51,6 +54,8 @@ def assign(table: Table, request: Request, path: Path) -> tuple[dict[str, Column
         channel = column.header if table.own else channel_of(header)
         if channel in mapped and not table.own:
             channel = snake_case(header.name)
+        if channel in named and channel.startswith(ROLES):
+            channel = snake_case(header.name)  # the first of several references is the loop's
         text = column.values is None
         wanted = channel not in named and (channel == "time" or request.asks_for(channel))
         if channel in mapped or (text and not wanted):

@@ -23,6 +23,16 @@ ALIASES: dict[str, str] = {
 }
 """Standard channel -> the names that people give it, in lower snake case."""
 
+ROLES: dict[str, str] = {
+    "reference": "reference ref setpoint desired target sollwert",
+    "command": "command commanded cmd",
+}
+"""What a loop is told and what it sends -> the words for it beside, or instead of, a channel's name."""
+
+FOLLOWED = {"mm": "displacement", "N": "force", "bar": "pressure", "V": "voltage", "rad": "angle"}
+"""Unit -> the channel of a role that names none."""
+
+_ROLES = {word: role for role, words in ROLES.items() for word in words.split()}
 _CHANNELS = {alias: channel for channel, names in ALIASES.items() for alias in names.split()}
 _NUMBERED = {alias for alias in _CHANNELS if len(alias) > 1} | {"p"}
 _EXTENSOR = {"extensor", "ext"}
@@ -91,6 +101,8 @@ def channel_of(header: Header) -> str:
     """
     name = snake_case(header.name)
     standard = _standard(name)
+    if standard is None and (of_loop := _of_loop(name, header)) is not None:
+        return of_loop
     if standard is None or header.unit is None:
         return standard or name
     unit = find(header.unit)
@@ -102,6 +114,34 @@ def channel_of(header: Header) -> str:
     # The unit decides about names that can mean other things: "f [Hz]" is no force, "load [kg]" is
     # no newtons. A plain "pressure [mm]" stays a pressure, and is refused later.
     return standard if name.startswith(base) else name
+
+
+def _of_loop(name: str, header: Header) -> str | None:
+    """Return the channel of a loop's reference or command, or None: a pressure wished for is sent.
+
+    >>> channel_of(parse("desired position [mm]")), channel_of(parse("ref_mm"))
+    ('reference_displacement', 'reference_displacement')
+    >>> channel_of(parse("p_cmd_kPa")), channel_of(parse("setpoint"))
+    ('command_pressure', 'reference_displacement')
+    """
+    words = name.replace("set_point", "setpoint").split("_")
+    roles = [_ROLES[word] for word in words if word in _ROLES]
+    if len(roles) != 1:
+        return None
+    role, rest = roles[0], "_".join(word for word in words if word not in _ROLES)
+    unit = None if header.unit is None else find(header.unit)
+    usual = "pressure" if role == "command" else "displacement"
+    number = rest if rest.isdigit() else ""
+    if not rest or number:
+        target = "" if unit is None else unit.target or ""
+        channel = usual if unit is None else FOLLOWED.get(target)
+        channel = f"{channel}_{number}" if channel and number else channel
+    else:
+        channel = channel_of(Header(rest, header.unit)) if _standard(rest) else None
+    if channel is None or unit_of(channel) is None:
+        return None
+    sent = channel.startswith(("pressure", "voltage"))
+    return f"{'command' if sent else role}_{channel}"
 
 
 def unit_of(channel: str) -> str | None:

@@ -12,6 +12,7 @@ from mckibben.report import (
     description_subjects,
     interactive,
     model_subjects,
+    review_subjects,
     subjects,
     templating,
     wording,
@@ -87,6 +88,7 @@ def page(study: Study) -> str:
         answers=answers(study),
         checked=checked(study),
         description=study.description,
+        review=study.review,
     )
 
 
@@ -140,6 +142,10 @@ def _figures(study: Study, pictured: tuple[Shown, ...]) -> tuple[Plots, str]:
     if study.inverse is not None and study.inverse.reachable is not None:
         timed = study.train[0].sample_time is not None
         figures["inverse"] = [interactive.plots(model_subjects.inverse_check(study.inverse, timed))]
+    for followed in () if study.review is None else study.review.outputs:
+        figures[f"review {followed.output}"] = [
+            interactive.plots(review_subjects.causes(followed, points))
+        ]
     for name in study.leaderboard.outputs if study.loops else ():
         drawing = model_subjects.tracking(study.loops, name, points)
         figures[f"tracking {name}"] = [interactive.plots(drawing)]

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from mckibben.blocks.core.saving import to_text
 from mckibben.outputs import Results
 from mckibben.report.page import page
+from mckibben.studying.refitting import Refit
 from mckibben.system.atomic import to_json
 
 if TYPE_CHECKING:
@@ -40,6 +41,8 @@ def study_files(models: Iterable[str]) -> list[str]:
         "inverse.json",
         "validation.json",
         "banded.json",
+        "review.json",
+        "refit.json",
     )
     return [*LEADERBOARD, *rest, *map(model_file, models)]
 
@@ -73,6 +76,10 @@ class StudyFolder:
         if not board.rows and study.characterization is not None:
             found = study.characterization.to_dict()
             write("characterization.json", to_json(found) + "\n")
+        if not board.rows and study.review is not None:
+            write("review.json", to_json(study.review.to_dict()) + "\n")
+            if isinstance(study.review.refit, Refit):
+                write("refit.json", to_text(study.review.refit.model))
         for row in board.rows:
             if row.block is not None and row.model not in self._saved:
                 write(model_file(row.model), to_text(row.block))

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from mckibben.arrays import Array
+from mckibben.blocks.core.block import Block
 from mckibben.characterization import Characterization, characterize
 from mckibben.comparison.channels import Names
 from mckibben.comparison.planning import Settings, plan_of
@@ -23,6 +24,7 @@ from mckibben.recording import Recording
 from mckibben.studying.checking import check_on_test
 from mckibben.studying.inverting import InverseCheck, invert_best
 from mckibben.studying.loops import closed_loops, published_rig
+from mckibben.studying.reviewing import Review, review
 from mckibben.validation.describing import ModelDescription, describe
 from mckibben.validation.results import Validation
 
@@ -57,6 +59,8 @@ class Study:
         What the chosen model misses on the test, or why that cannot be told; None without a choice.
     description : ModelDescription or None
         What the chosen model is: equations, parameters and how sure they are, how it answers.
+    review : Review or None
+        How the loop that was logged followed its reference, where model or compensator are given.
     """
 
     train: tuple[Recording, ...]
@@ -72,6 +76,7 @@ class Study:
     untold: tuple[Gap, ...] = ()
     check: Validation | str | None = None
     description: ModelDescription | None = field(default=None, repr=False)
+    review: Review | None = None
 
     @property
     def input(self) -> str:
@@ -91,6 +96,7 @@ class Study:
             "untold": [gap.to_dict() for gap in self.untold],
             "check": self.check.to_dict() if isinstance(self.check, Validation) else self.check,
             "description": None if self.description is None else self.description.to_dict(),
+            "review": None if self.review is None else self.review.to_dict(),
             "leaderboard": self.leaderboard.to_dict(),
             "inverse": None if self.inverse is None else self.inverse.to_dict(),
             "tracking": {name: dict(tracked.rmse) for name, tracked in self.loops.items()},
@@ -117,6 +123,8 @@ def study(
     progress: Callable[[Standing], None] | None = None,
     found: Callable[[Study], None] | None = None,
     notes: Sequence[str] = (),
+    model: Block | None = None,
+    compensator: Block | None = None,
 ) -> Study:
     """Characterize recordings, choose a model by cross-validation, test it, and invert it if it can be.
 
@@ -140,6 +148,8 @@ def study(
         fitted, then whenever a model is finished.
     notes : sequence of str
         What was assumed or mended while reading, to be passed on.
+    model, compensator : Block, optional
+        What ran when ``train`` was logged, which is then reviewed first; see `review`.
 
     Returns
     -------
@@ -151,6 +161,9 @@ def study(
         On recordings that cannot be used.
     """
     recordings, tests = listed(train), listed(test)
+    reviewed = None
+    if model is not None or compensator is not None:  # the test is not for a refit to see
+        reviewed = review(recordings, model=model, compensator=compensator, seed=seed)
     plan = plan_of(
         recordings,
         tests,
@@ -185,6 +198,7 @@ def study(
         load=load,
         notes=(*notes, *plan.notes),
         untold=untold(recordings, channels.inputs, channels.outputs, tests=tests),
+        review=reviewed,
     )
     if found is not None:
         found(so_far)

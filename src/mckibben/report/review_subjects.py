@@ -1,0 +1,43 @@
+"""Figures of a log looked back on: what was wished for, what came, and what the error is made of."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from mckibben.report.drawing import (
+    N_COLOURS,
+    POINTS,
+    Curve,
+    Drawing,
+    Panel,
+    axis_label,
+    over_time,
+    series_colour,
+)
+
+if TYPE_CHECKING:
+    from mckibben.studying.reviewing import Followed
+
+SHOWN = 0.01
+"""Share, on either side of zero, from which a cause is drawn."""
+
+
+def causes(one: Followed, points: int = POINTS) -> Drawing:
+    """Draw reference and measured motion, and below the error with the part of every cause."""
+    wanted = over_time(one.time, one.reference, points)
+    got = over_time(one.time, one.measured, points)
+    error = over_time(one.time, one.measured - one.reference, points)
+    parts = [cause for cause in one.causes if abs(cause.share) >= SHOWN][:N_COLOURS]
+    curves = [
+        Curve(*over_time(one.time, cause.signal, points), cause.kind, series_colour(place))
+        for place, cause in enumerate(parts)
+    ]
+    above = (Curve(*wanted, "reference", style="broad"), Curve(*got, "measured", "series-1"))
+    below = (Curve(*error, "error", style="broad"), *curves)
+    return Drawing(
+        (
+            Panel("time [s]", axis_label(one.output, one.unit), above),
+            Panel("time [s]", axis_label("error", one.unit), below, zero=True),
+        ),
+        stacked=True,
+    )

@@ -1,0 +1,314 @@
+"""A log looked back on: the cause that was put in is named first, and shares add up to the error."""
+
+from __future__ import annotations
+
+import json
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import mckibben
+from mckibben import PI, Channel, DataError, ModelError, PerChannel, Recording, review
+from mckibben.arrays import Array
+from mckibben.cli.main import run
+from mckibben.control import Controller, track
+from mckibben.files.headers import channel_of, parse
+from mckibben.studying.causes import explained
+from mckibben.studying.closed import closed
+from mckibben.studying.refitting import Refit
+from mckibben.studying.reviewing import Followed
+from mckibben.studying.shifts import dead_time, lagged, shifted
+from tests.studying.plants import Faulty
+
+MUSCLE = PI(thresholds=(0.0, 0.3, 0.8, 1.5), weights=(4.0, 1.0, 0.6, 0.4))
+STEP = 0.02
+
+KP, KI = 0.02, 0.15
+"""Of feedback beside the compensator [bar/mm, bar/mm s]."""
+
+FAULTS = {
+    "noise": {"noise": 0.05},
+    "model": {"gain": 0.88, "noise": 0.05},
+    "actuator": {"lag": 0.15, "noise": 0.05},
+    "delay": {"late": 8, "noise": 0.05},
+    "drift": {"drift": 2.5, "noise": 0.05},
+    "limits": {"high": 3.0, "noise": 0.05},
+}
+"""Cause -> a plant that has it."""
+
+
+def reference(seed: int, duration: float = 40.0) -> Recording:
+    """Return two sines of random phase, within reach [mm]."""
+    t = np.arange(0, duration, STEP)
+    one, other = np.random.default_rng(seed).uniform(0, 6, 2)
+    wave = 0.3 * np.sin(2 * np.pi * t / 9 + one) + 0.15 * np.sin(2 * np.pi * t / 3.7 + other)
+    return Recording({"displacement": 1 + 24 * (0.5 + wave)}, STEP)
+
+
+class Helped(Controller):
+    """The muscle's inverse, and PI feedback beside."""
+
+    def reset(self, sample_time: float) -> None:
+        self._stream, self._sum, self._last = MUSCLE.inverse().stream(sample_time), 0.0, 0.0
+        self._step = sample_time
+
+    def step(self, reference: Array, displacement: Array, scheduled: Array) -> Array:
+        error = self._last - float(displacement[0])  # what was asked for is due a step later
+        self._last = float(reference[0])
+        self._sum += KI * self._step * error
+        return np.array([self._stream.step(self._last)[0] + KP * error + self._sum])
+
+
+def logged(seed: int = 0, *, feedback: bool = False, **faults: float) -> tuple[Recording, float]:
+    """Return the log of a loop with faults, and the RMSE that the loop itself reckoned."""
+    plant = Faulty(MUSCLE, **faults)  # type: ignore[arg-type]
+    controller = Helped() if feedback else MUSCLE.inverse()
+    found = track(controller, plant, reference(seed), pressure_loop=False, seed=seed)
+    return found.recording, found.rmse["displacement"]
+
+
+def first(log: Recording, **known: object) -> Followed:
+    """Return what is found of the one output."""
+    return review(log, refit=False, **(known or {"model": MUSCLE})).outputs[0]  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+@pytest.mark.parametrize("cause", FAULTS)
+def test_the_cause_that_was_put_in_is_named_first(cause: str, seed: int) -> None:
+    log, rmse = logged(seed, **FAULTS[cause])  # type: ignore[arg-type]
+    found = first(log, compensator=MUSCLE.inverse())
+    assert found.causes[0].kind == cause
+    assert found.causes[0].share > 0.9
+    assert found.achieved == pytest.approx(rmse, rel=1e-9)
+    error = found.measured - found.reference
+    assert np.allclose(np.sum([c.signal for c in found.causes], axis=0), error, atol=1e-9)
+    assert sum(c.share for c in found.causes) == pytest.approx(1, abs=1e-9)
+
+
+@pytest.mark.parametrize("cause", ["noise", "model", "actuator", "delay"])
+def test_behind_feedback_the_cause_is_named_too(cause: str) -> None:
+    log, _ = logged(0, feedback=True, **FAULTS[cause])
+    found = review(log, model=MUSCLE, refit=False)
+    shares = {c.kind: c.share for c in found.outputs[0].causes}
+    assert max(shares, key=lambda kind: shares[kind]) == cause
+    assert sum(shares.values()) == pytest.approx(1, abs=1e-9)
+    assert any("feedback" in note for note in found.notes)
+
+
+def test_two_causes_at_once_are_both_told() -> None:
+    found = first(logged(0, lag=0.2, late=3, noise=0.05)[0])
+    assert [c.kind for c in found.causes[:2]] == ["actuator", "delay"]
+    found = first(logged(1, gain=0.9, late=3, noise=0.05)[0])
+    assert [c.kind for c in found.causes[:2]] == ["model", "delay"]
+    (late,) = found.delays
+    assert late.interval[0] - 0.005 < 3 * STEP < late.interval[1] + 0.005
+
+
+def test_a_delay_is_told_with_its_interval() -> None:
+    late = first(logged(0, late=8, noise=0.05)[0]).delays[0]
+    assert late.interval[0] < 8 * STEP < late.interval[1]
+    assert late.interval[1] - late.interval[0] < STEP
+    pressure = review(logged(0, dead=8, noise=0.05)[0], model=MUSCLE, refit=False).delays[0]
+    assert pressure.seconds == pytest.approx(8 * STEP, abs=STEP / 4)
+
+
+def test_no_delay_is_certain_where_there_is_none() -> None:
+    certain = 0
+    for seed in range(6):
+        found = review(logged(seed, noise=0.05)[0], model=MUSCLE, refit=False)
+        certain += any(d.certain for d in (*found.delays, *found.outputs[0].delays))
+    assert certain <= 1  # in 5 % of the logs
+
+
+def test_a_lag_is_no_dead_time() -> None:
+    wanted = reference(0)["displacement"]
+    late, half, lag = dead_time(wanted, lagged(wanted, 6.0), STEP)
+    assert late - half <= 0.01
+    assert lag == pytest.approx(6.0, abs=0.3)
+    late, half, _ = dead_time(wanted, shifted(wanted, 6.0), STEP)
+    assert abs(late - 6) <= half + 0.05
+
+
+def test_explained_parts_add_up_and_do_not_depend_on_order() -> None:
+    rng = np.random.default_rng(0)
+    table = rng.standard_normal((200, 6)) @ rng.standard_normal((6, 6))
+    y = rng.standard_normal(200)
+    groups = {"a": table[:, :2], "b": table[:, 2:4], "c": table[:, 4:]}
+    found = explained(y, groups)
+    whole = table @ np.linalg.lstsq(table, y)[0]
+    assert np.allclose(sum(found.values()), whole)
+    again = explained(y, dict(reversed(groups.items())))
+    assert all(np.allclose(found[name], again[name]) for name in groups)
+
+
+def test_feedback_is_taken_out_of_what_causes_come_to() -> None:
+    rng = np.random.default_rng(0)
+    causes = {"model": np.cumsum(rng.standard_normal(500)), "noise": rng.standard_normal(500)}
+    whole, error, summed = sum(causes.values()), np.zeros(500), 0.0
+    assert isinstance(whole, np.ndarray)
+    for t in range(500):
+        error[t] = whole[t] - 0.2 * summed - 0.3 * (error[t - 1] if t else 0.0)
+        summed += error[t]
+    found = closed(causes | {"feedback": error - whole})
+    assert found is not None
+    assert np.abs(found["feedback"]).max() < 1e-6
+    alone = np.zeros(500)
+    summed = 0.0
+    for t in range(500):
+        alone[t] = causes["noise"][t] - 0.2 * summed - 0.3 * (alone[t - 1] if t else 0.0)
+        summed += alone[t]
+    assert np.allclose(found["noise"], alone, atol=1e-6)
+
+
+def test_a_refit_is_recommended_where_the_muscle_changed_and_only_there() -> None:
+    changed = review(logged(0, gain=0.85, noise=0.05)[0], model=MUSCLE).refit
+    assert isinstance(changed, Refit)
+    assert changed.recommended
+    assert changed.new < 0.2 * changed.old
+    same = review(logged(0, noise=0.1)[0], model=MUSCLE).refit
+    assert isinstance(same, Refit)
+    assert not same.recommended
+
+
+def test_older_data_go_into_the_refit() -> None:
+    pressure = np.tile(np.concatenate([np.linspace(0, 5, 150), np.linspace(5, 0, 150)]), 3)
+    monday = Recording({"pressure": pressure, "displacement": MUSCLE.simulate(pressure)}, STEP)
+    found = review([logged(0, noise=0.05)[0], monday], model=MUSCLE)
+    assert isinstance(found.refit, Refit)
+    assert found.refit.older == 1
+    assert len(found.logs) == 1
+
+
+def test_without_commands_pressures_are_compared_with_the_compensators() -> None:
+    log, _ = logged(0, lag=0.15, noise=0.05)
+    found = review(
+        log.select(["reference_displacement", "pressure", "displacement"]),
+        model=MUSCLE,
+        refit=False,
+    )
+    assert found.judged_by == "compensator"
+    assert found.outputs[0].causes[0].kind == "actuator"
+    blind = log.select(["reference_displacement", "command_pressure", "displacement"])
+    told = review(blind, model=MUSCLE, refit=False)
+    assert told.judged_by == ""
+    assert any("not both logged" in note for note in told.notes)
+
+
+def test_several_outputs_are_told_apart() -> None:
+    parts = [
+        replace(
+            MUSCLE,
+            input=Channel(f"pressure_{k}", "bar"),
+            output=Channel(f"displacement_{k}", "mm"),
+        )
+        for k in (1, 2)
+    ]
+    both = PerChannel(tuple(parts))
+    one, _ = logged(0, gain=0.88, noise=0.05)
+    other, _ = logged(1, lag=0.15, noise=0.05)
+    names = ("reference_displacement", "command_pressure", "pressure", "displacement")
+    inputs, outputs = ([c.name for c in side] for side in (both.inputs, both.outputs))
+    own = {"pressure": inputs, "displacement": outputs}
+    channels = {
+        name.replace(key, own[key][place]): log[name]
+        for place, log in enumerate((one, other))
+        for name in names
+        for key in [name.rpartition("_")[2]]
+    }
+    found = review(Recording(channels, STEP, start_time=one.start_time), model=both, refit=False)
+    assert [each.causes[0].kind for each in found.outputs] == ["model", "actuator"]
+
+
+def test_what_is_no_log_is_refused_in_a_sentence() -> None:
+    log, _ = logged(0, noise=0.05)
+    with pytest.raises(DataError, match="reference"):
+        review(log.select(["pressure", "displacement"]), model=MUSCLE)
+    with pytest.raises(DataError, match="command_pressure"):
+        review(log.select(["reference_displacement", "displacement"]), model=MUSCLE)
+    with pytest.raises(ModelError, match="--model"):
+        review(log)
+    with pytest.raises(DataError, match="too few"):
+        review(log.slice(1000, 1030), model=MUSCLE)
+
+
+@pytest.mark.parametrize(
+    ("header", "channel"),
+    [
+        ("reference", "reference_displacement"),
+        ("setpoint", "reference_displacement"),
+        ("desired [mm]", "reference_displacement"),
+        ("ref_mm", "reference_displacement"),
+        ("Position setpoint (cm)", "reference_displacement"),
+        ("ref_force_N", "reference_force"),
+        ("command", "command_pressure"),
+        ("p_cmd_kPa", "command_pressure"),
+        ("pressure_setpoint_bar", "command_pressure"),
+        ("cmd_p2 [bar]", "command_pressure_2"),
+        ("command_voltage", "voltage"),
+        ("ref_x_mm", "ref_x"),
+    ],
+)
+def test_headers_of_loops_are_known(header: str, channel: str) -> None:
+    assert channel_of(parse(header)) == channel
+
+
+def called(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], *arguments: object
+) -> tuple[int, str]:
+    """Return exit code and words of the command line."""
+    monkeypatch.setattr(sys, "argv", ["mckibben", *map(str, arguments)])
+    try:
+        run()
+        code = 0
+    except SystemExit as leaving:
+        code = int(leaving.code or 0)
+    printed = capsys.readouterr()
+    return code, printed.out + printed.err
+
+
+def test_study_writes_what_it_finds_of_a_log(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    log, rmse = logged(0, gain=0.85, noise=0.05)
+    table = np.column_stack([log[name] for name in log.channels])[1000::2]
+    heads = {
+        "reference_displacement": "ref_mm",
+        "command_pressure": "setpoint_bar",
+        "pressure": "pressure_bar",
+        "displacement": "displacement_mm",
+    }
+    file = tmp_path / "robot.csv"
+    names = ",".join(heads[name] for name in log.channels)
+    np.savetxt(file, table, delimiter=",", header=names, comments="")
+    inverse = tmp_path / "inverse.json"
+    MUSCLE.inverse().save(inverse)
+    out = tmp_path / "study"
+    given = ["study", file, "--rate", 25, "--compensator", inverse, "--models", "gpi", "--jobs", 1]
+    code, printed = called(monkeypatch, capsys, *given, "-o", out)
+    assert code == 0, printed
+    assert "is the model" in printed
+    told = json.loads((out / "review.json").read_text())
+    (followed,) = told["outputs"]
+    assert followed["achieved"] == pytest.approx(rmse, rel=0.01)
+    assert sum(cause["share"] for cause in followed["causes"]) == pytest.approx(1)
+    assert told["refit"]["recommended"]
+    refit = mckibben.load(out / "refit.json")
+    assert isinstance(refit, PI)
+    page = (out / "report.html").read_text()
+    assert "How the loop followed" in page
+    assert "review displacement" in page
+
+
+def test_study_refuses_a_log_without_reference(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    inverse = tmp_path / "inverse.json"
+    MUSCLE.inverse().save(inverse)
+    example = Path(__file__).parents[2] / "examples/decaying-triangle.csv"
+    given = ["study", example, "--compensator", inverse, "-o", tmp_path / "study"]
+    code, printed = called(monkeypatch, capsys, *given)
+    assert code == 2
+    assert "--column reference_displacement=COLUMN" in printed

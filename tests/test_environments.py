@@ -161,6 +161,7 @@ def test_a_twin_of_ones_own_muscle_is_an_environment() -> None:
     np.testing.assert_array_equal(first, again)
     assert not np.array_equal(first, other)
     assert first.std() > 0.05
-    for given, words in (({"spread": 0.1}, "spread"), ({"load": 5.0}, "load")):
-        with pytest.raises(DataError, match=words):
-            environments.Tracking(plant=bare, **given)
+    with pytest.raises(DataError, match="spread"):
+        environments.Tracking(plant=bare, spread=0.1)
+    with pytest.raises(DataError, match="load"):
+        environments.Tracking(plant=bare, load=5.0)

@@ -34,7 +34,8 @@ def workspace_of(folder: Path) -> Workspace:
 def test_other_models_are_offered_before_the_one_inverted(tmp_path: Path) -> None:
     workspace = workspace_of(tmp_path)
     assert workspace.plants("mine") == ["bigger", "mine-banded", "mine"]
-    run = Recording({"pressure": np.linspace(0.5, 4.0, 50), "displacement": np.arange(50.0)}, 0.1)
+    rising = np.asarray(np.linspace(0.5, 4.0, 50), dtype=np.float64)
+    run = Recording({"pressure": rising, "displacement": 5.0 * rising}, 0.1)
     workspace.add(run, origin="", call="", role="train")  # tells the limits of what knows none
     assert workspace.plants("mine") == ["bigger", "unlimited", "mine-banded", "mine"]
     assert tuple(workspace.twin("unlimited").limits("pressure")) == (0.5, 4.0)

@@ -347,8 +347,7 @@ class Link:
                     remedy=f"give {device.period:g} to {device.period * device.silence:g} s",
                 )
         body = bytes.fromhex(device.fingerprint) + struct.pack("<BI", self._lock_step, ticks)
-        # the device knows by it that this is later than all before; by chance, so that two hosts differ
-        self._session = (self._heard + 1 + int.from_bytes(os.urandom(2), "little")) % WORDS
+        self._session = (self._heard + 1) % WORDS  # by which the device knows that it is a later one
         self._ask(Kind.OPEN, body, session=self._session)
         self._led = True
         if self._every:

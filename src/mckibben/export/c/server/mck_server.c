@@ -477,7 +477,7 @@ static void handle(mck_server *self, const uint8_t *frame, int length)
 
 void mck_server_init(mck_server *self, uint32_t start)
 {
-    self->session = start;
+    self->session = (start & 0xFFFFu) << 16;
     self->sequence = 0;
     self->last_kind = 0;
     self->last_status = 0;

@@ -85,7 +85,8 @@ typedef struct {
     mck_frame *sending;
 } mck_server;
 
-/* Before anything else; `start` is better a number that differs from one start to the next. */
+/* Before anything else; `start` counts the starts of the device where that is kept, and is else 0: frames
+ * from before a start are then known by it, however late they come. */
 void mck_server_init(mck_server *self, uint32_t start);
 
 /* Take a byte that came. */

@@ -172,6 +172,8 @@ def identified(body: bytes) -> tuple[Device, Counts, int, int]:
     n_in, n_out, n_coefficients, n_memory = sizes
     if size not in (4, 8) or not period or not silence or not n_out:
         raise unfit("an identity")
+    if size * (n_in + n_out) > ROOM:  # which no frame would hold
+        raise unfit("an identity")
     kind = np.dtype(f"<f{size}")
     device = Device(print_.hex(), 1e-6 * period, silence, kind, n_coefficients, n_memory)
     return device, Counts(Note(notes), steps, loads, dropped), n_in, n_out

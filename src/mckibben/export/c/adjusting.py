@@ -36,9 +36,11 @@ def coefficient_limits(wiring: Wiring, share: float) -> tuple[Array, Array]:
     lowest, highest = [], []
     for call in wiring.calls:
         numbers = call.part.coefficients if call.part.coefficients.size else np.zeros(1)
-        reach = np.where(_moved(call.part.block, numbers, wiring.sample_time), share, 0.0)
-        lowest.append(numbers - reach * np.abs(numbers))
-        highest.append(numbers + reach * np.abs(numbers))
+        reach = np.zeros(numbers.size)
+        moved = _moved(call.part.block, numbers, wiring.sample_time)
+        reach[moved] = share * np.abs(numbers[moved])
+        lowest.append(numbers - reach)
+        highest.append(numbers + reach)
     return np.concatenate(lowest), np.concatenate(highest)
 
 
@@ -60,7 +62,7 @@ def _moved(block: Block, numbers: Array, sample_time: float | None) -> Array:
             whole &= moved == np.round(moved)
         else:
             return np.zeros(numbers.size, dtype=bool)
-    return found & ~whole
+    return found & ~whole & np.isfinite(numbers)
 
 
 def memory_limits(wiring: Wiring, lowest: Array, highest: Array) -> tuple[Array, Array] | None:

@@ -38,6 +38,7 @@ COMMANDS: dict[str, list[str]] = {
     "muscles list": [],
     "muscles show": ["rail"],
     "app": ["workspace", "--no-show"],
+    "link": ["absent-port"],
     "export c": ["model.json", "-o", "out"],
     "export fmu": ["model.json", "-o", "out.fmu", "--platforms", "none"],
     "rig list": [],

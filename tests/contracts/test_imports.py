@@ -28,7 +28,7 @@ LAYERS = (
     {"environments"},
     {"blocks"},
     {"muscles"},
-    {"estimators", "export", "stream", "outputs"},
+    {"estimators", "export", "stream", "link", "outputs"},
     {"control"},
     {"bands"},
     {"comparison"},
@@ -62,6 +62,7 @@ STANDS_ON = {
         "system",
     },
     "stream": {"stream", "blocks", "arrays", "errors"},
+    "link": {"link", "export", "blocks", "arrays", "errors"},
     "control": {"control", "blocks", "recording", "signals", "arrays", "errors", "registry"},
     "environments": {"environments", "rigs", "recording", "signals", "arrays", "errors"},
 }

@@ -20,7 +20,6 @@ from pathlib import Path
 
 from fuzz_c import SAMPLE_TIME, fuzzed
 from fuzzing import guarded
-
 from mckibben.blocks.core.block import Block
 from mckibben.blocks.laws.examples import examples
 from mckibben.errors import DataError, ModelError
@@ -152,7 +151,8 @@ static void load(mck_server *link, source *from, uint8_t what)
 {{
     const int most = 20;
     for (int first = 0; first < link->served->sizes[what]; first += most) {{
-        uint8_t body[3 + 20 * sizeof(mck_real)] = {{what, (uint8_t)(first & 255), (uint8_t)(first >> 8)}};
+        uint8_t body[3 + 20 * sizeof(mck_real)] = {{
+            what, (uint8_t)(first & 255), (uint8_t)(first >> 8)}};
         const int left = link->served->sizes[what] - first;
         const int n = left < most ? left : most;
         for (int i = 0; i < n; i++) {{
@@ -257,7 +257,7 @@ CASE = """    case {index}: {{
 
 
 def servable() -> dict[str, tuple[Block, Serving]]:
-    """Return all blocks that fit into frames, with limits for channels that their model knows none of."""
+    """Return all blocks that fit into frames, with limits where their model knows none."""
     found = {}
     for name, block in examples().items():
         channels = {channel.name for channel in (*block.inputs, *block.outputs)}
@@ -348,7 +348,10 @@ class Hostile:
 
     def _any(self) -> bytes:
         rng = self._rng
-        return bytes([rng.choice([0, 0, rng.randrange(256)])]) + rng.randbytes(rng.randrange(240))[:235]
+        return (
+            bytes([rng.choice([0, 0, rng.randrange(256)])])
+            + rng.randbytes(rng.randrange(240))[:235]
+        )
 
 
 IDENTITY_ANSWER = struct.Struct("<B" + IDENTITY.format.lstrip("<"))

@@ -1,4 +1,4 @@
-"""Whatever a line does to bytes, nothing wrong is applied, the watchdog acts, and the link comes back."""
+"""Whatever a line does: nothing wrong is applied, the watchdog acts, and the link comes back."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ def test_each_input_is_applied_once_in_order_or_not_at_all(faults: list[tuple[st
     stepped(link, INPUTS[:40])
     for boot in range(server.boots + 1):
         applied = [value for when, (value,) in server.applied if when == boot]
-        places = [int(np.flatnonzero(INPUTS == value)[0]) for value in applied]
+        places = [int(np.flatnonzero(value == INPUTS)[0]) for value in applied]
         assert places == sorted(set(places))
     # the faults have ended by now: the link has come back
     link.reset()
@@ -175,7 +175,7 @@ def test_coefficients_move_within_limits_and_all_at_once() -> None:
     with pytest.raises(LinkError, match="beyond limits"):
         link.load_coefficients(wrong)
     np.testing.assert_array_equal(link.coefficients(), more)
-    with pytest.raises(LinkError, match="for .* that can be set"):
+    with pytest.raises(LinkError, match=r"for .* that can be set"):
         link.load_coefficients(own[:-1])
 
 

@@ -25,7 +25,6 @@ from tests.tools import needs
 
 SAMPLE_TIME = 0.02
 SERVING = Serving(limits={"pressure": (0, 6), "displacement": (-50, 50)}, watchdog=60.0)
-PATIENT = {"timeout": 1.0, "patience": 30.0}
 
 
 def single(name: str, folder: Path, inputs: np.ndarray) -> np.ndarray:
@@ -60,7 +59,7 @@ def test_a_process_gives_the_numbers_of_the_export(name: str, tmp_path: Path) ->
     inputs = inputs_of(name, 300)
     with (
         hosted(examples()[name], sample_time=SAMPLE_TIME, single=True, serving=SERVING) as line,
-        Link(line, lock_step=True, **PATIENT) as link,
+        Link(line, lock_step=True, timeout=1.0, patience=30.0) as link,
     ):
         outputs = [link.step(row).outputs for row in inputs]
     np.testing.assert_array_equal(outputs, single(name, tmp_path / "c", inputs))
@@ -73,7 +72,7 @@ def test_firmware_answers_with_the_numbers_of_the_export(tmp_path: Path) -> None
     serving = Serving(SERVING.limits, watchdog=60.0, adjustable=0.3)
     with (
         emulated(examples()["pi"], sample_time=SAMPLE_TIME, serving=serving) as line,
-        Link(line, lock_step=True, **PATIENT) as link,
+        Link(line, lock_step=True, timeout=1.0, patience=30.0) as link,
     ):
         outputs = [link.step(row).outputs for row in inputs]
         np.testing.assert_array_equal(outputs, single("pi", tmp_path / "c", inputs))
@@ -91,7 +90,9 @@ def test_served_exports_of_all_kinds_compile(tmp_path: Path) -> None:
         block = examples()[name]
         channels = [channel.name for channel in (*block.inputs, *block.outputs)]
         wide = Serving(dict.fromkeys(channels, (-9.0, 9.0)), adjustable=0.2 if number % 2 else 0.0)
-        folder = export_c(block, tmp_path / name, sample_time=SAMPLE_TIME, serving=wide, single=True)
+        folder = export_c(
+            block, tmp_path / name, sample_time=SAMPLE_TIME, serving=wide, single=True
+        )
         sources = [*sorted((folder / "src").glob("*.c")), folder / "examples" / "link_posix.c"]
         options = ["-D_POSIX_C_SOURCE=200809L", f"-I{folder / 'src'}"]
         compile_c(sources, tmp_path / f"{name}.elf", options=options)
@@ -106,7 +107,7 @@ def test_a_port_is_opened_by_name_and_closed() -> None:
         assert port.read(1.0) == b"\x03\x04\x11"
         assert port.read(0.0) == b""
         other.close()
-        with pytest.raises(DataError, match="has been closed by the other end.*Remedy"):
+        with pytest.raises(DataError, match=r"has been closed by the other end.*Remedy"):
             port.read(1.0)
         port.close()
         port.close()

@@ -92,13 +92,13 @@ def test_c_answers_as_the_twin_does(is_open: bool, told: list[tuple[str, bytes |
 
 
 @given(st.lists(st.binary(max_size=236), max_size=5), st.integers(1, 50))
-def test_frames_come_out_as_they_went_in_however_they_are_cut(bodies: list[bytes], cut: int) -> None:
+def test_frames_come_out_as_they_went_in_however_they_are_cut(
+    bodies: list[bytes], cut: int
+) -> None:
     frames = [Frame(k % 14, 2**32 - 1 - k, k, body) for k, body in enumerate(bodies)]
     wire = b"".join(frame.packed() for frame in frames)
     reader = Reader()
-    found = [
-        frame for at in range(0, len(wire), cut) for frame in reader.feed(wire[at : at + cut])
-    ]
+    found = [frame for at in range(0, len(wire), cut) for frame in reader.feed(wire[at : at + cut])]
     assert found == frames
     assert wire.count(0) == len(frames)
     assert not reader.dropped
@@ -107,7 +107,9 @@ def test_frames_come_out_as_they_went_in_however_they_are_cut(bodies: list[bytes
 @given(st.binary(min_size=1, max_size=236), st.data())
 def test_no_frame_with_up_to_three_flipped_bits_is_taken(body: bytes, data: st.DataObject) -> None:
     wire = bytearray(Frame(4, 7, 9, body).packed())
-    places = data.draw(st.lists(st.integers(0, 8 * len(wire) - 1), min_size=1, max_size=3, unique=True))
+    places = data.draw(
+        st.lists(st.integers(0, 8 * len(wire) - 1), min_size=1, max_size=3, unique=True)
+    )
     for place in places:
         wire[place // 8] ^= 1 << place % 8
     assert not Reader().feed(bytes(wire) + b"\0")

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from mckibben.arrays import Array
 from mckibben.blocks.core.block import Primitive
 from mckibben.export.c.adjusting import coefficient_limits, memory_limits
 from mckibben.export.c.serving import Serving, limits
@@ -35,7 +36,7 @@ class Twin:
         self.low, self.high, self.safe = found.low, found.high, found.safe
         self.n_in, self.n_out = len(self.block.inputs), len(self.block.outputs)
         self.most_silence = int(self.serving.watchdog / self.sample_time + 1e-9)
-        self.bounds = [None, None]
+        self.bounds: list[tuple[Array, Array] | None] = [None, None]
         if self.serving.adjustable:
             wiring = Wiring(self.block, self.sample_time)
             self.bounds = [

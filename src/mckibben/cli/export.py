@@ -106,8 +106,8 @@ def _number(text: str, said: str) -> float:
         found = math.nan
     if not math.isfinite(found):
         raise ModelError(
-            f"{said[:60]!r} says no limits. Remedy: give --limit NAME=LOW:HIGH or --safe NAME=VALUE, such as "
-            "pressure=0:6."
+            f"{said[:60]!r} says no limits. Remedy: give --limit NAME=LOW:HIGH or "
+            "--safe NAME=VALUE, such as pressure=0:6."
         )
     return found
 

@@ -88,7 +88,9 @@ def _settings(given: list[str]) -> dict[str, float]:
         except ValueError:
             found[name] = math.nan
         if not name or not math.isfinite(found[name]):
-            raise DataError(f"--set {text!r:.60}", remedy="give NAME=VALUE, such as displacement=12")
+            raise DataError(
+                f"--set {text!r:.60}", remedy="give NAME=VALUE, such as displacement=12"
+            )
     return found
 
 
@@ -126,12 +128,18 @@ def _recorded(device: Device, samples: list[State], every: int) -> Recording:
 
     if len(samples) < 2:
         raise DataError(
-            "the device told no two steps in that time", remedy="give more --seconds, or less --every"
+            "the device told no two steps in that time",
+            remedy="give more --seconds, or less --every",
         )
-    steps = np.array([state.steps - samples[0].steps for state in samples], dtype=np.float64) / every
+    steps = (
+        np.array([state.steps - samples[0].steps for state in samples], dtype=np.float64) / every
+    )
     grid = np.arange(int(steps[-1]) + 1)
     if lost := len(grid) - len(samples):
-        say(f"Note: {lost} of {len(grid)} rows were lost on the way, and are interpolated", error=True)
+        say(
+            f"Note: {lost} of {len(grid)} rows were lost on the way, and are interpolated",
+            error=True,
+        )
     channels, units = {}, {}
     inputs = [port.name for port in device.inputs]
     for k, port in enumerate(device.inputs):

@@ -1,13 +1,12 @@
-"""A host's end of the wire: asks, asks again what was not answered, and counts what was lost."""
+"""A host's end of the wire: finds out what is there, and leads it."""
 
 from __future__ import annotations
 
-import os
 import struct
 import time
-from collections import deque
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
 from typing import Self
@@ -18,7 +17,6 @@ from numpy.typing import ArrayLike
 from mckibben.arrays import Array
 from mckibben.errors import DataError
 from mckibben.link.device import (
-    ANSWER,
     COEFFICIENTS,
     MEMORY,
     Counts,
@@ -26,54 +24,16 @@ from mckibben.link.device import (
     Kind,
     Port,
     State,
-    Status,
     described,
     identified,
     stated,
     unfit,
 )
-from mckibben.link.framing import Frame, Reader
+from mckibben.link.exchange import WORDS, Exchange, LinkError, LostError, Statistics
 from mckibben.link.ports import ByteStream, open_port
-
-WORDS = 1 << 32
-
-KEPT = 100_000
-"""Samples of a stream that wait to be taken, at most: the latest."""
-
 
 OPENINGS = 3
 """How often to open a session for one frame, at most."""
-
-
-class LinkError(DataError):
-    """A device that does not answer, refuses, or is not what it was."""
-
-
-class _ReopenedError(Exception):
-    """The device knows nothing of the session."""
-
-
-@dataclass
-class Statistics:
-    """What a link has counted.
-
-    Parameters
-    ----------
-    asked, answered : int
-        Frames that were to be carried out, and answers to them.
-    repeated : int
-        Frames that were sent again, for want of an answer in time.
-    dropped : int
-        Pieces that came and were no frames, or answers to nothing that was asked.
-    reopened : int
-        How often the device was led again, after its watchdog had acted or it had been switched off.
-    """
-
-    asked: int = 0
-    answered: int = 0
-    repeated: int = 0
-    dropped: int = 0
-    reopened: int = 0
 
 
 class Link:
@@ -131,27 +91,18 @@ class Link:
         reopen: bool = True,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
-        if not 0 < timeout <= patience:
-            raise DataError(
-                f"a timeout of {timeout:g} s and a patience of {patience:g} s",
-                remedy="give positive times, the patience no shorter",
-            )
-        self._stream = open_port(stream, baud=baud) if isinstance(stream, str | Path) else stream
-        self._lock_step, self._watchdog, self._clock = lock_step, watchdog, clock
-        self._timeout, self._patience, self._reopen = timeout, patience, reopen
-        self._reader, self._samples = Reader(), deque[State](maxlen=KEPT)
-        # no answer to an earlier program has these numbers
-        self._session, self._sequence = 0, int.from_bytes(os.urandom(4), "little")
-        self._led, self._loads, self._every = False, 0, 0
-        self.statistics = Statistics()
+        line = open_port(stream, baud=baud) if isinstance(stream, str | Path) else stream
+        self._exchange = Exchange(line, timeout=timeout, patience=patience, clock=clock)
+        self._lock_step, self._watchdog, self._reopen = lock_step, watchdog, reopen
+        self._session, self._led, self._loads, self._every = 0, False, 0, 0
         try:
             self.device = self._identify(fingerprint)
         except BaseException:
-            self._stream.close()
+            line.close()
             raise
 
     def _identify(self, fingerprint: str | None) -> Device:
-        device, counts, n_in, n_out = identified(self._ask(Kind.IDENTIFY))
+        device, counts, n_in, n_out = identified(self._exchange.ask(Kind.IDENTIFY))
         if fingerprint is not None and fingerprint.lower() != device.fingerprint:
             raise LinkError(
                 f"the device holds model {device.fingerprint}, not {fingerprint:.40}",
@@ -160,10 +111,15 @@ class Link:
         self._loads = counts.loads
         ports: list[Port] = []
         for place in range(n_in + n_out):
-            ports.append(described(self._ask(Kind.DESCRIBE, bytes([place])), device))
+            ports.append(described(self._exchange.ask(Kind.DESCRIBE, bytes([place])), device))
         return replace(device, inputs=tuple(ports[:n_in]), outputs=tuple(ports[n_in:]))
 
     # -- leading -----------------------------------------------------------------------------
+
+    @property
+    def statistics(self) -> Statistics:
+        """What was asked, repeated and dropped so far."""
+        return self._exchange.statistics
 
     def step(self, inputs: ArrayLike) -> State:
         """Step the model on the device by one sample, and return how it stands then.
@@ -182,7 +138,8 @@ class Link:
         """
         if not self._lock_step:
             raise LinkError(
-                "the device's own timer steps the model", remedy="call set(), or give lock_step=True"
+                "the device's own timer steps the model",
+                remedy="call set(), or give lock_step=True",
             )
         return self._inputs(inputs)
 
@@ -226,12 +183,21 @@ class Link:
 
     def samples(self, timeout: float = 0.0) -> list[State]:
         """Return the steps that the device has told since, waiting so long for the first [s]."""
-        until = self._clock() + timeout
-        self._take(0.0)
-        while not self._samples and (left := until - self._clock()) > 0:
-            self._take(left)
-        found = list(self._samples)
-        self._samples.clear()
+        exchange = self._exchange
+        until = exchange.clock() + timeout
+        exchange.take(0.0)
+        while not exchange.samples and (left := until - exchange.clock()) > 0:
+            exchange.take(left)
+        found = []
+        while exchange.samples:
+            frame = exchange.samples.popleft()
+            try:
+                if self._led and frame.session == self._session:
+                    found.append(stated(frame.body[1:], self.device, with_inputs=True))
+                    continue
+            except DataError:
+                pass
+            self.statistics.dropped += 1
         return found
 
     def keep(self) -> None:
@@ -246,17 +212,18 @@ class Link:
         """Lead no more: the device takes its safe outputs at once."""
         if self._led:
             self._led = False
-            self._ask(Kind.RELEASE, session=self._session, refused=(Status.NO_SESSION,))
+            with suppress(LostError):  # it has let go by itself
+                self._exchange.ask(Kind.RELEASE, session=self._session)
 
     # -- asking ------------------------------------------------------------------------------
 
     def state(self) -> State:
         """Return how the device stands; this leads nothing."""
-        return stated(self._ask(Kind.STATE), self.device, with_inputs=True)
+        return stated(self._exchange.ask(Kind.STATE), self.device, with_inputs=True)
 
     def counts(self) -> Counts:
         """Return what the device has counted; this leads nothing."""
-        return identified(self._ask(Kind.IDENTIFY))[1]
+        return identified(self._exchange.ask(Kind.IDENTIFY))[1]
 
     def coefficients(self) -> Array:
         """Return the coefficients of the model, in the order of its C; none where they are fixed."""
@@ -284,7 +251,7 @@ class Link:
         parts = [np.empty(0)]
         for first in range(0, n, self.device.most):
             count = min(self.device.most, n - first)
-            body = self._ask(Kind.READ, struct.pack("<BHB", what, first, count))
+            body = self._exchange.ask(Kind.READ, struct.pack("<BHB", what, first, count))
             parts.append(self.device.numbers(body))
         found = np.concatenate(parts)
         if found.size != n:
@@ -314,8 +281,8 @@ class Link:
             try:
                 if not self._led:
                     self._open()
-                return self._ask(kind, body, session=self._session)
-            except _ReopenedError as error:
+                return self._exchange.ask(kind, body, session=self._session)
+            except LostError as error:
                 lost, self._led = self._led, False
                 if tried == OPENINGS - 1 or (lost and not (self._reopen and again)):
                     raise LinkError(
@@ -327,7 +294,7 @@ class Link:
         raise AssertionError("unreachable")
 
     def _open(self) -> None:
-        device, counts, *_ = identified(self._ask(Kind.IDENTIFY))
+        device, counts, *_ = identified(self._exchange.ask(Kind.IDENTIFY))
         if device.fingerprint != self.device.fingerprint:
             raise LinkError(
                 f"the device holds model {device.fingerprint} now, not {self.device.fingerprint}",
@@ -347,83 +314,13 @@ class Link:
                     remedy=f"give {device.period:g} to {device.period * device.silence:g} s",
                 )
         body = bytes.fromhex(device.fingerprint) + struct.pack("<BI", self._lock_step, ticks)
-        self._session = (self._heard + 1) % WORDS  # by which the device knows that it is a later one
-        self._ask(Kind.OPEN, body, session=self._session)
+        self._session = (
+            self._exchange.session + 1
+        ) % WORDS  # by which the device knows that it is a later one
+        self._exchange.ask(Kind.OPEN, body, session=self._session)
         self._led = True
         if self._every:
-            self._ask(Kind.STREAM, struct.pack("<H", self._every), session=self._session)
-
-    def _ask(
-        self,
-        kind: Kind,
-        body: bytes = b"",
-        *,
-        session: int = 0,
-        refused: Sequence[Status] = (),
-    ) -> bytes:
-        """Send a frame until it is answered, and return what the answer says."""
-        self._sequence = (self._sequence + 1) % WORDS
-        packed = Frame(kind, session, self._sequence, body).packed()
-        until = self._clock() + self._patience
-        self.statistics.asked += 1
-        self._stream.write(packed)
-        asked = self._clock()
-        while True:
-            left = asked + self._timeout - self._clock()
-            answer = self._take(max(left, 0.0), kind)
-            if answer is not None:
-                break
-            now = self._clock()
-            if now >= until:
-                raise LinkError(
-                    f"nothing has answered for {self._patience:g} s",
-                    remedy="see that the device is on, that this is its port and rate, and that "
-                    "nothing else talks to it",
-                )
-            if now >= asked + self._timeout:
-                # a zero first, which ends whatever noise has begun
-                self._stream.write(b"\0" + packed)
-                self.statistics.repeated += 1
-                asked = now
-        self.statistics.answered += 1
-        return self._content(kind, answer, refused)
-
-    def _content(self, kind: Kind, answer: Frame, refused: Sequence[Status]) -> bytes:
-        if not answer.body:
-            raise unfit("an answer")
-        try:
-            status = Status(answer.body[0])
-        except ValueError:
-            raise unfit("an answer") from None
-        if status in (Status.NO_SESSION, Status.IS_SAFE, Status.OLD_SESSION) and status not in refused:
-            raise _ReopenedError(status.name.lower().replace("_", " "))
-        if status != Status.OK and status not in refused:
-            raise LinkError(
-                f"the device refuses {kind.name}: {status.name.lower().replace('_', ' ')}",
-                remedy="see docs/deploy/link.md for what that means",
-            )
-        if kind == Kind.IDENTIFY:
-            self._heard = answer.session
-        return answer.body[1:]
-
-    def _take(self, timeout: float, kind: Kind | None = None) -> Frame | None:
-        """Read once, keep samples, and return the answer that is waited for if it is there."""
-        found: Frame | None = None
-        for frame in self._reader.feed(self._stream.read(timeout)):
-            if frame.kind == Kind.SAMPLE | ANSWER and self._led and frame.session == self._session:
-                try:
-                    self._samples.append(stated(frame.body[1:], self.device, with_inputs=True))
-                    continue
-                except DataError:
-                    pass
-            elif kind is not None and frame.kind == kind | ANSWER:
-                if frame.sequence == self._sequence:
-                    found = frame
-                    continue
-            self.statistics.dropped += 1
-        self.statistics.dropped += self._reader.dropped
-        self._reader.dropped = 0
-        return found
+            self._exchange.ask(Kind.STREAM, struct.pack("<H", self._every), session=self._session)
 
     # -- ending ------------------------------------------------------------------------------
 
@@ -434,7 +331,7 @@ class Link:
         except DataError:
             pass  # its watchdog does it
         finally:
-            self._stream.close()
+            self._exchange.stream.close()
 
     def __enter__(self) -> Self:
         """Return the link."""

@@ -1,4 +1,4 @@
-"""Frames on a stream of bytes: stuffed so that a zero ends each (COBS), numbered, and checked (CRC-32)."""
+"""Frames on a stream of bytes: stuffed so that a zero ends each (COBS), numbered, checked (CRC-32)."""
 
 from __future__ import annotations
 

@@ -121,10 +121,14 @@ def open_port(name: str | Path, *, baud: int = 115200) -> Descriptor:
         ) from None
     rate = getattr(termios, f"B{baud}", None)
     if rate is None or not math.isfinite(baud) or baud <= 0:
-        raise DataError(f"{baud} bits a second", remedy="give a usual rate, such as 115200 or 921600")
+        raise DataError(
+            f"{baud} bits a second", remedy="give a usual rate, such as 115200 or 921600"
+        )
     try:
         if not stat.S_ISCHR(Path(name).stat().st_mode):
-            raise DataError("it is no serial port", file=name, remedy="give one, such as /dev/ttyACM0")
+            raise DataError(
+                "it is no serial port", file=name, remedy="give one, such as /dev/ttyACM0"
+            )
         number = os.open(name, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
     except OSError as error:
         raise DataError(

@@ -83,9 +83,7 @@ def emulated(
 def _write(
     folder: Path, block: Block, sample_time: float, single: bool, serving: Serving | None
 ) -> None:
-    files = c_files(
-        block, sample_time=sample_time, single=single, serving=serving or Serving()
-    )
+    files = c_files(block, sample_time=sample_time, single=single, serving=serving or Serving())
     for path, text in files.items():
         (folder / path).parent.mkdir(parents=True, exist_ok=True)
         (folder / path).write_text(text, encoding="utf-8")
@@ -98,8 +96,8 @@ def _running(command: Sequence[str]) -> Iterator[Descriptor]:
     with ours, theirs:
         process = subprocess.Popen(
             command,
-            stdin=theirs,
-            stdout=theirs,
+            stdin=theirs.fileno(),
+            stdout=theirs.fileno(),
             stderr=subprocess.DEVNULL,
             start_new_session=True,  # Ctrl-C is the host's
         )

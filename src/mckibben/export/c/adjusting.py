@@ -84,7 +84,9 @@ def memory_limits(wiring: Wiring, lowest: Array, highest: Array) -> tuple[Array,
     signals: dict[str, Array] = {f"in[{k}]": column for k, column in enumerate(inputs.T)}
     for step in wiring.steps:
         if not isinstance(step, Call):
-            signals[f"signals[{step.output}]"] = sum(signals[term] for term in step.terms)
+            signals[f"signals[{step.output}]"] = np.sum(
+                [signals[term] for term in step.terms], axis=0
+            )
             continue
         given = np.column_stack([signals[name] for name in step.inputs])
         visited, outputs = _run(step.part.block, given, wiring.sample_time)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import subprocess
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -152,6 +153,14 @@ def test_the_command_line_looks_leads_and_records(tmp_path: Path) -> None:
         finally:
             process.kill()
             process.wait()
+
+
+@needs("cc")
+def test_the_example_runs() -> None:
+    example = Path(__file__).parents[2] / "examples" / "robot_firmware.py"
+    command = [sys.executable, str(example), "--here", "--duration", "1"]
+    told = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    assert "Followed within" in told
 
 
 REFUSED = {

@@ -282,14 +282,10 @@ class Link:
                 if not self._led:
                     self._open()
                 return self._exchange.ask(kind, body, session=self._session)
-            except LostError as error:
+            except LostError:
                 lost, self._led = self._led, False
                 if tried == OPENINGS - 1 or (lost and not (self._reopen and again)):
-                    raise LinkError(
-                        f"the device leads no more: {error}",
-                        remedy="see what has kept the host silent or has switched the device off, and "
-                        "open the link again",
-                    ) from None
+                    raise
                 self.statistics.reopened += lost
         raise AssertionError("unreachable")
 

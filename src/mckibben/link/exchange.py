@@ -22,7 +22,7 @@ class LinkError(DataError):
     """A device that does not answer, refuses, or is not what it was."""
 
 
-class LostError(Exception):
+class LostError(LinkError):
     """The device knows nothing of the session any more, or has let go."""
 
 
@@ -126,7 +126,11 @@ class Exchange:
             raise unfit("an answer") from None
         words = status.name.lower().replace("_", " ")
         if status in (Status.NO_SESSION, Status.IS_SAFE, Status.OLD_SESSION):
-            raise LostError(words)
+            raise LostError(
+                f"the device leads no more: {words}",
+                remedy="see what has kept the host silent or has switched the device off, and open the "
+                "link again",
+            )
         if status != Status.OK:
             raise LinkError(
                 f"the device refuses {kind.name}: {words}",

@@ -125,7 +125,8 @@ class Device:
         """Return numbers that the device wrote."""
         if len(body) % self.kind.itemsize:
             raise unfit("numbers")
-        return np.frombuffer(body, self.kind).astype(np.float64)
+        with np.errstate(invalid="ignore"):  # of a NaN that signals
+            return np.frombuffer(body, self.kind).astype(np.float64)
 
 
 @dataclass(frozen=True)

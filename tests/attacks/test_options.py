@@ -42,6 +42,7 @@ COMMANDS: dict[str, list[str]] = {
     "muscles list": [],
     "muscles show": ["rail"],
     "app": ["workspace", "--no-show"],
+    "link": ["absent-port"],
     "export c": ["model.json", "-o", "out"],
     "export fmu": ["model.json", "-o", "out.fmu", "--platforms", "none"],
     "export ros2": ["inverse.json", "-o", "out"],

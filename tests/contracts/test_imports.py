@@ -27,7 +27,7 @@ LAYERS = (
     {"rigs"},
     {"blocks"},
     {"muscles"},
-    {"estimators", "export", "stream", "outputs"},
+    {"estimators", "export", "stream", "link", "outputs"},
     {"control", "simulators", "ros"},
     {"environments"},
     {"bands"},
@@ -62,6 +62,7 @@ STANDS_ON = {
         "system",
     },
     "stream": {"stream", "blocks", "arrays", "errors"},
+    "link": {"link", "export", "blocks", "arrays", "errors"},
     "control": {
         *("control", "blocks", "recording", "signals", "arrays", "errors", "registry", "numerals"),
     },

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -13,6 +14,7 @@ from mckibben.cli.output import print_json, say
 
 if TYPE_CHECKING:
     from mckibben.blocks.core.block import Block
+    from mckibben.export.c.serving import Serving
 
 app = typer.Typer(
     name="export",
@@ -65,6 +67,51 @@ def _emulated(block: Block, sample_time: float | None) -> str:
     return str(found)
 
 
+def _serving(
+    link: bool,
+    limit: list[str],
+    safe: list[str],
+    watchdog: float | None,
+    adjustable: float | None,
+) -> Serving | None:
+    """Return how the model is served, where it is."""
+    from mckibben.errors import ModelError
+    from mckibben.export.c.serving import Serving
+
+    if not link:
+        if limit or safe or watchdog is not None or adjustable is not None:
+            raise ModelError(
+                "--limit, --safe, --watchdog and --adjustable are of a served model. Remedy: add --link."
+            )
+        return None
+    limits = {}
+    for text in limit:
+        name, _, ends = text.partition("=")
+        low, _, high = ends.partition(":")
+        limits[name] = (_number(low, f"--limit {text}"), _number(high, f"--limit {text}"))
+    values = {
+        name: _number(value, f"--safe {text}")
+        for text in safe
+        for name, _, value in [text.partition("=")]
+    }
+    return Serving(limits, values, 0.5 if watchdog is None else watchdog, adjustable or 0.0)
+
+
+def _number(text: str, said: str) -> float:
+    from mckibben.errors import ModelError
+
+    try:
+        found = float(text)
+    except ValueError:
+        found = math.nan
+    if not math.isfinite(found):
+        raise ModelError(
+            f"{said[:60]!r} says no limits. Remedy: give --limit NAME=LOW:HIGH or "
+            "--safe NAME=VALUE, such as pressure=0:6."
+        )
+    return found
+
+
 @app.command("c")
 def export_c(
     model: Model,
@@ -82,6 +129,36 @@ def export_c(
             "--emulate", help="Run it on an emulated Cortex-M4F too, in single precision (QEMU)."
         ),
     ] = False,
+    link: Annotated[
+        bool, typer.Option("--link", help="Add a server that answers over a serial line.")
+    ] = False,
+    limit: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--limit",
+            metavar="NAME=LOW:HIGH",
+            help="With --link: of a channel; repeatable. Default: what the model knows.",
+        ),
+    ] = None,
+    safe: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--safe",
+            metavar="NAME=VALUE",
+            help="With --link: an output while no host leads; repeatable. Default: its lowest.",
+        ),
+    ] = None,
+    watchdog: Annotated[
+        float | None,
+        typer.Option(help="With --link: silence after which outputs are safe [s]. Default: 0.5."),
+    ] = None,
+    adjustable: Annotated[
+        float | None,
+        typer.Option(
+            metavar="SHARE",
+            help="With --link: by how much coefficients may be set to others, as 0.2. Default: fixed.",
+        ),
+    ] = None,
     overwrite: Overwrite = False,
     as_json: Json = False,
 ) -> None:
@@ -93,6 +170,7 @@ def export_c(
     from mckibben.outputs import refuse_inputs
 
     chosen = name or name_from(model)
+    serving = _serving(link, limit or [], safe or [], watchdog, adjustable)
     refuse_inputs(out, [model])
     refuse_folder(out, overwrite=overwrite)
     block = _loaded(model, inverse)
@@ -103,6 +181,7 @@ def export_c(
         sample_time=sample_time,
         single=float32,
         overwrite=overwrite,
+        serving=serving,
     )
     told = self_test(out, chosen) if check else None
     ran = _emulated(block, sample_time) if emulate else None

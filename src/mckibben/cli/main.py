@@ -25,6 +25,7 @@ from mckibben.cli.export import app as export_app
 from mckibben.cli.fit import fit
 from mckibben.cli.info import info
 from mckibben.cli.invert import invert
+from mckibben.cli.link import link
 from mckibben.cli.measured import measured
 from mckibben.cli.muscles import app as muscles_app
 from mckibben.cli.output import InterruptionError, finish, say, visible
@@ -56,7 +57,7 @@ app = typer.Typer(
 )
 for command in (
     *(study, characterize, fit, compare, check, calibrate, simulate, invert, track, plan, plot),
-    *(reproduce, measured, info, ros),
+    *(reproduce, measured, info, link, ros),
 ):
     app.command()(command)
 app.command("check-block")(check_block)

@@ -81,6 +81,22 @@ def missing_tools() -> list[str]:
     return [tool for tool in (COMPILER, SIZE, EMULATOR) if shutil.which(tool) is None]
 
 
+def refuse_without_tools() -> None:
+    """Refuse to emulate where a program is missing.
+
+    Raises
+    ------
+    ModelError
+        That says which.
+    """
+    missing = missing_tools()
+    if missing:
+        raise ModelError(
+            f"not on this machine: {', '.join(missing)}. Remedy: install gcc-arm-none-eabi, "
+            "libnewlib-arm-none-eabi and qemu-system-arm."
+        )
+
+
 def emulate(block: Block, *, sample_time: float | None = None, seed: int = 0) -> Emulated:
     """Cross-compile a model in single precision and run it on the emulated microcontroller.
 
@@ -89,12 +105,7 @@ def emulate(block: Block, *, sample_time: float | None = None, seed: int = 0) ->
     ModelError
         If tools are missing, it does not compile, or the emulated program fails.
     """
-    missing = missing_tools()
-    if missing:
-        raise ModelError(
-            f"not on this machine: {', '.join(missing)}. Remedy: install gcc-arm-none-eabi, "
-            "libnewlib-arm-none-eabi and qemu-system-arm."
-        )
+    refuse_without_tools()
     content = described(block, name="model", sample_time=sample_time, single=True)
     tests = vectors(block, content["sample_time"], single=True, seed=seed)
     content |= test_content(tests, single=True)
@@ -105,7 +116,7 @@ def emulate(block: Block, *, sample_time: float | None = None, seed: int = 0) ->
             for path, text in texts.items():
                 (folder / path).parent.mkdir(exist_ok=True)
                 (folder / path).write_text(text, encoding="utf-8")
-        flash = _build(folder)
+        flash = built(folder)
         told = _run(
             EMULATOR,
             *("-M", "mps2-an386", "-cpu", "cortex-m4", "-icount", "shift=6"),
@@ -128,7 +139,7 @@ def emulate(block: Block, *, sample_time: float | None = None, seed: int = 0) ->
     )
 
 
-def _build(folder: Path) -> int:
+def built(folder: Path) -> int:
     """Compile and link, and return the bytes of code and constants."""
     objects = []
     for source in sorted((folder / "src").glob("*.c")):

@@ -14,6 +14,7 @@ from mckibben.errors import ModelError
 from mckibben.export.c.literals import literal, rows
 from mckibben.export.c.parts import PRIMITIVES, check_single
 from mckibben.export.c.rounding import warn_of_rounding
+from mckibben.export.c.serving import Serving, served, served_files
 from mckibben.export.c.vectors import Vectors, vectors
 from mckibben.export.c.wiring import Call, Wiring
 from mckibben.export.folders import refuse_folder, write_folder
@@ -37,6 +38,7 @@ def export_c(
     sample_time: float | None = None,
     single: bool = False,
     overwrite: bool = False,
+    serving: Serving | None = None,
 ) -> Path:
     """Write a model as a folder of C99, with a self-test whose vectors Python computed.
 
@@ -56,6 +58,8 @@ def export_c(
         Single instead of double precision.
     overwrite : bool
         Whether a folder that an export wrote before may be replaced.
+    serving : Serving, optional
+        Add a server that answers over a wire, within these settings; see `mckibben.link`.
 
     Returns
     -------
@@ -71,20 +75,28 @@ def export_c(
     """
     folder = Path(folder)
     refuse_folder(folder, overwrite=overwrite)
-    files = c_files(block, name=name, sample_time=sample_time, single=single)
+    files = c_files(block, name=name, sample_time=sample_time, single=single, serving=serving)
     write_folder(folder, {path: text.encode() for path, text in files.items()}, overwrite=overwrite)
     return folder
 
 
 def c_files(
-    block: Block, *, name: str = "model", sample_time: float | None = None, single: bool = False
+    block: Block,
+    *,
+    name: str = "model",
+    sample_time: float | None = None,
+    single: bool = False,
+    serving: Serving | None = None,
 ) -> dict[str, str]:
     """Return the files of `export_c`, text by path in the folder."""
     content = described(block, name=name, sample_time=sample_time, single=single)
+    if serving is not None:
+        content |= served(block, content, serving, sample_time or own_time(block))
     tests = vectors(block, content["sample_time"], single=single)
     content |= test_content(tests, single=single)
     return {
         **source_files(content),
+        **(served_files(content) if serving is not None else {}),
         "CMakeLists.txt": render("CMakeLists.txt.j2", content),
         "README.md": render("README.md.j2", content),
         "library.properties": render("library.properties.j2", content),
@@ -144,6 +156,10 @@ def described(
     cost, size = wiring.cost, 4 if single else 8
     n_numbers = max(wiring.n_numbers, 1)
     calls = [_call(call, index, single) for index, call in enumerate(wiring.calls)]
+    first = 0
+    for told in calls:
+        told["first_coefficient"] = first
+        first += max(told["n_coefficients"], 1)
     order = {id(call): told for call, told in zip(wiring.calls, calls, strict=True)}
     constants = sum(call.part.coefficients.size for call in wiring.calls)
     return {
@@ -164,6 +180,8 @@ def described(
         "given": wiring.outputs,
         "n_signals": wiring.n_signals,
         "n_numbers": n_numbers,
+        "n_coefficients": first,
+        "adjustable": False,
         "n_states": sum(call["n_states"] for call in calls),
         "explicit": any(call["state_rows"] for call in calls),
         "primitives": primitives,

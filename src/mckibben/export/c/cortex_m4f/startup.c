@@ -15,8 +15,13 @@ static void fault(void)
     _Exit(70);
 }
 
-__attribute__((section(".vectors"), used)) static void (*const vectors[16])(void) = {
-    (void (*)(void))(uintptr_t)stack_top, reset_handler, fault, fault, fault, fault, fault};
+/* What programs that want these interrupts define. */
+__attribute__((weak)) void timer_passed(void);
+__attribute__((weak)) void uart_received(void);
+
+__attribute__((section(".vectors"), used)) static void (*const vectors[17])(void) = {
+    (void (*)(void))(uintptr_t)stack_top, reset_handler, fault, fault, fault, fault, fault,
+    [15] = timer_passed, [16] = uart_received};
 
 void reset_handler(void)
 {

@@ -1,0 +1,405 @@
+"""Fuzz both ends of the wire: the C servers of all blocks under sanitizers, then the Python client.
+
+    python benchmarks/fuzz_link.py --seconds 600 --seed 1
+
+To the servers go bytes of any kind, frames that are stuffed, checked and numbered as they should be with
+anything in them, coefficients and memory within the limits of the export, ticks, and starts. A crash, an
+undefined operation, a call that hangs, or an output that is not finite or beyond its limits ends it with
+an error. The client is answered anything that a hostile device can say: whatever is no error in words
+is a finding. Each end has half of the time.
+"""
+
+from __future__ import annotations
+
+import argparse
+import random
+import struct
+import sys
+import tempfile
+from pathlib import Path
+
+from fuzz_c import SAMPLE_TIME, fuzzed
+from fuzzing import guarded
+from mckibben.blocks.core.block import Block
+from mckibben.blocks.laws.examples import examples
+from mckibben.errors import DataError, ModelError
+from mckibben.export.c.project import described, source_files
+from mckibben.export.c.serving import Serving, limits, served, served_files
+from mckibben.link import Link
+from mckibben.link.device import IDENTITY
+from mckibben.link.framing import Frame, Reader
+
+SERVING = Serving(watchdog=0.1, adjustable=0.3)
+WIDE = (-50.0, 50.0)
+"""Limits of channels whose model knows none."""
+
+HARNESS = """
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+{includes}
+
+typedef struct {{
+    const uint8_t *data;
+    size_t left;
+}} source;
+
+static uint8_t next(source *from)
+{{
+    if (from->left == 0) {{
+        return 0;
+    }}
+    from->left--;
+    return *from->data++;
+}}
+
+static uint32_t crc32(const uint8_t *bytes, int n)
+{{
+    uint32_t crc = 0xFFFFFFFFu;
+    for (int i = 0; i < n; i++) {{
+        crc ^= bytes[i];
+        for (int k = 0; k < 8; k++) {{
+            crc = (crc >> 1) ^ (crc & 1u ? 0xEDB88320u : 0u);
+        }}
+    }}
+    return ~crc;
+}}
+
+static uint32_t sequence, session;
+
+/* Send a frame as it should be around any body. */
+static void send_frame(mck_server *link, uint8_t kind, const uint8_t *body, int n)
+{{
+    uint8_t frame[MCK_PAYLOAD];
+    uint8_t stuffed[MCK_STUFFED];
+    int length = 0;
+    int at = 1;
+    int mark = 0;
+    frame[length++] = MCK_LINK_VERSION;
+    frame[length++] = kind;
+    for (int i = 0; i < 4; i++) {{
+        frame[length++] = (uint8_t)(session >> (8 * i));
+    }}
+    for (int i = 0; i < 4; i++) {{
+        frame[length++] = (uint8_t)(sequence >> (8 * i));
+    }}
+    memcpy(frame + length, body, (size_t)n);
+    length += n;
+    const uint32_t check = crc32(frame, length);
+    for (int i = 0; i < 4; i++) {{
+        frame[length++] = (uint8_t)(check >> (8 * i));
+    }}
+    for (int i = 0; i < length; i++) {{
+        if (frame[i] == 0) {{
+            stuffed[mark] = (uint8_t)(at - mark);
+            mark = at;
+        }} else {{
+            stuffed[at] = frame[i];
+        }}
+        at++;
+    }}
+    stuffed[mark] = (uint8_t)(at - mark);
+    for (int i = 0; i < at; i++) {{
+        mck_server_receive(link, stuffed[i]);
+    }}
+    mck_server_receive(link, 0);
+}}
+
+static void drain(mck_server *link)
+{{
+    int n = 0;
+    while (mck_server_send(link) >= 0) {{
+        if (++n > 2 * MCK_STUFFED) {{
+            abort();
+        }}
+    }}
+}}
+
+static void open_session(mck_server *link, source *from)
+{{
+    uint8_t body[13] = {{0}};
+    memcpy(body, link->served->fingerprint, 8);
+    body[8] = next(from) & 1u;
+    body[9] = (uint8_t)(1u + next(from) % 10u);
+    session = link->session + 1u;
+    sequence++;
+    send_frame(link, 3, body, 13);
+    drain(link);
+}}
+
+/* Numbers between limits, as the limits of the export allow. */
+static void put_between(uint8_t *to, mck_real low, mck_real high, uint8_t share)
+{{
+    mck_real value = low + (high - low) * ((mck_real)share / (mck_real)255);
+    value = value < low ? low : value > high ? high : value;
+    memcpy(to, &value, sizeof value);
+}}
+
+static void set_inputs(mck_server *link, source *from)
+{{
+    uint8_t body[MCK_PAYLOAD];
+    for (int i = 0; i < link->served->n_inputs; i++) {{
+        const mck_channel *channel = &link->served->channels[i];
+        put_between(body + i * (int)sizeof(mck_real), channel->low, channel->high, next(from));
+    }}
+    sequence++;
+    send_frame(link, 4, body, link->served->n_inputs * (int)sizeof(mck_real));
+    drain(link);
+}}
+
+static void load(mck_server *link, source *from, uint8_t what)
+{{
+    const int most = 20;
+    for (int first = 0; first < link->served->sizes[what]; first += most) {{
+        uint8_t body[3 + 20 * sizeof(mck_real)] = {{
+            what, (uint8_t)(first & 255), (uint8_t)(first >> 8)}};
+        const int left = link->served->sizes[what] - first;
+        const int n = left < most ? left : most;
+        for (int i = 0; i < n; i++) {{
+            put_between(body + 3 + i * (int)sizeof(mck_real), link->served->lowest[what][first + i],
+                        link->served->highest[what][first + i], next(from));
+        }}
+        sequence++;
+        send_frame(link, 8, body, 3 + n * (int)sizeof(mck_real));
+        drain(link);
+    }}
+    sequence++;
+    send_frame(link, 9, &what, 1);
+    drain(link);
+}}
+
+static void check(const mck_server *link)
+{{
+    for (int i = 0; i < link->served->n_outputs; i++) {{
+        const mck_channel *channel = &link->served->channels[link->served->n_inputs + i];
+        if (!(link->out[i] >= channel->low && link->out[i] <= channel->high)) {{
+            abort();
+        }}
+    }}
+    for (int i = 0; i < link->served->n_inputs; i++) {{
+        const mck_channel *channel = &link->served->channels[i];
+        if (!(link->in[i] >= channel->low && link->in[i] <= channel->high)) {{
+            abort();
+        }}
+    }}
+}}
+
+static void tried(mck_server *link, source *from)
+{{
+    session = sequence = 0;
+    mck_server_init(link, 0);
+    open_session(link, from);
+    while (from->left > 0) {{
+        const uint8_t what = next(from);
+        uint8_t bytes[ROOM];
+        int n = 0;
+        switch (what % 10) {{
+        case 0:
+            for (n = next(from); n > 0 && from->left > 0; n--) {{
+                mck_server_receive(link, next(from));
+            }}
+            break;
+        case 1:
+        case 2:
+            n = next(from) % ROOM;
+            for (int i = 0; i < n; i++) {{
+                bytes[i] = next(from);
+            }}
+            sequence += what % 50 == 1 ? next(from) : 1u;
+            send_frame(link, next(from) % 16, bytes, n);
+            break;
+        case 3:
+            open_session(link, from);
+            break;
+        case 4:
+        case 5:
+            set_inputs(link, from);
+            break;
+        case 6:
+            load(link, from, (uint8_t)(next(from) & 1u));
+            break;
+        case 7:
+            for (n = next(from) % 16; n > 0; n--) {{
+                mck_server_tick(link);
+            }}
+            break;
+        case 8:
+            drain(link);
+            break;
+        default:
+            if (what % 100 == 9) {{
+                mck_server_init(link, next(from));
+            }} else {{
+                (void)mck_server_send(link);
+            }}
+            break;
+        }}
+        check(link);
+    }}
+}}
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
+{{
+    source from = {{data, size}};
+    switch (next(&from) % {count}) {{
+{cases}
+    }}
+    return 0;
+}}
+"""
+
+CASE = """    case {index}: {{
+        static {name}_server server;
+        {name}_server_init(&server, 0);
+        tried(&server.link, &from);
+        break;
+    }}"""
+
+
+def servable() -> dict[str, tuple[Block, Serving]]:
+    """Return all blocks that fit into frames, with limits where their model knows none."""
+    found = {}
+    for name, block in examples().items():
+        channels = {channel.name for channel in (*block.inputs, *block.outputs)}
+        try:
+            limits(block, SERVING)
+            serving = SERVING
+        except ModelError:
+            wide = dict.fromkeys(channels, WIDE)
+            serving = Serving(wide, watchdog=SERVING.watchdog, adjustable=SERVING.adjustable)
+        found[name] = (block, serving)
+    return found
+
+
+def write_sources(folder: Path, single: bool) -> None:
+    """Write servers of all blocks, and the harness."""
+    includes, cases = [], []
+    for index, (block, serving) in enumerate(servable().values()):
+        name = f"block_{index}"
+        content = described(block, name=name, sample_time=SAMPLE_TIME, single=single)
+        content |= served(block, content, serving, SAMPLE_TIME)
+        for path, text in {**source_files(content), **served_files(content)}.items():
+            if path.startswith("src/"):
+                (folder / Path(path).name).write_text(text, encoding="utf-8")
+        includes.append(f'#include "{name}_server.h"')
+        cases.append(CASE.format(index=index, name=name))
+    (folder / "harness.c").write_text(
+        HARNESS.format(includes="\n".join(includes), cases="\n".join(cases), count=len(cases))
+        .replace("[ROOM]", "[MCK_PAYLOAD - 14]")
+        .replace("% ROOM", "% (MCK_PAYLOAD - 14)"),
+        encoding="utf-8",
+    )
+
+
+class Hostile:
+    """A device that says anything, mostly near to what it should."""
+
+    def __init__(self, rng: random.Random) -> None:
+        self.time, self._rng, self._reader, self._coming = 0.0, rng, Reader(), b""
+        self._truthful = rng.random()
+
+    def write(self, data: bytes) -> None:
+        for frame in self._reader.feed(data):
+            self._coming += self._answer(frame)
+
+    def read(self, timeout: float) -> bytes:
+        self.time += max(timeout, 0.0) + 1e-3
+        n = self._rng.choice([1, 7, 4096])
+        came, self._coming = self._coming[:n], self._coming[n:]
+        if self._rng.random() < 0.02:
+            came += self._rng.randbytes(self._rng.randrange(600))
+        return came
+
+    def close(self) -> None:
+        pass
+
+    def _answer(self, frame: Frame) -> bytes:
+        rng = self._rng
+        body = self._good(frame) if rng.random() < self._truthful else self._any()
+        session, sequence, kind = frame.session, frame.sequence, frame.kind | 128
+        if rng.random() < 0.05:
+            session, sequence, kind = rng.randrange(2**32), rng.randrange(2**32), rng.randrange(256)
+        packed = Frame(kind, session, sequence, body[:236]).packed()
+        if rng.random() < 0.1:
+            sample = Frame(13 | 128, frame.session, 0, self._any())
+            packed += sample.packed()
+        if rng.random() < 0.02:
+            place = rng.randrange(len(packed))
+            packed = packed[:place] + rng.randbytes(1) + packed[place + 1 :]
+        return packed
+
+    def _good(self, frame: Frame) -> bytes:
+        rng = self._rng
+        if frame.kind == 1:
+            sizes = [rng.choice([0, 1, 1, 2, 30, 65535]) for _ in range(4)]
+            told = [0, rng.choice([4, 8, 8, 5]), 0, bytes(8), 5000, rng.choice([0, 100]), 1, 0, 0]
+            return IDENTITY_ANSWER.pack(*told, *sizes)
+        if frame.kind == 2:
+            return b"\0" + struct.pack("<3d", -1e3, 1e3, 0.0) + b"\1x\3bar"
+        if frame.kind in (4, 5):
+            return b"\0" + struct.pack("<BI", 1, 7) + self._numbers(rng.choice([1, 2, 3]))
+        if frame.kind == 7 and len(frame.body) == 4:
+            return b"\0" + self._numbers(frame.body[3])
+        return b"\0"
+
+    def _numbers(self, n: int) -> bytes:
+        odd = (0.0, -1.5, float("nan"), float("inf"), 1e308)
+        return struct.pack(f"<{n}d", *(self._rng.choice(odd) for _ in range(n)))
+
+    def _any(self) -> bytes:
+        rng = self._rng
+        return (
+            bytes([rng.choice([0, 0, rng.randrange(256)])])
+            + rng.randbytes(rng.randrange(240))[:235]
+        )
+
+
+IDENTITY_ANSWER = struct.Struct("<B" + IDENTITY.format.lstrip("<"))
+
+
+def lead(number: int, seed: int) -> None:
+    """Do all that a client can with a hostile device; errors in words are as they should be."""
+    rng = random.Random(f"{seed} {number}")
+    device = Hostile(rng)
+    try:
+        link = Link(device, lock_step=rng.random() < 0.5, clock=lambda: device.time, patience=0.4)
+    except DataError:
+        return
+    n = len(link.device.inputs)
+    calls = [
+        *(lambda: link.step([0.0] * n), lambda: link.set([0.0] * n), link.state, link.counts),
+        *(link.coefficients, link.memory, lambda: link.stream(3), lambda: link.samples(0.1)),
+        *(link.keep, link.reset, lambda: link.load_coefficients(link.coefficients()), link.release),
+    ]
+    for call in rng.choices(calls, k=20):
+        try:
+            call()
+        except DataError as error:
+            assert "Remedy" in str(error)  # noqa: PT017
+    link.close()
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--seconds", type=int, default=60, help="how long to try")
+    parser.add_argument("--seed", type=int, default=1, help="of all that is tried")
+    parser.add_argument("--float32", action="store_true", help="servers in single precision")
+    parser.add_argument("--case", type=int, help="try the client on this one alone")
+    chosen = parser.parse_args()
+    if chosen.case is not None:
+        lead(chosen.case, chosen.seed)
+        return 0
+    half = max(chosen.seconds // 2, 1)
+    with tempfile.TemporaryDirectory() as place:
+        write_sources(Path(place), chosen.float32)
+        if code := fuzzed(Path(place), half, chosen.seed):
+            return code
+    tried, findings = guarded(lambda number: lead(number, chosen.seed), half)
+    for place_, numbers in sorted(findings.items()):
+        print(f"{place_}: again with --seed {chosen.seed} --case {numbers[0]}")
+    print(f"{tried} hostile devices tried, {sum(map(len, findings.values()))} findings")
+    return 1 if findings else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

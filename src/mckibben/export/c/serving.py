@@ -1,0 +1,223 @@
+"""What an exported model that answers over a wire accepts: fixed here, and nowhere on the wire."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mckibben.arrays import Array
+from mckibben.blocks.core.block import Block
+from mckibben.blocks.core.single_channel import Ranged
+from mckibben.errors import ModelError
+from mckibben.export.c.adjusting import coefficient_limits, memory_limits
+from mckibben.export.c.literals import literal, rows
+from mckibben.export.c.wiring import Wiring
+from mckibben.export.templating import render
+
+SERVER = tuple(Path(__file__).parent / "server" / f"mck_server.{end}" for end in ("c", "h"))
+
+ROOM = 236
+"""Bytes of a frame for what it says."""
+
+MOST_NUMBERS = 0xFFFF
+
+MOST_TICKS = 2**31 - 1
+
+
+@dataclass(frozen=True)
+class Serving:
+    """How a model is served.
+
+    Parameters
+    ----------
+    limits : mapping of str to (float, float)
+        Lowest and highest of a channel, in its unit; default what the model knows.
+    safe : mapping of str to float
+        Of an output, what stands there while no host leads; default its lowest.
+    watchdog : float
+        How long a host may be silent at most [s].
+    adjustable : float
+        Share by which coefficients may be set to others, 0 for not at all; with it, memory may be set
+        too, where the model's own runs take it.
+    """
+
+    limits: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    safe: Mapping[str, float] = field(default_factory=dict)
+    watchdog: float = 0.5
+    adjustable: float = 0.0
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Ranges of a model's channels, and its safe outputs."""
+
+    low: Array
+    high: Array
+    safe: Array
+
+
+def limits(block: Block, serving: Serving) -> Limits:
+    """Return the limits of all inputs, then outputs, each of shape (n_inputs + n_outputs,).
+
+    Raises
+    ------
+    ModelError
+        If they are unknown, or none, or name what is no channel.
+    """
+    names = [channel.name for channel in (*block.inputs, *block.outputs)]
+    n_in = len(block.inputs)
+    for given, allowed in ((serving.limits, names), (serving.safe, names[n_in:])):
+        if strange := sorted(set(given) - set(allowed)):
+            raise ModelError(
+                f"{strange[0]!r:.60} is no channel to say that of. Remedy: name one of "
+                f"{', '.join(allowed)}."
+            )
+    low, high = np.full(len(names), -np.inf), np.full(len(names), np.inf)
+    driven = slice(0, n_in - len(block.scheduling))
+    low[driven], high[driven] = _known(block)
+    low[n_in:], high[n_in:] = block.reachable()
+    for place, name in enumerate(names):
+        if name in serving.limits:
+            low[place], high[place] = serving.limits[name]
+    unknown = [n for n, a, b in zip(names, low, high, strict=True) if not np.isfinite(b - a)]
+    if unknown:
+        raise ModelError(
+            f"the model does not know between what limits {', '.join(unknown)} may be. Remedy: say it "
+            f"for each of them, --limit {unknown[0]}=LOW:HIGH."
+        )
+    for name, a, b in zip(names, low, high, strict=True):
+        if not a < b:
+            raise ModelError(
+                f"the limits of {name} are {a:g} and {b:g}. Remedy: give the lower one first."
+            )
+    safe = low.copy()
+    for place, name in enumerate(names[n_in:], start=n_in):
+        safe[place] = serving.safe.get(name, low[place])
+        if not low[place] <= safe[place] <= high[place]:
+            raise ModelError(
+                f"the safe value of {name} is {safe[place]:g}, beyond its limits {low[place]:g} to "
+                f"{high[place]:g}. Remedy: give one within."
+            )
+    return Limits(low, high, safe)
+
+
+def _known(block: Block) -> tuple[Array, Array]:
+    """Return the driven inputs' range as far as the block knows it."""
+    if isinstance(block, Ranged):
+        return np.array([block.limits[0]]), np.array([block.limits[1]])
+    n = len(block.inputs) - len(block.scheduling)
+    try:
+        return block.inverse().reachable()
+    except ModelError:
+        return np.full(n, -np.inf), np.full(n, np.inf)
+
+
+def served(
+    block: Block, content: Mapping[str, Any], serving: Serving, period: float | None
+) -> dict[str, Any]:
+    """Return what the templates say of a served model, beside what they say of the model.
+
+    Raises
+    ------
+    ModelError
+        If settings will not do, or the channels are too many for a frame.
+    """
+    ticks = _ticks(serving, period)
+    assert period is not None
+    single, n = content["single"], len(block.inputs) + len(block.outputs)
+    if n * content["bytes"] + 6 > ROOM:
+        raise ModelError(
+            f"{n} channels do not fit into a frame of the wire. Remedy: export in single precision, "
+            "--float32, or fewer channels."
+        )
+    if not 0 <= serving.adjustable < 1:
+        raise ModelError(
+            f"coefficients adjustable by {serving.adjustable:g} of their values. Remedy: give a share "
+            "from 0 to below 1, such as 0.2."
+        )
+    found = limits(block, serving)
+    wiring = Wiring(block, content["sample_time"])
+    adjusted: dict[str, dict[str, list[str]]] = {}
+    sizes = [0, 0]
+    if serving.adjustable:
+        inputs = slice(0, len(block.inputs))
+        ways = {
+            "coefficients": coefficient_limits(wiring, serving.adjustable),
+            "memory": memory_limits(wiring, found.low[inputs], found.high[inputs]),
+        }
+        for place, (what, ends) in enumerate(ways.items()):
+            if ends is not None and 0 < ends[0].size <= MOST_NUMBERS:
+                sizes[place] = ends[0].size
+                named = zip(("lowest", "highest"), ends, strict=True)
+                adjusted[what] = {end: rows(numbers, single=single) for end, numbers in named}
+    kept = ["coefficients", "memory"]
+    microseconds = max(round(1e6 * period), 1)
+    told = {
+        "period": period,
+        "microseconds": microseconds,
+        "silence": ticks,
+        "channels": [
+            channel
+            | {
+                end: literal(float(numbers[place]), single=single)
+                for end, numbers in (("low", found.low), ("high", found.high), ("safe", found.safe))
+            }
+            for place, channel in enumerate((*content["inputs"], *content["outputs"]))
+        ],
+        "adjusted": adjusted,
+        "sizes": sizes,
+        "lowest": [f"{what}_lowest" if what in adjusted else "NULL" for what in kept],
+        "highest": [f"{what}_highest" if what in adjusted else "NULL" for what in kept],
+        "staged": max(*sizes, 1),
+        "fingerprint_bytes": "",
+    }
+    full = {**content, "adjustable": bool(serving.adjustable), "served": told}
+    texts = [render("mckibben.export.c", file, full) for file in ("model.c.j2", "server.c.j2")]
+    digest = hashlib.sha256("\n".join([*texts, repr(single)]).encode()).digest()[:8]
+    told["fingerprint"] = digest.hex()
+    told["fingerprint_bytes"] = ", ".join(f"0x{byte:02X}" for byte in digest)
+    return {
+        "served": told,
+        "adjustable": bool(serving.adjustable),
+        "primitives": [*content["primitives"], *SERVER],
+        "sources": [*content["sources"], SERVER[0].name, f"{content['name']}_server.c"],
+    }
+
+
+def _ticks(serving: Serving, period: float | None) -> int:
+    """Return after how many silent ticks the watchdog acts."""
+    if period is None:
+        raise ModelError(
+            "a served model ticks, and this one has no time of its own. Remedy: give the time between "
+            "steps, --sample-time SECONDS."
+        )
+    ticks = serving.watchdog / period if math.isfinite(serving.watchdog) else math.inf
+    if not 1 <= ticks <= MOST_TICKS:
+        raise ModelError(
+            f"a watchdog of {serving.watchdog:g} s. Remedy: give a time from one sample time "
+            f"({period:g} s) on."
+        )
+    return math.floor(ticks + 1e-9)
+
+
+def served_files(content: Mapping[str, Any]) -> dict[str, str]:
+    """Return the files of the server, text by path, beside those of the model."""
+    name, told = content["name"], content["served"]
+    files = {
+        f"src/{name}_server.h": "server.h.j2",
+        f"src/{name}_server.c": "server.c.j2",
+        "examples/link_posix.c": "link_posix.c.j2",
+        "examples/link_mps2.c": "link_mps2.c.j2",
+    }
+    said = {"name": name, "fingerprint": told["fingerprint"], "period_us": told["microseconds"]}
+    return {
+        **{path: render("mckibben.export.c", file, content) for path, file in files.items()},
+        "link.json": json.dumps(said, indent=2) + "\n",
+    }

@@ -1,0 +1,193 @@
+"""Served exports as processes, over pseudo-terminals, and on the emulated microcontroller."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mckibben.blocks.laws.examples import examples
+from mckibben.errors import DataError, ModelError
+from mckibben.export import Serving, export_c
+from mckibben.export.c.building import CompiledModel, compile_c
+from mckibben.files import read
+from mckibben.link import Descriptor, Link, LinkError, open_port
+from mckibben.link.trying import emulated, hosted
+from tests.attacks.commands import call
+from tests.export.test_c import path_for
+from tests.export.test_emulation import emulated as with_emulator
+from tests.tools import needs
+
+SAMPLE_TIME = 0.02
+SERVING = Serving(limits={"pressure": (0, 6), "displacement": (-50, 50)}, watchdog=60.0)
+
+
+def single(name: str, folder: Path, inputs: np.ndarray) -> np.ndarray:
+    """Return what the export without a wire makes of inputs, in single precision."""
+    block = examples()[name]
+    export_c(block, folder, name="muscle", single=True, sample_time=SAMPLE_TIME)
+    n_in, n_out = len(block.inputs), len(block.outputs)
+    outputs, _ = CompiledModel(folder, "muscle", n_in, n_out).run(inputs)
+    return outputs
+
+
+def inputs_of(name: str, n: int) -> np.ndarray:
+    return path_for(examples()[name], 1, n).astype(np.float32).astype(np.float64)
+
+
+@contextmanager
+def terminals() -> Iterator[tuple[int, str]]:
+    """Give one end of a pseudo-terminal, and the name of the other."""
+    import tty
+
+    ours, theirs = os.openpty()
+    tty.setraw(theirs)
+    try:
+        yield ours, os.ttyname(theirs)
+    finally:
+        os.close(theirs)
+
+
+@needs("cc")
+@pytest.mark.parametrize("name", ["pi", "process-model"])
+def test_a_process_gives_the_numbers_of_the_export(name: str, tmp_path: Path) -> None:
+    inputs = inputs_of(name, 300)
+    with (
+        hosted(examples()[name], sample_time=SAMPLE_TIME, single=True, serving=SERVING) as line,
+        Link(line, lock_step=True, timeout=1.0, patience=30.0) as link,
+    ):
+        outputs = [link.step(row).outputs for row in inputs]
+    np.testing.assert_array_equal(outputs, single(name, tmp_path / "c", inputs))
+
+
+@with_emulator
+@needs("cc")
+def test_firmware_answers_with_the_numbers_of_the_export(tmp_path: Path) -> None:
+    inputs = inputs_of("pi", 200)
+    serving = Serving(SERVING.limits, watchdog=60.0, adjustable=0.3)
+    with (
+        emulated(examples()["pi"], sample_time=SAMPLE_TIME, serving=serving) as line,
+        Link(line, lock_step=True, timeout=1.0, patience=30.0) as link,
+    ):
+        outputs = [link.step(row).outputs for row in inputs]
+        np.testing.assert_array_equal(outputs, single("pi", tmp_path / "c", inputs))
+        line.write(b"noise\0" + bytes(range(256)))
+        memory = link.memory()
+        again = [link.step(row).outputs for row in inputs[:50]]
+        link.load_memory(memory)
+        np.testing.assert_array_equal([link.step(row).outputs for row in inputs[:50]], again)
+        assert link.counts().dropped > 0
+
+
+@needs("cc")
+def test_served_exports_of_all_kinds_compile(tmp_path: Path) -> None:
+    for number, name in enumerate(("balance", "gpi-inverse", "feedforward-feedback", "play")):
+        block = examples()[name]
+        channels = [channel.name for channel in (*block.inputs, *block.outputs)]
+        wide = Serving(dict.fromkeys(channels, (-9.0, 9.0)), adjustable=0.2 if number % 2 else 0.0)
+        folder = export_c(
+            block, tmp_path / name, sample_time=SAMPLE_TIME, serving=wide, single=True
+        )
+        sources = [*sorted((folder / "src").glob("*.c")), folder / "examples" / "link_posix.c"]
+        options = ["-D_POSIX_C_SOURCE=200809L", f"-I{folder / 'src'}"]
+        compile_c(sources, tmp_path / f"{name}.elf", options=options)
+
+
+def test_a_port_is_opened_by_name_and_closed() -> None:
+    with terminals() as (ours, name):
+        port, other = open_port(name), Descriptor(ours)
+        port.write(b"\0\x01\n\r\xff")
+        assert other.read(1.0) == b"\0\x01\n\r\xff"
+        other.write(b"\x03\x04\x11")
+        assert port.read(1.0) == b"\x03\x04\x11"
+        assert port.read(0.0) == b""
+        other.close()
+        with pytest.raises(DataError, match=r"has been closed by the other end.*Remedy"):
+            port.read(1.0)
+        port.close()
+        port.close()
+        with pytest.raises(DataError, match="has been closed"):
+            port.write(b"x")
+
+
+def test_what_is_no_port_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("x")
+    for wrong in (tmp_path / "file", "/dev/null", tmp_path / "absent"):
+        with pytest.raises(DataError, match="Remedy"):
+            open_port(wrong)
+    with pytest.raises(DataError, match="17 bits a second"):
+        open_port("/dev/null", baud=17)
+
+
+@needs("cc")
+def test_the_command_line_looks_leads_and_records(tmp_path: Path) -> None:
+    folder = export_c(examples()["pi"], tmp_path / "c", sample_time=0.01, serving=SERVING)
+    program = tmp_path / "device"
+    sources = [*sorted((folder / "src").glob("*.c")), folder / "examples" / "link_posix.c"]
+    compile_c(sources, program, options=["-D_POSIX_C_SOURCE=200809L", f"-I{folder / 'src'}"])
+    with terminals() as (ours, name):
+        process = subprocess.Popen([str(program)], stdin=ours, stdout=ours)
+        try:
+            looked = call("link", name)
+            assert looked.code == 0, looked.err
+            assert "safe after 0 steps" in looked.out
+            out = tmp_path / "out.csv"
+            led = call("link", name, "--set", "pressure=2", "--seconds", "0.5", "-o", str(out))
+            assert led.code == 0, led.err
+            (recording,) = read(out)
+            assert recording.sample_time == pytest.approx(0.01)
+            assert set(recording["pressure"]) == {2.0}
+            (expected,) = examples()["pi"].simulate([2.0])
+            assert recording["displacement"][-1] == pytest.approx(expected, rel=1e-12)
+            for wrong in ("pressure=7", "force=1", "pressure"):
+                refused = call("link", name, "--set", wrong)
+                assert refused.code == 2
+                assert "Remedy" in refused.err
+            assert "safe after" in call("link", name).out
+        finally:
+            process.kill()
+            process.wait()
+
+
+@needs("cc")
+def test_the_example_runs() -> None:
+    example = Path(__file__).parents[2] / "examples" / "robot_firmware.py"
+    command = [sys.executable, str(example), "--here", "--duration", "1"]
+    told = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    assert "Followed within" in told
+
+
+REFUSED = {
+    "does not know between what limits pressure, displacement": Serving(),
+    "the safe value of displacement is 90": Serving(SERVING.limits, {"displacement": 90.0}),
+    "'speed' is no channel": Serving({"speed": (0.0, 1.0)}),
+    "a watchdog of nan s": Serving(SERVING.limits, watchdog=float("nan")),
+    "a watchdog of 0.001 s": Serving(SERVING.limits, watchdog=0.001),
+    "adjustable by 1.5": Serving(SERVING.limits, adjustable=1.5),
+    "the limits of pressure are 3 and 1": Serving({**SERVING.limits, "pressure": (3.0, 1.0)}),
+}
+
+
+@pytest.mark.parametrize("complaint", REFUSED)
+def test_what_cannot_be_served_is_refused(complaint: str, tmp_path: Path) -> None:
+    serving, block = REFUSED[complaint], examples()["play"]
+    with pytest.raises(ModelError, match=rf"{complaint}.*Remedy:"):
+        export_c(block, tmp_path / "c", sample_time=SAMPLE_TIME, serving=serving)
+    with pytest.raises(ModelError, match="has no time of its own"):
+        export_c(block, tmp_path / "c", serving=SERVING)
+
+
+@needs("cc")
+def test_a_device_that_is_switched_off_is_told() -> None:
+    with hosted(examples()["play"], sample_time=SAMPLE_TIME, serving=SERVING) as line:
+        link = Link(line, lock_step=True)
+        link.step([1.0])
+    with pytest.raises(DataError, match="Remedy"):
+        link.step([1.0])
+    assert issubclass(LinkError, DataError)

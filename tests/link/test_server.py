@@ -1,0 +1,160 @@
+"""The server in C does what its twin in Python does, whatever comes."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mckibben.link.framing import Frame, Reader
+from tests.link.serving import SERVING, Compiled, block, exported, twin
+from tests.link.twin import Twin
+from tests.tools import needs
+
+NUMBERS = st.one_of(
+    st.floats(-1, 7), st.floats(allow_nan=True, allow_infinity=True), st.sampled_from([0.0, 6.0])
+)
+
+
+@st.composite
+def bodies(draw: st.DrawFn, kind: int) -> bytes:
+    """Return what a frame of a kind may say, mostly as it should be."""
+    if draw(st.integers(0, 11)) == 7:
+        return draw(st.binary(max_size=40))
+    if kind == 3:
+        print_ = bytes.fromhex(exported()[0]) if draw(st.booleans()) else bytes(8)
+        return print_ + struct.pack("<BI", draw(st.integers(0, 2)), draw(st.integers(0, 6)))
+    if kind == 4:
+        return struct.pack("<d", draw(NUMBERS))
+    if kind == 2:
+        return bytes([draw(st.integers(0, 3))])
+    if kind == 6:
+        return struct.pack("<H", draw(st.integers(0, 3)))
+    if kind == 7:
+        return struct.pack("<BHB", draw(st.integers(0, 2)), *draw(st.tuples(*[SMALL] * 2)))
+    if kind == 8:
+        what, first = draw(st.sampled_from([0, 0, 0, 1, 2])), draw(st.sampled_from([0, 0, 1, 2]))
+        own = block().c_numbers(None) if what == 0 else np.zeros(1)
+        scale = draw(st.sampled_from([1.0, 1.0, 1.0, 2.0]))
+        values = (own * scale)[first : first + draw(st.integers(1, len(own)))]
+        return struct.pack("<BH", what, first) + values.tobytes()
+    if kind == 9:
+        return bytes([draw(st.sampled_from([0, 0, 0, 1, 2]))])
+    return b""
+
+
+SMALL = st.integers(0, 12)
+
+
+@st.composite
+def doings(draw: st.DrawFn) -> tuple[str, bytes | int]:
+    """Return what happens to a server next: mostly a frame, ahead of the last one by a number."""
+    what = draw(
+        st.sampled_from(["frame"] * 8 + ["again"] * 2 + ["bytes", "tick", "tick", "switch on"])
+    )
+    if what == "frame":
+        kind = draw(st.sampled_from([4, 4, 4, 8, 8, 9, *range(15)]))
+        ahead = draw(st.sampled_from([1] * 8 + [0, 2, 2**31, 2**32 - 1]))
+        session = draw(st.sampled_from([1] * 8 + [2, 65537, 0]))
+        return what, Frame(kind, session, ahead, draw(bodies(kind))).packed()
+    return what, draw(st.binary(max_size=300)) if what == "bytes" else draw(st.integers(1, 7))
+
+
+def sent_by(server: Twin | Compiled, most: int) -> Iterator[int]:
+    for _ in range(most):
+        if (byte := server.send()) < 0:
+            return
+        yield byte
+
+
+@pytest.mark.parametrize("which", ["twin", pytest.param("C", marks=needs("cc"))])
+def test_numbers_are_staged_from_the_first_on_and_loaded_whole(which: str) -> None:
+    server: Twin | Compiled = twin() if which == "twin" else Compiled()
+    own, sequence = block().c_numbers(None), 0
+
+    def told(kind: int, body: bytes) -> int:
+        nonlocal sequence
+        sequence += 1
+        for byte in Frame(kind, 1, sequence, body).packed():
+            server.receive(byte)
+        (answer,) = Reader().feed(bytes(sent_by(server, 600)))
+        return answer.body[0]
+
+    def staged(first: int, n: int, what: int = 0) -> int:
+        return told(8, struct.pack("<BH", what, first) + own[first : first + n].tobytes())
+
+    told_ = server.fingerprint
+    print_ = bytes.fromhex(told_) if isinstance(told_, str) else told_
+    assert told(3, print_ + struct.pack("<BI", 1, 5)) == 0
+    assert staged(1, 1) == 7
+    assert staged(0, 1) == 0
+    assert staged(2, 1) == 7
+    assert told(9, b"\0") == 7
+    assert staged(0, 1) == staged(1, len(own) - 1) == 0
+    assert told(9, b"\1") == 7
+    assert told(9, b"\0") == 0
+    assert told(9, b"\0") == 7
+    assert staged(0, 1) == 0
+    assert told(8, b"\0\1\0" + bytes(8 * len(own))) == 3
+
+
+@needs("cc")
+@settings(max_examples=200)
+@given(st.lists(doings(), min_size=10, max_size=30))
+def test_c_answers_as_the_twin_does(told: list[tuple[str, bytes | int]]) -> None:
+    servers: list[Twin | Compiled] = [own := twin(), Compiled()]
+    own.fingerprint = bytes.fromhex(exported()[0])
+    opening = Frame(3, 1, 0, own.fingerprint + struct.pack("<BI", len(told) % 2, 5)).packed()
+    sequence, last = 0, opening
+    for what, how in [("frame", opening), *told]:
+        if what == "frame" and isinstance(how, bytes):
+            (frame,) = Reader().feed(how)
+            sequence = (sequence + frame.sequence) % 2**32
+            how = last = replace(frame, sequence=sequence).packed()
+        elif what == "again":
+            how = last
+        sent = []
+        for server in servers:
+            if isinstance(how, bytes):
+                for byte in how:
+                    server.receive(byte)
+            elif what == "switch on":
+                server.switch_on()
+            elif what == "tick":
+                for _ in range(how):
+                    server.tick()
+            # what is told by itself may stay, and the next answer then waits behind it
+            sent.append(list(sent_by(server, 40 if what == "tick" else 600)))
+        assert sent[0] == sent[1]
+        np.testing.assert_array_equal(servers[0].outputs, servers[1].outputs)
+        (low, high) = SERVING.limits["displacement"]
+        assert low <= servers[1].outputs[0] <= high
+
+
+@given(st.lists(st.binary(max_size=236), max_size=5), st.integers(1, 50))
+def test_frames_come_out_as_they_went_in_however_they_are_cut(
+    bodies: list[bytes], cut: int
+) -> None:
+    frames = [Frame(k % 14, 2**32 - 1 - k, k, body) for k, body in enumerate(bodies)]
+    wire = b"".join(frame.packed() for frame in frames)
+    reader = Reader()
+    found = [frame for at in range(0, len(wire), cut) for frame in reader.feed(wire[at : at + cut])]
+    assert found == frames
+    assert wire.count(0) == len(frames)
+    assert not reader.dropped
+
+
+@given(st.binary(min_size=1, max_size=236), st.data())
+def test_no_frame_with_up_to_three_flipped_bits_is_taken(body: bytes, data: st.DataObject) -> None:
+    wire = bytearray(Frame(4, 7, 9, body).packed())
+    places = data.draw(
+        st.lists(st.integers(0, 8 * len(wire) - 1), min_size=1, max_size=3, unique=True)
+    )
+    for place in places:
+        wire[place // 8] ^= 1 << place % 8
+    assert not Reader().feed(bytes(wire) + b"\0")

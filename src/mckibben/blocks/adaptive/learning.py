@@ -50,6 +50,7 @@ def learn(
     work: Array,
     measured: float,
     predicted: float,
+    asked: float,
 ) -> bool:
     """Teach parameters by one measured output; return whether they were.
 
@@ -69,28 +70,23 @@ def learn(
         Of the output over the parameters.
     work : array, shape (2 p,)
         To compute in.
-    measured, predicted : float
-        The output, and what it is by ``theta``.
+    measured, predicted, asked : float
+        The output, what it is by ``theta``, and what it is by what the inverse runs with.
     """
     share, noise = settings[0], settings[1]
     if measured - measured != 0.0:
         sense[IGNORED] += 1.0
         return False
     if sense[READY] == 0.0:
-        sense[READY], sense[LAST], sense[THEN] = 1.0, measured, predicted
+        sense[READY], sense[LAST], sense[THEN] = 1.0, measured, asked
         return False
     usual = sense[USUAL]
     if measured != sense[LAST]:
-        sense[LAST], sense[THEN] = measured, predicted
-    elif abs(predicted - sense[THEN]) > GATE * usual:
+        sense[LAST], sense[THEN] = measured, asked
+    elif abs(asked - sense[THEN]) > GATE * usual:
         sense[IGNORED] += 1.0
         return False
     error = measured - predicted
-    most = GATE * usual
-    if abs(error) > most:
-        error = np.copysign(most, error)
-        sense[IGNORED] += 1.0
-    forgotten = _felt(share, noise, error, sense)
     p = theta.size
     f, g = work[:p], work[p : 2 * p]
     r = 0.0
@@ -102,12 +98,18 @@ def learn(
             f[j] += root[first + i] * f[i]
         g[j] = root[j] * f[j]
         r += f[j] * g[j]
+    expected = np.sqrt(usual * usual + r * noise * noise)
+    weight = 1.0
+    if abs(error) > GATE * expected:
+        weight = GATE * expected / abs(error)
+        sense[IGNORED] += 1.0
+    forgotten = _felt(share, noise, weight * error / expected, sense)
     if not 1e-12 < r < np.inf:
         return False
-    kept = 1.0 - forgotten
-    excited = kept - forgotten / r
-    gain = error / noise / (1.0 + r)
-    _spread(root, f, g, excited)
+    r *= weight
+    excited = 1.0 - forgotten - forgotten / r
+    _spread(root, f, g, weight * excited)
+    gain = weight * error / noise / (1.0 + r)
     for i in range(p):
         theta[i] += scales[i] * g[i] * gain
     _bound(root, widest, int(sense[READY]) % p)
@@ -116,10 +118,9 @@ def learn(
 
 
 @kernel
-def _felt(share: float, noise: float, error: float, sense: Array) -> float:
-    """Remember the size of an error; return the share of what is known that it makes forgotten."""
+def _felt(share: float, noise: float, relative: float, sense: Array) -> float:
+    """Remember an error, by its expected size; return the share of what is known that is forgotten."""
     usual = sense[USUAL]
-    relative = error / usual
     quick = min(20.0 * share, 0.5)
     grows = 1.0 + 0.5 * quick
     sense[USUAL] = max(usual * grows if abs(relative) > QUARTILE else usual / grows, noise)

@@ -58,10 +58,11 @@ def follow_learning(
     slopes = work[2 * n + 2 : 3 * n + 3]
     for t in range(references.shape[0]):
         y = references[t, 0]
-        believed = 0.0
+        believed, asked = 0.0, used[n]
         for i in range(n):
             slopes[i] = s[i]
             believed += theta[i] * s[i]
+            asked += used[i] * s[i]
         slopes[n] = 1.0
         believed += theta[n]
         if learn(
@@ -75,6 +76,7 @@ def follow_learning(
             work,
             measured[t, 0],
             believed,
+            asked,
         ):
             keep_rising(theta, least)
         if y > last[0]:

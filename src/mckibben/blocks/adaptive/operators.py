@@ -33,6 +33,7 @@ def follow_learning(
     settings: Array,
     scales: Array,
     widest: Array,
+    fresh: Array,
     theta: Array,
     used: Array,
     root: Array,
@@ -69,6 +70,7 @@ def follow_learning(
             settings,
             scales,
             widest,
+            fresh,
             theta,
             root,
             sense,
@@ -194,6 +196,6 @@ class LearntOperators(Ranged, Adaptable):
         rest = (one.theta, one.used, one.root, one.senses, one.work)
         return bound(
             follow_learning,
-            *(one.settings, one.scales, one.widest, *rest, *numbers),
+            *(one.settings, one.scales, one.widest, one.fresh, *rest, *numbers),
             *(s, last, references, measured, z, direction),
         )

@@ -11,6 +11,7 @@ exactly what was asked for, what it predicts is known from the inverse's own mem
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 from typing import Annotated, ClassVar, Self
 
 import numpy as np
@@ -169,8 +170,14 @@ class Adaptive(Block):
         asked, measured = inputs[:, :n], inputs[:, n:]
         return forward.bind_adaptive(sample_time, learning, own, asked, measured, outputs)
 
+    @property
+    def c_file(self) -> Path:
+        """The forward block's, which learns."""
+        own = self.forward.c_file
+        return own.with_name(f"{own.stem}_adaptive.c")
+
     def c_numbers(self, sample_time: float | None) -> Array:
-        """Return [settings, start of the covariance, scales, widest, theta], then the family's."""
+        """Return [number of parameters, settings, scales, widest, theta, root], then the family's."""
         forward = self.forward
         return np.concatenate(
             [

@@ -34,6 +34,10 @@ GATE = 3.0
 """Usual errors beyond which an error teaches no more."""
 QUARTILE = 0.6745
 """Median of the sizes of errors of unit variance."""
+ABSURD = 1e-6
+"""Weight of an error too large to be one."""
+STILL, UNMOVED = 1e-9, 1e-12
+"""What is added to what is known, and squares of slopes by the noise, below which nothing changes."""
 SURPRISED = 5.0
 """Mean square of errors, cut at the gate, by the usual one, beyond which all is learnt afresh."""
 
@@ -89,6 +93,9 @@ def learn(
     elif abs(asked - sense[THEN]) > GATE * usual:
         sense[IGNORED] += 1.0
         return False
+    if sense[SURPRISE] > SURPRISED:  # the plant has stepped
+        root[:] = fresh
+        sense[SURPRISE] = 1.0
     error = measured - predicted
     p = theta.size
     f, g = work[:p], work[p : 2 * p]
@@ -106,10 +113,8 @@ def learn(
     if abs(error) > GATE * expected:
         weight = GATE * expected / abs(error)
         sense[IGNORED] += 1.0
-    if _felt(share, noise, weight * error / expected, sense):
-        root[:] = fresh
-        sense[SURPRISE] = 1.0
-    if not 1e-12 < r < np.inf:
+    _feel(share, noise, weight * error / expected, sense)
+    if not UNMOVED < r < np.inf or weight < ABSURD:
         return False
     r *= weight
     excited = 1.0 - share - share / r
@@ -123,8 +128,8 @@ def learn(
 
 
 @kernel
-def _felt(share: float, noise: float, relative: float, sense: Array) -> bool:
-    """Remember an error, by its expected size; return whether too many have been too large."""
+def _feel(share: float, noise: float, relative: float, sense: Array) -> None:
+    """Remember an error, by its expected size."""
     usual = sense[USUAL]
     quick = min(20.0 * share, 0.5)
     grows = 1.0 + 0.5 * quick
@@ -134,14 +139,13 @@ def _felt(share: float, noise: float, relative: float, sense: Array) -> bool:
     sense[RELATED] += share * (relative * sense[BEFORE] - sense[RELATED])
     sense[SQUARED] += share * (square - sense[SQUARED])
     sense[BEFORE] = relative
-    return sense[SURPRISE] > SURPRISED
 
 
 @kernel
 def _spread(root: Array, f: Array, g: Array, excited: float) -> None:
     """Add ``excited`` times what a measurement tells to what is known; ``g`` becomes P phi."""
     p = f.size
-    still = abs(excited) < 1e-9
+    still = abs(excited) < STILL
     before = 0.0 if still else 1.0 / excited
     first = p
     for j in range(p):

@@ -23,7 +23,9 @@ PART = 1e-4
 class Ageing(Plant, Protocol):
     """A plant whose muscles can age while it runs: rigs."""
 
-    sample_time: float
+    @property
+    def sample_time(self) -> float:
+        """Time of a step [s]."""
 
     def aged(self, factors: Mapping[str, float]) -> Self:
         """Return the plant, where this one is, with stiffness and friction of its muscles scaled."""

@@ -1,0 +1,217 @@
+"""An inverse that learns from what is measured, and stays exact.
+
+Inputs are those of the inverse, then what is measured of the references; outputs are the inverse's.
+With every measured sample the parameters of the model follow, see `learning`; the inverse runs with
+them as they are, so that model and inverse match at every step.
+
+A measurement answers the reference of the step before, as behind a compensator: since the model gives
+exactly what was asked for, what it predicts is known from the inverse's own memory.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Annotated, ClassVar, Self
+
+import numpy as np
+from annotated_types import Gt
+from pydantic import BeforeValidator, FiniteFloat, InstanceOf
+from pydantic.dataclasses import dataclass
+
+from mckibben.arrays import Array
+from mckibben.blocks.adaptive.adaptable import Adaptable, Learning
+from mckibben.blocks.adaptive.learning import start_root, start_sense
+from mckibben.blocks.core.block import Block, Run
+from mckibben.blocks.core.exportable import Cost
+from mckibben.blocks.core.fields import STRICT, Channel, Initial, Vector
+from mckibben.blocks.core.inverse import Inverse
+from mckibben.blocks.core.refusals import explicit_state, needs_sample_time
+from mckibben.blocks.core.saving import nested
+from mckibben.blocks.feedback.pid import MEASURED
+from mckibben.errors import ModelError
+
+TRUSTED = 1 / 3
+"""Standard deviations of the fitted parameters at the start, by those of changes to be expected."""
+
+
+@dataclass(frozen=True, config=STRICT)
+class Adaptive(Block):
+    """The inverse of a block, which learns the block's linear parameters while it runs.
+
+    Parameters
+    ----------
+    forward : Block
+        The block undone, which declares what of it is learnt.
+    time : float
+        How long it takes to learn what the motion shows [s]; positive.
+    noise : float
+        Standard deviation of what is measured [unit of the output]; errors below are not told apart.
+    memory : sequence of float, optional
+        State to go on from, as `resumed` keeps it; default is to start from the fit.
+    """
+
+    kind: ClassVar[str] = "adaptive"
+    rate_dependent: ClassVar[bool] = True
+    parameters: ClassVar[tuple[str, ...]] = ("forward",)
+
+    forward: Annotated[InstanceOf[Adaptable], BeforeValidator(nested)]
+    time: Annotated[FiniteFloat, Gt(0)]
+    noise: Annotated[FiniteFloat, Gt(0)]
+    memory: Vector | None = None
+
+    def __post_init__(self) -> None:
+        self.forward.check_invertible()
+        if self.memory is not None and len(self.memory) != self.n_states:
+            raise ModelError(
+                f"the memory of {self.kind!r} has {len(self.memory)} numbers, its state "
+                f"{self.n_states}. Remedy: resume what was saved with the same model."
+            )
+
+    @property
+    def fixed(self) -> Inverse:
+        """The inverse that does not learn."""
+        return Inverse(self.forward)
+
+    @property
+    def title(self) -> str:
+        """That of the block undone, and that it learns."""
+        return f"{self.forward.title}-adaptive"
+
+    @property
+    def path_dependent(self) -> bool:  # type: ignore[override]
+        """As the forward block says."""
+        return self.forward.inverse_path_dependent
+
+    @property
+    def measured(self) -> tuple[Channel, ...]:
+        """What is measured of the references."""
+        return tuple(Channel(f"{c.name}{MEASURED}", c.unit) for c in self.forward.outputs)
+
+    @property
+    def inputs(self) -> tuple[Channel, ...]:
+        """References, what schedules the forward block, measurements."""
+        return (*self.fixed.inputs, *self.measured)
+
+    @property
+    def scheduling(self) -> tuple[str, ...]:
+        """What schedules the forward block, and measurements."""
+        return (*self.forward.scheduling, *(channel.name for channel in self.measured))
+
+    @property
+    def may_miss(self) -> tuple[str, ...]:
+        """Measurements: the inverse goes on without."""
+        return tuple(channel.name for channel in self.measured)
+
+    @property
+    def outputs(self) -> tuple[Channel, ...]:
+        """The forward block's driven inputs."""
+        return self.fixed.outputs
+
+    @property
+    def n_states(self) -> int:
+        """The inverse's, the direction of travel, and what is learnt."""
+        return self.forward.n_inverse_states + 1 + self.forward.n_learning_states
+
+    @property
+    def n_scratch(self) -> int:
+        """Three numbers a parameter, and those of the inverse."""
+        return 3 * self.forward.taught.size + self.forward.n_inverse_scratch
+
+    @property
+    def start(self) -> Initial:
+        """Memory to go on from, or the forward block's start."""
+        return self.forward.start if self.memory is None else self.memory
+
+    def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
+        """Return the state before the first sample: the inverse's, and parameters as fitted.
+
+        An explicit state may be this block's own, the inverse's or the forward block's.
+        """
+        start = self.start if initial is None else initial
+        if not isinstance(start, str) and len(start) == self.n_states:
+            return explicit_state(self, start)
+        forward = self.forward
+        asked = first[: len(first) - len(self.measured)]
+        theta = forward.taught
+        senses = np.tile(start_sense(self.noise), len(self.measured))
+        own = self.fixed.initial_state(asked, start)
+        root = start_root(forward.spread * TRUSTED**2)
+        return np.concatenate([own, [0.0], theta, theta, root, senses])
+
+    def _split(self, state: Array) -> tuple[Array, Array, Array, Array, Array]:
+        p = self.forward.taught.size
+        sizes = [self.forward.n_inverse_states + 1, p, p, (p * (p + 1)) // 2]
+        own, theta, used, root, senses = np.split(state, np.cumsum(sizes))
+        return own, theta, used, root, senses
+
+    def _settings(self, sample_time: float | None) -> Array:
+        step = needs_sample_time(self.kind, sample_time)
+        return np.array([min(step / self.time, 0.5), self.noise])
+
+    def bind(self, sample_time: float | None, state: Array, inputs: Array, outputs: Array) -> Run:
+        """Return a function that learns and inverts in place."""
+        own, theta, used, root, senses = self._split(state)
+        forward, n = self.forward, len(self.inputs) - len(self.measured)
+        learning = Learning(
+            settings=self._settings(sample_time),
+            scales=forward.scales,
+            widest=np.diag(forward.spread).copy(),
+            theta=theta,
+            used=used,
+            root=root,
+            senses=senses,
+            work=np.zeros(3 * theta.size),
+        )
+        asked, measured = inputs[:, :n], inputs[:, n:]
+        return forward.bind_adaptive(sample_time, learning, own, asked, measured, outputs)
+
+    def c_numbers(self, sample_time: float | None) -> Array:
+        """Return [settings, start of the covariance, scales, widest, theta], then the family's."""
+        forward = self.forward
+        return np.concatenate(
+            [
+                [float(forward.taught.size)],
+                self._settings(sample_time),
+                forward.scales,
+                np.diag(forward.spread),
+                forward.taught,
+                start_root(forward.spread * TRUSTED**2),
+                forward.adaptive_numbers(sample_time),
+            ]
+        )
+
+    def cost(self, sample_time: float | None) -> Cost:
+        """Return that of the inverse, and three operations a number of the covariance."""
+        p = self.forward.taught.size
+        learnt = 6 * p * p + 20 * p
+        return self.fixed.cost(sample_time) + Cost(learnt, learnt)
+
+    def reachable(self) -> tuple[Array, Array]:
+        """Return what the inverse gives."""
+        return self.forward.inverse_reachable()
+
+    def inverse(self) -> Block:
+        """Return the forward block, as fitted."""
+        return self.forward
+
+    def present(self, state: Array) -> Block:
+        """Return the forward block that the inverse runs with in a state, shape (n_states,)."""
+        return self.forward.retaught(self._split(state)[2])
+
+    def resumed(self, state: Array) -> Self:
+        """Return this block, which goes on from a state when it is next started."""
+        return replace(self, memory=tuple(np.asarray(state, dtype=np.float64).tolist()))
+
+    def equations(self) -> tuple[str, ...]:
+        """Return what is undone, and how parameters follow."""
+        return (
+            r"\hat{u}_t = P_{\theta_t}^{-1}[y]_t",
+            r"\theta_t = \Pi\left(\theta_{t-1} + \frac{C \varphi}{1 + \varphi^T C \varphi}\, e_t"
+            r"\right),\quad e_t = y_{m,t} - P_{\theta_{t-1}}[\hat{u}]_{t-1}",
+        )
+
+    @classmethod
+    def example(cls) -> Self:
+        from mckibben.blocks.play_type.pi import PI
+
+        return cls(PI.example(), 60.0, 0.05)

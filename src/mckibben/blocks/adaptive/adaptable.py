@@ -47,6 +47,8 @@ class Learning:
         [sample time / time, noise of the outputs].
     scales, widest : array, shape (p,)
         Of every parameter, see `learning.learn`.
+    fresh : array, shape (p (p + 1) / 2,)
+        Covariance at the start.
     theta : array, shape (p,)
         Parameters as far as they are learnt.
     used : array, shape (p,)
@@ -62,6 +64,7 @@ class Learning:
     settings: Array
     scales: Array
     widest: Array
+    fresh: Array
     theta: Array
     used: Array
     root: Array

@@ -11,6 +11,7 @@ exactly what was asked for, what it predicts is known from the inverse's own mem
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 from typing import Annotated, ClassVar, Self
 
 import numpy as np
@@ -135,14 +136,17 @@ class Adaptive(Block):
         theta = forward.taught
         senses = np.tile(start_sense(self.noise), len(self.measured))
         own = self.fixed.initial_state(asked, start)
-        root = start_root(forward.spread * TRUSTED**2)
-        return np.concatenate([own, [0.0], theta, theta, root, senses])
+        return np.concatenate([own, [0.0], theta, theta, self._fresh, senses])
 
     def _split(self, state: Array) -> tuple[Array, Array, Array, Array, Array]:
         p = self.forward.taught.size
         sizes = [self.forward.n_inverse_states + 1, p, p, (p * (p + 1)) // 2]
         own, theta, used, root, senses = np.split(state, np.cumsum(sizes))
         return own, theta, used, root, senses
+
+    @property
+    def _fresh(self) -> Array:
+        return start_root(self.forward.spread * TRUSTED**2)
 
     def _settings(self, sample_time: float | None) -> Array:
         step = needs_sample_time(self.kind, sample_time)
@@ -156,6 +160,7 @@ class Adaptive(Block):
             settings=self._settings(sample_time),
             scales=forward.scales,
             widest=np.diag(forward.spread).copy(),
+            fresh=self._fresh,
             theta=theta,
             used=used,
             root=root,
@@ -165,8 +170,14 @@ class Adaptive(Block):
         asked, measured = inputs[:, :n], inputs[:, n:]
         return forward.bind_adaptive(sample_time, learning, own, asked, measured, outputs)
 
+    @property
+    def c_file(self) -> Path:
+        """The forward block's, which learns."""
+        own = self.forward.c_file
+        return own.with_name(f"{own.stem}_adaptive.c")
+
     def c_numbers(self, sample_time: float | None) -> Array:
-        """Return [settings, start of the covariance, scales, widest, theta], then the family's."""
+        """Return [number of parameters, settings, scales, widest, theta, root], then the family's."""
         forward = self.forward
         return np.concatenate(
             [
@@ -175,7 +186,7 @@ class Adaptive(Block):
                 forward.scales,
                 np.diag(forward.spread),
                 forward.taught,
-                start_root(forward.spread * TRUSTED**2),
+                self._fresh,
                 forward.adaptive_numbers(sample_time),
             ]
         )

@@ -12,8 +12,8 @@ forgotten nor blown up: r settles at (1 - l) / l, and no variance passes the wid
 U D U', changed by Bierman's recursion, so that it stays positive in single precision.
 
 Errors beyond a few times their usual size teach no more than that size. Their usual size follows their
-median, so a single outlier is nothing, and a step of the plant is believed after a while; while errors
-are larger than usual, more is forgotten. A measurement that is not a number teaches nothing, nor does
+median, so a single outlier is nothing. Where many are too large for a twentieth of the time, the plant has
+stepped: the covariance is made as wide as at the start, and what is new is learnt at once. A measurement that is not a number teaches nothing, nor does
 one that stands exactly still while what is predicted moves.
 """
 
@@ -34,8 +34,12 @@ GATE = 3.0
 """Usual errors beyond which an error teaches no more."""
 QUARTILE = 0.6745
 """Median of the sizes of errors of unit variance."""
-SURPRISED = 3.0
-"""Mean square of errors, by the usual one, beyond which more is forgotten."""
+ABSURD = 1e-6
+"""Weight of an error too large to be one."""
+STILL, UNMOVED = 1e-9, 1e-12
+"""What is added to what is known, and squares of slopes by the noise, below which nothing changes."""
+SURPRISED = 5.0
+"""Mean square of errors, cut at the gate, by the usual one, beyond which all is learnt afresh."""
 
 
 @kernel
@@ -43,6 +47,7 @@ def learn(
     settings: Array,
     scales: Array,
     widest: Array,
+    fresh: Array,
     theta: Array,
     root: Array,
     sense: Array,
@@ -60,6 +65,8 @@ def learn(
         [sample time / time, noise of the output].
     scales, widest : array, shape (p,)
         Scale of every parameter, and the largest variance, in squares of it.
+    fresh : array, shape (p (p + 1) / 2,)
+        Covariance to learn afresh with, as ``root``.
     theta : array, shape (p,)
         Parameters, changed.
     root : array, shape (p (p + 1) / 2,)
@@ -86,6 +93,9 @@ def learn(
     elif abs(asked - sense[THEN]) > GATE * usual:
         sense[IGNORED] += 1.0
         return False
+    if sense[SURPRISE] > SURPRISED:  # the plant has stepped
+        root[:] = fresh
+        sense[SURPRISE] = 1.0
     error = measured - predicted
     p = theta.size
     f, g = work[:p], work[p : 2 * p]
@@ -103,11 +113,11 @@ def learn(
     if abs(error) > GATE * expected:
         weight = GATE * expected / abs(error)
         sense[IGNORED] += 1.0
-    forgotten = _felt(share, noise, weight * error / expected, sense)
-    if not 1e-12 < r < np.inf:
+    _feel(share, noise, weight * error / expected, sense)
+    if not UNMOVED < r < np.inf or weight < ABSURD:
         return False
     r *= weight
-    excited = 1.0 - forgotten - forgotten / r
+    excited = 1.0 - share - share / r
     _spread(root, f, g, weight * excited)
     gain = weight * error / noise / (1.0 + r)
     for i in range(p):
@@ -118,8 +128,8 @@ def learn(
 
 
 @kernel
-def _felt(share: float, noise: float, relative: float, sense: Array) -> float:
-    """Remember an error, by its expected size; return the share of what is known that is forgotten."""
+def _feel(share: float, noise: float, relative: float, sense: Array) -> None:
+    """Remember an error, by its expected size."""
     usual = sense[USUAL]
     quick = min(20.0 * share, 0.5)
     grows = 1.0 + 0.5 * quick
@@ -129,15 +139,13 @@ def _felt(share: float, noise: float, relative: float, sense: Array) -> float:
     sense[RELATED] += share * (relative * sense[BEFORE] - sense[RELATED])
     sense[SQUARED] += share * (square - sense[SQUARED])
     sense[BEFORE] = relative
-    surprise = sense[SURPRISE]
-    return min(share * surprise if surprise > SURPRISED else share, 0.5)
 
 
 @kernel
 def _spread(root: Array, f: Array, g: Array, excited: float) -> None:
     """Add ``excited`` times what a measurement tells to what is known; ``g`` becomes P phi."""
     p = f.size
-    still = abs(excited) < 1e-9
+    still = abs(excited) < STILL
     before = 0.0 if still else 1.0 / excited
     first = p
     for j in range(p):

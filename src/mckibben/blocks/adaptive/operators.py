@@ -33,6 +33,7 @@ def follow_learning(
     settings: Array,
     scales: Array,
     widest: Array,
+    fresh: Array,
     theta: Array,
     used: Array,
     root: Array,
@@ -51,8 +52,8 @@ def follow_learning(
     """Learn, and find the operators' common input, for every reference.
 
     ``theta`` and ``used`` are [weights, offset]; ``limits`` [lowest, highest]; ``least`` [lowest
-    weights, lowest partial sums]; ``s`` the operators, followed in memory by 1, the slopes' last, is
-    not assumed; ``last`` is [previous reference, samples clipped, direction of travel].
+    weights, lowest partial sums]; ``s`` the operators; ``last`` is [previous reference, samples clipped,
+    direction of travel].
     """
     n = r.size
     slopes = work[2 * n + 2 : 3 * n + 3]
@@ -69,6 +70,7 @@ def follow_learning(
             settings,
             scales,
             widest,
+            fresh,
             theta,
             root,
             sense,
@@ -117,8 +119,9 @@ def take_over(
         change += (theta[i] - used[i]) * s[i]
     room = y - total
     share = 1.0
-    if travel * (room - change) < 0.0 and abs(room - change) <= band:
-        share = min(max(room / change, 0.0), 1.0) if change != 0.0 else 1.0
+    left = room - change
+    if travel * left < 0.0 and abs(left) <= band and change != 0.0:
+        share = min(max(room / change, 0.0), 1.0)
     for i in range(n + 1):
         used[i] = theta[i] if share == 1.0 else used[i] + share * (theta[i] - used[i])
 
@@ -170,6 +173,11 @@ class LearntOperators(Ranged, Adaptable):
         lowest = np.where(w >= 0, 0.0, -np.inf)
         return np.concatenate([lowest, LEAST * np.cumsum(w)])
 
+    def adaptive_numbers(self, sample_time: float | None) -> Array:
+        """Return [lowest, highest input of the operators, least], then the inverse's."""
+        own = super().adaptive_numbers(sample_time)
+        return np.concatenate([self.learnt_limits, self.least, own])
+
     def group_changes(self, theta: Array) -> Array:
         """Return the relative changes of sum w, of sum w r over sum w, and the offset over the span."""
         r, w = np.array(self.thresholds), np.array(self.weights)
@@ -194,6 +202,6 @@ class LearntOperators(Ranged, Adaptable):
         rest = (one.theta, one.used, one.root, one.senses, one.work)
         return bound(
             follow_learning,
-            *(one.settings, one.scales, one.widest, *rest, *numbers),
+            *(one.settings, one.scales, one.widest, one.fresh, *rest, *numbers),
             *(s, last, references, measured, z, direction),
         )

@@ -121,9 +121,9 @@ class Adaptive(Block):
         return (*self.forward.scheduling, *(channel.name for channel in self.measured))
 
     @property
-    def may_miss(self) -> tuple[str, ...]:
+    def n_missable(self) -> int:
         """Measurements: the inverse goes on without."""
-        return tuple(channel.name for channel in self.measured)
+        return len(self.measured)
 
     @property
     def outputs(self) -> tuple[Channel, ...]:

@@ -82,6 +82,9 @@ class Adaptable(Invertible):
     groups: ClassVar[tuple[Group, ...]]
     """What drift is told of."""
 
+    learns_inverted: ClassVar[bool] = True
+    """Whether it learns while it is undone; else while it runs, as a block that is a compensator."""
+
     @property
     @abstractmethod
     def taught(self) -> Array:
@@ -117,10 +120,20 @@ class Adaptable(Invertible):
     ) -> Run:
         """Return a function that runs the learning inverse in place.
 
-        ``state`` is the inverse's own with one number more, the direction of travel; ``inputs`` are the
+        ``state`` is the inverse's own, and ``n_more_states`` behind, as the direction of travel; ``inputs`` are the
         inverse's, shape (n, n_inputs), ``measured`` the outputs that answer those of the step before,
         shape (n, m), NaN where absent.
         """
+
+    @property
+    def n_more_states(self) -> int:
+        """Numbers of the last sample that learning wants, behind those of the inverse."""
+        return 1
+
+    @property
+    def n_learning_scratch(self) -> int:
+        """Numbers to compute in, beside three a parameter and those of the inverse."""
+        return 0
 
     def adaptive_numbers(self, sample_time: float | None) -> Array:
         """Return the numbers that C reads, behind those of the learner; the inverse's by default."""

@@ -43,7 +43,7 @@ class Adaptive(Block):
     Parameters
     ----------
     forward : Block
-        The block undone, which declares what of it is learnt.
+        The block undone, which declares what of it is learnt; or its inverse does, as of a balance.
     time : float
         How long it takes to learn what the motion shows [s]; positive.
     noise : float
@@ -56,13 +56,17 @@ class Adaptive(Block):
     rate_dependent: ClassVar[bool] = True
     parameters: ClassVar[tuple[str, ...]] = ("forward",)
 
-    forward: Annotated[InstanceOf[Adaptable], BeforeValidator(nested)]
+    forward: Annotated[InstanceOf[Adaptable] | InstanceOf[Inverse], BeforeValidator(nested)]
     time: Annotated[FiniteFloat, Gt(0)]
     noise: Annotated[FiniteFloat, Gt(0)]
     memory: Vector | None = None
 
     def __post_init__(self) -> None:
-        self.forward.check_invertible()
+        if self.learner.learns_inverted is not isinstance(self.forward, Adaptable):
+            raise ModelError(
+                f"{self.learner.kind!r} learns in the other direction. Remedy: give its inverse."
+            )
+        self.learner.check_invertible()
         if self.memory is not None and len(self.memory) != self.n_states:
             raise ModelError(
                 f"the memory of {self.kind!r} has {len(self.memory)} numbers, its state "
@@ -70,19 +74,37 @@ class Adaptive(Block):
             )
 
     @property
-    def fixed(self) -> Inverse:
+    def learner(self) -> Adaptable:
+        """What declares what is learnt: the block undone, or what undoes it.
+
+        Raises
+        ------
+        ModelError
+            Of the inverse of a block that declares nothing.
+        """
+        found = self.forward
+        if isinstance(found, Inverse):
+            found = found.forward
+        if not isinstance(found, Adaptable):
+            raise ModelError(
+                f"{found.kind!r} does not learn. Remedy: use pi, gpi, mpi, cpi or balance."
+            )
+        return found
+
+    @property
+    def fixed(self) -> Block:
         """The inverse that does not learn."""
-        return Inverse(self.forward)
+        return self.forward.inverse()
 
     @property
     def title(self) -> str:
         """That of the block undone, and that it learns."""
-        return f"{self.forward.title}-adaptive"
+        return f"{self.learner.title}-adaptive"
 
     @property
     def path_dependent(self) -> bool:  # type: ignore[override]
         """As the forward block says."""
-        return self.forward.inverse_path_dependent
+        return self.fixed.path_dependent
 
     @property
     def measured(self) -> tuple[Channel, ...]:
@@ -111,13 +133,14 @@ class Adaptive(Block):
 
     @property
     def n_states(self) -> int:
-        """The inverse's, the direction of travel, and what is learnt."""
-        return self.forward.n_inverse_states + 1 + self.forward.n_learning_states
+        """The inverse's, what more learning wants of the last sample, and what is learnt."""
+        return self.fixed.n_states + self.learner.n_more_states + self.learner.n_learning_states
 
     @property
     def n_scratch(self) -> int:
-        """Three numbers a parameter, and those of the inverse."""
-        return 3 * self.forward.taught.size + self.forward.n_inverse_scratch
+        """Three numbers a parameter, what more the family wants, and those of the inverse."""
+        more = self.learner.n_learning_scratch + self.fixed.n_scratch
+        return 3 * self.learner.taught.size + more
 
     @property
     def start(self) -> Initial:
@@ -132,22 +155,22 @@ class Adaptive(Block):
         start = self.start if initial is None else initial
         if not isinstance(start, str) and len(start) == self.n_states:
             return explicit_state(self, start)
-        forward = self.forward
+        learner = self.learner
         asked = first[: len(first) - len(self.measured)]
-        theta = forward.taught
+        theta = learner.taught
         senses = np.tile(start_sense(self.noise), len(self.measured))
         own = self.fixed.initial_state(asked, start)
-        return np.concatenate([own, [0.0], theta, theta, self._fresh, senses])
+        return np.concatenate([own, np.zeros(learner.n_more_states), theta, theta, self._fresh, senses])
 
     def _split(self, state: Array) -> tuple[Array, Array, Array, Array, Array]:
-        p = self.forward.taught.size
-        sizes = [self.forward.n_inverse_states + 1, p, p, (p * (p + 1)) // 2]
+        p = self.learner.taught.size
+        sizes = [self.fixed.n_states + self.learner.n_more_states, p, p, (p * (p + 1)) // 2]
         own, theta, used, root, senses = np.split(state, np.cumsum(sizes))
         return own, theta, used, root, senses
 
     @property
     def _fresh(self) -> Array:
-        return start_root(self.forward.spread * TRUSTED**2)
+        return start_root(self.learner.spread * TRUSTED**2)
 
     def _settings(self, sample_time: float | None) -> Array:
         step = needs_sample_time(self.kind, sample_time)
@@ -156,11 +179,11 @@ class Adaptive(Block):
     def bind(self, sample_time: float | None, state: Array, inputs: Array, outputs: Array) -> Run:
         """Return a function that learns and inverts in place."""
         own, theta, used, root, senses = self._split(state)
-        forward, n = self.forward, len(self.inputs) - len(self.measured)
+        learner, n = self.learner, len(self.inputs) - len(self.measured)
         learning = Learning(
             settings=self._settings(sample_time),
-            scales=forward.scales,
-            widest=np.diag(forward.spread).copy(),
+            scales=learner.scales,
+            widest=np.diag(learner.spread).copy(),
             fresh=self._fresh,
             theta=theta,
             used=used,
@@ -169,7 +192,7 @@ class Adaptive(Block):
             work=np.zeros(3 * theta.size),
         )
         asked, measured = inputs[:, :n], inputs[:, n:]
-        return forward.bind_adaptive(sample_time, learning, own, asked, measured, outputs)
+        return learner.bind_adaptive(sample_time, learning, own, asked, measured, outputs)
 
     @property
     def c_file(self) -> Path:
@@ -179,28 +202,28 @@ class Adaptive(Block):
 
     def c_numbers(self, sample_time: float | None) -> Array:
         """Return [number of parameters, settings, scales, widest, theta, root], then the family's."""
-        forward = self.forward
+        learner = self.learner
         return np.concatenate(
             [
-                [float(forward.taught.size)],
+                [float(learner.taught.size)],
                 self._settings(sample_time),
-                forward.scales,
-                np.diag(forward.spread),
-                forward.taught,
+                learner.scales,
+                np.diag(learner.spread),
+                learner.taught,
                 self._fresh,
-                forward.adaptive_numbers(sample_time),
+                learner.adaptive_numbers(sample_time),
             ]
         )
 
     def cost(self, sample_time: float | None) -> Cost:
         """Return that of the inverse, and three operations a number of the covariance."""
-        p = self.forward.taught.size
+        p = self.learner.taught.size
         learnt = 6 * p * p + 20 * p
         return self.fixed.cost(sample_time) + Cost(learnt, learnt)
 
     def reachable(self) -> tuple[Array, Array]:
         """Return what the inverse gives."""
-        return self.forward.inverse_reachable()
+        return self.fixed.reachable()
 
     def inverse(self) -> Block:
         """Return the forward block, as fitted."""
@@ -208,7 +231,7 @@ class Adaptive(Block):
 
     def present(self, state: Array) -> Block:
         """Return the forward block that the inverse runs with in a state, shape (n_states,)."""
-        return self.forward.retaught(self._split(state)[2])
+        return self.learner.retaught(self._split(state)[2])
 
     def drift(self, state: Array) -> Drift:
         """Return how far what is learnt has gone from the fit, in a state, shape (n_states,)."""

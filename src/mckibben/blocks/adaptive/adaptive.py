@@ -236,12 +236,12 @@ class Adaptive(Block):
     def drift(self, state: Array) -> Drift:
         """Return how far what is learnt has gone from the fit, in a state, shape (n_states,)."""
         forward = self.forward
-        _, theta, _, root, senses = self._split(state)
+        _, theta, _, root, _ = self._split(state)
         steps = 1e-6 * np.diag(forward.scales)
         there = forward.group_changes(theta)
         slopes = np.array([(forward.group_changes(theta + h) - there) / 1e-6 for h in steps]).T
         covariance = covariance_of(root, theta.size)
-        errors = scatter(covariance, slopes, senses, self.noise)
+        errors = scatter(covariance, slopes)
         limit = alarm_limit(self.time, len(forward.groups))
         return Drift(forward.groups, vector(there), vector(errors), limit)
 

@@ -497,8 +497,8 @@ STEPPED = {
     "multistate-friction": 1000,
     "pi-adaptive": 1000,
 }
-"""Kinds whose twin steps through corners, bisects over steps, or subtracts nearly equal matrices, and how
-many samples to compare."""
+"""Kinds whose twin steps through corners, bisects over steps, or subtracts nearly equal matrices, and
+how many samples to compare."""
 
 STEP_ERROR = 1e-5
 """Of those twins, relative to the output's range."""

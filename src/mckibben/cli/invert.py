@@ -37,10 +37,13 @@ def invert(
     ] = Wanted.input,
     adaptive: Annotated[
         bool,
-        typer.Option("--adaptive", help="Learn the model's parameters from what is measured meanwhile."),
+        typer.Option(
+            "--adaptive", help="Learn the model's parameters from what is measured meanwhile."
+        ),
     ] = False,
     time: Annotated[
-        float | None, typer.Option(help="With --adaptive: how long it takes to learn [s].  [default: 60]")
+        float | None,
+        typer.Option(help="With --adaptive: how long it takes to learn [s].  [default: 60]"),
     ] = None,
     noise: Annotated[
         float | None,
@@ -70,7 +73,9 @@ def invert(
     if not adaptive and (time is not None or noise is not None):
         raise ModelError("--time and --noise are of what learns. Remedy: give --adaptive too.")
     if adaptive and wanted is Wanted.force:
-        raise ModelError("--adaptive learns an inverse, not a force. Remedy: leave out one of them.")
+        raise ModelError(
+            "--adaptive learns an inverse, not a force. Remedy: leave out one of them."
+        )
     claim_model(out, inputs=[model], force=force)
     block = load(model)
     if wanted is Wanted.force:
@@ -91,7 +96,9 @@ def invert(
         say("Pressure by force and length, in closed form; track it where length is imposed.")
         say(f"Written: {out}")
         return
-    inverse = learning(block, 60.0 if time is None else time, noise) if adaptive else block.inverse()
+    inverse = (
+        learning(block, 60.0 if time is None else time, noise) if adaptive else block.inverse()
+    )
     inverse.save(out)
     low, high = block.reachable()
     reachable = {
@@ -113,7 +120,7 @@ def invert(
             f"{channel.unit}; references beyond are clipped."
         )
     if adaptive:
-        say(f"Learns from {_listed(inverse.inputs[-len(block.outputs):])}: one a step, beside references.")
+        say(f"Learns from {_listed(inverse.inputs[-len(block.outputs) :])}, one a step.")
     say(f"Written: {out}")
 
 

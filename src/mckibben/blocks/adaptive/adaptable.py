@@ -120,9 +120,9 @@ class Adaptable(Invertible):
     ) -> Run:
         """Return a function that runs the learning inverse in place.
 
-        ``state`` is the inverse's own, and ``n_more_states`` behind, as the direction of travel; ``inputs`` are the
-        inverse's, shape (n, n_inputs), ``measured`` the outputs that answer those of the step before,
-        shape (n, m), NaN where absent.
+        ``state`` is the inverse's own, and ``n_more_states`` behind, as the direction of travel;
+        ``inputs`` are the inverse's, shape (n, n_inputs), ``measured`` the outputs that answer those of
+        the step before, shape (n, m), NaN where absent.
         """
 
     @property

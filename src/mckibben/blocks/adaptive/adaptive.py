@@ -160,7 +160,9 @@ class Adaptive(Block):
         theta = learner.taught
         senses = np.tile(start_sense(self.noise), len(self.measured))
         own = self.fixed.initial_state(asked, start)
-        return np.concatenate([own, np.zeros(learner.n_more_states), theta, theta, self._fresh, senses])
+        return np.concatenate(
+            [own, np.zeros(learner.n_more_states), theta, theta, self._fresh, senses]
+        )
 
     def _split(self, state: Array) -> tuple[Array, Array, Array, Array, Array]:
         p = self.learner.taught.size

@@ -1,8 +1,8 @@
 """How far a learner has gone from the fit: by groups of parameters, in standard errors, in a sentence.
 
-A standard error is that of the learner's covariance, and what a fit itself is wrong by. An alarm is given
-where a change is too many standard errors for chance, at a told rate of false ones, when one look is
-independent of the next after the time to learn in.
+A standard error is that of the learner's covariance, and what a fit itself is wrong by. An alarm is
+given where a change is too many standard errors for chance, at a told rate of false ones, when one look
+is independent of the next after the time to learn in.
 """
 
 from __future__ import annotations
@@ -57,7 +57,9 @@ class Drift:
 
     def __str__(self) -> str:
         told = [
-            f"{group.name} {abs(change):.0%} {group.more if change > 0 else group.less}".replace("%", " %")
+            f"{group.name} {abs(change):.0%} {group.more if change > 0 else group.less}".replace(
+                "%", " %"
+            )
             for group, change, alarm in zip(self.groups, self.changes, self.alarms, strict=True)
             if alarm
         ]
@@ -65,7 +67,9 @@ class Drift:
         if not told:
             return f"{' and '.join(same)} unchanged since the day of the fit"
         since = " than on the day of the fit"
-        return "; ".join([", ".join(told) + since, *([f"{', '.join(same)} unchanged"] if same else [])])
+        return "; ".join(
+            [", ".join(told) + since, *([f"{', '.join(same)} unchanged"] if same else [])]
+        )
 
 
 def alarm_limit(time: float, n_groups: int, rate: float = FALSE_ALARMS) -> float:

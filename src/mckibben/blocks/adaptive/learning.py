@@ -11,14 +11,15 @@ forgetting in real-time identification", Automatica 23 (1987), 589). What is not
 forgotten nor blown up: r settles at (1 - l) / l, and no variance passes the widest. P is kept as
 U D U', changed by Bierman's recursion, so that it stays positive in single precision.
 
-The scatter is the usual size of errors, times the root of how many that follow one another tell as much as
-one that is independent: what a model leaves unexplained is alike from sample to sample, and is not to be
-learnt in a moment.
+The scatter is the usual size of errors, times the root of how many that follow one another tell as
+much as one that is independent: what a model leaves unexplained is alike from sample to sample, and is
+not to be learnt in a moment.
 
-Errors beyond a few times their usual size teach no more than that size. Their usual size follows their
-median, so a single outlier is nothing. Where many are too large for a twentieth of the time, the plant has
-stepped: the covariance is made as wide as at the start, and what is new is learnt at once. A measurement that is not a number teaches nothing, nor does
-one that stands exactly still while what is predicted moves.
+Errors beyond a few times their usual size teach no more than that size, which follows their median, so
+a single outlier is nothing. Where many are too large for a twentieth of the time, the plant has
+stepped: the covariance is made as wide as at the start, and what is new is learnt at once. A
+measurement that is not a number teaches nothing, nor does one that stands exactly still while what is
+asked for moves.
 """
 
 from __future__ import annotations

@@ -22,10 +22,10 @@ if TYPE_CHECKING:
 class Stream:
     """A block running sample by sample, whatever comes.
 
-    An input that is not finite, and may not be missing, changes nothing, and outputs are always finite: after a bad input,
-    memory is untouched and the outputs are those of the last good step, 0 before the first. Where a
-    huge input gives an output that is not finite, the outputs are those of the last good step too, and
-    memory that is lost with it starts afresh at the next step. Exported C does the same.
+    An input that is not finite, and may not be missing, changes nothing, and outputs are always finite:
+    after a bad input, memory is untouched and the outputs are those of the last good step, 0 before the
+    first. Where a huge input gives an output that is not finite, the outputs are those of the last good
+    step too, and memory that is lost with it starts afresh at the next step. Exported C does the same.
 
     Parameters
     ----------

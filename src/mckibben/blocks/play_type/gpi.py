@@ -30,6 +30,7 @@ from pydantic.dataclasses import dataclass
 from mckibben.arrays import Array
 from mckibben.blocks.adaptive.adaptable import Learning
 from mckibben.blocks.adaptive.operators import LearntOperators
+from mckibben.blocks.compose import Series
 from mckibben.blocks.core.block import Block, Run
 from mckibben.blocks.core.fields import (
     DISPLACEMENT,
@@ -45,7 +46,6 @@ from mckibben.blocks.core.kernels import kernel, summing_kernel
 from mckibben.blocks.core.notation import Notation
 from mckibben.blocks.core.refusals import explicit_state
 from mckibben.blocks.core.single_channel import check_input_range
-from mckibben.blocks.compose import Series
 from mckibben.blocks.memoryless.affine import Affine
 from mckibben.blocks.play_type.envelopes.base import Envelope, nested_envelope
 from mckibben.blocks.play_type.envelopes.tanh import Tanh

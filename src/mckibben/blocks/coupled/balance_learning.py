@@ -26,6 +26,7 @@ from mckibben.blocks.coupled.balance_adapting import (
     STIFFNESS,
     adapt_balance,
 )
+from mckibben.blocks.coupled.balance_terms import HEAD
 from mckibben.system.compiling import bound
 
 if TYPE_CHECKING:
@@ -179,9 +180,10 @@ class LearntBalance(Adaptable):
 
     @property
     def n_learning_scratch(self) -> int:
-        """Slopes of residuals, two matrices and a vector; then the coefficients as they are now."""
-        n = len(self._own.driven)
-        return n * self.taught.size + 2 * n * n + n + self._own.coefficients(1.0).size
+        """Slopes of residuals, two matrices and a vector; then the muscles as they are now."""
+        own, n = self._own, len(self._own.driven)
+        shared = HEAD + len(own.limits) + 2 * len(own.lags)
+        return n * self.taught.size + 2 * n * n + n + own.coefficients(1.0).size - shared
 
     def bind_adaptive(
         self,
@@ -208,6 +210,6 @@ class LearntBalance(Adaptable):
         )
 
     def adaptive_numbers(self, sample_time: float | None) -> Array:
-        """Return which parameters are learnt, their bounds, and the coefficients as fitted."""
-        which = [float(k * KINDS + kind) for k, kind in self.learnt]
-        return np.concatenate([which, self.ratios, self._own.c_numbers(sample_time)])
+        """Return n, which parameters are learnt, their bounds, and the coefficients as fitted."""
+        n, which = len(self._own.driven), [k * KINDS + kind for k, kind in self.learnt]
+        return np.concatenate([[n], which, self.ratios, self._own.c_numbers(sample_time)])

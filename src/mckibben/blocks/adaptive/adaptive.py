@@ -21,10 +21,11 @@ from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
 from mckibben.blocks.adaptive.adaptable import Adaptable, Learning
-from mckibben.blocks.adaptive.learning import start_root, start_sense
+from mckibben.blocks.adaptive.drift import Drift, alarm_limit, scatter
+from mckibben.blocks.adaptive.learning import covariance_of, start_root, start_sense
 from mckibben.blocks.core.block import Block, Run
 from mckibben.blocks.core.exportable import Cost
-from mckibben.blocks.core.fields import STRICT, Channel, Initial, Vector
+from mckibben.blocks.core.fields import STRICT, Channel, Initial, Vector, vector
 from mckibben.blocks.core.inverse import Inverse
 from mckibben.blocks.core.refusals import explicit_state, needs_sample_time
 from mckibben.blocks.core.saving import nested
@@ -231,6 +232,18 @@ class Adaptive(Block):
     def present(self, state: Array) -> Block:
         """Return the forward block that the inverse runs with in a state, shape (n_states,)."""
         return self.learner.retaught(self._split(state)[2])
+
+    def drift(self, state: Array) -> Drift:
+        """Return how far what is learnt has gone from the fit, in a state, shape (n_states,)."""
+        forward = self.forward
+        _, theta, _, root, senses = self._split(state)
+        steps = 1e-6 * np.diag(forward.scales)
+        there = forward.group_changes(theta)
+        slopes = np.array([(forward.group_changes(theta + h) - there) / 1e-6 for h in steps]).T
+        covariance = covariance_of(root, theta.size)
+        errors = scatter(covariance, slopes, senses, self.noise)
+        limit = alarm_limit(self.time, len(forward.groups))
+        return Drift(forward.groups, vector(there), vector(errors), limit)
 
     def resumed(self, state: Array) -> Self:
         """Return this block, which goes on from a state when it is next started."""

@@ -19,6 +19,7 @@ from pydantic.dataclasses import dataclass
 from mckibben.arrays import Array
 from mckibben.blocks.adaptive.adaptable import Adaptable
 from mckibben.blocks.adaptive.adaptive import Adaptive
+from mckibben.blocks.adaptive.drift import Drift
 from mckibben.blocks.compose import Series
 from mckibben.blocks.core.block import Block, Run
 from mckibben.blocks.core.composition import Composition
@@ -199,6 +200,10 @@ class AdaptiveSeries(Composition):
         parts = list(self.forward.parts)
         parts[self._place] = self.core.present(self._core_state(state))
         return Series(tuple(parts))
+
+    def drift(self, state: Array) -> Drift:
+        """Return how far what is learnt has gone from the fit, in a state, shape (n_states,)."""
+        return self.core.drift(self._core_state(state))
 
     def resumed(self, state: Array) -> Self:
         """Return this block, which goes on from a state when it is next started."""

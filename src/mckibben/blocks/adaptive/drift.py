@@ -61,7 +61,9 @@ class Drift:
 
     def __str__(self) -> str:
         told = [
-            f"{group.name} {abs(change):.0%} {group.more if change > 0 else group.less}".replace("%", " %")
+            f"{group.name} {abs(change):.0%} {group.more if change > 0 else group.less}".replace(
+                "%", " %"
+            )
             for group, change, alarm in zip(self.groups, self.changes, self.alarms, strict=True)
             if alarm
         ]
@@ -69,7 +71,9 @@ class Drift:
         if not told:
             return f"{' and '.join(same)} unchanged since the day of the fit"
         since = " than on the day of the fit"
-        return "; ".join([", ".join(told) + since, *([f"{', '.join(same)} unchanged"] if same else [])])
+        return "; ".join(
+            [", ".join(told) + since, *([f"{', '.join(same)} unchanged"] if same else [])]
+        )
 
 
 def alarm_limit(time: float, n_groups: int, rate: float = FALSE_ALARMS) -> float:

@@ -108,9 +108,7 @@ def keep_rising(theta: Array, least: Array) -> None:
 
 
 @kernel
-def take_over(
-    theta: Array, used: Array, s: Array, y: float, travel: float, band: float
-) -> None:
+def take_over(theta: Array, used: Array, s: Array, y: float, travel: float, band: float) -> None:
     """Move what is used to what is learnt, as far as the input need not turn before the reference."""
     n = s.size
     total, change = used[n], theta[n] - used[n]
@@ -130,7 +128,9 @@ class LearntOperators(Ranged, Adaptable):
     """A weighted sum of play operators whose weights, and an offset, are learnt."""
 
     groups: ClassVar[tuple[Group, ...]] = (
-        Group("gain", "higher (softer springs, or more area)", "lower (stiffer springs, or less area)"),
+        Group(
+            "gain", "higher (softer springs, or more area)", "lower (stiffer springs, or less area)"
+        ),
         Group("friction"),
         Group("offset", "up", "down"),
     )

@@ -1,7 +1,7 @@
 """How a balance of forces follows what is measured, and stays one that it can be.
 
 Of every muscle a constant force and four factors are learnt: on its springs and elasticity, its area,
-its friction, and what relaxes. Springs that couple two muscles are scaled by the root of both factors, so
+its friction, and what relaxes. Springs that couple two are scaled by the root of both factors, so
 that they stay symmetric and positive. The residual is linear in all of this. A displacement follows by
 
     dy / dtheta = -(dR / dy)^-1 dR / dtheta,

@@ -167,11 +167,18 @@ class LearntBalance(Adaptable):
         ends = own.known[:n_x] if own.known else n_x * ((0.0, 0.0),)
         found = []
         for shares in product((0.0, 0.5, 1.0), repeat=n_x):
-            x = [low + share * (high - low) for share, (low, high) in zip(shares, ends, strict=True)]
+            x = [
+                low + share * (high - low) for share, (low, high) in zip(shares, ends, strict=True)
+            ]
             powers = [1.0, *(v**d for v in x for d in range(1, own.degree + 1))]
             matrix = np.tensordot(np.array(powers), springs, (0, 1))
             found.append(float(np.linalg.eigvalsh(0.5 * (matrix + matrix.T))[0]))
         return max(min(found), 0.0)
+
+    @property
+    def known_span(self) -> float:
+        """Of the displacements known."""
+        return max(high - low for low, high in self._own.hull)
 
     @property
     def n_more_states(self) -> int:
@@ -205,7 +212,19 @@ class LearntBalance(Adaptable):
         return bound(
             adapt_balance,
             *(one.settings, one.scales, one.widest, one.fresh, one.theta),
-            *(one.used, one.root, one.senses, one.work, fitted, which, self.ratios, working, scratch, kept, was),
+            *(
+                one.used,
+                one.root,
+                one.senses,
+                one.work,
+                fitted,
+                which,
+                self.ratios,
+                working,
+                scratch,
+                kept,
+                was,
+            ),
             *(inputs, measured, outputs),
         )
 

@@ -240,12 +240,12 @@ class Adaptive(Block):
     def drift(self, state: Array) -> Drift:
         """Return how far what is learnt has gone from the fit, in a state, shape (n_states,)."""
         learner = self.learner
-        _, theta, _, root, senses = self._split(state)
+        _, theta, _, root, _ = self._split(state)
         steps = 1e-6 * np.diag(learner.scales)
         there = learner.group_changes(theta)
         slopes = np.array([(learner.group_changes(theta + h) - there) / 1e-6 for h in steps]).T
         covariance = covariance_of(root, theta.size)
-        errors = scatter(covariance, slopes, senses, self.noise)
+        errors = scatter(covariance, slopes)
         limit = alarm_limit(self.time, len(learner.groups))
         return Drift(learner.groups, vector(there), vector(errors), limit)
 

@@ -1,7 +1,6 @@
 """How far a learner has gone from the fit: by groups of parameters, in standard errors, in a sentence.
 
-A standard error counts what is learnt within the time, the usual size of errors, how errors that follow
-one another are alike (which makes fewer of them), and what a fit itself is wrong by. An alarm is given
+A standard error is that of the learner's covariance, and what a fit itself is wrong by. An alarm is given
 where a change is too many standard errors for chance, at a told rate of false ones, when one look is
 independent of the next after the time to learn in.
 """
@@ -15,14 +14,11 @@ import numpy as np
 
 from mckibben.arrays import Array
 from mckibben.blocks.adaptive.adaptable import Group
-from mckibben.blocks.adaptive.learning import RELATED, SENSES, SQUARED, USUAL
 
 FALSE_ALARMS = 1e-3
 """An hour, where nothing drifts."""
 FIT_ERROR = 0.01
 """Standard error of a fit itself, of every group."""
-MOST_ALIKE = 0.999
-"""Correlation of errors that follow one another, at most."""
 
 
 @dataclass(frozen=True)
@@ -82,23 +78,14 @@ def alarm_limit(time: float, n_groups: int, rate: float = FALSE_ALARMS) -> float
     return NormalDist().inv_cdf(1.0 - min(rate / looks, 0.5) / 2.0)
 
 
-def scatter(covariance: Array, slopes: Array, senses: Array, noise: float) -> Array:
+def scatter(covariance: Array, slopes: Array) -> Array:
     """Return the standard error of every group, shape (n_groups,).
 
     Parameters
     ----------
     covariance : array, shape (p, p)
-        Of the parameters, in squares of the scales and of the noise.
+        Of the parameters, in squares of their scales.
     slopes : array, shape (n_groups, p)
         Of the groups' changes over the parameters in their scales.
-    senses : array, shape (m SENSES,)
-        What is remembered of the sensors.
-    noise : float
-        That the learner was told.
     """
-    worst = 0.0
-    for sense in senses.reshape(-1, SENSES):
-        alike = float(np.clip(sense[RELATED] / max(sense[SQUARED], 1e-12), 0.0, MOST_ALIKE))
-        worst = max(worst, (sense[USUAL] / noise) ** 2 * (1.0 + alike) / (1.0 - alike))
-    variances = np.einsum("gi,ij,gj->g", slopes, covariance, slopes) * worst
-    return np.asarray(np.sqrt(variances + FIT_ERROR**2))
+    return np.asarray(np.sqrt(np.einsum("gi,ij,gj->g", slopes, covariance, slopes) + FIT_ERROR**2))

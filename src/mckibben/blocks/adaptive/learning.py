@@ -1,7 +1,7 @@
 """How parameters are learnt from one measurement: recursive least squares that forget by excitation.
 
-With slopes phi of a measured output over the parameters, each in its scale and by the noise, and P the
-parameters' covariance by that of the noise,
+With slopes phi of a measured output over the parameters, each in its scale and by the scatter of errors,
+and P the parameters' covariance,
 
     r = phi' P phi,   theta <- theta + P phi e / (1 + r),   P^-1 <- P^-1 + b phi phi',
     b = l - (1 - l) / r,   l = 1 - sample time / time:
@@ -10,6 +10,10 @@ what is known is forgotten along phi alone, as much as comes in (Kulhavy, "Restr
 forgetting in real-time identification", Automatica 23 (1987), 589). What is not excited is neither
 forgotten nor blown up: r settles at (1 - l) / l, and no variance passes the widest. P is kept as
 U D U', changed by Bierman's recursion, so that it stays positive in single precision.
+
+The scatter is the usual size of errors, times the root of how many that follow one another tell as much as
+one that is independent: what a model leaves unexplained is alike from sample to sample, and is not to be
+learnt in a moment.
 
 Errors beyond a few times their usual size teach no more than that size. Their usual size follows their
 median, so a single outlier is nothing. Where many are too large for a twentieth of the time, the plant has
@@ -36,6 +40,10 @@ QUARTILE = 0.6745
 """Median of the sizes of errors of unit variance."""
 ABSURD = 1e-6
 """Weight of an error too large to be one."""
+ALIKE, MOST_ALIKE = 0.98, 0.9995
+"""Correlation of errors that follow one another: until it is known, and at most."""
+NEVER = 1e30
+"""What no output is."""
 STILL, UNMOVED = 1e-9, 1e-12
 """What is added to what is known, and squares of slopes by the noise, below which nothing changes."""
 SURPRISED = 5.0
@@ -91,6 +99,7 @@ def learn(
     if measured != sense[LAST]:
         sense[LAST], sense[THEN] = measured, asked
     elif abs(asked - sense[THEN]) > GATE * usual:
+        sense[THEN] = NEVER  # it stands until it changes
         sense[IGNORED] += 1.0
         return False
     if sense[SURPRISE] > SURPRISED:  # the plant has stepped
@@ -100,15 +109,16 @@ def learn(
     p = theta.size
     f, g = work[:p], work[p : 2 * p]
     r = 0.0
+    told = usual * np.sqrt(fewer(sense))
     for j in range(p):
-        f[j] = slopes[j] * scales[j] / noise
+        f[j] = slopes[j] * scales[j] / told
     for j in range(p - 1, -1, -1):  # U' phi in place
         first = p + (j * (j - 1)) // 2
         for i in range(j):
             f[j] += root[first + i] * f[i]
         g[j] = root[j] * f[j]
         r += f[j] * g[j]
-    expected = np.sqrt(usual * usual + r * noise * noise)
+    expected = np.sqrt(usual * usual + r * told * told)
     weight = 1.0
     if abs(error) > GATE * expected:
         weight = GATE * expected / abs(error)
@@ -119,12 +129,19 @@ def learn(
     r *= weight
     excited = 1.0 - share - share / r
     _spread(root, f, g, weight * excited)
-    gain = weight * error / noise / (1.0 + r)
+    gain = weight * error / told / (1.0 + r)
     for i in range(p):
         theta[i] += scales[i] * g[i] * gain
     _bound(root, widest, int(sense[READY]) % p)
     sense[READY] = sense[READY] % p + 1.0
     return True
+
+
+@kernel
+def fewer(sense: Array) -> float:
+    """Return how many errors that follow one another tell as much as one independent one."""
+    alike = min(max(sense[RELATED] / sense[SQUARED], 0.0), MOST_ALIKE)
+    return (1.0 + alike) / (1.0 - alike)
 
 
 @kernel
@@ -208,5 +225,5 @@ def covariance_of(root: Array, p: int) -> Array:
 def start_sense(noise: float) -> Array:
     """Return what is remembered of a sensor before it is read."""
     sense = np.zeros(SENSES)
-    sense[USUAL], sense[SURPRISE], sense[SQUARED] = 3.0 * noise, 1.0, 1.0
+    sense[USUAL], sense[SURPRISE], sense[SQUARED], sense[RELATED] = 3.0 * noise, 1.0, 1.0, ALIKE
     return sense

@@ -3,6 +3,9 @@
 #define QUARTILE MCK_R(0.6745)
 #define SURPRISED MCK_R(5.0)
 #define ABSURD MCK_R(1e-6)
+#define ALIKE MCK_R(0.98) /* errors that follow one another, until it is known */
+#define MOST_ALIKE MCK_R(0.9995)
+#define NEVER MCK_R(1e30)
 #define STILL MCK_R(1e-9)
 #define UNMOVED MCK_R(1e-12)
 
@@ -50,7 +53,15 @@ void mck_learnt_start(const mck_learner *m, const mck_learnt *s, int outputs)
         sense[MCK_USUAL] = MCK_R(3.0) * m->noise;
         sense[MCK_SURPRISE] = MCK_R(1.0);
         sense[MCK_SQUARED] = MCK_R(1.0);
+        sense[MCK_RELATED] = ALIKE;
     }
+}
+
+/* How many errors that follow one another tell as much as one independent one. */
+static mck_real fewer(const mck_real *sense)
+{
+    const mck_real alike = mck_clip(sense[MCK_RELATED] / sense[MCK_SQUARED], MCK_R(0.0), MOST_ALIKE);
+    return (MCK_R(1.0) + alike) / (MCK_R(1.0) - alike);
 }
 
 /* Remember an error, by its expected size. */
@@ -135,6 +146,7 @@ int mck_learn(const mck_learner *m, const mck_learnt *s, mck_real *sense, mck_re
         sense[MCK_LAST] = measured;
         sense[MCK_THEN] = asked;
     } else if (mck_abs(asked - sense[MCK_THEN]) > MCK_GATE * usual) {
+        sense[MCK_THEN] = NEVER; /* it stands until it changes */
         sense[MCK_IGNORED] += MCK_R(1.0);
         return 0;
     }
@@ -146,8 +158,9 @@ int mck_learn(const mck_learner *m, const mck_learnt *s, mck_real *sense, mck_re
     }
     const mck_real error = measured - predicted;
     mck_real r = MCK_R(0.0);
+    const mck_real told = usual * mck_sqrt(fewer(sense));
     for (int j = 0; j < p; j++) {
-        f[j] = slopes[j] * m->scales[j] / m->noise;
+        f[j] = slopes[j] * m->scales[j] / told;
     }
     for (int j = p - 1; j >= 0; j--) { /* U' phi in place */
         const mck_real *column = s->root + p + (j * (j - 1)) / 2;
@@ -157,7 +170,7 @@ int mck_learn(const mck_learner *m, const mck_learnt *s, mck_real *sense, mck_re
         g[j] = s->root[j] * f[j];
         r += f[j] * g[j];
     }
-    const mck_real expected = mck_sqrt(usual * usual + r * m->noise * m->noise);
+    const mck_real expected = mck_sqrt(usual * usual + r * told * told);
     mck_real weight = MCK_R(1.0);
     if (mck_abs(error) > MCK_GATE * expected) {
         weight = MCK_GATE * expected / mck_abs(error);
@@ -169,7 +182,7 @@ int mck_learn(const mck_learner *m, const mck_learnt *s, mck_real *sense, mck_re
     }
     r *= weight;
     spread(p, s->root, f, g, weight * (MCK_R(1.0) - m->share - m->share / r));
-    const mck_real gain = weight * error / m->noise / (MCK_R(1.0) + r);
+    const mck_real gain = weight * error / told / (MCK_R(1.0) + r);
     for (int i = 0; i < p; i++) {
         s->theta[i] += m->scales[i] * g[i] * gain;
     }

@@ -126,6 +126,11 @@ class Adaptable(Invertible):
         """
 
     @property
+    def known_span(self) -> float:
+        """Largest range of an output where it was fitted, for models that reach anywhere; 0 if unknown."""
+        return 0.0
+
+    @property
     def n_more_states(self) -> int:
         """Numbers of the last sample that learning wants, behind those of the inverse."""
         return 1

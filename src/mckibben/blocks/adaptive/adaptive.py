@@ -36,6 +36,14 @@ TRUSTED = 1 / 3
 """Standard deviations of the fitted parameters at the start, by those of changes to be expected."""
 
 
+def learner_of(block: Block) -> Adaptable | None:
+    """Return what learns while a block is undone: it, or what undoes it; None where none does."""
+    if isinstance(block, Inverse):
+        inner = block.forward
+        return inner if isinstance(inner, Adaptable) and not inner.learns_inverted else None
+    return block if isinstance(block, Adaptable) and block.learns_inverted else None
+
+
 @dataclass(frozen=True, config=STRICT)
 class Adaptive(Block):
     """The inverse of a block, which learns the block's linear parameters while it runs.
@@ -62,10 +70,6 @@ class Adaptive(Block):
     memory: Vector | None = None
 
     def __post_init__(self) -> None:
-        if self.learner.learns_inverted is not isinstance(self.forward, Adaptable):
-            raise ModelError(
-                f"{self.learner.kind!r} learns in the other direction. Remedy: give its inverse."
-            )
         self.learner.check_invertible()
         if self.memory is not None and len(self.memory) != self.n_states:
             raise ModelError(
@@ -80,14 +84,12 @@ class Adaptive(Block):
         Raises
         ------
         ModelError
-            Of the inverse of a block that declares nothing.
+            Where none does.
         """
-        found = self.forward
-        if isinstance(found, Inverse):
-            found = found.forward
-        if not isinstance(found, Adaptable):
+        found = learner_of(self.forward)
+        if found is None:
             raise ModelError(
-                f"{found.kind!r} does not learn. Remedy: use pi, gpi, mpi, cpi or balance."
+                f"{self.forward.title!r} does not learn. Remedy: give a pi, gpi or balance model."
             )
         return found
 
@@ -237,15 +239,15 @@ class Adaptive(Block):
 
     def drift(self, state: Array) -> Drift:
         """Return how far what is learnt has gone from the fit, in a state, shape (n_states,)."""
-        forward = self.forward
+        learner = self.learner
         _, theta, _, root, _ = self._split(state)
-        steps = 1e-6 * np.diag(forward.scales)
-        there = forward.group_changes(theta)
-        slopes = np.array([(forward.group_changes(theta + h) - there) / 1e-6 for h in steps]).T
+        steps = 1e-6 * np.diag(learner.scales)
+        there = learner.group_changes(theta)
+        slopes = np.array([(learner.group_changes(theta + h) - there) / 1e-6 for h in steps]).T
         covariance = covariance_of(root, theta.size)
         errors = scatter(covariance, slopes)
-        limit = alarm_limit(self.time, len(forward.groups))
-        return Drift(forward.groups, vector(there), vector(errors), limit)
+        limit = alarm_limit(self.time, len(learner.groups))
+        return Drift(learner.groups, vector(there), vector(errors), limit)
 
     def resumed(self, state: Array) -> Self:
         """Return this block, which goes on from a state when it is next started."""

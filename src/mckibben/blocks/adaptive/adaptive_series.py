@@ -18,13 +18,14 @@ from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
 from mckibben.blocks.adaptive.adaptable import Adaptable
-from mckibben.blocks.adaptive.adaptive import Adaptive
+from mckibben.blocks.adaptive.adaptive import Adaptive, learner_of
 from mckibben.blocks.adaptive.drift import Drift
 from mckibben.blocks.compose import Series
 from mckibben.blocks.core.block import Block, Run
 from mckibben.blocks.core.composition import Composition
 from mckibben.blocks.core.exportable import Board
 from mckibben.blocks.core.fields import STRICT, Channel, Initial, Vector
+from mckibben.blocks.core.inverse import Inverse
 from mckibben.blocks.core.saving import nested
 from mckibben.blocks.feedback.pid import MEASURED
 from mckibben.errors import ModelError
@@ -56,7 +57,7 @@ class AdaptiveSeries(Composition):
     memory: Vector | None = None
 
     def __post_init__(self) -> None:
-        learning = sum(isinstance(part, Adaptable) for part in self.forward.parts)
+        learning = sum(learner_of(part) is not None for part in self.forward.parts)
         single = all(len(part.inputs) == 1 == len(part.outputs) for part in self.forward.parts)
         if learning != 1 or not single:
             raise ModelError(
@@ -72,13 +73,13 @@ class AdaptiveSeries(Composition):
     @cached_property
     def _place(self) -> int:
         parts = self.forward.parts
-        return next(k for k, part in enumerate(parts) if isinstance(part, Adaptable))
+        return next(k for k, part in enumerate(parts) if learner_of(part) is not None)
 
     @cached_property
     def core(self) -> Adaptive:
         """The part that learns, its noise that of the output by the mean slope of parts behind it."""
         part = self.forward.parts[self._place]
-        assert isinstance(part, Adaptable)
+        assert isinstance(part, Adaptable | Inverse)
         low, high = (float(end[0]) for end in part.reachable())
         ends = np.array([low]), np.array([high])
         for behind in self.forward.parts[self._place + 1 :]:
@@ -247,7 +248,8 @@ def adaptive(model: Block, time: float, noise: float | None = None) -> Adaptive 
         If nothing of the model can learn, or it has no inverse.
     """
     parts = getattr(model, "parts", (model,))
-    if not any(isinstance(part, Adaptable) for part in parts):
+    learner = next(filter(None, map(learner_of, parts)), None)
+    if learner is None:
         raise ModelError(
             f"{model.title!r} cannot learn while it runs. Remedy: adapt a pi, gpi, mpi, cpi or balance "
             "model."
@@ -255,6 +257,7 @@ def adaptive(model: Block, time: float, noise: float | None = None) -> Adaptive 
     if noise is None:
         low, high = model.reachable()
         width = float(np.max(high - low))
+        width = width if np.isfinite(width) else learner.known_span
         if not 0 < width < np.inf:
             raise ModelError(
                 f"what {model.title!r} reaches does not tell how exactly it is measured. "
@@ -263,5 +266,5 @@ def adaptive(model: Block, time: float, noise: float | None = None) -> Adaptive 
         noise = width / 1000
     if isinstance(model, Series):
         return AdaptiveSeries(model, float(time), float(noise))
-    assert isinstance(model, Adaptable)
+    assert isinstance(model, Adaptable | Inverse)
     return Adaptive(model, float(time), float(noise))

@@ -1,7 +1,7 @@
 """How a balance of forces follows what is measured, and stays one that it can be.
 
 Of every muscle a constant force and four factors are learnt: on its springs and elasticity, its area,
-its friction, and what relaxes. Springs that couple two muscles are scaled by the root of both factors, so
+its friction, and what relaxes. Springs that couple two are scaled by the root of both factors, so
 that they stay symmetric and positive. The residual is linear in all of this. A displacement follows by
 
     dy / dtheta = -(dR / dy)^-1 dR / dtheta,
@@ -34,8 +34,11 @@ KINDS = 5
 OFFSET, STIFFNESS, AREA, FRICTION, RELAXATION = range(KINDS)
 """What is learnt of a muscle; a parameter is named by its muscle times `KINDS`, plus this."""
 
-LEAST_FACTOR, MOST_FACTOR = 0.2, 5.0
+LEAST_FACTOR, MOST_FACTOR = 0.5, 2.0
 """Of what was fitted."""
+
+MOST_FORCE = 0.3
+"""Constant force, relative to its scale."""
 
 HAIR = 1e-9
 """Slack that is none, relative to the scale."""
@@ -101,7 +104,8 @@ def adapt_balance(
             ):
                 taught = True
         if taught:
-            keep_balanced(which, bounds, theta)
+            pull_back(settings[0], which, scales, widest, root, theta, slopes, work)
+            keep_balanced(which, bounds, scales, root, theta, slopes, work)
             for i in range(size):
                 used[i] = theta[i]
             retune(fitted, which, used, c)
@@ -219,23 +223,86 @@ def answer(terms: Array, matrix: Array, k: int, row: Array, slopes: Array) -> No
 
 
 @kernel
-def keep_balanced(which: Array, bounds: Array, theta: Array) -> None:
-    """Bring factors into what a balance can have.
+def pull_back(
+    share: float,
+    which: Array,
+    scales: Array,
+    widest: Array,
+    root: Array,
+    theta: Array,
+    along: Array,
+    work: Array,
+) -> None:
+    """Bring what measurements do not tell back to what was fitted, in the time to learn in.
 
-    ``bounds`` has for every muscle the most friction by area, and the most area by stiffness.
+    It is weighed as if the fit were measured too: by the covariance, over the widest.
     """
-    for i in range(which.size):
-        if int(which[i]) % KINDS != OFFSET:
-            theta[i] = min(max(theta[i], LEAST_FACTOR), MOST_FACTOR)
-    for k in range(bounds.size // 2):
-        stiffness, area_factor, rubbing = -1, 1.0, -1
+    p = theta.size
+    for i in range(p):
+        fitted = 0.0 if int(which[i]) % KINDS == OFFSET else 1.0
+        work[i] = share * (fitted - theta[i]) / (scales[i] * widest[i])
+    covariant(root, work, along)
+    for i in range(p):
+        theta[i] += scales[i] * along[i]
+
+
+@kernel
+def covariant(root: Array, vector: Array, product: Array) -> None:
+    """Multiply by the covariance U D U'."""
+    p = product.size
+    first = p + (p * (p - 1)) // 2
+    for j in range(p - 1, -1, -1):
+        first -= j
+        total = vector[j]
+        for i in range(j):
+            total += root[first + i] * vector[i]
+        product[j] = root[j] * total
+    first = p
+    for j in range(p):
+        for i in range(j):
+            product[i] += root[first + i] * product[j]
+        first += j
+
+
+@kernel
+def keep_balanced(
+    which: Array,
+    bounds: Array,
+    scales: Array,
+    root: Array,
+    theta: Array,
+    along: Array,
+    work: Array,
+) -> None:
+    """Bring parameters into what a balance can have.
+
+    ``bounds`` has for every muscle the most friction by area, and the most area by stiffness. What is
+    changed takes the others along as they are known to go together, which may not be possible twice.
+    """
+    for turn in range(2):
         for i in range(which.size):
-            if int(which[i]) == k * KINDS + STIFFNESS:
-                stiffness = i
-            elif int(which[i]) == k * KINDS + AREA:
-                area_factor = theta[i]
-            elif int(which[i]) == k * KINDS + FRICTION:
-                rubbing = i
-        theta[stiffness] = max(theta[stiffness], area_factor / bounds[2 * k + 1])
-        if rubbing >= 0:
-            theta[rubbing] = min(theta[rubbing], area_factor * bounds[2 * k])
+            k, kind = int(which[i]) // KINDS, int(which[i]) % KINDS
+            low, high = LEAST_FACTOR, MOST_FACTOR
+            if kind == OFFSET:
+                low, high = -MOST_FORCE * scales[i], MOST_FORCE * scales[i]
+            elif kind != AREA:
+                area_factor = 1.0
+                for j in range(which.size):
+                    if int(which[j]) == k * KINDS + AREA:
+                        area_factor = theta[j]
+                if kind == STIFFNESS:
+                    low = max(low, area_factor / bounds[2 * k + 1])
+                elif kind == FRICTION:
+                    high = min(high, area_factor * bounds[2 * k])
+            short = min(max(theta[i], low), high) - theta[i]
+            if short == 0.0:
+                continue
+            if turn == 0:
+                for j in range(which.size):
+                    work[j] = 0.0
+                work[i] = 1.0
+                covariant(root, work, along)
+                for j in range(which.size):
+                    theta[j] += short * scales[j] / scales[i] * along[j] / along[i]
+            else:
+                theta[i] += short

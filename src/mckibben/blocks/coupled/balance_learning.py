@@ -26,6 +26,7 @@ from mckibben.blocks.coupled.balance_adapting import (
     STIFFNESS,
     adapt_balance,
 )
+from mckibben.blocks.coupled.balance_terms import HEAD
 from mckibben.system.compiling import bound
 
 if TYPE_CHECKING:
@@ -166,11 +167,18 @@ class LearntBalance(Adaptable):
         ends = own.known[:n_x] if own.known else n_x * ((0.0, 0.0),)
         found = []
         for shares in product((0.0, 0.5, 1.0), repeat=n_x):
-            x = [low + share * (high - low) for share, (low, high) in zip(shares, ends, strict=True)]
+            x = [
+                low + share * (high - low) for share, (low, high) in zip(shares, ends, strict=True)
+            ]
             powers = [1.0, *(v**d for v in x for d in range(1, own.degree + 1))]
             matrix = np.tensordot(np.array(powers), springs, (0, 1))
             found.append(float(np.linalg.eigvalsh(0.5 * (matrix + matrix.T))[0]))
         return max(min(found), 0.0)
+
+    @property
+    def known_span(self) -> float:
+        """Of the displacements known."""
+        return max(high - low for low, high in self._own.hull)
 
     @property
     def n_more_states(self) -> int:
@@ -179,9 +187,10 @@ class LearntBalance(Adaptable):
 
     @property
     def n_learning_scratch(self) -> int:
-        """Slopes of residuals, two matrices and a vector; then the coefficients as they are now."""
-        n = len(self._own.driven)
-        return n * self.taught.size + 2 * n * n + n + self._own.coefficients(1.0).size
+        """Slopes of residuals, two matrices and a vector; then the muscles as they are now."""
+        own, n = self._own, len(self._own.driven)
+        shared = HEAD + len(own.limits) + 2 * len(own.lags)
+        return n * self.taught.size + 2 * n * n + n + own.coefficients(1.0).size - shared
 
     def bind_adaptive(
         self,
@@ -203,11 +212,23 @@ class LearntBalance(Adaptable):
         return bound(
             adapt_balance,
             *(one.settings, one.scales, one.widest, one.fresh, one.theta),
-            *(one.used, one.root, one.senses, one.work, fitted, which, self.ratios, working, scratch, kept, was),
+            *(
+                one.used,
+                one.root,
+                one.senses,
+                one.work,
+                fitted,
+                which,
+                self.ratios,
+                working,
+                scratch,
+                kept,
+                was,
+            ),
             *(inputs, measured, outputs),
         )
 
     def adaptive_numbers(self, sample_time: float | None) -> Array:
-        """Return which parameters are learnt, their bounds, and the coefficients as fitted."""
-        which = [float(k * KINDS + kind) for k, kind in self.learnt]
-        return np.concatenate([which, self.ratios, self._own.c_numbers(sample_time)])
+        """Return n, which parameters are learnt, their bounds, and the coefficients as fitted."""
+        n, which = len(self._own.driven), [k * KINDS + kind for k, kind in self.learnt]
+        return np.concatenate([[n], which, self.ratios, self._own.c_numbers(sample_time)])

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from mckibben import ModelError
 from mckibben.blocks.adaptive.adaptive import Adaptive
+from mckibben.blocks.core.inverse import Inverse
 from mckibben.blocks.coupled.balance import Balance
 from mckibben.blocks.coupled.balance_adapting import (
     FRICTION,
@@ -79,7 +80,7 @@ def answers(forward: Any, own: Array, pressures: Array, scheduled: Array) -> Arr
 @given(balances(), st.integers(0, 1000), st.booleans())
 def test_model_and_inverse_match_at_every_step(balance: Balance, seed: int, wild: bool) -> None:
     """Whatever is measured: of a muscle that drifts, or garbage, or nothing."""
-    block = Adaptive(balance.inverse(), 2.0, 0.05)
+    block = Adaptive(Inverse(balance), 2.0, 0.05)
     asked, n, loop = path(balance, seed, 120), len(balance.driven), Loop(block)
     rng = np.random.default_rng(seed)
     measured = asked[0, :n]
@@ -97,7 +98,7 @@ def test_model_and_inverse_match_at_every_step(balance: Balance, seed: int, wild
 @given(balances(), st.integers(0, 1000))
 def test_what_garbage_teaches_is_a_balance_still(balance: Balance, seed: int) -> None:
     """`retaught` refuses what makes energy; areas outweigh friction, as the fitted ones do."""
-    block, n = Adaptive(balance.inverse(), 1.0, 0.05), len(balance.driven)
+    block, n = Adaptive(Inverse(balance), 1.0, 0.05), len(balance.driven)
     loop, rng = Loop(block), np.random.default_rng(seed)
     for sample in path(balance, seed, 150):
         loop.step(sample, rng.uniform(-100.0, 100.0, n))
@@ -203,7 +204,7 @@ def single() -> Balance:
 
 def test_softer_springs_are_made_up_for_and_told() -> None:
     balance = single()
-    block = Adaptive(balance.inverse(), 20.0, 0.02)
+    block = Adaptive(Inverse(balance), 20.0, 0.02)
     loop, errors = followed(block, changed_by(balance, STIFFNESS, 0.85), 4000)
     fixed = np.abs(errors[:200]).max()
     assert np.sqrt((errors[-1000:] ** 2).mean()) < 0.05 * fixed
@@ -218,7 +219,7 @@ def test_softer_springs_are_made_up_for_and_told() -> None:
 
 def test_more_friction_is_learnt_as_friction() -> None:
     balance = single()
-    block = Adaptive(balance.inverse(), 20.0, 0.02)
+    block = Adaptive(Inverse(balance), 20.0, 0.02)
     loop, _ = followed(block, changed_by(balance, FRICTION, 1.3), 4000)
     changes = block.drift(loop.state).changes
     assert changes[2] == pytest.approx(0.3, abs=0.06)
@@ -227,7 +228,7 @@ def test_more_friction_is_learnt_as_friction() -> None:
 
 def test_several_muscles_learn_together() -> None:
     balance = replace(Balance.example(), settled=True)
-    block = Adaptive(balance.inverse(), 10.0, 0.02)
+    block = Adaptive(Inverse(balance), 10.0, 0.02)
     plant = changed_by(balance, STIFFNESS, 0.9)
     _, errors = followed(block, plant, 3000)
     assert (np.sqrt((errors[-1000:] ** 2).mean(axis=0)) < 0.02).all()
@@ -236,14 +237,14 @@ def test_several_muscles_learn_together() -> None:
 
 def test_without_drift_it_is_as_good_as_fixed() -> None:
     balance = single()
-    _, errors = followed(Adaptive(balance.inverse(), 20.0, 0.02), balance.inverse(), 4000)
+    _, errors = followed(Adaptive(Inverse(balance), 20.0, 0.02), balance.inverse(), 4000)
     assert np.sqrt((errors**2).mean()) < 0.01
 
 
 @pytest.mark.parametrize("fault", [np.nan, 12.0])
 def test_a_sensor_that_drops_out_or_stands_still_teaches_nothing(fault: float) -> None:
     balance = single()
-    loop = Loop(Adaptive(balance.inverse(), 20.0, 0.02))
+    loop = Loop(Adaptive(Inverse(balance), 20.0, 0.02))
     asked = path(balance, 3, 400)
     loop.step(asked[0], np.array([fault]))
     loop.step(asked[1], np.array([fault]))
@@ -255,7 +256,7 @@ def test_a_sensor_that_drops_out_or_stands_still_teaches_nothing(fault: float) -
 
 def test_it_goes_on_where_it_was_stopped() -> None:
     balance = single()
-    block, asked = Adaptive(balance.inverse(), 5.0, 0.02), path(balance, 5, 200)
+    block, asked = Adaptive(Inverse(balance), 5.0, 0.02), path(balance, 5, 200)
     whole, first = Loop(block), Loop(block)
     straight = [whole.step(s, 0.95 * s) for s in asked]
     for sample in asked[:100]:
@@ -274,7 +275,7 @@ def test_what_is_told_of_an_area_needs_a_load() -> None:
 
 def test_a_balance_learns_as_a_compensator_only() -> None:
     with pytest.raises(ModelError, match="does not learn"):
-        Adaptive(single(), 20.0, 0.02)  # type: ignore[arg-type]
+        Adaptive(single(), 20.0, 0.02)
 
 
 @needs("cc")
@@ -287,7 +288,7 @@ def test_c_gives_the_same_numbers(
     from mckibben.export.c.building import CompiledModel
 
     balance = replace(Balance.example(), **change)
-    block, rng = Adaptive(balance.inverse(), 5.0, 0.1), np.random.default_rng(1)
+    block, rng = Adaptive(Inverse(balance), 5.0, 0.1), np.random.default_rng(1)
     asked = path(balance, 4, 2000)
     measured = 0.95 * asked[:, :2] + 1.0 + 0.1 * rng.standard_normal((2000, 2))
     measured = np.vstack([measured[:1], measured[:-1]])

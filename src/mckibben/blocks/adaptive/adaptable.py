@@ -127,7 +127,7 @@ class Adaptable(Invertible):
 
     @property
     def known_span(self) -> float:
-        """Largest range of an output where it was fitted, for models that reach anywhere; 0 if unknown."""
+        """Largest range of an output where fitted, for models that reach anywhere; 0 if unknown."""
         return 0.0
 
     @property

@@ -37,17 +37,47 @@ from mckibben.blocks.core.fields import (
     Rule,
     Vector,
 )
+from mckibben.blocks.core.kernels import kernel
 from mckibben.blocks.core.linear_system import newton_cost
 from mckibben.blocks.core.many_channels import ManyChannels
 from mckibben.blocks.core.notation import Notation
 from mckibben.blocks.core.refusals import explicit_state, needs_sample_time
 from mckibben.blocks.coupled.balance_equations import balance_of_forces
 from mckibben.blocks.coupled.balance_fields import check_fields
-from mckibben.blocks.coupled.balance_law import NEVER, begin, keep, pressed, settle
+from mckibben.blocks.coupled.balance_law import NEARLY, NEVER, begin, keep, press, pressed, settle
 from mckibben.blocks.coupled.balance_learning import LearntBalance
-from mckibben.blocks.coupled.balance_steps import balance_inverse_kernel, balance_kernel
-from mckibben.blocks.coupled.balance_terms import AT_REST
+from mckibben.blocks.coupled.balance_terms import AT_REST, FROM_REST, IN_TIME
 from mckibben.errors import ModelWarning
+
+
+@kernel
+def balance_kernel(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
+    """Give pressures; the last state counts samples that muscles cannot reach."""
+    for t in range(inputs.shape[0]):
+        press(coefficients, state, inputs[t], outputs[t])
+
+
+@kernel
+def balance_inverse_kernel(
+    coefficients: Array, state: Array, inputs: Array, outputs: Array
+) -> None:
+    """Give displacements; the last state counts samples that were not solved."""
+    c = coefficients
+    n, n_x = int(c[0]), int(c[1]) + int(c[3])
+    scratch = c[c.size - n * (n + 6) :]
+    y, tare = scratch[:n], state[state.size - 2 - n :]
+    for t in range(inputs.shape[0]):
+        p, x = inputs[t, :n], inputs[t, n : n + n_x]
+        for k in range(n):
+            y[k] = state[k]
+        way = FROM_REST if state[state.size - 2] != 0.0 else IN_TIME
+        left = settle(c, state, way, y, x, p, scratch[2 * n :])
+        keep(c, state, way, y, p)
+        state[state.size - 2] = 0.0
+        for k in range(n):
+            outputs[t, k] = y[k] - tare[k]
+        if not left < NEARLY:
+            state[state.size - 1] += 1.0
 
 
 @dataclass(frozen=True, config=STRICT)

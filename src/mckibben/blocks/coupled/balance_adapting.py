@@ -20,7 +20,7 @@ from mckibben.arrays import Array
 from mckibben.blocks.adaptive.learning import SENSES, learn
 from mckibben.blocks.core.kernels import kernel
 from mckibben.blocks.core.linear_system import eliminate
-from mckibben.blocks.coupled.balance_steps import balance_kernel
+from mckibben.blocks.coupled.balance_law import press
 from mckibben.blocks.coupled.balance_terms import (
     OWN,
     area,
@@ -109,7 +109,7 @@ def adapt_balance(
             for i in range(size):
                 used[i] = theta[i]
             retune(fitted, which, used, c)
-        balance_kernel(c, state, inputs[t : t + 1], outputs[t : t + 1])
+        press(c, state, inputs[t], outputs[t])
         first = c.size - n * (n + 6)
         for k in range(n):
             y[k], p[k] = c[first + k], outputs[t, k]

@@ -146,7 +146,7 @@ class LearntBalance(Adaptable):
         own, found = self._own, []
         softest = self._softest()
         for k in range(len(own.driven)):
-            u = np.linspace(*own.hull[k], GRID) / own.scale
+            u = np.linspace(own.hull[k][0], own.hull[k][1], GRID) / own.scale
             area = np.polynomial.Polynomial(own.areas[k])
             elasticity = np.polynomial.Polynomial([0.0, 0.0, *own.elasticity[k]])
             rubbed = float(np.dot(own.friction[k], np.array(own.limits) + own.walls[k]))

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from mckibben import Block, ModelError, Series, load
 from mckibben.blocks.adaptive.adaptable import Adaptable
-from mckibben.blocks.adaptive.adaptive import Adaptive
+from mckibben.blocks.adaptive.adaptive import Adaptive, taught
 from mckibben.blocks.adaptive.adaptive_series import AdaptiveSeries, adaptive
 from mckibben.blocks.adaptive.drift import alarm_limit
 from mckibben.blocks.adaptive.learning import covariance_of, start_root
@@ -39,7 +39,7 @@ def changed(model: Any, gain: float = 1.2, shift: float = 0.3) -> Block:
     theta = model.taught.copy()
     theta[:-1] *= gain
     theta[-1] += shift
-    return model.retaught(theta)
+    return taught(model, theta)
 
 
 def references(model: Block, seconds: float, share: float = 0.7, seed: int = 0) -> Array:

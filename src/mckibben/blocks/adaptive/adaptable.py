@@ -104,6 +104,11 @@ class Adaptable(Invertible):
     def retaught(self, theta: Array) -> Block:
         """Return the forward block with other parameters, shape (p,)."""
 
+    def added(self, theta: Array) -> float:
+        """Return what is added to its output, where it has no parameter of its own for that."""
+        del theta
+        return 0.0
+
     @abstractmethod
     def group_changes(self, theta: Array) -> Array:
         """Return the relative change of every group from the fitted one, shape (n_groups,)."""

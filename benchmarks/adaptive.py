@@ -1,6 +1,6 @@
 """Inverses that learn, on rigs that drift: beside fixed ones, feedback, and a model fitted afresh.
 
-    python benchmarks/adaptive.py [--rig mas20-hanging] [--kind gpi] [--motions 3] [--time 60] [--change all]
+    python benchmarks/adaptive.py [--rig mas20-hanging] [--kind gpi] [--motions 3] [--change all]
     python benchmarks/adaptive.py --hour
     python benchmarks/adaptive.py --instructions
 

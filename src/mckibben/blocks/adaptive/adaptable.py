@@ -132,7 +132,7 @@ class Adaptable(Invertible):
 
     @property
     def known_span(self) -> float:
-        """Largest range of an output where it was fitted, for models that reach anywhere; 0 if unknown."""
+        """Largest range of an output where it was fitted; 0 if unknown."""
         return 0.0
 
     @property

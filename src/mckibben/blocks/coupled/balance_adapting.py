@@ -281,28 +281,34 @@ def keep_balanced(
     """
     for turn in range(2):
         for i in range(which.size):
-            k, kind = int(which[i]) // KINDS, int(which[i]) % KINDS
-            low, high = LEAST_FACTOR, MOST_FACTOR
-            if kind == OFFSET:
-                low, high = -MOST_FORCE * scales[i], MOST_FORCE * scales[i]
-            elif kind != AREA:
-                area_factor = 1.0
-                for j in range(which.size):
-                    if int(which[j]) == k * KINDS + AREA:
-                        area_factor = theta[j]
-                if kind == STIFFNESS:
-                    low = max(low, area_factor / bounds[2 * k + 1])
-                elif kind == FRICTION:
-                    high = min(high, area_factor * bounds[2 * k])
-            short = min(max(theta[i], low), high) - theta[i]
-            if short == 0.0:
+            lacks = short_of(which, bounds, scales, theta, i)
+            if lacks == 0.0:
                 continue
-            if turn == 0:
-                for j in range(which.size):
-                    work[j] = 0.0
-                work[i] = 1.0
-                covariant(root, work, along)
-                for j in range(which.size):
-                    theta[j] += short * scales[j] / scales[i] * along[j] / along[i]
-            else:
-                theta[i] += short
+            if turn > 0:
+                theta[i] += lacks
+                continue
+            for j in range(which.size):
+                work[j] = 1.0 if j == i else 0.0
+            covariant(root, work, along)
+            for j in range(which.size):
+                theta[j] += lacks * scales[j] / scales[i] * along[j] / along[i]
+
+
+@kernel
+def short_of(which: Array, bounds: Array, scales: Array, theta: Array, i: int) -> float:
+    """Return how far parameter i is short of what a balance can have."""
+    k, kind = int(which[i]) // KINDS, int(which[i]) % KINDS
+    low, high = LEAST_FACTOR, MOST_FACTOR
+    if kind == OFFSET:
+        high = MOST_FORCE * scales[i]
+        low = -high
+    elif kind != AREA:
+        area_factor = 1.0
+        for j in range(which.size):
+            if int(which[j]) == k * KINDS + AREA:
+                area_factor = theta[j]
+        if kind == STIFFNESS:
+            low = max(low, area_factor / bounds[2 * k + 1])
+        elif kind == FRICTION:
+            high = min(high, area_factor * bounds[2 * k])
+    return min(max(theta[i], low), high) - theta[i]

@@ -7,8 +7,9 @@
 
 #define OWN 8
 #define BLADDER 6
-#define LEAST_FACTOR MCK_R(0.2)
-#define MOST_FACTOR MCK_R(5.0)
+#define LEAST_FACTOR MCK_R(0.5)
+#define MOST_FACTOR MCK_R(2.0)
+#define MOST_FORCE MCK_R(0.3)
 
 /* What is learnt of a muscle. */
 enum { OFFSET, STIFFNESS, AREA, FRICTION, RELAXATION, KINDS };
@@ -176,23 +177,89 @@ static int place_of(const adapting *a, int k, int kind)
     return -1;
 }
 
-/* Bring factors into what a balance can have. */
-static void keep_balanced(adapting *a)
+/* Multiply by the covariance U D U'. */
+static void covariant(int p, const mck_real *root, const mck_real *vector, mck_real *product)
 {
-    mck_real *theta = a->learnt.theta;
-    for (int i = 0; i < a->learner.p; i++) {
-        if ((int)a->which[i] % KINDS != OFFSET) {
-            theta[i] = mck_clip(theta[i], LEAST_FACTOR, MOST_FACTOR);
+    for (int j = 0; j < p; j++) {
+        const mck_real *column = root + p + (j * (j - 1)) / 2;
+        mck_real total = vector[j];
+        for (int i = 0; i < j; i++) {
+            total += column[i] * vector[i];
+        }
+        product[j] = root[j] * total;
+    }
+    for (int j = 0; j < p; j++) {
+        const mck_real *column = root + p + (j * (j - 1)) / 2;
+        for (int i = 0; i < j; i++) {
+            product[i] += column[i] * product[j];
         }
     }
-    for (int k = 0; k < a->now.n; k++) {
-        const int stiffness = place_of(a, k, STIFFNESS);
-        const int rubbing = place_of(a, k, FRICTION);
+}
+
+/* Bring what measurements do not tell back to what was fitted, in the time to learn in. */
+static void pull_back(adapting *a)
+{
+    const int p = a->learner.p;
+    mck_real *along = a->learnt.work;
+    mck_real *pull = along + p;
+    for (int i = 0; i < p; i++) {
+        const mck_real back = a->learner.fitted[i] - a->learnt.theta[i];
+        pull[i] = a->learner.share * back / (a->learner.scales[i] * a->learner.widest[i]);
+    }
+    covariant(p, a->learnt.root, pull, along);
+    for (int i = 0; i < p; i++) {
+        a->learnt.theta[i] += a->learner.scales[i] * along[i];
+    }
+}
+
+/* How far parameter i is short of what a balance can have. */
+static mck_real short_of(const adapting *a, int i)
+{
+    const mck_real *theta = a->learnt.theta;
+    const int k = (int)a->which[i] / KINDS;
+    const int kind = (int)a->which[i] % KINDS;
+    mck_real low = LEAST_FACTOR;
+    mck_real high = MOST_FACTOR;
+    if (kind == OFFSET) {
+        high = MOST_FORCE * a->learner.scales[i];
+        low = -high;
+    } else if (kind != AREA) {
         const int pulling = place_of(a, k, AREA);
         const mck_real area = pulling < 0 ? MCK_R(1.0) : theta[pulling];
-        theta[stiffness] = mck_max(theta[stiffness], area / a->bounds[2 * k + 1]);
-        if (rubbing >= 0) {
-            theta[rubbing] = mck_min(theta[rubbing], area * a->bounds[2 * k]);
+        if (kind == STIFFNESS) {
+            low = mck_max(low, area / a->bounds[2 * k + 1]);
+        } else if (kind == FRICTION) {
+            high = mck_min(high, area * a->bounds[2 * k]);
+        }
+    }
+    return mck_clip(theta[i], low, high) - theta[i];
+}
+
+/* Bring parameters into what a balance can have; the others go along as they are known to go together,
+ * which may not be possible twice. */
+static void keep_balanced(adapting *a)
+{
+    const int p = a->learner.p;
+    const mck_real *scales = a->learner.scales;
+    mck_real *along = a->learnt.work;
+    mck_real *one = along + p;
+    for (int turn = 0; turn < 2; turn++) {
+        for (int i = 0; i < p; i++) {
+            const mck_real lacks = short_of(a, i);
+            if (!(mck_abs(lacks) > MCK_R(0.0))) {
+                continue;
+            }
+            if (turn > 0) {
+                a->learnt.theta[i] += lacks;
+                continue;
+            }
+            for (int j = 0; j < p; j++) {
+                one[j] = j == i ? MCK_R(1.0) : MCK_R(0.0);
+            }
+            covariant(p, a->learnt.root, one, along);
+            for (int j = 0; j < p; j++) {
+                a->learnt.theta[j] += lacks * scales[j] / scales[i] * along[j] / along[i];
+            }
         }
     }
 }
@@ -229,6 +296,7 @@ void mck_balance_adaptive_step(const mck_part *part, mck_real *state, const mck_
                             believed, asked);
     }
     if (taught) {
+        pull_back(&a);
         keep_balanced(&a);
         for (int i = 0; i < a.learner.p; i++) {
             a.learnt.used[i] = a.learnt.theta[i];

@@ -1,6 +1,6 @@
 """Inverses that learn, on rigs that drift: beside fixed ones, feedback, and a model fitted afresh.
 
-    python benchmarks/adaptive.py [--rig mas20-hanging] [--kind gpi] [--motions 3] [--time 60]
+    python benchmarks/adaptive.py [--rig mas20-hanging] [--kind gpi] [--motions 3] [--change all]
     python benchmarks/adaptive.py --hour
     python benchmarks/adaptive.py --instructions
 
@@ -116,7 +116,7 @@ def laws(
     }
 
 
-def drifts(rig_name: str, kind: str, motions: int, time: float) -> None:
+def drifts(rig_name: str, kind: str, motions: int, time: float, only: str) -> None:
     rig = load_rig(rig_name).changed({"sample_time": STEP})
     model = fitted(kind, Drifting(rig, []), 1)
     tuned = tune_pid(rig, sample_time=STEP)
@@ -126,11 +126,13 @@ def drifts(rig_name: str, kind: str, motions: int, time: float) -> None:
         (AT + 40, AT + 100),
     ]
     for change, factors in CHANGES.items():
+        if not change.startswith(only):
+            continue
         aged = Drifting(rig, [Drift(group, factor) for group, factor in factors.items()])
         fresh = fitted(kind, aged, 2)
         for shape, over, length in (("step", 0.0, AT + 100), ("ten minutes", 600.0, 660.0)):
             ends = after if over == 0 else [(300.0, 360.0), (600.0, 660.0)]
-            start = APPROACH + (AT if over == 0 else 0.0)
+            start = AT if over == 0 else 0.0
             print(
                 f"\n{rig_name}, {kind}: {change}, {shape}; error [mm], median (largest) of {motions}",
                 flush=True,
@@ -180,6 +182,7 @@ if __name__ == "__main__":
     parser.add_argument("--kind", default="gpi")
     parser.add_argument("--motions", type=int, default=3)
     parser.add_argument("--time", type=float, default=60.0)
+    parser.add_argument("--change", default="", help="how the name of the change begins")
     parser.add_argument("--hour", action="store_true")
     parser.add_argument("--instructions", action="store_true")
     chosen = parser.parse_args()
@@ -188,4 +191,4 @@ if __name__ == "__main__":
     elif chosen.hour:
         hour(chosen.rig, chosen.kind, chosen.time)
     else:
-        drifts(chosen.rig, chosen.kind, chosen.motions, chosen.time)
+        drifts(chosen.rig, chosen.kind, chosen.motions, chosen.time, chosen.change)

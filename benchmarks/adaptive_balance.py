@@ -114,7 +114,7 @@ def arm() -> None:
         "fitted afresh": Drifting(rig, [Drift(g, f) for g, f in factors.items()]),
     }
     models = {
-        name: load("estimators", "balance")(scheduling=("pressure_extensor",))
+        name: load("estimators", "balance")(scheduling=("pressure_extensor",), contact=False)
         .fit([driven(plant, 1, 150.0)])
         .model_
         for name, plant in plants.items()

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from mckibben import Block, ModelError, Series, load
 from mckibben.blocks.adaptive.adaptable import Adaptable
-from mckibben.blocks.adaptive.adaptive import Adaptive
+from mckibben.blocks.adaptive.adaptive import Adaptive, taught
 from mckibben.blocks.adaptive.adaptive_series import AdaptiveSeries, adaptive
 from mckibben.blocks.adaptive.drift import alarm_limit
 from mckibben.blocks.adaptive.learning import covariance_of, start_root
@@ -39,7 +39,7 @@ def changed(model: Any, gain: float = 1.2, shift: float = 0.3) -> Block:
     theta = model.taught.copy()
     theta[:-1] *= gain
     theta[-1] += shift
-    return model.retaught(theta)
+    return taught(model, theta)
 
 
 def references(model: Block, seconds: float, share: float = 0.7, seed: int = 0) -> Array:
@@ -144,7 +144,7 @@ def test_outliers_cost_little() -> None:
 @pytest.mark.parametrize("measured", ["absent", "frozen"])
 def test_a_sensor_that_fails_teaches_nothing(measured: str) -> None:
     model = PI.example()
-    block = adaptive(model, 20.0, 0.02)
+    block = Adaptive(model, 20.0, 0.02)
     asked = references(model, 30.0)
     stream = block.stream(STEP)
     for y in asked:
@@ -156,7 +156,7 @@ def test_a_sensor_that_fails_teaches_nothing(measured: str) -> None:
 
 def test_nothing_blows_up_where_nothing_moves() -> None:
     model = GPI.example()
-    block = adaptive(model, 5.0, 0.02)
+    block = Adaptive(model, 5.0, 0.02)
     asked = np.full(20_000, references(model, 1.0)[0])
     stream, plant, rng = block.stream(STEP), changed(model).stream(STEP), np.random.default_rng(3)
     reading = asked[0]

@@ -104,6 +104,11 @@ class Adaptable(Invertible):
     def retaught(self, theta: Array) -> Block:
         """Return the forward block with other parameters, shape (p,)."""
 
+    def added(self, theta: Array) -> float:
+        """Return what is added to its output, where it has no parameter of its own for that."""
+        del theta
+        return 0.0
+
     @abstractmethod
     def group_changes(self, theta: Array) -> Array:
         """Return the relative change of every group from the fitted one, shape (n_groups,)."""
@@ -127,7 +132,7 @@ class Adaptable(Invertible):
 
     @property
     def known_span(self) -> float:
-        """Largest range of an output where fitted, for models that reach anywhere; 0 if unknown."""
+        """Largest range of an output where it was fitted; 0 if unknown."""
         return 0.0
 
     @property

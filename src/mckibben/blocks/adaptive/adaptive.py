@@ -23,6 +23,7 @@ from mckibben.arrays import Array
 from mckibben.blocks.adaptive.adaptable import Adaptable, Learning
 from mckibben.blocks.adaptive.drift import Drift, alarm_limit, scatter
 from mckibben.blocks.adaptive.learning import covariance_of, start_root, start_sense
+from mckibben.blocks.compose import Series
 from mckibben.blocks.core.block import Block, Run
 from mckibben.blocks.core.exportable import Cost
 from mckibben.blocks.core.fields import STRICT, Channel, Initial, Vector, vector
@@ -30,6 +31,7 @@ from mckibben.blocks.core.inverse import Inverse
 from mckibben.blocks.core.refusals import explicit_state, needs_sample_time
 from mckibben.blocks.core.saving import nested
 from mckibben.blocks.feedback.pid import MEASURED
+from mckibben.blocks.memoryless.affine import Affine
 from mckibben.errors import ModelError
 
 TRUSTED = 1 / 3
@@ -235,7 +237,7 @@ class Adaptive(Block):
 
     def present(self, state: Array) -> Block:
         """Return the forward block that the inverse runs with in a state, shape (n_states,)."""
-        return self.learner.retaught(self._split(state)[2])
+        return taught(self.learner, self._split(state)[2])
 
     def drift(self, state: Array) -> Drift:
         """Return how far what is learnt has gone from the fit, in a state, shape (n_states,)."""
@@ -266,3 +268,12 @@ class Adaptive(Block):
         from mckibben.blocks.play_type.pi import PI
 
         return cls(PI.example(), 60.0, 0.05)
+
+
+def taught(learner: Adaptable, theta: Array) -> Block:
+    """Return a forward block with other parameters, shape (p,), and behind it what is added."""
+    block, added = learner.retaught(theta), learner.added(theta)
+    if not added:
+        return block
+    output = block.outputs[0]
+    return Series((block, Affine(1.0, added, output, output)))

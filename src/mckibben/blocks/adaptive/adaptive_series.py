@@ -48,7 +48,7 @@ class AdaptiveSeries(Composition):
     """
 
     kind: ClassVar[str] = "adaptive-series"
-    rate_dependent: ClassVar[bool] = True  # type: ignore[misc]
+    rate_dependent: ClassVar[bool] = True
     parameters: ClassVar[tuple[str, ...]] = ("forward",)
 
     forward: Annotated[InstanceOf[Series], BeforeValidator(nested)]

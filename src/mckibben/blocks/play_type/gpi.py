@@ -30,8 +30,7 @@ from pydantic.dataclasses import dataclass
 from mckibben.arrays import Array
 from mckibben.blocks.adaptive.adaptable import Learning
 from mckibben.blocks.adaptive.operators import LearntOperators
-from mckibben.blocks.compose import Series
-from mckibben.blocks.core.block import Block, Run
+from mckibben.blocks.core.block import Run
 from mckibben.blocks.core.fields import (
     DISPLACEMENT,
     PRESSURE,
@@ -46,7 +45,6 @@ from mckibben.blocks.core.kernels import kernel, summing_kernel
 from mckibben.blocks.core.notation import Notation
 from mckibben.blocks.core.refusals import explicit_state
 from mckibben.blocks.core.single_channel import check_input_range
-from mckibben.blocks.memoryless.affine import Affine
 from mckibben.blocks.play_type.envelopes.base import Envelope, nested_envelope
 from mckibben.blocks.play_type.envelopes.tanh import Tanh
 from mckibben.blocks.play_type.memory import (
@@ -297,10 +295,13 @@ class GPI(LearntOperators):
         low, high = self.input_range
         return float(self.falling(low)), float(self.rising(high))
 
-    def retaught(self, theta: Array) -> Block:
-        """Return the model with other weights, and an offset behind it."""
-        weighted = replace(self, weights=tuple(theta[:-1].tolist()))
-        return Series((weighted, Affine(1.0, float(theta[-1]), self.output, self.output)))
+    def retaught(self, theta: Array) -> GPI:
+        """Return the model with other weights; it has no offset."""
+        return replace(self, weights=tuple(theta[:-1].tolist()))
+
+    def added(self, theta: Array) -> float:
+        """Return the offset."""
+        return float(theta[-1])
 
     def bind_adaptive(
         self,

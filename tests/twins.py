@@ -14,6 +14,8 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any
 
+import numpy as np
+
 Rows = list[list[float]]
 Twin = Callable[[Any, Rows, float], Rows]
 
@@ -131,6 +133,87 @@ def pi_inverse(block: Any, inputs: Rows, sample_time: float) -> Rows:
         outputs.append(bisect(lambda u: offset + _sum(weights, moved(u)), y, low, high))
         states = moved(outputs[-1])
     return _rows(outputs)
+
+
+def pi_adaptive(block: Any, inputs: Rows, sample_time: float) -> Rows:
+    """Learn with the covariance itself, as a matrix, and undo by bisection."""
+    forward, noise, share = block.forward, block.noise, sample_time / block.time
+    thresholds, n = forward.thresholds, len(forward.weights)
+    low, high = forward.input_range
+    scales, widest = forward.scales, np.diag(forward.spread)
+    theta, fresh = forward.taught.copy(), forward.spread / 9
+    used, covariance = theta.copy(), fresh.copy()
+
+    def moved(u: float) -> list[float]:
+        return [_play(s, u, r) for s, r in zip(states, thresholds, strict=True)]
+
+    def gives(u: float) -> float:
+        return float(used @ [*moved(u), 1.0])
+
+    states = [u - r for u in [_risen(forward, inputs[0][0])] for r in thresholds]
+    turn, usual, surprise, last, then = 0, 3 * noise, 1.0, 0.0, 0.0
+    related, squared, late = 0.98, 1.0, 0.0
+    previous, travel, outputs = inputs[0][0], 0.0, []
+    for y, measured in inputs:
+        slopes = np.array([*states, 1.0])
+        asked = float(used @ slopes)
+        still = turn > 0 and measured == last and abs(asked - then) > 3 * usual
+        then = 1e30 if still else then
+        if turn == 0 or (math.isfinite(measured) and measured != last):
+            last, then = measured, asked
+        if turn == 0:
+            turn = 1
+        elif math.isfinite(measured) and not still:
+            if surprise > 5:
+                covariance, surprise = fresh.copy(), 1.0
+            alike = min(max(related / squared, 0.0), 0.9995)
+            told = usual * math.sqrt((1 + alike) / (1 - alike))
+            phi = slopes * scales / told
+            p_phi = covariance @ phi
+            r = float(phi @ p_phi)
+            error = measured - float(theta @ slopes)
+            expected = math.sqrt(usual**2 + r * told**2)
+            weight = min(1.0, 3 * expected / max(abs(error), 1e-300))
+            relative = weight * error / expected
+            quick = min(20 * share, 0.5)
+            grows = 1 + quick / 2
+            usual = max(usual * grows if abs(relative) > 0.6745 else usual / grows, noise)
+            surprise += quick * (relative**2 - surprise)
+            related += share * (relative * late - related)
+            squared += share * (relative**2 - squared)
+            late = relative
+            kept = weight * (1 - share) - share / r
+            covariance -= np.outer(p_phi, p_phi) * kept / (1 + kept * r)
+            theta += scales * p_phi * weight * error / told / (1 + weight * r)
+            place = turn % (n + 1)
+            if covariance[place, place] > widest[place]:
+                less = math.sqrt(widest[place] / covariance[place, place])
+                covariance[place] *= less
+                covariance[:, place] *= less
+            turn = place + 1
+            total = 0.0
+            for i, w in enumerate(forward.weights):
+                floor = 0.1 * sum(forward.weights[: i + 1]) - total
+                theta[i] = max(theta[i], 0.0 if w >= 0 else -math.inf, floor)
+                total += theta[i]
+        travel = float(y > previous) - float(y < previous) or travel
+        room, change = y - float(used @ slopes), float((theta - used) @ slopes)
+        part = 1.0
+        if travel * (room - change) < 0 and abs(room - change) <= 3 * usual and change:
+            part = min(max(room / change, 0.0), 1.0)
+        used = theta.copy() if part == 1.0 else used + part * (theta - used)
+        outputs.append(bisect(gives, y, low, high))
+        states = moved(outputs[-1])
+        previous = y
+    return _rows(outputs)
+
+
+def _risen(forward: Any, y: float) -> float:
+    def risen(u: float) -> float:
+        pairs = zip(forward.weights, forward.thresholds, strict=True)
+        return float(forward.offset + sum(w * (u - r) for w, r in pairs))
+
+    return bisect(risen, y, *forward.input_range)
 
 
 def rate_dependent_pi(block: Any, inputs: Rows, sample_time: float) -> Rows:
@@ -412,8 +495,10 @@ STEPPED = {
     "generalized-bouc-wen": 1000,
     "generalized-bouc-wen-inverse": 30,
     "multistate-friction": 1000,
+    "pi-adaptive": 1000,
 }
-"""Kinds whose twin steps through corners, or bisects over steps, and how many samples to compare."""
+"""Kinds whose twin steps through corners, bisects over steps, or subtracts nearly equal matrices, and
+how many samples to compare."""
 
 STEP_ERROR = 1e-5
 """Of those twins, relative to the output's range."""
@@ -1418,6 +1503,7 @@ TWINS: dict[str, Twin] = {
     "negative": negative,
     "pi": pi,
     "pid": pid,
+    "pi-adaptive": pi_adaptive,
     "pi-inverse": pi_inverse,
     "piecewise-linear": piecewise_linear,
     "play": play,

@@ -31,7 +31,10 @@ def needs_compiler(test: Callable[..., None]) -> Callable[..., None]:
 
 
 VERSIONS = ("2.0", "3.0")
-SHOWN = ("gpi-inverse", "SDIHC", "MPI-NARMAX", "process-model", "feedforward-feedback")
+SHOWN = (
+    *("gpi-inverse", "SDIHC", "MPI-NARMAX", "process-model", "feedforward-feedback"),
+    "pi-adaptive",
+)
 
 
 def exported(block: Block, folder: Path, version: Any, **settings: Any) -> Path:

@@ -35,6 +35,23 @@ def invert(
             "pressures are measured (of a balance).",
         ),
     ] = Wanted.input,
+    adaptive: Annotated[
+        bool,
+        typer.Option(
+            "--adaptive", help="Learn the model's parameters from what is measured meanwhile."
+        ),
+    ] = False,
+    time: Annotated[
+        float | None,
+        typer.Option(help="With --adaptive: how long it takes to learn [s].  [default: 60]"),
+    ] = None,
+    noise: Annotated[
+        float | None,
+        typer.Option(
+            help="With --adaptive: standard deviation of what is measured, in the unit of the model's "
+            "output.  [default: a thousandth of what is reached]"
+        ),
+    ] = None,
     force: Force = False,
     as_json: Json = False,
 ) -> None:
@@ -42,14 +59,23 @@ def invert(
 
     Of a model of force, what is written gives the pressure by wished-for force and length. With
     --for force, what is written gives the force by measured displacements and pressures: simulate it.
+    With --adaptive, what is written also takes what is measured, and learns from it while it runs.
     """
     import numpy as np
 
+    from mckibben.blocks.adaptive.adaptive_series import adaptive as learning
     from mckibben.blocks.core.saving import load
     from mckibben.blocks.coupled.load_estimate import load_of
     from mckibben.blocks.force.feedforward import ForceFeedforward
+    from mckibben.errors import ModelError
     from mckibben.outputs import claim_model
 
+    if not adaptive and (time is not None or noise is not None):
+        raise ModelError("--time and --noise are of what learns. Remedy: give --adaptive too.")
+    if adaptive and wanted is Wanted.force:
+        raise ModelError(
+            "--adaptive learns an inverse, not a force. Remedy: leave out one of them."
+        )
     claim_model(out, inputs=[model], force=force)
     block = load(model)
     if wanted is Wanted.force:
@@ -61,7 +87,7 @@ def invert(
         say(f"{_listed(estimate.outputs)} by {_listed(estimate.inputs)}, all measured.")
         say(f"Written: {out}")
         return
-    feedforward = ForceFeedforward.of(block)
+    feedforward = None if adaptive else ForceFeedforward.of(block)
     if feedforward is not None:
         feedforward.save(out)
         if as_json:
@@ -70,7 +96,9 @@ def invert(
         say("Pressure by force and length, in closed form; track it where length is imposed.")
         say(f"Written: {out}")
         return
-    inverse = block.inverse()
+    inverse = (
+        learning(block, 60.0 if time is None else time, noise) if adaptive else block.inverse()
+    )
     inverse.save(out)
     low, high = block.reachable()
     reachable = {
@@ -91,6 +119,8 @@ def invert(
             f"Reachable whatever happened before: {channel.name} {numeral(a, 5)} to {numeral(b, 5)} "
             f"{channel.unit}; references beyond are clipped."
         )
+    if adaptive:
+        say(f"Learns from {_listed(inverse.inputs[-len(block.outputs) :])}, one a step.")
     say(f"Written: {out}")
 
 

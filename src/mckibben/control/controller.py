@@ -84,17 +84,19 @@ class BlockController(Controller):
             self._feedback = whole.feedback.stream(sample_time)
             whole = whole.compensator
         self._stream = whole.stream(sample_time)
-        self._taken = len(whole.inputs)
-        self._feels = any(channel.name.endswith(MEASURED) for channel in whole.inputs)
+        felt = [channel.name.endswith(MEASURED) for channel in whole.inputs]
+        self._sample, self._feels = np.empty(len(felt)), np.array(felt)
 
     def foresees(self, reference: Array, scheduled: Array) -> None:
         self._ahead = np.concatenate([reference, scheduled])
 
     def step(self, reference: Array, displacement: Array, scheduled: Array) -> Array:
         given = np.concatenate([reference, scheduled]) if self._ahead is None else self._ahead
-        if self._feels:
-            given = np.concatenate([reference, displacement, scheduled])
-        found = self._stream.step(given[: self._taken])
+        if self._feels.any():  # what is measured answers the reference of the last step
+            given = np.concatenate([reference, scheduled])
+            self._sample[self._feels] = displacement
+        self._sample[~self._feels] = given[: np.count_nonzero(~self._feels)]
+        found = self._stream.step(self._sample)
         if self._feedback is not None:
             found = self._feedback.step(np.concatenate([reference, displacement, found]))
         return found.copy()

@@ -158,6 +158,13 @@ class Muscle(Section):
         return made
 
 
+AGEING = {
+    "stiffness": ("c10", "c01", "creep.stiffness"),
+    "friction": ("friction.contracting", "friction.extending"),
+}
+"""What of a muscle changes in months: rubber, and how threads rub. Presliding is thread, and stays."""
+
+
 class Air(Section):
     """A proportional pressure regulator, its supply and its line to a muscle."""
 

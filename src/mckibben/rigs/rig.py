@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
+from operator import attrgetter
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -14,7 +15,7 @@ from mckibben.arrays import Array
 from mckibben.errors import DataError
 from mckibben.recording import PROVENANCE, Recording
 from mckibben.rigs.commands import Commands
-from mckibben.rigs.parameters import Air, Range, Section, Sensor, parameter
+from mckibben.rigs.parameters import AGEING, Air, Muscle, Range, Section, Sensor, parameter
 from mckibben.rigs.refusals import refused
 from mckibben.rigs.system import Demands, State, System, Traces
 from mckibben.signals.checking import generator
@@ -146,6 +147,36 @@ class Rig(Section, ABC):
             return type(self).model_validate(fields)
         except ValidationError as error:
             raise refused(error, type(self), f"rig {self.name}") from None
+
+    def aged(self, factors: Mapping[str, float]) -> Self:
+        """Return the rig with muscles that have aged, where this one is: it runs on, tare and all.
+
+        Parameters
+        ----------
+        factors : mapping
+            On ``stiffness`` and ``friction`` of its muscles as they are here; see `AGEING`.
+
+        Raises
+        ------
+        DataError
+            On another name, or a factor that makes no muscle.
+        """
+        settings: dict[str, Any] = {}
+        for group, factor in factors.items():
+            if group not in AGEING:
+                raise DataError(
+                    f"muscles do not age in {group!r}", remedy=f"give one of {', '.join(AGEING)}"
+                )
+            for name, part in self:
+                for path in AGEING[group] if isinstance(part, Muscle) else ():
+                    value = attrgetter(path)(part)
+                    scaled = (
+                        [factor * v for v in value] if isinstance(value, tuple) else factor * value
+                    )
+                    settings[f"{name}.{path}"] = scaled
+        made = self.changed(settings)
+        made._rest, made._running = self._at_rest(), self._running
+        return made
 
     def run(
         self, inputs: Recording, seed: int = 0, *, ideal: bool = False, held: bool = False

@@ -66,6 +66,11 @@ class Block(Exportable, Parametrised, HandsOver):
         """Outputs."""
 
     @property
+    def n_missable(self) -> int:
+        """How many of the last inputs may be absent: NaN, in a stream, in C, and in arrays."""
+        return 0
+
+    @property
     def scheduling(self) -> tuple[str, ...]:
         """Names of the inputs that schedule the block but are not driven through it."""
         return ()
@@ -287,6 +292,7 @@ class Block(Exportable, Parametrised, HandsOver):
                 + (" or (n,)" if n_inputs == 1 else ""),
             )
         finite = np.isfinite(table)
+        finite[:, n_inputs - self.n_missable :] = True
         if not finite.all():
             row, column = np.argwhere(~finite)[0]
             raise DataError(

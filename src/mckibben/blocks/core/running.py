@@ -22,10 +22,10 @@ if TYPE_CHECKING:
 class Stream:
     """A block running sample by sample, whatever comes.
 
-    An input that is not finite changes nothing, and outputs are always finite: after a bad input,
-    memory is untouched and the outputs are those of the last good step, 0 before the first. Where a
-    huge input gives an output that is not finite, the outputs are those of the last good step too, and
-    memory that is lost with it starts afresh at the next step. Exported C does the same.
+    An input that is not finite, and may not be missing, changes nothing, and outputs are always finite:
+    after a bad input, memory is untouched and the outputs are those of the last good step, 0 before the
+    first. Where a huge input gives an output that is not finite, the outputs are those of the last good
+    step too, and memory that is lost with it starts afresh at the next step. Exported C does the same.
 
     Parameters
     ----------
@@ -57,6 +57,7 @@ class Stream:
         self._input, self._output = inputs[0], outputs[0]
         # Python's own numbers are faster than arrays so small
         self._given, self._gives = _scalars(self._input), _scalars(self._output)
+        self._needed = self._input.size - block.n_missable
         self._one_given, self._one_gives = self._input.size == 1, self._output.size == 1
         self.reset()
 
@@ -89,7 +90,7 @@ class Stream:
             if not self._one_given and np.size(inputs) != self._input.size:  # spread, not given
                 raise self._misfit(ValueError(f"{np.size(inputs)} number(s)"))
             total = given[0] if self._one_given else sum(given)
-        if total - total and not all(map(isfinite, given)):
+        if total - total and not all(map(isfinite, given[: self._needed])):
             return self._held(self.BAD_INPUT)
         if not self._started:
             self.state[:] = self.block.initial_state(self._input, self.initial)

@@ -37,7 +37,6 @@ from mckibben.blocks.core.fields import (
     Rule,
     Vector,
 )
-from mckibben.blocks.core.inverse import Invertible
 from mckibben.blocks.core.kernels import kernel
 from mckibben.blocks.core.linear_system import newton_cost
 from mckibben.blocks.core.many_channels import ManyChannels
@@ -45,7 +44,8 @@ from mckibben.blocks.core.notation import Notation
 from mckibben.blocks.core.refusals import explicit_state, needs_sample_time
 from mckibben.blocks.coupled.balance_equations import balance_of_forces
 from mckibben.blocks.coupled.balance_fields import check_fields
-from mckibben.blocks.coupled.balance_law import NEARLY, NEVER, begin, keep, pressed, settle
+from mckibben.blocks.coupled.balance_law import NEARLY, NEVER, begin, keep, press, pressed, settle
+from mckibben.blocks.coupled.balance_learning import LearntBalance
 from mckibben.blocks.coupled.balance_terms import AT_REST, FROM_REST, IN_TIME
 from mckibben.errors import ModelWarning
 
@@ -53,29 +53,8 @@ from mckibben.errors import ModelWarning
 @kernel
 def balance_kernel(coefficients: Array, state: Array, inputs: Array, outputs: Array) -> None:
     """Give pressures; the last state counts samples that muscles cannot reach."""
-    c = coefficients
-    n, n_x = int(c[0]), int(c[1]) + int(c[3])
-    scratch = c[c.size - n * (n + 6) :]
-    y, p, gradient = scratch[:n], scratch[n : 2 * n], scratch[2 * n : 3 * n]
-    tare = state[state.size - 2 - n :]
     for t in range(inputs.shape[0]):
-        x = inputs[t, n : n + n_x]
-        way = FROM_REST if state[state.size - 2] != 0.0 else IN_TIME
-        amiss = False
-        for j in range(n):
-            y[j] = inputs[t, j] + tare[j]
-        for k in range(n):
-            found, reached = pressed(c, k, state, way, y, x, gradient)
-            p[k] = min(max(found, c[10]), c[11])
-            # a hair beyond is rounding
-            amiss = amiss or not (reached and abs(p[k] - found) <= 1e-9 * (1.0 + abs(found)))
-            outputs[t, k] = p[k]
-        if amiss:  # where the muscles go instead is what friction will remember
-            settle(c, state, way, y, x, p, scratch[2 * n :])
-        keep(c, state, way, y, p)
-        state[state.size - 2] = 0.0
-        if amiss:
-            state[state.size - 1] += 1.0
+        press(coefficients, state, inputs[t], outputs[t])
 
 
 @kernel
@@ -102,7 +81,7 @@ def balance_inverse_kernel(
 
 
 @dataclass(frozen=True, config=STRICT)
-class Balance(ManyChannels, Invertible):
+class Balance(ManyChannels, LearntBalance):
     """From displacements of n muscles, and what schedules and loads them, to their pressures.
 
     Forces are in N, or, of a model that knows no force, in bar on muscle 1's area at rest.

@@ -17,6 +17,7 @@ from mckibben.blocks.core.kernels import kernel
 from mckibben.blocks.core.linear_system import eliminate
 from mckibben.blocks.coupled.balance_terms import (
     AT_REST,
+    FROM_REST,
     HEAD,
     IN_TIME,
     area,
@@ -246,3 +247,29 @@ def begin(c: Array, state: Array, x: Array, p: Array, scratch: Array) -> None:
         for k in range(n):
             state[state.size - 2 - n + k] = y[k]
     state[state.size - 2] = 1.0
+
+
+@kernel
+def press(c: Array, state: Array, given: Array, p: Array) -> None:
+    """Give the pressures of a sample, and bring the state there; then scratch begins with where.
+
+    The last state counts samples that muscles cannot reach.
+    """
+    n, n_x = int(c[0]), int(c[1]) + int(c[3])
+    scratch = c[c.size - n * (n + 6) :]
+    y, gradient = scratch[:n], scratch[2 * n : 3 * n]
+    tare, x = state[state.size - 2 - n :], given[n : n + n_x]
+    way = FROM_REST if state[state.size - 2] != 0.0 else IN_TIME
+    amiss = False
+    for j in range(n):
+        y[j] = given[j] + tare[j]
+    for k in range(n):
+        found, reached = pressed(c, k, state, way, y, x, gradient)
+        p[k] = min(max(found, c[10]), c[11])
+        # a hair beyond is rounding
+        amiss = amiss or not (reached and abs(p[k] - found) <= 1e-9 * (1.0 + abs(found)))
+    if amiss:  # where the muscles go instead is what friction will remember
+        settle(c, state, way, y, x, p, scratch[2 * n :])
+        state[state.size - 1] += 1.0
+    keep(c, state, way, y, p)
+    state[state.size - 2] = 0.0

@@ -84,14 +84,20 @@ class FeedforwardFeedback(Composition):
 
     @cached_property
     def inputs(self) -> tuple[Channel, ...]:
-        """References, measurements, and what schedules the compensator."""
+        """References, measurements, and what else the compensator takes, which may learn from these."""
         n = len(self.feedback.driven)
-        return (*self.compensator.inputs[:n], *self.measured, *self.compensator.inputs[n:])
+        others = (c for c in self.compensator.inputs[n:] if c not in self.measured)
+        return (*self.compensator.inputs[:n], *self.measured, *others)
+
+    @cached_property
+    def _taken(self) -> list[int]:
+        """Which inputs the compensator takes."""
+        return [self.inputs.index(channel) for channel in self.compensator.inputs]
 
     @cached_property
     def scheduling(self) -> tuple[str, ...]:
-        """Measurements, and what schedules the compensator."""
-        return (*(channel.name for channel in self.measured), *self.compensator.scheduling)
+        """All inputs but the references."""
+        return tuple(channel.name for channel in self.inputs[len(self.feedback.driven) :])
 
     @property
     def outputs(self) -> tuple[Channel, ...]:
@@ -104,7 +110,7 @@ class FeedforwardFeedback(Composition):
         both = np.concatenate([first[: 2 * n], np.zeros(n)])
         return np.concatenate(
             [
-                self.compensator.initial_state(np.concatenate([first[:n], first[2 * n :]]), own),
+                self.compensator.initial_state(np.asarray(first)[self._taken], own),
                 self.feedback.initial_state(both, feedback),
             ]
         )
@@ -119,8 +125,7 @@ class FeedforwardFeedback(Composition):
         correct = self.feedback.bind(sample_time, asked, given, outputs)
 
         def run() -> None:
-            wanted[:, :n] = inputs[:, :n]
-            wanted[:, n:] = inputs[:, 2 * n :]
+            wanted[:] = inputs[:, self._taken]
             compensate()
             given[:, : 2 * n] = inputs[:, : 2 * n]
             given[:, 2 * n :] = base
@@ -130,7 +135,7 @@ class FeedforwardFeedback(Composition):
 
     def wired(self, board: Board, given: Sequence[str]) -> list[str]:
         n = len(self.feedback.driven)
-        bases = self.compensator.wired(board, [*given[:n], *given[2 * n :]])
+        bases = self.compensator.wired(board, [given[place] for place in self._taken])
         return self.feedback.wired(board, [*given[: 2 * n], *bases])
 
     def joined(self, parts: Sequence[str]) -> str:

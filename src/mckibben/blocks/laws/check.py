@@ -145,7 +145,8 @@ def _takes_recordings(trial: Trial) -> None:
 
 
 def _refuses_bad_arrays(trial: Trial) -> None:
-    for column, channel in enumerate(trial.block.inputs):
+    needed = len(trial.block.inputs) - trial.block.n_missable
+    for column, channel in enumerate(trial.block.inputs[:needed]):
         for bad in (np.nan, np.inf):
             inputs = trial.inputs.copy()
             inputs[3, column] = bad

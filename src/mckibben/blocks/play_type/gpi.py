@@ -20,6 +20,7 @@ Pneumatic Artificial Muscle-Driven Soft Manipulator", Eqs. (1) to (7), the inver
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Annotated, ClassVar, Self
 
 import numpy as np
@@ -27,6 +28,8 @@ from pydantic import BeforeValidator, FiniteFloat, InstanceOf
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
+from mckibben.blocks.adaptive.adaptable import Learning
+from mckibben.blocks.adaptive.operators import LearntOperators
 from mckibben.blocks.core.block import Run
 from mckibben.blocks.core.fields import (
     DISPLACEMENT,
@@ -41,7 +44,7 @@ from mckibben.blocks.core.fields import (
 from mckibben.blocks.core.kernels import kernel, summing_kernel
 from mckibben.blocks.core.notation import Notation
 from mckibben.blocks.core.refusals import explicit_state
-from mckibben.blocks.core.single_channel import Ranged, check_input_range
+from mckibben.blocks.core.single_channel import check_input_range
 from mckibben.blocks.play_type.envelopes.base import Envelope, nested_envelope
 from mckibben.blocks.play_type.envelopes.tanh import Tanh
 from mckibben.blocks.play_type.memory import (
@@ -142,7 +145,7 @@ def choose_branch(
 
 
 @dataclass(frozen=True, config=STRICT)
-class GPI(Ranged):
+class GPI(LearntOperators):
     """Generalised Prandtl-Ishlinskii model.
 
     Parameters
@@ -280,20 +283,52 @@ class GPI(Ranged):
     ) -> Run:
         """Return a function that solves for z, then inverts the envelopes."""
         del sample_time
-        limits = np.array(self.input_range)
-        ends = [float(self.falling(limits[0])), float(self.rising(limits[1]))]
-        operators = np.array([*ends, *self.thresholds, *self.weights])
+        operators = np.array([*self.learnt_limits, *self.thresholds, *self.weights])
         references = inputs.reshape(-1)
-        z, direction, rising, falling = (np.empty(references.size) for _ in range(4))
-        up, down = type(self.rising).inverse, type(self.falling).inverse
-        up_coefficients, down_coefficients = self.rising.coefficients(), self.falling.coefficients()
+        z, direction = np.empty(references.size), np.empty(references.size)
+        solve = bound(gpi_inverse_kernel, operators, state, references, z, direction)
+        return in_turn(solve, *self._bind_branches(state, z, direction, outputs))
 
-        return in_turn(
-            bound(gpi_inverse_kernel, operators, state, references, z, direction),
-            bound(up, up_coefficients, z, rising),
-            bound(down, down_coefficients, z, falling),
+    @property
+    def learnt_limits(self) -> tuple[float, float]:
+        """What the envelopes make of the lowest and highest input."""
+        low, high = self.input_range
+        return float(self.falling(low)), float(self.rising(high))
+
+    def retaught(self, theta: Array) -> GPI:
+        """Return the model with other weights; it has no offset."""
+        return replace(self, weights=tuple(theta[:-1].tolist()))
+
+    def added(self, theta: Array) -> float:
+        """Return the offset."""
+        return float(theta[-1])
+
+    def bind_adaptive(
+        self,
+        sample_time: float | None,
+        learning: Learning,
+        state: Array,
+        inputs: Array,
+        measured: Array,
+        outputs: Array,
+    ) -> Run:
+        """Return a function that learns and solves for z, then inverts the envelopes."""
+        del sample_time
+        n, length = len(self.thresholds), inputs.shape[0]
+        s, last = state[:n], state[n + 1 :]
+        z, direction = np.empty(length), np.empty(length)
+        learn = self._bind_operators(learning, s, last, inputs, measured, z, direction)
+        return in_turn(learn, *self._bind_branches(state[: n + 3], z, direction, outputs))
+
+    def _bind_branches(self, state: Array, z: Array, direction: Array, outputs: Array) -> list[Run]:
+        rising, falling = np.empty(z.size), np.empty(z.size)
+        up, down = self.rising, self.falling
+        limits = np.array(self.input_range)
+        return [
+            bound(type(up).inverse, up.coefficients(), z, rising),
+            bound(type(down).inverse, down.coefficients(), z, falling),
             bound(choose_branch, limits, state, direction, rising, falling, outputs),
-        )
+        ]
 
     @classmethod
     def example(cls) -> Self:

@@ -10,6 +10,7 @@ when a reference has to be clipped.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import ClassVar, Self
 
 import numpy as np
@@ -17,7 +18,9 @@ from pydantic import FiniteFloat
 from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
-from mckibben.blocks.core.block import Kernel
+from mckibben.blocks.adaptive.adaptable import Learning
+from mckibben.blocks.adaptive.operators import LearntOperators
+from mckibben.blocks.core.block import Kernel, Run
 from mckibben.blocks.core.fields import (
     DISPLACEMENT,
     PRESSURE,
@@ -30,7 +33,7 @@ from mckibben.blocks.core.fields import (
 )
 from mckibben.blocks.core.kernels import kernel, summing_kernel
 from mckibben.blocks.core.notation import FEW, Notation, summed, tex
-from mckibben.blocks.core.single_channel import Ranged, check_input_range
+from mckibben.blocks.core.single_channel import check_input_range
 from mckibben.blocks.play_type.memory import (
     check_invertible_sum,
     check_thresholds,
@@ -78,7 +81,7 @@ def pi_inverse_kernel(coefficients: Array, state: Array, inputs: Array, outputs:
 
 
 @dataclass(frozen=True, config=STRICT)
-class PI(Ranged):
+class PI(LearntOperators):
     """Classical Prandtl-Ishlinskii model.
 
     Parameters
@@ -161,6 +164,26 @@ class PI(Ranged):
     def remembered(self, state: Array) -> tuple[float, ...]:
         """Return the output."""
         return (self.offset + np.dot(self.weights, state),)
+
+    def retaught(self, theta: Array) -> PI:
+        """Return the model with other weights and another offset."""
+        return replace(self, weights=tuple(theta[:-1].tolist()), offset=float(theta[-1]))
+
+    def bind_adaptive(
+        self,
+        sample_time: float | None,
+        learning: Learning,
+        state: Array,
+        inputs: Array,
+        measured: Array,
+        outputs: Array,
+    ) -> Run:
+        """Return a function that learns and inverts; the input is that of the operators."""
+        del sample_time
+        s, last = state[:-3], state[-3:]
+        ways = np.empty(inputs.shape[0])
+        z = outputs.reshape(-1)
+        return self._bind_operators(learning, s, last, inputs, measured, z, ways)
 
     def worked(self) -> tuple[str, ...]:
         """Return the sum with its numbers, where it is short."""

@@ -178,6 +178,7 @@ def described(
         "steps": [order[id(item)] if isinstance(item, Call) else item for item in wiring.steps],
         "stateful": [call for call in calls if call["n_states"]],
         "given": wiring.outputs,
+        "n_needed": len(inputs) - block.n_missable,
         "n_signals": wiring.n_signals,
         "n_numbers": n_numbers,
         "n_coefficients": first,

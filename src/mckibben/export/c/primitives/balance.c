@@ -22,27 +22,33 @@ void mck_balance_start(const mck_part *part, mck_real *state, const mck_real *in
     }
 }
 
-void mck_balance_step(const mck_part *part, mck_real *state, const mck_real *in, mck_real *out)
+void mck_balance_press(const mck_balance *f, const mck_real *in, mck_real *out)
 {
-    const mck_balance f = mck_balance_of(part, state);
-    const int way = mck_balance_way(&f);
-    mck_real *y = f.scratch;
+    const int way = mck_balance_way(f);
+    const mck_real *x = in + f->n;
+    mck_real *y = f->scratch;
     int beyond = 0;
-    for (int j = 0; j < f.n; j++) {
-        y[j] = in[j] + f.tare[j];
+    for (int j = 0; j < f->n; j++) {
+        y[j] = in[j] + f->tare[j];
     }
-    for (int k = 0; k < f.n; k++) {
+    for (int k = 0; k < f->n; k++) {
         int reached;
-        const mck_real found = mck_balance_pressed(&f, k, way, y, in + f.n, y + f.n, &reached);
-        out[k] = mck_clip(found, f.lowest, f.highest);
+        const mck_real found = mck_balance_pressed(f, k, way, y, x, y + f->n, &reached);
+        out[k] = mck_clip(found, f->lowest, f->highest);
         beyond |= !reached || mck_abs(out[k] - found) > MCK_SLACK * (MCK_R(1.0) + mck_abs(found));
     }
     if (beyond) {
         /* where the muscles go instead is what friction will remember */
-        (void)mck_balance_settle(&f, way, y, in + f.n, out, y + f.n + f.n);
-        *f.amiss += MCK_R(1.0);
+        (void)mck_balance_settle(f, way, y, x, out, y + f->n + f->n);
+        *f->amiss += MCK_R(1.0);
     }
-    mck_balance_keep(&f, way, y, out);
+    mck_balance_keep(f, way, y, out);
+}
+
+void mck_balance_step(const mck_part *part, mck_real *state, const mck_real *in, mck_real *out)
+{
+    const mck_balance f = mck_balance_of(part, state);
+    mck_balance_press(&f, in, out);
 }
 
 void mck_balance_inverse_start(const mck_part *part, mck_real *state, const mck_real *in)

@@ -10,6 +10,7 @@
 #define LEAST_AREA MCK_R(0.01)
 #define NEVER MCK_R(1e30)
 #define OWN 8
+#define HAIR MCK_EITHER(1e-9, 1e-6)
 
 /* Coefficients of one muscle. */
 typedef struct {
@@ -360,6 +361,31 @@ mck_real mck_balance_lack(const mck_balance *f, int way, const mck_real *y, cons
         }
     }
     return worst;
+}
+
+mck_balance_forces mck_balance_share(const mck_balance *f, int k, const mck_real *y,
+                                     const mck_real *x, mck_real p, mck_real *gradient)
+{
+    const muscle one = read_muscle(f, k);
+    mck_balance_forces found = {MCK_R(0.0), MCK_R(0.0), MCK_R(0.0),
+                                MCK_R(0.0), MCK_R(0.0), MCK_R(0.0)};
+    (void)sprung(f, &one, y, x, gradient);
+    for (int j = 0; j < f->n; j++) {
+        found.pulled += gradient[j] * y[j];
+    }
+    if (y[k] - f->u[k] <= HAIR * f->scale) {
+        mck_real lost;
+        found.held = elastic(f, &one, y[k], &found.stiff);
+        found.given = p * area(f, &one, y[k], &lost);
+        found.stiff -= p * lost;
+        for (int i = 0; i < f->m; i++) {
+            found.rubbed += one.friction[i] * f->stops[k * f->m + i];
+        }
+        for (int i = 0; i < f->n_l; i++) {
+            found.relaxing += one.relaxation[i] * f->lags[k * f->n_l + i];
+        }
+    }
+    return found;
 }
 
 static mck_real product(int n, const mck_real *a, const mck_real *b)

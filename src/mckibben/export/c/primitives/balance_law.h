@@ -76,6 +76,21 @@ mck_real mck_balance_pressed(const mck_balance *f, int k, int way, const mck_rea
 mck_real mck_balance_lack(const mck_balance *f, int way, const mck_real *y, const mck_real *x,
                           const mck_real *p, mck_real *residual, mck_real *matrix);
 
+/* Forces of muscle k where it is. */
+typedef struct {
+    mck_real pulled;   /* by the springs between muscles, without constants */
+    mck_real held;     /* by elasticity and its own spring */
+    mck_real given;    /* by pressure */
+    mck_real rubbed;   /* by stops */
+    mck_real relaxing; /* by lags */
+    mck_real stiff;    /* its slope but for springs, stops and lags */
+} mck_balance_forces;
+
+/* Return them where muscles are at y under x; a muscle that is slack has none of its own. `gradient` gets
+ * the springs. */
+mck_balance_forces mck_balance_share(const mck_balance *f, int k, const mck_real *y,
+                                     const mck_real *x, mck_real p, mck_real *gradient);
+
 /* Move the displacements to where pressures hold them; returns what is left of the residual.
  * Where no place is found, they stay where they were. `scratch` has n n + 3 n numbers. */
 mck_real mck_balance_settle(const mck_balance *f, int way, mck_real *y, const mck_real *x,

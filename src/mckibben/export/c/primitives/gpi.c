@@ -122,6 +122,18 @@ void mck_gpi_inverse_start(const mck_part *part, mck_real *state, const mck_real
     state[m.n + 2] = MCK_R(0.0);
 }
 
+mck_real mck_gpi_branch(const mck_real *coefficients, int n, int direction, mck_real z, mck_real u)
+{
+    const model m = read_model(coefficients + 2, n);
+    if (direction > 0) {
+        return mck_clip(solve(&m.rising, z), coefficients[0], coefficients[1]);
+    }
+    if (direction < 0) {
+        return mck_clip(solve(&m.falling, z), coefficients[0], coefficients[1]);
+    }
+    return u;
+}
+
 void mck_gpi_inverse_step(const mck_part *part, mck_real *state, const mck_real *in, mck_real *out)
 {
     const mck_real low = part->coefficients[0];
@@ -134,11 +146,7 @@ void mck_gpi_inverse_step(const mck_part *part, mck_real *state, const mck_real 
     if (clipped) {
         state[m.n + 2] += MCK_R(1.0);
     }
-    if (direction > 0) {
-        state[m.n] = mck_clip(solve(&m.rising, state[0]), low, high);
-    } else if (direction < 0) {
-        state[m.n] = mck_clip(solve(&m.falling, state[0]), low, high);
-    }
+    state[m.n] = mck_gpi_branch(part->coefficients, m.n, direction, state[0], state[m.n]);
     state[m.n + 1] = in[0];
     out[0] = state[m.n];
 }

@@ -18,4 +18,8 @@ void mck_gpi_step(const mck_part *part, mck_real *state, const mck_real *in, mck
 void mck_gpi_inverse_start(const mck_part *part, mck_real *state, const mck_real *in);
 void mck_gpi_inverse_step(const mck_part *part, mck_real *state, const mck_real *in, mck_real *out);
 
+/* The input at a common envelope value z of n operators: of the envelope of the direction, or u. The
+ * coefficients are those of the inverse. */
+mck_real mck_gpi_branch(const mck_real *coefficients, int n, int direction, mck_real z, mck_real u);
+
 #endif

@@ -1,0 +1,1 @@
+"""Compensators that learn from what is measured while they run."""

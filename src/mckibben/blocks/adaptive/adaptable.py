@@ -1,0 +1,174 @@
+"""What a block declares so that its inverse can learn while it runs.
+
+A family says which of its numbers are learnt, how far they may be off, and how the inverse runs while
+they move. The time loop is the family's own, a kernel that for every sample calls `learning.learn` with
+the slopes of what was measured, projects what was learnt onto the conditions of invertibility, takes
+it over, and undoes the reference with it, so that forward and inverse match at every step.
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from dataclasses import dataclass
+from typing import ClassVar, Self
+
+import numpy as np
+
+from mckibben.arrays import Array
+from mckibben.blocks.adaptive.learning import SENSES
+from mckibben.blocks.core.block import Block, Run
+from mckibben.blocks.core.inverse import Invertible
+
+
+@dataclass(frozen=True)
+class Group:
+    """Parameters that drift together, as people speak of them.
+
+    Parameters
+    ----------
+    name : str
+        As in "friction".
+    more, less : str
+        What it is called to have more or less of it, as in "higher" and "lower".
+    """
+
+    name: str
+    more: str = "higher"
+    less: str = "lower"
+
+
+@dataclass(frozen=True)
+class Learning:
+    """The numbers of a learner, as its kernel works on them in place: views of one state vector.
+
+    Parameters
+    ----------
+    settings : array, shape (2,)
+        [sample time / time, noise of the outputs].
+    scales, widest : array, shape (p,)
+        Of every parameter, see `learning.learn`.
+    fresh : array, shape (p (p + 1) / 2,)
+        Covariance at the start.
+    theta : array, shape (p,)
+        Parameters as far as they are learnt.
+    used : array, shape (p,)
+        Parameters that the inverse runs with now.
+    root : array, shape (p (p + 1) / 2,)
+        Their covariance, in squares of the scales and of the noise, as U D U'.
+    senses : array, shape (m SENSES,)
+        What is remembered of every sensor.
+    work : array, shape (2 p,)
+        To compute in.
+    """
+
+    settings: Array
+    scales: Array
+    widest: Array
+    fresh: Array
+    theta: Array
+    used: Array
+    root: Array
+    senses: Array
+    work: Array
+
+
+class Adaptable(Invertible):
+    """An invertible block whose linear parameters can be learnt while its inverse runs.
+
+    The state of the adaptive inverse is [inverse's own, theta, used, root, senses, direction]: see
+    `Learning`.
+    """
+
+    groups: ClassVar[tuple[Group, ...]]
+    """What drift is told of."""
+
+    learns_inverted: ClassVar[bool] = True
+    """Whether it learns while it is undone; else while it runs, as a block that is a compensator."""
+
+    @property
+    @abstractmethod
+    def taught(self) -> Array:
+        """Parameters to be learnt, as fitted, shape (p,), in their units."""
+
+    @property
+    @abstractmethod
+    def scales(self) -> Array:
+        """Size of a change of every parameter that counts as a whole, shape (p,), positive."""
+
+    @property
+    @abstractmethod
+    def spread(self) -> Array:
+        """Covariance of changes to be expected, in squares of the scales, shape (p, p), definite."""
+
+    @abstractmethod
+    def retaught(self, theta: Array) -> Block:
+        """Return the forward block with other parameters, shape (p,)."""
+
+    def added(self, theta: Array) -> float:
+        """Return what is added to its output, where it has no parameter of its own for that."""
+        del theta
+        return 0.0
+
+    @abstractmethod
+    def group_changes(self, theta: Array) -> Array:
+        """Return the relative change of every group from the fitted one, shape (n_groups,)."""
+
+    @abstractmethod
+    def bind_adaptive(
+        self,
+        sample_time: float | None,
+        learning: Learning,
+        state: Array,
+        inputs: Array,
+        measured: Array,
+        outputs: Array,
+    ) -> Run:
+        """Return a function that runs the learning inverse in place.
+
+        ``state`` is the inverse's own, and ``n_more_states`` behind, as the direction of travel;
+        ``inputs`` are the inverse's, shape (n, n_inputs), ``measured`` the outputs that answer those of
+        the step before, shape (n, m), NaN where absent.
+        """
+
+    @property
+    def known_span(self) -> float:
+        """Largest range of an output where it was fitted; 0 if unknown."""
+        return 0.0
+
+    @property
+    def n_more_states(self) -> int:
+        """Numbers of the last sample that learning wants, behind those of the inverse."""
+        return 1
+
+    @property
+    def n_learning_scratch(self) -> int:
+        """Numbers to compute in, beside three a parameter and those of the inverse."""
+        return 0
+
+    def adaptive_numbers(self, sample_time: float | None) -> Array:
+        """Return the numbers that C reads, behind those of the learner; the inverse's by default."""
+        return self.inverse_numbers(self.c_numbers(sample_time))
+
+    @property
+    def n_learning_states(self) -> int:
+        """Theta, used, root, senses."""
+        p = self.taught.size
+        return 2 * p + (p * (p + 1)) // 2 + SENSES * len(self.outputs)
+
+    @classmethod
+    @abstractmethod
+    def example(cls) -> Self: ...
+
+
+def relative_spread(common: float, friction: float, own: float, offset: float, n: int) -> Array:
+    """Return the covariance of changes of n weights of play operators and of an offset.
+
+    All weights change in common, those of operators with a threshold by friction too, every weight by
+    itself, and the offset: standard deviations in scales.
+    """
+    sliding = np.array([0.0, *np.ones(n - 1), 0.0])
+    weights = np.array([*np.ones(n), 0.0])
+    covariance = common**2 * np.outer(weights, weights) + friction**2 * np.outer(sliding, sliding)
+    return np.asarray(
+        covariance + np.diag([*np.full(n, own**2), offset**2]),
+    )

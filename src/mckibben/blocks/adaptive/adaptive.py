@@ -1,0 +1,279 @@
+"""An inverse that learns from what is measured, and stays exact.
+
+Inputs are those of the inverse, then what is measured of the references; outputs are the inverse's.
+With every measured sample the parameters of the model follow, see `learning`; the inverse runs with
+them as they are, so that model and inverse match at every step.
+
+A measurement answers the reference of the step before, as behind a compensator: since the model gives
+exactly what was asked for, what it predicts is known from the inverse's own memory.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated, ClassVar, Self
+
+import numpy as np
+from annotated_types import Gt
+from pydantic import BeforeValidator, FiniteFloat, InstanceOf
+from pydantic.dataclasses import dataclass
+
+from mckibben.arrays import Array
+from mckibben.blocks.adaptive.adaptable import Adaptable, Learning
+from mckibben.blocks.adaptive.drift import Drift, alarm_limit, scatter
+from mckibben.blocks.adaptive.learning import covariance_of, start_root, start_sense
+from mckibben.blocks.compose import Series
+from mckibben.blocks.core.block import Block, Run
+from mckibben.blocks.core.exportable import Cost
+from mckibben.blocks.core.fields import STRICT, Channel, Initial, Vector, vector
+from mckibben.blocks.core.inverse import Inverse
+from mckibben.blocks.core.refusals import explicit_state, needs_sample_time
+from mckibben.blocks.core.saving import nested
+from mckibben.blocks.feedback.pid import MEASURED
+from mckibben.blocks.memoryless.affine import Affine
+from mckibben.errors import ModelError
+
+TRUSTED = 1 / 3
+"""Standard deviations of the fitted parameters at the start, by those of changes to be expected."""
+
+
+def learner_of(block: Block) -> Adaptable | None:
+    """Return what learns while a block is undone: it, or what undoes it; None where none does."""
+    if isinstance(block, Inverse):
+        inner = block.forward
+        return inner if isinstance(inner, Adaptable) and not inner.learns_inverted else None
+    return block if isinstance(block, Adaptable) and block.learns_inverted else None
+
+
+@dataclass(frozen=True, config=STRICT)
+class Adaptive(Block):
+    """The inverse of a block, which learns the block's linear parameters while it runs.
+
+    Parameters
+    ----------
+    forward : Block
+        The block undone, which declares what of it is learnt; or its inverse does, as of a balance.
+    time : float
+        How long it takes to learn what the motion shows [s]; positive.
+    noise : float
+        Standard deviation of what is measured [unit of the output]; errors below are not told apart.
+    memory : sequence of float, optional
+        State to go on from, as `resumed` keeps it; default is to start from the fit.
+    """
+
+    kind: ClassVar[str] = "adaptive"
+    rate_dependent: ClassVar[bool] = True
+    parameters: ClassVar[tuple[str, ...]] = ("forward",)
+
+    forward: Annotated[InstanceOf[Adaptable] | InstanceOf[Inverse], BeforeValidator(nested)]
+    time: Annotated[FiniteFloat, Gt(0)]
+    noise: Annotated[FiniteFloat, Gt(0)]
+    memory: Vector | None = None
+
+    def __post_init__(self) -> None:
+        self.learner.check_invertible()
+        if self.memory is not None and len(self.memory) != self.n_states:
+            raise ModelError(
+                f"the memory of {self.kind!r} has {len(self.memory)} numbers, its state "
+                f"{self.n_states}. Remedy: resume what was saved with the same model."
+            )
+
+    @property
+    def learner(self) -> Adaptable:
+        """What declares what is learnt: the block undone, or what undoes it.
+
+        Raises
+        ------
+        ModelError
+            Where none does.
+        """
+        found = learner_of(self.forward)
+        if found is None:
+            raise ModelError(
+                f"{self.forward.title!r} does not learn. Remedy: give a pi, gpi or balance model."
+            )
+        return found
+
+    @property
+    def fixed(self) -> Block:
+        """The inverse that does not learn."""
+        return self.forward.inverse()
+
+    @property
+    def title(self) -> str:
+        """That of the block undone, and that it learns."""
+        return f"{self.learner.title}-adaptive"
+
+    @property
+    def path_dependent(self) -> bool:  # type: ignore[override]
+        """As the forward block says."""
+        return self.fixed.path_dependent
+
+    @property
+    def measured(self) -> tuple[Channel, ...]:
+        """What is measured of the references."""
+        return tuple(Channel(f"{c.name}{MEASURED}", c.unit) for c in self.forward.outputs)
+
+    @property
+    def inputs(self) -> tuple[Channel, ...]:
+        """References, what schedules the forward block, measurements."""
+        return (*self.fixed.inputs, *self.measured)
+
+    @property
+    def scheduling(self) -> tuple[str, ...]:
+        """What schedules the forward block, and measurements."""
+        return (*self.forward.scheduling, *(channel.name for channel in self.measured))
+
+    @property
+    def n_missable(self) -> int:
+        """Measurements: the inverse goes on without."""
+        return len(self.measured)
+
+    @property
+    def outputs(self) -> tuple[Channel, ...]:
+        """The forward block's driven inputs."""
+        return self.fixed.outputs
+
+    @property
+    def n_states(self) -> int:
+        """The inverse's, what more learning wants of the last sample, and what is learnt."""
+        return self.fixed.n_states + self.learner.n_more_states + self.learner.n_learning_states
+
+    @property
+    def n_scratch(self) -> int:
+        """Three numbers a parameter, what more the family wants, and those of the inverse."""
+        more = self.learner.n_learning_scratch + self.fixed.n_scratch
+        return 3 * self.learner.taught.size + more
+
+    @property
+    def start(self) -> Initial:
+        """Memory to go on from, or the forward block's start."""
+        return self.forward.start if self.memory is None else self.memory
+
+    def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
+        """Return the state before the first sample: the inverse's, and parameters as fitted.
+
+        An explicit state may be this block's own, the inverse's or the forward block's.
+        """
+        start = self.start if initial is None else initial
+        if not isinstance(start, str) and len(start) == self.n_states:
+            return explicit_state(self, start)
+        learner = self.learner
+        asked = first[: len(first) - len(self.measured)]
+        theta = learner.taught
+        senses = np.tile(start_sense(self.noise), len(self.measured))
+        own = self.fixed.initial_state(asked, start)
+        return np.concatenate(
+            [own, np.zeros(learner.n_more_states), theta, theta, self._fresh, senses]
+        )
+
+    def _split(self, state: Array) -> tuple[Array, Array, Array, Array, Array]:
+        p = self.learner.taught.size
+        sizes = [self.fixed.n_states + self.learner.n_more_states, p, p, (p * (p + 1)) // 2]
+        own, theta, used, root, senses = np.split(state, np.cumsum(sizes))
+        return own, theta, used, root, senses
+
+    @property
+    def _fresh(self) -> Array:
+        return start_root(self.learner.spread * TRUSTED**2)
+
+    def _settings(self, sample_time: float | None) -> Array:
+        step = needs_sample_time(self.kind, sample_time)
+        return np.array([min(step / self.time, 0.5), self.noise])
+
+    def bind(self, sample_time: float | None, state: Array, inputs: Array, outputs: Array) -> Run:
+        """Return a function that learns and inverts in place."""
+        own, theta, used, root, senses = self._split(state)
+        learner, n = self.learner, len(self.inputs) - len(self.measured)
+        learning = Learning(
+            settings=self._settings(sample_time),
+            scales=learner.scales,
+            widest=np.diag(learner.spread).copy(),
+            fresh=self._fresh,
+            theta=theta,
+            used=used,
+            root=root,
+            senses=senses,
+            work=np.zeros(3 * theta.size),
+        )
+        asked, measured = inputs[:, :n], inputs[:, n:]
+        return learner.bind_adaptive(sample_time, learning, own, asked, measured, outputs)
+
+    @property
+    def c_file(self) -> Path:
+        """The forward block's, which learns."""
+        own = self.forward.c_file
+        return own.with_name(f"{own.stem}_adaptive.c")
+
+    def c_numbers(self, sample_time: float | None) -> Array:
+        """Return [number of parameters, settings, scales, widest, theta, root], then the family's."""
+        learner = self.learner
+        return np.concatenate(
+            [
+                [float(learner.taught.size)],
+                self._settings(sample_time),
+                learner.scales,
+                np.diag(learner.spread),
+                learner.taught,
+                self._fresh,
+                learner.adaptive_numbers(sample_time),
+            ]
+        )
+
+    def cost(self, sample_time: float | None) -> Cost:
+        """Return that of the inverse, and three operations a number of the covariance."""
+        p = self.learner.taught.size
+        learnt = 6 * p * p + 20 * p
+        return self.fixed.cost(sample_time) + Cost(learnt, learnt)
+
+    def reachable(self) -> tuple[Array, Array]:
+        """Return what the inverse gives."""
+        return self.fixed.reachable()
+
+    def inverse(self) -> Block:
+        """Return the forward block, as fitted."""
+        return self.forward
+
+    def present(self, state: Array) -> Block:
+        """Return the forward block that the inverse runs with in a state, shape (n_states,)."""
+        return taught(self.learner, self._split(state)[2])
+
+    def drift(self, state: Array) -> Drift:
+        """Return how far what is learnt has gone from the fit, in a state, shape (n_states,)."""
+        learner = self.learner
+        _, theta, _, root, _ = self._split(state)
+        steps = 1e-6 * np.diag(learner.scales)
+        there = learner.group_changes(theta)
+        slopes = np.array([(learner.group_changes(theta + h) - there) / 1e-6 for h in steps]).T
+        covariance = covariance_of(root, theta.size)
+        errors = scatter(covariance, slopes)
+        limit = alarm_limit(self.time, len(learner.groups))
+        return Drift(learner.groups, vector(there), vector(errors), limit)
+
+    def resumed(self, state: Array) -> Self:
+        """Return this block, which goes on from a state when it is next started."""
+        return replace(self, memory=tuple(np.asarray(state, dtype=np.float64).tolist()))
+
+    def equations(self) -> tuple[str, ...]:
+        """Return what is undone, and how parameters follow."""
+        return (
+            r"\hat{u}_t = P_{\theta_t}^{-1}[y]_t",
+            r"\theta_t = \Pi\left(\theta_{t-1} + \frac{C \varphi}{1 + \varphi^T C \varphi}\, e_t"
+            r"\right),\quad e_t = y_{m,t} - P_{\theta_{t-1}}[\hat{u}]_{t-1}",
+        )
+
+    @classmethod
+    def example(cls) -> Self:
+        from mckibben.blocks.play_type.pi import PI
+
+        return cls(PI.example(), 60.0, 0.05)
+
+
+def taught(learner: Adaptable, theta: Array) -> Block:
+    """Return a forward block with other parameters, shape (p,), and behind it what is added."""
+    block, added = learner.retaught(theta), learner.added(theta)
+    if not added:
+        return block
+    output = block.outputs[0]
+    return Series((block, Affine(1.0, added, output, output)))

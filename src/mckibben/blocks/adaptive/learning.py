@@ -1,0 +1,230 @@
+"""How parameters are learnt from one measurement: recursive least squares that forget by excitation.
+
+With slopes phi of a measured output over the parameters, each in its scale and by the scatter of errors,
+and P the parameters' covariance,
+
+    r = phi' P phi,   theta <- theta + P phi e / (1 + r),   P^-1 <- P^-1 + b phi phi',
+    b = l - (1 - l) / r,   l = 1 - sample time / time:
+
+what is known is forgotten along phi alone, as much as comes in (Kulhavy, "Restricted exponential
+forgetting in real-time identification", Automatica 23 (1987), 589). What is not excited is neither
+forgotten nor blown up: r settles at (1 - l) / l, and no variance passes the widest. P is kept as
+U D U', changed by Bierman's recursion, so that it stays positive in single precision.
+
+The scatter is the usual size of errors, times the root of how many that follow one another tell as
+much as one that is independent: what a model leaves unexplained is alike from sample to sample, and is
+not to be learnt in a moment.
+
+Errors beyond a few times their usual size teach no more than that size, which follows their median, so
+a single outlier is nothing. Where many are too large for a twentieth of the time, the plant has
+stepped: the covariance is made as wide as at the start, and what is new is learnt at once. A
+measurement that is not a number teaches nothing, nor does one that stands exactly still while what is
+asked for moves.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mckibben.arrays import Array
+from mckibben.blocks.core.kernels import kernel
+
+SENSES = 9
+"""How many numbers are remembered of a sensor: whether it was read, usual error, surprise, last
+measured, what was predicted when that changed, product and square of errors, last error, ignored."""
+
+READY, USUAL, SURPRISE, LAST, THEN, RELATED, SQUARED, BEFORE, IGNORED = range(SENSES)
+
+GATE = 3.0
+"""Usual errors beyond which an error teaches no more."""
+QUARTILE = 0.6745
+"""Median of the sizes of errors of unit variance."""
+ABSURD = 1e-6
+"""Weight of an error too large to be one."""
+ALIKE, MOST_ALIKE = 0.98, 0.9995
+"""Correlation of errors that follow one another: until it is known, and at most."""
+NEVER = 1e30
+"""What no output is."""
+STILL, UNMOVED = 1e-9, 1e-12
+"""What is added to what is known, and squares of slopes by the noise, below which nothing changes."""
+SURPRISED = 5.0
+"""Mean square of errors, cut at the gate, by the usual one, beyond which all is learnt afresh."""
+
+
+@kernel
+def learn(
+    settings: Array,
+    scales: Array,
+    widest: Array,
+    fresh: Array,
+    theta: Array,
+    root: Array,
+    sense: Array,
+    slopes: Array,
+    work: Array,
+    measured: float,
+    predicted: float,
+    asked: float,
+) -> bool:
+    """Teach parameters by one measured output; return whether they were.
+
+    Parameters
+    ----------
+    settings : array, shape (2,)
+        [sample time / time, noise of the output].
+    scales, widest : array, shape (p,)
+        Scale of every parameter, and the largest variance, in squares of it.
+    fresh : array, shape (p (p + 1) / 2,)
+        Covariance to learn afresh with, as ``root``.
+    theta : array, shape (p,)
+        Parameters, changed.
+    root : array, shape (p (p + 1) / 2,)
+        [D, columns of U above its diagonal of ones], changed.
+    sense : array, shape (SENSES,)
+        What is remembered of the sensor, changed.
+    slopes : array, shape (p,)
+        Of the output over the parameters.
+    work : array, shape (2 p,)
+        To compute in.
+    measured, predicted, asked : float
+        The output, what it is by ``theta``, and what it is by what the inverse runs with.
+    """
+    share, noise = settings[0], settings[1]
+    if measured - measured != 0.0:
+        sense[IGNORED] += 1.0
+        return False
+    if sense[READY] == 0.0:
+        sense[READY], sense[LAST], sense[THEN] = 1.0, measured, asked
+        return False
+    usual = sense[USUAL]
+    if measured != sense[LAST]:
+        sense[LAST], sense[THEN] = measured, asked
+    elif abs(asked - sense[THEN]) > GATE * usual:
+        sense[THEN] = NEVER  # it stands until it changes
+        sense[IGNORED] += 1.0
+        return False
+    if sense[SURPRISE] > SURPRISED:  # the plant has stepped
+        root[:] = fresh
+        sense[SURPRISE] = 1.0
+    error = measured - predicted
+    p = theta.size
+    f, g = work[:p], work[p : 2 * p]
+    r = 0.0
+    told = usual * np.sqrt(fewer(sense))
+    for j in range(p):
+        f[j] = slopes[j] * scales[j] / told
+    for j in range(p - 1, -1, -1):  # U' phi in place
+        first = p + (j * (j - 1)) // 2
+        for i in range(j):
+            f[j] += root[first + i] * f[i]
+        g[j] = root[j] * f[j]
+        r += f[j] * g[j]
+    expected = np.sqrt(usual * usual + r * told * told)
+    weight = 1.0
+    if abs(error) > GATE * expected:
+        weight = GATE * expected / abs(error)
+        sense[IGNORED] += 1.0
+    _feel(share, noise, weight * error / expected, sense)
+    if not UNMOVED < r < np.inf or weight < ABSURD:
+        return False
+    r *= weight
+    excited = 1.0 - share - share / r
+    _spread(root, f, g, weight * excited)
+    gain = weight * error / told / (1.0 + r)
+    for i in range(p):
+        theta[i] += scales[i] * g[i] * gain
+    _bound(root, widest, int(sense[READY]) % p)
+    sense[READY] = sense[READY] % p + 1.0
+    return True
+
+
+@kernel
+def fewer(sense: Array) -> float:
+    """Return how many errors that follow one another tell as much as one independent one."""
+    alike = min(max(sense[RELATED] / sense[SQUARED], 0.0), MOST_ALIKE)
+    return (1.0 + alike) / (1.0 - alike)
+
+
+@kernel
+def _feel(share: float, noise: float, relative: float, sense: Array) -> None:
+    """Remember an error, by its expected size."""
+    usual = sense[USUAL]
+    quick = min(20.0 * share, 0.5)
+    grows = 1.0 + 0.5 * quick
+    sense[USUAL] = max(usual * grows if abs(relative) > QUARTILE else usual / grows, noise)
+    square = relative * relative
+    sense[SURPRISE] += quick * (square - sense[SURPRISE])
+    sense[RELATED] += share * (relative * sense[BEFORE] - sense[RELATED])
+    sense[SQUARED] += share * (square - sense[SQUARED])
+    sense[BEFORE] = relative
+
+
+@kernel
+def _spread(root: Array, f: Array, g: Array, excited: float) -> None:
+    """Add ``excited`` times what a measurement tells to what is known; ``g`` becomes P phi."""
+    p = f.size
+    still = abs(excited) < STILL
+    before = 0.0 if still else 1.0 / excited
+    first = p
+    for j in range(p):
+        after = before + f[j] * g[j]
+        known = 0.0
+        if not still:
+            known = -f[j] / before
+            root[j] *= before / after
+        for i in range(j):
+            u = root[first + i]
+            root[first + i] = u + g[i] * known
+            g[i] += u * g[j]
+        first += j
+        before = after
+
+
+@kernel
+def _bound(root: Array, widest: Array, i: int) -> None:
+    """Keep the variance of one parameter from passing the widest; each has its turn."""
+    p = widest.size
+    variance = root[i]
+    first = p + (i * (i + 1)) // 2
+    for j in range(i + 1, p):
+        variance += root[first + i] * root[first + i] * root[j]
+        first += j
+    if variance <= widest[i]:
+        return
+    less = np.sqrt(widest[i] / variance)
+    root[i] *= less * less
+    own = p + (i * (i - 1)) // 2
+    for k in range(i):
+        root[own + k] /= less
+    first = p + (i * (i + 1)) // 2
+    for j in range(i + 1, p):
+        root[first + i] *= less
+        first += j
+
+
+def start_root(covariance: Array) -> Array:
+    """Return [D, U] of a covariance, shape (p, p): U D U', U upper with ones on its diagonal."""
+    p = len(covariance)
+    left = np.array(covariance, dtype=np.float64)
+    upper, diagonal = np.eye(p), np.empty(p)
+    for j in reversed(range(p)):
+        diagonal[j] = left[j, j]
+        upper[:j, j] = left[:j, j] / diagonal[j]
+        left[:j, :j] -= diagonal[j] * np.outer(upper[:j, j], upper[:j, j])
+    return np.concatenate([diagonal, *(upper[:j, j] for j in range(p))])
+
+
+def covariance_of(root: Array, p: int) -> Array:
+    """Return U D U', shape (p, p)."""
+    upper, first = np.eye(p), p
+    for j in range(p):
+        upper[:j, j] = root[first : first + j]
+        first += j
+    return np.asarray((upper * root[:p]) @ upper.T)
+
+
+def start_sense(noise: float) -> Array:
+    """Return what is remembered of a sensor before it is read."""
+    sense = np.zeros(SENSES)
+    sense[USUAL], sense[SURPRISE], sense[SQUARED], sense[RELATED] = 3.0 * noise, 1.0, 1.0, ALIKE
+    return sense

@@ -1,0 +1,207 @@
+"""Weighted sums of play operators whose weights and offset are learnt while they are inverted.
+
+y = y_0 + sum_i w_i s_i: the slopes of the output are the operators and 1, so nothing is linearised.
+The operators play in the space of the input: they stay as they are where weights move, and memory is
+carried over exactly.
+
+What is learnt is taken over as far as the input then goes on in the direction of the reference, unless
+it differs by more than the usual error: a change of weights is never mistaken for a reversal, and
+noise does not make the input chatter across the loop.
+"""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import numpy as np
+
+from mckibben.arrays import Array
+from mckibben.blocks.adaptive.adaptable import Adaptable, Group, Learning, relative_spread
+from mckibben.blocks.adaptive.learning import GATE, USUAL, learn
+from mckibben.blocks.core.block import Run
+from mckibben.blocks.core.kernels import kernel
+from mckibben.blocks.core.single_channel import Ranged
+from mckibben.blocks.play_type.memory import follow
+from mckibben.system.compiling import bound
+
+LEAST = 0.1
+"""Share of a fitted partial sum of weights that is left, whatever is measured."""
+
+
+@kernel
+def follow_learning(
+    settings: Array,
+    scales: Array,
+    widest: Array,
+    fresh: Array,
+    theta: Array,
+    used: Array,
+    root: Array,
+    sense: Array,
+    work: Array,
+    limits: Array,
+    r: Array,
+    least: Array,
+    s: Array,
+    last: Array,
+    references: Array,
+    measured: Array,
+    z: Array,
+    direction: Array,
+) -> None:
+    """Learn, and find the operators' common input, for every reference.
+
+    ``theta`` and ``used`` are [weights, offset]; ``limits`` [lowest, highest]; ``least`` [lowest
+    weights, lowest partial sums]; ``s`` the operators; ``last`` is [previous reference, samples clipped,
+    direction of travel].
+    """
+    n = r.size
+    slopes = work[2 * n + 2 : 3 * n + 3]
+    for t in range(references.shape[0]):
+        y = references[t, 0]
+        believed, asked = 0.0, used[n]
+        for i in range(n):
+            slopes[i] = s[i]
+            believed += theta[i] * s[i]
+            asked += used[i] * s[i]
+        slopes[n] = 1.0
+        believed += theta[n]
+        if learn(
+            settings,
+            scales,
+            widest,
+            fresh,
+            theta,
+            root,
+            sense,
+            slopes,
+            work,
+            measured[t, 0],
+            believed,
+            asked,
+        ):
+            keep_rising(theta, least)
+        if y > last[0]:
+            last[2] = 1.0
+        elif y < last[0]:
+            last[2] = -1.0
+        take_over(theta, used, s, y, last[2], GATE * sense[USUAL])
+        total = 0.0
+        for i in range(n):
+            total += used[i] * s[i]
+        way, clipped = follow(y - used[n], total, limits[0], limits[1], r, used[:n], s)
+        if clipped:
+            last[1] += 1.0
+        last[0] = y
+        z[t] = s[0]
+        direction[t] = way
+
+
+@kernel
+def keep_rising(theta: Array, least: Array) -> None:
+    """Raise weights that are too low for a sum that rises right after every reversal."""
+    n = theta.size - 1
+    total = 0.0
+    for i in range(n):
+        theta[i] = max(theta[i], least[i], least[n + i] - total)
+        total += theta[i]
+
+
+@kernel
+def take_over(theta: Array, used: Array, s: Array, y: float, travel: float, band: float) -> None:
+    """Move what is used to what is learnt, as far as the input need not turn before the reference."""
+    n = s.size
+    total, change = used[n], theta[n] - used[n]
+    for i in range(n):
+        total += used[i] * s[i]
+        change += (theta[i] - used[i]) * s[i]
+    room = y - total
+    share = 1.0
+    left = room - change
+    if travel * left < 0.0 and abs(left) <= band and change != 0.0:
+        share = min(max(room / change, 0.0), 1.0)
+    for i in range(n + 1):
+        used[i] = theta[i] if share == 1.0 else used[i] + share * (theta[i] - used[i])
+
+
+class LearntOperators(Ranged, Adaptable):
+    """A weighted sum of play operators whose weights, and an offset, are learnt."""
+
+    groups: ClassVar[tuple[Group, ...]] = (
+        Group(
+            "gain", "higher (softer springs, or more area)", "lower (stiffer springs, or less area)"
+        ),
+        Group("friction"),
+        Group("offset", "up", "down"),
+    )
+
+    thresholds: tuple[float, ...]
+    weights: tuple[float, ...]
+
+    @property
+    def learnt_limits(self) -> tuple[float, float]:
+        """Lowest and highest input of the operators."""
+        return self.limits
+
+    @property
+    def taught(self) -> Array:
+        """Weights, then the offset."""
+        return np.array([*self.weights, getattr(self, "offset", 0.0)])
+
+    @property
+    def span(self) -> float:
+        """Change of the output over the whole input [its unit]."""
+        low, high = self.learnt_limits
+        width = high - low if np.isfinite(high - low) else max(self.thresholds) or 1.0
+        return float(np.sum(self.weights) * width)
+
+    @property
+    def scales(self) -> Array:
+        """The weights, none below a hundredth of their mean; the change over the whole input."""
+        w = np.abs(self.weights)
+        return np.array([*np.maximum(w, 0.01 * w.mean()), self.span])
+
+    @property
+    def spread(self) -> Array:
+        """Gain and friction by 30 %, every weight by 10 %, the offset by 30 % of the span."""
+        return relative_spread(0.3, 0.3, 0.1, 0.3, len(self.weights))
+
+    @property
+    def least(self) -> Array:
+        """Lowest weights, then lowest partial sums."""
+        w = np.array(self.weights)
+        lowest = np.where(w >= 0, 0.0, -np.inf)
+        return np.concatenate([lowest, LEAST * np.cumsum(w)])
+
+    def adaptive_numbers(self, sample_time: float | None) -> Array:
+        """Return [lowest, highest input of the operators, least], then the inverse's."""
+        own = super().adaptive_numbers(sample_time)
+        return np.concatenate([self.learnt_limits, self.least, own])
+
+    def group_changes(self, theta: Array) -> Array:
+        """Return the relative changes of sum w, of sum w r over sum w, and the offset over the span."""
+        r, w = np.array(self.thresholds), np.array(self.weights)
+        new, old = theta[:-1], w
+        width_new, width_old = new @ r / new.sum(), old @ r / old.sum()
+        friction = width_new / width_old - 1 if width_old > 0 else 0.0
+        shift = (theta[-1] - self.taught[-1]) / self.span
+        return np.array([new.sum() / old.sum() - 1, friction, shift])
+
+    def _bind_operators(
+        self,
+        learning: Learning,
+        s: Array,
+        last: Array,
+        references: Array,
+        measured: Array,
+        z: Array,
+        direction: Array,
+    ) -> Run:
+        numbers = (np.array(self.learnt_limits), np.array(self.thresholds), self.least)
+        one = learning
+        rest = (one.theta, one.used, one.root, one.senses, one.work)
+        return bound(
+            follow_learning,
+            *(one.settings, one.scales, one.widest, one.fresh, *rest, *numbers),
+            *(s, last, references, measured, z, direction),
+        )

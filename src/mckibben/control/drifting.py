@@ -1,0 +1,158 @@
+"""A plant that changes while it runs: muscles soften, rub less, and pressure is measured differently."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol, Self
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from mckibben.arrays import Array
+from mckibben.control.loop import Plant
+from mckibben.errors import ModelError
+
+GROUPS = ("stiffness", "friction", "gain")
+"""What drifts: rubber, friction, and the calibration of pressure, commanded and measured alike."""
+
+PART = 1e-4
+"""Changes come in parts of this size, relative to what changes."""
+
+
+class Ageing(Plant, Protocol):
+    """A plant whose muscles can age while it runs: rigs."""
+
+    @property
+    def sample_time(self) -> float:
+        """Time of a step [s]."""
+
+    def aged(self, factors: Mapping[str, float]) -> Self:
+        """Return the plant, where this one is, with stiffness and friction of its muscles scaled."""
+
+
+@dataclass(frozen=True)
+class Drift:
+    """A change of a group, by a factor, straight in time or at once.
+
+    Parameters
+    ----------
+    group : {"stiffness", "friction", "gain"}
+    factor : float
+        At the end, of what it was.
+    start : float
+        When it begins [s since `Drifting.reset`].
+    over : float
+        How long it takes [s]; 0 is a step.
+    """
+
+    group: str
+    factor: float
+    start: float = 0.0
+    over: float = 0.0
+
+    def __post_init__(self) -> None:
+        if self.group not in GROUPS:
+            raise ModelError(f"there is no group {self.group!r}. Remedy: {', '.join(GROUPS)}.")
+        if not 0.1 <= self.factor <= 10.0:
+            raise ModelError(f"a factor of {self.factor:g} is no drift. Remedy: give 0.1 to 10.")
+        if not (0.0 <= self.start < np.inf and 0.0 <= self.over < np.inf):
+            raise ModelError(
+                f"a drift from {self.start:g} s over {self.over:g} s. Remedy: give times from 0 up."
+            )
+
+    def at(self, time: float) -> float:
+        """Return the factor at a time [s], in parts of `PART`."""
+        if self.over > 0.0:
+            share = min(max((time - self.start) / self.over, 0.0), 1.0)
+        else:
+            share = float(time >= self.start)
+        if share == 1.0:
+            return self.factor
+        return 1.0 + PART * round(share * (self.factor - 1.0) / PART)
+
+
+class Drifting:
+    """A rig of which something drifts while it is stepped, by its own physics.
+
+    What it remembers, as forces in its friction, it keeps.
+
+    Parameters
+    ----------
+    rig : Ageing
+    drifts : sequence of Drift
+        Several of one group multiply.
+    """
+
+    def __init__(self, rig: Ageing, drifts: Sequence[Drift]) -> None:
+        self.fresh, self.drifts = rig, tuple(drifts)
+        self._now, self._steps = rig, 0
+        self._factors = dict.fromkeys(GROUPS, 1.0)
+        self._pressed = np.array([name.startswith("pressure") for name in rig.inputs])
+        self._felt = np.array([name in rig.inputs and "pressure" in name for name in rig.outputs])
+
+    @property
+    def name(self) -> str:
+        """The rig's."""
+        return self.fresh.name
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """The rig's."""
+        return self.fresh.inputs
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """The rig's."""
+        return self.fresh.outputs
+
+    @property
+    def factors(self) -> Mapping[str, float]:
+        """How far every group has come, of what it was."""
+        return dict(self._factors)
+
+    def limits(self, name: str) -> Any:
+        """Return the rig's limits on an input channel."""
+        return self.fresh.limits(name)
+
+    def changed(self, settings: Mapping[str, Any]) -> Drifting:
+        """Return the same of a rig with other settings."""
+        return Drifting(self.fresh.changed(settings), self.drifts)
+
+    def reset(self, seed: int = 0) -> Array:
+        """Make it as new, bring it to rest, and return the first measurement."""
+        self._now, self._steps = self.fresh, 0
+        self._factors = dict.fromkeys(GROUPS, 1.0)
+        measured = self.fresh.reset(seed)
+        self._age()
+        return self._shown(measured)
+
+    def step(self, action: ArrayLike | Mapping[str, float]) -> Array:
+        """Hold commands for one sample time, age, and return the next measurement."""
+        gain = self._factors["gain"]
+        if isinstance(action, Mapping):
+            action = {
+                name: value * gain if name.startswith("pressure") else value
+                for name, value in action.items()
+            }
+        elif gain != 1.0:
+            action = np.where(self._pressed, gain, 1.0) * np.asarray(action, dtype=float)
+        shown = self._shown(self._now.step(action))
+        self._steps += 1
+        self._age()
+        return shown
+
+    def _shown(self, measured: Array) -> Array:
+        """Return what sensors of a drifted calibration show."""
+        return np.where(self._felt, measured / self._factors["gain"], measured)
+
+    def _age(self) -> None:
+        """Change what has changed by now."""
+        time = self._steps * self.fresh.sample_time
+        factors = dict.fromkeys(GROUPS, 1.0)
+        for drift in self.drifts:
+            factors[drift.group] *= drift.at(time)
+        muscles = {group: factors[group] for group in ("stiffness", "friction")}
+        if any(self._factors[group] != factor for group, factor in muscles.items()):
+            self._now = self.fresh.aged(muscles)
+        self._factors = factors

@@ -1,0 +1,281 @@
+"""An inverse that learns: exact at every step, quick after a change, and taught by nothing wrong."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from mckibben import Block, ModelError, Series, load
+from mckibben.blocks.adaptive.adaptable import Adaptable
+from mckibben.blocks.adaptive.adaptive import Adaptive, taught
+from mckibben.blocks.adaptive.adaptive_series import AdaptiveSeries, adaptive
+from mckibben.blocks.adaptive.drift import alarm_limit
+from mckibben.blocks.adaptive.learning import covariance_of, start_root
+from mckibben.blocks.dynamic.creep import Creep
+from mckibben.blocks.feedback.feedforward_feedback import FeedforwardFeedback
+from mckibben.blocks.feedback.pid import PIDFeedback
+from mckibben.blocks.play_type.gpi import GPI
+from mckibben.blocks.play_type.pi import PI
+from mckibben.export import export_c
+from mckibben.export.c.building import CompiledModel
+from tests.tools import needs
+
+Array = NDArray[np.float64]
+
+STEP = 0.01
+MODELS: list[Any] = [PI.example(), GPI.example()]
+CREEPING = Series((*Series.example().parts, Creep.example()))
+
+
+def changed(model: Any, gain: float = 1.2, shift: float = 0.3) -> Block:
+    """Return a model of another gain, and shifted."""
+    theta = model.taught.copy()
+    theta[:-1] *= gain
+    theta[-1] += shift
+    return taught(model, theta)
+
+
+def references(model: Block, seconds: float, share: float = 0.7, seed: int = 0) -> Array:
+    """Return random smooth motion within what is reachable."""
+    rng = np.random.default_rng(seed)
+    low, high = (float(end[0]) for end in model.reachable())
+    turns = low + (high - low) * (0.1 + share * rng.random(int(seconds) + 2))
+    turns[0] = low + 0.4 * (high - low)
+    t = np.arange(round(seconds / STEP)) * STEP
+    place, part = t.astype(int), t % 1.0
+    ease = part**2 * (3 - 2 * part)
+    return np.asarray(turns[place] + (turns[place + 1] - turns[place]) * ease)
+
+
+def closed(block: Block, plants: list[Block], asked: Array, noise: float, seed: int = 0) -> Array:
+    """Return what plants, each for its share of the time, give; the block learns from noisy readings."""
+    rng = np.random.default_rng(seed)
+    stream, runs = block.stream(STEP), [plant.stream(STEP) for plant in plants]
+    given, reading = np.empty(asked.size), asked[0]
+    for t, y in enumerate(asked):
+        u = stream.step([y, reading])[0]
+        outputs = [run.step(u)[0] for run in runs]
+        given[t] = outputs[t * len(plants) // asked.size]
+        reading = given[t] + noise * rng.standard_normal()
+    return given
+
+
+def rms(values: Array) -> float:
+    return float(np.sqrt(np.mean(values**2)))
+
+
+@pytest.mark.parametrize("model", MODELS, ids=lambda model: model.kind)
+@settings(max_examples=8, deadline=None)
+@given(seed=st.integers(0, 2**32 - 1), size=st.sampled_from([0.01, 1.0, 1e3, 1e200]))
+def test_forward_and_inverse_match_at_every_step_whatever_is_measured(
+    model: Any, seed: int, size: float
+) -> None:
+    rng = np.random.default_rng(seed)
+    low, high = (float(end[0]) for end in model.reachable())
+    block = Adaptive(model, 1.0, 0.01 * (high - low))
+    stream = block.stream(STEP)
+    middle, n = 0.5 * (low + high), len(model.weights)
+    for t in range(300):
+        y = middle + 0.3 * (high - low) * np.sin(0.07 * t + 2 * np.sin(0.013 * t))
+        measured = y + size * rng.standard_normal() if rng.random() > 0.1 else np.nan
+        clipped = stream.state[model.n_inverse_states - 1]
+        u = stream.step([y, measured])[0]
+        state = stream.state
+        assert np.isfinite(state).all()
+        assert (block._split(state)[3][: n + 1] > 0).all()
+        if t % 10:
+            continue
+        theta = block._split(state)[2]
+        model.unpack([*theta[:-1], *model.pack()[n:]]).check_invertible()
+        if state[model.n_inverse_states - 1] == clipped:
+            memory, present = state[: model.n_states].tolist(), block.present(state)
+            given = present.simulate([u], initial=memory)[0]
+            assert given == pytest.approx(y, abs=1e-9 * (high - low))
+
+
+@pytest.mark.parametrize("model", [*MODELS, Series.example()], ids=lambda model: model.kind)
+def test_after_a_step_the_error_is_that_of_a_fresh_model_within_two_cycles(model: Any) -> None:
+    asked = references(model, 60.0)
+    if isinstance(model, Series):
+        aged: Block = Series((changed(model.parts[0], 1.2, 0.0), *model.parts[1:]))
+    else:
+        aged = changed(model)
+    given = closed(adaptive(model, 20.0, 0.02), [model, aged], asked, 0.02)
+    fixed = aged.simulate(model.inverse().simulate(asked))
+    late = slice(5000, None)
+    assert rms(given[late] - asked[late]) < 0.02
+    assert rms(fixed[late] - asked[late]) > 0.5
+
+
+def test_noise_makes_the_input_turn_no_more_often_than_the_reference() -> None:
+    model = GPI.example()
+    asked = references(model, 40.0)
+    stream, rng = adaptive(model, 20.0, 0.05).stream(STEP), np.random.default_rng(1)
+    given = np.array([stream.step([y, y + 0.05 * rng.standard_normal()])[0] for y in asked])
+
+    def turns(values: Array) -> int:
+        steps = np.diff(values)
+        return int(np.sum(np.diff(np.sign(steps[np.abs(steps) > 1e-12])) != 0))
+
+    assert turns(given) == turns(asked)
+
+
+def test_outliers_cost_little() -> None:
+    model, rng = PI.example(), np.random.default_rng(2)
+    asked = references(model, 60.0)
+    stream, plant = adaptive(model, 20.0, 0.02).stream(STEP), model.stream()
+    errors, reading = [], asked[0]
+    for y in asked:
+        given = plant.step(stream.step([y, reading])[0])[0]
+        errors.append(given - y)
+        reading = given + 0.02 * rng.standard_normal()
+        if rng.random() < 0.02:
+            reading = rng.uniform(-1000, 1000)
+    assert rms(np.array(errors)) < 0.02
+
+
+@pytest.mark.parametrize("measured", ["absent", "frozen"])
+def test_a_sensor_that_fails_teaches_nothing(measured: str) -> None:
+    model = PI.example()
+    block = Adaptive(model, 20.0, 0.02)
+    asked = references(model, 30.0)
+    stream = block.stream(STEP)
+    for y in asked:
+        u = stream.step([y, np.nan if measured == "absent" else asked[0]])
+        assert np.isfinite(u).all()
+    change = (block._split(stream.state)[1] - model.taught) / model.scales
+    assert np.abs(change).max() < (1e-15 if measured == "absent" else 0.01)
+
+
+def test_nothing_blows_up_where_nothing_moves() -> None:
+    model = GPI.example()
+    block = Adaptive(model, 5.0, 0.02)
+    asked = np.full(20_000, references(model, 1.0)[0])
+    stream, plant, rng = block.stream(STEP), changed(model).stream(STEP), np.random.default_rng(3)
+    reading = asked[0]
+    for y in asked:
+        given = plant.step(stream.step([y, reading])[0])[0]
+        reading = given + 0.02 * rng.standard_normal()
+    _, theta, _, root, _ = block._split(stream.state)
+    variances = np.diag(covariance_of(root, theta.size))
+    assert (variances <= 1.001 * np.diag(model.spread)).all()
+    assert (root[: theta.size] > 0).all()
+    assert abs(given - y) < 0.02
+    assert np.abs(theta[:-1] / model.weights - 1).max() < 0.3
+
+
+def test_the_root_is_that_of_its_covariance() -> None:
+    spread = PI.example().spread
+    np.testing.assert_allclose(covariance_of(start_root(spread), len(spread)), spread, rtol=1e-12)
+
+
+@pytest.mark.parametrize("model", [*MODELS, CREEPING], ids=lambda model: model.kind)
+def test_saved_and_resumed_it_goes_on_to_the_bit(model: Block, tmp_path: Path) -> None:
+    block = adaptive(model, 10.0, 0.05)
+    rng = np.random.default_rng(4)
+    asked = references(PI.example(), 10.0)
+    pairs = np.column_stack([asked, asked + rng.normal(0, 0.3, asked.size)])
+    whole = block.stream(STEP)
+    expected = [whole.step(pair).copy() for pair in pairs]
+    first = block.stream(STEP)
+    for pair in pairs[:500]:
+        first.step(pair)
+    block.resumed(first.state).save(tmp_path / "learnt.json")
+    second = load(tmp_path / "learnt.json").stream(STEP)
+    np.testing.assert_array_equal(
+        [second.step(pair).copy() for pair in pairs[500:]], expected[500:]
+    )
+
+
+def test_a_memory_of_another_model_is_refused() -> None:
+    with pytest.raises(ModelError, match=r"memory of 'adaptive' has 3 numbers.*Remedy"):
+        replace(Adaptive.example(), memory=(0.0, 1.0, 2.0))
+    with pytest.raises(ModelError, match=r"cannot learn while it runs.*Remedy"):
+        adaptive(Creep.example(), 10.0)
+    with pytest.raises(ModelError, match=r"0 parts of this series can learn.*Remedy"):
+        AdaptiveSeries(Series((Creep.example(),)), 10.0, 0.1)
+
+
+def test_drift_is_told_in_a_sentence() -> None:
+    model = PI.example()
+    block = adaptive(model, 20.0, 0.02)
+    stream, plant = block.stream(STEP), changed(model, 1.2, 0.0).stream()
+    reading, rng = 0.0, np.random.default_rng(5)
+    for y in references(model, 60.0):
+        reading = plant.step(stream.step([y, reading or y])[0])[0] + 0.02 * rng.standard_normal()
+    found = block.drift(stream.state)
+    assert found.alarm
+    assert "gain 20 % higher" in str(found)
+    assert "friction" in str(found)
+    assert "unchanged" in str(found)
+    assert not block.drift(block.stream(STEP).block.initial_state(np.zeros(2))).alarm
+
+
+def test_alarms_are_false_no_more_often_than_told() -> None:
+    """Where errors are alike from sample to sample, few groups pass two standard errors by chance."""
+    model = PI.example()
+    block = adaptive(model, 5.0, 0.05)
+    beyond = looks = 0
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        asked = references(model, 40.0, seed=seed)
+        noise = np.zeros(asked.size)
+        for t in range(1, asked.size):
+            noise[t] = 0.95 * noise[t - 1] + 0.05 * np.sqrt(1 - 0.95**2) * rng.standard_normal()
+        stream, plant, given = block.stream(STEP), model.stream(STEP), asked[0]
+        for t, y in enumerate(asked):
+            given = plant.step(stream.step([y, given + noise[t]])[0])[0]
+            if t % 500 == 499:
+                sizes = np.abs(block.drift(stream.state).by_errors)
+                beyond, looks = beyond + int(np.sum(sizes > 1.96)), looks + sizes.size
+    assert beyond <= 0.05 * looks
+    assert alarm_limit(60.0, 3) == pytest.approx(4.54, abs=0.01)
+
+
+def test_beside_feedback_it_shares_what_is_measured() -> None:
+    model = PI.example()
+    learner = adaptive(model, 20.0, 0.02)
+    pid = PIDFeedback.of(model.outputs, model.inputs, (0.01,), (0.05,), (0.0,), limits=(0.0, 5.0))
+    block = FeedforwardFeedback.of(learner, pid)
+    assert [channel.name for channel in block.inputs] == ["displacement", "displacement_measured"]
+    asked = references(model, 40.0)
+    given = closed(block, [changed(model)], asked, 0.02)
+    assert rms((given - asked)[3000:]) < 0.02
+
+
+@needs("cc")
+@pytest.mark.parametrize("name", ["gpi", "series", "creeping", "feedback"])
+def test_c_is_python(name: str, tmp_path: Path) -> None:
+    model: Any = {"gpi": GPI.example(), "series": Series.example()}.get(name, CREEPING)
+    block: Block = adaptive(model, 10.0, 0.05)
+    if name == "feedback":
+        gains = ((0.01,), (0.05,), (0.0,))
+        pid = PIDFeedback.of(model.outputs, model.inputs, *gains, limits=(0.0, 5.0))
+        block = FeedforwardFeedback.of(adaptive(model, 10.0, 0.05), pid)
+    rng = np.random.default_rng(6)
+    asked = references(model if model.kind == "gpi" else Series.example(), 30.0)
+    pairs = np.column_stack([asked, asked + rng.normal(0, 0.3, asked.size)])
+    if block.n_missable:
+        pairs[rng.random(asked.size) < 0.05, 1] = np.nan
+    expected = block.simulate(pairs, sample_time=STEP)
+    for single, tolerance in ((False, 1e-12), (True, 1e-4)):
+        folder = tmp_path / f"c{single}"
+        export_c(block, folder, name="muscle", sample_time=STEP, single=single)
+        outputs, statuses = CompiledModel(folder, "muscle", 2, 1).run(pairs)
+        assert not statuses.any()
+        assert np.abs(outputs - expected).max() <= tolerance * np.ptp(expected)
+
+
+def test_every_family_says_what_its_parameters_are() -> None:
+    for model in MODELS:
+        assert isinstance(model, Adaptable)
+        assert model.spread.shape == (model.taught.size,) * 2
+        assert (np.linalg.eigvalsh(model.spread) > 0).all()
+        np.testing.assert_allclose(model.group_changes(model.taught), 0.0, atol=1e-15)

@@ -1,0 +1,307 @@
+"""A balance of forces that learns stays one, is undone exactly at every step, and tells what changed."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from mckibben import ModelError
+from mckibben.blocks.adaptive.adaptive import Adaptive
+from mckibben.blocks.core.inverse import Inverse
+from mckibben.blocks.coupled.balance import Balance
+from mckibben.blocks.coupled.balance_adapting import (
+    FRICTION,
+    KINDS,
+    OFFSET,
+    STIFFNESS,
+    answer,
+    retune,
+    slopes_of,
+)
+from mckibben.blocks.coupled.balance_law import pressed
+from mckibben.blocks.coupled.balance_terms import AT_REST
+from mckibben.blocks.laws.trial import wander
+from tests.blocks.balances import balances
+from tests.tools import needs
+
+Array = NDArray[np.float64]
+
+STEP = 0.05
+"""Sample time [s]."""
+
+
+class Loop:
+    """A learning balance stepped sample by sample, its state in sight."""
+
+    def __init__(self, block: Adaptive) -> None:
+        self.block = block
+        self.inputs = np.zeros((1, len(block.inputs)))
+        self.outputs = np.zeros((1, len(block.outputs)))
+        self.state = np.zeros(block.n_states)
+        self.run = block.bind(STEP, self.state, self.inputs, self.outputs)
+        self.started = False
+
+    def step(self, asked: Array, measured: Array) -> Array:
+        self.inputs[0] = np.concatenate([asked, measured])
+        if not self.started:
+            self.state[:] = self.block.initial_state(self.inputs[0])
+            self.started = True
+        self.run()
+        return self.outputs[0].copy()
+
+    @property
+    def own(self) -> Array:
+        return self.state[: self.block.fixed.n_states].copy()
+
+
+def path(balance: Balance, seed: int, n: int) -> Array:
+    """Return displacements, what schedules and loads, shape (n, inputs)."""
+    low = [5.0] * len(balance.driven) + [0.2] * len(balance.scheduled)
+    high = [20.0] * len(balance.driven) + [1.0] * len(balance.scheduled)
+    moves = wander(np.array(low), np.array(high), np.random.default_rng(seed), 20, n // 20 + 3)
+    return np.asarray(moves[:n])
+
+
+def answers(forward: Any, own: Array, pressures: Array, scheduled: Array) -> Array:
+    """Return the displacements of a model that remembers what the inverse does."""
+    given, out = np.concatenate([pressures, scheduled])[np.newaxis], np.zeros((1, len(pressures)))
+    forward.bind(STEP, own, given, out)()
+    return out[0]
+
+
+@settings(max_examples=15, deadline=None)
+@given(balances(), st.integers(0, 1000), st.booleans())
+def test_model_and_inverse_match_at_every_step(balance: Balance, seed: int, wild: bool) -> None:
+    """Whatever is measured: of a muscle that drifts, or garbage, or nothing."""
+    block = Adaptive(Inverse(balance), 2.0, 0.05)
+    asked, n, loop = path(balance, seed, 120), len(balance.driven), Loop(block)
+    rng = np.random.default_rng(seed)
+    measured = asked[0, :n]
+    for sample in asked:
+        before = loop.own if loop.started else block.fixed.initial_state(sample)
+        pressures = loop.step(sample, measured)
+        found = answers(block.present(loop.state), before, pressures, sample[n:])
+        assert np.abs(found - sample[:n]).max() <= 1e-9 * 15.0
+        measured = 0.9 * sample[:n] + 1.0 + 0.05 * rng.standard_normal(n)
+        if wild:
+            measured = measured + rng.choice([0.0, 1e3, np.nan, -30.0], n)
+
+
+@settings(max_examples=15, deadline=None)
+@given(balances(), st.integers(0, 1000))
+def test_what_garbage_teaches_is_a_balance_still(balance: Balance, seed: int) -> None:
+    """`retaught` refuses what makes energy; areas outweigh friction, as the fitted ones do."""
+    block, n = Adaptive(Inverse(balance), 1.0, 0.05), len(balance.driven)
+    loop, rng = Loop(block), np.random.default_rng(seed)
+    for sample in path(balance, seed, 150):
+        loop.step(sample, rng.uniform(-100.0, 100.0, n))
+    forward = block.present(loop.state)
+    changed: Balance = forward.inverse()  # type: ignore[assignment]
+    for k in range(n):
+        most = balance.ratios[2 * k]
+        area = changed.areas[k][0] / balance.areas[k][0]
+        for new, old in zip(changed.friction[k], balance.friction[k], strict=True):
+            assert new <= old * area * most * (1 + 1e-12)
+    matrix = np.array(changed.springs)[:, 1 : 1 + n]
+    np.testing.assert_allclose(matrix, matrix.T, rtol=1e-12)
+    assert np.linalg.eigvalsh(matrix)[0] > 0
+
+
+@settings(max_examples=15, deadline=None)
+@given(balances(m=0, n_lags=0))
+def test_slopes_are_those_of_equilibria(balance: Balance) -> None:
+    """Against differences of equilibria of balances with other parameters, without friction."""
+    learner, n = balance, len(balance.driven)
+    theta, which = learner.taught, np.array([float(k * KINDS + i) for k, i in learner.learnt])
+    c = np.concatenate([balance.coefficients(STEP), np.zeros(balance.n_scratch)])
+    state, x = np.zeros(balance.n_states), np.full(len(balance.scheduled), 0.5)
+    y = np.linspace(8.0, 14.0, n)
+    state[:n] = y
+    p = np.array([pressed(c, k, state, AT_REST, y, x, np.zeros(n))[0] for k in range(n)])
+    terms, matrix = np.zeros((n, theta.size)), np.zeros((n, n))
+    slopes_of(c, state, which, theta, y, p, x, terms, matrix, np.zeros(n))
+    slopes = np.zeros((n, theta.size))
+    for k in range(n):
+        answer(terms, matrix, k, np.zeros(n + n * n), slopes[k])
+    still = replace(balance, damping=n * (0.0,), lines=(), mass=())
+    for i, scale in enumerate(learner.scales):
+        h = 1e-6 * scale * np.eye(theta.size)[i]
+        low, high = (
+            answers(still.retaught(theta + sign * h), state.copy(), p, x) for sign in (-1.0, 1.0)
+        )
+        expected = (high - low) / (2e-6 * scale)
+        np.testing.assert_allclose(slopes[:, i], expected, rtol=1e-5, atol=1e-6 * np.ptp(y) + 1e-6)
+
+
+@settings(max_examples=20, deadline=None)
+@given(balances(), st.integers(0, 1000))
+def test_retuned_coefficients_are_those_of_the_block_retaught(balance: Balance, seed: int) -> None:
+    rng, taught = np.random.default_rng(seed), balance.taught
+    theta = taught + rng.uniform(-0.3, 0.3, taught.size) * balance.scales
+    fitted = balance.coefficients(STEP)
+    found = fitted.copy()
+    which = np.array([float(k * KINDS + kind) for k, kind in balance.learnt])
+    retune(fitted, which, theta, found)
+    changed: Balance = balance.retaught(theta).inverse()  # type: ignore[assignment]
+    np.testing.assert_allclose(found, changed.coefficients(STEP), rtol=1e-12, atol=1e-12)
+
+
+def changed_by(balance: Balance, kind: int, factor: float) -> Any:
+    """Return the forward block of a balance one kind of whose factors is another."""
+    kinds = np.array([one for _, one in balance.learnt])
+    return balance.retaught(np.where(kinds == kind, factor, balance.taught))
+
+
+def followed(block: Adaptive, plant: Any, n: int, noise: float = 0.02) -> tuple[Loop, Array]:
+    """Return a loop after it drove a plant, and errors, shape (n, muscles)."""
+    balance: Balance = block.learner  # type: ignore[assignment]
+    loop, muscles = Loop(block), len(balance.driven)
+    t = STEP * np.arange(n)
+    waves = [14.0 + 9.0 * np.sin((1.0 + 0.37 * k) * t) * np.sin(0.13 * t) for k in range(muscles)]
+    held = [np.full(n, 1.0) for _ in balance.scheduled]
+    asked, rng = np.column_stack([*waves, *held]), np.random.default_rng(0)
+    state = plant.initial_state(np.zeros(len(plant.inputs)))
+    measured, errors = asked[0, :muscles], np.zeros((n, muscles))
+    for k, sample in enumerate(asked):
+        pressures = loop.step(sample, measured)
+        given, out = np.concatenate([pressures, sample[muscles:]]), np.zeros((1, muscles))
+        plant.bind(STEP, state, given[np.newaxis], out)()
+        errors[k] = out[0] - sample[:muscles]
+        measured = out[0] + noise * rng.standard_normal(muscles)
+    return loop, errors
+
+
+def single() -> Balance:
+    """Return one muscle that has come to rest."""
+    return Balance(
+        springs=((0.5, 0.15),),
+        elasticity=((0.4, 0.2),),
+        areas=((1.0, -0.4, 0.02),),
+        friction=((0.1, 0.06, 0.03),),
+        relaxation=((0.01,),),
+        loads=((),),
+        damping=(0.001,),
+        walls=(0.0,),
+        limits=(0.05, 0.3, 1.2),
+        grip=0.5,
+        lags=(2.0,),
+        hull=((0.0, 30.0),),
+        scale=30.0,
+        degree=1,
+        driven=Balance.example().driven[:1],
+        scheduled=(),
+        given=Balance.example().given[:1],
+        settled=True,
+    )
+
+
+def test_softer_springs_are_made_up_for_and_told() -> None:
+    balance = single()
+    block = Adaptive(Inverse(balance), 20.0, 0.02)
+    loop, errors = followed(block, changed_by(balance, STIFFNESS, 0.85), 4000)
+    fixed = np.abs(errors[:200]).max()
+    assert np.sqrt((errors[-1000:] ** 2).mean()) < 0.05 * fixed
+    drift = block.drift(loop.state)
+    told = dict(zip((g.name for g in drift.groups), drift.changes, strict=True))
+    assert told["springs"] == pytest.approx(-0.15, abs=0.03)
+    assert drift.alarm
+    assert "springs" in str(drift)
+    assert "softer" in str(drift)
+    assert "friction unchanged" in str(drift) or "friction" in str(drift).split("; ")[-1]
+
+
+def test_more_friction_is_learnt_as_friction() -> None:
+    balance = single()
+    block = Adaptive(Inverse(balance), 20.0, 0.02)
+    loop, _ = followed(block, changed_by(balance, FRICTION, 1.3), 4000)
+    changes = block.drift(loop.state).changes
+    assert changes[2] == pytest.approx(0.3, abs=0.06)
+    assert abs(changes[0]) < 0.03
+
+
+def test_several_muscles_learn_together() -> None:
+    balance = replace(Balance.example(), settled=True)
+    block = Adaptive(Inverse(balance), 10.0, 0.02)
+    plant = changed_by(balance, STIFFNESS, 0.9)
+    _, errors = followed(block, plant, 3000)
+    assert (np.sqrt((errors[-1000:] ** 2).mean(axis=0)) < 0.02).all()
+    assert np.abs(errors[:20]).max() > 0.3
+
+
+def test_without_drift_it_is_as_good_as_fixed() -> None:
+    balance = single()
+    _, errors = followed(Adaptive(Inverse(balance), 20.0, 0.02), balance.inverse(), 4000)
+    assert np.sqrt((errors**2).mean()) < 0.01
+
+
+@pytest.mark.parametrize("fault", [np.nan, 12.0])
+def test_a_sensor_that_drops_out_or_stands_still_teaches_nothing(fault: float) -> None:
+    balance = single()
+    loop = Loop(Adaptive(Inverse(balance), 20.0, 0.02))
+    asked = path(balance, 3, 400)
+    loop.step(asked[0], np.array([fault]))
+    loop.step(asked[1], np.array([fault]))
+    for sample in asked[2:]:
+        loop.step(sample, np.array([fault]))
+    theta = loop.block._split(loop.state)[1]
+    np.testing.assert_allclose(theta, balance.taught, atol=0.02)
+
+
+def test_it_goes_on_where_it_was_stopped() -> None:
+    balance = single()
+    block, asked = Adaptive(Inverse(balance), 5.0, 0.02), path(balance, 5, 200)
+    whole, first = Loop(block), Loop(block)
+    straight = [whole.step(s, 0.95 * s) for s in asked]
+    for sample in asked[:100]:
+        first.step(sample, 0.95 * sample)
+    second = Loop(block.resumed(first.state))
+    again = [second.step(s, 0.95 * s) for s in asked[100:]]
+    np.testing.assert_array_equal(straight[100:], again)
+
+
+def test_what_is_told_of_an_area_needs_a_load() -> None:
+    """A muscle alone, without a load that is measured: forces are known but for their unit."""
+    assert all(kind != 2 for _, kind in single().learnt)
+    loaded = Balance.example()
+    assert {(0, 2), (1, 2)} <= set(loaded.learnt)
+
+
+def test_a_balance_learns_as_a_compensator_only() -> None:
+    with pytest.raises(ModelError, match="does not learn"):
+        Adaptive(single(), 20.0, 0.02)
+
+
+@needs("cc")
+@pytest.mark.parametrize("single_precision", [False, True])
+@pytest.mark.parametrize("change", [{}, {"pushes": (8.0, 2.0)}, {"settled": True, "tare": True}])
+def test_c_gives_the_same_numbers(
+    change: dict[str, Any], single_precision: bool, tmp_path: Path
+) -> None:
+    from mckibben.export import export_c
+    from mckibben.export.c.building import CompiledModel
+
+    balance = replace(Balance.example(), **change)
+    block, rng = Adaptive(Inverse(balance), 5.0, 0.1), np.random.default_rng(1)
+    asked = path(balance, 4, 2000)
+    measured = 0.95 * asked[:, :2] + 1.0 + 0.1 * rng.standard_normal((2000, 2))
+    measured = np.vstack([measured[:1], measured[:-1]])
+    measured[700] *= 3.0
+    measured[1000:1030] = measured[1000]
+    inputs = np.hstack([asked, measured])
+    if single_precision:
+        inputs = inputs.astype(np.float32).astype(np.float64)
+    export_c(block, tmp_path / "c", name="muscle", sample_time=STEP, single=single_precision)
+    outputs, statuses = CompiledModel(tmp_path / "c", "muscle", 6, 2).run(inputs)
+    assert not statuses.any()
+    expected = block.simulate(inputs, sample_time=STEP)
+    far = np.abs(outputs - expected) / np.ptp(expected, axis=0)
+    assert far.max() <= (1e-4 if single_precision else 1e-12)
+    kinds = np.array([kind for _, kind in balance.learnt])
+    assert (kinds == OFFSET).sum() == 2

@@ -1,0 +1,95 @@
+"""A rig that changes while it runs: its physics is the rig's, at every moment."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from mckibben.control.drifting import Drift, Drifting
+from mckibben.errors import DataError, ModelError
+from mckibben.rigs import load_rig
+
+RIG = load_rig("mas20-hanging").changed(
+    {"sensor.pressure.noise": 0.0, "sensor.displacement.noise": 0.0, "sample_time": 0.02}
+)
+
+
+def pressures(n: int) -> list[float]:
+    return [2.5 + 1.5 * float(np.sin(0.05 * k) * np.sin(0.013 * k)) for k in range(n)]
+
+
+def test_nothing_drifts_until_it_begins() -> None:
+    plain, drifting = RIG.changed({}), Drifting(RIG, [Drift("stiffness", 0.8, start=1.0)])
+    assert np.array_equal(plain.reset(3), drifting.reset(3))
+    for p in pressures(50):
+        assert np.array_equal(plain.step([p]), drifting.step([p]))
+    assert not np.array_equal(plain.step([3.0]), drifting.step([3.0]))
+
+
+@pytest.mark.parametrize("group", ["stiffness", "friction"])
+def test_from_the_start_it_is_the_aged_rig_but_for_the_tare(group: str) -> None:
+    """Changed at rest, it forgets within the run what it was: the tare alone differs."""
+    drifting = Drifting(RIG, [Drift(group, 0.8)])
+    drifting.reset()
+    aged = RIG.aged({group: 0.8}).changed({})  # changed forgets where it ran
+    aged.reset()
+    levels = [1.0] * 200 + [5.5] * 200 + pressures(300)
+    found = np.array([[drifting.step([p])[1], aged.step([p])[1]] for p in levels])[400:]
+    found -= found.mean(axis=0)
+    np.testing.assert_allclose(found[:, 0], found[:, 1], atol=0.04)  # of 20 mm; creep fades
+
+
+def test_a_step_keeps_where_the_muscle_is() -> None:
+    """No time passes at a change: the next measurement is of the same muscle, moved a little."""
+    drifting = Drifting(RIG, [Drift("friction", 0.5, start=2.0)])
+    drifting.reset()
+    found = np.array([drifting.step([3.0])[1] for _ in range(200)])
+    assert abs(found[100] - found[99]) < 1.0 < found[99]
+    assert drifting.factors == {"stiffness": 1.0, "friction": 0.5, "gain": 1.0}
+
+
+def test_gain_is_the_calibration_of_pressure() -> None:
+    """Commands and measurements are both in what the drifted sensor calls a bar."""
+    exact = RIG.changed({"sensor.pressure.resolution": 0.0})
+    plain, drifting = exact.changed({}), Drifting(exact, [Drift("gain", 0.9)])
+    plain.reset()
+    drifting.reset()
+    for p in pressures(60):
+        true, shown = plain.step([0.9 * p]), drifting.step({"pressure": p})
+        np.testing.assert_allclose(shown, [true[0] / 0.9, true[1]], rtol=1e-12)
+
+
+def test_softer_muscles_shorten_further() -> None:
+    drifting = Drifting(RIG, [Drift("stiffness", 0.7, start=10.0, over=10.0)])
+    drifting.reset()
+    found = np.array([drifting.step([4.0])[1] for _ in range(1250)])
+    assert found[1000:].min() > found[499] + 0.3
+    assert (np.diff(found[500:1000:50]) > 0).all()
+
+
+def test_drifts_of_a_group_multiply_and_reset_makes_new() -> None:
+    drifting = Drifting(RIG, [Drift("gain", 0.9), Drift("gain", 1.1, start=0.1, over=0.1)])
+    first = drifting.reset(1)
+    for _ in range(20):
+        drifting.step([2.0])
+    assert drifting.factors["gain"] == pytest.approx(0.99)
+    assert np.array_equal(drifting.reset(1), first)
+    assert drifting.factors["gain"] == 0.9
+
+
+def test_an_arm_ages_in_all_its_muscles() -> None:
+    arm = load_rig("soft-arm")
+    aged = arm.aged({"stiffness": 0.5})
+    assert (aged.muscle.c10, aged.extensor.c10) == (arm.muscle.c10 / 2, arm.extensor.c10 / 2)  # type: ignore[attr-defined]
+    assert aged.muscle.friction == arm.muscle.friction  # type: ignore[attr-defined]
+
+
+def test_refusals() -> None:
+    with pytest.raises(ModelError, match="no group 'colour'"):
+        Drift("colour", 0.9)
+    with pytest.raises(ModelError, match="no drift"):
+        Drift("gain", 0.0)
+    with pytest.raises(ModelError, match="times from 0"):
+        Drift("gain", 0.9, start=-1.0)
+    with pytest.raises(DataError, match="do not age in 'gain'"):
+        RIG.aged({"gain": 0.9})

@@ -70,6 +70,7 @@ def track(
     from mckibben.blocks.coupled.known import beyond_known
     from mckibben.blocks.feedback.feedforward_feedback import FeedforwardFeedback
     from mckibben.control import control_law, dead_time_undone, tune_pid
+    from mckibben.control.preview import samples_foreseen
     from mckibben.control import track as close
     from mckibben.files import write
     from mckibben.outputs import claim_model, claim_recording
@@ -103,6 +104,7 @@ def track(
                 "Remedy: leave out --controller-out, or use a compensator, PID, or both together."
             )
         ahead = dead_time_undone(block) if preview is None else preview
+        ahead += samples_foreseen(block) * step
         if controller_out is not None and isinstance(chosen, FeedforwardFeedback) and ahead > step:
             raise ModelError(
                 f"a block has one reference, but compensator and feedback get it {ahead:g} s apart. "

@@ -10,6 +10,8 @@ grows with the horizon only as its length.
 
 from __future__ import annotations
 
+import numpy as np
+
 from mckibben.arrays import Array
 from mckibben.blocks.core.kernels import kernel
 from mckibben.blocks.predictive.supply import weighed
@@ -20,8 +22,8 @@ MOST_STEPS = 30
 CLOSED = 1e-11
 """Gap between primal and dual, over the mean squared slope [bar^2], that counts as none."""
 
-ROOM = 0.1
-"""Least room that limits are given at the start [bar]."""
+ROOM = 0.3
+"""Least room that limits are given at the start [bar], and their price."""
 
 
 @kernel
@@ -221,7 +223,7 @@ def plan(
         for i in range(m):
             left = rows[i, 1] - weighed(rows[i], before if t == 0 else p[t - 1], p[t])
             room[t, i] = max(left, ROOM)
-            price[t, i] = 0.1 * ROOM
+            price[t, i] = ROOM
     for taken in range(MOST_STEPS):
         gap = 0.0
         amiss = 0.0
@@ -260,9 +262,13 @@ def plan(
             for i in range(m):
                 goal[t, i] = (centre - room_step[t, i] * price_step[t, i]) / room[t, i]
         moved(rows, factors, off, right, step, room, price, goal, room_step, price_step, short, work)
-        share = min(1.0, 0.995 * furthest(room, room_step))
-        dear = min(1.0, 0.995 * furthest(price, price_step))
-        share = min(share, dear)
+        share = 0.99 * min(furthest(room, room_step), furthest(price, price_step))
+        size = 0.0
+        for t in range(length):
+            for k in range(n):
+                size += abs(step[t, k])
+        if not size < np.inf:  # as near as rounding lets it come
+            return taken
         for t in range(length):
             for k in range(n):
                 p[t, k] += share * step[t, k]

@@ -42,6 +42,9 @@ PASSES = 2
 NUDGE = 1e-3
 """Of the pressure range: by how much pressures are moved to see the model's slope."""
 
+STILL = 0.1
+"""Of that: what moves less counts as going on as before."""
+
 Limit = Annotated[FiniteFloat, Gt(0)]
 
 
@@ -62,10 +65,9 @@ class Predictive(Block):
     total_limit : float, optional
         Highest sum of all pressures [bar].
     flow_limit : float, optional
-        Most air that the supply gives, sum of volumes by rates of the pressures that rise [bar/s, by the
-        unit of ``volumes``].
+        Most air that the supply gives: rates of all pressures that rise, by volumes, together [bar/s].
     volumes : sequence of n float
-        Of muscles, in any unit, positive; 1 each by default.
+        Of muscles, relative to one another, positive; 1 each by default.
     """
 
     kind: ClassVar[str] = "predictive"
@@ -78,7 +80,7 @@ class Predictive(Block):
         r"\sum_k p_{k,t} \le S,\quad \sum_k V_k \max(p_{k,t} - p_{k,t-1}, 0) \le Q T",
         rate_limit=r"\rho [bar/s]",
         total_limit="S [bar]",
-        flow_limit="Q",
+        flow_limit="Q [bar/s]",
         volumes="V_k",
     )
 
@@ -178,7 +180,7 @@ class Predictive(Block):
         tried = 3 * self.model.n_states + self.model.n_scratch
         tried += self.compensator.n_states + self.compensator.n_scratch
         planned = plan_scratch(length, n, len(self.rows(1.0)))
-        return tried + len(self.inputs) + 3 * n + length * n * (5 + n) + planned
+        return tried + len(self.inputs) + 3 * n + length * n * (4 + n) + planned
 
     def c_numbers(self, sample_time: float | None) -> Array:
         """Return what the C reads, as its header says.
@@ -212,7 +214,7 @@ class Predictive(Block):
         """Return that of the inverse over the horizon; at worst, of all plans too."""
         n, length = len(self.outputs), self.horizon
         inverse = self.compensator.cost(sample_time).usual
-        answers = PASSES * (n + 2) * self.model.cost(sample_time).usual
+        answers = PASSES * (n + 1) * self.model.cost(sample_time).usual
         planned = PASSES * MOST_STEPS * (2 * n**3 + len(self.rows(1.0)) * (4 * n * n + 12 * n + 20))
         return Cost(length * inverse, length * (inverse + answers + planned))
 
@@ -270,11 +272,11 @@ class _Horizon:
             self.before[:] = self.inverted[0]
             allowed(self.rows[self.rows[:, 0] == 0.0], self.lowest, self.before)
             self.started[0] = 1.0
-        best = self.inverted.copy()
-        if not self._kept_to(best):
-            best = self._planned(best)
+        pressures = self.inverted.copy()
+        if not self._kept_to(pressures):
+            pressures = self._planned()
             self.planned[0] += 1.0
-        self.before[:] = best[0]
+        self.before[:] = pressures[0]
         self.trial[:] = self.memory
         self._answered(self.before)
         self.memory[:] = self.trial
@@ -288,48 +290,30 @@ class _Horizon:
             before = row
         return there
 
-    def _planned(self, clipped: Array) -> Array:
-        """Return the best of the clipped inverse and of plans, as the model sees them."""
-        best, least = clipped, self._cost(clipped)
-        nominal = self.inverted
+    def _planned(self) -> Array:
+        """Return the pressures of a horizon that come nearest to the references, within limits."""
+        pressures = self.inverted
         for _ in range(PASSES):
-            self._linearised(nominal)
-            nominal = nominal.copy()
-            plan(
-                self.rows,
-                self.before,
-                self.slopes.reshape(-1),
-                nominal,
-                self.errors,
-                self.planning,
-                self.scratch,
-            )
-            nominal = self.planning.copy()
-            self._kept_to(nominal)
-            cost = self._cost(nominal)
-            if cost < least:
-                best, least = nominal, cost
-        return best
+            self._linearised(pressures)
+            slopes = self.slopes.reshape(-1)
+            given = (self.rows, self.before, slopes, pressures, self.errors)
+            plan(*given, self.planning, self.scratch)
+            pressures = self.planning.copy()
+            self._kept_to(pressures)
+        return pressures
 
     def _answered(self, pressures: Array) -> Array:
         self.driven[0, : self.n] = pressures
         self.answers()
         return self.answer[0]
 
-    def _cost(self, pressures: Array) -> float:
-        """Return the squared error that the model predicts of a horizon."""
-        self.trial[:] = self.memory
-        total = 0.0
-        for row, wished in zip(pressures, self.wished, strict=True):
-            total += float(np.sum((wished - self._answered(row)) ** 2))
-        return total
-
     def _linearised(self, pressures: Array) -> None:
         """Find the errors along pressures, and the model's slopes where the motion goes on."""
         way, before = np.ones(self.n), self.before
         self.kept[:] = self.memory
         for t, row in enumerate(pressures):
-            way = np.where(row > before, 1.0, np.where(row < before, -1.0, way))
+            moved = row - before
+            way = np.where(np.abs(moved) > STILL * self.nudges, np.sign(moved), way)
             self.trial[:] = self.kept
             answer = self._answered(row).copy()
             after = self.trial.copy()

@@ -3,9 +3,9 @@
 #include "supply.h"
 
 #define MOST_STEPS 30
-#define CLOSED MCK_EITHER(1e-11, 1e-8)
+#define CLOSED MCK_EITHER(1e-11, 1e-7)
 #define STAYING MCK_EITHER(1e-9, 1e-6)
-#define ROOM MCK_R(0.1)
+#define ROOM MCK_R(0.3)
 
 typedef struct {
     int length;
@@ -241,7 +241,7 @@ static void begin(const horizon *h, const mck_real *slopes, const mck_real *nomi
             const mck_real *row = h->rows + i * (n + 2);
             const mck_real *last = t == 0 ? h->before : p + (t - 1) * n;
             h->room[t * h->m + i] = mck_max(row[1] - mck_weighed(n, row, last, p + t * n), ROOM);
-            h->price[t * h->m + i] = MCK_R(0.1) * ROOM;
+            h->price[t * h->m + i] = ROOM;
         }
     }
 }
@@ -280,8 +280,9 @@ static int lack(const horizon *h, const mck_real *p, mck_real *gap)
     return *gap <= CLOSED && amiss * amiss <= CLOSED;
 }
 
-/* One step of Mehrotra's: where a step to no gap at all would lead, then one that aims for less. */
-static void advance(const horizon *h, mck_real gap, mck_real *p)
+/* One step of Mehrotra's: where a step to no gap at all would lead, then one that aims for less; returns
+ * 0 where rounding leaves none. */
+static int advance(const horizon *h, mck_real gap, mck_real *p)
 {
     const int count = h->length * h->m;
     factor(h);
@@ -303,7 +304,14 @@ static void advance(const horizon *h, mck_real gap, mck_real *p)
     move(h);
     share = mck_min(furthest(count, h->room, h->room_step),
                     furthest(count, h->price, h->price_step));
-    share = mck_min(MCK_R(1.0), MCK_R(0.995) * share);
+    share *= MCK_R(0.99);
+    mck_real size = MCK_R(0.0);
+    for (int i = 0; i < h->length * h->n; i++) {
+        size += mck_abs(h->step[i]);
+    }
+    if (!(size < MCK_INFINITY)) { /* as near as rounding lets it come */
+        return 0;
+    }
     for (int i = 0; i < h->length * h->n; i++) {
         p[i] += share * h->step[i];
     }
@@ -311,6 +319,7 @@ static void advance(const horizon *h, mck_real gap, mck_real *p)
         h->room[i] += share * h->room_step[i];
         h->price[i] += share * h->price_step[i];
     }
+    return 1;
 }
 
 int mck_plan(int length, int n, int n_rows, const mck_real *rows, const mck_real *before,
@@ -341,8 +350,7 @@ int mck_plan(int length, int n, int n_rows, const mck_real *rows, const mck_real
     begin(&h, slopes, nominal, errors, p);
     int taken = 0;
     mck_real gap;
-    while (taken < MOST_STEPS && !lack(&h, p, &gap)) {
-        advance(&h, gap, p);
+    while (taken < MOST_STEPS && !lack(&h, p, &gap) && advance(&h, gap, p)) {
         taken++;
     }
     return taken;

@@ -7,6 +7,7 @@
 #include "supply.h"
 
 #define HEAD 11
+#define STILL MCK_R(0.1)
 #define PI_MODEL 0
 #define GPI_MODEL 1
 
@@ -50,7 +51,6 @@ typedef struct {
     mck_real *given;    /* inputs of the model or its inverse */
     mck_real *nudged;   /* pressures, and what they give */
     mck_real *inverted; /* pressures of the horizon: of the inverse, */
-    mck_real *best;     /* the best so far, */
     mck_real *nominal;  /* those that a plan is made along, */
     mck_real *next;     /* and the plan */
     mck_real *errors;
@@ -102,8 +102,7 @@ static planner planner_of(const mck_part *part, mck_real *state)
     f.given = f.after + f.n_memory;
     f.nudged = f.given + part->n_inputs;
     f.inverted = f.nudged + 3 * f.n;
-    f.best = f.inverted + count;
-    f.nominal = f.best + count;
+    f.nominal = f.inverted + count;
     f.next = f.nominal + count;
     f.errors = f.next + count;
     f.slopes = f.errors + count;
@@ -147,29 +146,12 @@ static int kept_to(const planner *f, mck_real *pressures)
     return there;
 }
 
-/* The squared error that the model predicts. */
-static mck_real cost(const planner *f, const mck_real *pressures)
-{
-    mck_real total = MCK_R(0.0);
-    copy(f->n_memory, f->memory, f->trial);
-    for (int t = 0; t < f->length; t++) {
-        mck_real *given = f->nudged + f->n;
-        answer(f, pressures + t * f->n, given);
-        for (int k = 0; k < f->n; k++) {
-            const mck_real off = f->wished[t * f->n + k] - given[k];
-            total += off * off;
-        }
-    }
-    return total;
-}
-
 /* Errors along pressures, and the model's slopes where the motion goes on. */
 static void linearise(const planner *f, const mck_real *pressures)
 {
     const int n = f->n;
     mck_real *given = f->nudged + n;
     mck_real *then = given + n;
-    mck_real ways = MCK_R(1.0);
     copy(f->n_memory, f->memory, f->kept);
     for (int t = 0; t < f->length; t++) {
         const mck_real *row = pressures + t * n;
@@ -178,11 +160,10 @@ static void linearise(const planner *f, const mck_real *pressures)
         copy(f->n_memory, f->trial, f->after);
         for (int k = 0; k < n; k++) {
             mck_real way = MCK_R(0.0); /* that of the last change */
-            for (int s = t; s >= 0 && !(way < MCK_R(0.0)) && !(way > MCK_R(0.0)); s--) {
+            for (int s = t; s >= 0 && !(mck_abs(way) > STILL * f->nudges[k]); s--) {
                 way = pressures[s * n + k] - (s > 0 ? pressures[(s - 1) * n + k] : f->before[k]);
             }
-            ways = way < MCK_R(0.0) ? MCK_R(-1.0) : MCK_R(1.0);
-            const mck_real nudge = ways * f->nudges[k];
+            const mck_real nudge = way < -STILL * f->nudges[k] ? -f->nudges[k] : f->nudges[k];
             copy(n, row, f->nudged);
             f->nudged[k] += nudge;
             copy(f->n_memory, f->kept, f->trial);
@@ -198,23 +179,18 @@ static void linearise(const planner *f, const mck_real *pressures)
     }
 }
 
-/* Leave in `best` the best of the clipped inverse and of plans, as the model sees them. */
+/* Leave in `next` the pressures of the horizon that come nearest to the references, within limits. */
 static void choose(const planner *f)
 {
-    const int count = f->length * f->n;
-    mck_real least = cost(f, f->best);
-    copy(count, f->inverted, f->nominal);
+    copy(f->length * f->n, f->inverted, f->nominal);
     for (int pass = 0; pass < f->passes; pass++) {
+        if (pass > 0) {
+            copy(f->length * f->n, f->next, f->nominal);
+        }
         linearise(f, f->nominal);
         (void)mck_plan(f->length, f->n, f->n_rows, f->rows, f->before, f->slopes, f->nominal,
                        f->errors, f->next, f->scratch);
         (void)kept_to(f, f->next);
-        copy(count, f->next, f->nominal);
-        const mck_real found = cost(f, f->next);
-        if (found < least) {
-            least = found;
-            copy(count, f->next, f->best);
-        }
     }
 }
 
@@ -252,12 +228,12 @@ void mck_predictive_step(const mck_part *part, mck_real *state, const mck_real *
         }
         *f.started = MCK_R(1.0);
     }
-    copy(f.length * n, f.inverted, f.best);
-    if (!kept_to(&f, f.best)) {
+    copy(f.length * n, f.inverted, f.next);
+    if (!kept_to(&f, f.next)) {
         choose(&f);
         *f.planned += MCK_R(1.0);
     }
-    copy(n, f.best, f.before);
+    copy(n, f.next, f.before);
     copy(f.n_memory, f.memory, f.trial);
     answer(&f, f.before, f.nudged + n);
     copy(f.n_memory, f.trial, f.memory);

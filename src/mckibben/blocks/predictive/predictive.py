@@ -33,6 +33,7 @@ from mckibben.blocks.play_type.gpi import GPI
 from mckibben.blocks.play_type.pi import PI
 from mckibben.blocks.predictive.memory import memory_of, undoing
 from mckibben.blocks.predictive.plan import MOST_STEPS, plan, plan_scratch
+from mckibben.blocks.predictive.plan_one import one_scratch, plan_one
 from mckibben.blocks.predictive.supply import allowed, limit_rows
 from mckibben.errors import ModelError
 
@@ -179,7 +180,7 @@ class Predictive(Block):
         n, length = len(self.outputs), self.horizon
         tried = 3 * self.model.n_states + self.model.n_scratch
         tried += self.compensator.n_states + self.compensator.n_scratch
-        planned = plan_scratch(length, n, len(self.rows(1.0)))
+        planned = one_scratch(length) if n == 1 else plan_scratch(length, n, len(self.rows(1.0)))
         return tried + len(self.inputs) + 3 * n + length * n * (4 + n) + planned
 
     def c_numbers(self, sample_time: float | None) -> Array:
@@ -215,7 +216,8 @@ class Predictive(Block):
         n, length = len(self.outputs), self.horizon
         inverse = self.compensator.cost(sample_time).usual
         answers = PASSES * (n + 1) * self.model.cost(sample_time).usual
-        planned = PASSES * MOST_STEPS * (2 * n**3 + len(self.rows(1.0)) * (4 * n * n + 12 * n + 20))
+        step = 2 * n**3 + len(self.rows(1.0)) * (4 * n * n + 12 * n + 20)
+        planned = PASSES * (4 * length if n == 1 else MOST_STEPS * step)
         return Cost(length * inverse, length * (inverse + answers + planned))
 
     def bind(self, sample_time: float | None, state: Array, inputs: Array, outputs: Array) -> Run:
@@ -257,7 +259,8 @@ class _Horizon:
         self.answers = model.bind(sample_time, self.trial, self.driven, self.answer)
         self.slopes = np.empty((length, n, n))
         self.errors, self.planning = np.empty((2, length, n))
-        self.scratch = np.empty(plan_scratch(length, n, len(self.rows)))
+        needed = one_scratch(length) if n == 1 else plan_scratch(length, n, len(self.rows))
+        self.scratch = np.empty(needed)
 
     def step(self, inputs: Array) -> Array:
         """Return the pressures of a sample, shape (n,), and take the step."""
@@ -297,7 +300,7 @@ class _Horizon:
             self._linearised(pressures)
             slopes = self.slopes.reshape(-1)
             given = (self.rows, self.before, slopes, pressures, self.errors)
-            plan(*given, self.planning, self.scratch)
+            (plan_one if self.n == 1 else plan)(*given, self.planning, self.scratch)
             pressures = self.planning.copy()
             self._kept_to(pressures)
         return pressures

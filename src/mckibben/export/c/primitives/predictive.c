@@ -4,6 +4,7 @@
 #include "gpi.h"
 #include "pi.h"
 #include "plan.h"
+#include "plan_one.h"
 #include "supply.h"
 
 #define HEAD 11
@@ -188,8 +189,13 @@ static void choose(const planner *f)
             copy(f->length * f->n, f->next, f->nominal);
         }
         linearise(f, f->nominal);
-        (void)mck_plan(f->length, f->n, f->n_rows, f->rows, f->before, f->slopes, f->nominal,
-                       f->errors, f->next, f->scratch);
+        if (f->n == 1) {
+            mck_plan_one(f->length, f->n_rows, f->rows, f->before[0], f->slopes, f->nominal,
+                         f->errors, f->next, f->scratch);
+        } else {
+            (void)mck_plan(f->length, f->n, f->n_rows, f->rows, f->before, f->slopes, f->nominal,
+                           f->errors, f->next, f->scratch);
+        }
         (void)kept_to(f, f->next);
     }
 }

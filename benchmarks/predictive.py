@@ -28,6 +28,7 @@ from mckibben.blocks.coupled.balance import Balance
 from mckibben.blocks.play_type.gpi import GPI
 from mckibben.blocks.play_type.pi import PI
 from mckibben.blocks.predictive.plan import plan, plan_scratch
+from mckibben.blocks.predictive.plan_one import plan_one
 from mckibben.blocks.predictive.predictive import Predictive
 from mckibben.blocks.predictive.supply import allowed, limit_rows
 from mckibben.control import track
@@ -47,7 +48,9 @@ def wander(rng: np.random.Generator, n: int, low: float, high: float, width: flo
     return np.asarray(low + (high - low) * (0.5 + 0.5 * np.tanh(0.8 * noise / noise.std())))
 
 
-def followed(inverse: Block, references: Array, horizon: int, **limits: float) -> tuple[Array, float]:
+def followed(
+    inverse: Block, references: Array, horizon: int, **limits: float
+) -> tuple[Array, float]:
     """Return what the model makes of a plan's pressures, and the share of samples planned."""
     block = Predictive(inverse, horizon=horizon, **limits)  # type: ignore[arg-type]
     n = len(block.outputs)
@@ -80,7 +83,9 @@ def clipped(inverse: Block, references: Array, **limits: float) -> Array:
 
 def in_the_model() -> None:
     print("\n## In the model\n")
-    print("| model | limits | planned | clipped inverse | clipped, memory kept | ahead over clipped |")
+    print(
+        "| model | limits | planned | clipped inverse | clipped, memory kept | ahead over clipped |"
+    )
     print("|---|---|---:|---:|---:|---:|")
     for name, inverse, scheduled, limits in cases():
         ratios: list[float] = []
@@ -137,7 +142,9 @@ def on_rigs() -> None:
         rng = np.random.default_rng(1)
         train = rig.run(recorded(wander(rng, 4000, 0.5, 5.0, 30), step), seed=1)
         for kind in ("gpi", "mpi", "balance"):
-            model = load("estimators", kind)().fit([train.select(["pressure", "displacement"])]).model_
+            model = (
+                load("estimators", kind)().fit([train.select(["pressure", "displacement"])]).model_
+            )
             for rate in (6.0, 3.0):
                 rows = []
                 for seed in SEEDS:
@@ -183,9 +190,10 @@ def solvers() -> None:
             before = np.clip(nominal[0] + 0.1, 0.0, 2.4)
             found, scratch = nominal.copy(), np.zeros(plan_scratch(HORIZON, n, len(rows)))
             given = (rows, before, slopes.reshape(-1), nominal, np.zeros_like(nominal))
-            plan(*given, found, scratch)
+            solve_ours = plan_one if n == 1 else plan
+            solve_ours(*given, found, scratch)
             started = time.perf_counter()
-            steps.append(plan(*given, found, scratch))
+            steps.append(solve_ours(*given, found, scratch) or 0)  # type: ignore[func-returns-value]
             times["ours"].append(time.perf_counter() - started)
             problem = dense(rows, before, slopes, nominal)
             for name, solve in (("daqp", by_daqp), ("osqp", by_osqp)):
@@ -220,7 +228,9 @@ def dense(rows: Array, before: Array, slopes: Array, nominal: Array) -> tuple[Ar
     return hessian, linear, table, bounds
 
 
-def by_daqp(hessian: Array, linear: Array, table: Array, bounds: Array) -> tuple[Array, float] | None:
+def by_daqp(
+    hessian: Array, linear: Array, table: Array, bounds: Array
+) -> tuple[Array, float] | None:
     try:
         import daqp
     except ImportError:
@@ -231,7 +241,9 @@ def by_daqp(hessian: Array, linear: Array, table: Array, bounds: Array) -> tuple
     return found[0], time.perf_counter() - started
 
 
-def by_osqp(hessian: Array, linear: Array, table: Array, bounds: Array) -> tuple[Array, float] | None:
+def by_osqp(
+    hessian: Array, linear: Array, table: Array, bounds: Array
+) -> tuple[Array, float] | None:
     try:
         import osqp
     except ImportError:
@@ -258,7 +270,8 @@ int main(void) {
     m_init(&model);
     for (int i = 0; i < n; i++) {
         double in[M_N_INPUTS], out[M_N_OUTPUTS];
-        for (int k = 0; k < M_N_INPUTS; k++) in[k] = LEVEL(k) + SWING(k) * sin(0.13 * i + k + sin(0.031 * i));
+        for (int k = 0; k < M_N_INPUTS; k++)
+            in[k] = LEVEL(k) + SWING(k) * sin(0.13 * i + k + sin(0.031 * i));
         struct timespec a, b;
         clock_gettime(CLOCK_THREAD_CPUTIME_ID, &a);
         m_step(&model, in, out);

@@ -70,8 +70,8 @@ def track(
     from mckibben.blocks.coupled.known import beyond_known
     from mckibben.blocks.feedback.feedforward_feedback import FeedforwardFeedback
     from mckibben.control import control_law, dead_time_undone, tune_pid
-    from mckibben.control.preview import samples_foreseen
     from mckibben.control import track as close
+    from mckibben.control.preview import samples_foreseen
     from mckibben.files import write
     from mckibben.outputs import claim_model, claim_recording
     from mckibben.rigs import load_rig

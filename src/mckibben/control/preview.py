@@ -16,6 +16,7 @@ from mckibben.blocks.predictive.predictive import Predictive
 from mckibben.errors import DataError, ModelError
 from mckibben.recording import Recording
 
+
 def samples_foreseen(compensator: Block) -> int:
     """Return by how many samples a compensator wants its reference ahead to plan with."""
     if isinstance(compensator, FeedforwardFeedback):

@@ -38,9 +38,7 @@ def memory_of(compensator: Block) -> Ways:
             turn = -1 if isinstance(compensator, Series) else 1
 
             def joined(state: Array) -> Array:
-                own = [
-                    way(share) for way, share in zip(ways, np.split(state, sizes), strict=True)
-                ]
+                own = [way(share) for way, share in zip(ways, np.split(state, sizes), strict=True)]
                 return np.concatenate(own[::turn])
 
             return joined
@@ -66,9 +64,7 @@ def undoing(compensator: Block) -> Ways:
 
             def joined(state: Array) -> Array:
                 shares = np.split(state, ends)[::turn]
-                return np.concatenate(
-                    [way(share) for way, share in zip(ways, shares, strict=True)]
-                )
+                return np.concatenate([way(share) for way, share in zip(ways, shares, strict=True)])
 
             return joined
     return np.copy

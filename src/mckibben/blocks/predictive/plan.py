@@ -1,6 +1,6 @@
 """The plan of a horizon: pressures of all muscles in so many samples, as near a wish as limits let.
 
-    min sum_t |G_t (p_t - q_t) - e_t|^2 / 2   where every row of `mckibben.blocks.predictive.supply` holds,
+    min sum_t |G_t (p_t - q_t) - e_t|^2 / 2   where rows of `mckibben.blocks.predictive.supply` hold.
 
 G_t (n by n) are the model's slopes along the pressures q_t, and e_t is what these leave of the error.
 It is solved by a primal-dual interior-point method with Mehrotra's predictor (Nocedal and Wright,
@@ -156,9 +156,7 @@ def moved(
         for i in range(rows.shape[0]):
             change = weighed(rows[i], none if t == 0 else step[t - 1], step[t])
             room_step[t, i] = -short[t, i] - change
-            price_step[t, i] = (
-                goal[t, i] - price[t, i] - price[t, i] / room[t, i] * room_step[t, i]
-            )
+            price_step[t, i] = goal[t, i] - price[t, i] - price[t, i] / room[t, i] * room_step[t, i]
 
 
 @kernel
@@ -248,7 +246,9 @@ def plan(
         for t in range(length):
             for i in range(m):
                 goal[t, i] = 0.0
-        moved(rows, factors, off, right, step, room, price, goal, room_step, price_step, short, work)
+        moved(
+            rows, factors, off, right, step, room, price, goal, room_step, price_step, short, work
+        )
         share, dear = furthest(room, room_step), furthest(price, price_step)
         then = 0.0
         for t in range(length):
@@ -261,7 +261,9 @@ def plan(
         for t in range(length):
             for i in range(m):
                 goal[t, i] = (centre - room_step[t, i] * price_step[t, i]) / room[t, i]
-        moved(rows, factors, off, right, step, room, price, goal, room_step, price_step, short, work)
+        moved(
+            rows, factors, off, right, step, room, price, goal, room_step, price_step, short, work
+        )
         share = 0.99 * min(furthest(room, room_step), furthest(price, price_step))
         size = 0.0
         for t in range(length):

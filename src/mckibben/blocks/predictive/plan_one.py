@@ -1,4 +1,4 @@
-"""The plan of a horizon for one muscle: exact, by dynamic programming, in a bounded number of operations.
+"""The plan of a horizon for one muscle: exact, by dynamic programming, in bounded time.
 
     V_t(p) = |g_t (p - q_t) - e_t|^2 / 2 + min V_{t+1}(p')   over   p - fall <= p' <= p + rise
 
@@ -91,7 +91,7 @@ def plan_one(
 def turned(
     count: int, x: Array, d: Array, low: float, high: float, best: Array, t: int
 ) -> tuple[int, float]:
-    """Find where the derivative passes 0, within the range; return the first knot beyond, and its value."""
+    """Find where the derivative passes 0, within the range; return the knot beyond, and the value."""
     place = 0
     while place < count and not d[place] > 0.0:
         place += 1

@@ -286,7 +286,7 @@ class _Horizon:
         return self.before
 
     def _kept_to(self, pressures: Array) -> bool:
-        """Clip pressures of a horizon to all limits, one after another; tell whether they kept to them."""
+        """Clip pressures of a horizon to all limits, in turn; tell whether they kept to them."""
         there, before = True, self.before
         for row in pressures:
             there = allowed(self.rows, before, row) and there

@@ -84,8 +84,7 @@ def test_limits_hold_always_and_looking_ahead_costs_less(name: str) -> None:
     inverse, references = motion(name, 160, seed=3)
     errors = {}
     for horizon in (1, 20):
-        limits = {"rate_limit": 14.0, "total_limit": 8.0, "flow_limit": 20.0}
-        block = Predictive(inverse, horizon=horizon, **limits)
+        block = Predictive(inverse, horizon, 14.0, total_limit=8.0, flow_limit=20.0)
         rows = block.rows(STEP)
         pressures = np.asarray(block.simulate(ahead(references, block), sample_time=STEP))
         for before, now in pairwise(pressures):
@@ -125,9 +124,14 @@ def test_plans_are_the_best_there_are(n: int) -> None:
             bound[0] += changes * (row[2:] @ before)
             bounds.append(bound)
         limits = LinearConstraint(np.vstack(tables), -np.inf, np.concatenate(bounds))
-        options = {"maxiter": 500, "ftol": 1e-12}
         start = np.tile(before, 6)
-        best = minimize(lost, start, method="SLSQP", constraints=[limits], options=options)
+        best = minimize(  # type: ignore[call-overload]
+            lost,
+            start,
+            method="SLSQP",
+            constraints=[limits],
+            options={"maxiter": 500, "ftol": 1e-12},
+        )
         found = nominal.copy()
         given = (rows, before, slopes.reshape(-1), nominal, errors, found)
         plan(*given, np.zeros(plan_scratch(6, n, len(rows))))

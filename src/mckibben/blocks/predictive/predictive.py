@@ -211,6 +211,13 @@ class Predictive(Block):
         head += [*map(len, own), *(block.n_scratch for block in blocks), PASSES]
         return np.concatenate([head, NUDGE * (high - low), low, rows.ravel(), *own])
 
+    @property
+    def needs_double(self) -> str:
+        """Of several muscles: their plan is solved for step by step, and would be off by 0.2 %."""
+        return "plans several muscles, for which single precision is too coarse" * (
+            len(self.outputs) > 1
+        )
+
     def cost(self, sample_time: float | None) -> Cost:
         """Return that of the inverse over the horizon; at worst, of all plans too."""
         n, length = len(self.outputs), self.horizon

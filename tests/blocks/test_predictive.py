@@ -125,7 +125,7 @@ def test_plans_are_the_best_there_are(n: int) -> None:
             bounds.append(bound)
         limits = LinearConstraint(np.vstack(tables), -np.inf, np.concatenate(bounds))
         start = np.tile(before, 6)
-        best = minimize(  # type: ignore[call-overload]
+        best = minimize(
             lost,
             start,
             method="SLSQP",

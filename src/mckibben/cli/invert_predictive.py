@@ -24,11 +24,11 @@ def write_predictive(
     as_json: bool,
 ) -> None:
     """Write a predictive compensator around an inverse, and say what it needs."""
-    from mckibben.blocks.predictive.predictive import Predictive
+    from mckibben.blocks.predictive.predictive import MOST, Predictive
 
     for name, value in (("rate-limit", rate), ("total-limit", total), ("flow-limit", flow)):
-        if value is not None and not 0 < value < float("inf"):
-            raise ModelError(f"--{name} is {value}. Remedy: give a positive number.")
+        if value is not None and not 0 < value <= MOST:
+            raise ModelError(f"--{name} is {value}. Remedy: give a positive number up to {MOST:g}.")
     if not 1 <= horizon <= 200:
         raise ModelError(f"--horizon is {horizon}. Remedy: give 1 to 200 samples.")
     if pressures is not None and not float("-inf") < pressures[0] < pressures[1] < float("inf"):

@@ -16,7 +16,7 @@ from functools import cached_property
 from typing import Annotated, ClassVar, Self
 
 import numpy as np
-from annotated_types import Gt, Interval
+from annotated_types import Gt, Interval, Le
 from pydantic import BeforeValidator, FiniteFloat, InstanceOf
 from pydantic.dataclasses import dataclass
 
@@ -46,7 +46,10 @@ NUDGE = 1e-3
 STILL = 0.1
 """Of that: what moves less counts as going on as before."""
 
-Limit = Annotated[FiniteFloat, Gt(0)]
+MOST = 1e6
+"""Of limits: bar, or bar/s."""
+
+Limit = Annotated[FiniteFloat, Gt(0), Le(MOST)]
 
 
 @dataclass(frozen=True, config=STRICT)

@@ -206,6 +206,11 @@ class Predictive(Block):
                     f"{self.compensator.title!r} cannot be run ahead in C. Remedy: export pi, gpi or "
                     "balance, or stream this one from Python."
                 )
+        if not isinstance(self.compensator.start, str):
+            raise ModelError(
+                f"{self.compensator.title!r} starts from a given state, which C does "
+                "not. Remedy: invert a model that starts at its first sample."
+            )
         rows = self.rows(needs_sample_time(self.kind, sample_time))
         low, high = self.pressures
         own = self.model.c_numbers(sample_time), self.compensator.c_numbers(sample_time)

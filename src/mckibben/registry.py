@@ -75,6 +75,7 @@ PLUGINS: dict[str, dict[str, str | Preset]] = {
         "play": "mckibben.blocks.play_type.play:Play",
         "polynomial": "mckibben.blocks.memoryless.polynomial:Polynomial",
         "polynomial-force": "mckibben.blocks.force.polynomial_force:PolynomialForce",
+        "predictive": "mckibben.blocks.predictive.predictive:Predictive",
         "preisach": "mckibben.blocks.preisach_type.preisach:Preisach",
         "process-model": "mckibben.blocks.dynamic.process_model:ProcessModel",
         "rate-dependent-pi": "mckibben.blocks.play_type.rate_dependent_pi:RateDependentPI",

@@ -29,7 +29,7 @@ COMMANDS: dict[str, list[str]] = {
     "simulate": ["model.json", "run.csv", "-o", "out.csv"],
     "check": ["model.json", "run.csv", "-o", "out"],
     "calibrate": ["model.json", "two.csv", "-o", "out.json"],
-    "invert": ["model.json", "-o", "out.json"],
+    "invert": ["model.json", "--predictive", "-o", "out.json"],
     "track": ["inverse.json", "--rig", "mas20-hanging", "--reference", "run.csv"],
     "plan": ["run.csv", "--model", "model.json", "--minutes", "0.5", "-o", "out.csv"],
     "ros": [

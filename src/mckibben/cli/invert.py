@@ -9,8 +9,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from mckibben.cli.invert_predictive import write_predictive
 from mckibben.cli.options import Force, Json
 from mckibben.cli.output import print_json, say
+from mckibben.errors import ModelError
 from mckibben.numerals import numeral
 
 if TYPE_CHECKING:
@@ -52,6 +54,24 @@ def invert(
             "output.  [default: a thousandth of what is reached]"
         ),
     ] = None,
+    predictive: Annotated[
+        bool, typer.Option("--predictive", help="Look ahead, so that limits cost less.")
+    ] = False,
+    horizon: Annotated[int, typer.Option(help="Samples it looks at (--predictive).")] = 20,
+    rate_limit: Annotated[
+        float | None, typer.Option(help="Fastest change of a pressure [bar/s] (--predictive).")
+    ] = None,
+    pressures: Annotated[
+        tuple[float, float] | None,
+        typer.Option(help="Lowest and highest pressure [bar] (--predictive)."),
+    ] = None,
+    total_limit: Annotated[
+        float | None, typer.Option(help="Highest sum of pressures [bar] (--predictive).")
+    ] = None,
+    flow_limit: Annotated[
+        float | None,
+        typer.Option(help="Fastest rise of all pressures together [bar/s] (--predictive)."),
+    ] = None,
     force: Force = False,
     as_json: Json = False,
 ) -> None:
@@ -76,8 +96,23 @@ def invert(
         raise ModelError(
             "--adaptive learns an inverse, not a force. Remedy: leave out one of them."
         )
+    limits = (rate_limit, pressures, total_limit, flow_limit)
+    if not predictive and any(limit is not None for limit in limits):
+        raise ModelError("limits are for compensators that look ahead. Remedy: add --predictive.")
     claim_model(out, inputs=[model], force=force)
     block = load(model)
+    if predictive:
+        write_predictive(
+            block.inverse(),
+            out,
+            horizon=horizon,
+            rate=rate_limit,
+            pressures=pressures,
+            total=total_limit,
+            flow=flow_limit,
+            as_json=as_json,
+        )
+        return
     if wanted is Wanted.force:
         estimate = load_of(block)
         estimate.save(out)

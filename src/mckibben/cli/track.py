@@ -93,6 +93,7 @@ def track(
     from mckibben.blocks.feedback.feedforward_feedback import FeedforwardFeedback
     from mckibben.control import UNCOMPENSATED, before, control_law, dead_time_undone, tune_pid
     from mckibben.control import track as close
+    from mckibben.control.preview import samples_foreseen
     from mckibben.files import write
     from mckibben.outputs import claim_model, claim_recording
 
@@ -124,6 +125,7 @@ def track(
                 "Remedy: leave out --controller-out, or use a compensator, PID, or both together."
             )
         ahead = dead_time_undone(block) if preview is None else preview
+        ahead += samples_foreseen(block) * step
         if controller_out is not None and isinstance(chosen, FeedforwardFeedback) and ahead > step:
             raise ModelError(
                 f"a block has one reference, but compensator and feedback get it {ahead:g} s apart. "

@@ -13,7 +13,7 @@ from mckibben.blocks.core.block import Block
 from mckibben.blocks.core.running import Stream
 from mckibben.blocks.feedback.feedforward_feedback import FeedforwardFeedback
 from mckibben.blocks.feedback.pid import MEASURED
-from mckibben.control.preview import dead_time_undone
+from mckibben.control.preview import dead_time_undone, samples_foreseen
 
 
 class Controller(ABC):
@@ -41,6 +41,11 @@ class Controller(ABC):
     def preview(self) -> float:
         """How far ahead its compensator wants the reference, to make up for dead time [s]."""
         return 0.0
+
+    @property
+    def samples_ahead(self) -> int:
+        """How many samples further ahead it wants the reference, to plan with."""
+        return 0
 
     def foresees(self, reference: Array, scheduled: Array) -> None:
         """Learn reference and schedule as they will be then, before `step`, where they are known.
@@ -76,6 +81,11 @@ class BlockController(Controller):
         """The dead time of what the block undoes."""
         return dead_time_undone(self.block)
 
+    @property
+    def samples_ahead(self) -> int:
+        """Those of the horizon of a compensator that looks ahead."""
+        return samples_foreseen(self.block)
+
     def reset(self, sample_time: float) -> None:
         whole = self.block
         self._ahead: Array | None = None
@@ -91,10 +101,13 @@ class BlockController(Controller):
         self._ahead = np.concatenate([reference, scheduled])
 
     def step(self, reference: Array, displacement: Array, scheduled: Array) -> Array:
-        given = np.concatenate([reference, scheduled]) if self._ahead is None else self._ahead
-        if self._feels.any():  # what is measured answers the reference of the last step
-            given = np.concatenate([reference, scheduled])
-            self._sample[self._feels] = displacement
+        given = np.concatenate([reference, scheduled])
+        if self._ahead is not None and not self._feels.any():
+            # what is measured answers the reference of the last step; a plan takes what schedules as
+            # it is now
+            known = len(reference) if self.samples_ahead else len(given)
+            given[:known] = self._ahead[:known]
+        self._sample[self._feels] = displacement
         self._sample[~self._feels] = given[: np.count_nonzero(~self._feels)]
         found = self._stream.step(self._sample)
         if self._feedback is not None:

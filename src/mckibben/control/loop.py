@@ -125,7 +125,8 @@ def track(
         Fastest change of a pressure [bar/s].
     preview : float, optional
         How far ahead compensators are given the reference [s], in whole steps, and never less than the
-        next step's; the end is held. Default the dead time of what they undo.
+        next step's; the end is held. Default the dead time of what they undo. Those that plan get it
+        the samples of their horizon earlier still.
     seed : int
         Of all noise.
     progress : callable, optional
@@ -151,7 +152,8 @@ def track(
     if isinstance(controller, Block):
         controller = BlockController(controller)
     preview = controller.preview if preview is None else preview
-    further = samples_ahead(preview, step) - 1  # than the next step's, which is given anyway
+    further = max(samples_ahead(preview, step) - 1, 0)  # than the next step's, given anyway
+    further += controller.samples_ahead
     rng = generator(seed)
     followed = followed_by(plant, reference)
     driven, held = _roles(plant, reference)

@@ -93,6 +93,11 @@ class Exportable(metaclass=Checked):
             "Remedy: compose it of blocks."
         )
 
+    @property
+    def needs_double(self) -> str:
+        """Why single precision will not do, as part of a sentence; empty where it does."""
+        return ""
+
     def cost(self, sample_time: float | None) -> Cost:
         """Return what a step costs."""
         return Cost.of(self.c_numbers(sample_time), self.n_states)

@@ -58,8 +58,13 @@ def check_single(block: Block) -> None:
     Raises
     ------
     ModelError
-        If two knots, levels or thresholds that follow one another become one.
+        If two knots, levels or thresholds that follow one another become one, or the block says that
+        it needs more.
     """
+    if block.needs_double:
+        raise ModelError(
+            f"{block.title!r} {block.needs_double}. Remedy: export in double precision."
+        )
     for name, places in block.kept_apart():
         if np.any(np.diff(np.array(places, dtype=np.float32)) <= 0) and np.all(np.diff(places) > 0):
             raise ModelError(

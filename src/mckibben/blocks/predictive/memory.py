@@ -1,0 +1,74 @@
+"""The memory that a model and its inverse share: each way from one's state to the other's."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from mckibben.arrays import Array
+from mckibben.blocks.compose import PerChannel, Series
+from mckibben.blocks.core.block import Block
+from mckibben.blocks.core.composition import Composition
+from mckibben.blocks.core.inverse import Inverse
+from mckibben.blocks.coupled.balance import Balance
+from mckibben.errors import ModelError
+
+Ways = Callable[[Array], Array]
+
+
+def memory_of(compensator: Block) -> Ways:
+    """Return what makes the model's state of a compensator's.
+
+    Raises
+    ------
+    ModelError
+        If the compensator is no exact inverse, or its state does not tell the model's.
+    """
+    match compensator:
+        case Inverse() if compensator.n_states >= compensator.forward.n_states:
+            n = compensator.forward.n_states
+            return lambda state: state[:n].copy()
+        case Balance():
+            return np.copy
+        case Series() | PerChannel():
+            parts = _parts(compensator)
+            ways = [memory_of(part) for part in parts]
+            sizes = np.cumsum([part.n_states for part in parts])[:-1]
+            turn = -1 if isinstance(compensator, Series) else 1
+
+            def joined(state: Array) -> Array:
+                own = [way(share) for way, share in zip(ways, np.split(state, sizes), strict=True)]
+                return np.concatenate(own[::turn])
+
+            return joined
+    if compensator.n_states == 0:
+        return np.copy
+    raise ModelError(
+        f"{compensator.title!r} is no exact inverse whose memory could be foreseen. Remedy: invert a "
+        "model such as pi, gpi, mpi or balance (mckibben invert), and give that."
+    )
+
+
+def undoing(compensator: Block) -> Ways:
+    """Return what makes a compensator's state of its model's."""
+    match compensator:
+        case Inverse():
+            return compensator.forward.inverse_state
+        case Series() | PerChannel():
+            parts = _parts(compensator)
+            ways = [undoing(part) for part in parts]
+            turn = -1 if isinstance(compensator, Series) else 1
+            model_sizes = [part.inverse().n_states for part in parts][::turn]
+            ends = np.cumsum(model_sizes)[:-1]
+
+            def joined(state: Array) -> Array:
+                shares = np.split(state, ends)[::turn]
+                return np.concatenate([way(share) for way, share in zip(ways, shares, strict=True)])
+
+            return joined
+    return np.copy
+
+
+def _parts(compensator: Composition) -> tuple[Block, ...]:
+    return compensator.parts

@@ -1,0 +1,208 @@
+"""Compensators that look ahead: the exact inverse where limits let it, and the best plan where not."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.optimize import LinearConstraint, minimize
+
+from mckibben import Block, Recording
+from mckibben.arrays import Array
+from mckibben.blocks.coupled.balance import Balance
+from mckibben.blocks.play_type.gpi import GPI
+from mckibben.blocks.play_type.pi import PI
+from mckibben.blocks.predictive.plan import plan, plan_scratch
+from mckibben.blocks.predictive.plan_one import one_scratch, plan_one
+from mckibben.blocks.predictive.predictive import Predictive
+from mckibben.blocks.predictive.supply import allowed, limit_rows
+from mckibben.control import control_law, track
+from mckibben.errors import ModelError
+from mckibben.rigs import load_rig
+
+STEP = 0.01
+ARM = replace(Balance.example(), pressure_range=(0.0, 6.0))
+INVERSES: dict[str, tuple[Block, list[float]]] = {
+    "pi": (PI.example().inverse(), []),
+    "gpi": (GPI.example().inverse(), []),
+    "balance": (ARM, [1.0, 5.0]),
+}
+
+
+def wander(seed: int, n: int, width: int = 12) -> Array:
+    """Return a smooth random path between 0.5 and 4.5."""
+    rng = np.random.default_rng(seed)
+    taps = np.hanning(4 * width)
+    noise = np.convolve(rng.standard_normal(n + taps.size), taps, "valid")[:n]
+    return np.asarray(2.5 + 2.0 * np.tanh(noise / noise.std()))
+
+
+def motion(name: str, n: int, seed: int) -> tuple[Block, Array]:
+    """Return an inverse, and references that its model reached, with what schedules it."""
+    inverse, scheduled = INVERSES[name]
+    driven = [wander(seed + 10 * k, n) for k in range(len(inverse.outputs))]
+    table = np.stack([*driven, *(np.full(n, value) for value in scheduled)], axis=1)
+    table[:20] = table[:1]
+    reached = np.asarray(inverse.inverse().simulate(table, sample_time=STEP))
+    references = np.hstack([reached.reshape(n, -1), table[:, len(driven) :]])
+    references[:20] = references[20]
+    return inverse, references
+
+
+def ahead(references: Array, block: Predictive) -> Array:
+    """Return references as a compensator that looks ahead is given them."""
+    n = len(block.outputs)
+    given = references.copy()
+    places = np.minimum(np.arange(len(given)) + block.samples_ahead, len(given) - 1)
+    given[:, :n] = references[places, :n]
+    return given
+
+
+def error(block: Predictive, references: Array) -> float:
+    """Return the error that the model makes with a compensator's pressures."""
+    n = len(block.outputs)
+    pressures = np.asarray(block.simulate(ahead(references, block), sample_time=STEP))
+    driven = np.hstack([pressures.reshape(-1, n), references[:, n:]])
+    given = block.model.simulate(driven, sample_time=STEP)
+    return float(np.sqrt(np.mean((np.asarray(given) - references[:, :n]) ** 2)))
+
+
+@pytest.mark.parametrize("name", INVERSES)
+def test_without_active_limits_it_is_the_exact_inverse(name: str) -> None:
+    inverse, references = motion(name, 300, seed=1)
+    block = Predictive(inverse, horizon=6, rate_limit=1e6, pressure_range=(-1e3, 1e3))
+    expected = inverse.simulate(references, sample_time=STEP)
+    given = block.simulate(ahead(references, block), sample_time=STEP)
+    assert np.abs(given - expected).max() <= 1e-12 * np.ptp(expected)
+
+
+@pytest.mark.parametrize("name", INVERSES)
+def test_limits_hold_always_and_looking_ahead_costs_less(name: str) -> None:
+    inverse, references = motion(name, 160, seed=3)
+    errors = {}
+    for horizon in (1, 20):
+        block = Predictive(inverse, horizon, 14.0, total_limit=8.0, flow_limit=20.0)
+        rows = block.rows(STEP)
+        pressures = np.asarray(block.simulate(ahead(references, block), sample_time=STEP))
+        for before, now in pairwise(pressures):
+            moved = np.where(rows[:, :1] > 0, now - before, now)
+            assert (np.sum(rows[:, 2:] * moved, axis=1) <= rows[:, 1] + 1e-9).all()
+        errors[horizon] = error(block, references)
+    assert errors[20] < 0.7 * errors[1]
+
+
+def problem(n: int, seed: int) -> tuple[Array, Array, Array, Array, Array]:
+    """Return limits and a plan's problem."""
+    rng = np.random.default_rng(seed)
+    draw = np.inf if n == 1 else 0.06 * n
+    rows = limit_rows(np.zeros(n), np.full(n, 5.0), 0.08, 2.4 * n, draw, rng.uniform(0.5, 2.0, n))
+    slopes = rng.uniform(2.0, 6.0, (6, 1, 1)) * np.eye(n)
+    slopes = slopes + 0.8 * (n > 1) * rng.standard_normal((6, n, n))
+    nominal = 2.2 + np.cumsum(0.25 * rng.standard_normal((6, n)), axis=0)
+    return rows, np.clip(nominal[0] + 0.1, 0.0, 2.3), slopes, nominal, rng.standard_normal((6, n))
+
+
+@pytest.mark.parametrize("n", [1, 2, 3])
+def test_plans_are_the_best_there_are(n: int) -> None:
+    for seed in range(2):
+        rows, before, slopes, nominal, errors = problem(n, seed)
+
+        def lost(p: Array) -> float:
+            off = np.einsum("tij,tj->ti", slopes, p.reshape(6, n) - nominal) - errors  # noqa: B023
+            return float(0.5 * np.sum(off**2))
+
+        path = np.eye(6 * n) - np.eye(6 * n, k=-n)
+        tables, bounds = [], []
+        for row in rows:
+            every = np.kron(np.eye(6), row[2:])
+            changes = row[0] > 0
+            tables.append(every @ path if changes else every)
+            bound = np.full(6, row[1])
+            bound[0] += changes * (row[2:] @ before)
+            bounds.append(bound)
+        limits = LinearConstraint(np.vstack(tables), -np.inf, np.concatenate(bounds))
+        start = np.tile(before, 6)
+        best = minimize(
+            lost,
+            start,
+            method="SLSQP",
+            constraints=[limits],
+            options={"maxiter": 500, "ftol": 1e-12},
+        )
+        found = nominal.copy()
+        given = (rows, before, slopes.reshape(-1), nominal, errors, found)
+        plan(*given, np.zeros(plan_scratch(6, n, len(rows))))
+        assert np.abs(found.ravel() - best.x).max() < 1e-4
+        if n == 1:
+            exact = nominal.copy()
+            plan_one(*given[:-1], exact, np.zeros(one_scratch(6)))
+            assert np.abs(exact - found).max() < 1e-4
+            assert lost(exact.ravel()) <= lost(best.x) + 1e-7
+
+
+def test_plans_are_those_of_a_kept_library() -> None:
+    daqp = pytest.importorskip("daqp")
+    for seed in range(20):
+        rows, before, slopes, nominal, errors = problem(1, seed)
+        found = nominal.copy()
+        plan_one(rows, before, slopes.reshape(-1), nominal, errors, found, np.zeros(58))
+        path = np.eye(6) - np.eye(6, k=-1)
+        changes = rows[:, 0] > 0
+        table = np.vstack([row[2] * (path if row[0] > 0 else np.eye(6)) for row in rows])
+        bounds = np.repeat(rows[:, 1], 6)
+        bounds[::6] += changes * rows[:, 2] * before[0]
+        slope = slopes[:, 0, 0]
+        pull = -(slope**2) * nominal[:, 0] - slope * errors[:, 0]
+        low, kinds = np.full(len(bounds), -1e30), np.zeros(len(bounds), dtype=np.int32)
+        best = daqp.solve(np.diag(slope**2), pull, table, bounds, low, kinds)[0]
+        assert np.abs(found[:, 0] - best).max() < 1e-5
+
+
+def test_the_supply_takes_from_all_in_one_share() -> None:
+    rows = limit_rows(np.zeros(2), np.full(2, 5.0), np.inf, 6.0, 1.0, np.ones(2))
+    p = np.array([3.0, 2.0])
+    assert not allowed(rows, np.array([1.0, 1.0]), p)
+    assert p == pytest.approx([1.5, 1.5])
+    falling = np.array([0.0, 2.0])
+    assert allowed(rows, np.array([4.0, 1.0]), falling)  # what vents gives nothing back
+    assert not allowed(rows, np.array([4.0, 0.5]), np.array([0.0, 2.0]))
+
+
+def test_unlimited_rows_are_left_out() -> None:
+    assert len(limit_rows(np.zeros(1), np.ones(1), np.inf, np.inf, np.inf, np.ones(1))) == 2
+
+
+def test_a_loop_gives_references_ahead() -> None:
+    rig = load_rig("mas20-hanging")
+    inverse = replace(PI.example(), weights=(6.0, 1.0, 1.0, 1.0), offset=0.0).inverse()
+    path = 10.0 + 5.0 * np.sign(np.sin(np.arange(300) / 25.0))
+    reference = Recording({"displacement": path}, STEP, {"displacement": "mm"})
+    given = {}
+    for horizon in (1, 20):
+        block = Predictive(inverse, horizon=horizon, rate_limit=8.0)
+        found = track(block, rig, reference, approach=1.0, slew=8.0, pressure_loop=False)
+        assert found.clipped == 0
+        given[horizon] = found.recording["command_pressure"]
+    jumps = [int(np.argmax(np.diff(p[130:]) < -0.05)) for p in given.values()]
+    assert jumps[1] < jumps[0]
+
+
+def test_it_is_saved_and_refuses_what_it_cannot_plan(tmp_path: Path) -> None:
+    from mckibben import load
+
+    block = Predictive(ARM, horizon=3, total_limit=5.0, volumes=(1.0, 2.0))
+    block.save(tmp_path / "p.json")
+    assert load(tmp_path / "p.json") == block
+    with pytest.raises(ModelError, match="pressure_range"):
+        Predictive(replace(PI.example(), input_range=None).inverse())
+    with pytest.raises(ModelError, match="no exact inverse"):
+        Predictive(PI.example())
+    with pytest.raises(ModelError, match="volumes"):
+        Predictive(ARM, volumes=(1.0,))
+    with pytest.raises(ModelError, match="total_limit"):
+        Predictive(ARM, pressure_range=(1.0, 2.0), total_limit=1.5)
+    with pytest.raises(ModelError, match="observer"):
+        control_law("observer", block, lambda: None)  # type: ignore[arg-type, return-value]

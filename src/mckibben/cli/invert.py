@@ -12,7 +12,6 @@ import typer
 from mckibben.cli.invert_predictive import write_predictive
 from mckibben.cli.options import Force, Json
 from mckibben.cli.output import print_json, say
-from mckibben.errors import ModelError
 from mckibben.numerals import numeral
 
 if TYPE_CHECKING:
@@ -95,6 +94,10 @@ def invert(
     if adaptive and wanted is Wanted.force:
         raise ModelError(
             "--adaptive learns an inverse, not a force. Remedy: leave out one of them."
+        )
+    if predictive and (adaptive or wanted is Wanted.force):
+        raise ModelError(
+            "--predictive plans a fixed model's inputs. Remedy: leave out --adaptive or --for force."
         )
     limits = (rate_limit, pressures, total_limit, flow_limit)
     if not predictive and any(limit is not None for limit in limits):

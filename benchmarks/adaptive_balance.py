@@ -41,9 +41,7 @@ ARM_AT = 90.0
 """When the arm ages [s]."""
 
 
-def foretold(
-    block: Adaptive, forward: Block, pressures: Array, levels: Array, step: float
-) -> Array:
+def foretold(block: Block, forward: Block, pressures: Array, levels: Array, step: float) -> Array:
     """Return every level by the model as it is after the levels before it.
 
     The inverse is asked for what the model says of the pressure that was applied, and so applies it.

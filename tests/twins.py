@@ -152,7 +152,7 @@ def pi_adaptive(block: Any, inputs: Rows, sample_time: float) -> Rows:
 
     states = [u - r for u in [_risen(forward, inputs[0][0])] for r in thresholds]
     turn, usual, surprise, last, then = 0, 3 * noise, 1.0, 0.0, 0.0
-    related, squared, late = 0.98, 1.0, 0.0
+    related, squared, late, stood = 0.98, 1.0, 0.0, 9 * noise**2 * 99
     previous, travel, outputs = inputs[0][0], 0.0, []
     for y, measured in inputs:
         slopes = np.array([*states, 1.0])
@@ -168,6 +168,10 @@ def pi_adaptive(block: Any, inputs: Rows, sample_time: float) -> Rows:
                 covariance, surprise = fresh.copy(), 1.0
             alike = min(max(related / squared, 0.0), 0.9995)
             told = usual * math.sqrt((1 + alike) / (1 - alike))
+            if told**2 > stood:
+                covariance, stood = covariance * (told**2 / stood), told**2
+            else:
+                stood += share * (told**2 - stood)
             phi = slopes * scales / told
             p_phi = covariance @ phi
             r = float(phi @ p_phi)

@@ -168,10 +168,8 @@ def pi_adaptive(block: Any, inputs: Rows, sample_time: float) -> Rows:
                 covariance, surprise = fresh.copy(), 1.0
             alike = min(max(related / squared, 0.0), 0.9995)
             told = usual * math.sqrt((1 + alike) / (1 - alike))
-            if told**2 > stood:
-                covariance, stood = covariance * (told**2 / stood), told**2
-            else:
-                stood += share * (told**2 - stood)
+            stands = max(told**2, stood + share * (told**2 - stood))
+            covariance, stood = covariance * (stands / stood), stands
             phi = slopes * scales / told
             p_phi = covariance @ phi
             r = float(phi @ p_phi)

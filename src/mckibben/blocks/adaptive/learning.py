@@ -144,14 +144,13 @@ def learn(
 
 @kernel
 def _stand_by(square: float, share: float, part: float, diagonal: Array, sense: Array) -> None:
-    """Widen the covariance with the scatter, so that larger errors are not learnt the more slowly."""
-    if square > sense[STOOD]:
-        grows = 1.0 + part * (square / sense[STOOD] - 1.0)
-        for i in range(diagonal.size):
-            diagonal[i] *= grows
-        sense[STOOD] = square
-    else:
-        sense[STOOD] += share * (square - sense[STOOD])
+    """Scale the covariance with the scatter: at once where that grows, so that slow drift is followed."""
+    stood = sense[STOOD]
+    stands = square if square > stood else stood + share * (square - stood)
+    grows = 1.0 + part * (stands / stood - 1.0)
+    for i in range(diagonal.size):
+        diagonal[i] *= grows
+    sense[STOOD] = stands
 
 
 @kernel

@@ -128,18 +128,16 @@ static void bound(int p, mck_real *root, mck_real widest, int i)
     }
 }
 
-/* Widen the covariance with the scatter, so that larger errors are not learnt the more slowly. */
+/* Scale the covariance with the scatter: at once where that grows, so that slow drift is followed. */
 static void stand_by(const mck_learner *m, mck_real square, mck_real *diagonal, mck_real *sense)
 {
-    if (square > sense[MCK_STOOD]) {
-        const mck_real grows = MCK_R(1.0) + m->part * (square / sense[MCK_STOOD] - MCK_R(1.0));
-        for (int i = 0; i < m->p; i++) {
-            diagonal[i] *= grows;
-        }
-        sense[MCK_STOOD] = square;
-    } else {
-        sense[MCK_STOOD] += m->share * (square - sense[MCK_STOOD]);
+    const mck_real stood = sense[MCK_STOOD];
+    const mck_real stands = square > stood ? square : stood + m->share * (square - stood);
+    const mck_real grows = MCK_R(1.0) + m->part * (stands / stood - MCK_R(1.0));
+    for (int i = 0; i < m->p; i++) {
+        diagonal[i] *= grows;
     }
+    sense[MCK_STOOD] = stands;
 }
 
 int mck_learn(const mck_learner *m, const mck_learnt *s, mck_real *sense, mck_real measured,

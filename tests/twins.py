@@ -184,7 +184,7 @@ def pi_adaptive(block: Any, inputs: Rows, sample_time: float) -> Rows:
             related += share * (relative * late - related)
             squared += share * (relative**2 - squared)
             late = relative
-            kept = weight * (1 - share) - share / r
+            kept = 1 / share - 1 / r if r < share else weight * (1 - share) - share / r
             covariance -= np.outer(p_phi, p_phi) * kept / (1 + kept * r)
             theta += scales * p_phi * weight * error / told / (1 + weight * r)
             place = turn % (n + 1)

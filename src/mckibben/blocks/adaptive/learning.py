@@ -131,9 +131,10 @@ def learn(
     _feel(share, noise, weight * error / expected, sense)
     if not UNMOVED < r < np.inf or weight < ABSURD:
         return False
+    lacks = r < share  # as where errors have grown: what is excited is learnt within the time
+    tells = 1.0 / share - 1.0 / r
     r *= weight
-    excited = 1.0 - share - share / r
-    _spread(root, f, g, weight * excited)
+    _spread(root, f, g, tells if lacks else weight * (1.0 - share - share / r))
     gain = weight * error / told / (1.0 + r)
     for i in range(p):
         theta[i] += scales[i] * g[i] * gain

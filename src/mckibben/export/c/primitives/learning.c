@@ -197,8 +197,12 @@ int mck_learn(const mck_learner *m, const mck_learnt *s, mck_real *sense, mck_re
     if (!(r > UNMOVED && r < MCK_INFINITY && weight > ABSURD)) {
         return 0;
     }
+    /* as where errors have grown: what is excited is learnt within the time */
+    const int lacks = r < m->share;
+    const mck_real tells = MCK_R(1.0) / m->share - MCK_R(1.0) / r;
     r *= weight;
-    spread(p, s->root, f, g, weight * (MCK_R(1.0) - m->share - m->share / r));
+    spread(p, s->root, f, g,
+           lacks ? tells : weight * (MCK_R(1.0) - m->share - m->share / r));
     const mck_real gain = weight * error / told / (MCK_R(1.0) + r);
     for (int i = 0; i < p; i++) {
         s->theta[i] += m->scales[i] * g[i] * gain;

@@ -145,7 +145,7 @@ def learn(
 
 @kernel
 def _stand_by(square: float, share: float, part: float, diagonal: Array, sense: Array) -> None:
-    """Scale the covariance with the scatter: at once where that grows, so that slow drift is followed."""
+    """Scale the covariance with the scatter, at once where that grows: slow drift is followed."""
     stood = sense[STOOD]
     stands = square if square > stood else stood + share * (square - stood)
     grows = 1.0 + part * (stands / stood - 1.0)

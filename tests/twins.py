@@ -152,7 +152,7 @@ def pi_adaptive(block: Any, inputs: Rows, sample_time: float) -> Rows:
 
     states = [u - r for u in [_risen(forward, inputs[0][0])] for r in thresholds]
     turn, usual, surprise, last, then = 0, 3 * noise, 1.0, 0.0, 0.0
-    related, squared, late = 0.98, 1.0, 0.0
+    related, squared, late, stood = 0.98, 1.0, 0.0, 9 * noise**2 * 99
     previous, travel, outputs = inputs[0][0], 0.0, []
     for y, measured in inputs:
         slopes = np.array([*states, 1.0])
@@ -168,6 +168,8 @@ def pi_adaptive(block: Any, inputs: Rows, sample_time: float) -> Rows:
                 covariance, surprise = fresh.copy(), 1.0
             alike = min(max(related / squared, 0.0), 0.9995)
             told = usual * math.sqrt((1 + alike) / (1 - alike))
+            stands = max(told**2, stood + share * (told**2 - stood))
+            covariance, stood = covariance * (stands / stood), stands
             phi = slopes * scales / told
             p_phi = covariance @ phi
             r = float(phi @ p_phi)
@@ -182,7 +184,7 @@ def pi_adaptive(block: Any, inputs: Rows, sample_time: float) -> Rows:
             related += share * (relative * late - related)
             squared += share * (relative**2 - squared)
             late = relative
-            kept = weight * (1 - share) - share / r
+            kept = 1 / share - 1 / r if r < share else weight * (1 - share) - share / r
             covariance -= np.outer(p_phi, p_phi) * kept / (1 + kept * r)
             theta += scales * p_phi * weight * error / told / (1 + weight * r)
             place = turn % (n + 1)

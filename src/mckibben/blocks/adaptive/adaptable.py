@@ -43,8 +43,8 @@ class Learning:
 
     Parameters
     ----------
-    settings : array, shape (2,)
-        [sample time / time, noise of the outputs].
+    settings : array, shape (3,)
+        [sample time / time, noise of the outputs, one by how many of them].
     scales, widest : array, shape (p,)
         Of every parameter, see `learning.learn`.
     fresh : array, shape (p (p + 1) / 2,)

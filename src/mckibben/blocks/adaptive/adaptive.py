@@ -180,7 +180,7 @@ class Adaptive(Block):
 
     def _settings(self, sample_time: float | None) -> Array:
         step = needs_sample_time(self.kind, sample_time)
-        return np.array([min(step / self.time, 0.5), self.noise])
+        return np.array([min(step / self.time, 0.5), self.noise, 1.0 / len(self.measured)])
 
     def bind(self, sample_time: float | None, state: Array, inputs: Array, outputs: Array) -> Run:
         """Return a function that learns and inverts in place."""

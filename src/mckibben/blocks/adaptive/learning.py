@@ -29,11 +29,12 @@ import numpy as np
 from mckibben.arrays import Array
 from mckibben.blocks.core.kernels import kernel
 
-SENSES = 9
+SENSES = 10
 """How many numbers are remembered of a sensor: whether it was read, usual error, surprise, last
-measured, what was predicted when that changed, product and square of errors, last error, ignored."""
+measured, what was predicted when that changed, product and square of errors, last error, ignored,
+square of the scatter that the covariance stands by."""
 
-READY, USUAL, SURPRISE, LAST, THEN, RELATED, SQUARED, BEFORE, IGNORED = range(SENSES)
+READY, USUAL, SURPRISE, LAST, THEN, RELATED, SQUARED, BEFORE, IGNORED, STOOD = range(SENSES)
 
 GATE = 3.0
 """Usual errors beyond which an error teaches no more."""
@@ -43,6 +44,8 @@ ABSURD = 1e-6
 """Weight of an error too large to be one."""
 ALIKE, MOST_ALIKE = 0.98, 0.9995
 """Correlation of errors that follow one another: until it is known, and at most."""
+LARGEST = 1e9
+"""Usual error, by the noise."""
 NEVER = 1e30
 """What no output is."""
 STILL, UNMOVED = 1e-9, 1e-12
@@ -70,8 +73,8 @@ def learn(
 
     Parameters
     ----------
-    settings : array, shape (2,)
-        [sample time / time, noise of the output].
+    settings : array, shape (3,)
+        [sample time / time, noise of the output, share of this output among those measured].
     scales, widest : array, shape (p,)
         Scale of every parameter, and the largest variance, in squares of it.
     fresh : array, shape (p (p + 1) / 2,)
@@ -111,6 +114,7 @@ def learn(
     f, g = work[:p], work[p : 2 * p]
     r = 0.0
     told = usual * np.sqrt(fewer(sense))
+    _stand_by(told * told, share, settings[2], root[: theta.size], sense)
     for j in range(p):
         f[j] = slopes[j] * scales[j] / told
     for j in range(p - 1, -1, -1):  # U' phi in place
@@ -127,15 +131,27 @@ def learn(
     _feel(share, noise, weight * error / expected, sense)
     if not UNMOVED < r < np.inf or weight < ABSURD:
         return False
+    lacks = r < share  # as where errors have grown: what is excited is learnt within the time
+    tells = 1.0 / share - 1.0 / r
     r *= weight
-    excited = 1.0 - share - share / r
-    _spread(root, f, g, weight * excited)
+    _spread(root, f, g, tells if lacks else weight * (1.0 - share - share / r))
     gain = weight * error / told / (1.0 + r)
     for i in range(p):
         theta[i] += scales[i] * g[i] * gain
     _bound(root, widest, int(sense[READY]) % p)
     sense[READY] = sense[READY] % p + 1.0
     return True
+
+
+@kernel
+def _stand_by(square: float, share: float, part: float, diagonal: Array, sense: Array) -> None:
+    """Scale the covariance with the scatter, at once where that grows: slow drift is followed."""
+    stood = sense[STOOD]
+    stands = square if square > stood else stood + share * (square - stood)
+    grows = 1.0 + part * (stands / stood - 1.0)
+    for i in range(diagonal.size):
+        diagonal[i] *= grows
+    sense[STOOD] = stands
 
 
 @kernel
@@ -151,7 +167,8 @@ def _feel(share: float, noise: float, relative: float, sense: Array) -> None:
     usual = sense[USUAL]
     quick = min(20.0 * share, 0.5)
     grows = 1.0 + 0.5 * quick
-    sense[USUAL] = max(usual * grows if abs(relative) > QUARTILE else usual / grows, noise)
+    next_usual = usual * grows if abs(relative) > QUARTILE else usual / grows
+    sense[USUAL] = min(max(next_usual, noise), LARGEST * noise)
     square = relative * relative
     sense[SURPRISE] += quick * (square - sense[SURPRISE])
     sense[RELATED] += share * (relative * sense[BEFORE] - sense[RELATED])
@@ -227,4 +244,5 @@ def start_sense(noise: float) -> Array:
     """Return what is remembered of a sensor before it is read."""
     sense = np.zeros(SENSES)
     sense[USUAL], sense[SURPRISE], sense[SQUARED], sense[RELATED] = 3.0 * noise, 1.0, 1.0, ALIKE
+    sense[STOOD] = (3.0 * noise) ** 2 * (1.0 + ALIKE) / (1.0 - ALIKE)
     return sense

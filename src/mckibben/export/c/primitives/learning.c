@@ -5,6 +5,7 @@
 #define ABSURD MCK_R(1e-6)
 #define ALIKE MCK_R(0.98) /* errors that follow one another, until it is known */
 #define MOST_ALIKE MCK_R(0.9995)
+#define LARGEST MCK_R(1e9) /* usual error, by the noise */
 #define NEVER MCK_R(1e30)
 #define STILL MCK_R(1e-9)
 #define UNMOVED MCK_R(1e-12)
@@ -17,7 +18,8 @@ mck_learner mck_read_learner(const mck_real *c)
     m.p = (int)c[0];
     m.share = c[1];
     m.noise = c[2];
-    m.scales = c + 3;
+    m.part = c[3];
+    m.scales = c + 4;
     m.widest = m.scales + m.p;
     m.fitted = m.widest + m.p;
     m.fresh = m.fitted + m.p;
@@ -54,6 +56,8 @@ void mck_learnt_start(const mck_learner *m, const mck_learnt *s, int outputs)
         sense[MCK_SURPRISE] = MCK_R(1.0);
         sense[MCK_SQUARED] = MCK_R(1.0);
         sense[MCK_RELATED] = ALIKE;
+        sense[MCK_STOOD] = MCK_R(3.0) * m->noise * (MCK_R(3.0) * m->noise) *
+                           (MCK_R(1.0) + ALIKE) / (MCK_R(1.0) - ALIKE);
     }
 }
 
@@ -72,7 +76,7 @@ static void feel(mck_real share, mck_real noise, mck_real relative, mck_real *se
     const mck_real grows = MCK_R(1.0) + MCK_R(0.5) * quick;
     const mck_real next = mck_abs(relative) > QUARTILE ? usual * grows : usual / grows;
     const mck_real square = relative * relative;
-    sense[MCK_USUAL] = mck_max(next, noise);
+    sense[MCK_USUAL] = mck_min(mck_max(next, noise), LARGEST * noise);
     sense[MCK_SURPRISE] += quick * (square - sense[MCK_SURPRISE]);
     sense[MCK_RELATED] += share * (relative * sense[MCK_BEFORE] - sense[MCK_RELATED]);
     sense[MCK_SQUARED] += share * (square - sense[MCK_SQUARED]);
@@ -124,6 +128,18 @@ static void bound(int p, mck_real *root, mck_real widest, int i)
     }
 }
 
+/* Scale the covariance with the scatter: at once where that grows, so that slow drift is followed. */
+static void stand_by(const mck_learner *m, mck_real square, mck_real *diagonal, mck_real *sense)
+{
+    const mck_real stood = sense[MCK_STOOD];
+    const mck_real stands = square > stood ? square : stood + m->share * (square - stood);
+    const mck_real grows = MCK_R(1.0) + m->part * (stands / stood - MCK_R(1.0));
+    for (int i = 0; i < m->p; i++) {
+        diagonal[i] *= grows;
+    }
+    sense[MCK_STOOD] = stands;
+}
+
 int mck_learn(const mck_learner *m, const mck_learnt *s, mck_real *sense, mck_real measured,
               mck_real predicted, mck_real asked)
 {
@@ -159,6 +175,7 @@ int mck_learn(const mck_learner *m, const mck_learnt *s, mck_real *sense, mck_re
     const mck_real error = measured - predicted;
     mck_real r = MCK_R(0.0);
     const mck_real told = usual * mck_sqrt(fewer(sense));
+    stand_by(m, told * told, s->root, sense);
     for (int j = 0; j < p; j++) {
         f[j] = slopes[j] * m->scales[j] / told;
     }
@@ -180,8 +197,12 @@ int mck_learn(const mck_learner *m, const mck_learnt *s, mck_real *sense, mck_re
     if (!(r > UNMOVED && r < MCK_INFINITY && weight > ABSURD)) {
         return 0;
     }
+    /* as where errors have grown: what is excited is learnt within the time */
+    const int lacks = r < m->share;
+    const mck_real tells = MCK_R(1.0) / m->share - MCK_R(1.0) / r;
     r *= weight;
-    spread(p, s->root, f, g, weight * (MCK_R(1.0) - m->share - m->share / r));
+    spread(p, s->root, f, g,
+           lacks ? tells : weight * (MCK_R(1.0) - m->share - m->share / r));
     const mck_real gain = weight * error / told / (MCK_R(1.0) + r);
     for (int i = 0; i < p; i++) {
         s->theta[i] += m->scales[i] * g[i] * gain;

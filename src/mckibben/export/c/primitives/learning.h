@@ -17,6 +17,7 @@ enum {
     MCK_SQUARED,  /* mean square of errors */
     MCK_BEFORE,   /* last error */
     MCK_IGNORED,  /* measurements that were absent, stood still or were too far off */
+    MCK_STOOD,    /* square of the scatter that the covariance stands by */
     MCK_SENSES
 };
 
@@ -26,6 +27,7 @@ typedef struct {
     int p;
     mck_real share;         /* sample time by the time to learn in */
     mck_real noise;         /* of the output */
+    mck_real part;          /* one by how many outputs are measured */
     const mck_real *scales; /* of the parameters */
     const mck_real *widest; /* variances that are not passed */
     const mck_real *fitted; /* parameters at the start */
@@ -41,7 +43,7 @@ typedef struct {
     mck_real *work;  /* 3 p numbers behind the memory: slopes, then two to compute in */
 } mck_learnt;
 
-/* Numbers: p, share, noise, scales, widest, fitted, fresh, then the family's. */
+/* Numbers: p, share, noise, part, scales, widest, fitted, fresh, then the family's. */
 mck_learner mck_read_learner(const mck_real *c);
 
 /* Parts of the memory behind `own` numbers of the inverse; `outputs` are measured. */

@@ -59,11 +59,11 @@ def followed(
     places = np.minimum(np.arange(len(held)) + block.samples_ahead, len(held) - 1)
     ahead[:, :n] = held[places, :n]
     state = block.initial_state(held[0])
-    start = state[: block.model.n_states].tolist()
+    start = state[: block.undone.n_states].tolist()
     pressures = np.empty((len(held), n))
     block.bind(STEP, state, ahead, pressures)()
     driven = np.hstack([pressures, held[:, n:]])
-    given = block.model.simulate(driven, initial=start, sample_time=STEP)
+    given = block.undone.simulate(driven, initial=start, sample_time=STEP)
     return np.asarray(given)[HORIZON:], float(state[-1] / len(held))
 
 
@@ -75,9 +75,9 @@ def clipped(inverse: Block, references: Array, **limits: float) -> Array:
     pressures = np.asarray(inverse.simulate(held, sample_time=STEP))
     for before, row in pairwise(pressures):
         allowed(rows, before, row)
-    start = block.initial_state(held[0])[: block.model.n_states].tolist()
+    start = block.initial_state(held[0])[: block.undone.n_states].tolist()
     driven = np.hstack([pressures, held[:, n:]])
-    given = block.model.simulate(driven, initial=start, sample_time=STEP)
+    given = block.undone.simulate(driven, initial=start, sample_time=STEP)
     return np.asarray(given)[HORIZON:]
 
 

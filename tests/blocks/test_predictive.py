@@ -66,7 +66,7 @@ def error(block: Predictive, references: Array) -> float:
     n = len(block.outputs)
     pressures = np.asarray(block.simulate(ahead(references, block), sample_time=STEP))
     driven = np.hstack([pressures.reshape(-1, n), references[:, n:]])
-    given = block.model.simulate(driven, sample_time=STEP)
+    given = block.undone.simulate(driven, sample_time=STEP)
     return float(np.sqrt(np.mean((np.asarray(given) - references[:, :n]) ** 2)))
 
 

@@ -107,7 +107,8 @@ class BlockController(Controller):
             # it is now
             known = len(reference) if self.samples_ahead else len(given)
             given[:known] = self._ahead[:known]
-        self._sample[self._feels] = displacement
+        if self._feels.any():
+            self._sample[self._feels] = displacement
         self._sample[~self._feels] = given[: np.count_nonzero(~self._feels)]
         found = self._stream.step(self._sample)
         if self._feedback is not None:

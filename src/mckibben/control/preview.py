@@ -39,12 +39,8 @@ def dead_time_undone(compensator: Block) -> float:
     >>> dead_time_undone(Air.example().inverse())
     0.02
     """
-    if isinstance(compensator, FeedforwardFeedback):
-        return dead_time_undone(compensator.compensator)
-    try:
-        return compensator.inverse().dead_time
-    except ModelError:
-        return 0.0
+    model = compensator.undone
+    return 0.0 if model is None else model.dead_time
 
 
 def samples_ahead(preview: float, sample_time: float) -> int:

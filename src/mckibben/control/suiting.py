@@ -3,19 +3,15 @@
 from __future__ import annotations
 
 import warnings
-from contextlib import suppress
 
 import numpy as np
 
 from mckibben.blocks.bands.banded import inside
-from mckibben.blocks.compose import Parallel
 from mckibben.blocks.core.block import Block
-from mckibben.blocks.feedback.feedforward_feedback import FeedforwardFeedback
-from mckibben.blocks.force.feedforward import ForceFeedforward
 from mckibben.control.identified import known_ranges
 from mckibben.control.loop import Plant
 from mckibben.control.twin import Twin, plain
-from mckibben.errors import MckibbenError, ModelError, ModelWarning
+from mckibben.errors import MckibbenError, ModelWarning
 from mckibben.numerals import numeral
 from mckibben.recording import Recording
 
@@ -29,18 +25,6 @@ BEYOND = 0.05
 REMEDY = (
     "Remedy: try it on a model of your own muscle (--plant model.json), or on a rig of its size"
 )
-
-
-def undone(compensator: Block) -> Block | None:
-    """Return the model that a compensator undoes; None where it undoes none, as PID does."""
-    if isinstance(compensator, FeedforwardFeedback):
-        return undone(compensator.compensator)
-    if isinstance(compensator, ForceFeedforward):
-        law, friction = compensator.law, compensator.friction
-        return law if friction is None else Parallel((law, friction))
-    with suppress(ModelError):
-        return compensator.inverse()
-    return None
 
 
 def of_itself(model: Block | None, plant: Plant) -> bool:
@@ -67,7 +51,7 @@ def doubts(compensator: Block, plant: Plant, rise: Recording) -> list[str]:
     list of str
         A sentence each, with its remedy.
     """
-    model = undone(compensator)
+    model = compensator.undone
     if model is None:
         return []
     if of_itself(model, plant):

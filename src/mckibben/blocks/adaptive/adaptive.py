@@ -63,6 +63,7 @@ class Adaptive(Block):
     """
 
     kind: ClassVar[str] = "adaptive"
+    undoing: ClassVar[bool] = True
     rate_dependent: ClassVar[bool] = True
     parameters: ClassVar[tuple[str, ...]] = ("forward",)
 
@@ -231,8 +232,9 @@ class Adaptive(Block):
         """Return what the inverse gives."""
         return self.fixed.reachable()
 
-    def inverse(self) -> Block:
-        """Return the forward block, as fitted."""
+    @property
+    def undone(self) -> Block:
+        """The forward block, as fitted."""
         return self.forward
 
     def present(self, state: Array) -> Block:

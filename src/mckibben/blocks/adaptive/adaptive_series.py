@@ -185,8 +185,9 @@ class AdaptiveSeries(Composition):
         pressures = self.core.wired(board, signals)
         return before.wired(board, pressures) if before else pressures
 
-    def inverse(self) -> Block:
-        """Return the forward series, as fitted."""
+    @property
+    def undone(self) -> Block:
+        """The forward series, as fitted."""
         return self.forward
 
     def reachable(self) -> tuple[Array, Array]:

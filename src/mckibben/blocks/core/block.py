@@ -49,6 +49,9 @@ class Block(Exportable, Parametrised, HandsOver):
     """Whether it is made of rules that each know a part of the inputs' joint range, so that nothing says
     what it gives where none was shown any data."""
 
+    undoing: ClassVar[bool] = False
+    """Whether blocks of this class undo another, which `undone` gives."""
+
     sample_time: float | None = None
     """Time between samples that a discrete block is bound to [s]; None for any."""
 
@@ -112,6 +115,14 @@ class Block(Exportable, Parametrised, HandsOver):
         raise ModelError(
             f"{self.kind!r} has no exact inverse. Remedy: use an invertible model (pi, gpi, mpi)."
         )
+
+    @property
+    def undone(self) -> Block | None:
+        """Of a compensator, the model that it undoes; None where it undoes none, as feedback alone."""
+        try:
+            return self.inverse()
+        except ModelError:
+            return None
 
     def reachable(self) -> tuple[Array, Array]:
         """Return the outputs that can be reached whatever happened before, lowest and highest.

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from mckibben.blocks.core.block import Block
 from mckibben.blocks.core.composition import Composition
-from mckibben.blocks.core.inverse import Inverse
 
 COMMANDS = ("pressure", "voltage")
 """How channels that drive a muscle are called."""
@@ -14,7 +13,7 @@ def undoes(block: Block) -> bool:
     """Tell whether a block is an inverse, or holds one: it reaches only what the block undone wants."""
     if isinstance(block, Composition):
         return any(map(undoes, block.parts))
-    return isinstance(block, Inverse)
+    return block.undoing
 
 
 def commands(block: Block) -> bool:

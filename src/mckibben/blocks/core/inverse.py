@@ -117,6 +117,7 @@ class Inverse(Block):
     """
 
     kind: ClassVar[str] = "inverse"
+    undoing: ClassVar[bool] = True
     parameters: ClassVar[tuple[str, ...]] = ("forward",)
 
     forward: Annotated[InstanceOf[Invertible], BeforeValidator(nested)]

@@ -78,6 +78,11 @@ class FeedforwardFeedback(Composition):
         return self.compensator.path_dependent
 
     @property
+    def undone(self) -> Block | None:
+        """What the compensator undoes."""
+        return self.compensator.undone
+
+    @property
     def measured(self) -> tuple[Channel, ...]:
         """What is measured."""
         return self.feedback.scheduled[: len(self.feedback.driven)]

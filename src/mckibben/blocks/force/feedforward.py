@@ -59,6 +59,11 @@ class ForceFeedforward(Block):
                 "pressure."
             )
 
+    @property
+    def undone(self) -> Block:
+        """The force, of the law alone or with friction."""
+        return self.law if self.friction is None else Parallel((self.law, self.friction))
+
     @classmethod
     def of(cls, model: Block) -> Self | None:
         """Return the feedforward of a model of force, or None if the model is another.

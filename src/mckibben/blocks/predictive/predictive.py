@@ -75,6 +75,7 @@ class Predictive(Block):
     """
 
     kind: ClassVar[str] = "predictive"
+    undoing: ClassVar[bool] = True
     parameters: ClassVar[tuple[str, ...]] = ("compensator",)
     rate_dependent: ClassVar[bool] = True
     path_dependent: ClassVar[bool] = True
@@ -116,7 +117,7 @@ class Predictive(Block):
             )
 
     @cached_property
-    def model(self) -> Block:
+    def undone(self) -> Block:
         """What the compensator undoes: from pressures to displacements."""
         return self.compensator.inverse()
 
@@ -154,7 +155,7 @@ class Predictive(Block):
     def n_states(self) -> int:
         """The model's memory; references to come; last pressures, whether there are; plans made."""
         n = len(self.outputs)
-        return self.model.n_states + self.horizon * n + n + 2
+        return self.undone.n_states + self.horizon * n + n + 2
 
     def rows(self, sample_time: float) -> Array:
         """Return all limits, as `mckibben.blocks.predictive.supply` says."""
@@ -181,7 +182,7 @@ class Predictive(Block):
     def n_scratch(self) -> int:
         """States to try, pressures, slopes, and what a plan computes in."""
         n, length = len(self.outputs), self.horizon
-        tried = 3 * self.model.n_states + self.model.n_scratch
+        tried = 3 * self.undone.n_states + self.undone.n_scratch
         tried += self.compensator.n_states + self.compensator.n_scratch
         planned = one_scratch(length) if n == 1 else plan_scratch(length, n, len(self.rows(1.0)))
         return tried + len(self.inputs) + 3 * n + length * n * (4 + n) + planned
@@ -213,8 +214,8 @@ class Predictive(Block):
             )
         rows = self.rows(needs_sample_time(self.kind, sample_time))
         low, high = self.pressures
-        own = self.model.c_numbers(sample_time), self.compensator.c_numbers(sample_time)
-        blocks = (self.model, self.compensator)
+        own = self.undone.c_numbers(sample_time), self.compensator.c_numbers(sample_time)
+        blocks = (self.undone, self.compensator)
         head = [which, self.horizon, len(low), len(rows), *(block.n_states for block in blocks)]
         head += [*map(len, own), *(block.n_scratch for block in blocks), PASSES]
         return np.concatenate([head, NUDGE * (high - low), low, rows.ravel(), *own])
@@ -230,7 +231,7 @@ class Predictive(Block):
         """Return that of the inverse over the horizon; at worst, of all plans too."""
         n, length = len(self.outputs), self.horizon
         inverse = self.compensator.cost(sample_time).usual
-        answers = PASSES * (n + 1) * self.model.cost(sample_time).usual
+        answers = PASSES * (n + 1) * self.undone.cost(sample_time).usual
         step = 2 * n**3 + len(self.rows(1.0)) * (4 * n * n + 12 * n + 20)
         planned = PASSES * (4 * length if n == 1 else MOST_STEPS * step)
         return Cost(length * inverse, length * (inverse + answers + planned))
@@ -255,7 +256,7 @@ class _Horizon:
     """What a predictive compensator computes in, bound to its state."""
 
     def __init__(self, block: Predictive, sample_time: float, state: Array) -> None:
-        model, undo = block.model, block.compensator
+        model, undo = block.undone, block.compensator
         n, length = len(block.outputs), block.horizon
         self.n, self.length = n, length
         self.rows = block.rows(sample_time)

@@ -71,10 +71,7 @@ def loop_of(model: Block | None, compensator: Block | None, logs: Sequence[Recor
     own, undone = model is None, None
     if compensator is not None:
         compensator = inside(compensator)
-        try:
-            undone = compensator.inverse()
-        except ModelError:
-            undone = None
+        undone = compensator.undone
     model = undone if model is None else inside(model)
     if model is None:
         raise ModelError(

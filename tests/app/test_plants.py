@@ -20,10 +20,11 @@ def workspace_of(folder: Path) -> Workspace:
     workspace = Workspace(folder)
     bigger = replace(MODEL, weights=tuple(3 * weight for weight in MODEL.weights))
     unlimited = replace(MODEL, input_range=None)
-    models = {"mine": MODEL, "mine-inverse": MODEL.inverse(), "mine-banded": Banded.example()}
+    models = {"mine": MODEL, "mine-inverse": MODEL.inverse()}
     models |= {"bigger": bigger, "unlimited": unlimited, "arm": load("blocks", "balance").example()}
     for name, block in models.items():
         block.save(workspace.path("models", f"{name}.json"))
+    replace(Banded.example(), forward=bigger).save(workspace.path("banded", "bigger.json"))
     t = np.arange(400) * 0.02
     (low,), (high,) = MODEL.reachable()
     wave = 0.5 * (low + high) + 0.4 * (high - low) * np.sin(t)
@@ -33,11 +34,13 @@ def workspace_of(folder: Path) -> Workspace:
 
 def test_other_models_are_offered_before_the_one_inverted(tmp_path: Path) -> None:
     workspace = workspace_of(tmp_path)
-    assert workspace.plants("mine") == ["bigger", "mine-banded", "mine"]
+    assert workspace.plants("mine") == ["bigger", "mine"]
     rising = np.asarray(np.linspace(0.5, 4.0, 50), dtype=np.float64)
     run = Recording({"pressure": rising, "displacement": 5.0 * rising}, 0.1)
     workspace.add(run, origin="", call="", role="train")  # tells the limits of what knows none
-    assert workspace.plants("mine") == ["bigger", "unlimited", "mine-banded", "mine"]
+    assert workspace.plants("mine") == ["bigger", "unlimited", "mine"]
+    assert workspace.twin("bigger").scatters
+    assert not workspace.twin("mine").scatters
     assert tuple(workspace.twin("unlimited").limits("pressure")) == (0.5, 4.0)
 
 

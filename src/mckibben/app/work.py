@@ -41,8 +41,11 @@ def fit(workspace: Workspace, given: dict[str, Any], tell: Tell) -> str:
         raise ModelError(row.reason or "it gave no model. Remedy: try other settings.")
     name = str(given["name"])
     row.block.save(workspace.path("models", f"{name}.json"))
-    if row.banded is not None:  # with which it can stand where a plant stands
-        row.banded.save(workspace.path("models", f"{name}-banded.json"))
+    banded = workspace.path("banded", f"{name}.json")  # with which it scatters as a plant
+    if row.banded is None:
+        banded.unlink(missing_ok=True)
+    else:
+        row.banded.save(banded)
     result = row.to_dict() | {
         "input": board.input,
         "output": board.output,

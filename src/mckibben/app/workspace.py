@@ -254,8 +254,8 @@ class Workspace(Folder):
             return True
         return False
 
-    def model(self, name: str) -> Block:
-        """Return a model; it is loaded once.
+    def model(self, name: str, folder: str = "models") -> Block:
+        """Return a model, or one with its band from ``banded``; it is loaded once.
 
         Raises
         ------
@@ -264,7 +264,7 @@ class Workspace(Folder):
         """
         from mckibben.blocks.core.saving import load
 
-        path = self.path("models", f"{name}.json")
+        path = self.path(folder, f"{name}.json")
 
         def make() -> tuple[Block, int]:
             block = load(path)
@@ -289,7 +289,9 @@ class Workspace(Folder):
         return False
 
     def twin(self, name: str) -> Twin:
-        """Return a model as a plant; where it does not know its limits, they are those recorded.
+        """Return a model as a plant, with its band where it has one.
+
+        Where it does not know its limits, they are those recorded.
 
         Raises
         ------
@@ -299,7 +301,8 @@ class Workspace(Folder):
         from mckibben.control import Twin
         from mckibben.control.identified import known_ranges
 
-        model, limits = self.model(name), {}
+        banded = self.path("banded", f"{name}.json").exists()
+        model, limits = self.model(name, "banded" if banded else "models"), {}
         for channel in model.inputs:
             runs = [run[channel.name] for run in self.readable() if channel.name in run]
             if runs and channel.name not in known_ranges(model):
@@ -311,8 +314,7 @@ class Workspace(Folder):
     def plants(self, inverted: str) -> list[str]:
         """Return the models that a model's compensator can be tried on.
 
-        Those of another kind first, for on its own model a compensator proves nothing; then its own with
-        a band, and bare.
+        Others first, for on its own model a compensator proves nothing.
         """
         undone = self.model(inverted)
         found = []
@@ -323,8 +325,8 @@ class Workspace(Folder):
                     c.name for c in undone.outputs
                 ):
                     twin.limits(twin.inputs[0])
-                    found.append((twin.forward == undone, not twin.scatters, name))
-        return [name for *_, name in sorted(found)]
+                    found.append((twin.forward == undone, name))
+        return [name for _, name in sorted(found)]
 
     def warm(self) -> None:
         """Read what has changed; what is read is then at hand, for pages that must not wait."""

@@ -14,6 +14,8 @@ import pytest
 from numpy.typing import NDArray
 
 from mckibben import Block, Channel, ModelError, ModelWarning, Series
+from mckibben.blocks.adaptive.adaptive import Adaptive
+from mckibben.blocks.adaptive.adaptive_series import AdaptiveSeries
 from mckibben.blocks.coupled.coupling import Coupling
 from mckibben.blocks.coupled.fuzzy_network import FuzzyNetwork
 from mckibben.blocks.coupled.recurrent_fuzzy_network import RecurrentFuzzyNetwork
@@ -32,7 +34,7 @@ Array = NDArray[np.float64]
 pytestmark = needs("cc")
 
 SAMPLE_TIME = 0.01
-DOUBLE, SINGLE = 1e-12, 1e-4
+DOUBLE, SINGLE, GROWN = 1e-12, 1e-4, 1e-8
 """Largest difference allowed, relative to the range."""
 
 STEPS = 100_000
@@ -156,7 +158,13 @@ def path_for(block: Block, seed: int, n: int) -> Array:
     rng = np.random.default_rng(seed)
     pace = 200 if block.rate_dependent else 12
     inputs = wander(*input_limits(block), rng, pace, max(n // pace, 3) + 2)
-    return np.resize(inputs, (n, inputs.shape[1]))
+    inputs = np.resize(inputs, (n, inputs.shape[1]))
+    if isinstance(block, Adaptive | AdaptiveSeries):
+        # measured as on a plant that is 5 % off: of nonsense, rounding decides what is believed
+        m = len(block.measured)
+        inputs[1:, -m:] = 1.05 * inputs[:-1, :m] + 0.02 * rng.normal(size=(n - 1, m))
+        inputs[0, -m:] = 1.05 * inputs[0, :m]
+    return inputs
 
 
 def changed(block: Block, rng: np.random.Generator) -> Block:
@@ -197,7 +205,11 @@ def test_double_precision_is_python_and_a_parameter_changed_is_seen(
     inputs = path_for(block, 1, n)
     outputs, statuses = compiled(block, tmp_path / "c").run(inputs)
     assert not statuses.any()
-    assert difference(outputs, simulated(block, inputs)) <= DOUBLE
+    expected = simulated(block, inputs)
+    if isinstance(block, Adaptive | AdaptiveSeries):  # what learns remembers rounding
+        assert difference(outputs, expected) <= GROWN
+        outputs, expected = outputs[:5_000], expected[:5_000]
+    assert difference(outputs, expected) <= DOUBLE
     if block.n_parameters == 0:
         return
     parameters, few = block.pack(), slice(0, 2000)

@@ -5,8 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
+import numpy as np
+from numpy.typing import ArrayLike
+
+from mckibben.arrays import Array
 from mckibben.blocks.core.block import Block
 from mckibben.blocks.core.exportable import Cost, Exportable
+from mckibben.errors import DataError
 from mckibben.export.c.parts import Part, part_of
 
 
@@ -80,3 +85,34 @@ class Wiring:
         first = self.n_signals
         self.n_signals += count
         return [f"signals[{first + index}]" for index in range(count)]
+
+
+def state_of(block: Block, memory: ArrayLike, sample_time: float | None) -> Array:
+    """Return the state of a block that its C has in memory, without what it only computes in.
+
+    Parameters
+    ----------
+    block : Block
+        What was exported.
+    memory : array-like, shape (n_numbers,)
+        ``numbers`` of the C model, as `mckibben.link.Link.memory` reads them.
+    sample_time : float or None
+        That it was exported with [s].
+
+    Returns
+    -------
+    array, shape (n_states,)
+
+    Raises
+    ------
+    DataError
+        If it is the memory of another model.
+    """
+    wiring, numbers = Wiring(block, sample_time), np.asarray(memory, dtype=np.float64)
+    if numbers.shape != (wiring.n_numbers,):
+        raise DataError(
+            f"the memory has {numbers.size} numbers, that of {block.title!r} {wiring.n_numbers}",
+            remedy="give the block that was exported",
+        )
+    states = [numbers[c.first_state :][: c.part.block.n_states] for c in wiring.calls]
+    return np.concatenate([np.empty(0), *states])

@@ -3,8 +3,8 @@
     python examples/robot_firmware.py docs/pictures/robot_firmware.png --fast
 
 reference -> adaptive inverse on an emulated Cortex-M4F, over its serial port -> a virtual rig in another
-process -> what it measured, back to the firmware. Halfway muscle, friction and pressure begin to change
-by a fifth. The fixed inverse then follows the same reference on the same rig, in Python.
+process -> what it measured, back to the firmware. Halfway its rubber begins to soften and its friction to
+grow, each by a fifth. The fixed inverse then follows the same reference on the same rig, in Python.
 
 QEMU and an Arm compiler must be installed; --here runs the same C as a process of this machine, and
 --port leads a board that holds such an export. Host, firmware and rig step in lock-step: however late
@@ -35,8 +35,8 @@ from mckibben.signals import random_wave
 from mckibben.stream import FixedRate
 
 RIG, PERIOD = "mas20-hanging", 0.005
-CHANGES = {"stiffness": 0.8, "friction": 1.2, "gain": 0.8}
-"""What drifts, and by what factor in the end; gain is that of the pressure."""
+CHANGES = {"stiffness": 0.8, "friction": 1.2}
+"""What drifts, and by what factor in the end."""
 
 DRIFTS = 0.1
 """How long it drifts for, from halfway on, of the whole time."""
@@ -46,8 +46,6 @@ APPROACH = 10.0
 
 WITHIN, PRESSURES = (-20.0, 60.0), (0.0, 6.0)
 """What the firmware takes [mm] and gives [bar]."""
-
-Errors = np.ndarray
 
 
 def drifting(duration: float) -> Drifting:
@@ -152,7 +150,7 @@ def draw(path: Path, reference: np.ndarray, runs: dict[str, np.ndarray], told: s
     """Draw the errors over all the time, and the motion before and after the drift."""
     n, window = len(reference), max(len(reference) // 120, 1)
     time = np.arange(n) * PERIOD
-    half, over = 0.5 * time[-1], DRIFTS * time[-1]
+    half, over = 0.5 * n * PERIOD, DRIFTS * n * PERIOD
     figure = Figure(figsize=(9, 6.4), layout="constrained")
     axes = figure.subplot_mosaic([["errors", "errors"], ["before", "after"]])
     colours = {"fixed": "tab:red", "adaptive": "tab:blue"}

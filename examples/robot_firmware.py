@@ -3,8 +3,8 @@
     python examples/robot_firmware.py docs/pictures/robot_firmware.png --fast
 
 reference -> adaptive inverse on an emulated Cortex-M4F, over its serial port -> a virtual rig in another
-process -> what it measured, back to the firmware. Halfway its rubber begins to soften and its friction to
-grow, each by a fifth. The fixed inverse then follows the same reference on the same rig, in Python.
+process -> what it measured, back to the firmware. Halfway its rubber begins to soften and its friction
+to grow, each by a fifth. The fixed inverse then follows the same reference on the same rig, in Python.
 
 QEMU and an Arm compiler must be installed; --here runs the same C as a process of this machine, and
 --port leads a board that holds such an export. Host, firmware and rig step in lock-step: however late

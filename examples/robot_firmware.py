@@ -20,6 +20,7 @@ from collections.abc import Callable, Iterable
 from contextlib import AbstractContextManager, nullcontext
 from multiprocessing.connection import Connection
 from pathlib import Path
+from textwrap import fill
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -172,7 +173,7 @@ def draw(path: Path, reference: np.ndarray, runs: dict[str, np.ndarray], told: s
             axis.plot(time[part], measured[part], color=colours[run], lw=1.0, label=run)
         axis.set(title=f"{name} the drift", xlabel="time [s]", ylabel="displacement [mm]")
     axes["before"].legend()
-    figure.suptitle(f"what the firmware learnt: {told}", fontsize="medium")
+    figure.suptitle(fill(f"what the firmware learnt: {told}", 90), fontsize="medium")
     figure.savefig(path, dpi=120)
 
 

@@ -150,6 +150,9 @@ static void set_inputs(mck_server *link, source *from)
 static void load(mck_server *link, source *from, uint8_t what)
 {{
     const int most = 20;
+    if (link->served->lowest[what] == NULL) {{
+        return; /* it can be read only */
+    }}
     for (int first = 0; first < link->served->sizes[what]; first += most) {{
         uint8_t body[3 + 20 * sizeof(mck_real)] = {{
             what, (uint8_t)(first & 255), (uint8_t)(first >> 8)}};

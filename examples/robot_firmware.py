@@ -1,113 +1,225 @@
-"""A controller in firmware, led over a serial line, and a virtual rig as the robot in another process.
+"""A compensator that learns, in firmware at 200 Hz, beside a fixed one on the same robot, which drifts.
 
-    .venv/bin/python examples/robot_firmware.py --duration 20
+    python examples/robot_firmware.py docs/pictures/robot_firmware.png --fast
 
-The controller is exported to C with its limits and its watchdog, and runs on an emulated Cortex-M4F
-(QEMU, and an Arm compiler, must be installed; --here runs the same C as a process of this machine, and
---port leads a board that holds such an export). 200 times a second the host gives it the reference and
-what the rig measured, and the rig the pressure that it answers. --model takes any saved controller or
-inverse with a reference, or a reference and what was measured, as inputs.
+reference -> adaptive inverse on an emulated Cortex-M4F, over its serial port -> a virtual rig in another
+process -> what it measured, back to the firmware. Halfway the rubber softens and friction grows, each by
+a fifth. The fixed inverse then follows the same reference on the same rig, in Python.
+
+QEMU and an Arm compiler must be installed; --here runs the same C as a process of this machine, and
+--port leads a board that holds such an export. Host, firmware and rig step in lock-step: however late
+a step is, the numbers are the same, and --fast waits for no deadline. --model takes an adaptive inverse
+(``mckibben invert --adaptive``) for one fitted here; --save keeps what was learnt.
 """
 
 from __future__ import annotations
 
 import argparse
-import math
 import multiprocessing
+from collections.abc import Callable, Iterable
 from contextlib import AbstractContextManager, nullcontext
 from multiprocessing.connection import Connection
 from pathlib import Path
+from textwrap import fill
 
 import numpy as np
+from matplotlib.figure import Figure
 
 import mckibben
-from mckibben.blocks.feedback.feedforward_feedback import FeedforwardFeedback
-from mckibben.control import tune_pid
-from mckibben.export import Serving
+from mckibben.blocks.adaptive.adaptive import Adaptive
+from mckibben.blocks.adaptive.adaptive_series import adaptive
+from mckibben.control.drifting import Drift, Drifting
+from mckibben.export import Serving, state_of
 from mckibben.link import ByteStream, Link
 from mckibben.link.trying import emulated, hosted
-from mckibben.signals import decaying_triangle
+from mckibben.signals import random_wave
 from mckibben.stream import FixedRate
 
-RIG = "mas20-hanging"
-WITHIN = (-20.0, 60.0)
-"""References and measurements that the firmware takes [mm]."""
+RIG, PERIOD = "mas20-hanging", 0.005
+CHANGES = {"stiffness": 0.8, "friction": 1.2}
+"""What drifts, and by what factor."""
+
+APPROACH = 10.0
+"""How long it takes from rest to the wave [s]."""
+
+WITHIN, PRESSURES = (-20.0, 60.0), (0.0, 6.0)
+"""What the firmware takes [mm] and gives [bar]."""
 
 
-def robot(pipe: Connection, period: float) -> None:
+def drifting(duration: float) -> Drifting:
+    """Return the robot, whose drift is switched on halfway."""
+    rig = mckibben.load_rig(RIG).changed({"sample_time": PERIOD})
+    half = 0.5 * duration
+    return Drifting(rig, [Drift(group, factor, half) for group, factor in CHANGES.items()])
+
+
+def robot(pipe: Connection, duration: float) -> None:
     """Be the robot: take a pressure, give the displacement, until there is none."""
-    rig = mckibben.load_rig(RIG).changed({"sample_time": period})
+    rig = drifting(duration)
     place = rig.outputs.index("displacement")
     pipe.send(float(rig.reset(0)[place]))
     while (pressure := pipe.recv()) is not None:
         pipe.send(float(rig.step({"pressure": pressure})[place]))
 
 
-def controller(period: float) -> mckibben.Block:
-    """Return a compensator fitted to the rig, with feedback."""
-    rig = mckibben.load_rig(RIG)
-    time = np.arange(3000) * 0.05
-    pressure = decaying_triangle(time, low=0.0, high=5.0, period=20.0)
-    recording = rig.run(mckibben.Recording({"pressure": pressure}, 0.05))
-    inverse = mckibben.GPIEstimator().fit(recording).model_.inverse()
-    return FeedforwardFeedback.of(inverse, tune_pid(rig, sample_time=period))
+def learning() -> Adaptive:
+    """Return an inverse fitted to two minutes of the rig, which learns from there."""
+    time = np.arange(2400) * 0.05
+    pressure = random_wave(time, 0.4, high=5.0, seed=1)
+    recording = mckibben.load_rig(RIG).run(mckibben.Recording({"pressure": pressure}, 0.05))
+    block = adaptive(mckibben.GPIEstimator().fit(recording).model_, time=60.0)
+    assert isinstance(block, Adaptive)
+    return block
 
 
-def serving(block: mckibben.Block) -> Serving:
-    """Return what the firmware accepts: motions of this rig, and pressures that it stands."""
-    limits = mckibben.load_rig(RIG).limits("pressure")
-    pressures = dict.fromkeys((c.name for c in block.outputs), (limits.low, limits.high))
-    return Serving(
-        {**dict.fromkeys((c.name for c in block.inputs), WITHIN), **pressures}, watchdog=0.5
-    )
+def wanted(n: int) -> np.ndarray:
+    """Return a reference [mm]: smooth, with loops of all sizes, by way of rest."""
+    time = np.arange(n) * PERIOD
+    wave = random_wave(time, 0.4, high=22.0, low=4.0, min_frequency=0.05, seed=3)
+    share = np.clip(time / APPROACH, 0.0, 1.0)
+    return np.asarray(share**2 * (3 - 2 * share) * wave)
 
 
-def follow(link: Link, pipe: Connection, period: float, duration: float) -> tuple[float, str]:
-    """Follow a wave, and return the root-mean-square error [mm] and how well time was kept."""
-    rate, errors, measured = FixedRate(period, duration), [], pipe.recv()
-    n_inputs = len(link.device.inputs)
-    for k in rate:
-        reference = 12.0 - 6.0 * math.cos(2 * math.pi * k * period / 5.0)
-        low, high = WITHIN
-        seen = min(max(measured, low), high)  # a sensor may say anything
-        pipe.send(float(link.step([reference, seen][:n_inputs]).outputs[0]))
-        measured = pipe.recv()
-        errors.append(reference - measured)
-    settled = np.array(errors)[len(errors) // 5 :]
-    return float(np.sqrt(np.mean(settled**2))), str(rate.deadlines)
+def follow(
+    turns: Iterable[object],
+    reference: np.ndarray,
+    measured: float,
+    compensate: Callable[[float, float], float],
+    moved: Callable[[float], float],
+) -> np.ndarray:
+    """Follow a reference, one sample a turn, and return what was measured [mm]."""
+    found = np.empty(len(reference))
+    for k, _ in zip(range(len(reference)), turns, strict=False):
+        seen = min(max(measured, WITHIN[0]), WITHIN[1])  # a sensor may say anything
+        found[k] = measured = moved(compensate(float(reference[k]), seen))
+    return found
+
+
+def in_firmware(
+    link: Link, reference: np.ndarray, duration: float, *, fast: bool
+) -> tuple[np.ndarray, str]:
+    """Return what was measured [mm], and how well time was kept."""
+    ours, theirs = multiprocessing.Pipe()
+    context = multiprocessing.get_context("spawn")
+    process = context.Process(target=robot, args=(theirs, duration), daemon=True)
+    process.start()
+    theirs.close()
+
+    def moved(pressure: float) -> float:
+        ours.send(pressure)
+        return float(ours.recv())
+
+    def compensate(*inputs: float) -> float:
+        return float(link.step(inputs).outputs[0])
+
+    first, rate = float(ours.recv()), FixedRate(PERIOD)
+    turns = range(len(reference)) if fast else rate
+    found = follow(turns, reference, first, compensate, moved)
+    ours.send(None)
+    process.join()
+    return found, "as fast as it goes" if fast else str(rate.deadlines)
+
+
+def fixed(block: Adaptive, reference: np.ndarray, duration: float) -> np.ndarray:
+    """Return what is measured [mm] where the inverse does not learn."""
+    rig, stream = drifting(duration), block.fixed.stream(PERIOD)
+    place = rig.outputs.index("displacement")
+
+    def compensate(asked: float, _: float) -> float:
+        return float(np.clip(stream.step([asked])[0], *PRESSURES))
+
+    def moved(pressure: float) -> float:
+        return float(rig.step({"pressure": pressure})[place])
+
+    return follow(reference, reference, float(rig.reset(0)[place]), compensate, moved)
+
+
+def rms(errors: np.ndarray) -> float:
+    """Return the root of the mean square."""
+    return float(np.sqrt(np.mean(errors**2)))
+
+
+def spans(n: int) -> tuple[slice, slice]:
+    """Return the fifth before the drift, and the last one."""
+    return slice(3 * n // 10, n // 2), slice(4 * n // 5, n)
+
+
+def draw(path: Path, reference: np.ndarray, runs: dict[str, np.ndarray], told: str) -> None:
+    """Draw the errors over all the time, and the motion before and after the drift."""
+    n, window = len(reference), max(len(reference) // 120, 1)
+    time = np.arange(n) * PERIOD
+    half = 0.5 * n * PERIOD
+    figure = Figure(figsize=(9, 6.4), layout="constrained")
+    axes = figure.subplot_mosaic([["errors", "errors"], ["before", "after"]])
+    colours = {"fixed": "tab:red", "adaptive": "tab:blue"}
+    top = axes["errors"]
+    top.axvline(half, color="0.6", ls="--", label="drift")
+    for name, measured in runs.items():
+        error = (measured - reference)[: n - n % window].reshape(-1, window)
+        size = np.sqrt(np.mean(error**2, axis=1))
+        middle = time[: n - n % window].reshape(-1, window).mean(axis=1)
+        by = " and ".join(f"{rms((measured - reference)[span]):.2f}" for span in spans(n))
+        top.plot(middle, size, color=colours[name], label=f"{name}: {by} mm before and after")
+    changes = ", ".join(f"{group} {factor - 1:+.0%}" for group, factor in CHANGES.items())
+    top.set(title=f"robot: {changes} from {half:g} s on".replace("%", " %"))
+    top.set(xlabel="time [s]", ylabel=f"error, RMS of {window * PERIOD:g} s [mm]")
+    top.set_ylim(bottom=0.0)
+    top.legend(loc="upper left")
+    shown = min(round(20.0 / PERIOD), n // 5)
+    for name, end in (("before", n // 2), ("after", n)):
+        axis, part = axes[name], slice(end - shown, end)
+        axis.plot(time[part], reference[part], color="0.2", lw=2.5, alpha=0.5, label="reference")
+        for run, measured in runs.items():
+            axis.plot(time[part], measured[part], color=colours[run], lw=1.0, label=run)
+        axis.set(title=f"{name} the drift", xlabel="time [s]", ylabel="displacement [mm]")
+    axes["before"].legend()
+    figure.suptitle(fill(f"what the firmware learnt: {told}", 90), fontsize="medium")
+    figure.savefig(path, dpi=120)
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--period", type=float, default=0.005, help="of control and rig [s]")
-    parser.add_argument("--duration", type=float, default=20.0, help="[s]")
-    parser.add_argument("--model", type=Path, help="controller or inverse (JSON)")
+    parser.add_argument("picture", type=Path, nargs="?", help="where to draw it")
+    parser.add_argument("--duration", type=float, default=600.0, help="[s]")
+    parser.add_argument("--fast", action="store_true", help="wait for no deadline")
+    parser.add_argument("--model", type=Path, help="adaptive inverse (JSON)")
+    parser.add_argument("--save", type=Path, help="where to keep what was learnt (JSON)")
     where = parser.add_mutually_exclusive_group()
     where.add_argument("--port", help="serial port of a board, instead of the emulated one")
     where.add_argument("--here", action="store_true", help="as a process, without emulation")
     chosen = parser.parse_args()
-    block = mckibben.load(chosen.model) if chosen.model else controller(chosen.period)
-    ours, theirs = multiprocessing.Pipe()
-    context = multiprocessing.get_context("spawn")
-    process = context.Process(target=robot, args=(theirs, chosen.period), daemon=True)
+    block = mckibben.load(chosen.model) if chosen.model else learning()
+    if not isinstance(block, Adaptive):
+        parser.error(f"{chosen.model} is no adaptive inverse")
+    reference = wanted(round(chosen.duration / PERIOD))
+    asked, measured = (channel.name for channel in block.inputs)
+    limits = {asked: WITHIN, measured: WITHIN, block.outputs[0].name: PRESSURES}
+    serving = Serving(limits, watchdog=0.5)
     device: AbstractContextManager[ByteStream | str]
     if chosen.port:
         device = nullcontext(chosen.port)
     elif chosen.here:
-        device = hosted(block, sample_time=chosen.period, single=True, serving=serving(block))
+        device = hosted(block, sample_time=PERIOD, single=True, serving=serving)
     else:
-        device = emulated(block, sample_time=chosen.period, serving=serving(block))
-    with device as line, Link(line, lock_step=True) as link:
-        process.start()
-        error, kept = follow(link, ours, chosen.period, chosen.duration)
-        ours.send(None)
-        process.join()
-        counts, statistics = link.counts(), link.statistics
-    print(f"Followed within {error:.2f} mm RMS: {kept}")
+        device = emulated(block, sample_time=PERIOD, serving=serving)
+    with device as line, Link(line, lock_step=True, patience=10.0) as link:
+        learnt, kept = in_firmware(link, reference, chosen.duration, fast=chosen.fast)
+        state = state_of(block, link.memory(), PERIOD)
+        steps, statistics = link.counts().steps, link.statistics
     print(
-        f"The device took {counts.steps} steps; {statistics.repeated} frames were sent again, "
+        f"The device took {steps} steps, {kept}; {statistics.repeated} frames were sent again, "
         f"{statistics.dropped} dropped, and it was led again {statistics.reopened} times"
     )
+    runs = {"fixed": fixed(block, reference, chosen.duration), "adaptive": learnt}
+    for name, found in runs.items():
+        before, after = (rms((found - reference)[span]) for span in spans(len(reference)))
+        print(f"{name}: followed within {before:.4f} mm RMS before the drift, {after:.4f} after it")
+    told = str(block.drift(state))
+    print(told)
+    if chosen.save:
+        block.resumed(state).save(chosen.save)
+    if chosen.picture:
+        draw(chosen.picture, reference, runs, told)
 
 
 if __name__ == "__main__":

@@ -5,16 +5,21 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import cache
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from mckibben.blocks.adaptive.adaptive import Adaptive
+from mckibben.blocks.adaptive.adaptive_series import AdaptiveSeries
 from mckibben.blocks.laws.examples import examples
+from mckibben.blocks.play_type.gpi import GPI
 from mckibben.errors import DataError, ModelError
-from mckibben.export import Serving, export_c
+from mckibben.export import Serving, export_c, state_of
 from mckibben.export.c.building import CompiledModel, compile_c
 from mckibben.files import read
 from mckibben.link import Descriptor, Link, LinkError, open_port
@@ -156,11 +161,61 @@ def test_the_command_line_looks_leads_and_records(tmp_path: Path) -> None:
 
 
 @needs("cc")
-def test_the_example_runs() -> None:
+@pytest.mark.parametrize("name", ["pi-adaptive", "adaptive-series"])
+def test_what_was_learnt_is_read_and_gone_on_from(name: str) -> None:
+    block = examples()[name]
+    assert isinstance(block, Adaptive | AdaptiveSeries)
+    reference = 2.0 + np.sin(0.05 * np.arange(150))
+    inputs = np.column_stack([reference, 1.1 * reference])
+    channels = [channel.name for channel in (*block.inputs, *block.outputs)]
+    serving = Serving(dict.fromkeys(channels, (-99.0, 99.0)), watchdog=60.0)
+    stream = block.stream(SAMPLE_TIME)
+    with (
+        hosted(block, sample_time=SAMPLE_TIME, serving=serving) as line,
+        Link(line, lock_step=True, timeout=1.0, patience=30.0) as link,
+    ):
+        for row in inputs[:100]:
+            link.step(row)
+            stream.step(row)
+        memory = link.memory()
+        with pytest.raises(LinkError, match="is fixed"):
+            link.load_memory(memory)
+        gone_on = [link.step(row).outputs for row in inputs[100:]]
+    state = state_of(block, memory, SAMPLE_TIME)
+    np.testing.assert_allclose(state, stream.state, rtol=1e-12, atol=1e-12)
+    with (
+        hosted(block.resumed(state), sample_time=SAMPLE_TIME, serving=serving) as line,
+        Link(line, lock_step=True, timeout=1.0, patience=30.0) as link,
+    ):
+        np.testing.assert_array_equal([link.step(row).outputs for row in inputs[100:]], gone_on)
+    with pytest.raises(DataError, match="the memory has 3 numbers"):
+        state_of(block, memory[:3], SAMPLE_TIME)
+
+
+@cache
+def followed(*options: str) -> tuple[str, str]:
+    """Run the example for two seconds; return what it tells of errors, and what was learnt, as saved."""
     example = Path(__file__).parents[2] / "examples" / "robot_firmware.py"
-    command = [sys.executable, str(example), "--here", "--duration", "1"]
-    told = subprocess.run(command, capture_output=True, text=True, check=True).stdout
-    assert "Followed within" in told
+    with tempfile.TemporaryDirectory() as place:
+        model, learnt, picture = (Path(place) / name for name in ("a.json", "b.json", "c.png"))
+        Adaptive(GPI.example(), 60.0, 0.05).save(model)
+        files = [str(picture), "--model", str(model), "--save", str(learnt)]
+        command = [sys.executable, str(example), *files, "--duration", "2", *options]
+        told = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+        assert "The device took 400 steps" in told
+        assert picture.stat().st_size > 10_000
+        return told.partition("\n")[2], learnt.read_text()
+
+
+@needs("cc")
+def test_the_example_runs() -> None:
+    assert "adaptive: followed within" in followed("--here", "--fast")[0]
+
+
+@with_emulator
+@needs("cc")
+def test_the_example_gives_the_same_numbers_at_any_pace_and_on_the_microcontroller() -> None:
+    assert followed() == followed("--here", "--fast")
 
 
 REFUSED = {

@@ -146,7 +146,7 @@ class Twin:
         return struct.pack("<BI", self.flags(), self.steps) + self.outputs.tobytes()
 
     def tell(self, kind: int, body: bytes) -> bytes:
-        sizes = [0 if b is None else len(b[0]) for b in self.bounds]
+        sizes = [0 if self.bounds[0] is None else len(self.numbers[0]), len(self.numbers[1])]
         if kind == 1 and not body:
             told = [0, 8, self.flags(), self.fingerprint, round(1e6 * self.sample_time)]
             told += [self.most_silence, self.steps, self.loads, self.dropped % (1 << 32)]

@@ -230,7 +230,7 @@ class Link:
         return self._read(COEFFICIENTS, self.device.n_coefficients)
 
     def memory(self) -> Array:
-        """Return the memory of the model, in the order of its C; none where it cannot be set."""
+        """Return the memory of the model, in the order of its C; see `mckibben.export.state_of`."""
         return self._read(MEMORY, self.device.n_memory)
 
     def load_coefficients(self, values: ArrayLike) -> None:

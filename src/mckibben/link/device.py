@@ -98,8 +98,10 @@ class Device:
         Ticks without a frame after which its watchdog acts, at most.
     kind : dtype
         Of its numbers, float32 or float64.
-    n_coefficients, n_memory : int
+    n_coefficients : int
         Numbers that can be set; 0 where they are fixed.
+    n_memory : int
+        Numbers that can be read; an export says which of them can be set.
     inputs, outputs : tuple of Port
     """
 

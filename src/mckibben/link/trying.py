@@ -73,7 +73,8 @@ def emulated(
         command = [
             *(EMULATOR, "-M", "mps2-an386", "-cpu", "cortex-m4"),
             *("-semihosting-config", "enable=on,target=native"),
-            *("-display", "none", "-monitor", "none", "-serial", "stdio"),
+            *("-display", "none", "-monitor", "none"),
+            *("-chardev", "stdio,id=wire,mux=on", "-serial", "chardev:wire", "-echr", "256"),
             *("-kernel", str(folder / "model.elf")),
         ]
         with _running(command) as line:

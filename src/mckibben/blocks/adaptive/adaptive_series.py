@@ -183,7 +183,10 @@ class AdaptiveSeries(Composition):
         behind, before = self._split_parts
         signals = [behind.wired(board, [signal])[0] for signal in given] if behind else list(given)
         pressures = self.core.wired(board, signals)
-        return before.wired(board, pressures) if before else pressures
+        found = before.wired(board, pressures) if before else pressures
+        if self.memory is not None:
+            board.resume(self.memory)
+        return found
 
     @property
     def undone(self) -> Block:

@@ -41,6 +41,9 @@ class Board(Protocol):
     def add(self, terms: Sequence[str]) -> str:
         """Return the sum of signals."""
 
+    def resume(self, state: Sequence[float]) -> None:
+        """Start the blocks called last from a state of them all."""
+
 
 class Exportable(metaclass=Checked):
     """What is written as C: by default one primitive, a file named after the kind."""

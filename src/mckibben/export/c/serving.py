@@ -145,7 +145,8 @@ def served(
     found = limits(block, serving)
     wiring = Wiring(block, content["sample_time"])
     adjusted: dict[str, dict[str, list[str]]] = {}
-    sizes = [0, 0]
+    # memory can be read anyhow: what has been learnt is there
+    sizes = [0, wiring.n_numbers if wiring.n_numbers <= MOST_NUMBERS else 0]
     if serving.adjustable:
         inputs = slice(0, len(block.inputs))
         ways = {
@@ -175,7 +176,7 @@ def served(
         "sizes": sizes,
         "lowest": [f"{what}_lowest" if what in adjusted else "NULL" for what in kept],
         "highest": [f"{what}_highest" if what in adjusted else "NULL" for what in kept],
-        "staged": max(*sizes, 1),
+        "staged": max([1, *(sizes[kept.index(what)] for what in adjusted)]),
         "fingerprint_bytes": "",
     }
     full = {**content, "adjustable": bool(serving.adjustable), "served": told}

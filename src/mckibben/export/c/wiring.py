@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
+import numpy as np
+from numpy.typing import ArrayLike
+
+from mckibben.arrays import Array
 from mckibben.blocks.core.block import Block
 from mckibben.blocks.core.exportable import Cost, Exportable
+from mckibben.errors import DataError
 from mckibben.export.c.parts import Part, part_of
 
 
@@ -76,7 +81,46 @@ class Wiring:
         self.steps.append(Sum(tuple(terms), self.n_signals))
         return self._new_signals(1)[0]
 
+    def resume(self, state: Sequence[float]) -> None:
+        """Start the parts called last from the memory of them all."""
+        left = np.array(state, dtype=np.float64)
+        for place, step in reversed(list(enumerate(self.steps))):
+            if isinstance(step, Call) and left.size:
+                left, own = np.split(left, [left.size - step.part.block.n_states])
+                self.steps[place] = replace(step, part=replace(step.part, state=own))
+
     def _new_signals(self, count: int) -> list[str]:
         first = self.n_signals
         self.n_signals += count
         return [f"signals[{first + index}]" for index in range(count)]
+
+
+def state_of(block: Block, memory: ArrayLike, sample_time: float | None) -> Array:
+    """Return the state of a block that its C has in memory, without what it only computes in.
+
+    Parameters
+    ----------
+    block : Block
+        What was exported.
+    memory : array-like, shape (n_numbers,)
+        ``numbers`` of the C model, as `mckibben.link.Link.memory` reads them.
+    sample_time : float or None
+        That it was exported with [s].
+
+    Returns
+    -------
+    array, shape (n_states,)
+
+    Raises
+    ------
+    DataError
+        If it is the memory of another model.
+    """
+    wiring, numbers = Wiring(block, sample_time), np.asarray(memory, dtype=np.float64)
+    if numbers.shape != (wiring.n_numbers,):
+        raise DataError(
+            f"the memory has {numbers.size} numbers, that of {block.title!r} {wiring.n_numbers}",
+            remedy="give the block that was exported",
+        )
+    states = [numbers[c.first_state :][: c.part.block.n_states] for c in wiring.calls]
+    return np.concatenate([np.empty(0), *states])

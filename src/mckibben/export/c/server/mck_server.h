@@ -33,7 +33,7 @@ typedef struct {
     uint32_t silence; /* ticks without a good frame, at most */
     int n_inputs;
     int n_outputs;
-    int sizes[2];               /* coefficients, and numbers of the memory; 0 where they are fixed */
+    int sizes[2];               /* coefficients, 0 where they are fixed, and numbers of the memory */
     const mck_real *lowest[2];  /* of each; NULL where they are fixed */
     const mck_real *highest[2]; /* below the lowest where a number is scratch, which is not taken */
     const mck_channel *channels; /* inputs, then outputs */

@@ -7,6 +7,7 @@
 #define MOST_ALIKE MCK_R(0.9995)
 #define LARGEST MCK_R(1e9) /* usual error, by the noise */
 #define NEVER MCK_R(1e30)
+#define LATE MCK_R(3.0) /* errors that what is used goes by: those of a third of the time */
 #define STILL MCK_R(1e-9)
 #define UNMOVED MCK_R(1e-12)
 
@@ -58,6 +59,7 @@ void mck_learnt_start(const mck_learner *m, const mck_learnt *s, int outputs)
         sense[MCK_RELATED] = ALIKE;
         sense[MCK_STOOD] = MCK_R(3.0) * m->noise * (MCK_R(3.0) * m->noise) *
                            (MCK_R(1.0) + ALIKE) / (MCK_R(1.0) - ALIKE);
+        sense[MCK_APART] = m->noise * m->noise;
     }
 }
 
@@ -81,6 +83,26 @@ static void feel(mck_real share, mck_real noise, mck_real relative, mck_real *se
     sense[MCK_RELATED] += share * (relative * sense[MCK_BEFORE] - sense[MCK_RELATED]);
     sense[MCK_SQUARED] += share * (square - sense[MCK_SQUARED]);
     sense[MCK_BEFORE] = relative;
+}
+
+/* Remember how what is learnt would have helped: what it leaves, what it makes up for. */
+static void compare(const mck_learner *m, mck_real left, mck_real made_up, mck_real *sense)
+{
+    const mck_real late = mck_min(LATE * m->share, MCK_R(0.5));
+    const mck_real apart = made_up * made_up + m->noise * m->noise;
+    sense[MCK_HELPED] += late * (made_up * (left + made_up) - sense[MCK_HELPED]);
+    sense[MCK_APART] += late * (apart - sense[MCK_APART]);
+}
+
+mck_real mck_trusted(const mck_learnt *s, int outputs)
+{
+    mck_real helped = MCK_R(0.0);
+    mck_real apart = MCK_R(0.0);
+    for (int k = 0; k < outputs; k++) {
+        helped += s->sense[MCK_SENSES * k + MCK_HELPED];
+        apart += s->sense[MCK_SENSES * k + MCK_APART];
+    }
+    return mck_clip(helped / apart, MCK_R(0.0), MCK_R(1.0));
 }
 
 /* Add `excited` times what a measurement tells to what is known (Bierman); g becomes P phi. */
@@ -141,7 +163,7 @@ static void stand_by(const mck_learner *m, mck_real square, mck_real *diagonal, 
 }
 
 int mck_learn(const mck_learner *m, const mck_learnt *s, mck_real *sense, mck_real measured,
-              mck_real predicted, mck_real asked)
+              mck_real predicted, mck_real asked, mck_real fitted)
 {
     const int p = m->p;
     const mck_real *slopes = s->work;
@@ -194,6 +216,7 @@ int mck_learn(const mck_learner *m, const mck_learnt *s, mck_real *sense, mck_re
         sense[MCK_IGNORED] += MCK_R(1.0);
     }
     feel(m->share, m->noise, weight * error / expected, sense);
+    compare(m, weight * error, predicted - fitted, sense);
     if (!(r > UNMOVED && r < MCK_INFINITY && weight > ABSURD)) {
         return 0;
     }

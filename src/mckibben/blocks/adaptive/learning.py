@@ -45,6 +45,8 @@ GATE = 3.0
 """Usual errors beyond which an error teaches no more."""
 QUARTILE = 0.6745
 """Median of the sizes of errors of unit variance."""
+NEAR = 0.1
+"""How near to it an error counts for less: single precision is to go the same way."""
 ABSURD = 1e-6
 """Weight of an error too large to be one."""
 ALIKE, MOST_ALIKE = 0.98, 0.9995
@@ -140,8 +142,9 @@ def learn(
     _compare(share, noise, weight * error, predicted - fitted, sense)
     if not UNMOVED < r < np.inf or weight < ABSURD:
         return False
-    lacks = r < share  # as where errors have grown: what is excited is learnt within the time
-    tells = 1.0 / share - 1.0 / r
+    settled = share / (1.0 - share)
+    lacks = r < settled  # as where errors have grown: what is excited is learnt within the time
+    tells = 1.0 / settled - 1.0 / r
     r *= weight
     _spread(root, f, g, tells if lacks else weight * (1.0 - share - share / r))
     gain = weight * error / told / (1.0 + r)
@@ -175,9 +178,8 @@ def _feel(share: float, noise: float, relative: float, sense: Array) -> None:
     """Remember an error, by its expected size."""
     usual = sense[USUAL]
     quick = min(20.0 * share, 0.5)
-    grows = 1.0 + 0.5 * quick
-    next_usual = usual * grows if abs(relative) > QUARTILE else usual / grows
-    sense[USUAL] = min(max(next_usual, noise), LARGEST * noise)
+    side = min(max((abs(relative) - QUARTILE) / NEAR, -1.0), 1.0)
+    sense[USUAL] = min(max(usual * (1.0 + 0.5 * quick * side), noise), LARGEST * noise)
     square = relative * relative
     sense[SURPRISE] += quick * (square - sense[SURPRISE])
     sense[RELATED] += share * (relative * sense[BEFORE] - sense[RELATED])

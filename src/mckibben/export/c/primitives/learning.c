@@ -1,6 +1,7 @@
 #include "learning.h"
 
 #define QUARTILE MCK_R(0.6745)
+#define NEAR MCK_R(0.1) /* to it, where an error counts for less */
 #define SURPRISED MCK_R(5.0)
 #define ABSURD MCK_R(1e-6)
 #define ALIKE MCK_R(0.98) /* errors that follow one another, until it is known */
@@ -75,8 +76,9 @@ static void feel(mck_real share, mck_real noise, mck_real relative, mck_real *se
 {
     const mck_real usual = sense[MCK_USUAL];
     const mck_real quick = mck_min(MCK_R(20.0) * share, MCK_R(0.5));
-    const mck_real grows = MCK_R(1.0) + MCK_R(0.5) * quick;
-    const mck_real next = mck_abs(relative) > QUARTILE ? usual * grows : usual / grows;
+    const mck_real side =
+        mck_clip((mck_abs(relative) - QUARTILE) / NEAR, MCK_R(-1.0), MCK_R(1.0));
+    const mck_real next = usual * (MCK_R(1.0) + MCK_R(0.5) * quick * side);
     const mck_real square = relative * relative;
     sense[MCK_USUAL] = mck_min(mck_max(next, noise), LARGEST * noise);
     sense[MCK_SURPRISE] += quick * (square - sense[MCK_SURPRISE]);
@@ -221,8 +223,9 @@ int mck_learn(const mck_learner *m, const mck_learnt *s, mck_real *sense, mck_re
         return 0;
     }
     /* as where errors have grown: what is excited is learnt within the time */
-    const int lacks = r < m->share;
-    const mck_real tells = MCK_R(1.0) / m->share - MCK_R(1.0) / r;
+    const mck_real settled = m->share / (MCK_R(1.0) - m->share);
+    const int lacks = r < settled;
+    const mck_real tells = MCK_R(1.0) / settled - MCK_R(1.0) / r;
     r *= weight;
     spread(p, s->root, f, g,
            lacks ? tells : weight * (MCK_R(1.0) - m->share - m->share / r));

@@ -53,8 +53,8 @@ def follow_learning(
     """Learn, and find the operators' common input, for every reference.
 
     ``theta`` and ``used`` are [weights, offset]; ``limits`` [lowest, highest]; ``least`` [lowest
-    weights, lowest partial sums]; ``fitted`` as ``theta``; ``s`` the operators; ``last`` is [previous reference, samples clipped,
-    direction of travel].
+    weights, lowest partial sums]; ``fitted`` is as ``theta``; ``s`` the operators; ``last`` is
+    [previous reference, samples clipped, direction of travel].
     """
     n = r.size
     slopes = work[2 * n + 2 : 3 * n + 3]

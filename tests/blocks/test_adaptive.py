@@ -17,7 +17,13 @@ from mckibben.blocks.adaptive.adaptable import Adaptable
 from mckibben.blocks.adaptive.adaptive import Adaptive, taught
 from mckibben.blocks.adaptive.adaptive_series import AdaptiveSeries, adaptive
 from mckibben.blocks.adaptive.drift import alarm_limit
-from mckibben.blocks.adaptive.learning import covariance_of, start_root
+from mckibben.blocks.adaptive.learning import (
+    covariance_of,
+    learn,
+    start_root,
+    start_sense,
+    trusted,
+)
 from mckibben.blocks.dynamic.creep import Creep
 from mckibben.blocks.feedback.feedforward_feedback import FeedforwardFeedback
 from mckibben.blocks.feedback.pid import PIDFeedback
@@ -125,6 +131,22 @@ def test_noise_makes_the_input_turn_no_more_often_than_the_reference() -> None:
         return int(np.sum(np.diff(np.sign(steps[np.abs(steps) > 1e-12])) != 0))
 
     assert turns(given) == turns(asked)
+
+
+@pytest.mark.parametrize("helps", [True, False])
+def test_what_is_learnt_is_used_as_far_as_it_helped(helps: bool) -> None:
+    """Against least squares of the fit's errors over what was learnt beside it."""
+    rng, n, share = np.random.default_rng(7), 4000, 0.001
+    sense, numbers = start_sense(0.1), (np.array([share, 0.1, 1.0]), *np.ones((2, 1)))
+    fresh = start_root(np.eye(1))
+    made_up = rng.standard_normal(n)
+    for change in made_up.tolist():  # what is learnt is made to be so far from the fit
+        theta, root = np.array([change]), fresh.copy()
+        measured = (0.6 * change if helps else -change) + 0.1 * rng.standard_normal()
+        learn(
+            *numbers, fresh, theta, root, sense, np.ones(1), np.zeros(3), measured, change, 0.0, 0.0
+        )
+    assert trusted(sense) == pytest.approx(0.6 if helps else 0.0, abs=0.05)
 
 
 def test_outliers_cost_little() -> None:

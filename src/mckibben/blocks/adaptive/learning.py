@@ -20,6 +20,9 @@ a single outlier is nothing. Where many are too large for a twentieth of the tim
 stepped: the covariance is made as wide as at the start, and what is new is learnt at once. A
 measurement that is not a number teaches nothing, nor does one that stands exactly still while what is
 asked for moves.
+
+What is learnt is used as far as it helps: the fitted parameters foretell too, beside it, and what is
+used lies between them, where late errors would have been least. Where nothing drifts it costs nothing.
 """
 
 from __future__ import annotations
@@ -29,17 +32,21 @@ import numpy as np
 from mckibben.arrays import Array
 from mckibben.blocks.core.kernels import kernel
 
-SENSES = 10
+SENSES = 12
 """How many numbers are remembered of a sensor: whether it was read, usual error, surprise, last
 measured, what was predicted when that changed, product and square of errors, last error, ignored,
-square of the scatter that the covariance stands by."""
+square of the scatter that the covariance stands by, what the fit lacks times what is made up for, and
+the square of that."""
 
-READY, USUAL, SURPRISE, LAST, THEN, RELATED, SQUARED, BEFORE, IGNORED, STOOD = range(SENSES)
+READY, USUAL, SURPRISE, LAST, THEN, RELATED, SQUARED, BEFORE, IGNORED, STOOD = range(10)
+HELPED, APART = 10, 11
 
 GATE = 3.0
 """Usual errors beyond which an error teaches no more."""
 QUARTILE = 0.6745
 """Median of the sizes of errors of unit variance."""
+NEAR = 0.1
+"""How near to it an error counts for less: single precision is to go the same way."""
 ABSURD = 1e-6
 """Weight of an error too large to be one."""
 ALIKE, MOST_ALIKE = 0.98, 0.9995
@@ -50,6 +57,8 @@ NEVER = 1e30
 """What no output is."""
 STILL, UNMOVED = 1e-9, 1e-12
 """What is added to what is known, and squares of slopes by the noise, below which nothing changes."""
+LATE = 3.0
+"""Of errors that what is used goes by: those of a third of the time."""
 SURPRISED = 5.0
 """Mean square of errors, cut at the gate, by the usual one, beyond which all is learnt afresh."""
 
@@ -68,6 +77,7 @@ def learn(
     measured: float,
     predicted: float,
     asked: float,
+    fitted: float,
 ) -> bool:
     """Teach parameters by one measured output; return whether they were.
 
@@ -89,8 +99,8 @@ def learn(
         Of the output over the parameters.
     work : array, shape (2 p,)
         To compute in.
-    measured, predicted, asked : float
-        The output, what it is by ``theta``, and what it is by what the inverse runs with.
+    measured, predicted, asked, fitted : float
+        The output, what it is by ``theta``, by what the inverse runs with, and by what was fitted.
     """
     share, noise = settings[0], settings[1]
     if measured - measured != 0.0:
@@ -129,10 +139,12 @@ def learn(
         weight = GATE * expected / abs(error)
         sense[IGNORED] += 1.0
     _feel(share, noise, weight * error / expected, sense)
+    _compare(share, noise, weight * error, predicted - fitted, sense)
     if not UNMOVED < r < np.inf or weight < ABSURD:
         return False
-    lacks = r < share  # as where errors have grown: what is excited is learnt within the time
-    tells = 1.0 / share - 1.0 / r
+    settled = share / (1.0 - share)
+    lacks = r < settled  # as where errors have grown: what is excited is learnt within the time
+    tells = 1.0 / settled - 1.0 / r
     r *= weight
     _spread(root, f, g, tells if lacks else weight * (1.0 - share - share / r))
     gain = weight * error / told / (1.0 + r)
@@ -166,14 +178,31 @@ def _feel(share: float, noise: float, relative: float, sense: Array) -> None:
     """Remember an error, by its expected size."""
     usual = sense[USUAL]
     quick = min(20.0 * share, 0.5)
-    grows = 1.0 + 0.5 * quick
-    next_usual = usual * grows if abs(relative) > QUARTILE else usual / grows
-    sense[USUAL] = min(max(next_usual, noise), LARGEST * noise)
+    side = min(max((abs(relative) - QUARTILE) / NEAR, -1.0), 1.0)
+    sense[USUAL] = min(max(usual * (1.0 + 0.5 * quick * side), noise), LARGEST * noise)
     square = relative * relative
     sense[SURPRISE] += quick * (square - sense[SURPRISE])
     sense[RELATED] += share * (relative * sense[BEFORE] - sense[RELATED])
     sense[SQUARED] += share * (square - sense[SQUARED])
     sense[BEFORE] = relative
+
+
+@kernel
+def _compare(share: float, noise: float, left: float, made_up: float, sense: Array) -> None:
+    """Remember how what is learnt would have helped: what it leaves, what it makes up for."""
+    late = min(LATE * share, 0.5)
+    sense[HELPED] += late * (made_up * (left + made_up) - sense[HELPED])
+    sense[APART] += late * (made_up * made_up + noise * noise - sense[APART])
+
+
+@kernel
+def trusted(senses: Array) -> float:
+    """Return how far from fitted to learnt errors would have been least, of all sensors."""
+    helped, apart = 0.0, 0.0
+    for first in range(0, senses.size, SENSES):
+        helped += senses[first + HELPED]
+        apart += senses[first + APART]
+    return min(max(helped / apart, 0.0), 1.0)
 
 
 @kernel
@@ -245,4 +274,5 @@ def start_sense(noise: float) -> Array:
     sense = np.zeros(SENSES)
     sense[USUAL], sense[SURPRISE], sense[SQUARED], sense[RELATED] = 3.0 * noise, 1.0, 1.0, ALIKE
     sense[STOOD] = (3.0 * noise) ** 2 * (1.0 + ALIKE) / (1.0 - ALIKE)
+    sense[APART] = noise**2
     return sense

@@ -17,7 +17,7 @@ import numpy as np
 
 from mckibben.arrays import Array
 from mckibben.blocks.adaptive.adaptable import Adaptable, Group, Learning, relative_spread
-from mckibben.blocks.adaptive.learning import GATE, USUAL, learn
+from mckibben.blocks.adaptive.learning import GATE, USUAL, learn, trusted
 from mckibben.blocks.core.block import Run
 from mckibben.blocks.core.kernels import kernel
 from mckibben.blocks.core.single_channel import Ranged
@@ -42,6 +42,7 @@ def follow_learning(
     limits: Array,
     r: Array,
     least: Array,
+    fitted: Array,
     s: Array,
     last: Array,
     references: Array,
@@ -52,20 +53,20 @@ def follow_learning(
     """Learn, and find the operators' common input, for every reference.
 
     ``theta`` and ``used`` are [weights, offset]; ``limits`` [lowest, highest]; ``least`` [lowest
-    weights, lowest partial sums]; ``s`` the operators; ``last`` is [previous reference, samples clipped,
-    direction of travel].
+    weights, lowest partial sums]; ``fitted`` is as ``theta``; ``s`` the operators; ``last`` is
+    [previous reference, samples clipped, direction of travel].
     """
     n = r.size
     slopes = work[2 * n + 2 : 3 * n + 3]
     for t in range(references.shape[0]):
         y = references[t, 0]
-        believed, asked = 0.0, used[n]
+        believed, asked, expected = theta[n], used[n], fitted[n]
         for i in range(n):
             slopes[i] = s[i]
             believed += theta[i] * s[i]
             asked += used[i] * s[i]
+            expected += fitted[i] * s[i]
         slopes[n] = 1.0
-        believed += theta[n]
         if learn(
             settings,
             scales,
@@ -79,13 +80,17 @@ def follow_learning(
             measured[t, 0],
             believed,
             asked,
+            expected,
         ):
             keep_rising(theta, least)
         if y > last[0]:
             last[2] = 1.0
         elif y < last[0]:
             last[2] = -1.0
-        take_over(theta, used, s, y, last[2], GATE * sense[USUAL])
+        share, aim = trusted(sense), slopes
+        for i in range(n + 1):
+            aim[i] = fitted[i] + share * (theta[i] - fitted[i])
+        take_over(aim, used, s, y, last[2], GATE * sense[USUAL])
         total = 0.0
         for i in range(n):
             total += used[i] * s[i]
@@ -108,20 +113,20 @@ def keep_rising(theta: Array, least: Array) -> None:
 
 
 @kernel
-def take_over(theta: Array, used: Array, s: Array, y: float, travel: float, band: float) -> None:
-    """Move what is used to what is learnt, as far as the input need not turn before the reference."""
+def take_over(aim: Array, used: Array, s: Array, y: float, travel: float, band: float) -> None:
+    """Move what is used to what is aimed at, as far as the input need not turn before the reference."""
     n = s.size
-    total, change = used[n], theta[n] - used[n]
+    total, change = used[n], aim[n] - used[n]
     for i in range(n):
         total += used[i] * s[i]
-        change += (theta[i] - used[i]) * s[i]
+        change += (aim[i] - used[i]) * s[i]
     room = y - total
     share = 1.0
     left = room - change
     if travel * left < 0.0 and abs(left) <= band and change != 0.0:
         share = min(max(room / change, 0.0), 1.0)
     for i in range(n + 1):
-        used[i] = theta[i] if share == 1.0 else used[i] + share * (theta[i] - used[i])
+        used[i] = aim[i] if share == 1.0 else used[i] + share * (aim[i] - used[i])
 
 
 class LearntOperators(Ranged, Adaptable):
@@ -197,7 +202,7 @@ class LearntOperators(Ranged, Adaptable):
         z: Array,
         direction: Array,
     ) -> Run:
-        numbers = (np.array(self.learnt_limits), np.array(self.thresholds), self.least)
+        numbers = (np.array(self.learnt_limits), np.array(self.thresholds), self.least, self.taught)
         one = learning
         rest = (one.theta, one.used, one.root, one.senses, one.work)
         return bound(

@@ -17,7 +17,7 @@ from __future__ import annotations
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.blocks.adaptive.learning import SENSES, learn
+from mckibben.blocks.adaptive.learning import SENSES, learn, trusted
 from mckibben.blocks.core.kernels import kernel
 from mckibben.blocks.core.linear_system import eliminate
 from mckibben.blocks.coupled.balance_law import press
@@ -85,9 +85,10 @@ def adapt_balance(
         taught = False
         for k in range(n):
             answer(terms, matrix, k, row, slopes)
-            believed = y[k] - tare[k]
+            believed = expected = y[k] - tare[k]
             for i in range(size):
                 believed += slopes[i] * (theta[i] - used[i])
+                expected += slopes[i] * (as_fitted(which, i) - used[i])
             if learn(
                 settings,
                 scales,
@@ -101,13 +102,15 @@ def adapt_balance(
                 measured[t, k],
                 believed,
                 y[k] - tare[k],
+                expected,
             ):
                 taught = True
         if taught:
             pull_back(settings[0], which, scales, widest, root, theta, slopes, work)
             keep_balanced(which, bounds, scales, root, theta, slopes, work)
+            share = trusted(senses)
             for i in range(size):
-                used[i] = theta[i]
+                used[i] = as_fitted(which, i) + share * (theta[i] - as_fitted(which, i))
             retune(fitted, which, used, c)
         press(c, state, inputs[t], outputs[t])
         first = c.size - n * (n + 6)
@@ -115,6 +118,12 @@ def adapt_balance(
             y[k], p[k] = c[first + k], outputs[t, k]
         for i in range(n_x):
             x[i] = inputs[t, n + i]
+
+
+@kernel
+def as_fitted(which: Array, i: int) -> float:
+    """Return parameter i as it was fitted."""
+    return 0.0 if int(which[i]) % KINDS == OFFSET else 1.0
 
 
 @kernel
@@ -239,8 +248,7 @@ def pull_back(
     """
     p = theta.size
     for i in range(p):
-        fitted = 0.0 if int(which[i]) % KINDS == OFFSET else 1.0
-        work[i] = share * (fitted - theta[i]) / (scales[i] * widest[i])
+        work[i] = share * (as_fitted(which, i) - theta[i]) / (scales[i] * widest[i])
     covariant(root, work, along)
     for i in range(p):
         theta[i] += scales[i] * along[i]

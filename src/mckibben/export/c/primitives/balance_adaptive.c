@@ -288,18 +288,22 @@ void mck_balance_adaptive_step(const mck_part *part, mck_real *state, const mck_
     for (int k = 0; k < n; k++) {
         const mck_real asked = a.y[k] - a.now.tare[k];
         mck_real believed = asked;
+        mck_real expected = asked;
         answer(&a, k);
         for (int i = 0; i < a.learner.p; i++) {
             believed += a.learnt.work[i] * (a.learnt.theta[i] - a.learnt.used[i]);
+            expected += a.learnt.work[i] * (a.learner.fitted[i] - a.learnt.used[i]);
         }
         taught |= mck_learn(&a.learner, &a.learnt, a.learnt.sense + MCK_SENSES * k, measured[k],
-                            believed, asked);
+                            believed, asked, expected);
     }
     if (taught) {
         pull_back(&a);
         keep_balanced(&a);
+        const mck_real share = mck_trusted(&a.learnt, n);
         for (int i = 0; i < a.learner.p; i++) {
-            a.learnt.used[i] = a.learnt.theta[i];
+            const mck_real fitted = a.learner.fitted[i];
+            a.learnt.used[i] = fitted + share * (a.learnt.theta[i] - fitted);
         }
         retune(&a);
     }

@@ -1,12 +1,14 @@
 #include "learning.h"
 
 #define QUARTILE MCK_R(0.6745)
+#define NEAR MCK_R(0.1) /* to it, where an error counts for less */
 #define SURPRISED MCK_R(5.0)
 #define ABSURD MCK_R(1e-6)
 #define ALIKE MCK_R(0.98) /* errors that follow one another, until it is known */
 #define MOST_ALIKE MCK_R(0.9995)
 #define LARGEST MCK_R(1e9) /* usual error, by the noise */
 #define NEVER MCK_R(1e30)
+#define LATE MCK_R(3.0) /* errors that what is used goes by: those of a third of the time */
 #define STILL MCK_R(1e-9)
 #define UNMOVED MCK_R(1e-12)
 
@@ -58,6 +60,7 @@ void mck_learnt_start(const mck_learner *m, const mck_learnt *s, int outputs)
         sense[MCK_RELATED] = ALIKE;
         sense[MCK_STOOD] = MCK_R(3.0) * m->noise * (MCK_R(3.0) * m->noise) *
                            (MCK_R(1.0) + ALIKE) / (MCK_R(1.0) - ALIKE);
+        sense[MCK_APART] = m->noise * m->noise;
     }
 }
 
@@ -73,14 +76,35 @@ static void feel(mck_real share, mck_real noise, mck_real relative, mck_real *se
 {
     const mck_real usual = sense[MCK_USUAL];
     const mck_real quick = mck_min(MCK_R(20.0) * share, MCK_R(0.5));
-    const mck_real grows = MCK_R(1.0) + MCK_R(0.5) * quick;
-    const mck_real next = mck_abs(relative) > QUARTILE ? usual * grows : usual / grows;
+    const mck_real side =
+        mck_clip((mck_abs(relative) - QUARTILE) / NEAR, MCK_R(-1.0), MCK_R(1.0));
+    const mck_real next = usual * (MCK_R(1.0) + MCK_R(0.5) * quick * side);
     const mck_real square = relative * relative;
     sense[MCK_USUAL] = mck_min(mck_max(next, noise), LARGEST * noise);
     sense[MCK_SURPRISE] += quick * (square - sense[MCK_SURPRISE]);
     sense[MCK_RELATED] += share * (relative * sense[MCK_BEFORE] - sense[MCK_RELATED]);
     sense[MCK_SQUARED] += share * (square - sense[MCK_SQUARED]);
     sense[MCK_BEFORE] = relative;
+}
+
+/* Remember how what is learnt would have helped: what it leaves, what it makes up for. */
+static void compare(const mck_learner *m, mck_real left, mck_real made_up, mck_real *sense)
+{
+    const mck_real late = mck_min(LATE * m->share, MCK_R(0.5));
+    const mck_real apart = made_up * made_up + m->noise * m->noise;
+    sense[MCK_HELPED] += late * (made_up * (left + made_up) - sense[MCK_HELPED]);
+    sense[MCK_APART] += late * (apart - sense[MCK_APART]);
+}
+
+mck_real mck_trusted(const mck_learnt *s, int outputs)
+{
+    mck_real helped = MCK_R(0.0);
+    mck_real apart = MCK_R(0.0);
+    for (int k = 0; k < outputs; k++) {
+        helped += s->sense[MCK_SENSES * k + MCK_HELPED];
+        apart += s->sense[MCK_SENSES * k + MCK_APART];
+    }
+    return mck_clip(helped / apart, MCK_R(0.0), MCK_R(1.0));
 }
 
 /* Add `excited` times what a measurement tells to what is known (Bierman); g becomes P phi. */
@@ -141,7 +165,7 @@ static void stand_by(const mck_learner *m, mck_real square, mck_real *diagonal, 
 }
 
 int mck_learn(const mck_learner *m, const mck_learnt *s, mck_real *sense, mck_real measured,
-              mck_real predicted, mck_real asked)
+              mck_real predicted, mck_real asked, mck_real fitted)
 {
     const int p = m->p;
     const mck_real *slopes = s->work;
@@ -194,12 +218,14 @@ int mck_learn(const mck_learner *m, const mck_learnt *s, mck_real *sense, mck_re
         sense[MCK_IGNORED] += MCK_R(1.0);
     }
     feel(m->share, m->noise, weight * error / expected, sense);
+    compare(m, weight * error, predicted - fitted, sense);
     if (!(r > UNMOVED && r < MCK_INFINITY && weight > ABSURD)) {
         return 0;
     }
     /* as where errors have grown: what is excited is learnt within the time */
-    const int lacks = r < m->share;
-    const mck_real tells = MCK_R(1.0) / m->share - MCK_R(1.0) / r;
+    const mck_real settled = m->share / (MCK_R(1.0) - m->share);
+    const int lacks = r < settled;
+    const mck_real tells = MCK_R(1.0) / settled - MCK_R(1.0) / r;
     r *= weight;
     spread(p, s->root, f, g,
            lacks ? tells : weight * (MCK_R(1.0) - m->share - m->share / r));

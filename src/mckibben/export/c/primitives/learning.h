@@ -18,6 +18,8 @@ enum {
     MCK_BEFORE,   /* last error */
     MCK_IGNORED,  /* measurements that were absent, stood still or were too far off */
     MCK_STOOD,    /* square of the scatter that the covariance stands by */
+    MCK_HELPED,   /* mean product of what the fit lacks and what is made up for */
+    MCK_APART,    /* mean square of what is made up for, and of the noise */
     MCK_SENSES
 };
 
@@ -52,8 +54,11 @@ mck_learnt mck_split_learnt(const mck_learner *m, mck_real *state, int own, int 
 void mck_learnt_start(const mck_learner *m, const mck_learnt *s, int outputs);
 
 /* Learn from one output, whose slopes are the first p numbers of s->work; `predicted` is the output by
- * theta, `asked` by what is used. Returns whether anything was learnt. */
+ * theta, `asked` by what is used, `fitted` by what was fitted. Returns whether anything was learnt. */
 int mck_learn(const mck_learner *m, const mck_learnt *s, mck_real *sense, mck_real measured,
-              mck_real predicted, mck_real asked);
+              mck_real predicted, mck_real asked, mck_real fitted);
+
+/* How far from fitted to learnt errors would have been least, of all outputs. */
+mck_real mck_trusted(const mck_learnt *s, int outputs);
 
 #endif

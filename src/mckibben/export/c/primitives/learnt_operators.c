@@ -14,15 +14,15 @@ static void keep_rising(int n, mck_real *theta, const mck_real *least)
     }
 }
 
-/* Move what is used to what is learnt, as far as the input need not turn before the reference. */
-static void take_over(int n, const mck_real *theta, mck_real *used, const mck_real *s, mck_real y,
+/* Move what is used to what is aimed at, as far as the input need not turn before the reference. */
+static void take_over(int n, const mck_real *aim, mck_real *used, const mck_real *s, mck_real y,
                       mck_real travel, mck_real band)
 {
     mck_real total = used[n];
-    mck_real change = theta[n] - used[n];
+    mck_real change = aim[n] - used[n];
     for (int i = 0; i < n; i++) {
         total += used[i] * s[i];
-        change += (theta[i] - used[i]) * s[i];
+        change += (aim[i] - used[i]) * s[i];
     }
     const mck_real room = y - total;
     const mck_real left = room - change;
@@ -30,13 +30,13 @@ static void take_over(int n, const mck_real *theta, mck_real *used, const mck_re
         const mck_real share = mck_clip(room / change, MCK_R(0.0), MCK_R(1.0));
         if (share < MCK_R(1.0)) {
             for (int i = 0; i <= n; i++) {
-                used[i] += share * (theta[i] - used[i]);
+                used[i] += share * (aim[i] - used[i]);
             }
             return;
         }
     }
     for (int i = 0; i <= n; i++) {
-        used[i] = theta[i];
+        used[i] = aim[i];
     }
 }
 
@@ -46,16 +46,17 @@ int mck_follow_learning(const mck_learner *m, const mck_learnt *learnt, const mc
     const int n = m->p - 1;
     mck_real *theta = learnt->theta;
     mck_real *used = learnt->used;
-    mck_real believed = MCK_R(0.0);
+    mck_real believed = theta[n];
     mck_real asked = used[n];
+    mck_real expected = m->fitted[n];
     for (int i = 0; i < n; i++) {
         learnt->work[i] = s[i];
         believed += theta[i] * s[i];
         asked += used[i] * s[i];
+        expected += m->fitted[i] * s[i];
     }
     learnt->work[n] = MCK_R(1.0);
-    believed += theta[n];
-    if (mck_learn(m, learnt, learnt->sense, in[1], believed, asked)) {
+    if (mck_learn(m, learnt, learnt->sense, in[1], believed, asked, expected)) {
         keep_rising(n, theta, m->family + 2);
     }
     if (in[0] > last[0]) {
@@ -63,7 +64,12 @@ int mck_follow_learning(const mck_learner *m, const mck_learnt *learnt, const mc
     } else if (in[0] < last[0]) {
         last[2] = MCK_R(-1.0);
     }
-    take_over(n, theta, used, s, in[0], last[2], MCK_GATE * learnt->sense[MCK_USUAL]);
+    const mck_real share = mck_trusted(learnt, 1);
+    mck_real *aim = learnt->work;
+    for (int i = 0; i <= n; i++) {
+        aim[i] = m->fitted[i] + share * (theta[i] - m->fitted[i]);
+    }
+    take_over(n, aim, used, s, in[0], last[2], MCK_GATE * learnt->sense[MCK_USUAL]);
     mck_real total = MCK_R(0.0);
     for (int i = 0; i < n; i++) {
         total += used[i] * s[i];

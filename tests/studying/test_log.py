@@ -15,6 +15,7 @@ from mckibben import PI, Channel, DataError, ModelError, PerChannel, Recording, 
 from mckibben.arrays import Array
 from mckibben.cli.main import run
 from mckibben.control import Controller, track
+from mckibben.files import write
 from mckibben.files.headers import channel_of, parse
 from mckibben.studying.causes import explained
 from mckibben.studying.closed import closed
@@ -312,3 +313,20 @@ def test_study_refuses_a_log_without_reference(
     code, printed = called(monkeypatch, capsys, *given)
     assert code == 2
     assert "--column reference_displacement=COLUMN" in printed
+
+
+def test_what_learns_is_tracked_as_it_is_written(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    model, learning, log, wished = (
+        tmp_path / name for name in ("model.json", "learning.json", "log.csv", "wished.csv")
+    )
+    MUSCLE.save(model)
+    write(reference(0, 10.0), wished)
+    code, printed = called(monkeypatch, capsys, "invert", model, "--adaptive", "-o", learning)
+    assert code == 0, printed
+    assert f"mckibben track {learning} --plant {model}" in printed
+    given = ["--plant", model, "--limits", "pressure=0:8", "--reference", wished, "-o", log]
+    code, printed = called(monkeypatch, capsys, "track", learning, *given, "--approach", 2)
+    assert code == 0, printed
+    assert "displacement_measured" not in log.read_text().splitlines()[0]

@@ -13,6 +13,8 @@ import pytest
 import mckibben
 from mckibben import PI, Channel, DataError, ModelError, PerChannel, Recording, review
 from mckibben.arrays import Array
+from mckibben.blocks.adaptive.adaptive_series import adaptive
+from mckibben.blocks.predictive.predictive import Predictive
 from mckibben.cli.main import run
 from mckibben.control import Controller, track
 from mckibben.files import write
@@ -323,10 +325,30 @@ def test_what_learns_is_tracked_as_it_is_written(
     )
     MUSCLE.save(model)
     write(reference(0, 10.0), wished)
-    code, printed = called(monkeypatch, capsys, "invert", model, "--adaptive", "-o", learning)
+    code, printed = called(
+        monkeypatch, capsys, "invert", model, "--adaptive", "--noise", 0.05, "-o", learning
+    )
     assert code == 0, printed
     assert f"mckibben track {learning} --plant {model}" in printed
     given = ["--plant", model, "--limits", "pressure=0:8", "--reference", wished, "-o", log]
     code, printed = called(monkeypatch, capsys, "track", learning, *given, "--approach", 2)
     assert code == 0, printed
     assert "displacement_measured" not in log.read_text().splitlines()[0]
+
+
+def test_what_learns_and_what_plans_is_asked_as_the_loop_asks_it() -> None:
+    """It then gives the commands of the log, so that nothing is laid to feedback."""
+    stronger = replace(MUSCLE, weights=tuple(1.15 * weight for weight in MUSCLE.weights))
+    learning = adaptive(MUSCLE, 10.0, 0.05)
+    log = track(learning, Faulty(stronger), reference(0), pressure_loop=False).recording
+    found = review(log, compensator=learning, refit=False)
+    assert not found.feedback
+    assert found.outputs[0].causes[0].kind == "model"
+    assert "The compensator learns" in found.notes[-1]
+    plans = Predictive(MUSCLE.inverse(), horizon=10, rate_limit=1.0, pressure_range=(0.0, 8.0))
+    log = track(plans, Faulty(MUSCLE), reference(0), pressure_loop=False).recording
+    found = review(log, compensator=plans, refit=False)
+    assert not found.feedback
+    followed = found.outputs[0]
+    assert followed.predicted == pytest.approx(followed.achieved, rel=1e-3)
+    assert followed.causes[0].kind == "compensator"

@@ -153,7 +153,7 @@ def told(one: Followed, check: OutputCheck, chains: Sequence[Chain]) -> dict[str
         "limits": f"{clipped} of {n} samples are at a limit of pressure, or their reference is out of "
         "reach",
         "feedback": "what it asks for is not what the model would need, or comes too late",
-        "compensator": "it is not the inverse of this model",
+        "compensator": "it is not the inverse of this model; one that plans within limits foresees it",
     }
 
 
@@ -175,6 +175,11 @@ def notes(review: Review, loop: Loop) -> tuple[str, ...]:
         found.append(
             "No commands are logged, so measured pressures are compared with what the compensator "
             "gives for the reference, as if there was no feedback."
+        )
+    if loop.learns:
+        found.append(
+            "The compensator learns: the model's share is what learning has left, and what is said of "
+            "the model is said of the one fitted before."
         )
     if (review.feedback and review.judged_by != "compensator") or not loop.known:
         found.append(

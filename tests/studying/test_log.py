@@ -22,6 +22,7 @@ from mckibben.files.headers import channel_of, parse
 from mckibben.studying.causes import explained
 from mckibben.studying.closed import closed
 from mckibben.studying.refitting import Refit
+from mckibben.studying.review_words import refit
 from mckibben.studying.reviewing import Followed
 from mckibben.studying.shifts import dead_time, lagged, shifted
 from tests.studying.plants import Faulty
@@ -298,8 +299,8 @@ def test_study_writes_what_it_finds_of_a_log(
     assert followed["achieved"] == pytest.approx(rmse, rel=0.01)
     assert sum(cause["share"] for cause in followed["causes"]) == pytest.approx(1)
     assert told["refit"]["recommended"]
-    refit = mckibben.load(out / "refit.json")
-    assert isinstance(refit, PI)
+    again = mckibben.load(out / "refit.json")
+    assert isinstance(again, PI)
     page = (out / "report.html").read_text()
     assert "How the loop followed" in page
     assert "review displacement" in page
@@ -352,3 +353,20 @@ def test_what_learns_and_what_plans_is_asked_as_the_loop_asks_it() -> None:
     followed = found.outputs[0]
     assert followed.predicted == pytest.approx(followed.achieved, rel=1e-3)
     assert followed.causes[0].kind == "compensator"
+
+
+@pytest.mark.parametrize("plans", [False, True])
+def test_a_loop_without_fault_gets_no_cause_and_no_refit(plans: bool) -> None:
+    inverse = MUSCLE.inverse()
+    ran = Predictive(inverse, 10, 1000.0, (0.0, 8.0)) if plans else inverse
+    log = track(ran, Faulty(MUSCLE), reference(0), pressure_loop=False).recording
+    found = review(log, compensator=ran)
+    assert found.verdict.endswith("Nothing is wrong to speak of.")
+    assert not [*found.sentences, *found.outputs[0].causes]
+    assert found.refit is None
+
+
+def test_a_refit_that_is_worse_is_called_so() -> None:
+    worse = Refit(MUSCLE, old=0.1, new=0.2, ratio=(1.5, 2.5), n_folds=4, older=0, covered=1.0)
+    assert "it is worse" in refit(worse)
+    assert "no more than chance" in refit(replace(worse, ratio=(0.9, 2.5)))

@@ -13,12 +13,16 @@ import pytest
 import mckibben
 from mckibben import PI, Channel, DataError, ModelError, PerChannel, Recording, review
 from mckibben.arrays import Array
+from mckibben.blocks.adaptive.adaptive_series import adaptive
+from mckibben.blocks.predictive.predictive import Predictive
 from mckibben.cli.main import run
 from mckibben.control import Controller, track
+from mckibben.files import write
 from mckibben.files.headers import channel_of, parse
 from mckibben.studying.causes import explained
 from mckibben.studying.closed import closed
 from mckibben.studying.refitting import Refit
+from mckibben.studying.review_words import refit
 from mckibben.studying.reviewing import Followed
 from mckibben.studying.shifts import dead_time, lagged, shifted
 from tests.studying.plants import Faulty
@@ -295,8 +299,8 @@ def test_study_writes_what_it_finds_of_a_log(
     assert followed["achieved"] == pytest.approx(rmse, rel=0.01)
     assert sum(cause["share"] for cause in followed["causes"]) == pytest.approx(1)
     assert told["refit"]["recommended"]
-    refit = mckibben.load(out / "refit.json")
-    assert isinstance(refit, PI)
+    again = mckibben.load(out / "refit.json")
+    assert isinstance(again, PI)
     page = (out / "report.html").read_text()
     assert "How the loop followed" in page
     assert "review displacement" in page
@@ -312,3 +316,57 @@ def test_study_refuses_a_log_without_reference(
     code, printed = called(monkeypatch, capsys, *given)
     assert code == 2
     assert "--column reference_displacement=COLUMN" in printed
+
+
+def test_what_learns_is_tracked_as_it_is_written(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    model, learning, log, wished = (
+        tmp_path / name for name in ("model.json", "learning.json", "log.csv", "wished.csv")
+    )
+    MUSCLE.save(model)
+    write(reference(0, 10.0), wished)
+    code, printed = called(
+        monkeypatch, capsys, "invert", model, "--adaptive", "--noise", 0.05, "-o", learning
+    )
+    assert code == 0, printed
+    assert f"mckibben track {learning} --plant {model}" in printed
+    given = ["--plant", model, "--limits", "pressure=0:8", "--reference", wished, "-o", log]
+    code, printed = called(monkeypatch, capsys, "track", learning, *given, "--approach", 2)
+    assert code == 0, printed
+    assert "displacement_measured" not in log.read_text().splitlines()[0]
+
+
+def test_what_learns_and_what_plans_is_asked_as_the_loop_asks_it() -> None:
+    """It then gives the commands of the log, so that nothing is laid to feedback."""
+    stronger = replace(MUSCLE, weights=tuple(1.15 * weight for weight in MUSCLE.weights))
+    learning = adaptive(MUSCLE, 10.0, 0.05)
+    log = track(learning, Faulty(stronger), reference(0), pressure_loop=False).recording
+    found = review(log, compensator=learning, refit=False)
+    assert not found.feedback
+    assert found.outputs[0].causes[0].kind == "model"
+    assert "The compensator learns" in found.notes[-1]
+    plans = Predictive(MUSCLE.inverse(), horizon=10, rate_limit=1.0, pressure_range=(0.0, 8.0))
+    log = track(plans, Faulty(MUSCLE), reference(0), pressure_loop=False).recording
+    found = review(log, compensator=plans, refit=False)
+    assert not found.feedback
+    followed = found.outputs[0]
+    assert followed.predicted == pytest.approx(followed.achieved, rel=1e-3)
+    assert followed.causes[0].kind == "compensator"
+
+
+@pytest.mark.parametrize("plans", [False, True])
+def test_a_loop_without_fault_gets_no_cause_and_no_refit(plans: bool) -> None:
+    inverse = MUSCLE.inverse()
+    ran = Predictive(inverse, 10, 1000.0, (0.0, 8.0)) if plans else inverse
+    log = track(ran, Faulty(MUSCLE), reference(0), pressure_loop=False).recording
+    found = review(log, compensator=ran)
+    assert found.verdict.endswith("Nothing is wrong to speak of.")
+    assert not [*found.sentences, *found.outputs[0].causes]
+    assert found.refit is None
+
+
+def test_a_refit_that_is_worse_is_called_so() -> None:
+    worse = Refit(MUSCLE, old=0.1, new=0.2, ratio=(1.5, 2.5), n_folds=4, older=0, covered=1.0)
+    assert "it is worse" in refit(worse)
+    assert "no more than chance" in refit(replace(worse, ratio=(0.9, 2.5)))

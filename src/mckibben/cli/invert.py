@@ -159,6 +159,7 @@ def invert(
         )
     if adaptive:
         say(f"Learns from {_listed(inverse.inputs[-len(block.outputs) :])}, one a step.")
+        say(f"Next: mckibben track {out} --plant {model} --reference FILE, or --rig NAME.")
     say(f"Written: {out}")
 
 

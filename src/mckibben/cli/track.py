@@ -257,14 +257,17 @@ def _driven(block: Block) -> list[str]:
 
 def _fits(block: Block, plant: Plant, reference: Recording) -> None:
     """Refuse a model in place of an inverse, and references without what the inverse needs."""
+    from mckibben.blocks.feedback.pid import MEASURED
+
     for name in _driven(block):
         if name not in plant.inputs:
             raise DataError(
                 f"the compensator gives {name!r}, which does not drive {plant.name!r}",
                 remedy="give what mckibben invert wrote, and a rig or model of such a muscle",
             )
+    fed_back = {f"{name}{MEASURED}" for name in plant.outputs}
     for channel in block.inputs:
-        if channel.name not in reference:
+        if channel.name not in reference and channel.name not in fed_back:
             raise DataError(
                 "the compensator needs it, but the reference has no such channel",
                 file=reference.source,

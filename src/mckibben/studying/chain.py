@@ -14,7 +14,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from mckibben.arrays import Array
+from mckibben.blocks.feedback.pid import MEASURED
 from mckibben.comparison.free_run import measured_start
+from mckibben.control.preview import samples_foreseen
 from mckibben.errors import ModelWarning
 from mckibben.recording import Recording
 from mckibben.studying.closed import TAPS
@@ -143,6 +145,7 @@ def chain(loop: Loop, log: Recording) -> Chain:
             "actuator": open_loop - moved,
             "delay": moved - own,
             "model": own - from_rest,  # of how its memory was at the start
+            "compensator": np.zeros_like(wished),
         }
         if lead < 0:
             delays.append(Delay("command after reference", -lead * step, (-lead * step,) * 2))
@@ -154,8 +157,12 @@ def chain(loop: Loop, log: Recording) -> Chain:
         else:
             reach = through(asked)[:, places] - wished
             limits |= loop.exact & (np.abs(reach) > SAME * span).any(axis=1)
-            links["compensator"] = reach * (not loop.exact)
-            links["limits"] = foreseen - links["compensator"]
+            own_part = reach * (not loop.exact)
+            links["limits"] = foreseen - own_part
+            # where it learns, it undoes another model than the one given, and what both miss is one
+            links["model" if loop.learns else "compensator"] += own_part
+            if loop.learns:
+                foreseen = foreseen - own_part
             links["feedback"] = answer
         feedback = timed is not None
         if timed is not None and allowed is not None:
@@ -209,14 +216,22 @@ def _sent(log: Recording, names: tuple[str, ...]) -> Array | None:
 
 
 def _asked(loop: Loop, log: Recording) -> Array | None:
-    """Return what the compensator gives for the reference."""
+    """Return what the compensator gives for the reference, and for what is measured where it learns."""
     if loop.compensator is None or not loop.known:
         return None
     names = [channel.name for channel in loop.compensator.inputs]
-    wished = {n: log[REFERENCE + n] for n in loop.outputs}
-    units = {n: c.unit for c in loop.model.outputs if (n := c.name) in wished}
-    wanted = log.with_channels(units, **wished).select(names)
-    return loop.compensator.simulate(wanted).matrix(loop.inputs)
+    wished = {
+        n: shifted(log[REFERENCE + n], -samples_foreseen(loop.compensator)) for n in loop.outputs
+    }
+    units = {c.name: c.unit for c in loop.model.outputs if c.name in wished}
+    wanted = log.with_channels(units, **wished)
+    if not loop.learns:
+        return loop.compensator.simulate(wanted.select(names)).matrix(loop.inputs)
+    # a pressure that is due at a sample was found at the one before, with what was measured there
+    late = {f"{n}{MEASURED}": shifted(log[n], 1) for n in loop.outputs}
+    wanted = wanted.with_channels({f"{n}{MEASURED}": unit for n, unit in units.items()}, **late)
+    found = loop.compensator.simulate(wanted.select(names).slice(1, len(log))).matrix(loop.inputs)
+    return np.concatenate([found[:1], found])
 
 
 def _rails(sent: Array | None, asked: Array | None, wished: Array) -> tuple[Array, Array]:

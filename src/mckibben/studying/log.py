@@ -11,6 +11,8 @@ from mckibben.arrays import Array
 from mckibben.blocks.bands.banded import inside
 from mckibben.blocks.core.block import Block
 from mckibben.blocks.feedback.feedforward_feedback import FeedforwardFeedback
+from mckibben.blocks.feedback.pid import MEASURED
+from mckibben.blocks.predictive.predictive import Predictive
 from mckibben.errors import DataError, ModelError
 from mckibben.recording import Recording
 
@@ -36,7 +38,8 @@ class Loop:
     outputs : tuple of str
         What is followed: the model's outputs that the logs hold references of.
     exact : bool
-        Whether the compensator is the inverse of this very model.
+        Whether the compensator is the inverse of this very model, and stays it: it neither learns nor
+        plans.
     """
 
     model: Block
@@ -44,6 +47,11 @@ class Loop:
     inputs: tuple[str, ...]
     outputs: tuple[str, ...]
     exact: bool
+
+    @property
+    def learns(self) -> bool:
+        """Whether the compensator takes what is measured."""
+        return self.compensator is not None and feels(self.compensator)
 
     @property
     def known(self) -> bool:
@@ -100,7 +108,14 @@ def loop_of(model: Block | None, compensator: Block | None, logs: Sequence[Recor
         )
     for log in logs:
         _refuse(log, model, inputs)
-    return Loop(model, compensator, inputs, outputs, own or undone == model)
+    exact = (own or undone == model) and not isinstance(compensator, Predictive)
+    learns = compensator is not None and feels(compensator)
+    return Loop(model, compensator, inputs, outputs, exact and not learns)
+
+
+def feels(compensator: Block) -> bool:
+    """Tell whether a compensator takes what is measured, and learns."""
+    return any(channel.name.endswith(MEASURED) for channel in compensator.inputs)
 
 
 def _refuse(log: Recording, model: Block, inputs: Sequence[str]) -> None:

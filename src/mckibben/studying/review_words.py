@@ -51,8 +51,8 @@ def _verdict(one: Followed, several: bool) -> str:
     about = f"{one.output}: achieved" if several else "Achieved"
     said = f"{about} error {_size(one, one.achieved)} RMS; model and compensator foresee "
     said += _size(one, one.predicted)
-    if not one.causes or one.achieved == 0:
-        return f"{said}."
+    if one.exact:
+        return f"{said}. Nothing is wrong to speak of."
     first = one.causes[0]
     if first.kind == "noise":
         return f"{said}. Most of it ({_percent(first.share)}) is noise, which no motion explains."
@@ -62,7 +62,9 @@ def _verdict(one: Followed, several: bool) -> str:
 
 def sentences(review: Review) -> list[str]:
     """Return every cause worth a word, most important first, then what a refit brings."""
-    found = []
+    found: list[str] = []
+    if all(one.exact for one in review.outputs):
+        return found
     for one in review.outputs:
         about = f"{one.output}: " if len(review.outputs) > 1 else ""
         found += [
@@ -113,6 +115,8 @@ def refit(found: Refit) -> str:
         f"{_percent(found.new / found.old)} of the old one's error, {of} "
         f"(95 %: {_percent(low)} to {_percent(high)})"
     )
+    if found.ratio[0] > 1:
+        return f"{said}: it is worse, so keep the old one."
     if not found.recommended:
         return f"{said}: no more than chance, so keep the old one."
     if found.covered < COVERED:
@@ -153,7 +157,7 @@ def told(one: Followed, check: OutputCheck, chains: Sequence[Chain]) -> dict[str
         "limits": f"{clipped} of {n} samples are at a limit of pressure, or their reference is out of "
         "reach",
         "feedback": "what it asks for is not what the model would need, or comes too late",
-        "compensator": "it is not the inverse of this model",
+        "compensator": "it is not the inverse of this model; one that plans within limits foresees it",
     }
 
 
@@ -175,6 +179,11 @@ def notes(review: Review, loop: Loop) -> tuple[str, ...]:
         found.append(
             "No commands are logged, so measured pressures are compared with what the compensator "
             "gives for the reference, as if there was no feedback."
+        )
+    if loop.learns:
+        found.append(
+            "The compensator learns: the model's share is what learning has left, and what is said of "
+            "the model is said of the one fitted before."
         )
     if (review.feedback and review.judged_by != "compensator") or not loop.known:
         found.append(

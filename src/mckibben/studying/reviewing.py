@@ -15,7 +15,7 @@ from mckibben.comparison.splits import listed
 from mckibben.recording import Recording
 from mckibben.studying import review_words
 from mckibben.studying.causes import Cause, explained, shares
-from mckibben.studying.chain import Chain, chain
+from mckibben.studying.chain import ROUNDING, Chain, chain
 from mckibben.studying.closed import closed
 from mckibben.studying.log import Loop, has_reference, loop_of
 from mckibben.studying.refitting import Refit, refitted
@@ -48,7 +48,8 @@ class Followed:
     gain : float
         Measured motion over modelled motion.
     causes : tuple of Cause
-        Their signals add up to the error and their shares to 1; largest share first.
+        Their signals add up to the error and their shares to 1; largest share first. None where the
+        error is rounding.
     delays : tuple of Delay
         Of measured motion after modelled motion.
     missing : tuple of str
@@ -69,6 +70,11 @@ class Followed:
     time: Array = field(repr=False)
     reference: Array = field(repr=False)
     measured: Array = field(repr=False)
+
+    @property
+    def exact(self) -> bool:
+        """Whether nothing is wrong but rounding, of which no cause can be told."""
+        return self.achieved <= ROUNDING * float(np.ptp(self.reference))
 
     def to_dict(self) -> dict[str, Any]:
         """Return it for JSON, without samples."""
@@ -220,7 +226,7 @@ def review(
         feedback=any(one.feedback for one in chains),
     )
     found = replace(found, notes=review_words.notes(found, loop))
-    if refit:
+    if refit and not all(one.exact for one in outputs):
         older = [one for one in every if not has_reference(one)]
         parts = [run.recording for run in runs]
         found = replace(found, refit=refitted(loop.model, parts, older, seed=seed))
@@ -273,6 +279,8 @@ def _followed(
         reference=reference,
         measured=measured,
     )
+    if partial.exact:
+        return replace(partial, delays=())
     told = review_words.told(partial, one, chains)
     if len(chains) == 1 and any(c.feedback for c in chains):
         signals = closed(signals) or signals

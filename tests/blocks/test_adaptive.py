@@ -218,6 +218,16 @@ def test_drift_is_told_in_a_sentence() -> None:
     assert not block.drift(block.stream(STEP).block.initial_state(np.zeros(2))).alarm
 
 
+@pytest.mark.parametrize("model", [PI.example(), CREEPING], ids=["pi", "series"])
+def test_before_anything_is_measured_nothing_has_drifted(model: Block) -> None:
+    block = adaptive(model, 20.0, 0.02)
+    for state in (block.stream(STEP).state, block.initial_state(np.zeros(2))):
+        found = block.drift(state)
+        assert str(found) == "nothing measured yet"
+        assert not any(found.changes)
+        assert not found.alarm
+
+
 def test_alarms_are_false_no_more_often_than_told() -> None:
     """Where errors are alike from sample to sample, few groups pass two standard errors by chance."""
     model = PI.example()

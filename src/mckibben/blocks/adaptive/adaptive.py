@@ -21,8 +21,14 @@ from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
 from mckibben.blocks.adaptive.adaptable import Adaptable, Learning
-from mckibben.blocks.adaptive.drift import Drift, alarm_limit, scatter
-from mckibben.blocks.adaptive.learning import covariance_of, start_root, start_sense
+from mckibben.blocks.adaptive.drift import FIT_ERROR, Drift, alarm_limit, scatter
+from mckibben.blocks.adaptive.learning import (
+    READY,
+    SENSES,
+    covariance_of,
+    start_root,
+    start_sense,
+)
 from mckibben.blocks.compose import Series
 from mckibben.blocks.core.block import Block, Run
 from mckibben.blocks.core.exportable import Cost
@@ -244,13 +250,16 @@ class Adaptive(Block):
     def drift(self, state: Array) -> Drift:
         """Return how far what is learnt has gone from the fit, in a state, shape (n_states,)."""
         learner = self.learner
-        _, theta, _, root, _ = self._split(state)
+        limit = alarm_limit(self.time, len(learner.groups))
+        _, theta, _, root, senses = self._split(state)
+        if not senses[READY::SENSES].any():
+            none = (0.0,) * len(learner.groups)
+            return Drift(learner.groups, none, (FIT_ERROR,) * len(none), limit, measured=False)
         steps = 1e-6 * np.diag(learner.scales)
         there = learner.group_changes(theta)
         slopes = np.array([(learner.group_changes(theta + h) - there) / 1e-6 for h in steps]).T
         covariance = covariance_of(root, theta.size)
         errors = scatter(covariance, slopes)
-        limit = alarm_limit(self.time, len(learner.groups))
         return Drift(learner.groups, vector(there), vector(errors), limit)
 
     def resumed(self, state: Array) -> Self:

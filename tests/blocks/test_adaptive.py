@@ -18,6 +18,7 @@ from mckibben.blocks.adaptive.adaptive import Adaptive, taught
 from mckibben.blocks.adaptive.adaptive_series import AdaptiveSeries, adaptive
 from mckibben.blocks.adaptive.drift import alarm_limit
 from mckibben.blocks.adaptive.learning import covariance_of, start_root
+from mckibben.blocks.compose import PerChannel
 from mckibben.blocks.dynamic.creep import Creep
 from mckibben.blocks.feedback.feedforward_feedback import FeedforwardFeedback
 from mckibben.blocks.feedback.pid import PIDFeedback
@@ -192,6 +193,28 @@ def test_saved_and_resumed_it_goes_on_to_the_bit(model: Block, tmp_path: Path) -
     np.testing.assert_array_equal(
         [second.step(pair).copy() for pair in pairs[500:]], expected[500:]
     )
+
+
+@pytest.mark.parametrize("model", [PI.example(), CREEPING], ids=["pi", "series"])
+@pytest.mark.parametrize("noise", [1e-300, 1e160])
+def test_noise_that_no_sensor_has_is_refused(model: Block, noise: float) -> None:
+    with pytest.raises(ModelError, match=r"noise of .* Remedy: give the standard deviation"):
+        adaptive(model, 20.0, noise)
+
+
+@pytest.mark.parametrize("time", [1e-9, 1e12])
+def test_times_that_nothing_is_learnt_in_are_refused(time: float) -> None:
+    with pytest.raises(ModelError, match=r"time of .*Remedy: give 0\.001 to 1e\+09 s"):
+        adaptive(PI.example(), time, 0.02)
+    for extreme in (1e-3, 1e9):
+        assert 0 < alarm_limit(extreme, 3) < 10
+
+
+def test_what_cannot_learn_says_what_can() -> None:
+    with pytest.raises(ModelError, match=r"cannot learn while it runs.*Remedy: adapt a pi"):
+        adaptive(PerChannel.example(), 20.0, 0.02)
+    with pytest.raises(ModelError, match=r"learns already.*Remedy"):
+        adaptive(Adaptive.example(), 20.0, 0.02)
 
 
 def test_a_memory_of_another_model_is_refused() -> None:

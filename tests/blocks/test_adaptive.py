@@ -24,6 +24,7 @@ from mckibben.blocks.adaptive.learning import (
     start_sense,
     trusted,
 )
+from mckibben.blocks.compose import PerChannel
 from mckibben.blocks.dynamic.creep import Creep
 from mckibben.blocks.feedback.feedforward_feedback import FeedforwardFeedback
 from mckibben.blocks.feedback.pid import PIDFeedback
@@ -216,6 +217,28 @@ def test_saved_and_resumed_it_goes_on_to_the_bit(model: Block, tmp_path: Path) -
     )
 
 
+@pytest.mark.parametrize("model", [PI.example(), CREEPING], ids=["pi", "series"])
+@pytest.mark.parametrize("noise", [1e-300, 1e160])
+def test_noise_that_no_sensor_has_is_refused(model: Block, noise: float) -> None:
+    with pytest.raises(ModelError, match=r"noise of .* Remedy: give the standard deviation"):
+        adaptive(model, 20.0, noise)
+
+
+@pytest.mark.parametrize("time", [1e-9, 1e12])
+def test_times_that_nothing_is_learnt_in_are_refused(time: float) -> None:
+    with pytest.raises(ModelError, match=r"time of .*Remedy: give 0\.001 to 1e\+09 s"):
+        adaptive(PI.example(), time, 0.02)
+    for extreme in (1e-3, 1e9):
+        assert 0 < alarm_limit(extreme, 3) < 10
+
+
+def test_what_cannot_learn_says_what_can() -> None:
+    with pytest.raises(ModelError, match=r"cannot learn while it runs.*Remedy: adapt a pi"):
+        adaptive(PerChannel.example(), 20.0, 0.02)
+    with pytest.raises(ModelError, match=r"learns already.*Remedy"):
+        adaptive(Adaptive.example(), 20.0, 0.02)
+
+
 def test_a_memory_of_another_model_is_refused() -> None:
     with pytest.raises(ModelError, match=r"memory of 'adaptive' has 3 numbers.*Remedy"):
         replace(Adaptive.example(), memory=(0.0, 1.0, 2.0))
@@ -238,6 +261,16 @@ def test_drift_is_told_in_a_sentence() -> None:
     assert "friction" in str(found)
     assert "unchanged" in str(found)
     assert not block.drift(block.stream(STEP).block.initial_state(np.zeros(2))).alarm
+
+
+@pytest.mark.parametrize("model", [PI.example(), CREEPING], ids=["pi", "series"])
+def test_before_anything_is_measured_nothing_has_drifted(model: Block) -> None:
+    block = adaptive(model, 20.0, 0.02)
+    for state in (block.stream(STEP).state, block.initial_state(np.zeros(2))):
+        found = block.drift(state)
+        assert str(found) == "nothing measured yet"
+        assert not any(found.changes)
+        assert not found.alarm
 
 
 def test_alarms_are_false_no_more_often_than_told() -> None:

@@ -21,8 +21,14 @@ from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
 from mckibben.blocks.adaptive.adaptable import Adaptable, Learning
-from mckibben.blocks.adaptive.drift import Drift, alarm_limit, scatter
-from mckibben.blocks.adaptive.learning import covariance_of, start_root, start_sense
+from mckibben.blocks.adaptive.drift import FIT_ERROR, Drift, alarm_limit, scatter
+from mckibben.blocks.adaptive.learning import (
+    READY,
+    SENSES,
+    covariance_of,
+    start_root,
+    start_sense,
+)
 from mckibben.blocks.compose import Series
 from mckibben.blocks.core.block import Block, Run
 from mckibben.blocks.core.exportable import Cost
@@ -38,12 +44,40 @@ TRUSTED = 1 / 3
 """Standard deviations of the fitted parameters at the start, by those of changes to be expected."""
 
 
+TIMES = 1e-3, 1e9
+"""Shortest and longest time to learn in [s]."""
+NOISES = 1e-9, 1e3
+"""Least and most noise, by the width of what is reached."""
+
+
 def learner_of(block: Block) -> Adaptable | None:
     """Return what learns while a block is undone: it, or what undoes it; None where none does."""
     if isinstance(block, Inverse):
         inner = block.forward
         return inner if isinstance(inner, Adaptable) and not inner.learns_inverted else None
     return block if isinstance(block, Adaptable) and block.learns_inverted else None
+
+
+def told_width(model: Block, learner: Adaptable) -> float:
+    """Return the widest range that a model reaches, or else where it was fitted; 0 if unknown."""
+    low, high = model.reachable()
+    width = float(np.max(high - low))
+    return width if np.isfinite(width) else learner.known_span
+
+
+def check_settings(kind: str, time: float, noise: float, width: float) -> None:
+    """Refuse times and noises, in the unit of ``width``, that nothing is measured with."""
+    if not TIMES[0] <= time <= TIMES[1]:
+        raise ModelError(
+            f"{kind!r} cannot learn in a time of {time:g} s. Remedy: give {TIMES[0]:g} to "
+            f"{TIMES[1]:g} s."
+        )
+    low, high = (bound * width for bound in NOISES) if 0 < width < np.inf else NOISES
+    if not low <= noise <= high:
+        raise ModelError(
+            f"a noise of {noise:g} is none that {kind!r} is measured with. Remedy: give the standard "
+            f"deviation of what is measured, {low:.3g} to {high:.3g} in its unit."
+        )
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -74,6 +108,7 @@ class Adaptive(Block):
 
     def __post_init__(self) -> None:
         self.learner.check_invertible()
+        check_settings(self.kind, self.time, self.noise, told_width(self.forward, self.learner))
         if self.memory is not None and len(self.memory) != self.n_states:
             raise ModelError(
                 f"the memory of {self.kind!r} has {len(self.memory)} numbers, its state "
@@ -244,13 +279,16 @@ class Adaptive(Block):
     def drift(self, state: Array) -> Drift:
         """Return how far what is learnt has gone from the fit, in a state, shape (n_states,)."""
         learner = self.learner
-        _, theta, _, root, _ = self._split(state)
+        limit = alarm_limit(self.time, len(learner.groups))
+        _, theta, _, root, senses = self._split(state)
+        if not senses[READY::SENSES].any():
+            none = (0.0,) * len(learner.groups)
+            return Drift(learner.groups, none, (FIT_ERROR,) * len(none), limit, measured=False)
         steps = 1e-6 * np.diag(learner.scales)
         there = learner.group_changes(theta)
         slopes = np.array([(learner.group_changes(theta + h) - there) / 1e-6 for h in steps]).T
         covariance = covariance_of(root, theta.size)
         errors = scatter(covariance, slopes)
-        limit = alarm_limit(self.time, len(learner.groups))
         return Drift(learner.groups, vector(there), vector(errors), limit)
 
     def resumed(self, state: Array) -> Self:

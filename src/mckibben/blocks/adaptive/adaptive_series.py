@@ -18,7 +18,7 @@ from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
 from mckibben.blocks.adaptive.adaptable import Adaptable
-from mckibben.blocks.adaptive.adaptive import Adaptive, learner_of
+from mckibben.blocks.adaptive.adaptive import Adaptive, check_settings, learner_of, told_width
 from mckibben.blocks.adaptive.drift import Drift
 from mckibben.blocks.compose import Series
 from mckibben.blocks.core.block import Block, Run
@@ -64,6 +64,7 @@ class AdaptiveSeries(Composition):
                 f"{learning} parts of this series can learn. Remedy: adapt pi, gpi, mpi, cpi or "
                 "balance models: one part that learns, of one channel like the others."
             )
+        check_settings(self.kind, self.time, self.noise, told_width(self.forward, self.core.learner))
         if self.memory is not None and len(self.memory) != self.n_states:
             raise ModelError(
                 f"the memory of {self.kind!r} has {len(self.memory)} numbers, its state "
@@ -251,7 +252,11 @@ def adaptive(model: Block, time: float, noise: float | None = None) -> Adaptive 
     ModelError
         If nothing of the model can learn, or it has no inverse.
     """
-    parts = getattr(model, "parts", (model,))
+    if isinstance(model, Adaptive | AdaptiveSeries):
+        raise ModelError(
+            f"{model.title!r} learns already. Remedy: use it as it is, or adapt the model it undoes."
+        )
+    parts = model.parts if isinstance(model, Series) else (model,)
     learner = next(filter(None, map(learner_of, parts)), None)
     if learner is None:
         raise ModelError(
@@ -259,9 +264,7 @@ def adaptive(model: Block, time: float, noise: float | None = None) -> Adaptive 
             "model."
         )
     if noise is None:
-        low, high = model.reachable()
-        width = float(np.max(high - low))
-        width = width if np.isfinite(width) else learner.known_span
+        width = told_width(model, learner)
         if not 0 < width < np.inf:
             raise ModelError(
                 f"what {model.title!r} reaches does not tell how exactly it is measured. "

@@ -33,12 +33,15 @@ class Drift:
         Relative change of every group, and its standard error.
     limit : float
         Standard errors at which an alarm is given.
+    measured : bool
+        Whether anything was, by now.
     """
 
     groups: tuple[Group, ...]
     changes: tuple[float, ...]
     errors: tuple[float, ...]
     limit: float
+    measured: bool = True
 
     @property
     def by_errors(self) -> tuple[float, ...]:
@@ -56,6 +59,8 @@ class Drift:
         return any(self.alarms)
 
     def __str__(self) -> str:
+        if not self.measured:
+            return "nothing measured yet"
         told = [
             f"{group.name} {abs(change):.0%} {group.more if change > 0 else group.less}".replace(
                 "%", " %"
@@ -75,7 +80,7 @@ class Drift:
 def alarm_limit(time: float, n_groups: int, rate: float = FALSE_ALARMS) -> float:
     """Return the standard errors at which alarms are false at a rate [1/h]; ``time`` in s."""
     looks = n_groups * 3600.0 / time
-    return NormalDist().inv_cdf(1.0 - min(rate / looks, 0.5) / 2.0)
+    return -NormalDist().inv_cdf(min(rate / looks, 0.5) / 2.0)
 
 
 def scatter(covariance: Array, slopes: Array) -> Array:

@@ -99,6 +99,21 @@ def test_served_exports_of_all_kinds_compile(tmp_path: Path) -> None:
         compile_c(sources, tmp_path / f"{name}.elf", options=options)
 
 
+@needs("cc")
+def test_nothing_is_left_over_where_no_number_can_be_adjusted(tmp_path: Path) -> None:
+    wide = Serving({"displacement": (-9.0, 9.0)}, adjustable=0.25)
+    folder = export_c(examples()["negative"], tmp_path / "c", sample_time=SAMPLE_TIME, serving=wide)
+    options = [f"-I{folder / 'src'}", "-Wall", "-Wextra", "-Werror", "-c"]
+    compile_c([folder / "src" / "model.c"], tmp_path / "model.o", options=options)
+
+
+@pytest.mark.parametrize("period", [1e-9, 9e-7, 1e4])
+def test_periods_that_a_device_cannot_tell_are_refused(period: float, tmp_path: Path) -> None:
+    serving = Serving(SERVING.limits, watchdog=1e6)
+    with pytest.raises(ModelError, match=r"whole microseconds.*from 1e-6 to 4295 s"):
+        export_c(examples()["play"], tmp_path / "c", sample_time=period, serving=serving)
+
+
 def test_a_port_is_opened_by_name_and_closed() -> None:
     with terminals() as (ours, name):
         port, other = open_port(name), Descriptor(ours)

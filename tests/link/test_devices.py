@@ -86,6 +86,28 @@ def test_firmware_answers_with_the_numbers_of_the_export(tmp_path: Path) -> None
 
 
 @needs("cc")
+def test_a_missing_measurement_takes_no_reference_with_it() -> None:
+    block = examples()["pi-adaptive"]
+    reference = 2.0 + np.sin(0.05 * np.arange(60))
+    inputs = np.column_stack([reference, 1.1 * reference])
+    inputs[10:20, 1] = np.nan
+    channels = [channel.name for channel in (*block.inputs, *block.outputs)]
+    serving = Serving(dict.fromkeys(channels, (-99.0, 99.0)), watchdog=60.0)
+    stream = block.stream(SAMPLE_TIME)
+    expected = [stream.step(row).tolist() for row in inputs]
+    inputs[15:20, 1] = 1e6  # beyond limits is missing too
+    with (
+        hosted(block, sample_time=SAMPLE_TIME, serving=serving) as line,
+        Link(line, lock_step=True, timeout=1.0, patience=30.0) as link,
+    ):
+        assert link.device.n_missable == 1
+        found = [link.step(row).outputs for row in inputs]
+        with pytest.raises(DataError, match="beyond the limits"):
+            link.step([np.nan, 1.0])
+    np.testing.assert_allclose(found, expected, rtol=1e-12)
+
+
+@needs("cc")
 def test_served_exports_of_all_kinds_compile(tmp_path: Path) -> None:
     for number, name in enumerate(("balance", "gpi-inverse", "feedforward-feedback", "play")):
         block = examples()[name]

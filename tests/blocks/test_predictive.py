@@ -174,7 +174,7 @@ def test_the_supply_takes_from_all_in_one_share() -> None:
 def test_a_supply_limits_one_muscle_too() -> None:
     inverse, references = motion("pi", 300, 5)
     for limits in ({"total_limit": 1.0}, {"pressure_range": (0.0, 1.0)}):
-        block = Predictive(inverse, horizon=8, rate_limit=5.0, **limits)  # type: ignore[arg-type]
+        block = Predictive(inverse, horizon=8, rate_limit=5.0, **limits)
         found = np.asarray(block.simulate(ahead(references, block), sample_time=STEP))
         assert 0.99 < found.max() <= 1.0 + 1e-9
         if "total_limit" in limits:

@@ -138,14 +138,15 @@ def test_noise_makes_the_input_turn_no_more_often_than_the_reference() -> None:
 def test_what_is_learnt_is_used_as_far_as_it_helped(helps: bool) -> None:
     """Against least squares of the fit's errors over what was learnt beside it."""
     rng, n, share = np.random.default_rng(7), 4000, 0.001
-    sense, numbers = start_sense(0.1), (np.array([share, 0.1, 1.0]), *np.ones((2, 1)))
+    sense, settings, one = start_sense(0.1), np.array([share, 0.1, 1.0]), np.ones(1)
     fresh = start_root(np.eye(1))
     made_up = rng.standard_normal(n)
     for change in made_up.tolist():  # what is learnt is made to be so far from the fit
         theta, root = np.array([change]), fresh.copy()
         measured = (0.6 * change if helps else -change) + 0.1 * rng.standard_normal()
         learn(
-            *numbers, fresh, theta, root, sense, np.ones(1), np.zeros(3), measured, change, 0.0, 0.0
+            *(settings, one, one, fresh, theta, root, sense, one, np.zeros(3)),
+            *(measured, change, 0.0, 0.0),
         )
     assert trusted(sense) == pytest.approx(0.6 if helps else 0.0, abs=0.05)
 

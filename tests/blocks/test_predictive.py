@@ -171,6 +171,17 @@ def test_the_supply_takes_from_all_in_one_share() -> None:
     assert not allowed(rows, np.array([4.0, 0.5]), np.array([0.0, 2.0]))
 
 
+def test_a_supply_limits_one_muscle_too() -> None:
+    inverse, references = motion("pi", 300, 5)
+    for limits in ({"total_limit": 1.0}, {"pressure_range": (0.0, 1.0)}):
+        block = Predictive(inverse, horizon=8, rate_limit=5.0, **limits)
+        found = np.asarray(block.simulate(ahead(references, block), sample_time=STEP))
+        assert 0.99 < found.max() <= 1.0 + 1e-9
+        if "total_limit" in limits:
+            first = found
+    np.testing.assert_allclose(found, first, rtol=0.0, atol=1e-9)
+
+
 def test_unlimited_rows_are_left_out() -> None:
     assert len(limit_rows(np.zeros(1), np.ones(1), np.inf, np.inf, np.inf, np.ones(1))) == 2
 
@@ -200,6 +211,8 @@ def test_it_is_saved_and_refuses_what_it_cannot_plan(tmp_path: Path) -> None:
         Predictive(replace(PI.example(), input_range=None).inverse())
     with pytest.raises(ModelError, match="no exact inverse"):
         Predictive(PI.example())
+    with pytest.raises(ModelError, match="what drives muscles"):
+        Predictive(ARM.inverse(), pressure_range=(0.0, 5.0))
     with pytest.raises(ModelError, match="volumes"):
         Predictive(ARM, volumes=(1.0,))
     with pytest.raises(ModelError, match="total_limit"):

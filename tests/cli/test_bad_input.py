@@ -53,6 +53,7 @@ def test_malformed_files_leave_with_a_remedy_and_nothing_lost(
         (["simulate", "FILE", "FILE", "-o", "x.csv"], "this is a recording"),
         (["simulate", "nowhere.json", "FILE", "-o", "x.csv"], "nowhere.json"),
         (["invert", "nowhere.json", "-o", "x.json"], "nowhere.json"),
+        (["invert", "FILE", "-o", "x.json", "--horizon", "5"], "add --predictive"),
         (["plot", "FILE", "-o", "x.bmp"], "bmp"),
         (["plot", "FILE", "-o", "x.png", "--kind", "pie"], "pie"),
         (["info"], "nothing to tell"),

@@ -11,6 +11,7 @@ import pytest
 
 from mckibben import GPI, ModelError, muscles
 from mckibben.blocks.core.block import Block
+from mckibben.blocks.laws.examples import examples
 from mckibben.export import export_ros2
 from mckibben.export.ros2.package import ros2_files
 from tests.tools import needs
@@ -82,8 +83,8 @@ def test_a_chained_controller_gives_pythons_numbers(program: Path) -> None:
 
 
 @needs("g++")
-def test_silence_is_safe_and_forgets(program: Path) -> None:
-    """References by topic stand for the time-out; then pressures are safe, and memory begins anew."""
+def test_silence_is_safe_and_forgets_nothing(program: Path) -> None:
+    """References by topic stand for the time-out; then pressures are safe, and memory stands."""
     spoken = [word for k in range(20) for word in (f"say {wave(k)!r}", "update")]
     given = pressures(
         driven(program, ["update", *spoken, *["update"] * 30, *spoken], timeout=0.105, safe=0.5)[1:]
@@ -93,7 +94,8 @@ def test_silence_is_safe_and_forgets(program: Path) -> None:
     assert given[0] == 0.5
     np.testing.assert_allclose(given[1:31], expected, rtol=1e-12)
     assert given[31:51] == [0.5] * 20
-    np.testing.assert_allclose(given[51:], expected[:20], rtol=1e-12)
+    after = [float(stream.step(wave(k))[0]) for k in range(20)]
+    np.testing.assert_allclose(given[51:], after, rtol=1e-12)
 
 
 @needs("g++")
@@ -104,6 +106,20 @@ def test_numbers_that_are_none_are_not_applied(program: Path) -> None:
     assert len(set(given)) == 1
     chained = driven(program, ["chained 1", "reference 5", "update", "reference nan", "update"])
     assert pressures(chained[1:])[1] == 0.0
+
+
+@needs("g++")
+def test_a_missing_measurement_is_no_reason_to_forget(tmp_path: Path) -> None:
+    block = examples()["pi-adaptive"]
+    program = built(block, tmp_path)
+    rows = [(2.0 + np.sin(0.05 * k), 2.2 + np.sin(0.05 * k)) for k in range(60)]
+    rows[20:25] = [(reference, np.nan) for reference, _ in rows[20:25]]
+    lines = [
+        word for r, m in rows for word in (f"say {float(r)!r}", f"state {float(m)!r}", "update")
+    ]
+    stream = block.stream(STEP)
+    expected = [float(stream.step(row)[0]) for row in rows]
+    np.testing.assert_allclose(pressures(driven(program, lines)[1:]), expected, rtol=1e-9)
 
 
 @needs("g++")

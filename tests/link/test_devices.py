@@ -91,6 +91,28 @@ def test_firmware_answers_with_the_numbers_of_the_export(tmp_path: Path) -> None
 
 
 @needs("cc")
+def test_a_missing_measurement_takes_no_reference_with_it() -> None:
+    block = examples()["pi-adaptive"]
+    reference = 2.0 + np.sin(0.05 * np.arange(60))
+    inputs = np.column_stack([reference, 1.1 * reference])
+    inputs[10:20, 1] = np.nan
+    channels = [channel.name for channel in (*block.inputs, *block.outputs)]
+    serving = Serving(dict.fromkeys(channels, (-99.0, 99.0)), watchdog=60.0)
+    stream = block.stream(SAMPLE_TIME)
+    expected = [stream.step(row).tolist() for row in inputs]
+    inputs[15:20, 1] = 1e6  # beyond limits is missing too
+    with (
+        hosted(block, sample_time=SAMPLE_TIME, serving=serving) as line,
+        Link(line, lock_step=True, timeout=1.0, patience=30.0) as link,
+    ):
+        assert link.device.n_missable == 1
+        found = [link.step(row).outputs for row in inputs]
+        with pytest.raises(DataError, match="beyond the limits"):
+            link.step([np.nan, 1.0])
+    np.testing.assert_allclose(found, expected, rtol=1e-12)
+
+
+@needs("cc")
 def test_served_exports_of_all_kinds_compile(tmp_path: Path) -> None:
     for number, name in enumerate(("balance", "gpi-inverse", "feedforward-feedback", "play")):
         block = examples()[name]
@@ -102,6 +124,21 @@ def test_served_exports_of_all_kinds_compile(tmp_path: Path) -> None:
         sources = [*sorted((folder / "src").glob("*.c")), folder / "examples" / "link_posix.c"]
         options = ["-D_POSIX_C_SOURCE=200809L", f"-I{folder / 'src'}"]
         compile_c(sources, tmp_path / f"{name}.elf", options=options)
+
+
+@needs("cc")
+def test_nothing_is_left_over_where_no_number_can_be_adjusted(tmp_path: Path) -> None:
+    wide = Serving({"displacement": (-9.0, 9.0)}, adjustable=0.25)
+    folder = export_c(examples()["negative"], tmp_path / "c", sample_time=SAMPLE_TIME, serving=wide)
+    options = [f"-I{folder / 'src'}", "-Wall", "-Wextra", "-Werror", "-c"]
+    compile_c([folder / "src" / "model.c"], tmp_path / "model.o", options=options)
+
+
+@pytest.mark.parametrize("period", [1e-9, 9e-7, 1e4])
+def test_periods_that_a_device_cannot_tell_are_refused(period: float, tmp_path: Path) -> None:
+    serving = Serving(SERVING.limits, watchdog=1e6)
+    with pytest.raises(ModelError, match=r"whole microseconds.*from 1e-6 to 4295 s"):
+        export_c(examples()["play"], tmp_path / "c", sample_time=period, serving=serving)
 
 
 def test_a_port_is_opened_by_name_and_closed() -> None:

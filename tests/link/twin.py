@@ -150,7 +150,8 @@ class Twin:
         if kind == 1 and not body:
             told = [0, 8, self.flags(), self.fingerprint, round(1e6 * self.sample_time)]
             told += [self.most_silence, self.steps, self.loads, self.dropped % (1 << 32)]
-            return struct.pack("<BBB8sIIIIIHHHH", *told, self.n_in, self.n_out, *sizes)
+            numbers = [self.n_in, self.n_out, *sizes, self.block.n_missable]
+            return struct.pack("<BBB8sIIIIIHHHHH", *told, *numbers)
         if kind == 5 and not body:
             return b"\0" + self.stand() + self.inputs.tobytes()
         if kind == 2 and len(body) == 1 and body[0] < self.n_in + self.n_out:
@@ -211,9 +212,10 @@ class Twin:
         if len(body) != 8 * self.n_in:
             return 3
         values = np.frombuffer(body)
-        if not ((self.low[: self.n_in] <= values) & (values <= self.high[: self.n_in])).all():
+        within = (self.low[: self.n_in] <= values) & (values <= self.high[: self.n_in])
+        if not within[: self.n_in - self.block.n_missable].all():
             return 2
-        self.inputs = values.copy()
+        self.inputs = np.where(within, values, np.nan)
         self.applied.append((self.boots, values.tolist()))
         self.running = True
         if self.lock_step:

@@ -56,7 +56,9 @@ def invert(
     predictive: Annotated[
         bool, typer.Option("--predictive", help="Look ahead, so that limits cost less.")
     ] = False,
-    horizon: Annotated[int, typer.Option(help="Samples it looks at (--predictive).")] = 20,
+    horizon: Annotated[
+        int | None, typer.Option(help="Samples it looks at (--predictive).  [default: 20]")
+    ] = None,
     rate_limit: Annotated[
         float | None, typer.Option(help="Fastest change of a pressure [bar/s] (--predictive).")
     ] = None,
@@ -99,16 +101,18 @@ def invert(
         raise ModelError(
             "--predictive plans a fixed model's inputs. Remedy: leave out --adaptive or --for force."
         )
-    limits = (rate_limit, pressures, total_limit, flow_limit)
+    limits = (horizon, rate_limit, pressures, total_limit, flow_limit)
     if not predictive and any(limit is not None for limit in limits):
-        raise ModelError("limits are for compensators that look ahead. Remedy: add --predictive.")
+        raise ModelError(
+            "a horizon and limits are for compensators that look ahead. Remedy: add --predictive."
+        )
     claim_model(out, inputs=[model], force=force)
     block = load(model)
     if predictive:
         write_predictive(
             block.inverse(),
             out,
-            horizon=horizon,
+            horizon=20 if horizon is None else horizon,
             rate=rate_limit,
             pressures=pressures,
             total=total_limit,

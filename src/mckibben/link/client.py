@@ -127,7 +127,8 @@ class Link:
         Parameters
         ----------
         inputs : array-like, shape (n_inputs,)
-            In the order of ``device.inputs``, within their limits.
+            In the order of ``device.inputs``, within their limits. The last ``device.n_missable`` may be
+            NaN, where a measurement is missing; beyond limits they are taken as missing.
 
         Raises
         ------
@@ -164,7 +165,8 @@ class Link:
                 remedy=f"give {', '.join(port.name for port in ports)}",
             )
         body = self.device.packed(values)
-        for port, value in zip(ports, self.device.numbers(body).tolist(), strict=True):
+        needed = ports[: len(ports) - self.device.n_missable]
+        for port, value in zip(needed, self.device.numbers(body).tolist(), strict=False):
             if not port.low <= value <= port.high:  # as NaN never is
                 raise DataError(
                     f"{value:g} {port.unit} is beyond the limits {port.low:g} to {port.high:g} that "

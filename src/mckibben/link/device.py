@@ -61,7 +61,7 @@ class Note(IntFlag):
 
 COEFFICIENTS, MEMORY = 0, 1
 
-IDENTITY = struct.Struct("<BB8sIIIIIHHHH")
+IDENTITY = struct.Struct("<BB8sIIIIIHHHHH")
 
 
 @dataclass(frozen=True)
@@ -102,6 +102,8 @@ class Device:
         Numbers that can be set; 0 where they are fixed.
     n_memory : int
         Numbers that can be read; an export says which of them can be set.
+    n_missable : int
+        Of the inputs the last, which may be missing.
     inputs, outputs : tuple of Port
     """
 
@@ -111,6 +113,7 @@ class Device:
     kind: np.dtype[np.floating]
     n_coefficients: int
     n_memory: int
+    n_missable: int = 0
     inputs: tuple[Port, ...] = ()
     outputs: tuple[Port, ...] = ()
 
@@ -172,13 +175,14 @@ def identified(body: bytes) -> tuple[Device, Counts, int, int]:
     if len(body) != IDENTITY.size:
         raise unfit("an identity")
     size, notes, print_, period, silence, steps, loads, dropped, *sizes = IDENTITY.unpack(body)
-    n_in, n_out, n_coefficients, n_memory = sizes
-    if size not in (4, 8) or not period or not silence or not n_out:
+    n_in, n_out, n_coefficients, n_memory, n_missable = sizes
+    if size not in (4, 8) or not period or not silence or not n_out or n_missable > n_in:
         raise unfit("an identity")
     if size * (n_in + n_out) > ROOM:  # which no frame would hold
         raise unfit("an identity")
     kind = np.dtype(f"<f{size}")
-    device = Device(print_.hex(), 1e-6 * period, silence, kind, n_coefficients, n_memory)
+    told = (n_coefficients, n_memory, n_missable)
+    device = Device(print_.hex(), 1e-6 * period, silence, kind, *told)
     return device, Counts(Note(notes), steps, loads, dropped), n_in, n_out
 
 

@@ -42,8 +42,7 @@ def limit_rows(
         own = np.eye(n)[k]
         found += [[0.0, high[k], *own], [0.0, -low[k], *-own]]
         found += [[1.0, change, *own], [1.0, change, *-own]]
-    if n > 1:
-        found.append([0.0, total, *np.ones(n)])
+    found.append([0.0, total, *np.ones(n)])
     for size in range(1, n + 1):
         for some in combinations(range(n), size):
             drawing = np.zeros(n)

@@ -30,6 +30,9 @@ MOST_NUMBERS = 0xFFFF
 
 MOST_TICKS = 2**31 - 1
 
+MOST_MICROSECONDS = 2**32 - 1
+"""Between ticks, as a device tells it."""
+
 
 @dataclass(frozen=True)
 class Serving:
@@ -159,10 +162,9 @@ def served(
                 named = zip(("lowest", "highest"), ends, strict=True)
                 adjusted[what] = {end: rows(numbers, single=single) for end, numbers in named}
     kept = ["coefficients", "memory"]
-    microseconds = max(round(1e6 * period), 1)
     told = {
         "period": period,
-        "microseconds": microseconds,
+        "microseconds": round(1e6 * period),
         "silence": ticks,
         "channels": [
             channel
@@ -198,6 +200,11 @@ def _ticks(serving: Serving, period: float | None) -> int:
         raise ModelError(
             "a served model ticks, and this one has no time of its own. Remedy: give the time between "
             "steps, --sample-time SECONDS."
+        )
+    if not 1 <= 1e6 * period <= MOST_MICROSECONDS:
+        raise ModelError(
+            f"a served model ticks every {period:g} s, which is told in whole microseconds. Remedy: "
+            f"give --sample-time from 1e-6 to {1e-6 * MOST_MICROSECONDS:.0f} s."
         )
     ticks = serving.watchdog / period if math.isfinite(serving.watchdog) else math.inf
     if not 1 <= ticks <= MOST_TICKS:

@@ -254,6 +254,11 @@ static uint8_t open_session(mck_server *self, uint32_t session, const uint8_t *b
     return OK;
 }
 
+static int missable(const mck_served *served, int input)
+{
+    return input >= served->n_inputs - served->n_missable;
+}
+
 static uint8_t take_inputs(mck_server *self, const uint8_t *body, int n)
 {
     const mck_served *served = self->served;
@@ -262,13 +267,16 @@ static uint8_t take_inputs(mck_server *self, const uint8_t *body, int n)
     }
     for (int i = 0; i < served->n_inputs; i++) {
         const mck_real value = get_number(body + i * NUMBER);
-        if (!self->own[i] && !within(value, served->channels[i].low, served->channels[i].high)) {
+        if (!self->own[i] && !missable(served, i) &&
+            !within(value, served->channels[i].low, served->channels[i].high)) {
             return BEYOND_LIMITS;
         }
     }
     for (int i = 0; i < served->n_inputs; i++) {
         if (!self->own[i]) {
-            self->in[i] = get_number(body + i * NUMBER);
+            const mck_real value = get_number(body + i * NUMBER);
+            const int there = within(value, served->channels[i].low, served->channels[i].high);
+            self->in[i] = there ? value : (mck_real)NAN;
         }
     }
     self->running = 1;
@@ -390,6 +398,7 @@ static void identify(const mck_server *self, writing *to)
     put(to, (uint32_t)served->n_outputs, 2);
     put(to, (uint32_t)served->sizes[0], 2);
     put(to, (uint32_t)served->sizes[1], 2);
+    put(to, (uint32_t)served->n_missable, 2);
 }
 
 /* Answer what changes nothing. */
@@ -563,7 +572,8 @@ void mck_server_tick(mck_server *self)
 
 void mck_server_measure(mck_server *self, int input, mck_real value)
 {
-    if (input >= 0 && input < self->served->n_inputs && isfinite(value)) {
+    if (input >= 0 && input < self->served->n_inputs &&
+        (isfinite(value) || missable(self->served, input))) {
         self->in[input] = value;
         self->own[input] = 1;
     }

@@ -32,6 +32,7 @@ typedef struct {
     uint32_t period;  /* time between ticks [us] */
     uint32_t silence; /* ticks without a good frame, at most */
     int n_inputs;
+    int n_missable; /* of them the last, which may be missing: NaN */
     int n_outputs;
     int sizes[2];               /* coefficients, 0 where they are fixed, and numbers of the memory */
     const mck_real *lowest[2];  /* of each; NULL where they are fixed */

@@ -153,6 +153,14 @@ def test_a_plant_of_other_dimensions_is_told(size: float, pressure: float, words
     assert (words in notes) if words else not notes
 
 
+def test_ranges_a_little_apart_are_of_one_muscle() -> None:
+    plant = Twin(
+        replace(MODEL, weights=tuple(1.001 * w for w in MODEL.weights)),
+        limits={"pressure": (0.3, 4.9)},
+    )
+    assert not before(MODEL.inverse(), plant, wave(300), approach=1.0).notes
+
+
 def test_several_muscles_of_a_twin_are_tracked_together() -> None:
     model = registered("blocks", "per-channel").example()
     twin = Twin(model)
@@ -263,7 +271,7 @@ def test_rigs_stand_beside_no_compensation_too() -> None:
 
 
 def test_what_is_out_of_reach_is_counted_and_told_apart(cli: Cli, tmp_path: Path) -> None:
-    """On the model itself all error is there, and limits equal to the model's range clip nothing else."""
+    """On the model itself all error is there, though the plant takes all pressures of the model."""
     wanted = wave(500)
     far = wanted["displacement"] + np.where(np.arange(500) > 400, HIGH, 0.0)
     wanted = Recording({"displacement": far}, STEP)

@@ -190,6 +190,8 @@ def track(
         if one is not None
     ]
     measure = wanted.units[next(iter(found.rmse))]
+    for note in notes:  # before what they put in doubt
+        say(f"Note: {note}")
     print_table(["followed", "by", f"RMSE [{measure}]", f"largest [{measure}]"], rows)
     if twin is None:
         say(f"On the virtual rig {plant.name}; --plant model.json tries it on your own muscle.")
@@ -211,8 +213,6 @@ def track(
         f"Controller: {1e6 * found.step_time[0]:.0f} µs a step (median), "
         f"{1e6 * found.step_time[1]:.0f} µs (99.9 %)."
     )
-    for note in notes:
-        say(f"Note: {note}")
     if out is not None:
         say(f"Written: {out}")
 

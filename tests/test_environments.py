@@ -183,7 +183,7 @@ def test_a_model_or_its_file_is_a_plant(tmp_path: Path) -> None:
         assert found[-1]["displacement"] == found[0]["displacement"]
     with pytest.raises(DataError, match=r"plant is 3.*a model, its file, or a Twin"):
         environments.Tracking(plant=3)  # type: ignore[arg-type]
-    with pytest.raises(DataError, match="absent"):
+    with pytest.raises(ModelError, match="absent"):
         environments.Tracking(plant="absent.json")
     with pytest.raises(ModelError, match="not its inverse"):
         environments.Tracking(plant=model.inverse())

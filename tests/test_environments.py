@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from mckibben import DataError
+from mckibben import DataError, ModelError
 from mckibben.rigs import load_rig, rig_names
 
 gymnasium = pytest.importorskip("gymnasium")
@@ -165,3 +166,24 @@ def test_a_twin_of_ones_own_muscle_is_an_environment() -> None:
         environments.Tracking(plant=bare, spread=0.1)
     with pytest.raises(DataError, match="load"):
         environments.Tracking(plant=bare, load=5.0)
+
+
+def test_a_model_or_its_file_is_a_plant(tmp_path: Path) -> None:
+    from mckibben.blocks.play_type.pi import PI
+
+    model = PI.example()
+    model.save(tmp_path / "mine.json")
+    found = []
+    for plant in (model, tmp_path / "mine.json", str(tmp_path / "mine.json")):
+        env = environments.Tracking(plant=plant, duration=1.0)
+        env.reset(seed=1)
+        found.append(env.step(np.array([0.5], dtype=np.float32))[4])
+        # which measures no pressure
+        assert found[-1]["pressure"] == pytest.approx([0.75 * 5.0])
+        assert found[-1]["displacement"] == found[0]["displacement"]
+    with pytest.raises(DataError, match=r"plant is 3.*a model, its file, or a Twin"):
+        environments.Tracking(plant=3)  # type: ignore[arg-type]
+    with pytest.raises(ModelError, match="absent"):
+        environments.Tracking(plant="absent.json")
+    with pytest.raises(ModelError, match="not its inverse"):
+        environments.Tracking(plant=model.inverse())

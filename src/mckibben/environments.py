@@ -33,6 +33,7 @@ except ImportError as missing:
     ) from missing
 
 if TYPE_CHECKING:
+    from mckibben.blocks.core.block import Block
     from mckibben.control import Twin
     from mckibben.recording import Recording
     from mckibben.rigs import Rig
@@ -67,7 +68,8 @@ class Tracking(gymnasium.Env[Vector, Vector]):
     Reward: minus the mean absolute error over stroke, minus ``effort`` times the mean square of the
     change of action.
 
-    Info: ``error``, ``reference``, ``displacement`` [mm] and ``pressure`` [bar], as measured.
+    Info: ``error``, ``reference``, ``displacement`` [mm] and ``pressure`` [bar], as measured, or as
+    commanded where it is not measured.
 
     Episodes never terminate; they are truncated after ``duration``.
 
@@ -93,10 +95,10 @@ class Tracking(gymnasium.Env[Vector, Vector]):
         Parameters of the rig to change, as `mckibben.Rig.changed` takes them.
     render_mode : {None, "rgb_array"}
         With the second, `render` draws the episode so far.
-    plant : Twin, optional
-        A fitted model instead of a rig, `mckibben.control.Twin`: what is no pressure stays as that holds
-        it. With a band it scatters, otherwise in every episode; ``spread`` is of rigs alone, and
-        ``settings`` are those of `Twin.changed`.
+    plant : Twin, Block or path, optional
+        A fitted model instead of a rig: itself, its file, or a `mckibben.control.Twin`, where what is no
+        pressure stays as that holds it. With a band it scatters, otherwise in every episode; ``spread``
+        is of rigs alone, and ``settings`` are those of `Twin.changed`.
 
     Raises
     ------
@@ -119,7 +121,7 @@ class Tracking(gymnasium.Env[Vector, Vector]):
         spread: float = 0.0,
         settings: Mapping[str, Any] | None = None,
         render_mode: str | None = None,
-        plant: Twin | None = None,
+        plant: Twin | Block | str | Path | None = None,
     ) -> None:
         from mckibben.rigs import load_rig
 
@@ -133,7 +135,7 @@ class Tracking(gymnasium.Env[Vector, Vector]):
         else:
             _demand(not spread, "spread", spread, "0 with a plant, whose band scatters")
             _demand(not load, "load", load, "0 with a plant, and held={'force': ...} to the plant")
-            chosen = plant
+            chosen = plant = _twin(plant)
             control_time = chosen.sample_time if control_time is None else control_time
         _demand(0 < control_time <= 1, "control_time", control_time, "0 to 1 s")
         _demand(2 * control_time <= duration <= 1e4, "duration", duration, "2 steps to 10000 s")
@@ -203,17 +205,15 @@ class Tracking(gymnasium.Env[Vector, Vector]):
         self._wanted = self._hidden_run(self._now)
         measured = self._now.reset(seed=int(self.np_random.integers(2**31)))
         self._action = np.zeros(len(self._commands))
+        self._applied = self._low.copy()
         self._done = [measured]
         return self._observation(measured), self._info(measured)
 
     def step(self, action: Vector) -> tuple[Vector, float, bool, bool, dict[str, Any]]:
         """Hold an action for a control step."""
         wish = np.clip(np.asarray(action, dtype=float), -1.0, 1.0)
-        commands = dict(
-            zip(
-                self._commands, self._low + 0.5 * (wish + 1) * (self._high - self._low), strict=True
-            )
-        )
+        self._applied = self._low + 0.5 * (wish + 1) * (self._high - self._low)
+        commands = dict(zip(self._commands, self._applied.tolist(), strict=True))
         if self._load:
             commands["force"] = self._load
         measured = self._now.step(commands)
@@ -258,7 +258,7 @@ class Tracking(gymnasium.Env[Vector, Vector]):
             "error": measured[self._moves] - reference,
             "reference": reference.copy(),
             "displacement": measured[self._moves],
-            "pressure": measured[self._bars],
+            "pressure": measured[self._bars] if self._bars else self._applied.copy(),
         }
 
     def _varied(self) -> Rig | Twin:
@@ -333,6 +333,22 @@ def register() -> None:
                     entry_point="mckibben.environments:Tracking",
                     kwargs={"rig": fields["name"]},
                 )
+
+
+def _twin(plant: object) -> Twin:
+    """Return a twin of what is given: itself, a model, or a model's file."""
+    from mckibben.blocks.core.block import Block
+    from mckibben.blocks.core.saving import load
+    from mckibben.control import Twin
+
+    match plant:
+        case Twin():
+            return plant
+        case Block():
+            return Twin(plant)
+        case str() | Path():
+            return Twin(load(plant), name=Path(plant).stem)
+    raise DataError(f"plant is {plant!r}", remedy="give a model, its file, or a Twin")
 
 
 def _demand(holds: bool, name: str, value: object, wanted: str) -> None:

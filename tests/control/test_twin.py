@@ -153,6 +153,14 @@ def test_a_plant_of_other_dimensions_is_told(size: float, pressure: float, words
     assert (words in notes) if words else not notes
 
 
+def test_ranges_a_little_apart_are_of_one_muscle() -> None:
+    plant = Twin(
+        replace(MODEL, weights=tuple(1.001 * w for w in MODEL.weights)),
+        limits={"pressure": (0.3, 4.9)},
+    )
+    assert not before(MODEL.inverse(), plant, wave(300), approach=1.0).notes
+
+
 def test_several_muscles_of_a_twin_are_tracked_together() -> None:
     model = registered("blocks", "per-channel").example()
     twin = Twin(model)
@@ -260,3 +268,25 @@ def test_an_unpaired_plant_says_why_nothing_stands_beside() -> None:
 def test_rigs_stand_beside_no_compensation_too() -> None:
     found = before(MODEL.inverse(), load_rig("rail").changed({}), wave(100), approach=0.5)
     assert found.tracked is not None
+
+
+def test_what_is_out_of_reach_is_counted_and_told_apart(cli: Cli, tmp_path: Path) -> None:
+    """On the model itself all error is there, though the plant takes all pressures of the model."""
+    wanted = wave(500)
+    far = wanted["displacement"] + np.where(np.arange(500) > 400, HIGH, 0.0)
+    wanted = Recording({"displacement": far}, STEP)
+    found = track(MODEL.inverse(), Twin(MODEL), wanted, approach=1.0)
+    beyond = found.beyond["displacement"]
+    due = np.concatenate([far[:1], far[:-1]])
+    assert beyond.samples == found.clipped == np.count_nonzero(due > HIGH)
+    assert (beyond.low, beyond.high) == (LOW, HIGH)
+    assert beyond.rmse_elsewhere < 1e-9 < found.rmse["displacement"]
+    assert not track(MODEL.inverse(), Twin(MODEL), wave(100), approach=1.0).beyond
+    MODEL.inverse().save(tmp_path / "inverse.json")
+    MODEL.save(tmp_path / "model.json")
+    write(wanted, tmp_path / "wished.csv")
+    asked = ("inverse.json", "--plant", "model.json", "--reference", "wished.csv", "--approach", 1)
+    given = [tmp_path / one if str(one).endswith((".json", ".csv")) else one for one in asked]
+    assert f"{beyond.samples} samples of the reference" in cli("track", *given).out
+    told = json.loads(cli("track", *given, "--json").out)["out_of_reach"]["displacement"]
+    assert told["samples"] == beyond.samples

@@ -173,6 +173,7 @@ def track(
                 "largest": dict(found.largest),
                 "clipped": found.clipped,
                 "clipping_cost": found.clipping_cost,
+                "out_of_reach": {name: far._asdict() for name, far in found.beyond.items()},
                 "uncompensated": _figures(without.tracked),
                 "step_time": {"median": found.step_time[0], "p99.9": found.step_time[1]},
                 "file": None if out is None else str(out),
@@ -189,23 +190,29 @@ def track(
         if one is not None
     ]
     measure = wanted.units[next(iter(found.rmse))]
+    for note in notes:  # before what they put in doubt
+        say(f"Note: {note}")
     print_table(["followed", "by", f"RMSE [{measure}]", f"largest [{measure}]"], rows)
     if twin is None:
         say(f"On the virtual rig {plant.name}; --plant model.json tries it on your own muscle.")
     if found.clipped >= len(found.recording):
         say("Pressures were at a limit throughout: the reference is out of reach.")
-    elif found.clipped:
-        side = "below" if found.clipping_cost < 0 else "above"
+    elif found.clipped > max((far.samples for far in found.beyond.values()), default=0):
+        cost = (
+            f"; RMSE there is {numeral(found.clipping_cost, 3)} {measure} above that of the others"
+        )
+        costs = found.clipping_cost > 0
+        say(f"Pressures were at a limit in {found.clipped} steps{cost if costs else ''}.")
+    for name, far in found.beyond.items():
         say(
-            f"Pressures were at a limit in {found.clipped} steps; RMSE there is "
-            f"{numeral(abs(found.clipping_cost), 3)} {measure} {side} that of the other steps."
+            f"{far.samples} samples of the reference {name} are out of reach ({numeral(far.low, 4)} to "
+            f"{numeral(far.high, 4)} {measure}); RMSE over the others is "
+            f"{numeral(far.rmse_elsewhere, 3)} {measure}."
         )
     say(
         f"Controller: {1e6 * found.step_time[0]:.0f} µs a step (median), "
         f"{1e6 * found.step_time[1]:.0f} µs (99.9 %)."
     )
-    for note in notes:
-        say(f"Note: {note}")
     if out is not None:
         say(f"Written: {out}")
 

@@ -43,6 +43,11 @@ class Controller(ABC):
         return 0.0
 
     @property
+    def undone(self) -> Block | None:
+        """The model that its compensator undoes, if it has one."""
+        return None
+
+    @property
     def samples_ahead(self) -> int:
         """How many samples further ahead it wants the reference, to plan with."""
         return 0
@@ -80,6 +85,11 @@ class BlockController(Controller):
     def preview(self) -> float:
         """The dead time of what the block undoes."""
         return dead_time_undone(self.block)
+
+    @property
+    def undone(self) -> Block | None:
+        """What the block undoes."""
+        return self.block.undone
 
     @property
     def samples_ahead(self) -> int:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Collection, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 import numpy as np
@@ -15,6 +15,7 @@ from mckibben.blocks.core.block import Block
 from mckibben.control.controller import BlockController, Controller
 from mckibben.control.pressure_loop import PressureLoop
 from mckibben.control.preview import samples_ahead
+from mckibben.control.reach import Beyond, beyond, ends, outside
 from mckibben.errors import DataError, ModelError
 from mckibben.recording import Recording, standard_unit
 from mckibben.signals.checking import generator
@@ -59,11 +60,13 @@ class Tracked:
     rmse, largest : mapping of str to float
         Of everything followed, after the approach [mm or N].
     clipped : int
-        Steps in which pressure or its rate was at a limit.
+        Steps in which pressure or its rate was at a limit, or the reference out of reach.
     clipping_cost : float
         RMSE over those steps less RMSE over the others [mm or N]; 0 where there are none.
     step_time : (float, float)
         Median and 99.9th percentile of the controller's own time a step [s].
+    beyond : mapping of str to Beyond
+        Where the reference is out of reach of what the compensator undoes, by what is followed.
     """
 
     recording: Recording
@@ -72,6 +75,7 @@ class Tracked:
     clipped: int
     clipping_cost: float
     step_time: tuple[float, float]
+    beyond: Mapping[str, Beyond] = field(default_factory=dict)
 
 
 MOST_STEPS = 10**7
@@ -219,7 +223,12 @@ def track(
     # what was asked for at a step is due at the next
     due = np.concatenate([path[:1], path[:-1]])
     errors = seen[:, at_y] - due
+    reached = ends(controller.undone, followed)
+    out = {name: outside(due[:, followed.index(name)], *reached[name]) for name in reached}
+    clipped |= np.any([*out.values(), np.zeros(n, dtype=bool)], axis=0)
     part, at_limit = errors[scored], clipped[scored]
+    parts = dict(zip(followed, part.T, strict=True))
+    far = {name: beyond(parts[name], out[name][scored], *reached[name]) for name in reached}
     return Tracked(
         _recorded(reference, followed, driven, due, seen, commands, scheduled, held, changed, lead),
         dict(zip(followed, np.sqrt(np.mean(part**2, axis=0)).tolist(), strict=True)),
@@ -227,6 +236,7 @@ def track(
         int(at_limit.sum()),
         _cost(part, at_limit),
         (float(np.median(times)), float(np.quantile(times, 0.999))),
+        {name: found for name, found in far.items() if found is not None},
     )
 
 

@@ -45,6 +45,11 @@ class DisturbanceObserver(Controller):
         """The dead time of the model."""
         return self._model.dead_time
 
+    @property
+    def undone(self) -> Block | None:
+        """The model."""
+        return self._model
+
     def reset(self, sample_time: float) -> None:
         self._coming: tuple[Array, Array] | None = None
         self._ahead = self.compensator.stream(sample_time)

@@ -19,8 +19,9 @@ APART = 0.25
 """Share of a model's stroke by which a plant's slow rise begins or ends elsewhere that is another
 muscle: specimens of a type, temperatures and loads differ by less, the next size by more."""
 
-BEYOND = 0.05
-"""Share of a range of pressure beyond which it is left."""
+BEYOND = 0.25
+"""Share of a model's range of pressure that a plant does not let through, and that is another muscle:
+recordings of one muscle begin and end a few tenths of a bar apart."""
 
 REMEDY = (
     "Remedy: try it on a model of your own muscle (--plant model.json), or on a rig of its size"

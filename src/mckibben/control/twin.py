@@ -131,6 +131,12 @@ class Twin:
         self._stream: Stream | None = None
         self._scatter: _Scatter | None = None
 
+    def __repr__(self) -> str:
+        """Name it, its model, and the ends of its commands."""
+        ends = {name: tuple(self._limits[name]) for name in self.inputs if name in self._limits}
+        band = f", band {self.model.level:g}" if isinstance(self.model, Banded) else ""
+        return f"Twin({self.name!r}, {self.forward.title!r}{band}, limits={ends}, held={self.held})"
+
     @property
     def scatters(self) -> bool:
         """Whether it has a band."""

@@ -1,0 +1,74 @@
+"""What of a reference the model that a compensator undoes cannot reach, and what that costs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mckibben.arrays import Array
+from mckibben.blocks.core.block import Block
+
+ROUNDING = 1e-9
+"""Share of what is reached by which a reference touches its end."""
+
+
+class Beyond(NamedTuple):
+    """Samples of a reference that are out of reach.
+
+    Parameters
+    ----------
+    samples : int
+    low, high : float
+        What the model can reach whatever happened before [mm or N].
+    rmse_elsewhere : float
+        RMSE over all other samples [mm or N]; not a number where there are none.
+    """
+
+    samples: int
+    low: float
+    high: float
+    rmse_elsewhere: float
+
+
+def ends(model: Block | None, followed: Sequence[str]) -> dict[str, tuple[float, float]]:
+    """Return the lowest and highest that a model can reach of what is followed, as far as it says.
+
+    Parameters
+    ----------
+    model : Block or None
+        What a compensator undoes.
+    followed : sequence of str
+    """
+    if model is None:
+        return {}
+    rows = zip(model.outputs, *model.reachable(), strict=True)
+    found = {channel.name: (float(low), float(high)) for channel, low, high in rows}
+    return {
+        name: found[name] for name in followed if name in found and np.isfinite(found[name]).all()
+    }
+
+
+def outside(reference: Array, low: float, high: float) -> NDArray[np.bool_]:
+    """Return which samples of a reference, shape (n,), lie beyond both ends and rounding."""
+    margin = ROUNDING * (high - low)
+    return np.asarray((reference < low - margin) | (reference > high + margin))
+
+
+def beyond(errors: Array, out: NDArray[np.bool_], low: float, high: float) -> Beyond | None:
+    """Return what of a reference is out of reach, or None.
+
+    Parameters
+    ----------
+    errors : array, shape (n,)
+    out : array of bool, shape (n,)
+        From `outside`.
+    low, high : float
+    """
+    if not out.any():
+        return None
+    others = errors[~out]
+    elsewhere = float(np.sqrt(np.mean(others**2))) if others.size else float("nan")
+    return Beyond(int(out.sum()), low, high, elsewhere)

@@ -370,3 +370,20 @@ def test_a_refit_that_is_worse_is_called_so() -> None:
     worse = Refit(MUSCLE, old=0.1, new=0.2, ratio=(1.5, 2.5), n_folds=4, older=0, covered=1.0)
     assert "it is worse" in refit(worse)
     assert "no more than chance" in refit(replace(worse, ratio=(0.9, 2.5)))
+
+
+def test_commands_stand_for_pressures_that_are_not_measured(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    log, _ = logged(0, gain=0.85, noise=0.05)
+    names = [name for name in log.channels if name != "pressure"]
+    blind, inverse = tmp_path / "blind.csv", tmp_path / "inverse.json"
+    write(log.select(names), blind)
+    MUSCLE.inverse().save(inverse)
+    found = {}
+    for out, more in (("as-it-is", []), ("by-name", ["--input", "command_pressure"])):
+        given = ["study", blind, "--compensator", inverse, "--models", "gpi", "--jobs", 1, *more]
+        code, printed = called(monkeypatch, capsys, *given, "-o", tmp_path / out)
+        assert code == 0, printed
+        found[out] = json.loads((tmp_path / out / "review.json").read_text())["outputs"]
+    assert found["as-it-is"] == found["by-name"]

@@ -127,8 +127,8 @@ _POLICIES: dict[Gaps, Literal["error", "split", "interpolate"]] = {
 }
 
 
-SEVERAL = re.compile(r"(pressure|displacement)_\d+")
-"""Names of channels by which recordings of several muscles are told."""
+SEVERAL = re.compile(r"(pressure|displacement)_\d+|command_.+")
+"""Names of channels by which recordings of several muscles, and logs of loops, are told."""
 
 
 @dataclass(frozen=True)
@@ -183,12 +183,13 @@ class Reading:
         try:
             begun = self.read([first], asked)
         except DataError:
-            if not self._is_of_several(first):
+            if not self._finds_its_own(first):
                 raise
             return [self.read(some, None, informative=False) for some in files]
         return [begun + self.read(rest, asked), *(self.read(some, asked) for some in others)]
 
-    def _is_of_several(self, file: Path) -> bool:
+    def _finds_its_own(self, file: Path) -> bool:
+        """Tell whether a file is of several muscles, or a loop's log of commands alone."""
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             try:

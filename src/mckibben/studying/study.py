@@ -23,6 +23,7 @@ from mckibben.excitation import Gap, untold
 from mckibben.recording import Recording
 from mckibben.studying.checking import check_on_test
 from mckibben.studying.inverting import InverseCheck, invert_best
+from mckibben.studying.log import COMMAND
 from mckibben.studying.loops import closed_loops, published_rig
 from mckibben.studying.reviewing import Review, review
 from mckibben.validation.describing import ModelDescription, describe
@@ -164,6 +165,8 @@ def study(
     reviewed = None
     if model is not None or compensator is not None:  # the test is not for a refit to see
         reviewed = review(recordings, model=model, compensator=compensator, seed=seed)
+        if inputs is None:
+            recordings = [_driven(one) for one in recordings]
     plan = plan_of(
         recordings,
         tests,
@@ -235,3 +238,11 @@ def study(
     if clear:
         kept.clear()
     return so_far
+
+
+def _driven(log: Recording) -> Recording:
+    """Return a log with its commands for pressures, where it has none that are measured."""
+    names = [name.removeprefix(COMMAND) for name in log.channels if name.startswith(COMMAND)]
+    blind = [name for name in names if name not in log]
+    units = {name: log.units[COMMAND + name] for name in blind}
+    return log.with_channels(units, **{name: log[COMMAND + name] for name in blind})

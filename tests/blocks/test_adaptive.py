@@ -252,7 +252,7 @@ def test_before_anything_is_measured_nothing_has_drifted(model: Block) -> None:
 
 
 def test_alarms_are_false_no_more_often_than_told() -> None:
-    """Where errors are alike from sample to sample, few groups pass two standard errors by chance."""
+    """Where the form is right, few groups pass two standard errors by chance."""
     model = PI.example()
     block = adaptive(model, 5.0, 0.05)
     beyond = looks = 0
@@ -270,6 +270,18 @@ def test_alarms_are_false_no_more_often_than_told() -> None:
                 beyond, looks = beyond + int(np.sum(sizes > 1.96)), looks + sizes.size
     assert beyond <= 0.05 * looks
     assert alarm_limit(60.0, 3) == pytest.approx(4.54, abs=0.01)
+
+
+def test_a_loop_no_wider_than_usual_errors_is_not_said_to_have_changed() -> None:
+    """Errors that go with the motion are not averaged out: friction is known by them over the loop."""
+    model = PI.example()
+    block = adaptive(model, 20.0, 0.1)
+    stream, loop = block.stream(STEP), 2 * np.dot(model.weights, model.thresholds)
+    for y in references(model, 40.0):
+        stream.step([y, y])
+    found = block.drift(stream.state)
+    assert found.errors[1] >= 0.1 / loop
+    assert found.errors[0] < 0.1 / loop
 
 
 def test_beside_feedback_it_shares_what_is_measured() -> None:

@@ -25,6 +25,7 @@ from mckibben.blocks.adaptive.drift import FIT_ERROR, Drift, alarm_limit, scatte
 from mckibben.blocks.adaptive.learning import (
     READY,
     SENSES,
+    USUAL,
     covariance_of,
     start_root,
     start_sense,
@@ -288,7 +289,10 @@ class Adaptive(Block):
         there = learner.group_changes(theta)
         slopes = np.array([(learner.group_changes(theta + h) - there) / 1e-6 for h in steps]).T
         covariance = covariance_of(root, theta.size)
-        errors = scatter(covariance, slopes)
+        usual = float(senses[USUAL::SENSES].max())
+        moved = learner.whole_changes
+        left = np.divide(usual, moved, out=np.zeros(moved.size), where=moved > 0)
+        errors = scatter(covariance, slopes, left)
         return Drift(learner.groups, vector(there), vector(errors), limit)
 
     def resumed(self, state: Array) -> Self:

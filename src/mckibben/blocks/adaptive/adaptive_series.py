@@ -64,7 +64,9 @@ class AdaptiveSeries(Composition):
                 f"{learning} parts of this series can learn. Remedy: adapt pi, gpi, mpi, cpi or "
                 "balance models: one part that learns, of one channel like the others."
             )
-        check_settings(self.kind, self.time, self.noise, told_width(self.forward, self.core.learner))
+        check_settings(
+            self.kind, self.time, self.noise, told_width(self.forward, self.core.learner)
+        )
         if self.memory is not None and len(self.memory) != self.n_states:
             raise ModelError(
                 f"the memory of {self.kind!r} has {len(self.memory)} numbers, its state "

@@ -1,10 +1,10 @@
 """How far a learner has gone from the fit: by groups of parameters, in standard errors, in a sentence.
 
-A standard error is that of the learner's covariance, and what a fit itself is wrong by: a little of every
-group, and whatever moves the output no further than its usual error. What the form of a model leaves
-goes with the motion and is never averaged out, so that other motion makes it look like other parameters.
-An alarm is given where a change is too many standard errors for chance, at a told rate of false ones, when one look
-is independent of the next after the time to learn in.
+A standard error is that of the learner's covariance, and what a fit itself is wrong by: a little of
+every group, and whatever moves the output no further than its usual error. What the form of a model
+leaves goes with the motion and is never averaged out: other motion makes it look like other parameters.
+An alarm is given where a change is too many standard errors for chance, at a told rate of false ones,
+when one look is independent of the next after the time to learn in.
 """
 
 from __future__ import annotations

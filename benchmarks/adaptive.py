@@ -2,11 +2,14 @@
 
     python benchmarks/adaptive.py [--rig mas20-hanging] [--kind gpi] [--motions 3] [--change all]
     python benchmarks/adaptive.py --hour
+    python benchmarks/adaptive.py --alarms
     python benchmarks/adaptive.py --instructions
 
 The first prints, of random motions, the tracking error by law [mm]: the minute before a step of 20 %,
 the first three ten seconds after it, and a minute from 40 s after; then of 20 % over ten minutes, the
-middle and the last minute. The second prints an hour without drift; the last, a generalised
+middle and the last minute. The second prints an hour without drift; the third how
+far what is learnt then goes from a fit to slow decaying triangles, and alarms, beside those of a step of
+20 %; the last, a generalised
 Prandtl-Ishlinskii model of ten operators on an emulated Cortex-M4F.
 """
 
@@ -28,6 +31,7 @@ from mckibben.control.drifting import Drift, Drifting
 from mckibben.export.c.emulation import emulate
 from mckibben.registry import load
 from mckibben.rigs import load_rig
+from mckibben.signals import decaying_triangle
 
 Array = NDArray[np.float64]
 
@@ -169,6 +173,40 @@ def hour(rig_name: str, kind: str, time: float) -> None:
     print(f"by minutes, adaptive / fixed: median {np.median(ratio):.3f}, largest {ratio.max():.3f}")
 
 
+def alarms(rig_name: str, kind: str) -> None:
+    rig = load_rig(rig_name).changed({"sample_time": STEP})
+    t = np.arange(6000) * STEP
+    slow = rig.run(
+        Recording({"pressure": decaying_triangle(t, low=0.0, high=5.0, period=20.0)}, STEP)
+    )
+    model: Block = load("estimators", kind)().fit([slow]).model_
+    low, high = (float(end[0]) for end in model.reachable())
+    t = np.arange(round(300.0 / STEP)) * STEP
+    print("| change | period, time [s] | looks, alarms | largest changes | in standard errors |")
+    for change, factors in {"none": {}, **CHANGES}.items():
+        for period, time in ((20.0, 60.0), (10.0, 60.0), (20.0, 20.0), (5.0, 20.0)):
+            plant = Drifting(rig, [Drift(group, f, 60.0) for group, f in factors.items()])
+            swing = np.sin(2 * np.pi * t / period) * (0.6 + 0.4 * np.cos(0.0731 * t))
+            asked = low + (high - low) * (0.5 + 0.35 * swing)
+            out = plant.outputs.index("displacement")
+            block = adaptive(model, time)
+            stream, seen = block.stream(STEP), plant.reset(1)
+            told = []
+            for k, y in enumerate(asked):
+                pressure = float(stream.step([y, seen[out]])[0])
+                seen = plant.step({"pressure": min(max(pressure, 0.0), 6.0)})
+                if k % 250 == 249:
+                    told.append(block.drift(stream.state))
+            changes = np.abs([found.changes for found in told]).max(axis=0)
+            sizes = np.abs([found.by_errors for found in told]).max(axis=0)
+            print(
+                f"| {change} | {period:g}, {time:g} | {len(told)}, {sum(f.alarm for f in told)} | "
+                + " | ".join(", ".join(f"{x:.2f}" for x in row) for row in (changes, sizes))
+                + " |",
+                flush=True,
+            )
+
+
 def instructions() -> None:
     thresholds, weights = tuple(0.05 * k for k in range(10)), tuple(12 / (1 + k) for k in range(10))
     model = replace(GPI.example(), thresholds=thresholds, weights=weights)
@@ -184,10 +222,13 @@ if __name__ == "__main__":
     parser.add_argument("--time", type=float, default=60.0)
     parser.add_argument("--change", default="", help="how the name of the change begins")
     parser.add_argument("--hour", action="store_true")
+    parser.add_argument("--alarms", action="store_true")
     parser.add_argument("--instructions", action="store_true")
     chosen = parser.parse_args()
     if chosen.instructions:
         instructions()
+    elif chosen.alarms:
+        alarms(chosen.rig, chosen.kind)
     elif chosen.hour:
         hour(chosen.rig, chosen.kind, chosen.time)
     else:

@@ -18,6 +18,8 @@ from mckibben.blocks.adaptive.adaptive import Adaptive, taught
 from mckibben.blocks.adaptive.adaptive_series import AdaptiveSeries, adaptive
 from mckibben.blocks.adaptive.drift import alarm_limit
 from mckibben.blocks.adaptive.learning import (
+    READY,
+    SENSES,
     covariance_of,
     learn,
     start_root,
@@ -240,6 +242,51 @@ def test_what_cannot_learn_says_what_can() -> None:
         adaptive(Adaptive.example(), 20.0, 0.02)
 
 
+def test_a_memory_that_never_came_of_running_is_refused() -> None:
+    block = adaptive(PI.example(), 10.0, 0.05)
+    stream, asked = block.stream(STEP), references(PI.example(), 2.0)
+    for y in asked:
+        stream.step([y, y + 0.01])
+    kept = block.resumed(stream.state).memory
+    assert kept is not None
+    for place in range(len(kept)):
+        spoilt = np.array(kept)
+        spoilt[place] = 1e18
+        try:
+            block_of = replace(block, memory=tuple(spoilt.tolist()))
+        except ModelError:
+            continue
+        run = block_of.stream(STEP)  # what the sensor read last may be anything
+        assert np.abs([run.step([y, y])[0] for y in asked]).max() < 10.0
+    for place in (0, block.fixed.n_states + 1, -SENSES + READY):
+        spoilt = np.array(kept)
+        spoilt[place] = 1e18
+        with pytest.raises(ModelError, match=r"in the memory of 'adaptive' cannot.*Remedy"):
+            replace(block, memory=tuple(spoilt.tolist()))
+
+
+@pytest.mark.parametrize("model", [PI.example(), CREEPING], ids=["pi", "series"])
+def test_vented_it_keeps_what_is_learnt(model: Block, tmp_path: Path) -> None:
+    block = adaptive(model, 10.0, 0.05)
+    asked = references(PI.example(), 10.0)
+    stream = block.stream(STEP)
+    for y in asked:
+        stream.step([y, 1.1 * y])
+    block.resumed(stream.state, memory=False).save(tmp_path / "learnt.json")
+    resumed = load(tmp_path / "learnt.json")
+    assert isinstance(resumed, type(block))
+    first = np.array([asked[0], asked[0]])
+    state = resumed.initial_state(first)
+    fresh = block.initial_state(first)
+    assert str(resumed.present(state)) == str(block.present(stream.state))
+    core = resumed.core if isinstance(resumed, AdaptiveSeries) else resumed
+    own = core.fixed.n_states
+    if core is resumed:
+        np.testing.assert_array_equal(state[:own], fresh[:own])
+    again = resumed.stream(STEP)
+    assert np.isfinite([again.step([y, y]) for y in asked]).all()
+
+
 def test_a_memory_of_another_model_is_refused() -> None:
     with pytest.raises(ModelError, match=r"memory of 'adaptive' has 3 numbers.*Remedy"):
         replace(Adaptive.example(), memory=(0.0, 1.0, 2.0))
@@ -275,7 +322,7 @@ def test_before_anything_is_measured_nothing_has_drifted(model: Block) -> None:
 
 
 def test_alarms_are_false_no_more_often_than_told() -> None:
-    """Where errors are alike from sample to sample, few groups pass two standard errors by chance."""
+    """Where the form is right, few groups pass two standard errors by chance."""
     model = PI.example()
     block = adaptive(model, 5.0, 0.05)
     beyond = looks = 0
@@ -293,6 +340,18 @@ def test_alarms_are_false_no_more_often_than_told() -> None:
                 beyond, looks = beyond + int(np.sum(sizes > 1.96)), looks + sizes.size
     assert beyond <= 0.05 * looks
     assert alarm_limit(60.0, 3) == pytest.approx(4.54, abs=0.01)
+
+
+def test_a_loop_no_wider_than_usual_errors_is_not_said_to_have_changed() -> None:
+    """Errors that go with the motion are not averaged out: friction is known by them over the loop."""
+    model = PI.example()
+    block = adaptive(model, 20.0, 0.1)
+    stream, loop = block.stream(STEP), 2 * np.dot(model.weights, model.thresholds)
+    for y in references(model, 40.0):
+        stream.step([y, y])
+    found = block.drift(stream.state)
+    assert found.errors[1] >= 0.1 / loop
+    assert found.errors[0] < 0.1 / loop
 
 
 def test_beside_feedback_it_shares_what_is_measured() -> None:

@@ -136,6 +136,14 @@ class Adaptable(Invertible):
         return 0.0
 
     @property
+    def whole_changes(self) -> Array:
+        """How far an output moves where a group changes by the whole of it, shape (n_groups,).
+
+        In the output's unit, infinite if unknown; by default the range where it was fitted.
+        """
+        return np.full(len(self.groups), self.known_span or np.inf)
+
+    @property
     def n_more_states(self) -> int:
         """Numbers of the last sample that learning wants, behind those of the inverse."""
         return 1

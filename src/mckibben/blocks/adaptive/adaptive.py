@@ -23,8 +23,12 @@ from mckibben.arrays import Array
 from mckibben.blocks.adaptive.adaptable import Adaptable, Learning
 from mckibben.blocks.adaptive.drift import FIT_ERROR, Drift, alarm_limit, scatter
 from mckibben.blocks.adaptive.learning import (
+    LARGEST,
     READY,
     SENSES,
+    SQUARED,
+    STOOD,
+    USUAL,
     covariance_of,
     start_root,
     start_sense,
@@ -48,6 +52,11 @@ TIMES = 1e-3, 1e9
 """Shortest and longest time to learn in [s]."""
 NOISES = 1e-9, 1e3
 """Least and most noise, by the width of what is reached."""
+
+FARTHEST = 1e6
+"""Scales, and variances expected, that no parameter goes beyond."""
+MOST = 1e12
+"""Beyond what memory of an inverse is, and samples are counted."""
 
 
 def learner_of(block: Block) -> Adaptable | None:
@@ -93,7 +102,8 @@ class Adaptive(Block):
     noise : float
         Standard deviation of what is measured [unit of the output]; errors below are not told apart.
     memory : sequence of float, optional
-        State to go on from, as `resumed` keeps it; default is to start from the fit.
+        State to go on from, or what is learnt of it, as `resumed` keeps it; default is to start from
+        the fit.
     """
 
     kind: ClassVar[str] = "adaptive"
@@ -109,11 +119,50 @@ class Adaptive(Block):
     def __post_init__(self) -> None:
         self.learner.check_invertible()
         check_settings(self.kind, self.time, self.noise, told_width(self.forward, self.learner))
-        if self.memory is not None and len(self.memory) != self.n_states:
+        if self.memory is not None and len(self.memory) not in (self.n_states, self.n_learnt):
             raise ModelError(
                 f"the memory of {self.kind!r} has {len(self.memory)} numbers, its state "
                 f"{self.n_states}. Remedy: resume what was saved with the same model."
             )
+        if self.memory is not None:
+            self.check_memory(np.array(self.memory))
+
+    def check_memory(self, state: Array) -> None:
+        """Refuse a state, or what is learnt of one, that learning never comes to.
+
+        Raises
+        ------
+        ModelError
+            If so.
+        """
+        own, theta, used, root, senses = self._split(state)
+        learner, fixed = self.learner, self.fixed
+        p, senses = theta.size, senses.reshape(-1, SENSES)
+        with np.errstate(all="ignore"):
+            far = np.abs(np.array([theta, used]) - learner.taught) > FARTHEST * learner.scales
+            variances = np.diag(covariance_of(root, p))
+            wide = variances > FARTHEST * np.diag(learner.spread)
+        ready, usual = senses[:, READY], senses[:, USUAL]
+        wrong = {
+            "hysteresis": (np.abs(own) > MOST).any(),
+            "parameters": far.any(),
+            "covariance": not (root[:p] > 0).all() or wide.any(),
+            "readings": not ((ready >= 0) & (ready <= p) & (ready == np.round(ready))).all(),
+            "errors": not (senses[:, [USUAL, SQUARED, STOOD]] > 0).all()
+            or (usual > 2 * LARGEST * self.noise).any(),
+        }
+        for name, found in wrong.items():
+            if found:
+                raise ModelError(
+                    f"the {name} in the memory of {self.kind!r} cannot have come from running it. "
+                    "Remedy: save the model afresh, or resume what was saved unchanged."
+                )
+        for parameters in (theta, used):
+            held = learner.retaught(parameters)
+            if isinstance(held, Adaptable):
+                held.check_invertible()
+        if own.size:
+            fixed.initial_state(np.zeros(len(fixed.inputs)), own[: fixed.n_states].tolist())
 
     @property
     def learner(self) -> Adaptable:
@@ -177,6 +226,11 @@ class Adaptive(Block):
         return self.fixed.n_states + self.learner.n_more_states + self.learner.n_learning_states
 
     @property
+    def n_learnt(self) -> int:
+        """Numbers of the state that are learnt."""
+        return self.learner.n_learning_states
+
+    @property
     def n_scratch(self) -> int:
         """Three numbers a parameter, what more the family wants, and those of the inverse."""
         more = self.learner.n_learning_scratch + self.fixed.n_scratch
@@ -193,10 +247,15 @@ class Adaptive(Block):
         An explicit state may be this block's own, the inverse's or the forward block's.
         """
         start = self.start if initial is None else initial
+        asked = first[: len(first) - len(self.measured)]
         if not isinstance(start, str) and len(start) == self.n_states:
             return explicit_state(self, start)
         learner = self.learner
-        asked = first[: len(first) - len(self.measured)]
+        if not isinstance(start, str) and len(start) == self.n_learnt:
+            learnt = np.array(start)
+            self._split(learnt)[4][READY::SENSES] = 0.0  # the next measurement answers nothing
+            own = self.fixed.initial_state(asked, self.forward.start)
+            return np.concatenate([own, np.zeros(learner.n_more_states), learnt])
         theta = learner.taught
         senses = np.tile(start_sense(self.noise), len(self.measured))
         own = self.fixed.initial_state(asked, start)
@@ -206,7 +265,7 @@ class Adaptive(Block):
 
     def _split(self, state: Array) -> tuple[Array, Array, Array, Array, Array]:
         p = self.learner.taught.size
-        sizes = [self.fixed.n_states + self.learner.n_more_states, p, p, (p * (p + 1)) // 2]
+        sizes = [len(state) - self.n_learnt, p, p, (p * (p + 1)) // 2]
         own, theta, used, root, senses = np.split(state, np.cumsum(sizes))
         return own, theta, used, root, senses
 
@@ -288,12 +347,19 @@ class Adaptive(Block):
         there = learner.group_changes(theta)
         slopes = np.array([(learner.group_changes(theta + h) - there) / 1e-6 for h in steps]).T
         covariance = covariance_of(root, theta.size)
-        errors = scatter(covariance, slopes)
+        usual = float(senses[USUAL::SENSES].max())
+        moved = learner.whole_changes
+        left = np.divide(usual, moved, out=np.zeros(moved.size), where=moved > 0)
+        errors = scatter(covariance, slopes, left)
         return Drift(learner.groups, vector(there), vector(errors), limit)
 
-    def resumed(self, state: Array) -> Self:
-        """Return this block, which goes on from a state when it is next started."""
-        return replace(self, memory=tuple(np.asarray(state, dtype=np.float64).tolist()))
+    def resumed(self, state: Array, memory: bool = True) -> Self:
+        """Return this block, which goes on from a state when it is next started.
+
+        Without ``memory`` of its hysteresis it keeps what is learnt alone: muscles were vented since.
+        """
+        kept = np.asarray(state, dtype=np.float64)[0 if memory else -self.n_learnt :]
+        return replace(self, memory=tuple(kept.tolist()))
 
     def equations(self) -> tuple[str, ...]:
         """Return what is undone, and how parameters follow."""

@@ -64,12 +64,27 @@ class AdaptiveSeries(Composition):
                 f"{learning} parts of this series can learn. Remedy: adapt pi, gpi, mpi, cpi or "
                 "balance models: one part that learns, of one channel like the others."
             )
-        check_settings(self.kind, self.time, self.noise, told_width(self.forward, self.core.learner))
-        if self.memory is not None and len(self.memory) != self.n_states:
+        check_settings(
+            self.kind, self.time, self.noise, told_width(self.forward, self.core.learner)
+        )
+        if self.memory is None or self._learnt is not None:
+            return
+        if len(self.memory) != self.n_states:
             raise ModelError(
                 f"the memory of {self.kind!r} has {len(self.memory)} numbers, its state "
                 f"{self.n_states}. Remedy: resume what was saved with the same model."
             )
+        state = np.array(self.memory)
+        self.core.check_memory(self._core_state(state))
+        for part, own in zip(self.parts, self._states(state), strict=True):
+            if part is not self.core:
+                part.initial_state(np.zeros(len(part.inputs)), own.tolist())
+
+    @property
+    def _learnt(self) -> Vector | None:
+        """The memory, where that is what is learnt alone."""
+        n = self.core.n_learnt
+        return self.memory if self.memory is not None and len(self.memory) == n else None
 
     @cached_property
     def _place(self) -> int:
@@ -87,7 +102,9 @@ class AdaptiveSeries(Composition):
             ends = behind.passes(*ends)
         slope = float(np.abs(ends[1] - ends[0])[0]) / (high - low)
         slope = slope if 0 < slope < np.inf else 1.0
-        return Adaptive(part, self.time, self.noise / slope)
+        core = Adaptive(part, self.time, self.noise / slope)
+        learnt = self.memory is not None and len(self.memory) == core.n_learnt
+        return replace(core, memory=self.memory) if learnt else core
 
     @cached_property
     def parts(self) -> tuple[Block, ...]:  # type: ignore[override]
@@ -133,10 +150,15 @@ class AdaptiveSeries(Composition):
     @property
     def start(self) -> Initial:
         """Memory to go on from, or every part's own start."""
-        return "first_sample" if self.memory is None else self.memory
+        return "first_sample" if self._whole is None else self._whole
+
+    @property
+    def _whole(self) -> Vector | None:
+        """The memory, where it is of all parts."""
+        return None if self._learnt is not None else self.memory
 
     def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
-        initial = self.memory if initial is None else initial
+        initial = self._whole if initial is None else initial
         shares = iter(zip(self.parts, self._shared_initial(initial), strict=True))
         behind, before = self._split_parts
         states, core_sample = [], np.array(first[:2], dtype=np.float64)
@@ -211,9 +233,14 @@ class AdaptiveSeries(Composition):
         """Return how far what is learnt has gone from the fit, in a state, shape (n_states,)."""
         return self.core.drift(self._core_state(state))
 
-    def resumed(self, state: Array) -> Self:
-        """Return this block, which goes on from a state when it is next started."""
-        return replace(self, memory=tuple(np.asarray(state, dtype=np.float64).tolist()))
+    def resumed(self, state: Array, memory: bool = True) -> Self:
+        """Return this block, which goes on from a state when it is next started.
+
+        Without ``memory`` of its hysteresis it keeps what is learnt alone: muscles were vented since.
+        """
+        numbers = np.asarray(state, dtype=np.float64)
+        kept = numbers if memory else self._core_state(numbers)[-self.core.n_learnt :]
+        return replace(self, memory=tuple(kept.tolist()))
 
     def joined(self, parts: Sequence[str]) -> str:
         """Return the parts around the one that learns."""

@@ -1,8 +1,10 @@
 """How far a learner has gone from the fit: by groups of parameters, in standard errors, in a sentence.
 
-A standard error is that of the learner's covariance, and what a fit itself is wrong by. An alarm is
-given where a change is too many standard errors for chance, at a told rate of false ones, when one look
-is independent of the next after the time to learn in.
+A standard error is that of the learner's covariance, and what a fit itself is wrong by: a little of
+every group, and whatever moves the output no further than its usual error. What the form of a model
+leaves goes with the motion and is never averaged out: other motion makes it look like other parameters.
+An alarm is given where a change is too many standard errors for chance, at a told rate of false ones,
+when one look is independent of the next after the time to learn in.
 """
 
 from __future__ import annotations
@@ -83,7 +85,7 @@ def alarm_limit(time: float, n_groups: int, rate: float = FALSE_ALARMS) -> float
     return -NormalDist().inv_cdf(min(rate / looks, 0.5) / 2.0)
 
 
-def scatter(covariance: Array, slopes: Array) -> Array:
+def scatter(covariance: Array, slopes: Array, left: Array) -> Array:
     """Return the standard error of every group, shape (n_groups,).
 
     Parameters
@@ -92,5 +94,8 @@ def scatter(covariance: Array, slopes: Array) -> Array:
         Of the parameters, in squares of their scales.
     slopes : array, shape (n_groups, p)
         Of the groups' changes over the parameters in their scales.
+    left : array, shape (n_groups,)
+        Usual error, by how far the output moves with the whole of a group.
     """
-    return np.asarray(np.sqrt(np.einsum("gi,ij,gj->g", slopes, covariance, slopes) + FIT_ERROR**2))
+    learnt = np.einsum("gi,ij,gj->g", slopes, covariance, slopes)
+    return np.asarray(np.sqrt(learnt + FIT_ERROR**2 + left**2))

@@ -255,6 +255,11 @@ class GPI(LearntOperators):
                 "keeps them in order."
             )
 
+    @property
+    def whole_changes(self) -> Array:
+        """What is reached, the width of the widest loop, and what is reached."""
+        return np.array([self.span, 2 * np.dot(self.weights, self.thresholds), self.span])
+
     def inverse_numbers(self, own: Array) -> Array:
         """Return [lowest, highest input], then this model's."""
         return np.array([*self.limits, *own])

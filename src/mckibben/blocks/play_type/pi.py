@@ -149,6 +149,11 @@ class PI(LearntOperators):
         """Demand a first threshold of 0, and partial sums of the weights that are positive."""
         check_invertible_sum(self.kind, self.thresholds, self.weights)
 
+    @property
+    def whole_changes(self) -> Array:
+        """What is reached, the width of the widest loop, and what is reached."""
+        return np.array([self.span, 2 * np.dot(self.weights, self.thresholds), self.span])
+
     def inverse_numbers(self, own: Array) -> Array:
         """Return [lowest, highest input, offset, thresholds, weights]."""
         return np.array([*self.limits, *own])

@@ -202,8 +202,8 @@ def _ticks(serving: Serving, period: float | None) -> int:
         )
     if not 1 <= 1e6 * period <= MOST_MICROSECONDS:
         raise ModelError(
-            f"a served model ticks every {period:g} s, which is told in whole microseconds. Remedy: give "
-            f"--sample-time from 1e-6 to {1e-6 * MOST_MICROSECONDS:.0f} s."
+            f"a served model ticks every {period:g} s, which is told in whole microseconds. Remedy: "
+            f"give --sample-time from 1e-6 to {1e-6 * MOST_MICROSECONDS:.0f} s."
         )
     ticks = serving.watchdog / period if math.isfinite(serving.watchdog) else math.inf
     if not 1 <= ticks <= MOST_TICKS:

@@ -15,7 +15,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mckibben import GPI, muscles, read
+from mckibben import GPI, load, muscles, read
+from mckibben.blocks.adaptive.adaptive import Adaptive
 from mckibben.errors import DataError, ModelError
 from mckibben.ros.kinds import KINDS, Kind
 from tests.attacks.commands import call
@@ -89,7 +90,7 @@ def test_pressures_are_those_of_the_stream() -> None:
 
 
 def test_a_late_reference_is_held_and_silence_is_safe() -> None:
-    """Up to the time-out the last reference stands; then it is safe, and memory begins anew."""
+    """Up to the time-out the last reference stands; then it is safe, and memory stands."""
     lines = Lines()
     one = node(lines, safe=0.5, timeout=0.105)
     said: dict[int, tuple[float, ...]]
@@ -100,8 +101,7 @@ def test_a_late_reference_is_held_and_silence_is_safe() -> None:
     assert given[0] == [0.5]
     assert given[1:70] == held
     assert given[70:100] == [[0.5]] * 30
-    afresh = INVERSE.stream(PERIOD)
-    assert given[100:] == [afresh.step(wave(k)).tolist() for k in range(100, 150)]
+    assert given[100:] == [stream.step(wave(k)).tolist() for k in range(100, 150)]
     assert one.silences == 1
 
 
@@ -119,6 +119,30 @@ def test_the_end_is_safe_whatever_ends_it() -> None:
         one.run(turns(), lambda: 0.0, lambda: DAY)
     assert lines.lines["p"].sent[-2].data > 0.25
     assert lines.lines["p"].sent[-1].data == 0.25
+
+
+def test_the_end_is_safe_and_closed_where_nothing_more_can_be_recorded(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    lines = Lines()
+    one = node(lines, safe=0.25, record=tmp_path / "run.mcap")
+    recorder = one._recorder
+    assert recorder is not None
+
+    def full(*_: object) -> None:
+        raise OSError(28, "no space left")
+
+    def turns() -> Any:
+        lines.say("r", wave(0))
+        yield 0
+        monkeypatch.setattr(recorder, "write", full)
+        yield 1
+
+    with pytest.raises(OSError, match="no space left"):
+        one.run(turns(), lambda: 0.0, lambda: DAY)
+    assert lines.lines["p"].sent[-1].data == 0.25
+    assert recorder._file.closed
+    assert one.led
 
 
 def test_numbers_that_are_none_are_not_applied() -> None:
@@ -271,8 +295,32 @@ def test_from_the_command_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
     assert result.code == 0, result.err
     assert '"refused": 0' in result.out
     assert Path("run.mcap").stat().st_size > 100
+    assert "No reference ever came on r;" in call(*words).out
+    assert "does not learn" in call(*words, "--save", "learnt.json").err
+    Adaptive.example().save("inverse.json")
+    assert call(*words, "--measured", "m", "--save", "learnt.json").code == 0
+    assert load("learnt.json") == Adaptive.example()
     again = call(*words, "-o", "run.mcap")
     assert again.code == 2
     assert "--force" in again.err
     for wrong in (["--reference", "a b"], ["--reference-type", "Float32"], ["--domain", "1000"]):
         assert call(*words, *wrong).code == 2
+
+
+def test_what_has_been_learnt_outlives_silence_and_is_gone_on_from() -> None:
+    block = Adaptive.example()
+    lines = Lines()
+    one = node(lines, block, measured=Topic("m"), timeout=0.055, lowest=-1e3)
+    assert one.state is None
+    stream = block.stream(PERIOD)
+    for k in [*range(60), *range(100, 160)]:
+        lines.say("r", wave(k))
+        lines.say("m", 1.1 * wave(k))
+        given = one.step(PERIOD * k, DAY)
+        assert given == stream.step([wave(k), 1.1 * wave(k)]).tolist()
+        if k == 59:
+            assert one.step(0.98, DAY) == [0.0]
+    assert one.state is not None
+    again = block.resumed(one.state).stream(PERIOD)
+    given = again.step([wave(160), 1.1 * wave(160)]).tolist()
+    assert given == stream.step([wave(160), 1.1 * wave(160)]).tolist()

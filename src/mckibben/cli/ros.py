@@ -9,7 +9,7 @@ import typer
 
 from mckibben.cli.options import Force, Json
 from mckibben.cli.output import print_json, say
-from mckibben.errors import DataError
+from mckibben.errors import DataError, ModelError
 
 _TYPES = "Float64, Float64MultiArray, FluidPressure or JointState; default by how many numbers."
 
@@ -42,6 +42,10 @@ def ros(
     out: Annotated[
         Path | None, typer.Option("-o", "--out", help="Recording of all topics to write: .mcap.")
     ] = None,
+    save: Annotated[
+        Path | None,
+        typer.Option("--save", help="What has been learnt, as a model to write (JSON)."),
+    ] = None,
     force: Force = False,
     as_json: Json = False,
 ) -> None:
@@ -51,8 +55,10 @@ def ros(
     import time
     from contextlib import suppress
 
+    from mckibben.blocks.adaptive.adaptive import Adaptive
+    from mckibben.blocks.adaptive.adaptive_series import AdaptiveSeries
     from mckibben.blocks.core.saving import load
-    from mckibben.outputs import claim, never
+    from mckibben.outputs import claim, claim_model, never
     from mckibben.ros.dds import Topics
     from mckibben.ros.kinds import kind_named
     from mckibben.ros.node import Node, Topic
@@ -71,6 +77,13 @@ def ros(
         return Topic(name, kind_named(kind) if kind is not None else None)
 
     block = load(model)
+    if save is not None:
+        if not isinstance(block, Adaptive | AdaptiveSeries):
+            raise ModelError(
+                f"{block.title!r} does not learn, so there is nothing to save. Remedy: leave out "
+                "--save, or give what mckibben invert --adaptive writes."
+            )
+        claim_model(save, inputs=[model], force=force)
     node = Node(
         block,
         Topics(domain, network=network),
@@ -85,21 +98,30 @@ def ros(
         record=out,
     )
     turns = FixedRate(1 / rate, math.inf if duration is None else duration)
-    # as Ctrl-C: whoever ends it, the last pressure is the safe one
-    before = signal.signal(signal.SIGTERM, signal.default_int_handler)
+    # as Ctrl-C: whoever ends it, a closed terminal too, the last pressure is the safe one
+    enders = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)]
+    before = {each: signal.signal(each, signal.default_int_handler) for each in enders}
     try:
         with suppress(KeyboardInterrupt):
             node.run(turns, time.monotonic, time.time_ns)
     finally:
-        signal.signal(signal.SIGTERM, before)
+        for each, handler in before.items():
+            signal.signal(each, handler)
+        if isinstance(block, Adaptive | AdaptiveSeries) and save is not None:
+            learnt = block if node.state is None else block.resumed(node.state)
+            learnt.save(save)
     kept = turns.deadlines
     if as_json:
         print_json(
             {"steps": int(kept.work.size), "missed": kept.missed, "refused": node.refused}
-            | {"silences": node.silences, "recording": str(out) if out else None}
+            | {"silences": node.silences, "led": node.led}
+            | {"recording": str(out) if out else None, "saved": str(save) if save else None}
         )
         return
     say(str(kept))
     say(f"{node.silences} silences, {node.refused} messages refused")
-    if out is not None:
-        say(f"Written: {out}")
+    if not node.led:
+        say(f"No reference ever came on {reference}; the pressure was safe throughout.")
+    for written in (out, save):
+        if written is not None:
+            say(f"Written: {written}")

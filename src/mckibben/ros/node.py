@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
 
+from mckibben.arrays import Array
 from mckibben.blocks.core.block import Block
 from mckibben.blocks.core.fields import Channel
 from mckibben.errors import DataError, ModelError
@@ -82,8 +83,8 @@ class Node:
     """A compensator, or controller, that runs between topics.
 
     References are the block's driven inputs, in order; what is measured the others. Where either is
-    silent for longer than ``timeout``, the pressure is ``safe`` and the block's memory is forgotten, for
-    the muscle goes where that pressure leads; with the next messages it starts afresh.
+    silent for longer than ``timeout``, the pressure is ``safe``; with the next messages the block goes
+    on from its memory, and from what it has learnt.
 
     Parameters
     ----------
@@ -156,7 +157,7 @@ class Node:
             seen = others or tuple(wanted)
             self._measured = _Ear(transport, measured, seen, needed=bool(others))
         self._mouth = _Mouth(transport, pressure, block.outputs)
-        self._silent = True
+        self._silent, self._stepped = True, False
         self.silences = 0
         # only now, for a file that is refused is not begun
         self._recorder = Recorder(record) if record is not None else None
@@ -190,11 +191,10 @@ class Node:
         if any(now - ear.heard > self._timeout for ear in needed):
             if not self._silent:
                 self.silences += 1
-                self._stream.reset()
             self._silent = True
             pressures = [self._safe] * len(self._mouth.channels)
         else:
-            self._silent = False
+            self._silent, self._stepped = False, True
             given = self._stream.step([value for ear in needed for value in ear.values])
             low, high = self._limits
             pressures = [min(max(value, low), high) for value in given.tolist()]
@@ -209,8 +209,20 @@ class Node:
             for _ in turns:
                 self.step(clock(), day())
         finally:
-            self._mouth.speak([self._safe] * len(self._mouth.channels), day())
-            self.close()
+            try:
+                self._mouth.speak([self._safe] * len(self._mouth.channels), day())
+            finally:  # the recording may be what ended it
+                self.close()
+
+    @property
+    def led(self) -> bool:
+        """Whether a reference ever came."""
+        return self._reference.heard > -math.inf
+
+    @property
+    def state(self) -> Array | None:
+        """What the block remembers; None where it took no step."""
+        return self._stream.state if self._stepped else None
 
     def close(self) -> None:
         """End the recording."""

@@ -1,7 +1,7 @@
 """Recording topics to MCAP, message by message, with ROS 2's definitions.
 
-Every message is in the file once it is written, outside of chunks: a recording that is cut off has lost
-its end and nothing else.
+Every message is handed to the system once it is written, outside of chunks: a recording that is cut off
+has lost its end and nothing else.
 
 By "MCAP Format Specification" (Foxglove), profile ros2.
 """
@@ -50,14 +50,17 @@ class Recorder:
         self._sequences[topic - 1] += 1
         head = pack("<HIQQ", topic, self._sequences[topic - 1] & 0xFFFFFFFF, when, when)
         self._record(_MESSAGE, head + message)
+        self._file.flush()
 
     def close(self) -> None:
         """End the recording."""
         if not self._file.closed:
-            self._record(_DATA_END, pack("<I", 0))
-            self._record(_FOOTER, pack("<QQI", 0, 0, 0))
-            self._file.write(MAGIC)
-            self._file.close()
+            try:
+                self._record(_DATA_END, pack("<I", 0))
+                self._record(_FOOTER, pack("<QQI", 0, 0, 0))
+                self._file.write(MAGIC)
+            finally:
+                self._file.close()
 
     def _record(self, kind: int, content: bytes) -> None:
         self._file.write(pack("<BQ", kind, len(content)) + content)

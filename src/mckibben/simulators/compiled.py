@@ -14,7 +14,7 @@ from mckibben.simulators.installed import mujoco
 from mckibben.simulators.pulling import Pulling
 
 MOST = 256
-"""Muscles of a process."""
+"""Different muscles of a process in C."""
 
 _HELPER = """
 #include "muscle.h"
@@ -75,9 +75,9 @@ class CompiledMuscle:
             self._library = ctypes.CDLL(str(library))
         self.size = -(-int(self._library.mck_size()) // 8)
 
-    def told(self, number: int, *, zero: float, pulls_only: bool) -> None:
-        """Tell the callback of it."""
-        pull = self._pull
+    def told(self, *, zero: float, pulls_only: bool) -> int:
+        """Tell the callback of it, and return its number."""
+        pull, number = self._pull, len(_kept)
         told = _Told(
             *(
                 ctypes.cast(self._library[name], ctypes.c_void_p)
@@ -88,9 +88,10 @@ class CompiledMuscle:
         )
         if not _library().mck_muscle(number, ctypes.byref(told)):
             raise ModelError(
-                f"there are more than {MOST} muscles in C. Remedy: start a process for others."
+                f"there are more than {MOST} different muscles in C. Remedy: start a process for others."
             )
         _kept.append(self)
+        return number
 
 
 _kept: list[CompiledMuscle] = []

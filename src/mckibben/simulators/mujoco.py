@@ -13,7 +13,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from itertools import count
 from threading import Lock
 from typing import Any
 
@@ -21,6 +20,7 @@ import numpy as np
 
 from mckibben.arrays import Array
 from mckibben.blocks.core.block import Block
+from mckibben.blocks.core.saving import to_text
 from mckibben.errors import DataError, ModelError
 from mckibben.simulators.compiled import CompiledMuscle, callback, install
 from mckibben.simulators.installed import mujoco
@@ -90,14 +90,7 @@ def with_muscles(
         If a model tells no force.
     """
     for name, muscle in muscles.items():
-        pull, number = pulling(muscle.model), next(_numbers)
-        size = pull.block.n_states
-        if compiled:
-            found = CompiledMuscle(pull, spec.option.timestep)
-            found.told(number, zero=muscle.zero, pulls_only=muscle.pulls_only)
-            size = found.size
-        else:
-            _attached[number] = _Attached(muscle, pull)
+        number, size = _compiled(muscle, spec.option.timestep) if compiled else _interpreted(muscle)
         add_actuator(spec, name, muscle, number, size)
     before = mujoco.get_mjcb_act_bias()
     mujoco.set_mjcb_act_bias(None)  # MuJoCo tries a model out before Python may see it
@@ -179,15 +172,39 @@ class _Attached:
         return -max(force, 0.0) if self._muscle.pulls_only else -force
 
 
-_attached: dict[int, _Attached] = {}
-_numbers = count(1)
+_attached: list[_Attached] = []
+_numbers: dict[tuple[object, ...], tuple[int, int]] = {}
+
+
+def _alike(muscle: Muscle) -> tuple[object, ...]:
+    """Return what muscles of one number share: what each remembers is in its simulation."""
+    return to_text(muscle.model), muscle.zero, muscle.pulls_only
+
+
+def _interpreted(muscle: Muscle) -> tuple[int, int]:
+    """Return the number of a muscle in Python, and the size of its memory."""
+    key = _alike(muscle)
+    if key not in _numbers:
+        pull = pulling(muscle.model)
+        _attached.append(_Attached(muscle, pull))
+        _numbers[key] = len(_attached), pull.block.n_states
+    return _numbers[key]
+
+
+def _compiled(muscle: Muscle, step: float) -> tuple[int, int]:
+    """Return the number of a muscle in C, and the size of its memory."""
+    key = (*_alike(muscle), step)
+    if key not in _numbers:
+        found = CompiledMuscle(pulling(muscle.model), step)
+        _numbers[key] = found.told(zero=muscle.zero, pulls_only=muscle.pulls_only), found.size
+    return _numbers[key]
 
 
 def _bias(m: mujoco.MjModel, d: mujoco.MjData, actuator: int) -> float:
     number, place = m.actuator_biasprm[actuator, :2]
-    muscle = _attached.get(int(number))
-    if muscle is None:
+    if not 1 <= number <= len(_attached):
         return 0.0
+    muscle = _attached[int(number) - 1]
     if m.opt.integrator == mujoco.mjtIntegrator.mjINT_RK4:
         raise ModelError(
             "muscles that remember step once a sample, RK4 four times. Remedy: choose the integrator "

@@ -99,7 +99,8 @@ int mck_server_send(mck_server *self);
 /* Once every period: counts the silence, and steps the model unless frames do. */
 void mck_server_tick(mck_server *self);
 
-/* Give an input from the firmware, such as a sensor's; frames do not set it any more. */
+/* Give an input from the firmware, such as a sensor's; frames do not set it any more. NaN says that one of
+ * the missable is missing; of others it is not taken. */
 void mck_server_measure(mck_server *self, int input, mck_real value);
 
 #endif

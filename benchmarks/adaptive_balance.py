@@ -6,9 +6,9 @@
 
 The first prints errors [mm] of models of the first 150 levels, and of the first 100, on the last 50
 levels of `festo_dmsp10_levels` in FOLDER, where every level is foretold from those before it, with the
-noise that the model left in training. The second prints the tracking error of the worst muscle of a soft
-arm in the half minute before rubber softens and friction grows by 20 % at once, from 10 s after it, and
-from a minute after it. `adaptive.py` has the rigs.
+default noise, and with what the model left in training. The second prints the tracking error of the
+worst muscle of a soft arm in the half minute before rubber softens and friction grows by 20 % at once,
+from 10 s after it, and from a minute after it. `adaptive.py` has the rigs.
 """
 
 from __future__ import annotations
@@ -76,7 +76,10 @@ def levels(folder: Path) -> None:
         fixed = model.simulate(whole)["displacement"]
         noise = float(np.median(np.abs(fixed - shown)[:first])) / 0.6745
         found = {"fixed": fixed} | {
-            f"{time:g} s": foretold(adaptive(model, time, noise), model, pressures, shown, step)
+            f"{time:g} s{told}": foretold(
+                adaptive(model, time, given), model, pressures, shown, step
+            )
+            for told, given in (("", None), (" with noise", noise))
             for time in TIMES
         }
         errors = {k: np.sqrt(np.mean((v - shown)[150:] ** 2)) for k, v in found.items()}

@@ -29,6 +29,12 @@ OFF = 0.02
 COVERED = 0.9
 """Share of the old model's pressures that a log covers at least, unsaid."""
 
+UNDIVIDED = (
+    "the loop answers what it misses, so that its faults, noise, delay and drift cannot be told apart "
+    "in this log"
+)
+"""Of the model, where causes are large and opposite."""
+
 NAMES = {
     "model": "the model",
     "actuator": "the actuator",

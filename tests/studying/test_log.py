@@ -296,6 +296,7 @@ def test_study_writes_what_it_finds_of_a_log(
     code, printed = called(monkeypatch, capsys, *given, "-o", out)
     assert code == 0, printed
     assert "is the model" in printed
+    assert f"mckibben invert {out / 'refit.json'} -o inverse2.json" in printed
     told = json.loads((out / "review.json").read_text())
     (followed,) = told["outputs"]
     assert followed["achieved"] == pytest.approx(rmse, rel=0.01)

@@ -93,7 +93,8 @@ def delays(review: Review) -> list[Delay]:
 def _cause(one: Followed, cause: Cause) -> str:
     name = NAMES[cause.kind].capitalize()
     if cause.share < 0:
-        return f"{name} works against the rest ({_percent(cause.share)}): {cause.told}"
+        verb = "work" if cause.kind == "limits" else "works"
+        return f"{name} {verb} against the rest ({_percent(cause.share)}): {cause.told}"
     return f"{name}, {_percent(cause.share)} ({_size(one, cause.size)} RMS): {cause.told}"
 
 

@@ -14,9 +14,11 @@ import mckibben
 from mckibben import PI, Channel, DataError, ModelError, PerChannel, Recording, review
 from mckibben.arrays import Array
 from mckibben.blocks.adaptive.adaptive_series import adaptive
+from mckibben.blocks.feedback.feedforward_feedback import FeedforwardFeedback
+from mckibben.blocks.feedback.pid import PIDFeedback
 from mckibben.blocks.predictive.predictive import Predictive
 from mckibben.cli.main import run
-from mckibben.control import Controller, track
+from mckibben.control import Controller, Twin, track
 from mckibben.files import write
 from mckibben.files.headers import channel_of, parse
 from mckibben.studying.causes import explained
@@ -294,6 +296,7 @@ def test_study_writes_what_it_finds_of_a_log(
     code, printed = called(monkeypatch, capsys, *given, "-o", out)
     assert code == 0, printed
     assert "is the model" in printed
+    assert f"mckibben invert {out / 'refit.json'} -o inverse2.json" in printed
     told = json.loads((out / "review.json").read_text())
     (followed,) = told["outputs"]
     assert followed["achieved"] == pytest.approx(rmse, rel=0.01)
@@ -387,3 +390,24 @@ def test_commands_stand_for_pressures_that_are_not_measured(
         assert code == 0, printed
         found[out] = json.loads((tmp_path / out / "review.json").read_text())["outputs"]
     assert found["as-it-is"] == found["by-name"]
+
+
+@pytest.mark.parametrize("seeds", [(1,), (2,), (1, 2)])
+def test_behind_feedback_a_plant_without_noise_has_none(seeds: tuple[int, ...]) -> None:
+    muscle = PI.example()
+    low, high = (float(end[0]) for end in muscle.reachable())
+    pid = PIDFeedback.of(muscle.outputs, muscle.inputs, (0.02,), (0.1,), (0.0,), limits=(0.0, 5.0))
+    both = FeedforwardFeedback.of(muscle.inverse(), pid)
+    stronger = replace(muscle, weights=tuple(1.15 * weight for weight in muscle.weights))
+    t = np.arange(0, 30, STEP)
+    logs = []
+    for seed in seeds:
+        wave = np.sin(2 * np.pi * (0.3 + 0.05 * seed) * t + seed) * np.cos(0.31 * t)
+        wished = Recording({"displacement": low + (high - low) * (0.45 + 0.3 * wave)}, STEP)
+        plant = Twin(stronger, limits={"pressure": (0, 5)})
+        logs.append(track(both, plant, wished).recording)
+    found = review(logs, compensator=both, refit=False).outputs[0]
+    by_kind = {cause.kind: cause.share for cause in found.causes}
+    assert found.causes[0].kind == "model"
+    assert abs(by_kind.get("noise", 0.0)) < 0.05
+    assert sum(by_kind.values()) == pytest.approx(1)

@@ -104,6 +104,8 @@ def _say(study: Study, folder: Path) -> None:
         say(str(study.review))
         if isinstance(study.review.refit, Refit):
             say(f"Written: {folder / 'refit.json'}")
+            if study.review.refit.recommended:
+                say(f"Next: mckibben invert {folder / 'refit.json'} -o inverse2.json")
         say()
     say(f"Drawn: {folder / 'report.html'}, which grows with every model fitted.\n", flush=True)
 

@@ -59,3 +59,18 @@ def closed(signals: Mapping[str, Array]) -> dict[str, Array] | None:
         if kind != FEEDBACK
     }
     return found | {FEEDBACK: error - np.sum(list(found.values()), axis=0)}
+
+
+def each_closed(signals: Mapping[str, Array], ends: Array) -> dict[str, Array] | None:
+    """Return what causes come to with feedback, log by log; None where that is unknown of one.
+
+    The logs follow one another; each begins where the one before ends, at ``ends``.
+    """
+    pieces = {kind: np.split(signal, ends) for kind, signal in signals.items()}
+    found = []
+    for k in range(len(ends) + 1):
+        one = closed({kind: parts[k] for kind, parts in pieces.items()})
+        if one is None:
+            return None
+        found.append(one)
+    return {kind: np.concatenate([one[kind] for one in found]) for kind in found[0]}

@@ -29,6 +29,12 @@ OFF = 0.02
 COVERED = 0.9
 """Share of the old model's pressures that a log covers at least, unsaid."""
 
+UNDIVIDED = (
+    "the loop answers what it misses, so that its faults, noise, delay and drift cannot be told apart "
+    "in this log"
+)
+"""Of the model, where causes are large and opposite."""
+
 NAMES = {
     "model": "the model",
     "actuator": "the actuator",
@@ -87,7 +93,8 @@ def delays(review: Review) -> list[Delay]:
 def _cause(one: Followed, cause: Cause) -> str:
     name = NAMES[cause.kind].capitalize()
     if cause.share < 0:
-        return f"{name} works against the rest ({_percent(cause.share)}): {cause.told}"
+        verb = "work" if cause.kind == "limits" else "works"
+        return f"{name} {verb} against the rest ({_percent(cause.share)}): {cause.told}"
     return f"{name}, {_percent(cause.share)} ({_size(one, cause.size)} RMS): {cause.told}"
 
 

@@ -16,7 +16,7 @@ from mckibben.recording import Recording
 from mckibben.studying import review_words
 from mckibben.studying.causes import Cause, explained, shares
 from mckibben.studying.chain import ROUNDING, Chain, chain
-from mckibben.studying.closed import closed
+from mckibben.studying.closed import each_closed
 from mckibben.studying.log import Loop, has_reference, loop_of
 from mckibben.studying.refitting import Refit, refitted
 from mckibben.studying.shifts import Delay, shifted
@@ -28,6 +28,13 @@ from mckibben.validation.suspects import Suspects, averaged, suspects
 
 CAUSE_OF = {"lag": "delay", "drift": "drift"}
 """What a residual follows -> its cause; all else that follows motion is the model's."""
+
+MISSED = ("model", "delay", "drift", "noise")
+"""Causes of what the model misses."""
+
+TELLABLE = 2.0
+"""Times the error that a cause may be, root mean square: beyond it causes that a loop answers are large
+and opposite, and a slip in one of them would be called another."""
 
 NORMAL = 1.96
 """Standard errors of a 95 % interval."""
@@ -219,7 +226,7 @@ def review(
         logs=tuple(one.name for one in logs),
         model=loop.model.kind,
         outputs=tuple(outputs),
-        delays=chains[0].delays,
+        delays=_delays(chains),
         clipped=sum(one.clipped for one in chains),
         n_samples=sum(int(one.rows.sum()) for one in chains),
         judged_by=chains[0].judged_by,
@@ -282,8 +289,13 @@ def _followed(
     if partial.exact:
         return replace(partial, delays=())
     told = review_words.told(partial, one, chains)
-    if len(chains) == 1 and any(c.feedback for c in chains):
-        signals = closed(signals) or signals
+    if any(c.feedback for c in chains):
+        ends = np.cumsum([int(c.rows.sum()) for c in chains])[:-1]
+        signals = each_closed(signals, ends) or signals
+    answered = loop.learns or any(c.feedback for c in chains)
+    if answered and max(map(_rms, signals.values())) > TELLABLE * partial.achieved:
+        parts = [signals.pop(kind) for kind in MISSED if kind in signals]
+        signals["model"], told["model"] = np.sum(parts, axis=0), review_words.UNDIVIDED
     return replace(partial, causes=shares(signals, told))
 
 
@@ -357,6 +369,13 @@ def _delay(table: Suspects, runs: Sequence[Run], one: OutputCheck, place: int) -
         samples * step,
         ((samples - NORMAL * sure) * step, (samples + NORMAL * sure) * step),
     )
+
+
+def _delays(chains: Sequence[Chain]) -> tuple[Delay, ...]:
+    """Return the delays of all logs, by name where there are several."""
+    if len(chains) == 1:
+        return chains[0].delays
+    return tuple(replace(d, where=f"{c.log.name}: {d.where}") for c in chains for d in c.delays)
 
 
 def _time(chains: Sequence[Chain]) -> Array:

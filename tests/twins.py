@@ -153,6 +153,7 @@ def pi_adaptive(block: Any, inputs: Rows, sample_time: float) -> Rows:
     states = [u - r for u in [_risen(forward, inputs[0][0])] for r in thresholds]
     turn, usual, surprise, last, then = 0, 3 * noise, 1.0, 0.0, 0.0
     related, squared, late, stood = 0.98, 1.0, 0.0, 9 * noise**2 * 99
+    fitted, helped, apart = theta.copy(), 0.0, noise**2
     previous, travel, outputs = inputs[0][0], 0.0, []
     for y, measured in inputs:
         slopes = np.array([*states, 1.0])
@@ -178,13 +179,17 @@ def pi_adaptive(block: Any, inputs: Rows, sample_time: float) -> Rows:
             weight = min(1.0, 3 * expected / max(abs(error), 1e-300))
             relative = weight * error / expected
             quick = min(20 * share, 0.5)
-            grows = 1 + quick / 2
-            usual = max(usual * grows if abs(relative) > 0.6745 else usual / grows, noise)
+            side = min(max(10 * (abs(relative) - 0.6745), -1.0), 1.0)
+            usual = max(usual * (1 + quick / 2 * side), noise)
             surprise += quick * (relative**2 - surprise)
             related += share * (relative * late - related)
             squared += share * (relative**2 - squared)
             late = relative
-            kept = 1 / share - 1 / r if r < share else weight * (1 - share) - share / r
+            recent, made_up = min(3 * share, 0.5), float((theta - fitted) @ slopes)
+            helped += recent * (made_up * (weight * error + made_up) - helped)
+            apart += recent * (made_up**2 + noise**2 - apart)
+            settled = share / (1 - share)
+            kept = 1 / settled - 1 / r if r < settled else weight * (1 - share) - share / r
             covariance -= np.outer(p_phi, p_phi) * kept / (1 + kept * r)
             theta += scales * p_phi * weight * error / told / (1 + weight * r)
             place = turn % (n + 1)
@@ -199,11 +204,12 @@ def pi_adaptive(block: Any, inputs: Rows, sample_time: float) -> Rows:
                 theta[i] = max(theta[i], 0.0 if w >= 0 else -math.inf, floor)
                 total += theta[i]
         travel = float(y > previous) - float(y < previous) or travel
-        room, change = y - float(used @ slopes), float((theta - used) @ slopes)
+        aim = fitted + min(max(helped / apart, 0.0), 1.0) * (theta - fitted)
+        room, change = y - float(used @ slopes), float((aim - used) @ slopes)
         part = 1.0
         if travel * (room - change) < 0 and abs(room - change) <= 3 * usual and change:
             part = min(max(room / change, 0.0), 1.0)
-        used = theta.copy() if part == 1.0 else used + part * (theta - used)
+        used = aim if part == 1.0 else used + part * (aim - used)
         outputs.append(bisect(gives, y, low, high))
         states = moved(outputs[-1])
         previous = y

@@ -243,7 +243,7 @@ def test_what_cannot_learn_says_what_can() -> None:
 
 
 def test_a_memory_that_never_came_of_running_is_refused() -> None:
-    block = adaptive(PI.example(), 10.0, 0.05)
+    block = Adaptive(PI.example(), 10.0, 0.05)
     stream, asked = block.stream(STEP), references(PI.example(), 2.0)
     for y in asked:
         stream.step([y, y + 0.01])

@@ -285,7 +285,15 @@ def test_what_is_out_of_reach_is_counted_and_told_apart(cli: Cli, tmp_path: Path
     MODEL.inverse().save(tmp_path / "inverse.json")
     MODEL.save(tmp_path / "model.json")
     write(wanted, tmp_path / "wished.csv")
-    asked = ("inverse.json", "--plant", "model.json", "--reference", "wished.csv", "--approach", 1)
+    asked = (
+        "inverse.json",
+        "--plant",
+        "model.json",
+        "--reference",
+        "wished.csv",
+        "--approach",
+        "1",
+    )
     given = [tmp_path / one if str(one).endswith((".json", ".csv")) else one for one in asked]
     assert f"{beyond.samples} samples of the reference" in cli("track", *given).out
     told = json.loads(cli("track", *given, "--json").out)["out_of_reach"]["displacement"]

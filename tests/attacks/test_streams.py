@@ -36,8 +36,11 @@ def path_for(block: Block, seed: int, n: int = 120) -> Array:
     return np.resize(inputs, (n, inputs.shape[1]))
 
 
-def poisoned(good: Array, seed: int) -> tuple[Array, NDArray[np.bool_]]:
-    """Return inputs with bad samples between the good ones, and which are good."""
+def poisoned(good: Array, seed: int, missable: int = 0) -> tuple[Array, NDArray[np.bool_]]:
+    """Return inputs with bad samples between the good ones, and which are good.
+
+    The last ``missable`` inputs stay as they are: one that is missing makes no bad sample.
+    """
     rng = np.random.default_rng(seed)
     kept = rng.random(2 * len(good)) < 0.5
     kept[0] = False  # before anything has come
@@ -48,7 +51,7 @@ def poisoned(good: Array, seed: int) -> tuple[Array, NDArray[np.bool_]]:
     inputs[kept] = good[: kept.sum()]
     inputs[~kept] = good[rng.integers(0, len(good), (~kept).sum())]
     for row in np.flatnonzero(~kept):
-        inputs[row, rng.integers(good.shape[1])] = rng.choice(BAD)
+        inputs[row, rng.integers(good.shape[1] - missable)] = rng.choice(BAD)
     return inputs, kept
 
 
@@ -65,7 +68,7 @@ def streamed(stream: Stream, inputs: Array) -> tuple[Array, Array, NDArray[np.in
 @pytest.mark.parametrize("kind", KINDS)
 def test_bad_samples_change_nothing(kind: str) -> None:
     block = EXAMPLES[kind]
-    inputs, kept = poisoned(path_for(block, 1), 2)
+    inputs, kept = poisoned(path_for(block, 1), 2, block.n_missable)
     outputs, states, statuses = streamed(block.stream(SAMPLE_TIME), inputs)
     expected, memory, good = streamed(block.stream(SAMPLE_TIME), inputs[kept])
     assert not good.any()

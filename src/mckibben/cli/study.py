@@ -60,8 +60,14 @@ def study(
         begun = asked.begin(files, reading, folder, study_files, beside=given)
         from mckibben.recording import notes_by_file
         from mckibben.report import StudyFolder
+        from mckibben.studying.log import REFERENCE
         from mckibben.studying.study import study as find
 
+        wished = any(name.startswith(REFERENCE) for run in begun.every for name in run.channels)
+        if wished and not given and not asked.as_json:
+            say(
+                "A reference is recorded: --compensator inverse.json, what ran, tells why it was missed."
+            )
         results = StudyFolder(begun.results or folder)
 
         def found(so_far: Study) -> None:

@@ -24,6 +24,8 @@ TESTS = (
     "blocks/test_adaptive_balance.py::test_retuned_coefficients_are_those_of_the_block_retaught",
     "blocks/test_adaptive_balance.py::test_slopes_are_those_of_equilibria",
     "blocks/test_adaptive_balance.py::test_what_garbage_teaches_is_a_balance_still",
+    "blocks/test_predictive.py::test_a_derivative_above_zero_throughout_is_least_at_its_lowest",
+    "blocks/test_predictive.py::test_plans_end_where_there_is_none",
     "blocks/test_predictive.py::test_a_supply_limits_one_muscle_too",
     "blocks/test_predictive.py::test_limits_hold_always_and_looking_ahead_costs_less",
     "blocks/test_predictive.py::test_plans_are_the_best_there_are",

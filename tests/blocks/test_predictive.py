@@ -145,7 +145,7 @@ def test_plans_are_the_best_there_are(n: int) -> None:
 
 def test_plans_end_where_there_is_none() -> None:
     rows, before, slopes, nominal, errors = problem(2, 0)
-    for slope, start, steps in ((1e200, before, 0), (1.0, before + 50.0, MOST_STEPS)):
+    for slope, start, steps in ((np.nan, before, 0), (1.0, before + 50.0, MOST_STEPS)):
         found = nominal.copy()
         given = (rows, start, slope * slopes.reshape(-1), nominal, errors, found)
         assert plan(*given, np.zeros(plan_scratch(6, 2, len(rows)))) == steps

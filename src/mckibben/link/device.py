@@ -100,9 +100,9 @@ class Device:
         Of its numbers, float32 or float64.
     n_coefficients, n_memory : int
         Numbers that can be set; 0 where they are fixed.
+    inputs, outputs : tuple of Port
     n_missable : int
         Of the inputs the last, which may be missing.
-    inputs, outputs : tuple of Port
     """
 
     fingerprint: str

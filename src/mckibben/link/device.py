@@ -102,9 +102,9 @@ class Device:
         Numbers that can be set; 0 where they are fixed.
     n_memory : int
         Numbers that can be read; an export says which of them can be set.
+    inputs, outputs : tuple of Port
     n_missable : int
         Of the inputs the last, which may be missing.
-    inputs, outputs : tuple of Port
     """
 
     fingerprint: str

@@ -44,10 +44,10 @@ static void invert_small(int n, mck_real *matrix, mck_real *result)
             result[i * n + j] *= pivot;
         }
         for (int row = 0; row < n; row++) {
-            const mck_real factor = matrix[row * n + i];
+            const mck_real share = matrix[row * n + i];
             for (int j = 0; j < n && row != i; j++) {
-                matrix[row * n + j] -= factor * matrix[i * n + j];
-                result[row * n + j] -= factor * result[i * n + j];
+                matrix[row * n + j] -= share * matrix[i * n + j];
+                result[row * n + j] -= share * result[i * n + j];
             }
         }
     }

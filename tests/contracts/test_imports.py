@@ -66,7 +66,16 @@ STANDS_ON = {
     "control": {
         *("control", "blocks", "recording", "signals", "arrays", "errors", "registry", "numerals"),
     },
-    "environments": {"environments", "control", "rigs", "recording", "signals", "arrays", "blocks", "errors"},
+    "environments": {
+        "environments",
+        "control",
+        "rigs",
+        "recording",
+        "signals",
+        "arrays",
+        "blocks",
+        "errors",
+    },
 }
 """What some members may import and no more: a rig's physics knows nothing of models."""
 

@@ -123,6 +123,11 @@ def test_scatter_of_few_runs_does_not_jump() -> None:
         assert inside.mean() > level - 0.03
 
 
+def test_a_twin_names_its_model_and_band() -> None:
+    assert "band 0.9" in repr(Twin(Banded(MODEL, band())))
+    assert "'pi', limits={'pressure': (0.0, 5.0)}" in repr(Twin(MODEL))
+
+
 def test_the_approach_does_not_scatter_and_scatter_is_told() -> None:
     twin = Twin(Banded(MODEL, band(0.5)))
     found = track(MODEL.inverse(), twin, wave(1000), approach=2.0)
@@ -324,8 +329,16 @@ def test_what_is_out_of_reach_is_counted_and_told_apart(cli: Cli, tmp_path: Path
     MODEL.inverse().save(tmp_path / "inverse.json")
     MODEL.save(tmp_path / "model.json")
     write(wanted, tmp_path / "wished.csv")
-    asked = ("inverse.json", "--plant", "model.json", "--reference", "wished.csv", "--approach", 1)
-    given = [tmp_path / one if str(one).endswith((".json", ".csv")) else one for one in asked]
+    asked = (
+        "inverse.json",
+        "--plant",
+        "model.json",
+        "--reference",
+        "wished.csv",
+        "--approach",
+        "1",
+    )
+    given = [tmp_path / one if one.endswith((".json", ".csv")) else one for one in asked]
     assert f"{beyond.samples} samples of the reference" in cli("track", *given).out
     told = json.loads(cli("track", *given, "--json").out)["out_of_reach"]["displacement"]
     assert told["samples"] == beyond.samples

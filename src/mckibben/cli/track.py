@@ -91,7 +91,14 @@ def track(
     from mckibben.blocks.core.saving import load
     from mckibben.blocks.coupled.known import beyond_known
     from mckibben.blocks.feedback.feedforward_feedback import FeedforwardFeedback
-    from mckibben.control import UNCOMPENSATED, before, control_law, dead_time_undone, tune_pid
+    from mckibben.control import (
+        UNCOMPENSATED,
+        Twin,
+        before,
+        control_law,
+        dead_time_undone,
+        tune_pid,
+    )
     from mckibben.control import track as close
     from mckibben.control.loop import wished
     from mckibben.control.preview import samples_foreseen
@@ -195,6 +202,11 @@ def track(
     print_table(["followed", "by", f"RMSE [{measure}]", f"largest [{measure}]"], rows)
     if twin is None:
         say(f"On the virtual rig {plant.name}; --plant model.json tries it on your own muscle.")
+    elif isinstance(plant, Twin):
+        scatters = (
+            "which scatters as its band says" if plant.scatters else "without a band to scatter"
+        )
+        say(f"On {twin}, a model ({plant.model.title}) {scatters}; seed {seed}.")
     for name, size in found.scatter.items():
         say(
             f"Of the RMSE of {name}, the plant's own scatter, which no compensator removes without "

@@ -141,7 +141,7 @@ class Twin:
     def __repr__(self) -> str:
         """Name it, its model, and the ends of its commands."""
         ends = {name: tuple(self._limits[name]) for name in self.inputs if name in self._limits}
-        band = f", band {self.model.level:g}" if isinstance(self.model, Banded) else ""
+        band = f", band {self.model.band.level:g}" if isinstance(self.model, Banded) else ""
         return f"Twin({self.name!r}, {self.forward.title!r}{band}, limits={ends}, held={self.held})"
 
     @property

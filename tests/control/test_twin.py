@@ -108,6 +108,37 @@ def test_scatter_stays_alike_as_long_as_misses_did() -> None:
         assert integral == pytest.approx(max(memory, STEP), rel=0.3)
 
 
+def test_scatter_of_few_runs_does_not_jump() -> None:
+    """Coarse scores are stairs, and a muscle has none."""
+    stairs = tuple(np.repeat((1.0, 4.0, 9.0), 334)[:1001])
+    coarse = replace(band(2.0), scores=(stairs,))
+    wide = Banded(MODEL, coarse)
+    held = Recording({"pressure": np.full(20_000, 3.0)}, STEP)
+    drawn = Twin(wide).run(held, seed=3)["displacement"]
+    # drawn off the stairs, it would move by five ninths of its largest at once
+    assert np.abs(np.diff(drawn)).max() < 0.2 * np.ptp(drawn)
+    for level in (0.5, 0.8, 0.9):
+        ends = wide.at(level).simulate(held)
+        inside = (ends["displacement_lower"] <= drawn) & (drawn <= ends["displacement_upper"])
+        assert inside.mean() > level - 0.03
+
+
+def test_a_twin_names_its_model_and_band() -> None:
+    assert "band 0.9" in repr(Twin(Banded(MODEL, band())))
+    assert "'pi', limits={'pressure': (0.0, 5.0)}" in repr(Twin(MODEL))
+
+
+def test_the_approach_does_not_scatter_and_scatter_is_told() -> None:
+    twin = Twin(Banded(MODEL, band(0.5)))
+    found = track(MODEL.inverse(), twin, wave(1000), approach=2.0)
+    run = found.recording
+    errors = run["displacement"] - run["reference_displacement"]
+    assert np.abs(errors[run.time < 0][50:]).max() < 1e-9 < np.abs(errors[run.time > 0]).max()
+    # a compensator of the model itself leaves nothing but what is drawn
+    assert found.scatter["displacement"] == pytest.approx(found.rmse["displacement"], rel=1e-6)
+    assert not track(MODEL.inverse(), Twin(MODEL), wave(100), approach=1.0).scatter
+
+
 def test_seeds_of_scatter_mean_something() -> None:
     twin, given = Twin(Banded(MODEL, band(0.5))), pressures(200)
     first, again, other = (twin.run(given, seed=seed)["displacement"] for seed in (1, 1, 2))
@@ -132,6 +163,19 @@ def test_a_compensator_beats_no_compensation_and_says_where_it_proves_nothing() 
     assert re.search(r"very model.*right by construction.*Remedy: .*another model", note)
     banded = before(MODEL.inverse(), Twin(Banded(MODEL, band())), reference)
     assert "draws from the band" in " ".join(banded.notes)
+
+
+def test_pressures_recorded_with_a_reference_are_passed_over() -> None:
+    bare = wave(200)
+    both = bare.with_channels({"pressure": "bar"}, pressure=np.full(200, 1.15))
+    found = [track(MODEL.inverse(), Twin(MODEL), one, approach=1.0).rmse for one in (bare, both)]
+    assert found[0] == found[1]
+    tracked = [
+        before(MODEL.inverse(), Twin(MODEL), one, approach=1.0).tracked for one in (bare, both)
+    ]
+    assert tracked[0] is not None
+    assert tracked[1] is not None
+    assert tracked[0].rmse == tracked[1].rmse
 
 
 def test_what_has_no_hysteresis_needs_no_compensation() -> None:
@@ -294,7 +338,7 @@ def test_what_is_out_of_reach_is_counted_and_told_apart(cli: Cli, tmp_path: Path
         "--approach",
         "1",
     )
-    given = [tmp_path / one if str(one).endswith((".json", ".csv")) else one for one in asked]
+    given = [tmp_path / one if one.endswith((".json", ".csv")) else one for one in asked]
     assert f"{beyond.samples} samples of the reference" in cli("track", *given).out
     told = json.loads(cli("track", *given, "--json").out)["out_of_reach"]["displacement"]
     assert told["samples"] == beyond.samples

@@ -91,8 +91,16 @@ def track(
     from mckibben.blocks.core.saving import load
     from mckibben.blocks.coupled.known import beyond_known
     from mckibben.blocks.feedback.feedforward_feedback import FeedforwardFeedback
-    from mckibben.control import UNCOMPENSATED, before, control_law, dead_time_undone, tune_pid
+    from mckibben.control import (
+        UNCOMPENSATED,
+        Twin,
+        before,
+        control_law,
+        dead_time_undone,
+        tune_pid,
+    )
     from mckibben.control import track as close
+    from mckibben.control.loop import wished
     from mckibben.control.preview import samples_foreseen
     from mckibben.files import write
     from mckibben.outputs import claim_model, claim_recording
@@ -108,9 +116,7 @@ def track(
     runs = Reading(column, unit, rate, Gaps.ERROR).read([reference], None, informative=False)
     wanted = runs[0]
     _fits(block, plant, wanted)
-    # pressures recorded with the reference are not what the compensator will give
-    given = {channel.name for channel in block.outputs} | set(_driven(block))
-    wanted = wanted.select([name for name in wanted.channels if name not in given])
+    wanted = wished(block, wanted)
     notes = beyond_known(block, wanted)
     held = {name: float(wanted[name][0]) for name in plant.inputs if name in wanted}
     step = wanted.sample_time or 0.02
@@ -174,6 +180,7 @@ def track(
                 "clipped": found.clipped,
                 "clipping_cost": found.clipping_cost,
                 "out_of_reach": {name: far._asdict() for name, far in found.beyond.items()},
+                "scatter": dict(found.scatter),
                 "uncompensated": _figures(without.tracked),
                 "step_time": {"median": found.step_time[0], "p99.9": found.step_time[1]},
                 "file": None if out is None else str(out),
@@ -195,6 +202,16 @@ def track(
     print_table(["followed", "by", f"RMSE [{measure}]", f"largest [{measure}]"], rows)
     if twin is None:
         say(f"On the virtual rig {plant.name}; --plant model.json tries it on your own muscle.")
+    elif isinstance(plant, Twin):
+        scatters = (
+            "which scatters as its band says" if plant.scatters else "without a band to scatter"
+        )
+        say(f"On {twin}, a model ({plant.model.title}) {scatters}; seed {seed}.")
+    for name, size in found.scatter.items():
+        say(
+            f"Of the RMSE of {name}, the plant's own scatter, which no compensator removes without "
+            f"feedback: {numeral(size, 3)} {measure} RMS (seed {seed})."
+        )
     if found.clipped >= len(found.recording):
         say("Pressures were at a limit throughout: the reference is out of reach.")
     elif found.clipped > max((far.samples for far in found.beyond.values()), default=0):
@@ -257,16 +274,12 @@ def _figures(tracked: Tracked | None) -> dict[str, object] | None:
     }
 
 
-def _driven(block: Block) -> list[str]:
-    """Return the inputs of a plant that a compensator drives; commands are recorded under such names."""
-    return [channel.name.removeprefix(COMMAND) for channel in block.outputs]
-
-
 def _fits(block: Block, plant: Plant, reference: Recording) -> None:
     """Refuse a model in place of an inverse, and references without what the inverse needs."""
     from mckibben.blocks.feedback.pid import MEASURED
+    from mckibben.control.loop import driven_by
 
-    for name in _driven(block):
+    for name in driven_by(block):
         if name not in plant.inputs:
             raise DataError(
                 f"the compensator gives {name!r}, which does not drive {plant.name!r}",

@@ -16,6 +16,7 @@ from mckibben.control.controller import BlockController, Controller
 from mckibben.control.pressure_loop import PressureLoop
 from mckibben.control.preview import samples_ahead
 from mckibben.control.reach import Beyond, beyond, ends, outside
+from mckibben.control.twin import Twin, plain
 from mckibben.errors import DataError, ModelError
 from mckibben.recording import Recording, standard_unit
 from mckibben.signals.checking import generator
@@ -67,6 +68,9 @@ class Tracked:
         Median and 99.9th percentile of the controller's own time a step [s].
     beyond : mapping of str to Beyond
         Where the reference is out of reach of what the compensator undoes, by what is followed.
+    scatter : mapping of str to float
+        Root mean square of what a twin with a band drew over that time [mm or N]; it draws nothing in
+        the approach.
     """
 
     recording: Recording
@@ -76,6 +80,7 @@ class Tracked:
     clipping_cost: float
     step_time: tuple[float, float]
     beyond: Mapping[str, Beyond] = field(default_factory=dict)
+    scatter: Mapping[str, float] = field(default_factory=dict)
 
 
 MOST_STEPS = 10**7
@@ -114,7 +119,7 @@ def track(
     reference : Recording
         Channels of displacement to follow [mm], or without any the force [N], and of what schedules the
         controller and is held on the plant, such as ``pressure_extensor`` or the length in a test stand,
-        as they should be.
+        as they should be. What a block drives, as pressures recorded with it, is passed over.
     approach : float
         Time to go from rest to the first reference [s], not scored.
     settle : float
@@ -154,6 +159,7 @@ def track(
         )
     _check(approach, settle, noise, delay, slew, step)
     if isinstance(controller, Block):
+        reference = wished(controller, reference)
         controller = BlockController(controller)
     preview = controller.preview if preview is None else preview
     further = max(samples_ahead(preview, step) - 1, 0)  # than the next step's, given anyway
@@ -162,7 +168,11 @@ def track(
     followed = followed_by(plant, reference)
     driven, held = _roles(plant, reference)
     starts = {f"start.{name}": float(reference[name][0]) for name in held}
-    changed = plant.changed({"sample_time": step, **starts})
+    settings = {"sample_time": step, **starts}
+    scatters = isinstance(plant, Twin) and plant.scatters
+    if scatters:
+        settings["scatter_after"] = approach
+    changed = plant.changed(settings)
     lead = round(approach / step)
     path = reference.matrix(followed)
     ramp = np.linspace(0.0, 1.0, lead, endpoint=False)[:, np.newaxis] * path[0]
@@ -188,9 +198,12 @@ def track(
     controller.reset(step)
     seen, commands = np.empty((n, len(measured))), np.empty((n, len(driven)))
     clipped, times = np.zeros(n, dtype=bool), np.empty(n)
+    drawn = np.zeros_like(seen)
     last: Array | None = None
     for t in range(n):
         seen[t] = measured
+        if isinstance(changed, Twin):
+            drawn[t] = changed.drawn
         late = [*late[1:], measured]
         felt = late[0][at_y] + noise * rng.standard_normal(len(at_y))
         readings = dict(zip(changed.outputs, late[0].tolist(), strict=True))
@@ -229,6 +242,7 @@ def track(
     part, at_limit = errors[scored], clipped[scored]
     parts = dict(zip(followed, part.T, strict=True))
     far = {name: beyond(parts[name], out[name][scored], *reached[name]) for name in reached}
+    sizes = np.sqrt(np.mean(drawn[scored] ** 2, axis=0))[at_y].tolist() if scatters else []
     return Tracked(
         _recorded(reference, followed, driven, due, seen, commands, scheduled, held, changed, lead),
         dict(zip(followed, np.sqrt(np.mean(part**2, axis=0)).tolist(), strict=True)),
@@ -237,6 +251,7 @@ def track(
         _cost(part, at_limit),
         (float(np.median(times)), float(np.quantile(times, 0.999))),
         {name: found for name, found in far.items() if found is not None},
+        dict(zip(followed, sizes, strict=False)),
     )
 
 
@@ -256,6 +271,19 @@ def _check(
             raise ModelError(f"{name} is {value}. Remedy: give 0 to {most:g} {unit}.")
     if slew is not None and not 0 < slew < np.inf:
         raise ModelError(f"slew is {slew}. Remedy: give a positive number, in bar/s.")
+
+
+def driven_by(compensator: Block) -> list[str]:
+    """Return the inputs of a plant that a compensator drives; commands are recorded under such names."""
+    return [plain(channel.name) for channel in compensator.outputs]
+
+
+def wished(compensator: Block, reference: Recording) -> Recording:
+    """Return a reference without pressures recorded with it, which the compensator is to give."""
+    given = {channel.name for channel in compensator.outputs} | set(driven_by(compensator))
+    if given.isdisjoint(reference.channels):
+        return reference
+    return reference.select([name for name in reference.channels if name not in given])
 
 
 def followed_by(plant: Plant, reference: Recording) -> list[str]:

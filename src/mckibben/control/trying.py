@@ -7,7 +7,7 @@ from typing import Any
 
 from mckibben.blocks.core.block import Block
 from mckibben.control.controller import Controller
-from mckibben.control.loop import Plant, Tracked, track
+from mckibben.control.loop import Plant, Tracked, track, wished
 from mckibben.control.suiting import doubts
 from mckibben.control.uncompensated import slow_rise, uncompensated
 from mckibben.errors import MckibbenError
@@ -57,6 +57,7 @@ def before(compensator: Block, plant: Plant, reference: Recording, **settings: A
         As of `track`; a preview is passed over, for no dead time is undone.
     """
     settings.pop("preview", None)
+    reference = wished(compensator, reference)
     few = {name: settings[name] for name in ("pressure_loop", "seed") if name in settings}
     try:
         rise = slow_rise(plant, reference, **few)

@@ -1,10 +1,13 @@
 """A twin: a fitted model where a plant stands, scattering as its band says.
 
-    y[t] = P[u][t] + m(z) + s(z) w sign(g[t]) Q(|g[t]|),   g[t + 1] = r g[t] + sqrt(1 - r²) n[t]
+    y[t] = P[u][t] + m(z) + s(z) w sign(g[t]) Q(|g[t]|),   (1 - r / q)² g = c n
 
 where P is the model; m, s, w and z are its band's (`mckibben.blocks.bands.band`), Q gives the score that
-the share of |g| below it reaches, and n is white and normal. So the band at any level holds that share
-of the samples, or more, and r keeps them alike for as long as the misses were that calibration saw.
+the share of |g| below it reaches, n is white and normal, 1 / q delays, and c makes g of variance 1. So
+the band at any level holds that share of the samples, or more, and r keeps them alike for as long as the
+misses were that calibration saw. No muscle jumps, so what is drawn does not either: Q rises straight
+between levels, where the scores of few runs are stairs, and m and s follow what the band says within as
+long as misses stay alike.
 Without a band nothing scatters, and outputs are those of ``model.simulate``, to the bit.
 """
 
@@ -17,6 +20,7 @@ from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.optimize import brentq
 
 from mckibben.arrays import Array
 from mckibben.blocks.bands.band import Band
@@ -64,6 +68,8 @@ class Twin:
         Time that a command is held [s]; default the model's own, or 0.02 s.
     name : str
         In tables and recordings.
+    scatter_after : float
+        Time from which it scatters [s].
 
     Raises
     ------
@@ -91,8 +97,9 @@ class Twin:
         held: Mapping[str, float] | None = None,
         sample_time: float | None = None,
         name: str = "twin",
+        scatter_after: float = 0.0,
     ) -> None:
-        self.model, self.name = model, name
+        self.model, self.name, self.scatter_after = model, name, scatter_after
         self.forward = inside(model)
         outputs = tuple(channel.name for channel in self.forward.outputs)
         if commands(self.forward) or not all(o.startswith(("displ", "force")) for o in outputs):
@@ -134,13 +141,18 @@ class Twin:
     def __repr__(self) -> str:
         """Name it, its model, and the ends of its commands."""
         ends = {name: tuple(self._limits[name]) for name in self.inputs if name in self._limits}
-        band = ", with a band" if isinstance(self.model, Banded) else ""
+        band = f", band {self.model.band.level:g}" if isinstance(self.model, Banded) else ""
         return f"Twin({self.name!r}, {self.forward.title!r}{band}, limits={ends}, held={self.held})"
 
     @property
     def scatters(self) -> bool:
         """Whether it has a band."""
         return isinstance(self.model, Banded)
+
+    @property
+    def drawn(self) -> Array:
+        """What the last measurement has beside the model's outputs, shape (outputs,)."""
+        return np.zeros(len(self.outputs)) if self._scatter is None else self._scatter.drawn
 
     def limits(self, name: str) -> Ends:
         """Return the lowest and highest of an input.
@@ -158,7 +170,7 @@ class Twin:
         return self._limits[name]
 
     def changed(self, settings: Mapping[str, Any]) -> Self:
-        """Return the same twin with another ``sample_time``, or with ``start.NAME`` of inputs held.
+        """Return the same twin with another ``sample_time``, ``scatter_after``, or ``start.NAME`` held.
 
         Raises
         ------
@@ -167,18 +179,26 @@ class Twin:
         ModelError
             If the model does not take the sample time.
         """
-        held, step = dict(self.held), self.sample_time
+        held, step, after = dict(self.held), self.sample_time, self.scatter_after
         for setting, value in settings.items():
             if setting == "sample_time":
                 step = float(value)
+            elif setting == "scatter_after":
+                after = float(value)
             elif setting.startswith("start."):
                 held[setting.removeprefix("start.")] = float(value)
             else:
                 raise DataError(
-                    f"a twin has no setting {setting!r}", remedy="give sample_time, or start.NAME"
+                    f"a twin has no setting {setting!r}",
+                    remedy="give sample_time, scatter_after, or start.NAME",
                 )
         return type(self)(
-            self.model, limits=self._given, held=held, sample_time=step, name=self.name
+            self.model,
+            limits=self._given,
+            held=held,
+            sample_time=step,
+            name=self.name,
+            scatter_after=after,
         )
 
     def reset(self, seed: int = 0) -> Array:
@@ -250,7 +270,9 @@ class Twin:
         rng = generator(seed)
         self._scatter = None
         if isinstance(self.model, Banded) and not ideal:
-            self._scatter = _Scatter(self.model.band, self.sample_time, rng)
+            self._scatter = _Scatter(
+                self.model.band, self.sample_time, rng, round(self.scatter_after / self.sample_time)
+            )
             self._stream = Banded(self.forward, self._scatter.wide).stream(self.sample_time)
         else:
             self._stream = self.forward.stream(self.sample_time)
@@ -294,25 +316,58 @@ class _Scatter:
     The band's shift and scale are read off one so wide that neither end is cut off at the model.
     """
 
-    def __init__(self, band: Band, sample_time: float, rng: np.random.Generator) -> None:
+    def __init__(
+        self, band: Band, sample_time: float, rng: np.random.Generator, quiet: int
+    ) -> None:
         shifts, logs = np.array(band.limits)[:, :2], np.array(band.limits)[:, 2]
         self._times = 1.0 + 2.0 * float((np.abs(shifts).max(axis=1) / np.exp(logs)).max())
         n = len(band.given)
         self.wide = replace(band, scores=((self._times, self._times),) * n, level=0.5)
-        self._scores = [np.array(row) for row in band.scores]
-        self._levels = [np.linspace(0.0, 1.0, row.size) for row in self._scores]
+        self._quantiles = [_quantiles(np.array(row)) for row in band.scores]
         samples = band.memory / (sample_time if band.times else 1.0)
-        self._keeps = max((samples - 1.0) / (samples + 1.0), 0.0)
-        self._rng, self._now = rng, rng.standard_normal(n)
+        self._keeps = r = _keeping(samples)
+        self._unit = sqrt((1.0 - r * r) ** 3 / (1.0 + r * r))
+        self._rng, self._quiet = rng, quiet
+        first, second = np.zeros((2, n)) if quiet else rng.standard_normal((2, n))
+        # as after a long time; after a quiet one it grows from nothing
+        once = first / sqrt(1.0 - r * r)
+        self._once, self._twice = once, (once + r * second / sqrt(1.0 - r * r)) / (1.0 - r * r)
+        self._slow = np.zeros((2, n)) if quiet else None
+        self.drawn = np.zeros(n)
 
     def on(self, found: Array) -> Array:
         """Return a sample of outputs with what is drawn, and move on."""
         y, lower, upper = found.reshape(-1, 3).T
-        shift, scale = 0.5 * (lower + upper) - y, 0.5 * (upper - lower) / self._times
+        if self._quiet > 0:
+            self._quiet -= 1
+            return np.array(y)
+        told = np.array([0.5 * (lower + upper) - y, 0.5 * (upper - lower) / self._times])
+        self._slow = told if self._slow is None else told + self._keeps * (self._slow - told)
         scores = [
-            np.copysign(np.interp(erf(abs(g) / sqrt(2.0)), levels, row), g)
-            for g, levels, row in zip(self._now.tolist(), self._levels, self._scores, strict=True)
+            np.copysign(np.interp(erf(abs(g) / sqrt(2.0)), *quantile), g)
+            for g, quantile in zip(
+                (self._unit * self._twice).tolist(), self._quantiles, strict=True
+            )
         ]
-        fresh = sqrt(1.0 - self._keeps**2) * self._rng.standard_normal(self._now.size)
-        self._now = self._keeps * self._now + fresh
-        return np.asarray(y + shift + scale * np.array(scores))
+        self._once = self._keeps * self._once + self._rng.standard_normal(self._once.size)
+        self._twice = self._keeps * self._twice + self._once
+        self.drawn = self._slow[0] + self._slow[1] * np.array(scores)
+        return np.asarray(y + self.drawn)
+
+
+def _keeping(samples: float) -> float:
+    """Return the r with which the integral of the autocorrelation is so many samples."""
+    if samples <= 1.0:
+        return 0.0
+    return float(brentq(lambda r: (1.0 + r) ** 3 - samples * (1.0 - r) * (1.0 + r * r), 0.0, 1.0))
+
+
+def _quantiles(scores: Array) -> tuple[Array, Array]:
+    """Return levels and scores between which lines are drawn: ends of stairs, and none at level 0.
+
+    Between these no score is above that of its level, so that the band still holds its share.
+    """
+    levels = np.linspace(0.0, 1.0, scores.size)
+    last = np.append(np.diff(scores) > 0, True)
+    last[0] = False
+    return np.append(0.0, levels[last]), np.append(0.0, scores[last])

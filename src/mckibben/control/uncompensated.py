@@ -10,7 +10,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import isotonic_regression
 
 from mckibben.arrays import Array
 from mckibben.control.controller import Controller
@@ -148,6 +147,8 @@ def curve(command: Array, moved: Array, name: str) -> tuple[Array, Array]:
     ModelError
         If nothing moves.
     """
+    from scipy.optimize import isotonic_regression  # slow to load
+
     falls = moved[-1] < moved[0]
     smooth = np.asarray(isotonic_regression(moved, increasing=not falls).x)
     if falls:

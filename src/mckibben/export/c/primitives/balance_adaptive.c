@@ -268,8 +268,10 @@ void mck_balance_adaptive_start(const mck_part *part, mck_real *state, const mck
 {
     adapting a = read_adapting(part, state);
     mck_balance_start(&a.fitted, state, in);
-    for (mck_real *last = a.y; last < a.learnt.theta; last++) {
+    mck_real *last = a.y;
+    while (last < a.learnt.theta) {
         *last = MCK_R(0.0);
+        last++;
     }
     mck_learnt_start(&a.learner, &a.learnt, a.now.n);
 }

@@ -20,7 +20,6 @@ from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.optimize import brentq
 
 from mckibben.arrays import Array
 from mckibben.blocks.bands.band import Band
@@ -359,6 +358,8 @@ def _keeping(samples: float) -> float:
     """Return the r with which the integral of the autocorrelation is so many samples."""
     if samples <= 1.0:
         return 0.0
+    from scipy.optimize import brentq  # slow to load
+
     return float(brentq(lambda r: (1.0 + r) ** 3 - samples * (1.0 - r) * (1.0 + r * r), 0.0, 1.0))
 
 

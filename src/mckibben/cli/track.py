@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     from mckibben.control.loop import Plant, Tracked
     from mckibben.recording import Recording
 
-COMMAND = "command_"
-
 
 def track(
     compensator: Annotated[Path, typer.Argument(help="Inverse, from mckibben invert (JSON).")],
@@ -101,7 +99,7 @@ def track(
     )
     from mckibben.control import track as close
     from mckibben.control.loop import wished
-    from mckibben.control.preview import samples_foreseen
+    from mckibben.control.twin import COMMAND
     from mckibben.files import write
     from mckibben.outputs import claim_model, claim_recording
 
@@ -131,7 +129,7 @@ def track(
                 "Remedy: leave out --controller-out, or use a compensator, PID, or both together."
             )
         ahead = dead_time_undone(block) if preview is None else preview
-        ahead += samples_foreseen(block) * step
+        ahead += block.samples_ahead * step
         if controller_out is not None and isinstance(chosen, FeedforwardFeedback) and ahead > step:
             raise ModelError(
                 f"a block has one reference, but compensator and feedback get it {ahead:g} s apart. "

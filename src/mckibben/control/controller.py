@@ -13,7 +13,7 @@ from mckibben.blocks.core.block import Block
 from mckibben.blocks.core.running import Stream
 from mckibben.blocks.feedback.feedforward_feedback import FeedforwardFeedback
 from mckibben.blocks.feedback.pid import MEASURED
-from mckibben.control.preview import dead_time_undone, samples_foreseen
+from mckibben.control.preview import dead_time_undone
 
 
 class Controller(ABC):
@@ -94,7 +94,7 @@ class BlockController(Controller):
     @property
     def samples_ahead(self) -> int:
         """Those of the horizon of a compensator that looks ahead."""
-        return samples_foreseen(self.block)
+        return self.block.samples_ahead
 
     def reset(self, sample_time: float) -> None:
         whole = self.block

@@ -14,7 +14,6 @@ from mckibben.blocks.feedback.feedforward_feedback import FeedforwardFeedback
 from mckibben.blocks.feedback.pid import PIDFeedback
 from mckibben.control.controller import Controller
 from mckibben.control.observer import DisturbanceObserver
-from mckibben.control.preview import samples_foreseen
 from mckibben.errors import ModelError
 
 Tuned = Callable[[], PIDFeedback]
@@ -55,7 +54,7 @@ def feedforward_pid(compensator: Block, tuned: Tuned) -> Block:
 def observer(compensator: Block, tuned: Tuned) -> Controller:
     """Compensator and disturbance observer."""
     del tuned
-    if samples_foreseen(compensator):
+    if compensator.samples_ahead:
         raise ModelError(
             "an observer corrects references that a plan has long known. Remedy: use feedforward or "
             "feedforward-pid with a compensator that looks ahead."

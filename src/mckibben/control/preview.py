@@ -11,18 +11,8 @@ from __future__ import annotations
 import numpy as np
 
 from mckibben.blocks.core.block import Block
-from mckibben.blocks.feedback.feedforward_feedback import FeedforwardFeedback
-from mckibben.blocks.predictive.predictive import Predictive
 from mckibben.errors import DataError, ModelError
 from mckibben.recording import Recording
-
-
-def samples_foreseen(compensator: Block) -> int:
-    """Return by how many samples a compensator wants its reference ahead to plan with."""
-    if isinstance(compensator, FeedforwardFeedback):
-        return samples_foreseen(compensator.compensator)
-    return compensator.samples_ahead if isinstance(compensator, Predictive) else 0
-
 
 MOST_PREVIEW = 1e4
 """Seconds."""

@@ -16,11 +16,11 @@ import numpy as np
 from mckibben.arrays import Array
 from mckibben.blocks.feedback.pid import MEASURED
 from mckibben.comparison.free_run import measured_start
-from mckibben.control.preview import samples_foreseen
+from mckibben.control.twin import COMMAND
 from mckibben.errors import ModelWarning
 from mckibben.recording import Recording
 from mckibben.studying.closed import TAPS
-from mckibben.studying.log import COMMAND, REFERENCE, Loop, scored
+from mckibben.studying.log import REFERENCE, Loop, scored
 from mckibben.studying.shifts import EARLY, Delay, dead_time, lagged, most_samples, shifted
 
 SAME = 0.01
@@ -220,9 +220,7 @@ def _asked(loop: Loop, log: Recording) -> Array | None:
     if loop.compensator is None or not loop.known:
         return None
     names = [channel.name for channel in loop.compensator.inputs]
-    wished = {
-        n: shifted(log[REFERENCE + n], -samples_foreseen(loop.compensator)) for n in loop.outputs
-    }
+    wished = {n: shifted(log[REFERENCE + n], -loop.compensator.samples_ahead) for n in loop.outputs}
     units = {c.name: c.unit for c in loop.model.outputs if c.name in wished}
     wanted = log.with_channels(units, **wished)
     if not loop.learns:

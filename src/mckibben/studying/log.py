@@ -13,11 +13,12 @@ from mckibben.blocks.core.block import Block
 from mckibben.blocks.feedback.feedforward_feedback import FeedforwardFeedback
 from mckibben.blocks.feedback.pid import MEASURED
 from mckibben.blocks.predictive.predictive import Predictive
+from mckibben.control.twin import COMMAND
 from mckibben.errors import DataError, ModelError
 from mckibben.recording import Recording
 
-REFERENCE, COMMAND = "reference_", "command_"
-"""What names of channels begin with that are wished for, and sent."""
+REFERENCE = "reference_"
+"""What names of channels begin with that are wished for."""
 
 FEWEST = 60
 """Scored samples of a log."""

@@ -18,12 +18,12 @@ from mckibben.comparison.results import Leaderboard
 from mckibben.comparison.splits import listed
 from mckibben.comparison.standing import Standing
 from mckibben.control import Tracked
+from mckibben.control.twin import COMMAND
 from mckibben.errors import DataError
 from mckibben.excitation import Gap, untold
 from mckibben.recording import Recording
 from mckibben.studying.checking import check_on_test
 from mckibben.studying.inverting import InverseCheck, invert_best
-from mckibben.studying.log import COMMAND
 from mckibben.studying.loops import closed_loops, published_rig
 from mckibben.studying.reviewing import Review, review
 from mckibben.validation.describing import ModelDescription, describe

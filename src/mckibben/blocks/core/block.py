@@ -55,6 +55,9 @@ class Block(Exportable, Parametrised, HandsOver):
     sample_time: float | None = None
     """Time between samples that a discrete block is bound to [s]; None for any."""
 
+    samples_ahead: int = 0
+    """By how many samples it wants references before they are due, to plan with."""
+
     dead_time: float = 0.0
     """By how long outputs come late, which its inverse leaves as it is [s]."""
 

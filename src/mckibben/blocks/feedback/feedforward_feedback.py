@@ -83,6 +83,11 @@ class FeedforwardFeedback(Composition):
         return self.compensator.undone
 
     @property
+    def samples_ahead(self) -> int:  # type: ignore[override]
+        """As many as the compensator wants."""
+        return self.compensator.samples_ahead
+
+    @property
     def measured(self) -> tuple[Channel, ...]:
         """What is measured."""
         return self.feedback.scheduled[: len(self.feedback.driven)]

@@ -138,7 +138,7 @@ class Predictive(Block):
         return self.compensator.reachable()
 
     @property
-    def samples_ahead(self) -> int:
+    def samples_ahead(self) -> int:  # type: ignore[override]
         """By how many samples references are given ahead of when they are due."""
         return self.horizon - 1
 

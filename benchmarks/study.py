@@ -16,8 +16,10 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from mckibben.example import TEST, TRAIN
+
 ROOT = Path(__file__).resolve().parent.parent
-EXAMPLES = ("examples/decaying-triangle.csv", "--test", "examples/irregular-triangle.csv")
+EXAMPLES = (str(TRAIN), "--test", str(TEST))
 BUSY_LOOPS = 2
 TARGETS = {"all models": 32.0, "quick": 10.0, "first picture": 10.0, "cold": 65.0, "busy": 2.5}
 """Seconds on two quiet cores; busy: relative to quiet."""

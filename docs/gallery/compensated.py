@@ -6,9 +6,10 @@ import numpy as np
 from matplotlib.figure import Figure
 
 import mckibben
+from mckibben import example
 from mckibben.control import control_law, track, tune_pid
 
-(train,) = mckibben.read("examples/decaying-triangle.csv")
+(train,) = mckibben.read(example.TRAIN)
 inverse = mckibben.GPIEstimator().fit(train).model_.inverse()
 rig = mckibben.load_rig("mas20-hanging")
 pid = tune_pid(rig, sample_time=0.02)

@@ -3,9 +3,10 @@
 import sys
 
 import mckibben
+from mckibben import example
 from mckibben.report.figures import plot_model
 
-(train,) = mckibben.read("examples/decaying-triangle.csv")
-(test,) = mckibben.read("examples/irregular-triangle.csv")
+(train,) = mckibben.read(example.TRAIN)
+(test,) = mckibben.read(example.TEST)
 model = mckibben.GPIEstimator(n_operators=12, envelope="piecewise-linear").fit(train).model_
 plot_model(model, [test], "loops", sys.argv[1])

@@ -43,6 +43,7 @@ COMMANDS: dict[str, list[str]] = {
     "muscles show": ["rail"],
     "app": ["workspace", "--no-show"],
     "link": ["absent-port"],
+    "example": ["out"],
     "export c": ["model.json", "-o", "out"],
     "export fmu": ["model.json", "-o", "out.fmu", "--platforms", "none"],
     "export ros2": ["inverse.json", "-o", "out"],

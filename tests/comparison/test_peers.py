@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import mckibben
+from mckibben import example
 from mckibben.comparison.channels import Channels
 from mckibben.comparison.free_run import run_free
 from mckibben.comparison.memory_test import memory_test
@@ -32,8 +33,8 @@ def libraries(monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
 
 
 def test_gaps_between_branches_are_those_of_the_memory_test(peers: Any) -> None:
-    train = mckibben.read(ROOT / "examples" / "decaying-triangle.csv")
-    test = mckibben.read(ROOT / "examples" / "irregular-triangle.csv")
+    train = mckibben.read(example.TRAIN)
+    test = mckibben.read(example.TEST)
     block = mckibben.PIEstimator(n_operators=5).fit(train).model_
     channels = Channels(("pressure",), ("displacement",))
     found = run_free(block, test[0], channels.outputs)

@@ -20,6 +20,7 @@ LAYERS = (
         "presets",
         "numerals",
         "version",
+        "example",
         "system",
     },
     {"recording", "signals", "metrics", "characterization"},

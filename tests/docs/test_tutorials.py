@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from mckibben import example
 from mckibben.cli.main import run
 
 ROOT = Path(__file__).parents[2]
@@ -35,7 +36,7 @@ def command(line: str, monkeypatch: pytest.MonkeyPatch) -> None:
 def test_tutorial_runs(path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     if "gymnasium" in path.read_text():
         pytest.importorskip("gymnasium")
-    shutil.copytree(ROOT / "examples", tmp_path / "examples")
+    shutil.copytree(example.FOLDER, tmp_path / "examples")
     monkeypatch.chdir(tmp_path)
     names: dict[str, object] = {"__name__": "tutorial"}
     blocks = BLOCK.findall(path.read_text(encoding="utf-8"))
@@ -67,7 +68,7 @@ def test_links_between_pages_lead_somewhere() -> None:
 def test_what_readme_shows_of_python_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     text = (ROOT / "README.md").read_text(encoding="utf-8")
     first = next(body for language, body in BLOCK.findall(text) if language == "python")
-    shutil.copytree(ROOT / "examples", tmp_path / "examples")
+    shutil.copytree(example.FOLDER, tmp_path / "examples")
     monkeypatch.chdir(tmp_path)
     exec(compile(first, "README.md", "exec"), {"__name__": "readme"})
     assert (tmp_path / "model.json").is_file()

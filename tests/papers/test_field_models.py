@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from mckibben import PIEstimator, Recording, read
+from mckibben import PIEstimator, Recording, example, read
 from mckibben.blocks.dynamic.transfer_function import TransferFunction
 from mckibben.cli.main import run
 from mckibben.papers.field_models import rerun as field_models
@@ -26,7 +26,6 @@ from tests.cli.conftest import files  # noqa: F401  # a fixture
 
 pytestmark = pytest.mark.xdist_group("field-models")  # one quick run serves all its tests
 
-EXAMPLES = Path(__file__).parents[2] / "examples"
 ROLES, RUNS = ("train", "test"), ("decaying-triangle", "irregular-triangle")
 PAPERS = tuple(PRINTED)
 
@@ -38,7 +37,9 @@ Found = dict[str, Any]
 def found(tmp_path_factory: pytest.TempPathFactory) -> Found:
     """Return the tables of the quick run on the rig's recordings, given as files."""
     out = tmp_path_factory.mktemp("field")
-    given = [f"--{role}={EXAMPLES / name}.csv" for role, name in zip(ROLES, RUNS, strict=True)]
+    given = [
+        f"--{role}={example.FOLDER / name}.csv" for role, name in zip(ROLES, RUNS, strict=True)
+    ]
     words = ["mckibben", "reproduce", "field-models", "--quick", *given, f"--out={out}"]
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(sys, "argv", words)
@@ -161,7 +162,7 @@ def test_the_rig_is_no_stranger_to_the_printed_model_than_the_papers_muscle() ->
     errors: list[float] = []
     line = np.zeros(2)
     for name in RUNS:
-        (recording,) = read(EXAMPLES / f"{name}.csv")
+        (recording,) = read(example.FOLDER / f"{name}.csv")
         shape = prandtl_ishlinskii().simulate(recording)["unscaled_displacement"]
         if not errors:
             line = np.polyfit(shape, recording["displacement"], 1)

@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
-from mckibben import DataError, read
+from mckibben import DataError, example, read
 from mckibben.registry import names
 from mckibben.rigs import load_rig, record
 from mckibben.signals import reversals
 from mckibben.signals.protocol import Protocol, protocol
-
-EXAMPLES = Path(__file__).parents[2] / "examples"
 
 
 @pytest.mark.parametrize("name", names("protocols"))
@@ -140,7 +136,7 @@ def test_a_lead_is_driven_but_not_recorded() -> None:
 
 def test_the_examples_are_what_the_rig_records() -> None:
     for run, recording in record("field-models"):
-        (stored,) = read(EXAMPLES / f"{run.name}.csv")
+        (stored,) = read(example.FOLDER / f"{run.name}.csv")
         for channel in recording.channels:
             step = load_rig("mas20-hanging").sensor[channel].resolution
             # Another computer may round a sample to the step beside.

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import mckibben
-from mckibben import PI, Channel, DataError, ModelError, PerChannel, Recording, review
+from mckibben import PI, Channel, DataError, ModelError, PerChannel, Recording, example, review
 from mckibben.arrays import Array
 from mckibben.blocks.adaptive.adaptive_series import adaptive
 from mckibben.blocks.feedback.feedforward_feedback import FeedforwardFeedback
@@ -314,8 +314,7 @@ def test_study_refuses_a_log_without_reference(
 ) -> None:
     inverse = tmp_path / "inverse.json"
     MUSCLE.inverse().save(inverse)
-    example = Path(__file__).parents[2] / "examples/decaying-triangle.csv"
-    given = ["study", example, "--compensator", inverse, "-o", tmp_path / "study"]
+    given = ["study", example.TRAIN, "--compensator", inverse, "-o", tmp_path / "study"]
     code, printed = called(monkeypatch, capsys, *given)
     assert code == 2
     assert "--column reference_displacement=COLUMN" in printed

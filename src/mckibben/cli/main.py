@@ -21,6 +21,7 @@ from mckibben.cli.characterize import characterize
 from mckibben.cli.check import check
 from mckibben.cli.check_block import check_block
 from mckibben.cli.compare import compare
+from mckibben.cli.example import example
 from mckibben.cli.export import app as export_app
 from mckibben.cli.fit import fit
 from mckibben.cli.info import info
@@ -57,7 +58,7 @@ app = typer.Typer(
 )
 for command in (
     *(study, characterize, fit, compare, check, calibrate, simulate, invert, track, plan, plot),
-    *(reproduce, measured, info, link, ros),
+    *(reproduce, measured, info, link, ros, example),
 ):
     app.command()(command)
 app.command("check-block")(check_block)

@@ -334,7 +334,7 @@ class Hostile:
     def _good(self, frame: Frame) -> bytes:
         rng = self._rng
         if frame.kind == 1:
-            sizes = [rng.choice([0, 1, 1, 2, 30, 65535]) for _ in range(4)]
+            sizes = [rng.choice([0, 1, 1, 2, 30, 65535]) for _ in range(5)]
             told = [0, rng.choice([4, 8, 8, 5]), 0, bytes(8), 5000, rng.choice([0, 100]), 1, 0, 0]
             return IDENTITY_ANSWER.pack(*told, *sizes)
         if frame.kind == 2:

@@ -24,13 +24,11 @@ from numpy.typing import NDArray
 
 from mckibben.arrays import Array
 from mckibben.errors import DataError
+from mckibben.system.extras import demand
 
-try:
-    import gymnasium
-except ImportError as missing:
-    raise DataError(
-        "environments need the package gymnasium", remedy="pip install 'mckibben[gym]'"
-    ) from missing
+demand("gymnasium", "gym", "environments")
+
+import gymnasium  # noqa: E402
 
 if TYPE_CHECKING:
     from mckibben.blocks.core.block import Block
@@ -229,6 +227,7 @@ class Tracking(gymnasium.Env[Vector, Vector]):
         """Return a picture of the episode so far, shape (height, width, 3), or None."""
         if self.render_mode is None:
             return None
+        demand("matplotlib", "figures", "pictures of episodes")
         from matplotlib.backends.backend_agg import FigureCanvasAgg
         from matplotlib.figure import Figure
 

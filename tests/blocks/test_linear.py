@@ -17,7 +17,7 @@ from mckibben.blocks.dynamic.transfer_function import TransferFunction
 from mckibben.blocks.memoryless.affine import Affine
 from mckibben.blocks.memoryless.negative import Negative
 from mckibben.blocks.play_type.pi import PI
-from mckibben.errors import ModelError
+from mckibben.errors import DataError, ModelError
 
 STEP = 0.01
 
@@ -116,5 +116,5 @@ def test_what_cannot_be_handed_over_says_so() -> None:
 
 def test_without_python_control_its_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(__import__("sys").modules, "control", None)
-    with pytest.raises(ModelError, match=r"mckibben\[control\]"):
+    with pytest.raises(DataError, match=r"mckibben\[control\]"):
         TransferFunction.example().to_control()

@@ -69,6 +69,7 @@ STANDS_ON = {
     },
     "environments": {
         *("environments", "control", "blocks", "rigs", "recording", "signals", "arrays", "errors"),
+        "system",
     },
 }
 """What some members may import and no more: a rig's physics knows nothing of models."""

@@ -87,7 +87,7 @@ def test_recordings_are_read_back_and_damaged_ones_made_again(tmp_path: Path) ->
         return found
 
     first = again()
-    (file,) = (tmp_path / "unfinished").glob("*.parquet")
+    (file,) = (tmp_path / "unfinished").glob("*.csv")
     stamp = file.stat().st_mtime_ns
     assert again() == first
     assert file.stat().st_mtime_ns == stamp

@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -27,7 +28,7 @@ Role = Literal["train", "test", "unused"]
 ARCHIVES = (".zip", ".gz", ".tgz", ".tar", ".7z", ".rar", ".bz2", ".xz")
 
 LONG = 200_000
-"""Samples beyond which recordings are kept as Parquet instead of CSV."""
+"""Samples beyond which recordings are kept as Parquet instead of CSV, where that is installed."""
 
 MOST_CELLS = 40_000_000
 """Samples times channels of the recordings that are held in memory, the one in use aside."""
@@ -152,7 +153,8 @@ class Workspace(Folder):
         )
 
     def _recording_path(self, name: str, n_samples: int) -> Path:
-        ending = "parquet" if n_samples > LONG else "csv"
+        quick = find_spec("pyarrow") is not None
+        ending = "parquet" if quick and n_samples > LONG else "csv"
         return self.path("recordings", f"{name}.{ending}")
 
     def entry(self, name: str) -> Entry:

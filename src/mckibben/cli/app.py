@@ -7,8 +7,6 @@ from typing import Annotated
 
 import typer
 
-from mckibben.errors import DataError
-
 
 def app(
     folder: Annotated[
@@ -26,12 +24,9 @@ def app(
     show: Annotated[bool, typer.Option("--show/--no-show", help="Open a browser.")] = True,
 ) -> None:
     """Open the workbench: data, loops, models, compensation and code in the browser."""
-    import importlib.util
+    from mckibben.system.extras import demand
 
-    if importlib.util.find_spec("nicegui") is None:
-        raise DataError(
-            "the workbench is not installed", remedy="install it: pip install 'mckibben[app]'"
-        )
+    demand("nicegui", "app", "the workbench")
     from mckibben.app.server import serve
 
     serve(folder, host=host, port=port, token=token, show=show)

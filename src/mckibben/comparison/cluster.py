@@ -16,6 +16,7 @@ from queue import Empty, SimpleQueue
 from typing import Any
 
 from mckibben.errors import DataError
+from mckibben.system.extras import demand
 from mckibben.system.threads import one_blas_thread
 from mckibben.system.workers import Outcome, Work, WorkerError, answered, said, understood
 
@@ -54,12 +55,8 @@ def on_cluster(address: str | None) -> Iterator[None]:
     if address is None:
         yield
         return
-    try:
-        distributed: Any = import_module("distributed")
-    except ImportError:
-        raise DataError(
-            "Dask is not installed", remedy="install it: pip install 'mckibben[dask]'"
-        ) from None
+    demand("distributed", "dask", "clusters of Dask")
+    distributed: Any = import_module("distributed")
     try:
         client = distributed.Client(address, timeout=PATIENCE, set_as_default=False)
     except (OSError, ValueError, TypeError) as error:

@@ -36,7 +36,9 @@ Result = TypeVar("Result")
 FOLDER = "unfinished"
 """Within the folder of results; it goes when all is done."""
 
-_OURS = re.compile(rf"-[0-9a-f]{{16}}\.(json|parquet)$|^{re.escape(PART)}[0-9a-f]{{16}}\.part$")
+_OURS = re.compile(
+    rf"-[0-9a-f]{{16}}\.(json|csv|csv-metadata\.json)$|^{re.escape(PART)}[0-9a-f]{{16}}\.part$"
+)
 """Names that parts have, and what was being written when the program was killed."""
 
 

@@ -20,6 +20,7 @@ from mckibben.files.notices import warn
 from mckibben.files.table import Table
 from mckibben.files.topics import Connection, Topic, table
 from mckibben.files.unpacking import Unpacking
+from mckibben.system.extras import demand
 
 _LISTED = 10
 _ZSTD = b"\x28\xb5\x2f\xfd"
@@ -29,14 +30,7 @@ _STEPS = 10_000_000
 
 def read(file: BufferedReader, path: Path) -> list[Table]:
     """Read the topics of a bag that have numbers."""
-    try:
-        import rosbags  # noqa: F401
-    except ImportError:
-        raise DataError(
-            "bags of ROS need a library that is not installed",
-            file=path,
-            remedy="pip install mckibben[ros]",
-        ) from None
+    demand("rosbags", "ros", "bags of ROS", file=path)
 
     budget = Budget(file, path)
     kind = path.suffix.casefold()

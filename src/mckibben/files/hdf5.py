@@ -20,6 +20,7 @@ from mckibben.files import hdf5_pieces
 from mckibben.files.chunks import DEFLATE, FLETCHER32, SHUFFLE, unpacked
 from mckibben.files.limits import MOST_TEXT, Budget
 from mckibben.files.table import Column, Table, column, of_equal_length
+from mckibben.system.extras import demand
 
 
 def is_hdf5(file: BufferedReader) -> bool:
@@ -31,14 +32,8 @@ def is_hdf5(file: BufferedReader) -> bool:
 
 def read(file: BufferedReader, path: Path) -> list[Table]:
     """Read the vectors of an HDF5 file."""
-    try:
-        import h5py
-    except ImportError:
-        raise DataError(
-            "HDF5 needs a library that is not installed",
-            file=path,
-            remedy="pip install mckibben[hdf5]",
-        ) from None
+    demand("h5py", "hdf5", "HDF5", file=path)
+    import h5py
 
     hdf5_pieces.look(file)
     budget = Budget(file, path)

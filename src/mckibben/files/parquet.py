@@ -15,7 +15,10 @@ from mckibben.files.stored import Stored
 from mckibben.files.table import Column, Table, column, of_equal_length
 from mckibben.recording import Recording
 from mckibben.system.atomic import replacing
+from mckibben.system.extras import demand
 from mckibben.system.manifest import digest
+
+demand("pyarrow", "parquet", "Parquet")
 
 _KEY = b"mckibben"
 

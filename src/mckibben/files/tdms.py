@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from mckibben.errors import DataError
 from mckibben.files.limits import MOST_TEXT, Budget
 from mckibben.files.table import Column, Table, column, of_equal_length
+from mckibben.system.extras import demand
 
 _LEAD = struct.Struct("<4sIIQQ")
 _META_DATA, _NEW_LIST, _BIG_ENDIAN = 1 << 1, 1 << 2, 1 << 6
@@ -27,14 +28,8 @@ _Waveform = tuple[float | None, float]
 
 def read(file: BufferedReader, path: Path) -> list[Table]:
     """Read the groups of a TDMS file that hold channels."""
-    try:
-        from nptdms import TdmsFile
-    except ImportError:
-        raise DataError(
-            "TDMS needs a library that is not installed",
-            file=path,
-            remedy="pip install mckibben[tdms]",
-        ) from None
+    demand("nptdms", "tdms", "TDMS", file=path)
+    from nptdms import TdmsFile
 
     budget = Budget(file, path)
     _count_segments(file, budget)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import bz2
 import os
+import sys
 from io import BufferedReader
 from typing import Any
 
@@ -61,7 +62,10 @@ def _unpacked(packed: bytes, name: str, most: int) -> bytes:
 
         unpacker = LZ4FrameDecompressor()
     elif name == "zstd":
-        from backports import zstd
+        if sys.version_info >= (3, 14):
+            from compression import zstd
+        else:
+            from backports import zstd
 
         unpacker = zstd.ZstdDecompressor()
     elif name == "bz2":

@@ -21,6 +21,7 @@ from mckibben.files.channels import NAME, about
 from mckibben.files.limits import MOST_PARTS, Budget
 from mckibben.files.notices import warn
 from mckibben.files.table import Table
+from mckibben.system.extras import demand
 
 MOST_ROWS = 2**20
 """Rows of a sheet, as in the program itself."""
@@ -38,14 +39,8 @@ _LOOKED_AT = 200  # rows from which the table's width is told
 
 def read(file: BufferedReader, path: Path) -> list[Table]:
     """Read the first sheet with numbers, or the one that ``channels.toml`` names."""
-    try:
-        import openpyxl
-    except ImportError:
-        raise DataError(
-            "spreadsheets need a library that is not installed",
-            file=path,
-            remedy="pip install mckibben[xlsx]",
-        ) from None
+    demand("openpyxl", "xlsx", "spreadsheets", file=path)
+    import openpyxl
 
     _look(file)
     budget = Budget(file, path)

@@ -87,7 +87,7 @@ def recorded(
 ) -> Iterator[tuple[Run, Recording]]:
     """Yield runs of a protocol on its rig, in their order, those recorded before read from disk."""
     plan = protocol(what) if isinstance(what, str) else what
-    files = {run: kept.file(run, ".parquet", plan.name, plan[run], seed) for run in runs}
+    files = {run: kept.file(run, ".csv", plan.name, plan[run], seed) for run in runs}
     there = {run: _read(file) for run, file in files.items()}
     fresh = record(plan, runs=[run for run in runs if there[run] is None], seed=seed)
     for done, run in enumerate(runs, start=1):

@@ -16,6 +16,7 @@ import numpy as np
 from mckibben.errors import DataError
 from mckibben.report.drawing import Curve, Drawing, Panel
 from mckibben.system.atomic import replacing
+from mckibben.system.extras import demand
 from mckibben.system.seals import MAKER, sealed
 
 if TYPE_CHECKING:
@@ -103,10 +104,10 @@ def save(drawing: Drawing, path: str | Path) -> None:
     DataError
         On another suffix, or a folder that does not exist.
     """
-    from matplotlib import rc_context
-
     path, style = Path(path), dict(STYLE)
     kind = format_of(path)
+    from matplotlib import rc_context
+
     figure = io.BytesIO()
     with rc_context(style):
         drawn(drawing).savefig(figure, format=kind, dpi=RESOLUTION, metadata=dict(METADATA[kind]))
@@ -116,6 +117,7 @@ def save(drawing: Drawing, path: str | Path) -> None:
 
 def format_of(path: Path) -> str:
     """Return the format that a figure's name asks for, or refuse it as `save` does."""
+    demand("matplotlib", "figures", "figures for print")
     kind = path.suffix.lower().lstrip(".")
     if kind not in METADATA:
         raise DataError(
@@ -128,6 +130,7 @@ def format_of(path: Path) -> str:
 
 def drawn(drawing: Drawing) -> Figure:
     """Return a drawing as a matplotlib figure; `save` adds the style of this module."""
+    demand("matplotlib", "figures", "figures for print")
     from matplotlib.figure import Figure
 
     n = len(drawing.panels)

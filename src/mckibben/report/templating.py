@@ -15,6 +15,10 @@ if TYPE_CHECKING:
     from jinja2 import Template
 
 
+SCRIPTS = ("plotly-basic.min.js", "report.js")
+"""The first is plotly.js 4.1.1 as published (plotly.js-basic-dist-min, MIT): in Python 60 MB."""
+
+
 def page(name: str, figures: dict[str, Any], **about: Any) -> str:
     """Return a page that opens without a network, and under which a browser runs nothing else.
 
@@ -27,10 +31,8 @@ def page(name: str, figures: dict[str, Any], **about: Any) -> str:
     **about
         What else the template names.
     """
-    from plotly.offline import get_plotlyjs
-
-    own = resources.files("mckibben.report").joinpath("templates/report.js").read_text("utf-8")
-    scripts = (get_plotlyjs(), own)
+    folder = resources.files("mckibben.report").joinpath("templates")
+    scripts = [folder.joinpath(script).read_text("utf-8") for script in SCRIPTS]
     return template(name).render(
         figures=figures,
         bar=interactive.BAR,

@@ -4,16 +4,13 @@ import math  # no future annotations: Cyclone DDS reads the types of fields
 from dataclasses import dataclass
 from typing import Any
 
-from mckibben.errors import DataError
 from mckibben.ros.kinds import Kind
+from mckibben.system.extras import demand
 
-try:
-    from cyclonedds.idl import IdlStruct
-    from cyclonedds.idl.types import float64, int32, sequence, uint32
-except ImportError as missing:
-    raise DataError(
-        "topics of ROS 2 need the package cyclonedds", remedy="pip install 'mckibben[dds]'"
-    ) from missing
+demand("cyclonedds", "dds", "topics of ROS 2")
+
+from cyclonedds.idl import IdlStruct  # noqa: E402
+from cyclonedds.idl.types import float64, int32, sequence, uint32  # noqa: E402
 
 
 @dataclass

@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-from mckibben.errors import DataError
+from mckibben.system.extras import demand
 
-try:
-    import mujoco as mujoco
-except ImportError as missing:
-    raise DataError(
-        "muscles in MuJoCo need the package mujoco", remedy="pip install 'mckibben[mujoco]'"
-    ) from missing
+demand("mujoco", "mujoco", "muscles in MuJoCo")
+
+import mujoco as mujoco  # noqa: E402

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mckibben.errors import DataError
+from mckibben.system.extras import demand
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -28,6 +29,7 @@ def plot(found: Validation, axes: Sequence[Axes] | None, output: str | None) -> 
         )
     one = found.outputs[0 if output is None else names.index(output)]
     if axes is None:
+        demand("matplotlib", "figures", "figures for print")
         from matplotlib.figure import Figure
 
         figure = Figure(figsize=(7.2, 5.0), layout="constrained")

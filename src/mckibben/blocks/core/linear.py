@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from mckibben.arrays import Array
 from mckibben.blocks.core.checked import Checked
 from mckibben.errors import ModelError
+from mckibben.system.extras import demand
 
 if TYPE_CHECKING:
     from scipy.signal import dlti, lti
@@ -171,14 +172,13 @@ class HandsOver(metaclass=Checked):
         Raises
         ------
         ModelError
-            As of `to_scipy`, or without python-control.
+            As of `to_scipy`.
+        DataError
+            Without python-control.
         """
-        try:
-            import control
-        except ImportError:
-            raise ModelError(
-                "python-control is not installed. Remedy: pip install mckibben[control]."
-            ) from None
+        demand("control", "control", "transfer functions of python-control")
+        import control
+
         continuous = self.continuous() if sample_time is None else None
         if continuous is not None:
             return control.tf(continuous.numerator, continuous.denominator)

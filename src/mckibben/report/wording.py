@@ -241,7 +241,7 @@ def versions() -> dict[str, str]:
     import platform
     from importlib.metadata import version
 
-    packages = ("mckibben", "numpy", "scipy", "numba", "scikit-learn")
+    packages = ("mckibben", "numpy", "scipy", "numba")
     return {"Python": platform.python_version()} | {name: version(name) for name in packages}
 
 

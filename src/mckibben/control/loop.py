@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import Any, ClassVar, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,6 +20,7 @@ from mckibben.control.twin import Twin, plain
 from mckibben.errors import DataError, ModelError
 from mckibben.recording import Recording, standard_unit
 from mckibben.signals.checking import generator
+from mckibben.system.showing import DrawsItself
 
 
 class Plant(Protocol):
@@ -51,7 +52,7 @@ class Plant(Protocol):
 
 
 @dataclass(frozen=True)
-class Tracked:
+class Tracked(DrawsItself):
     """What came of a loop.
 
     Parameters
@@ -72,6 +73,8 @@ class Tracked:
         Root mean square of what a twin with a band drew over that time [mm or N]; it draws nothing in
         the approach.
     """
+
+    face: ClassVar[str] = "tracked"
 
     recording: Recording
     rmse: Mapping[str, float]

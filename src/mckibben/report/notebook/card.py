@@ -16,8 +16,8 @@ from mckibben.report.printed import verbatim
 WIDTH = 80
 """Of a terminal [columns]."""
 
-WIDEST = 38
-"""Of a cell [columns]."""
+WIDEST = 30
+"""Of a cell that is not the last of its row [columns]."""
 
 POINTS = 240
 """Of the small picture."""
@@ -123,15 +123,19 @@ def _table(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
         return []
     right = _of_figures(rows)
     whole = [headings, *rows] if headings else rows
-    cells = [[shorten(verbatim(cell), WIDEST, placeholder=" …") for cell in row] for row in whole]
+    cells = [
+        [*(shorten(verbatim(cell), WIDEST, placeholder=" …") for cell in row[:-1]), verbatim(row[-1])]
+        for row in whole
+    ]
     widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
-    return [
+    lines = [
         "  ".join(
             cell.rjust(width) if aligned else cell.ljust(width)
             for cell, width, aligned in zip(row, widths, right, strict=True)
-        ).rstrip()[:WIDTH]
+        ).rstrip()
         for row in cells
     ]
+    return [line if len(line) <= WIDTH else f"{line[: WIDTH - 2]} …" for line in lines]
 
 
 def _picture(x: Array, y: Array) -> str:

@@ -38,7 +38,7 @@ def train() -> Recording:
 @pytest.fixture(scope="module")
 def board(train: Recording) -> Leaderboard:
     (test,) = mckibben.read(example.TEST)
-    return mckibben.compare(train, test, models=["pi", "gpi", "chou-hannaford"], jobs=1)
+    return mckibben.compare(train, test, models=["pi", "gpi", "force-chou"], jobs=1)
 
 
 @pytest.fixture(scope="module")
@@ -109,7 +109,7 @@ def test_a_leaderboard_prints_its_models_in_order(board: Leaderboard) -> None:
     assert re.search(r"rank +model +CV RMSE \[mm\] +test RMSE \[mm\] +inverse", text)
     assert text.index("gpi") < text.index("pi  ")
     assert "Chosen by cross-validation" in text
-    assert "Failed: chou-hannaford." in text
+    assert "Failed: force-chou." in text
 
 
 def test_a_leaderboard_is_a_table(board: Leaderboard) -> None:
@@ -129,7 +129,7 @@ def test_it_is_drawn_into_axes_that_are_given(train: Recording) -> None:
 
     axes = Figure().subplots(2)
     assert train.plot("loop", ax=axes[0]) is axes[0]
-    with pytest.raises(DataError, match="2 panels, and there are 1 axes.*Remedy"):
+    with pytest.raises(DataError, match=r"2 panels, and there are 1 axes.*Remedy"):
         train.plot("time", ax=axes[0])
     assert train.plot("time", ax=axes) == list(axes)
     assert train.plot("time", output="displacement", ax=axes[1]) is axes[1]

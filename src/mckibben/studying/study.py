@@ -26,6 +26,7 @@ from mckibben.studying.checking import check_on_test
 from mckibben.studying.inverting import InverseCheck, invert_best
 from mckibben.studying.loops import closed_loops, published_rig
 from mckibben.studying.reviewing import Review, review
+from mckibben.system.progress import telling
 from mckibben.system.showing import DrawsItself
 from mckibben.validation.describing import ModelDescription, describe
 from mckibben.validation.results import Validation
@@ -127,7 +128,7 @@ def study(
     allow_shared: bool = False,
     folder: str | Path | None = None,
     clear: bool = True,
-    progress: Callable[[Standing], None] | None = None,
+    progress: bool | Callable[[Standing], None] | None = None,
     found: Callable[[Study], None] | None = None,
     notes: Sequence[str] = (),
     model: Block | None = None,
@@ -212,7 +213,10 @@ def study(
     if found is not None:
         found(so_far)
     try:
-        with closing(ranked(plan, jobs=jobs, kept=kept, progress=progress)) as rankings:
+        with (
+            telling(progress, "studying") as tell,
+            closing(ranked(plan, jobs=jobs, kept=kept, progress=tell)) as rankings,
+        ):
             for ranking in rankings:
                 so_far = replace(so_far, leaderboard=ranking.board, predictions=ranking.outputs)
                 if ranking.board.pending and found is not None:

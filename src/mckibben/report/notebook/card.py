@@ -124,7 +124,10 @@ def _table(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
     right = _of_figures(rows)
     whole = [headings, *rows] if headings else rows
     cells = [
-        [*(shorten(verbatim(cell), WIDEST, placeholder=" …") for cell in row[:-1]), verbatim(row[-1])]
+        [
+            *(shorten(verbatim(cell), WIDEST, placeholder=" …") for cell in row[:-1]),
+            verbatim(row[-1]),
+        ]
         for row in whole
     ]
     widths = [max(map(len, column)) for column in zip(*cells, strict=True)]

@@ -119,9 +119,9 @@ def test_a_leaderboard_is_a_table(board: Leaderboard) -> None:
 
 def test_measured_is_drawn_beside_modelled(train: Recording, board: Leaderboard) -> None:
     axis = board.plot(recording=train)
-    assert [text.get_text() for text in axis.get_legend().get_texts()] == ["measured", "gpi"]  # type: ignore[union-attr]
+    assert [text.get_text() for text in axis.get_legend().get_texts()] == ["measured", "gpi"]
     both = board.plot("fit", recording=train, models=["gpi", "pi"])
-    assert {text.get_text() for text in both.get_legend().get_texts()} == {"measured", "gpi", "pi"}  # type: ignore[union-attr]
+    assert {text.get_text() for text in both.get_legend().get_texts()} == {"measured", "gpi", "pi"}
 
 
 def test_it_is_drawn_into_axes_that_are_given(train: Recording) -> None:
@@ -155,7 +155,7 @@ def test_a_model_that_is_not_there_is_named(board: Leaderboard, train: Recording
 
 
 def test_names_are_shown_verbatim_and_never_obeyed(tmp_path: Path) -> None:
-    ramp = [0.0, 1.0, 2.0, 1.0]
+    ramp = np.array([0.0, 1.0, 2.0, 1.0])
     evil = Recording(
         {"pressure": ramp, "displacement": ramp, EVIL: ramp}, meta={"name": EVIL, "notes": [EVIL]}
     )
@@ -168,8 +168,9 @@ def test_names_are_shown_verbatim_and_never_obeyed(tmp_path: Path) -> None:
 
 
 def test_a_recording_of_several_muscles_and_one_without_motion() -> None:
-    several = Recording({"pressure_1": [0, 1, 2.0], "displacement_1": [0, 1, 3.0]})
+    ramp, still = np.arange(3.0), np.ones(3)
+    several = Recording({"pressure_1": ramp, "displacement_1": ramp})
     assert several.plot().get_xlabel() == "pressure_1 [bar]"
-    still = Recording({"pressure": [1, 1, 1.0], "temperature": [20, 21, 22.0]}, 0.1)
-    assert len(still.plot()) == 2  # over time
-    assert "svg" not in still._repr_html_()
+    held = Recording({"pressure": still, "temperature": ramp}, 0.1)
+    assert len(held.plot()) == 2  # over time
+    assert "svg" not in held._repr_html_()

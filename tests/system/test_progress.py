@@ -70,9 +70,9 @@ def test_a_notebook_has_a_bar_without_other_packages(monkeypatch: pytest.MonkeyP
         return types.SimpleNamespace(update=shown.append)
 
     shell = types.SimpleNamespace(get_ipython=lambda: types.SimpleNamespace(kernel=None))
-    monkeypatch.setitem(sys.modules, "IPython", shell)  # type: ignore[arg-type]
+    monkeypatch.setitem(sys.modules, "IPython", shell)
     page = types.SimpleNamespace(HTML=str, display=display)
-    monkeypatch.setitem(sys.modules, "IPython.display", page)  # type: ignore[arg-type]
+    monkeypatch.setitem(sys.modules, "IPython.display", page)
     with telling(True, "work") as tell:
         assert tell is not None
         tell(0.5, "<b>half</b>")

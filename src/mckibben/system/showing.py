@@ -6,12 +6,9 @@ when it is asked for.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 from mckibben.registry import load
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 
 class ShowsItself:
@@ -32,7 +29,7 @@ class ShowsItself:
 class DrawsItself(ShowsItself):
     """Is drawn, too: the figures of the reports, by name."""
 
-    def plot(self, kind: str | None = None, *, ax: Any = None, **choices: Any) -> Axes | list[Axes]:
+    def plot(self, kind: str | None = None, *, ax: Any = None, **choices: Any) -> Any:
         """Draw it with matplotlib.
 
         Parameters
@@ -59,8 +56,7 @@ class DrawsItself(ShowsItself):
         DataError
             On absent channels, or another number of axes.
         """
-        found: Axes | list[Axes] = load("faces", self.face)(self).plot(kind, ax, choices)
-        return found
+        return load("faces", self.face)(self).plot(kind, ax, choices)
 
     def interactive(self, kind: str | None = None, **choices: Any) -> Any:
         """Draw it with plotly: the same figures, to zoom and read.

@@ -118,8 +118,7 @@ def compare(
         Whether to forget what was kept when all is done; else the caller does, once it has written
         what is returned, by ``Kept(folder).clear()``.
     progress : bool or callable, optional
-        Whether to show a bar, on a terminal or in a notebook; or who is told how far it is,
-        whenever that changes.
+        Whether to show a bar; or who is told how far it is, whenever that changes.
     found : callable, optional
         Told the leaderboard of the models finished, whenever one is.
     watch : callable, optional

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -12,7 +13,7 @@ import numpy as np
 import pytest
 
 import mckibben
-from mckibben import DataError, ModelError, Recording, example
+from mckibben import DataError, MckibbenError, ModelError, Recording, example
 from mckibben.comparison.results import Leaderboard
 from mckibben.control import track
 from mckibben.registry import load, names
@@ -167,6 +168,15 @@ def test_names_are_shown_verbatim_and_never_obeyed(tmp_path: Path) -> None:
     assert "\x1b" not in card
     evil.plot("time")
     assert "<img" not in evil.interactive("time").layout.yaxis3.title.text
+
+
+@pytest.mark.parametrize(("method", "lacking"), [("plot", "matplotlib"), ("interactive", "plotly")])
+def test_what_draws_it_may_be_missing(
+    method: str, lacking: str, train: Recording, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, lacking, None)  # as if it were not installed
+    with pytest.raises(MckibbenError, match=r"pip install .*mckibben\[(figures|notebook)\]"):
+        getattr(train, method)()
 
 
 def test_a_recording_of_several_muscles_and_one_without_motion() -> None:

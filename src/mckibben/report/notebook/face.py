@@ -13,6 +13,7 @@ from mckibben.errors import DataError, ModelError
 from mckibben.report import interactive, printed
 from mckibben.report.drawing import Drawing
 from mckibben.report.notebook.card import Card
+from mckibben.system.extras import demand
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -59,6 +60,7 @@ class Face(ABC):
 
     def plot(self, kind: str | None, ax: Any, choices: Mapping[str, Any]) -> Axes | list[Axes]:
         """Draw a figure of it with matplotlib; see `DrawsItself.plot`."""
+        demand("matplotlib", "figures", "plots")
         from matplotlib import rc_context
 
         drawing = self.drawing(kind, choices)
@@ -77,6 +79,7 @@ class Face(ABC):
 
     def interactive(self, kind: str | None, choices: Mapping[str, Any]) -> Any:
         """Draw a figure of it with plotly; see `DrawsItself.interactive`."""
+        demand("plotly", "notebook", "interactive figures")
         from plotly.graph_objects import Figure
 
         drawing = replace(self.drawing(kind, choices), stacked=True)

@@ -6,13 +6,14 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from mckibben.arrays import Array
 from mckibben.errors import DataError
+from mckibben.system.showing import DrawsItself
 
 STANDARD_UNITS: Mapping[str, str] = MappingProxyType(
     {
@@ -44,7 +45,7 @@ def standard_unit(channel: str) -> str | None:
 
 
 @dataclass(frozen=True, eq=False)
-class Recording:
+class Recording(DrawsItself):
     """Samples of one run, on a uniform time grid.
 
     Parameters
@@ -67,6 +68,8 @@ class Recording:
         On channels of unequal length, fewer than two samples, values that are not finite, a
         standard channel in another unit than the package's, or a sample time that is not positive.
     """
+
+    face: ClassVar[str] = "recording"
 
     channels: Mapping[str, Array]
     sample_time: float | None = None
@@ -123,6 +126,9 @@ class Recording:
         listed = ", ".join(f"{name} [{self.units[name] or '-'}]" for name in self.channels)
         grid = "no time" if self.sample_time is None else f"{self.sample_time:g} s apart"
         return f"Recording({self.name}: {self.n_samples} samples {grid}; {listed})"
+
+    def __str__(self) -> str:
+        return repr(self)
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Recording):

@@ -231,6 +231,17 @@ PLUGINS: dict[str, dict[str, str | Preset]] = {
         "state-network": "mckibben.estimators.dynamic.state_network:StateNetworkEstimator",
         "tsfnn": "mckibben.estimators.coupled.sdchm:TSFNNEstimator",
     },
+    "faces": {
+        "block": "mckibben.report.notebook.models:BlockFace",
+        "characterization": "mckibben.report.notebook.findings:CharacterizationFace",
+        "leaderboard": "mckibben.report.notebook.boards:LeaderboardFace",
+        "recording": "mckibben.report.notebook.recordings:RecordingFace",
+        "review": "mckibben.report.notebook.findings:ReviewFace",
+        "rig": "mckibben.report.notebook.rigs:RigFace",
+        "study": "mckibben.report.notebook.boards:StudyFace",
+        "tracked": "mckibben.report.notebook.findings:TrackedFace",
+        "validation": "mckibben.report.notebook.findings:ValidationFace",
+    },
     "papers": {
         "activation-pressure": "mckibben.papers.activation_pressure.rerun:activation_pressure",
         "field-models": "mckibben.papers.field_models.rerun:field_models",

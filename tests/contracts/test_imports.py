@@ -65,7 +65,8 @@ STANDS_ON = {
     "stream": {"stream", "blocks", "arrays", "errors"},
     "link": {"link", "export", "blocks", "arrays", "errors"},
     "control": {
-        *("control", "blocks", "recording", "signals", "arrays", "errors", "registry", "numerals"),
+        *("control", "blocks", "recording", "signals"),
+        *("arrays", "errors", "registry", "numerals", "system"),
     },
     "environments": {
         *("environments", "control", "blocks", "rigs", "recording", "signals", "arrays", "errors"),

@@ -53,6 +53,12 @@ def test_every_block_is_registered() -> None:
     assert concrete(Block, "blocks") == registered("blocks")
 
 
+def test_every_face_is_registered() -> None:
+    from mckibben.report.notebook.face import Face
+
+    assert concrete(Face, "report/notebook") == registered("faces")
+
+
 def test_every_envelope_is_registered() -> None:
     assert concrete(Envelope, "blocks/play_type/envelopes") == registered("envelopes")
 
@@ -109,6 +115,7 @@ def test_every_group_is_checked_here() -> None:
         "controllers",
         "envelopes",
         "estimators",
+        "faces",
         "papers",
         "protocols",
         "published",

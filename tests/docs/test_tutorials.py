@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 import re
+import runpy
 import shlex
-import shutil
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 
-from mckibben import example
 from mckibben.cli.main import run
 
 ROOT = Path(__file__).parents[2]
 TUTORIALS = sorted((ROOT / "docs" / "tutorials").glob("*.md"))
+NOTEBOOKS = runpy.run_path(str(ROOT / "docs" / "notebooks.py"))
+
+SETTING_UP = ("python3 -m venv .venv", ". .venv/bin/activate", "pip install", "uv sync")
+
 BLOCK = re.compile(r"^```(\w+)\n(.*?)^```", flags=re.M | re.S)
 
 
@@ -31,22 +35,46 @@ def command(line: str, monkeypatch: pytest.MonkeyPatch) -> None:
     assert not code, f"{line!r} ended with {code}"
 
 
+def shell(monkeypatch: pytest.MonkeyPatch) -> Any:
+    """Return what runs the cells of a notebook as Jupyter does, commands within this process."""
+    interactive = pytest.importorskip("IPython.core.interactiveshell")
+    config = pytest.importorskip("traitlets.config").Config()
+    config.HistoryManager.enabled = False
+
+    class Shell(interactive.InteractiveShell):  # type: ignore[misc, name-defined]
+        def system(self, line: str) -> None:
+            command(line, monkeypatch)
+
+    return Shell(config=config)
+
+
 @pytest.mark.parametrize("path", TUTORIALS, ids=lambda path: path.stem)
 @pytest.mark.filterwarnings("default")
-def test_tutorial_runs(path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_tutorial_runs_as_a_notebook(
+    path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     if "gymnasium" in path.read_text():
         pytest.importorskip("gymnasium")
-    shutil.copytree(example.FOLDER, tmp_path / "examples")
     monkeypatch.chdir(tmp_path)
-    names: dict[str, object] = {"__name__": "tutorial"}
-    blocks = BLOCK.findall(path.read_text(encoding="utf-8"))
-    assert blocks, "a tutorial without anything to run"
-    for language, text in blocks:
-        if language == "bash":
-            for line in filter(None, text.splitlines()):
-                command(line, monkeypatch)
-        elif language == "python":
-            exec(compile(text, path.name, "exec"), names)
+    cells = [text for kind, text in NOTEBOOKS["cells"](path) if kind == "code"]
+    assert cells, "a tutorial without anything to run"
+    running = shell(monkeypatch)
+    for cell in cells:
+        running.run_cell(cell).raise_error()
+
+
+def test_notebooks_are_what_jupyter_reads(tmp_path: Path) -> None:
+    nbformat = pytest.importorskip("nbformat")
+    folder = tmp_path / "notebooks"
+    written = NOTEBOOKS["write"](folder)
+    assert len(written) == len(TUTORIALS)
+    for path in written:
+        found = nbformat.read(path, as_version=4)
+        nbformat.validate(found)
+        for cell in found.cells:
+            for target in re.findall(r"\]\(([^)#\s]+)", cell.source):
+                if cell.cell_type == "markdown" and not target.startswith("http"):
+                    assert (folder / target).exists(), f"{path.name}: {target}"
 
 
 def test_every_tutorial_is_in_the_index() -> None:
@@ -65,10 +93,24 @@ def test_links_between_pages_lead_somewhere() -> None:
                 assert (page.parent / target).exists(), f"{page.name}: {target}"
 
 
-def test_what_readme_shows_of_python_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_readme_runs_as_it_stands_from_top_to_bottom(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     text = (ROOT / "README.md").read_text(encoding="utf-8")
-    first = next(body for language, body in BLOCK.findall(text) if language == "python")
-    shutil.copytree(example.FOLDER, tmp_path / "examples")
+    text = re.sub(r"<!-- test -->\n```bash\n.*?```\n", "", text, flags=re.S)  # this very suite
+    matplotlib = pytest.importorskip("matplotlib")
+    matplotlib.use("Agg")
     monkeypatch.chdir(tmp_path)
-    exec(compile(first, "README.md", "exec"), {"__name__": "readme"})
-    assert (tmp_path / "model.json").is_file()
+    names: dict[str, object] = {"__name__": "readme"}
+    blocks = BLOCK.findall(text)
+    assert blocks
+    for language, body in blocks:
+        if language == "python":
+            exec(compile(body, "README.md", "exec"), names)
+            continue
+        for line in filter(None, body.splitlines()):
+            for part in line.split(" && "):
+                if not part.startswith(SETTING_UP):
+                    command(part.partition(" > ")[0], monkeypatch)
+    for made in ("study/report.html", "inverse.json", "muscle", "loops.png", "loop.html"):
+        assert (tmp_path / made).exists()

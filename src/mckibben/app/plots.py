@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 import re
 from functools import cache
 from importlib import resources
@@ -70,8 +69,7 @@ def _resolved(value: Any, palette: dict[str, str]) -> Any:
     """Return plain numbers for packed ones, and colours for their names."""
     if isinstance(value, dict):
         if set(value) == {"base", "f4"}:
-            numbers = np.frombuffer(base64.b64decode(value["f4"]), dtype="<f4").astype(float)
-            return _listed(numbers + value["base"])
+            return _listed(interactive.unpacked(value))
         return {key: _resolved(item, palette) for key, item in value.items()}
     if isinstance(value, list | tuple):
         return [_resolved(item, palette) for item in value]

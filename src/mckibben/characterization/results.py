@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, fields
-from typing import Any
+from typing import Any, ClassVar
 
 from mckibben.characterization.evidence import LEVEL
 from mckibben.characterization.loops import Cycle
+from mckibben.system.showing import DrawsItself
 
 Range = tuple[float, float]
 
 
 @dataclass(frozen=True)
-class Characterization:
+class Characterization(DrawsItself):
     """What a muscle does, from recordings alone; None for what they cannot tell.
 
     ``table()`` explains every number, ``sentences`` says the most important ones in words. Units are
@@ -70,6 +71,8 @@ class Characterization:
         How likely noise alone would show as much dependence of the output on the input, and on its
         direction beside a curve without memory; None where there are too few samples.
     """
+
+    face: ClassVar[str] = "characterization"
 
     input: str
     output: str

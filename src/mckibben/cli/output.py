@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import sys
 from collections.abc import Callable, Iterator, Sequence
@@ -107,7 +108,8 @@ def progress_bar(what: str, *, plainly: bool = False) -> Iterator[Callable[[floa
     plainly : bool
         Whether to print a line for every step where standard error is no terminal; else nothing.
     """
-    if sys.stderr is None or not sys.stderr.isatty():
+    in_notebook = "JPY_PARENT_PID" in os.environ  # has a terminal that cannot go back in a line
+    if sys.stderr is None or not sys.stderr.isatty() or in_notebook:
         last = -1.0
 
         def line(share: float, text: str) -> None:

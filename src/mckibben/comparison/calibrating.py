@@ -17,6 +17,7 @@ from mckibben.comparison.shared_stretches import GRAVE, refuse_copies, shared_st
 from mckibben.comparison.splits import listed
 from mckibben.errors import DataError, ModelError, ModelWarning
 from mckibben.recording import Recording
+from mckibben.system.progress import Tell, one_by_one, telling
 
 FEWEST = 20
 """Samples of a run that anything is told by."""
@@ -31,6 +32,7 @@ def calibrate(
     *,
     exchangeable: Unit = "auto",
     fitted: Sequence[Recording] = (),
+    progress: bool | Tell | None = None,
 ) -> Banded:
     """Return a model with bands that hold on new runs, if these are like the recordings.
 
@@ -52,6 +54,8 @@ def calibrate(
         By default runs from 20 on, else blocks, and a warning says so.
     fitted : sequence of Recording, optional
         Those that it was fitted to, to make sure that none is among the recordings.
+    progress : bool or callable, optional
+        Whether to show a bar; or who is told the share done, and words.
 
     Returns
     -------
@@ -80,7 +84,10 @@ def calibrate(
     ['pressure', 'displacement', 'displacement_lower', 'displacement_upper']
     """
     runs = listed(recordings)
-    banded, found = calibration(model, runs, exchangeable=exchangeable, fitted=listed(fitted))
+    with telling(progress, "calibrating") as tell:
+        banded, found = calibration(
+            model, runs, exchangeable=exchangeable, fitted=listed(fitted), tell=tell
+        )
     for note in found.notes:
         warnings.warn(note, ModelWarning, stacklevel=2)
     return banded
@@ -92,6 +99,7 @@ def calibration(
     *,
     exchangeable: Unit = "auto",
     fitted: Sequence[Recording] = (),
+    tell: Tell | None = None,
 ) -> tuple[Banded, Found]:
     """Return a model with its band, and what is to be said of it; see `calibrate`."""
     model = inside(model)
@@ -133,7 +141,7 @@ def calibration(
                 remedy="record while it moves, or name another column with --column",
             )
     _check_apart(fitted, recordings, inputs, outputs)
-    held = [held_of(model, recording, outputs) for recording in recordings]
+    held = [held_of(model, recording, outputs) for recording in one_by_one(recordings, tell)]
     found = find_band(model, held, exchangeable)
     return Banded(model, found.band), found
 

@@ -27,6 +27,7 @@ from mckibben.estimators.core.estimator import Estimator
 from mckibben.estimators.core.single import SingleEstimator
 from mckibben.estimators.coupled.base import CoupledEstimator
 from mckibben.recording import Recording
+from mckibben.system.progress import Tell, telling
 from mckibben.system.workers import checked
 
 GRIDS: Mapping[str, Mapping[str, tuple[Any, ...]]] = {
@@ -73,6 +74,7 @@ def identify(
     *,
     n_folds: int = 4,
     jobs: int | None = None,
+    progress: bool | Tell | None = None,
     **settings: Any,
 ) -> Choice:
     """Identify a family of models, its orders chosen by cross-validated free-run error.
@@ -89,6 +91,8 @@ def identify(
         Parts of the cross-validation, at least 2.
     jobs : int, optional
         Processes; default as many as there are cores, or none for little work.
+    progress : bool or callable, optional
+        Whether to show a bar; or who is told the share done, and words.
     **settings
         Further settings of the estimator.
 
@@ -119,7 +123,12 @@ def identify(
         Part(family, Item(family, settings | chosen), every, whole=False) for chosen in combinations
     ]
     n = checked(jobs) or processes_for(effort_of(family, data) * len(parts) * len(work))
-    found = {outcome.index: outcome.result() for outcome in outcomes(data, work, n)}
+    found: dict[int, Tried] = {}
+    with telling(progress, f"identifying {family}") as tell:
+        for outcome in outcomes(data, work, n):
+            found[outcome.index] = outcome.result()
+            if tell is not None:
+                tell(len(found) / len(work), f"{len(found)} of {len(work)} orders")
     tried = [(chosen, *_error(found[place])) for place, chosen in enumerate(combinations)]
     chosen, lowest, reason = min(tried, key=lambda item: item[1])
     if not np.isfinite(lowest):

@@ -38,6 +38,7 @@ from mckibben.comparison.trying import (
 )
 from mckibben.errors import ModelError
 from mckibben.recording import Recording
+from mckibben.system.progress import telling
 from mckibben.system.workers import checked
 
 Watch = Callable[[str, float, float], None]
@@ -60,7 +61,7 @@ def compare(
     allow_shared: bool = False,
     folder: str | Path | None = None,
     clear: bool = True,
-    progress: Callable[[Standing], None] | None = None,
+    progress: bool | Callable[[Standing], None] | None = None,
     found: Callable[[Leaderboard], None] | None = None,
     watch: Watch | None = None,
 ) -> Leaderboard:
@@ -116,8 +117,8 @@ def compare(
     clear : bool
         Whether to forget what was kept when all is done; else the caller does, once it has written
         what is returned, by ``Kept(folder).clear()``.
-    progress : callable, optional
-        Told how far it is whenever that changes.
+    progress : bool or callable, optional
+        Whether to show a bar; or who is told how far it is, whenever that changes.
     found : callable, optional
         Told the leaderboard of the models finished, whenever one is.
     watch : callable, optional
@@ -151,9 +152,10 @@ def compare(
     )
     kept, board = plan.kept(folder), plan.board()
     try:
-        with closing(
-            ranked(plan, jobs=jobs, kept=kept, progress=progress, watch=watch)
-        ) as rankings:
+        with (
+            telling(progress, "comparing") as tell,
+            closing(ranked(plan, jobs=jobs, kept=kept, progress=tell, watch=watch)) as rankings,
+        ):
             for ranking in rankings:
                 board = ranking.board
                 if found is not None:

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from mckibben.comparison.choosing import Choice
 from mckibben.comparison.recommending import recommended
 from mckibben.comparison.row import Row
+from mckibben.system.showing import DrawsItself
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -26,8 +27,8 @@ CHOICES = {
 """What a model may be chosen by: the heading of its figure, and in words. The test is not among them."""
 
 
-@dataclass(frozen=True)
-class Leaderboard:
+@dataclass(frozen=True, repr=False)
+class Leaderboard(DrawsItself):
     """Models chosen on the training side, and their errors on data not used to fit or to choose.
 
     Parameters
@@ -62,6 +63,8 @@ class Leaderboard:
         What choosing among so many costs; None without a cross-validation to resample.
     """
 
+    face: ClassVar[str] = "leaderboard"
+
     inputs: tuple[str, ...]
     outputs: tuple[str, ...]
     unit: str
@@ -78,6 +81,9 @@ class Leaderboard:
     constant: Row | None = None
     shared: tuple[str, ...] = ()
     choice: Choice | None = None
+
+    def __repr__(self) -> str:
+        return str(self)
 
     @property
     def input(self) -> str:

@@ -24,6 +24,11 @@ class Standing:
     fitting: tuple[str, ...] = ()
     best: str = ""
 
+    @property
+    def share(self) -> float:
+        """Models done, of all."""
+        return self.done / max(self.total, 1)
+
     def __str__(self) -> str:
         """Return it as a person would say it.
 

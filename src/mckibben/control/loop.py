@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import Any, ClassVar, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,6 +20,8 @@ from mckibben.control.twin import Twin, plain
 from mckibben.errors import DataError, ModelError
 from mckibben.recording import Recording, standard_unit
 from mckibben.signals.checking import generator
+from mckibben.system.progress import telling
+from mckibben.system.showing import DrawsItself
 
 
 class Plant(Protocol):
@@ -51,7 +53,7 @@ class Plant(Protocol):
 
 
 @dataclass(frozen=True)
-class Tracked:
+class Tracked(DrawsItself):
     """What came of a loop.
 
     Parameters
@@ -72,6 +74,8 @@ class Tracked:
         Root mean square of what a twin with a band drew over that time [mm or N]; it draws nothing in
         the approach.
     """
+
+    face: ClassVar[str] = "tracked"
 
     recording: Recording
     rmse: Mapping[str, float]
@@ -106,7 +110,7 @@ def track(
     slew: float | None = None,
     preview: float | None = None,
     seed: int = 0,
-    progress: Callable[[float], None] | None = None,
+    progress: bool | Callable[[float], None] | None = None,
 ) -> Tracked:
     """Let a controller make a plant's displacements, or its force, follow references.
 
@@ -138,8 +142,8 @@ def track(
         the samples of their horizon earlier still.
     seed : int
         Of all noise.
-    progress : callable, optional
-        Told the share of the time that has passed.
+    progress : bool or callable, optional
+        Whether to show a bar; or who is told the share of the time that has passed.
 
     Returns
     -------
@@ -200,39 +204,40 @@ def track(
     clipped, times = np.zeros(n, dtype=bool), np.empty(n)
     drawn = np.zeros_like(seen)
     last: Array | None = None
-    for t in range(n):
-        seen[t] = measured
-        if isinstance(changed, Twin):
-            drawn[t] = changed.drawn
-        late = [*late[1:], measured]
-        felt = late[0][at_y] + noise * rng.standard_normal(len(at_y))
-        readings = dict(zip(changed.outputs, late[0].tolist(), strict=True))
-        readings |= dict(zip(followed, felt.tolist(), strict=True))
-        started = time.perf_counter()
-        controller.reads(readings)
-        if further > 0:
-            then = min(t + further, n - 1)
-            controller.foresees(path[then], scheduled[then])
-        wanted = controller.step(path[t], felt, scheduled[t])
-        times[t] = time.perf_counter() - started
-        if wanted.shape != low.shape or not np.isfinite(wanted).all():
-            raise ModelError(
-                f"the controller gave {wanted} for {len(driven)} muscles at {t * step:g} s. "
-                "Remedy: use a compensator made for this plant."
-            )
-        allowed = np.clip(wanted, low, high)
-        if slew is not None and last is not None:
-            allowed = np.clip(allowed, last - slew * step, last + slew * step)
-        clipped[t] = bool((np.abs(allowed - wanted) > 1e-9).any())
-        last = allowed
-        controller.applied(allowed)
-        command = loop.step(allowed, measured[at_p]) if inner else allowed
-        commands[t] = command
-        action = dict(zip(driven, command.tolist(), strict=True))
-        action |= dict(zip(held, scheduled[t].tolist(), strict=True))
-        measured = changed.step(action)
-        if progress is not None and t % 200 == 0:
-            progress(t / n)
+    with telling(progress, "tracking") as tell:
+        for t in range(n):
+            seen[t] = measured
+            if isinstance(changed, Twin):
+                drawn[t] = changed.drawn
+            late = [*late[1:], measured]
+            felt = late[0][at_y] + noise * rng.standard_normal(len(at_y))
+            readings = dict(zip(changed.outputs, late[0].tolist(), strict=True))
+            readings |= dict(zip(followed, felt.tolist(), strict=True))
+            started = time.perf_counter()
+            controller.reads(readings)
+            if further > 0:
+                then = min(t + further, n - 1)
+                controller.foresees(path[then], scheduled[then])
+            wanted = controller.step(path[t], felt, scheduled[t])
+            times[t] = time.perf_counter() - started
+            if wanted.shape != low.shape or not np.isfinite(wanted).all():
+                raise ModelError(
+                    f"the controller gave {wanted} for {len(driven)} muscles at {t * step:g} s. "
+                    "Remedy: use a compensator made for this plant."
+                )
+            allowed = np.clip(wanted, low, high)
+            if slew is not None and last is not None:
+                allowed = np.clip(allowed, last - slew * step, last + slew * step)
+            clipped[t] = bool((np.abs(allowed - wanted) > 1e-9).any())
+            last = allowed
+            controller.applied(allowed)
+            command = loop.step(allowed, measured[at_p]) if inner else allowed
+            commands[t] = command
+            action = dict(zip(driven, command.tolist(), strict=True))
+            action |= dict(zip(held, scheduled[t].tolist(), strict=True))
+            measured = changed.step(action)
+            if tell is not None and t % 200 == 0:
+                tell(t / n)
     # what was asked for at a step is due at the next
     due = np.concatenate([path[:1], path[:-1]])
     errors = seen[:, at_y] - due

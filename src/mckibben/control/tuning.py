@@ -17,6 +17,7 @@ from mckibben.blocks.feedback.pid import PIDFeedback
 from mckibben.control.loop import Plant, actuated
 from mckibben.errors import ModelError
 from mckibben.recording import standard_unit
+from mckibben.system.progress import Tell, one_by_one, telling
 
 STEP = 0.1
 """Of pressure, relative to its range."""
@@ -30,6 +31,7 @@ def tune_pid(
     hold: float = 15.0,
     scheduled: dict[str, float] | None = None,
     seed: int = 0,
+    progress: bool | Tell | None = None,
 ) -> PIDFeedback:
     """Return PID feedback tuned on a plant.
 
@@ -47,6 +49,8 @@ def tune_pid(
         Other inputs, held.
     seed : int
         Of the noise.
+    progress : bool or callable, optional
+        Whether to show a bar; or who is told the share of the muscles done, and words.
 
     Raises
     ------
@@ -63,22 +67,23 @@ def tune_pid(
     }
     n = round(hold / sample_time)
     gains, references = [], []
-    for name, limit in zip(driven, limits, strict=True):
-        rig.reset(seed)
-        followed = name.replace("pressure", "displacement").replace("voltage", "displacement")
-        if followed not in rig.outputs:
-            raise ModelError(
-                f"PID follows a displacement, and {plant.name} gives {', '.join(rig.outputs)}. "
-                "Remedy: use the compensator alone, or another rig."
-            )
-        references.append(followed)
-        place = rig.outputs.index(followed)
-        for _ in range(n):
-            before = rig.step({**middle, **scheduled})[place]
-        size = STEP * (limit.high - limit.low)
-        moved = {**middle, name: middle[name] + size, **scheduled}
-        response = np.array([rig.step(moved)[place] for _ in range(n)]) - before
-        gains.append(_simc(response, size, sample_time, closed_loop_time, name))
+    with telling(progress, "tuning") as tell:
+        for name, limit in one_by_one(zip(driven, limits, strict=True), tell):
+            rig.reset(seed)
+            followed = name.replace("pressure", "displacement").replace("voltage", "displacement")
+            if followed not in rig.outputs:
+                raise ModelError(
+                    f"PID follows a displacement, and {plant.name} gives {', '.join(rig.outputs)}. "
+                    "Remedy: use the compensator alone, or another rig."
+                )
+            references.append(followed)
+            place = rig.outputs.index(followed)
+            for _ in range(n):
+                before = rig.step({**middle, **scheduled})[place]
+            size = STEP * (limit.high - limit.low)
+            moved = {**middle, name: middle[name] + size, **scheduled}
+            response = np.array([rig.step(moved)[place] for _ in range(n)]) - before
+            gains.append(_simc(response, size, sample_time, closed_loop_time, name))
     kp, ki = zip(*gains, strict=True)
     lowest, highest = min(limit.low for limit in limits), max(limit.high for limit in limits)
     return PIDFeedback.of(

@@ -24,6 +24,7 @@ from mckibben.excitation.search import Progress, Search
 from mckibben.recording import Recording, standard_unit
 from mckibben.rigs import Rig, load_rig
 from mckibben.signals.checking import generator
+from mckibben.system.progress import telling
 from mckibben.system.threads import one_blas_thread
 
 SHARE_OF_WAYS = 0.25
@@ -43,7 +44,7 @@ def plan(
     limits: Mapping[str, Sequence[float | None]] | None = None,
     goal: str | None = None,
     seed: int = 0,
-    progress: Progress | None = None,
+    progress: bool | Progress | None = None,
 ) -> Plan:
     """Return what to record next.
 
@@ -67,8 +68,8 @@ def plan(
         Part of the names of parameters whose errors are to shrink, rather than predictions'.
     seed : int
         Of everything random.
-    progress : callable, optional
-        Told the share done, and how things stand.
+    progress : bool or callable, optional
+        Whether to show a bar; or who is told the share done, and how things stand.
 
     Raises
     ------
@@ -113,9 +114,9 @@ def plan(
         within_hardware({name: within[name] for name in plant.inputs if name in within}, plant)
     possible(within, 60 * minutes)
     try:
-        with one_blas_thread():
+        with one_blas_thread(), telling(progress, "planning") as tell:
             prospect = prospect_of(belief, within, 60 * minutes, goal, seed)
-            return Search(prospect, seed, progress).found(belief, goal)
+            return Search(prospect, seed, tell).found(belief, goal)
     except (ArithmeticError, np.linalg.LinAlgError) as error:
         raise ModelError(
             f"{belief.block.kind!r} does not run free within these limits ({error}). "

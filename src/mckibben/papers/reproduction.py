@@ -13,6 +13,7 @@ import numpy as np
 from mckibben import registry
 from mckibben.arrays import Array
 from mckibben.comparison.kept import Kept
+from mckibben.system.progress import telling
 from mckibben.system.threads import one_blas_thread
 
 Cell = str | float | None
@@ -130,7 +131,7 @@ def reproduce(
     jobs: int | None = None,
     folder: str | Path | None = None,
     clear: bool = True,
-    progress: Progress | None = None,
+    progress: bool | Progress | None = None,
     **own: Any,
 ) -> Reproduction:
     """Run a paper's experiment again.
@@ -151,8 +152,8 @@ def reproduce(
     clear : bool
         Whether to forget what was kept when all is done; else the caller does, once it has written
         what is returned, by ``Kept(folder).clear()``.
-    progress : callable, optional
-        Told the share of the work done, and what is next.
+    progress : bool or callable, optional
+        Whether to show a bar; or who is told the share of the work done, and what is next.
     **own
         What the paper's function takes beside: ``train`` and ``test`` of ``field-models``.
 
@@ -163,12 +164,12 @@ def reproduce(
     """
     run = registry.load("papers", name)
     kept = Kept(folder, name, quick, seed)
-    with one_blas_thread():
+    with one_blas_thread(), telling(progress, name) as tell:
         found: Reproduction = run(
             quick=quick,
             seed=seed,
             jobs=jobs,
-            tell=progress or (lambda share, text: None),
+            tell=tell or (lambda share, text: None),
             kept=kept,
             **own,
         )

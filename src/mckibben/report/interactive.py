@@ -6,7 +6,7 @@ which depend on whether the page is dark or light.
 
 from __future__ import annotations
 
-from base64 import b64encode
+from base64 import b64decode, b64encode
 from html import escape
 from typing import Any
 
@@ -53,6 +53,11 @@ def packed(values: Array) -> Json:
     finite = values[np.isfinite(values)]
     base = float(finite[0]) if finite.size else 0.0
     return {"base": base, "f4": b64encode((values - base).astype("<f4").tobytes()).decode("ascii")}
+
+
+def unpacked(numbers: Json) -> Array:
+    """Return numbers that are `packed`, as the page's script does."""
+    return np.frombuffer(b64decode(numbers["f4"]), dtype="<f4").astype(float) + numbers["base"]
 
 
 def text(words: str) -> str:

@@ -147,7 +147,7 @@ def drawn(drawing: Drawing) -> Figure:
     figure = Figure(figsize=(width, height), layout="constrained")
     axes = figure.subplots(rows, columns, squeeze=False, sharex=drawing.stacked).ravel()
     for place, (panel, axis) in enumerate(zip(drawing.panels, axes, strict=False)):
-        _panel(axis, panel, bottom=not drawing.stacked or place == n - 1)
+        draw_panel(axis, panel, bottom=not drawing.stacked or place == n - 1)
     for axis in axes[n:]:
         axis.set_axis_off()
     if drawing.note:
@@ -160,7 +160,8 @@ def verbatim(words: str) -> str:
     return "".join(letter if letter.isprintable() else " " for letter in words)
 
 
-def _panel(axis: Axes, panel: Panel, bottom: bool) -> None:
+def draw_panel(axis: Axes, panel: Panel, bottom: bool) -> None:
+    """Draw a panel into axes, with the label of x where it is the lowest of a stack."""
     if panel.zero:
         axis.axhline(0, color="#aaaaaa", linewidth=0.6, zorder=0)
     for curve in panel.curves:

@@ -19,16 +19,19 @@ from mckibben.rigs.parameters import AGEING, Air, Muscle, Range, Section, Sensor
 from mckibben.rigs.refusals import refused
 from mckibben.rigs.system import Demands, State, System, Traces
 from mckibben.signals.checking import generator
+from mckibben.system.showing import DrawsItself
 
 ROOM_TEMPERATURE = 20.0
 """Where every muscle starts [degC]."""
 
 
-class Rig(Section, ABC):
+class Rig(DrawsItself, Section, ABC):
     """What every rig has, whatever its set-up.
 
     Run it over a recording of commands with `run`, or sample by sample with `reset` and `step`.
     """
+
+    face: ClassVar[str] = "rig"
 
     setup: str = parameter("which physics: the name of the set-up")
     name: str = parameter("short name", min_length=1, pattern=r"^[a-z0-9][a-z0-9-]*$")
@@ -81,6 +84,10 @@ class Rig(Section, ABC):
                     f"{limits.low:g} to {limits.high:g}"
                 )
         return self
+
+    def __repr__(self) -> str:
+        given, measured = ", ".join(self.inputs), ", ".join(self.outputs)
+        return f"{type(self).__name__}({self.name}: {given} to {measured})"
 
     # --- what a set-up says
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -20,6 +20,7 @@ from mckibben.studying.closed import each_closed
 from mckibben.studying.log import Loop, has_reference, loop_of
 from mckibben.studying.refitting import Refit, refitted
 from mckibben.studying.shifts import Delay, shifted
+from mckibben.system.showing import DrawsItself
 from mckibben.validation.check import check_runs
 from mckibben.validation.regression import Regression
 from mckibben.validation.residuals import Run, check_usable
@@ -99,7 +100,7 @@ class Followed:
 
 
 @dataclass(frozen=True, eq=False)
-class Review:
+class Review(DrawsItself):
     """What a robot's log says of the compensator that ran.
 
     Parameters
@@ -122,6 +123,8 @@ class Review:
     notes : tuple of str
         What to know of the log.
     """
+
+    face: ClassVar[str] = "review"
 
     logs: tuple[str, ...]
     model: str

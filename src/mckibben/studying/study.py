@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 from mckibben.arrays import Array
 from mckibben.blocks.core.block import Block
@@ -26,12 +26,14 @@ from mckibben.studying.checking import check_on_test
 from mckibben.studying.inverting import InverseCheck, invert_best
 from mckibben.studying.loops import closed_loops, published_rig
 from mckibben.studying.reviewing import Review, review
+from mckibben.system.progress import telling
+from mckibben.system.showing import DrawsItself
 from mckibben.validation.describing import ModelDescription, describe
 from mckibben.validation.results import Validation
 
 
-@dataclass(frozen=True)
-class Study:
+@dataclass(frozen=True, repr=False)
+class Study(DrawsItself):
     """Everything that ``mckibben study`` finds.
 
     Parameters
@@ -64,6 +66,8 @@ class Study:
         How the loop that was logged followed its reference, where model or compensator are given.
     """
 
+    face: ClassVar[str] = "study"
+
     train: tuple[Recording, ...]
     test: tuple[Recording, ...]
     characterization: Characterization | None
@@ -78,6 +82,9 @@ class Study:
     check: Validation | str | None = None
     description: ModelDescription | None = field(default=None, repr=False)
     review: Review | None = None
+
+    def __repr__(self) -> str:
+        return str(self)
 
     @property
     def input(self) -> str:
@@ -121,7 +128,7 @@ def study(
     allow_shared: bool = False,
     folder: str | Path | None = None,
     clear: bool = True,
-    progress: Callable[[Standing], None] | None = None,
+    progress: bool | Callable[[Standing], None] | None = None,
     found: Callable[[Study], None] | None = None,
     notes: Sequence[str] = (),
     model: Block | None = None,
@@ -206,7 +213,10 @@ def study(
     if found is not None:
         found(so_far)
     try:
-        with closing(ranked(plan, jobs=jobs, kept=kept, progress=progress)) as rankings:
+        with (
+            telling(progress, "studying") as tell,
+            closing(ranked(plan, jobs=jobs, kept=kept, progress=tell)) as rankings,
+        ):
             for ranking in rankings:
                 so_far = replace(so_far, leaderboard=ranking.board, predictions=ranking.outputs)
                 if ranking.board.pending and found is not None:

@@ -12,6 +12,7 @@ from mckibben.blocks.core.block import Block
 from mckibben.comparison.splits import listed
 from mckibben.recording import Recording
 from mckibben.signals.reversals import noise_level, reversals
+from mckibben.system.progress import Tell, one_by_one, telling
 from mckibben.validation import judging
 from mckibben.validation.crossing import Crossing, crossing
 from mckibben.validation.k_step import errors_ahead
@@ -35,7 +36,12 @@ FORGOTTEN = np.exp(-1.0)
 """Correlation below which noise has forgotten."""
 
 
-def check(model: Block, recordings: Recording | Sequence[Recording]) -> Validation:
+def check(
+    model: Block,
+    recordings: Recording | Sequence[Recording],
+    *,
+    progress: bool | Tell | None = None,
+) -> Validation:
     """Say whether a model is right on recordings, and what it misses if it is not.
 
     The model runs free, from an honest start of its memory. What it leaves is tested for being white;
@@ -50,6 +56,8 @@ def check(model: Block, recordings: Recording | Sequence[Recording]) -> Validati
     recordings : Recording or sequence of Recording
         With all inputs and outputs of the model; of one sample time. They tell most where the model
         was fitted to others.
+    progress : bool or callable, optional
+        Whether to show a bar; or who is told the share done, and words.
 
     Returns
     -------
@@ -65,10 +73,11 @@ def check(model: Block, recordings: Recording | Sequence[Recording]) -> Validati
         Where the model's output is not finite, or runs away.
     """
     model = inside(model)
-    return check_runs(model, runs_of(model, listed(recordings)))
+    with telling(progress, "checking") as tell:
+        return check_runs(model, runs_of(model, listed(recordings)), tell)
 
 
-def check_runs(model: Block, runs: Sequence[Run]) -> Validation:
+def check_runs(model: Block, runs: Sequence[Run], tell: Tell | None = None) -> Validation:
     """Check a model by what it made of recordings, running free; see `check`."""
     every = block_length(model, runs)
     tested = [run for run in runs if len(run.inputs) // every >= FEWEST_BLOCKS] or list(runs)
@@ -77,7 +86,8 @@ def check_runs(model: Block, runs: Sequence[Run]) -> Validation:
         names = ", ".join(run.recording.name for run in runs if run not in tested)
         notes.append(f"too short beside the others to be tested, so left out of most: {names}")
     outputs = tuple(
-        _output(model, runs, tested, every, place) for place in range(len(model.outputs))
+        _output(model, runs, tested, every, place)
+        for place in one_by_one(range(len(model.outputs)), tell)
     )
     return Validation(
         model.kind, tuple(run.recording.name for run in runs), outputs, tuple(notes), tuple(runs)

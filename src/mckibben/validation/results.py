@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
+from mckibben.system.showing import ShowsItself
 from mckibben.validation.crossing import Crossing
 from mckibben.validation.k_step import Ahead
 from mckibben.validation.level import LEVEL
@@ -199,7 +200,7 @@ STEP = 0.5
 
 
 @dataclass(frozen=True, eq=False)
-class Validation:
+class Validation(ShowsItself):
     """Whether a model is right on recordings, and what it misses.
 
     Parameters
@@ -214,6 +215,8 @@ class Validation:
     runs : tuple of Run
         The recordings, and what the model makes of them; not in ``to_dict``.
     """
+
+    face: ClassVar[str] = "validation"
 
     model: str
     recordings: tuple[str, ...]

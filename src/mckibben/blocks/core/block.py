@@ -25,18 +25,21 @@ from mckibben.blocks.core.running import Stream, run_many
 from mckibben.errors import DataError, ModelError
 from mckibben.recording import Recording
 from mckibben.system.compiling import bound
+from mckibben.system.showing import DrawsItself
 
 Run = Callable[[], None]
 Kernel = Callable[..., None]
 
 
-class Block(Exportable, Parametrised, HandsOver):
+class Block(DrawsItself, Exportable, Parametrised, HandsOver):
     """An immutable parameter set with dynamics.
 
     Concrete blocks are frozen dataclasses, registered under `kind`. They know their inputs and
     outputs, their state, how to run, and where it exists their exact inverse. They know nothing of
     data or fitting.
     """
+
+    face: ClassVar[str] = "block"
 
     rate_dependent: ClassVar[bool] = False
     """Whether the sample time matters to any block of this class."""

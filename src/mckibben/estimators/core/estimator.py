@@ -22,6 +22,7 @@ from mckibben.estimators.core.uncertainty import covariance_of, simulate_all, un
 from mckibben.estimators.optimisers.tracker import Progress, Tracker
 from mckibben.recording import Recording
 from mckibben.signals.checking import LARGEST_SEED
+from mckibben.system.progress import telling
 from mckibben.system.threads import one_blas_thread
 
 Operators = Annotated[int, Interval(ge=1, le=1000)]
@@ -138,7 +139,7 @@ class Estimator(Parametrised, ABC):
         *,
         rows: Sequence[Mask] | None = None,
         validation: Sequence[Recording] = (),
-        progress: Progress | None = None,
+        progress: bool | Progress | None = None,
     ) -> Self:
         """Find the block that runs free closest to the recordings.
 
@@ -153,8 +154,8 @@ class Estimator(Parametrised, ABC):
         validation : sequence of Recording
             For searches that stop early; nothing is fitted to them, and most estimators have no use for
             them.
-        progress : callable, optional
-            Told the share of the work done and the best RMSE so far.
+        progress : bool or callable, optional
+            Whether to show a bar; or who is told the share of the work done and the best RMSE so far.
 
         Returns
         -------
@@ -170,8 +171,8 @@ class Estimator(Parametrised, ABC):
         """
         before = dict(vars(self))
         try:
-            with one_blas_thread():
-                return self._fit(recordings, rows, validation, progress)
+            with one_blas_thread(), telling(progress, "fitting") as tell:
+                return self._fit(recordings, rows, validation, tell)
         except BaseException:  # a fit that fails, or is interrupted too early, leaves no traces
             vars(self).clear()
             vars(self).update(before)

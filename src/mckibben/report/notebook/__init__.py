@@ -1,0 +1,1 @@
+"""How things show themselves to those who work in Python: cards, texts and plots."""

@@ -1,0 +1,132 @@
+"""How what was found of a muscle, a model or a loop is shown."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from mckibben.characterization.results import Characterization
+from mckibben.control.loop import Tracked
+from mckibben.errors import DataError, ModelError
+from mckibben.numerals import numeral
+from mckibben.report import model_subjects, review_subjects
+from mckibben.report.drawing import Curve, Drawing, Panel, axis_label
+from mckibben.report.notebook.card import Card
+from mckibben.report.notebook.face import Draw, Face
+from mckibben.studying.reviewing import Review
+from mckibben.validation.results import Validation
+
+QUANTITIES = (
+    *("loop width e_w", "mean branch gap", "asymmetry", "dead zone after upper reversals", "gain"),
+    *("creep", "drift", "rate dependence", "closure error"),
+)
+"""Of a characterization, those that a card has; its table has all."""
+
+
+class CharacterizationFace(Face):
+    """What a muscle does."""
+
+    def __init__(self, found: Characterization) -> None:
+        self.found = found
+
+    def card(self) -> Card:
+        """Return its sentences and main numbers."""
+        found = self.found
+        rows = [
+            (name, numeral(value, 3) if isinstance(value, float) else str(value), unit)
+            for name, value, unit, _ in found.table()
+            if name in QUANTITIES and value is not None
+        ]
+        title = f"Characterization, {found.input} to {found.output}"
+        return Card(title, found.sentences, rows=rows)
+
+    def drawings(self, choices: Mapping[str, Any]) -> Mapping[str, Draw]:
+        """Return the widths of its cycles."""
+        return {"cycles": self.cycles}
+
+    def cycles(self) -> Drawing:
+        """Draw the loop width of every cycle over its amplitude."""
+        cycles = self.found.cycles
+        if not cycles:
+            raise ModelError(
+                "there is no whole cycle to draw. Remedy: record one, from the lowest input and back."
+            )
+        x = np.array([cycle.amplitude for cycle in cycles])
+        y = np.array([cycle.width for cycle in cycles])
+        label = axis_label(f"amplitude of {self.found.input}", self.found.input_unit)
+        return Drawing((Panel(label, "loop width [%]", (Curve(x, y, "", "series-1", "dots"),)),))
+
+
+class TrackedFace(Face):
+    """A loop that was closed."""
+
+    def __init__(self, found: Tracked) -> None:
+        self.found = found
+
+    def card(self) -> Card:
+        """Return its errors."""
+        found = self.found
+        units = found.recording.units
+        rows = [
+            (name, numeral(rmse), numeral(found.largest[name]), units.get(name) or "–")
+            for name, rmse in found.rmse.items()
+        ]
+        notes = [f"{found.clipped} steps at a limit, or beyond reach"] if found.clipped else []
+        notes += [
+            f"{name}: {out.samples} samples beyond {numeral(out.low)} to {numeral(out.high)}"
+            for name, out in found.beyond.items()
+        ]
+        headings = ("followed", "RMSE", "largest error", "unit")
+        return Card("Tracked", (), headings, rows, notes=notes)
+
+    def drawings(self, choices: Mapping[str, Any]) -> Mapping[str, Draw]:
+        """Return reference and motion over time."""
+        return {"time": self.time}
+
+    def time(self, output: str | None = None) -> Drawing:
+        """Draw what was wished for, and what came of it."""
+        output = output or next(iter(self.found.rmse))
+        if output not in self.found.rmse:
+            raise DataError(
+                "this was not followed", channel=output, remedy=f"use {', '.join(self.found.rmse)}"
+            )
+        return model_subjects.tracking({"measured": self.found}, output)
+
+
+class ReviewFace(Face):
+    """What a robot's log says."""
+
+    def __init__(self, found: Review) -> None:
+        self.found = found
+
+    def card(self) -> Card:
+        """Return its verdict, and every cause that counts."""
+        said = (self.found.verdict, *self.found.sentences)
+        return Card("Review", said, notes=self.found.notes)
+
+    def drawings(self, choices: Mapping[str, Any]) -> Mapping[str, Draw]:
+        """Return reference, motion, and what the error is made of."""
+        return {"causes": self.causes}
+
+    def causes(self, output: str | None = None) -> Drawing:
+        """Draw reference and motion, and below the error with the part of every cause."""
+        by_name = {one.output: one for one in self.found.outputs}
+        if output is not None and output not in by_name:
+            raise DataError(
+                "this was not followed", channel=output, remedy=f"use {', '.join(by_name)}"
+            )
+        return review_subjects.causes(by_name[output or next(iter(by_name))])
+
+
+class ValidationFace(Face):
+    """Whether a model is right."""
+
+    def __init__(self, found: Validation) -> None:
+        self.found = found
+
+    def card(self) -> Card:
+        """Return its verdict, and what the model misses."""
+        said = (self.found.verdict, *self.found.sentences)
+        return Card(f"Check of {self.found.model}", said, notes=self.found.notes)

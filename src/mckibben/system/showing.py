@@ -1,0 +1,75 @@
+"""What shows itself: on a terminal, in a notebook, and in plots.
+
+How each kind is shown is in the report, which lies above all that is shown; it is looked up by name
+when it is asked for.
+"""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar
+
+from mckibben.registry import load
+
+
+class ShowsItself:
+    """Prints as a short text within 80 columns, and shows in a notebook as a small card."""
+
+    face: ClassVar[str]
+    """Name of what shows it, in the registry's ``faces``."""
+
+    def __str__(self) -> str:
+        found: str = load("faces", self.face)(self).text()
+        return found
+
+    def _repr_html_(self) -> str:
+        found: str = load("faces", self.face)(self).html()
+        return found
+
+
+class DrawsItself(ShowsItself):
+    """Is drawn, too: the figures of the reports, by name."""
+
+    def plot(self, kind: str | None = None, *, ax: Any = None, **choices: Any) -> Any:
+        """Draw it with matplotlib.
+
+        Parameters
+        ----------
+        kind : str, optional
+            Which figure. Of a recording ``"loop"`` or ``"time"``; of a model ``"loop"``, its answer to a
+            falling triangle, ``"weights"``, or against a ``recording`` ``"loops"``, ``"fit"`` or
+            ``"residuals"``; of a leaderboard ``"errors"`` or, against a ``recording``, as a model; of a
+            rig ``"loop"`` or ``"time"``; of a characterization ``"cycles"``; of a loop that was closed
+            ``"time"``. Default: the first that can be drawn.
+        ax : Axes or sequence of Axes, optional
+            What to draw into, as many as the figure has panels; default a new figure of pyplot.
+        **choices
+            What the figure takes: channels as ``input`` and ``output``, a measured ``recording``.
+
+        Returns
+        -------
+        Axes, or list of Axes of a figure of several panels
+
+        Raises
+        ------
+        ModelError
+            On an unknown kind, or where there is nothing to draw.
+        DataError
+            On absent channels, or another number of axes.
+        """
+        return load("faces", self.face)(self).plot(kind, ax, choices)
+
+    def interactive(self, kind: str | None = None, **choices: Any) -> Any:
+        """Draw it with plotly: the same figures, to zoom and read.
+
+        Parameters
+        ----------
+        kind : str, optional
+            As for `plot`.
+        **choices
+            As for `plot`.
+
+        Returns
+        -------
+        plotly.graph_objects.Figure
+        """
+        return load("faces", self.face)(self).interactive(kind, choices)

@@ -1,0 +1,94 @@
+"""Long work shows how far it is, or tells who asked."""
+
+from __future__ import annotations
+
+import sys
+import types
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+import mckibben
+from mckibben import Recording, example
+from mckibben.control import track, tune_pid
+from mckibben.system.progress import telling
+
+
+@pytest.fixture(scope="module")
+def run() -> Recording:
+    return mckibben.read(example.TRAIN)[0].slice(0, 1500)
+
+
+def model(run: Recording) -> Any:
+    return mckibben.PIEstimator(n_operators=4).fit(run).model_
+
+
+WORK: dict[str, Callable[[Recording, Any], object]] = {
+    "comparing": lambda run, p: mckibben.compare(run, models=["pi"], jobs=1, progress=p),
+    "studying": lambda run, p: mckibben.study(run, models=["pi"], jobs=1, progress=p),
+    "identifying pi": lambda run, p: mckibben.identify(
+        run, "pi", {"n_operators": (3, 4)}, n_folds=2, jobs=1, progress=p
+    ),
+    "fitting": lambda run, p: mckibben.GPIEstimator(n_operators=3).fit(run, progress=p),
+    "checking": lambda run, p: mckibben.check(model(run), run, progress=p),
+    "tracking": lambda run, p: track(
+        model(run).inverse(), mckibben.load_rig("mas20-hanging"), run.slice(0, 50), progress=p
+    ),
+    "tuning": lambda run, p: tune_pid(mckibben.load_rig("mas20-hanging"), hold=1.0, progress=p),
+    "calibrating": lambda run, p: mckibben.calibrate(
+        model(run), [run.slice(0, 700), run.slice(700, 1500)], progress=p
+    ),
+}
+
+
+@pytest.mark.parametrize("what", WORK)
+@pytest.mark.filterwarnings("ignore::mckibben.ModelWarning")
+def test_true_shows_a_bar_and_a_callable_is_told(
+    what: str, run: Recording, capfd: pytest.CaptureFixture[str]
+) -> None:
+    told: list[Any] = []
+    WORK[what](run, lambda *given: told.append(given))
+    assert told
+    shares = [getattr(first, "share", first) for first, *_ in told]
+    assert shares == sorted(shares)
+    assert 0 <= shares[0] <= shares[-1] <= 1
+    capfd.readouterr()
+    WORK[what](run, True)
+    out, error = capfd.readouterr()
+    assert what in error
+    assert not out
+    WORK[what](run, False)
+    assert capfd.readouterr() == ("", "")
+
+
+def test_commands_in_a_notebook_say_it_in_lines(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from mckibben.cli.output import progress_bar
+
+    monkeypatch.setenv("JPY_PARENT_PID", "1")
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True, raising=False)
+    with progress_bar("work", plainly=True) as tell:
+        tell(0.5, "half")
+        tell(0.5, "half")
+    assert capsys.readouterr().err == "half\n"
+
+
+def test_a_notebook_has_a_bar_without_other_packages(monkeypatch: pytest.MonkeyPatch) -> None:
+    shown: list[str] = []
+
+    def display(what: str, display_id: bool) -> Any:
+        shown.append(what)
+        return types.SimpleNamespace(update=shown.append)
+
+    shell = types.SimpleNamespace(get_ipython=lambda: types.SimpleNamespace(kernel=None))
+    monkeypatch.setitem(sys.modules, "IPython", shell)
+    page = types.SimpleNamespace(HTML=str, display=display)
+    monkeypatch.setitem(sys.modules, "IPython.display", page)
+    with telling(True, "work") as tell:
+        assert tell is not None
+        tell(0.5, "<b>half</b>")
+    assert 'value="0.0000"' in shown[0]
+    assert 'value="0.5000"' in shown[1]
+    assert "&lt;b&gt;half" in shown[1]

@@ -127,8 +127,9 @@ def loop_by(
             name = f"{by} {edges[place]:.3g} to {edges[place + 1]:.3g}{unit}"
             colour = f"age-{place + 1}"
             curves.append(Curve(x[chosen], y[chosen], name, colour, "specks"))
-    labels = (axis_label(n, recording.units[n]) for n in (input_name, output_name))
-    return Drawing((Panel(*labels, tuple(curves)),))
+    x_label = axis_label(input_name, recording.units[input_name])
+    y_label = axis_label(output_name, recording.units[output_name])
+    return Drawing((Panel(x_label, y_label, tuple(curves)),))
 
 
 def levels(values: Array) -> Array:

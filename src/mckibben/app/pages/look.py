@@ -26,7 +26,7 @@ def build(desk: Desk) -> None:
     def shown() -> None:
         entries = [entry.name for entry in desk.workspace.entries() if entry.role != "unused"]
         known = desk.workspace.channels()
-        if not entries or desk.input not in known or desk.output not in known:
+        if not entries or not {*desk.inputs, *desk.outputs} <= set(known):
             ui.label("Add recordings with an input and an output first, under Data.")
             return
         chosen = named(
@@ -76,12 +76,9 @@ def _matrix(desk: Desk, chosen: ui.select) -> None:
         small = plots.figures(
             coupling_subjects.matrix(recording, found), dark=desk.dark, height=SMALL_HEIGHT
         )
-        shown = [
-            (o, i)
-            for o in found.outputs[: coupling_subjects.MOST]
-            for i in found.inputs[: coupling_subjects.MOST]
-        ]
-        columns = min(len(found.inputs), coupling_subjects.MOST)
+        most = coupling_subjects.MOST
+        shown = [(o, i) for o in found.outputs[:most] for i in found.inputs[:most]]
+        columns = min(len(found.inputs), most)
         grid = ui.element("div").classes("w-full overflow-x-auto grid gap-1")
         grid.style(f"grid-template-columns: repeat({columns}, minmax(9rem, 1fr))")
         with grid:

@@ -174,7 +174,7 @@ def test_a_study_without_inverse_says_so() -> None:
 def test_a_study_in_which_every_model_failed_is_still_a_report() -> None:
     parsed = Parsed(page(study(blocks={})))
     assert set(SECTIONS) <= set(parsed.ids)
-    assert set(parsed.figures) == {"time", "loop"}
+    assert set(parsed.figures) == {"lead", "time", "loop"}
     assert "failed: the data have no time" in parsed.words
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -14,6 +15,15 @@ Given = Mapping[str, Any]
 
 FORGOTTEN = 1e-6
 """Share of a gap between branches below which none is left: the rest is rounding."""
+
+RAN_AWAY = 10.0
+"""Error over the output's standard deviation from which a model is said to have run away."""
+
+ROUNDING = 1e-9
+"""Error over the same below which there is none."""
+
+ERRORS = ("chosen", "test", "train", "worst", "interval", "difference")
+"""Columns of errors, which are in the unit of the output."""
 
 
 @dataclass(frozen=True)
@@ -48,9 +58,31 @@ class Column:
     def text(self, row: Given) -> str:
         """Return what a row holds, as it is shown; a dash for nothing."""
         value = self.value(row)
+        if isinstance(value, str):
+            return value
         if isinstance(value, list):
-            return " to ".join(numeral(end, self.digits) for end in value)
-        return numeral(value, self.digits)
+            return " to ".join(numeral(self._rounded(end, row), self.digits) for end in value)
+        return numeral(self._rounded(value, row), self.digits)
+
+    def flag(self, row: Given) -> str:
+        """Return what is absurd about what a row holds, in words; most often nothing."""
+        value = self.value(row)
+        if self.key == "r2" and value is not None and value < 100 * (1 - RAN_AWAY**2):
+            return "ran away"
+        if self.key not in ("chosen", "test", "train", "worst") or value is None:
+            return ""
+        return "ran away" if value > RAN_AWAY * _deviation(row) else ""
+
+    def sorted_by(self, row: Given) -> float | str | None:
+        """Return what a table is sorted by: of two ends the middle."""
+        value = self.value(row)
+        return sum(value) / len(value) if isinstance(value, list) else value
+
+    def _rounded(self, value: float | None, row: Given) -> float | None:
+        if self.key not in ERRORS or value is None:
+            return value
+        deviation = _deviation(row)
+        return 0.0 if abs(value) < ROUNDING * deviation < math.inf else value
 
 
 def columns_of(
@@ -98,6 +130,7 @@ def columns_of(
         Column("parameters", "parameters", "", _inside("n_parameters")),
         Column("seconds", "fit time", "s", _inside("fit_seconds"), 2),
         Column("step", "step", "ns", _inside("step_ns")),
+        Column("inverse", "inverse", "", _inside("inverse")),
     )
     return tuple(column for column in every if any(column.value(row) is not None for row in rows))
 
@@ -106,6 +139,15 @@ def columns_of_board(board: Leaderboard) -> tuple[Column, ...]:
     """Return the columns of a leaderboard."""
     rows = [row.to_dict() for row in board.ranking]
     return columns_of(rows, board.unit, board.outputs, board.chosen_by)
+
+
+def _deviation(row: Given) -> float:
+    """Return the standard deviation of the measured test output; infinite where it is not known."""
+    test = row.get("test") or {}
+    error, share = test.get("rmse"), test.get("r2")
+    if not error or share is None or not math.isfinite(share) or share >= 1:
+        return math.inf
+    return float(error / math.sqrt(1 - share))
 
 
 def _inside(*path: str) -> Callable[[Given], Any]:

@@ -13,6 +13,7 @@ from mckibben.blocks.core.block import Block
 from mckibben.comparison.banding import TestedBand
 from mckibben.comparison.coverage import OffTraining
 from mckibben.comparison.drift import Drift
+from mckibben.comparison.inverses import inverse_of
 from mckibben.comparison.limits import caution
 from mckibben.comparison.recommending import CONSTANT, order
 from mckibben.errors import MckibbenError
@@ -207,6 +208,7 @@ class Row:
             "band": None if self.band is None else self.band.to_dict(),
             "rate_dependent": self.block is not None and bool(self.block.rate_dependent),
             "invertible": self.inverse is not None,
+            "inverse": inverse_of(self.inverse),
             "caution": self.caution,
         }
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from mckibben.recording import notes_by_file, reading_notes
 from mckibben.report import (
     check_subjects,
+    coupling_subjects,
     description_subjects,
     interactive,
     model_subjects,
@@ -32,6 +33,9 @@ N_VALUES = 180_000
 
 MOST_CHECKED = 3
 """Outputs whose residuals have figures of their own."""
+
+LEAD_POINTS = 1500
+"""Points of a curve on the first screen."""
 
 FEWEST_POINTS = 400
 """Points left to a curve at least, however many curves there are."""
@@ -68,6 +72,10 @@ def page(study: Study) -> str:
     every = shown(study)
     pictured = drawn(every)
     figures, left_out = _figures(study, pictured)
+    coupled = _coupled(study, pictured)
+    if coupled is not None:
+        drawing = coupling_subjects.matrix(pictured[0].recording, coupled)
+        figures["coupling"] = [interactive.plots(drawing)]
     measured = [one.recording for one in unique(every)]
     return templating.page(
         "report.html.j2",
@@ -79,6 +87,9 @@ def page(study: Study) -> str:
         drawn=pictured,
         left_out=left_out,
         models=_models(study.leaderboard),
+        summaries=_summaries(study.leaderboard),
+        failures=failures(study.leaderboard),
+        coupling=coupled,
         bars=_bars(study.leaderboard),
         columns=columns_of_board(study.leaderboard),
         choices=CHOICES,
@@ -125,6 +136,14 @@ def _figures(study: Study, pictured: tuple[Shown, ...]) -> tuple[Plots, str]:
                 one.recording, one.input, one.output, one.outputs, one.test_from, points
             )
         )
+    figures["lead"] = [interactive.plots(_lead(pictured[0]))]
+    if study.load is not None and all(study.load in one.recording.channels for one in pictured):
+        load = study.load
+        figures["levels"] = each(
+            lambda one: coupling_subjects.loop_by(
+                one.recording, one.input, one.output, load, points
+            )
+        )
     blocks = {row.model: row.block for row in study.leaderboard.rows if row.block is not None}
     left_out = ""
     if any(any(model_subjects.operator_sums(block)) for block in blocks.values()):
@@ -150,6 +169,40 @@ def _figures(study: Study, pictured: tuple[Shown, ...]) -> tuple[Plots, str]:
         drawing = model_subjects.tracking(study.loops, name, points)
         figures[f"tracking {name}"] = [interactive.plots(drawing)]
     return figures, left_out
+
+
+def _lead(one: Shown) -> Drawing:
+    """Draw the measured loop with the chosen model's, or from early to late where there is none."""
+    if not one.outputs:
+        return subjects.loop([one.recording], one.input, one.output, LEAD_POINTS)
+    best = dict(list(one.outputs.items())[:1])
+    return subjects.fit_loops(one.recording, one.input, one.output, best, LEAD_POINTS)
+
+
+def _coupled(study: Study, pictured: tuple[Shown, ...]) -> coupling_subjects.Coupling | None:
+    """Return how inputs move outputs, where there are several."""
+    inputs, outputs = study.leaderboard.inputs, study.leaderboard.outputs
+    if not pictured or len(inputs) == len(outputs) == 1:
+        return None
+    return coupling_subjects.coupling([one.recording for one in unique(pictured)], inputs, outputs)
+
+
+def failures(board: Leaderboard) -> dict[str, list[str]]:
+    """Return every reason for which models failed, once, with those models."""
+    found: dict[str, list[str]] = {}
+    for row in board.ranking:
+        if row.reason is not None or row.test is None or row.train is None:
+            found.setdefault(row.reason or "no scores", []).append(row.model)
+    return found
+
+
+def _summaries(board: Leaderboard) -> dict[str, str]:
+    """Return what every model of a leaderboard is, in one sentence; nothing of what is unknown."""
+    from mckibben import registry
+    from mckibben.comparison.offered import summary
+
+    known = registry.names("estimators")
+    return {row.model: summary(row.model) if row.model in known else "" for row in board.ranking}
 
 
 def checked(study: Study) -> tuple[OutputCheck, ...]:

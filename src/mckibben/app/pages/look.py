@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Callable
 
 import numpy as np
 from nicegui import ui
@@ -12,7 +13,10 @@ from mckibben.app.desk import Desk, guarded, named
 from mckibben.app.pages.cutting import time_plot
 from mckibben.errors import MckibbenError
 from mckibben.recording import Recording
-from mckibben.report import subjects, wording
+from mckibben.report import coupling_subjects, subjects, wording
+
+SMALL_HEIGHT = 150
+"""Of a small picture [px]."""
 
 
 def build(desk: Desk) -> None:
@@ -22,7 +26,7 @@ def build(desk: Desk) -> None:
     def shown() -> None:
         entries = [entry.name for entry in desk.workspace.entries() if entry.role != "unused"]
         known = desk.workspace.channels()
-        if not entries or desk.input not in known or desk.output not in known:
+        if not entries or not {*desk.inputs, *desk.outputs} <= set(known):
             ui.label("Add recordings with an input and an output first, under Data.")
             return
         chosen = named(
@@ -31,10 +35,14 @@ def build(desk: Desk) -> None:
         )
         with ui.row().classes("w-full items-start gap-4"):
             with ui.column().classes("min-w-80 flex-[3]"):
-                _plots(desk, chosen)
+                if len(desk.inputs) > 1 or len(desk.outputs) > 1:
+                    _matrix(desk, chosen)
+                else:
+                    _plots(desk, chosen, desk.input, desk.output)
             with ui.column().classes("min-w-72 flex-[2]"):
-                _words(desk)
-                _untold(desk)
+                for given, wanted in desk.pairs:
+                    _words(desk, given, wanted)
+                    _untold(desk, given, wanted)
 
     desk.when("recordings", shown.refresh)
     desk.when("channels", shown.refresh)
@@ -42,7 +50,73 @@ def build(desk: Desk) -> None:
     shown()
 
 
-def _plots(desk: Desk, chosen: ui.select) -> None:
+def _matrix(desk: Desk, chosen: ui.select) -> None:
+    """Show every output over every input, small, with how far each moves each; a click enlarges."""
+    at = named(ui.column().classes("w-full"), "coupling")
+    pair = list(desk.pairs[0])
+
+    @ui.refreshable
+    def enlarged() -> None:
+        ui.label(f"{pair[1]} over {pair[0]}").classes("text-lg")
+        _plots(desk, chosen, *pair)
+
+    def enlarge(given: str, wanted: str) -> None:
+        pair[:] = given, wanted
+        enlarged.refresh()
+
+    @ui.refreshable
+    def pictured() -> None:
+        try:
+            recording = desk.workspace.recording(str(chosen.value))
+            found = coupling_subjects.coupling([recording], desk.inputs, desk.outputs)
+        except (MckibbenError, KeyError) as error:
+            ui.label(str(error)).classes("text-negative")
+            return
+        ui.label("What moves what: every output over every input").classes("text-lg")
+        small = plots.figures(
+            coupling_subjects.matrix(recording, found), dark=desk.dark, height=SMALL_HEIGHT
+        )
+        most = coupling_subjects.MOST
+        shown = [(o, i) for o in found.outputs[:most] for i in found.inputs[:most]]
+        columns = min(len(found.inputs), most)
+        grid = ui.element("div").classes("w-full overflow-x-auto grid gap-1")
+        grid.style(f"grid-template-columns: repeat({columns}, minmax(9rem, 1fr))")
+        with grid:
+            for figure, (wanted, given) in zip(small, shown, strict=True):
+                _small(figure, found, given, wanted, enlarge)
+        ui.label(
+            "In colour: the input that "
+            + ("belongs to the output." if found.paired else "moves the output most.")
+            + " Numbers: what the input over its whole range does to the output, by one straight line "
+            "through all inputs. Click on a picture's name to enlarge it."
+        ).classes("text-xs opacity-70")
+
+    chosen.on_value_change(pictured.refresh)
+    with at:
+        pictured()
+        enlarged()
+
+
+def _small(
+    figure: plots.Json,
+    found: coupling_subjects.Coupling,
+    given: str,
+    wanted: str,
+    enlarge: Callable[[str, str], None],
+) -> None:
+    figure["config"] = figure["config"] | {"staticPlot": True}
+    figure["layout"] |= {"margin": {"l": 44, "r": 6, "t": 4, "b": 36}}
+    figure["layout"]["font"] = figure["layout"]["font"] | {"size": 10}
+    row, column = found.outputs.index(wanted), found.inputs.index(given)
+    effect = found.effects[row, column]
+    told = f": {wording.number(effect)} {found.units[row]}" if np.isfinite(effect) else ""
+    with ui.column().classes("gap-0 min-w-0"):
+        button = ui.button(f"{given} → {wanted}{told}", on_click=lambda: enlarge(given, wanted))
+        named(button.props("flat dense no-caps").classes("text-xs"), f"pair-{given}-{wanted}")
+        ui.plotly(figure).classes("w-full")
+
+
+def _plots(desk: Desk, chosen: ui.select, given: str, wanted: str) -> None:
     from mckibben.signals import cycles
 
     @ui.refreshable
@@ -52,10 +126,17 @@ def _plots(desk: Desk, chosen: ui.select) -> None:
         except MckibbenError as error:
             ui.label(str(error)).classes("text-negative")
             return
-        found = cycles(recording[desk.input])
+        found = cycles(recording[given])
+        used = (*desk.inputs, *desk.outputs)
+        others = coupling_subjects.third_channels(recording, used)
         with ui.row().classes("items-center w-full"):
             colour = named(
-                ui.toggle({"time": "Colour by time", "rate": "Colour by rate"}, value="time"),
+                ui.toggle(
+                    {"time": "Colour by time"}
+                    | ({"rate": "Colour by rate"} if recording.sample_time is not None else {})
+                    | {f"by {name}": f"Colour by {name}" for name in others},
+                    value=f"by {others[0]}" if others else "time",
+                ).props("no-caps"),
                 "loop-colour",
             )
             cycle = named(
@@ -71,39 +152,42 @@ def _plots(desk: Desk, chosen: ui.select) -> None:
             part = recording
             if 1 <= number <= len(found):
                 part = recording.slice(found[number - 1].start, found[number - 1].stop)
-            figure = (
-                _by_rate(desk, part)
-                if colour.value == "rate"
-                else plots.figures(
-                    subjects.loop([part], desk.input, desk.output), dark=desk.dark, height=440
-                )[0]
-            )
+            if colour.value == "rate":
+                figure = _by_rate(desk, part, given, wanted)
+            else:
+                by = str(colour.value).removeprefix("by ")
+                drawing = (
+                    subjects.loop([part], given, wanted)
+                    if by == "time"
+                    else coupling_subjects.loop_by(part, given, wanted, by)
+                )
+                figure = plots.figures(drawing, dark=desk.dark, height=440)[0]
             named(ui.plotly(figure).classes("w-full"), "loop-plot")
 
         colour.on_value_change(loop.refresh)
         cycle.on_value_change(loop.refresh)
         loop()
-        time_plot(desk, recording, [desk.input, desk.output], "time-plot")
+        time_plot(desk, recording, [given, wanted], "time-plot")
 
     chosen.on_value_change(drawn.refresh)
     drawn()
 
 
-def _by_rate(desk: Desk, recording: Recording) -> plots.Json:
+def _by_rate(desk: Desk, recording: Recording, given: str, wanted: str) -> plots.Json:
     """Return the loop with its points coloured by how fast the input moves."""
     from mckibben.report.drawing import along
 
-    places, x, y = along(recording[desk.input], recording[desk.output], plots.POINTS)
+    places, x, y = along(recording[given], recording[wanted], plots.POINTS)
     step = recording.sample_time or 1.0
-    rate = np.abs(np.gradient(recording[desk.input]) / step)[places.astype(int)]
+    rate = np.abs(np.gradient(recording[given]) / step)[places.astype(int)]
     figure = plots.lines(
         [],
-        x=f"{desk.input} [{recording.units[desk.input]}]",
-        y=f"{desk.output} [{recording.units[desk.output]}]",
+        x=f"{given} [{recording.units[given]}]",
+        y=f"{wanted} [{recording.units[wanted]}]",
         dark=desk.dark,
         height=440,
     )
-    bar = {"title": {"text": f"{recording.units[desk.input]}/s"}}
+    bar = {"title": {"text": f"{recording.units[given]}/s"}}
     marker = {"color": rate.tolist(), "colorscale": "Viridis", "size": 4, "showscale": True}
     figure["data"] = [
         {"type": "scatter", "mode": "markers", "x": x.tolist(), "y": y.tolist()}
@@ -112,16 +196,16 @@ def _by_rate(desk: Desk, recording: Recording) -> plots.Json:
     return figure
 
 
-def _words(desk: Desk) -> None:
+def _words(desk: Desk, given: str, wanted: str) -> None:
     from mckibben.characterization import characterize
 
-    ui.label("What the muscle does").classes("text-lg")
+    ui.label(_headed(desk, "What the muscle does", wanted)).classes("text-lg")
     place = named(ui.column().classes("w-full"), "characterization")
 
     async def find() -> None:
         recordings = desk.workspace.with_role("train") + desk.workspace.with_role("test")
         try:
-            found = await asyncio.to_thread(characterize, recordings, desk.input, desk.output)
+            found = await asyncio.to_thread(characterize, recordings, given, wanted)
         except MckibbenError as error:
             with place:
                 ui.label(str(error)).classes("text-negative")
@@ -150,23 +234,23 @@ def _words(desk: Desk) -> None:
             ui.table(rows=rows, columns=columns, row_key="what").classes("w-full").props(
                 "dense flat"
             )
-            call = f"mckibben.characterize(recordings, {desk.input!r}, {desk.output!r})"
+            call = f"mckibben.characterize(recordings, {given!r}, {wanted!r})"
             desk.did("characterized the recordings", call)
 
     ui.timer(0.05, guarded(find), once=True)
 
 
-def _untold(desk: Desk) -> None:
+def _untold(desk: Desk, given: str, wanted: str) -> None:
     from mckibben.excitation import untold
 
-    ui.label("What these recordings cannot tell").classes("text-lg")
+    ui.label(_headed(desk, "What these recordings cannot tell", wanted)).classes("text-lg")
     place = named(ui.column().classes("w-full"), "untold")
 
     async def find() -> None:
         train, test = desk.workspace.with_role("train"), desk.workspace.with_role("test")
         try:
             gaps = await asyncio.to_thread(
-                untold, train or test, desk.input, desk.output, tests=test if train else ()
+                untold, train or test, given, wanted, tests=test if train else ()
             )
         except MckibbenError as error:
             with place:
@@ -180,7 +264,12 @@ def _untold(desk: Desk) -> None:
                 ui.label(gap.remedy).classes("text-caption pl-4")
             desk.did(
                 "asked what the recordings cannot tell",
-                f"mckibben.untold(train, {desk.input!r}, {desk.output!r}, tests=test)",
+                f"mckibben.untold(train, {given!r}, {wanted!r}, tests=test)",
             )
 
     ui.timer(0.05, guarded(find), once=True)
+
+
+def _headed(desk: Desk, heading: str, wanted: str) -> str:
+    """Return a heading, with the output where there are several."""
+    return f"{heading}: {wanted}" if len(desk.outputs) > 1 else heading

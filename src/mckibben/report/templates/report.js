@@ -78,6 +78,38 @@ for (const chooser of document.querySelectorAll("select[name=recording]")) {
   });
 }
 
+function value(row, column) {
+  const told = row.cells[column].dataset.value;
+  if (told === undefined || told === "") return null;
+  return Number.isNaN(Number(told)) ? told : Number(told);
+}
+
+function sort(table, heading) {
+  const column = heading.cellIndex;
+  const way = heading.getAttribute("aria-sort") === "ascending" ? -1 : 1;
+  for (const other of table.tHead.rows[0].cells) other.setAttribute("aria-sort", "none");
+  heading.setAttribute("aria-sort", way > 0 ? "ascending" : "descending");
+  const body = table.tBodies[0];
+  const rows = [...body.rows];
+  const order = (a, b) => {
+    if (a.dataset.last || b.dataset.last) return (a.dataset.last ? 1 : 0) - (b.dataset.last ? 1 : 0);
+    const [x, y] = [value(a, column), value(b, column)];
+    if (x === null || y === null) return (x === null ? 1 : 0) - (y === null ? 1 : 0);
+    return way * (typeof x === "string" || typeof y === "string" ? String(x).localeCompare(String(y)) : x - y);
+  };
+  body.append(...rows.sort(order));
+}
+
+for (const table of document.querySelectorAll("table[data-sortable]")) {
+  for (const heading of table.tHead.rows[0].cells) {
+    const button = document.createElement("button");
+    button.type = "button";
+    button.append(...heading.childNodes);
+    heading.append(button);
+    button.addEventListener("click", () => sort(table, heading));
+  }
+}
+
 function recolour() {
   figures = JSON.parse(source, unpack);
   redraw(() => true);
@@ -89,6 +121,8 @@ matchMedia("(prefers-color-scheme: dark)").addEventListener("change", recolour);
 async function start() {
   for (const place of places) {
     await draw(place);
+    // The tool bar is for the mouse: a key would have to pass through every button of every plot.
+    for (const stop of place.querySelectorAll(".modebar-container a, .modebar-container button, .modebar-container [tabindex]")) stop.tabIndex = -1;
     await new Promise((next) => setTimeout(next));
   }
   document.documentElement.dataset.drawn = "all";

@@ -1,0 +1,146 @@
+"""Figures of several muscles, and of what loads them: every input against every output."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from mckibben.arrays import Array
+from mckibben.recording import Recording
+from mckibben.report.drawing import (
+    N_AGES,
+    N_COLOURS,
+    POINTS,
+    Curve,
+    Drawing,
+    Panel,
+    along,
+    axis_label,
+    left_out,
+)
+
+SMALL = 500
+"""Points of a small picture."""
+
+MOST = 6
+"""Inputs, and outputs, that are pictured."""
+
+
+@dataclass(frozen=True, eq=False)
+class Coupling:
+    """How far every input moves every output, by one straight line through all inputs.
+
+    Parameters
+    ----------
+    inputs, outputs : tuple of str
+        Channels.
+    effects : array, shape (outputs, inputs)
+        What an input over its whole measured range does to an output, in the output's unit; NaN where
+        inputs move together, so that nobody can tell whose effect it is.
+    units : tuple of str
+        Of the outputs.
+    explained : tuple of float
+        Share of each output's variance that the line explains: the rest is bent, or remembers.
+    """
+
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+    effects: Array
+    units: tuple[str, ...]
+    explained: tuple[float, ...]
+
+    def own(self, output: str) -> str:
+        """Return the input that is an output's own: of as many its pair, else what moves it most."""
+        place = self.outputs.index(output)
+        if len(self.inputs) == len(self.outputs) or not np.isfinite(self.effects[place]).all():
+            return self.inputs[place % len(self.inputs)]
+        return self.inputs[int(np.argmax(np.abs(self.effects[place])))]
+
+    @property
+    def paired(self) -> bool:
+        """Whether there are as many inputs as outputs."""
+        return len(self.inputs) == len(self.outputs)
+
+
+def coupling(
+    recordings: Sequence[Recording], inputs: Sequence[str], outputs: Sequence[str]
+) -> Coupling:
+    """Return how far inputs move outputs over all recordings, each of which may rest elsewhere.
+
+    Parameters
+    ----------
+    recordings : sequence of Recording
+        At least one.
+    inputs, outputs : sequence of str
+        Channels that all of them have.
+    """
+    u = np.concatenate([r.matrix(inputs) - r.matrix(inputs).mean(axis=0) for r in recordings])
+    y = np.concatenate([r.matrix(outputs) - r.matrix(outputs).mean(axis=0) for r in recordings])
+    size = np.linalg.norm(u, axis=0)
+    scaled = u / np.where(size > 0, size, 1.0)
+    gains, _, rank, _ = np.linalg.lstsq(scaled, y, rcond=1e-6)
+    highest = np.max([r.matrix(inputs).max(axis=0) for r in recordings], axis=0)
+    ranges = highest - np.min([r.matrix(inputs).min(axis=0) for r in recordings], axis=0)
+    effects = (gains / np.where(size > 0, size, 1.0)[:, np.newaxis] * ranges[:, np.newaxis]).T
+    if rank < len(inputs):
+        effects = np.full_like(effects, np.nan)
+    total = np.sum(y**2, axis=0)
+    left = np.sum((y - scaled @ gains) ** 2, axis=0)
+    explained = 1 - left / np.where(total > 0, total, 1.0)
+    units = tuple(recordings[0].units[name] for name in outputs)
+    return Coupling(tuple(inputs), tuple(outputs), effects, units, tuple(explained.tolist()))
+
+
+def matrix(recording: Recording, found: Coupling, points: int = SMALL) -> Drawing:
+    """Draw every output (rows) over every input (columns), small; own pairs are in colour."""
+    panels = []
+    for output in found.outputs[:MOST]:
+        for name in found.inputs[:MOST]:
+            x, y = along(recording[name], recording[output], points)[1:]
+            colour = "series-1" if found.own(output) == name else "input"
+            panels.append(
+                Panel(
+                    axis_label(name, recording.units[name]),
+                    axis_label(output, recording.units[output]),
+                    (Curve(x, y, "", colour, "fine"),),
+                )
+            )
+    note = left_out([*found.inputs[MOST:], *found.outputs[MOST:]])
+    return Drawing(tuple(panels), columns=min(len(found.inputs), MOST), note=note)
+
+
+def loop_by(
+    recording: Recording, input_name: str, output_name: str, by: str, points: int = POINTS
+) -> Drawing:
+    """Draw output over input, coloured by a third channel, a load or a stiffness, from low to high."""
+    places, x, y = along(recording[input_name], recording[output_name], points)
+    level = recording[by][places.astype(int)]
+    edges = levels(recording[by])
+    unit = f" {recording.units[by]}" if recording.units[by] else ""
+    which = np.clip(np.searchsorted(edges, level, side="right") - 1, 0, len(edges) - 2)
+    curves = []
+    for place in range(len(edges) - 1):
+        chosen = which == place
+        if chosen.any():
+            name = f"{by} {edges[place]:.3g} to {edges[place + 1]:.3g}{unit}"
+            colour = f"age-{place + 1}"
+            curves.append(Curve(x[chosen], y[chosen], name, colour, "specks"))
+    x_label = axis_label(input_name, recording.units[input_name])
+    y_label = axis_label(output_name, recording.units[output_name])
+    return Drawing((Panel(x_label, y_label, tuple(curves)),))
+
+
+def levels(values: Array) -> Array:
+    """Return the edges of at most `N_AGES` equal steps from lowest to highest."""
+    low, high = float(values.min()), float(values.max())
+    if high <= low:
+        return np.array([low, low])
+    return np.linspace(low, high, N_AGES + 1)
+
+
+def third_channels(recording: Recording, used: Sequence[str]) -> list[str]:
+    """Return the channels that a loop can be coloured by: those that move and are not used already."""
+    free = [name for name in recording.channels if name not in used]
+    return [name for name in free if np.ptp(recording[name]) > 0][:N_COLOURS]

@@ -1,0 +1,34 @@
+from __future__ import annotations
+
+import numpy as np
+
+from mckibben.recording import Recording
+from mckibben.report import coupling_subjects
+
+
+def arm(shared: bool = False) -> Recording:
+    rng = np.random.default_rng(0)
+    a, b = rng.uniform(0, 2, (2, 400))
+    b = a if shared else b
+    names = ("u1", "u2", "y1", "y2")
+    values = (a, b, 3 * a, 5 * b + a)
+    units = dict(zip(names, ("bar", "bar", "mm", "mm"), strict=True))
+    return Recording(dict(zip(names, values, strict=True)), 0.01, units)
+
+
+def test_effects_are_those_of_inputs_over_their_ranges() -> None:
+    found = coupling_subjects.coupling([arm()], ("u1", "u2"), ("y1", "y2"))
+    np.testing.assert_allclose(found.effects, [[6, 0], [2, 10]], atol=0.1)
+    assert found.own("y2") == "u2"
+    assert len(coupling_subjects.matrix(arm(), found).panels) == 4
+
+
+def test_inputs_that_move_together_have_no_effects_of_their_own() -> None:
+    found = coupling_subjects.coupling([arm(shared=True)], ("u1", "u2"), ("y1", "y2"))
+    assert np.isnan(found.effects).all()
+
+
+def test_a_loop_is_coloured_by_a_third_channel() -> None:
+    panel = coupling_subjects.loop_by(arm(), "u1", "y2", "u2").panels[0]
+    assert len(panel.curves) == 5
+    assert panel.x_label == "u1 [bar]"

@@ -11,6 +11,7 @@ import sys
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from html import escape
+from importlib import import_module
 from typing import Any, TypeVar
 
 Tell = Callable[..., None]
@@ -85,11 +86,11 @@ def _on_terminal(what: str) -> Iterator[Callable[[float, str], None]]:
 
 @contextmanager
 def _in_notebook(what: str) -> Iterator[Callable[[float, str], None]]:
-    from IPython.display import HTML, display
+    shown: Any = import_module("IPython.display")
 
     def html(share: float, said: str) -> Any:
         bar = f'<progress value="{share:.4f}" max="1" style="vertical-align:middle"></progress>'
-        return HTML(f"<div>{escape(what)} {bar} {escape(said)}</div>")
+        return shown.HTML(f"<div>{escape(what)} {bar} {escape(said)}</div>")
 
-    place = display(html(0.0, ""), display_id=True)
+    place = shown.display(html(0.0, ""), display_id=True)
     yield lambda share, said: place.update(html(share, said))

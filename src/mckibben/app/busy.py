@@ -1,4 +1,4 @@
-"""What runs is told at once: on the button that began it and in the header; a second click is dropped."""
+"""What runs is told at once: on the button that began it, and in the header; no click counts twice."""
 
 from __future__ import annotations
 

@@ -48,6 +48,8 @@ def under_way(client: Client) -> list[Doing]:
 def tell_of(client: Client, told: Callable[[], None]) -> None:
     """Call a function whenever something begins or ends for a page."""
     _TOLD[client] = told
+    # what is called may know the page, which would then hold itself
+    client.on_delete(lambda: (_TOLD.pop(client, None), _RUNNING.pop(client, None)))
 
 
 @contextmanager

@@ -52,15 +52,12 @@ def build(workspace: Workspace, jobs: Jobs) -> Desk:
     desk.settle_channels()
     dark = ui.dark_mode(None)
     ui.add_head_html(f"<style>{theme.style()}</style><script>{theme.SCRIPT}</script>")
-    ui.element("a").props('href="#content"').classes("skip").props(
-        'innerHTML="Skip to the content"'
-    )
     ui.element("div").props('id=asked role=presentation aria-hidden="true"')
     tabs, tab = _header(desk, dark)
     if workspace.read_only:
         text = f"Nothing can be changed here: {workspace.read_only}."
         named(ui.label(text).classes("w-full text-center bg-warning"), "read-only")
-    with ui.element("main").props('id=content tabindex="-1"').classes("w-full"):
+    with ui.element("div").props('id=content tabindex="-1"').classes("w-full"):
         _panels(desk, tabs, tab)
         _log(desk)
     _watch(desk)
@@ -70,6 +67,7 @@ def build(workspace: Workspace, jobs: Jobs) -> Desk:
 
 def _header(desk: Desk, dark: ui.dark_mode) -> tuple[ui.tabs, dict[str, ui.tab]]:
     with ui.header().classes("bar items-center gap-x-2 gap-y-0 py-1"):
+        ui.link("Skip to the content", "#content").classes("skip")
         ui.label("mckibben").classes("text-lg font-medium").props('role=heading aria-level="1"')
         with ui.tabs().props("dense inline-label").classes("tabs") as tabs:
             labelled(tabs, "aria-label", "Steps")

@@ -76,6 +76,7 @@ body.body--dark {{ {_variables(DARK)} }}
   {filled} {{ color: var(--on) !important }}
   :is({filled}) :is(.text-white, .text-black) {{ color: var(--on) !important }}
   .bar {{ background: var(--bar) !important; color: var(--on-bar) !important }}
+  .q-uploader__header {{ color: var(--on) !important }}
   .text-grey, .q-table__bottom {{ color: var(--muted) !important }}
 }}
 {SHEET}"""
@@ -122,13 +123,27 @@ body { background: var(--paper); color: var(--ink) }
 @media (prefers-reduced-motion: reduce) {
   *, *::before, *::after {
     animation-duration: .01ms !important; animation-iteration-count: 1 !important;
-    transition-duration: .01ms !important; scroll-behavior: auto !important;
+    transition: none !important; scroll-behavior: auto !important;
   }
   #asked.on { animation: none }
 }
 """
 
 SCRIPT = """
+// what the frame's parts do not say to screen readers
+const name = (element, text) => {
+  if (!element.getAttribute("aria-label")) element.setAttribute("aria-label", text);
+};
+let naming = 0;
+const nameAll = () => {
+  naming = 0;
+  document.querySelectorAll(".q-uploader a.q-btn").forEach((add) => name(add, "Choose files"));
+  document.querySelectorAll(".q-table thead .q-checkbox").forEach((all) => name(all, "All rows"));
+  document.querySelectorAll(".q-table tbody .q-checkbox").forEach((one) =>
+    name(one, "Row " + (one.closest("tr")?.innerText.trim().split(/[\\t\\n]/)[0] ?? "")));
+};
+new MutationObserver(() => { naming ||= setTimeout(nameAll, 200) })
+  .observe(document.documentElement, {childList: true, subtree: true});
 addEventListener("unhandledrejection", (event) => {
   // a figure on a page that is not shown cannot be resized, and need not be
   if (String(event.reason).includes("displayed plot div")) event.preventDefault();

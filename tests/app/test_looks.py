@@ -113,7 +113,7 @@ FAINT = """() => {
     const large = size >= 24 || (size >= 18.66 && Number(style.fontWeight) >= 700);
     seen += 1;
     if (ratio < (large ? LARGE : LEAST) - 0.01)
-      found.push(`${ratio.toFixed(2)} ${text.slice(0, 40)} (${element.className.baseVal ?? element.className})`.slice(0, 140));
+      found.push(`${ratio.toFixed(2)} ${text.slice(0, 40)} (${element.className})`.slice(0, 140));
   }
   return [seen, [...new Set(found)]];
 }""".replace("LARGE", str(LEAST_LARGE)).replace("LEAST", str(LEAST))

@@ -76,7 +76,7 @@ def test_many_changes_at_once_are_drawn_once_and_hidden_tabs_when_they_are_opene
 
     async def look(_: User) -> None:
         page.drawn.clear()
-        for _ in range(5):
+        for _again in range(5):
             page.desk.changed("results", "channels")
         await settled(page)
         assert page.drawn == ["one"]
@@ -129,7 +129,7 @@ def test_what_fails_harms_nobody_else_and_is_tried_again(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(news, "AGAIN", (0.01, 0.01))
-    page, told, tries = Page(tmp_path), list[Exception](), []
+    page, told, tries = Page(tmp_path), list[Exception](), list[None]()
 
     def root() -> None:
         def half_written() -> None:
@@ -164,7 +164,7 @@ def test_listeners_go_with_what_they_show(tmp_path: Path) -> None:
     async def look(_: User) -> None:
         client = page.desk.news.client
         assert client is not None
-        for _ in range(10):
+        for _again in range(10):
             with client, ui.column() as place:
                 page.desk.when("runs", lambda: None)
             place.delete()

@@ -109,7 +109,7 @@ def test_what_is_asked_for_again_is_not_begun_twice(tmp_path: Path) -> None:
     assert again is not first
     jobs.cancel(again.name)
     assert jobs.submit("fit", fit("pi", "one")) is not again
-    assert len(jobs.active()) == 4
+    assert len(jobs.active()) == 3
     jobs.close()
 
 

@@ -112,6 +112,7 @@ body { background: var(--paper); color: var(--ink) }
   .bar .tabs { order: 9; width: 100% }
   .bar .tabs .q-tabs__content { width: 100% }
   .bar .tabs .q-tab { flex: 1 1 0; min-width: 0; padding: 0 2px; min-height: 52px }
+  .bar .tabs .q-tabs__arrow { display: none !important }
   .bar .tabs .q-tab__content { flex-direction: column; min-width: 0 }
   .bar .tabs .q-tab__label { font-size: 12px; margin: 2px 0 0; line-height: 1.2; overflow: visible }
   .nicegui-content, .q-tab-panel { padding: .25rem }

@@ -43,6 +43,15 @@ WORDS = {"fit": "Fitting", "loop": "Running", "record": "Recording", "report": "
 _LOADING = threading.RLock()
 
 
+class Steps(ui.tabs):
+    """Tabs that move when they are clicked, not when the server has answered.
+
+    Otherwise a click back, on a busy machine, would be one on the tab still shown: none at all.
+    """
+
+    LOOPBACK = False
+
+
 def build(workspace: Workspace, jobs: Jobs) -> Desk:
     """Build one page for one browser."""
     ui.on_exception(unexpected)
@@ -69,7 +78,7 @@ def _header(desk: Desk, dark: ui.dark_mode) -> tuple[ui.tabs, dict[str, ui.tab]]
     with ui.header().classes("bar items-center gap-x-2 gap-y-0 py-1"):
         ui.link("Skip to the content", "#content").classes("skip")
         ui.label("mckibben").classes("text-lg font-medium").props('role=heading aria-level="1"')
-        with ui.tabs().props("dense inline-label").classes("tabs") as tabs:
+        with Steps().props("dense inline-label").classes("tabs") as tabs:
             labelled(tabs, "aria-label", "Steps")
             tab = {
                 name: named(ui.tab(name, icon=icon), f"tab-{name.split()[0].lower()}")

@@ -85,7 +85,7 @@ def walk(page: Any, address: str, started: float, folder: Path) -> None:
 
     recording(folder / "long.parquet")
     page.locator("input[type=file]").first.set_input_files(str(folder / "long.parquet"))
-    page.get_by_test_id("recording-long").wait_for()
+    page.get_by_test_id("recording-long").wait_for(timeout=120_000)
     page.get_by_role("button", name="Show long").click()
     time.sleep(3)
     zooms = [page.evaluate(ZOOM, [40 * k, 40 * k + 30 * (1 + k % 4)]) / 1e3 for k in range(20)]

@@ -96,6 +96,23 @@ def test_cancelled_at_once_and_restarted(tmp_path: Path) -> None:
     assert slow.name not in Jobs(workspace).jobs
 
 
+def test_what_is_asked_for_again_is_not_begun_twice(tmp_path: Path) -> None:
+    workspace = filled(tmp_path)
+    jobs = Jobs(workspace, at_once=1)
+    jobs.at_once = 0  # none is started
+    first = jobs.submit("fit", fit("pi", "one"))
+    assert jobs.submit("fit", fit("pi", "one")) is first
+    other = jobs.submit("fit", fit("pi", "one", n_operators=7))
+    assert other is not first
+    workspace.set_role("run", "test")
+    again = jobs.submit("fit", fit("pi", "one"))
+    assert again is not first
+    jobs.cancel(again.name)
+    assert jobs.submit("fit", fit("pi", "one")) is not again
+    assert len(jobs.active()) == 3
+    jobs.close()
+
+
 def test_a_protocol_is_recorded(tmp_path: Path) -> None:
     workspace = Workspace(tmp_path)
     jobs = Jobs(workspace)

@@ -4,10 +4,6 @@ from __future__ import annotations
 
 import io
 import os
-import subprocess
-import sys
-import time
-import urllib.request
 import zipfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -16,24 +12,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from tests.app.browsing import BROWSER, OPTIONS, SLOW, seen, visited, workbench
 from tests.tools import needs, where
 
 playwright = pytest.importorskip("playwright.sync_api")
-
-BROWSER = where("chromium")
-SLOW = 180_000
-"""Milliseconds to wait for fits on a busy machine."""
-
-OPTIONS = [
-    "--no-sandbox",
-    "--disable-dev-shm-usage",
-    "--disable-gpu",
-    "--disable-quic",
-    "--no-first-run",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-]
 
 pytestmark = needs("chromium")
 
@@ -41,65 +23,27 @@ pytestmark = needs("chromium")
 @pytest.fixture
 def address(tmp_path: Path) -> Iterator[str]:
     """Start the workbench on a free port, and give its address."""
-    command = [sys.executable, "-m", "mckibben.cli.main", "app", str(tmp_path / "ws")]
-    plain = {name: value for name, value in os.environ.items() if "PYTEST" not in name}
-    process = subprocess.Popen(
-        [*command, "--port", "0", "--no-show"], stdout=subprocess.PIPE, text=True, env=plain
-    )
-    assert process.stdout is not None
-    line = process.stdout.readline()
-    assert "Workbench over" in line, line
-    address = next(word for word in line.split() if word.startswith("http"))
-    answering(address)
-    yield address
-    process.terminate()
-    process.wait(20)
-    process.stdout.close()
+    with workbench(tmp_path / "ws") as address:
+        yield address
     if (
         os.name == "posix"
     ):  # all that it wrote is for nobody else, whatever the rights of this process
         assert not [path for path in (tmp_path / "ws").rglob("*") if path.stat().st_mode & 0o077]
 
 
-def answering(address: str) -> None:
-    """Wait until the server answers."""
-    for _ in range(200):
-        try:
-            urllib.request.urlopen(address, timeout=5).close()
-        except OSError:
-            time.sleep(0.05)
-        else:
-            return
-    raise AssertionError("the workbench does not answer")
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    with playwright.sync_playwright() as play:
+        browser = play.chromium.launch(executable_path=BROWSER, args=OPTIONS)
+        yield browser
+        browser.close()
 
 
 @pytest.fixture
-def page(address: str) -> Iterator[Any]:
+def page(browser: Any, address: str) -> Iterator[Any]:
     """Open the workbench in a browser that tells of foreign requests and errors."""
-    with playwright.sync_playwright() as play:
-        browser = play.chromium.launch(executable_path=BROWSER, args=OPTIONS)
-        page = browser.new_page(viewport={"width": 1280, "height": 900})
-        foreign: list[str] = []
-        errors: list[str] = []
-
-        def asked(request: Any) -> None:
-            if not request.url.startswith((address.partition("?")[0], "data:", "blob:")):
-                foreign.append(request.url)
-
-        page.on("request", asked)
-        page.on("console", lambda said: errors.append(said.text) if said.type == "error" else None)
-        page.on("pageerror", lambda error: errors.append(str(error)))
-        page.goto(address)
+    with visited(browser, address) as page:
         yield page
-        browser.close()
-        assert foreign == []
-        assert errors == []
-
-
-def seen(page: Any, name: str, timeout: float = SLOW) -> Any:
-    place = page.get_by_test_id(name).first
-    place.wait_for(timeout=timeout)
-    return place
 
 
 def downloaded(page: Any, name: str) -> bytes:
@@ -243,7 +187,62 @@ def test_two_tabs_on_one_workbench(page: Any, address: str) -> None:
     seen(other, run)
     page.get_by_label("Remove irregular-triangle").click()
     page.get_by_test_id(run).wait_for(state="detached", timeout=SLOW)
-    other.get_by_label("Remove irregular-triangle").click()
-    other.get_by_text("no such recording").first.wait_for(timeout=SLOW)
+    other.get_by_test_id(run).wait_for(state="detached", timeout=SLOW)
     seen(other, "recording-decaying-triangle")
     seen(page, "recording-decaying-triangle")
+
+
+def swung(muscles: int, phase: float, *, load: bool = False) -> bytes:
+    """Return a file of muscles that lag behind their pressures, on one arm or under a load."""
+    t = np.arange(400) * 0.1
+    columns = {"time_s": t}
+    pressures = [2.5 - 1.5 * np.cos(t * (0.5 + 0.13 * k) + phase * k) for k in range(muscles)]
+    for k, pressure in enumerate(pressures):
+        suffix = f"_{k + 1}" if muscles > 1 else ""
+        others = sum(pressures) - pressure
+        lagging = pressure - 0.3 * np.sign(np.gradient(pressure)) - 0.1 * others
+        columns[f"pressure{suffix}_bar"] = pressure
+        columns[f"displacement{suffix}_mm"] = 6.0 * lagging
+    if load:
+        columns["force_N"] = 50.0 + 10.0 * np.sin(0.2 * t)
+    rows = [",".join(f"{v:.5g}" for v in row) for row in zip(*columns.values(), strict=True)]
+    return "\n".join([",".join(columns), *rows]).encode()
+
+
+@pytest.mark.parametrize(
+    ("muscles", "load", "model"),
+    [(3, False, "coupled-memory"), (1, True, "pi")],
+    ids=["arm", "load"],
+)
+def test_an_arm_and_a_load_from_files_to_a_leaderboard(
+    page: Any, muscles: int, load: bool, model: str
+) -> None:
+    for name, phase in (("first", 0.4), ("second", 1.1)):
+        seen(page, "upload")
+        upload(page, f"{name}.csv", swung(muscles, phase, load=load))
+        seen(page, f"recording-{name}")
+    seen(page, "role-second").get_by_text("test", exact=True).click()
+    seen(page, "tab-look").click()
+    seen(page, "loop-plot")
+    seen(page, "tab-models").click()
+    seen(page, "fit").click()
+    seen(page, "leaderboard").get_by_text(model).first.wait_for(timeout=3 * SLOW)
+    seen(page, "tab-take").click()
+    seen(page, "take-json")
+
+
+def test_results_appear_every_time_without_a_reload(page: Any) -> None:
+    """The button stands in what its change draws anew; no panel is left empty by that."""
+    upload(page, "one.csv", swung(1, 0.4))
+    seen(page, "recording-one")
+    seen(page, "tab-look").click()
+    for number in range(4):
+        seen(page, "tab-data").click()
+        upload(page, f"more-{number}.csv", swung(1, 0.1 * number))
+        seen(page, f"recording-more-{number}")
+        page.get_by_label(f"Remove more-{number}").click()
+        page.get_by_test_id(f"recording-more-{number}").wait_for(state="detached")
+        seen(page, "tab-look").click()
+        seen(page, "characterization").get_by_text("loop").first.wait_for(timeout=SLOW)
+        seen(page, "untold").locator("*").first.wait_for(timeout=SLOW)
+        assert page.get_by_test_id("characterization").count() == 1

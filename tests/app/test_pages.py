@@ -21,7 +21,7 @@ from mckibben.app.desk import Desk
 from mckibben.app.jobs import Jobs
 from mckibben.app.pages.compensate import _points
 from mckibben.app.pages.models import SEPARATOR
-from mckibben.app.server import _load_the_rest, build
+from mckibben.app.shell import build, load_the_rest
 from mckibben.app.work import fit, reference_recording
 from mckibben.app.workspace import Workspace
 from mckibben.registry import load
@@ -33,7 +33,7 @@ from tests.comparison.test_several import run as two_muscles
 def visit(workspace: Workspace, look: Callable[[User], Awaitable[None]]) -> None:
     """Open the workbench over a workspace, without a browser, and look at it."""
 
-    _load_the_rest()  # which a page that is opened would wait for
+    load_the_rest()  # which a page that is opened would wait for
 
     async def run() -> None:
         def root() -> None:
@@ -147,6 +147,7 @@ def test_a_damaged_recording_is_told_and_harms_nothing_else(tmp_path: Path) -> N
         user.find(marker="tab-look").click()
         await user.should_see("Add recordings with an input and an output first")
         user.find(marker="tab-models").click()
+        await user.should_see(marker="fit")
         user.find(marker="fit").click()
 
     visit(workspace, look)
@@ -155,6 +156,7 @@ def test_a_damaged_recording_is_told_and_harms_nothing_else(tmp_path: Path) -> N
 def test_fitting_without_a_recording_is_answered(tmp_path: Path) -> None:
     async def look(user: User) -> None:
         user.find(marker="tab-models").click()
+        await user.should_see(marker="fit")
         user.find(marker="fit").click()
         await user.should_see("There is no recording to train on.")
 

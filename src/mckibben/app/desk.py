@@ -8,10 +8,13 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+from weakref import WeakSet
 
 from nicegui import ui
 
+from mckibben.app.busy import Answer
 from mckibben.app.jobs import Jobs
+from mckibben.app.news import News, Refresh
 from mckibben.app.workspace import Workspace
 from mckibben.errors import MckibbenError
 
@@ -21,10 +24,13 @@ if TYPE_CHECKING:
 LONGEST = 2000
 """Characters of a message."""
 
-Refresh = Callable[[], Any]
+SHARED = ("recordings", "results", "runs", "log")
+"""Topics of the workspace; the others are of one page."""
+
+_DESKS: WeakSet[Desk] = WeakSet()
 
 
-@dataclass
+@dataclass(eq=False)
 class Desk:
     """One browser page over a workspace.
 
@@ -42,7 +48,8 @@ class Desk:
     """Whether models are tested on data that they were fitted to, which every result then says."""
     dark: bool = False
     preview: str | None = None
-    _shown: dict[str, list[Refresh]] = field(default_factory=dict, repr=False)
+    news: News = field(default_factory=News, repr=False)
+    """Who shows what on this page, and hears of changes."""
 
     @property
     def input(self) -> str:
@@ -76,15 +83,25 @@ class Desk:
             if result["input"] in ("", named[0]) and result["output"] in ("", named[1])
         ]
 
+    def __post_init__(self) -> None:
+        _DESKS.add(self)
+
     def when(self, topic: str, refresh: Refresh) -> None:
-        """Call a function whenever something of a topic has changed."""
-        self._shown.setdefault(topic, []).append(refresh)
+        """Call a function whenever something of a topic has changed, while what it shows is there."""
+        self.news.when(topic, refresh)
 
     def changed(self, *topics: str) -> None:
-        """Tell all that show a topic."""
-        for topic in topics:
-            for refresh in self._shown.get(topic, []):
-                refresh()
+        """Tell all that show a topic: on this page, and on other pages over the same workspace."""
+        self.news.changed(*topics)
+        shared = [topic for topic in topics if topic in SHARED]
+        for desk in list(_DESKS):
+            if shared and desk is not self and desk.workspace is self.workspace:
+                desk.news.changed(*shared)
+
+    def close(self) -> None:
+        """Let go of all that was shown: the page is closed."""
+        _DESKS.discard(self)
+        self.news.close()
 
     def did(self, what: str, call: str) -> None:
         """Show and log the call behind a click."""
@@ -142,24 +159,26 @@ def tell(error: Exception | str) -> None:
     )
 
 
-def guarded(action: Callable[[], Awaitable[Any]]) -> Callable[[], Awaitable[None]]:
-    """Return an action whose problems become messages."""
+def guarded(action: Callable[[], Awaitable[Any]], what: str = "") -> Callable[..., Awaitable[None]]:
+    """Return an action that shows that it runs, once at a time; its problems become messages."""
 
     async def act() -> None:
         with told():
             await action()
 
-    return act
+    return Answer(act, what)
 
 
-def on_event(action: Callable[[Any], Awaitable[Any]]) -> Callable[[Any], Awaitable[None]]:
-    """Return a handler of events whose problems become messages."""
+def on_event(
+    action: Callable[[Any], Awaitable[Any]], what: str = "", *, once: bool = False
+) -> Callable[[Any], Awaitable[None]]:
+    """Return a handler of events that shows that it runs; its problems become messages."""
 
     async def act(event: Any) -> None:
         with told():
             await action(event)
 
-    return act
+    return Answer(act, what, takes_event=True, once=once)
 
 
 @contextmanager

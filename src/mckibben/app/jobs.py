@@ -91,6 +91,7 @@ class Jobs:
         self.untold: list[str] = []
         """What could not be written down, for the page to tell."""
         self._seen = -1
+        self._asked: list[tuple[str, Job]] = []
         self.jobs = self._kept()
 
     def _kept(self) -> dict[str, Job]:
@@ -110,11 +111,18 @@ class Jobs:
     def submit(self, kind: str, given: dict[str, Any]) -> Job:
         """Queue a job; where its result has a name, it gets one like that wished for, its own.
 
+        One that is asked for again, on the same recordings, while it waits or runs is not begun
+        twice: it is returned as it is.
+
         Raises
         ------
         DataError
             If it cannot be written down.
         """
+        asked = self._asked_for(kind, given)
+        for known, job in self._asked:
+            if known == asked and job.state not in ENDED:
+                return job
         name = self.workspace.new_name("jobs", f"{kind}-{given.get('model', '')}")
         place = PLACES.get(kind)
         if place is not None:
@@ -126,8 +134,15 @@ class Jobs:
             self._give_back(job)
             raise
         self.jobs[name] = job
+        self._asked = [(known, one) for known, one in self._asked if one.state not in ENDED]
+        self._asked.append((asked, job))
         self.poll()
         return job
+
+    def _asked_for(self, kind: str, given: dict[str, Any]) -> str:
+        """Return what a job is, the same for the same: what it does, and the recordings there are."""
+        changed = (self.workspace.folder / "recordings").stat().st_mtime_ns
+        return f"{kind} {changed} {sorted(given.items())}"
 
     def poll(self) -> bool:
         """Start what can be started and see what has ended; tell whether anything changed."""

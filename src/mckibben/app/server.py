@@ -5,35 +5,21 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import socket
-import sys
 import threading
 import webbrowser
-from collections.abc import Awaitable, Callable, Iterator
-from importlib import import_module
+from collections.abc import Callable, Iterator
 from pathlib import Path
-from types import ModuleType
-from typing import Any
 
 from nicegui import Client, app, ui
+from starlette.responses import Response
 
-from mckibben import registry
 from mckibben.app.claim import keep_to_the_user
-from mckibben.app.desk import Desk, code, named, tell, unexpected
 from mckibben.app.guard import Guard, checked_token, new_token
-from mckibben.app.jobs import Job, Jobs
+from mckibben.app.jobs import Jobs
+from mckibben.app.shell import TICK, build, load_the_rest
 from mckibben.app.workspace import Workspace
 from mckibben.errors import DataError, MckibbenError
 from mckibben.system.atomic import write_text
-from mckibben.system.workers import PRELOADED
-
-PAGES = {
-    "Data": ("folder_open", "data"),
-    "Look": ("timeline", "look"),
-    "Models": ("leaderboard", "models"),
-    "Compensate": ("sync_alt", "compensate"),
-    "Take away": ("download", "takeaway"),
-}
-"""Icon and module of each page; a module is loaded when its page is opened, or nothing else is to do."""
 
 PATIENCE = 600.0
 """For what a page shows to be read, the first time [s]."""
@@ -49,164 +35,6 @@ OPENING = 0.5
 
 IDLE = 1.0
 """After the first page is there, when to load what the others need [s]."""
-
-HEAD = """
-<style>:focus-visible { outline: 2px solid #56b4e9; outline-offset: 2px }</style>
-<script>
-  // a figure on a page that is not shown cannot be resized, and need not be
-  addEventListener("unhandledrejection", (event) => {
-    if (String(event.reason).includes("displayed plot div")) event.preventDefault();
-  });
-</script>
-"""
-
-TICK = 0.4
-"""How often a page looks how its jobs do [s]."""
-
-TOPICS = {"fit": "results", "loop": "runs", "record": "recordings", "report": "jobs"}
-"""What changes when a job of a kind has ended."""
-
-
-def build(workspace: Workspace, jobs: Jobs) -> None:
-    """Build one page for one browser."""
-    ui.on_exception(unexpected)
-    desk = Desk(workspace, jobs)
-    desk.settle_channels()
-    dark = ui.dark_mode(None)
-    ui.add_head_html(HEAD)
-    with ui.header().classes("items-center gap-2 py-1"):
-        ui.label("mckibben").classes("text-lg font-medium")
-        with ui.tabs().props("dense inline-label outside-arrows mobile-arrows") as tabs:
-            tab = {
-                name: named(ui.tab(name, icon=icon), f"tab-{name.split()[0].lower()}")
-                for name, (icon, _) in PAGES.items()
-            }
-        ui.space()
-        busy = named(ui.label("").classes("text-xs"), "busy")
-        ui.button(icon="contrast", on_click=lambda: _switch(desk, dark)).props(
-            'flat dense color=white aria-label="Light or dark"'
-        )
-    if workspace.read_only:
-        text = f"Nothing can be changed here: {workspace.read_only}."
-        named(ui.label(text).classes("w-full text-center bg-warning text-black"), "read-only")
-    panels = ui.tab_panels(tabs, value=tab["Data"], animated=False)
-    with panels.classes("w-full bg-transparent"):
-        built: set[str] = set()
-        holders = {}
-        for name in PAGES:
-            with ui.tab_panel(tab[name]).classes("p-2"):
-                holders[name] = ui.column().classes("w-full")
-    built.add("Data")
-    with holders["Data"]:
-        _module("Data").build(desk)
-
-    def opened(event: Any) -> Awaitable[None] | None:
-        """Build a page when it is first opened: at once, where its module is there."""
-        name = str(event.value)
-        if name not in PAGES or name in built:
-            return None
-        built.add(name)
-        if not hasattr(sys.modules.get(_place(name)), "build"):
-            return load(name)
-        with holders[name]:
-            _module(name).build(desk)
-        return None
-
-    async def load(name: str) -> None:
-        module = await asyncio.to_thread(_module, name)
-        with holders[name]:
-            module.build(desk)
-
-    panels.on_value_change(opened)
-    _log(desk)
-    ends = {name: job.state for name, job in jobs.jobs.items()}
-    told: dict[str, int] = {}
-
-    async def tick() -> None:
-        while jobs.untold:
-            tell(jobs.untold.pop(0))
-        active = jobs.active()
-        busy.set_text(f"{len(active)} job(s)" if active else "")
-        moved, ended = False, []
-        for name, job in list(jobs.jobs.items()):
-            lines = len(jobs.progress(name)) if job.state == "running" else 0
-            if ends.get(name) != job.state:
-                ends[name] = job.state
-                moved = True
-                if job.state in ("done", "failed", "cancelled"):
-                    ended.append(job)
-            elif lines != told.get(name):
-                moved = True
-            told[name] = lines
-        if ended:
-            await asyncio.to_thread(workspace.warm)
-        for job in ended:
-            _say(job)
-            desk.changed(TOPICS.get(job.kind, "jobs"), "log")
-            if job.kind == "record":
-                desk.changed("channels")
-        if moved:
-            desk.changed("jobs")
-
-    async def match() -> None:
-        """Draw figures for the theme that the browser has chosen."""
-        query = "window.matchMedia('(prefers-color-scheme: dark)').matches"
-        with contextlib.suppress(TimeoutError):  # of a browser that is busy: it stays light
-            desk.dark = bool(await ui.run_javascript(query, timeout=5.0))
-        dark.set_value(desk.dark)
-        if desk.dark:
-            desk.changed("theme")
-
-    ui.timer(0.1, match, once=True)
-    ui.timer(TICK, tick)
-
-
-def _say(job: Job) -> None:
-    text = f"{job.title:.80}: {job.state}. {job.message}"[:300]
-    if job.state == "failed":
-        ui.notify(text, type="negative", multi_line=True, timeout=10_000)
-    else:
-        ui.notify(text, type="info")
-
-
-def _switch(desk: Desk, dark: ui.dark_mode) -> None:
-    desk.dark = not desk.dark
-    dark.set_value(desk.dark)
-    desk.changed("theme")
-
-
-def _module(name: str) -> ModuleType:
-    return import_module(_place(name))
-
-
-def _place(name: str) -> str:
-    return f"mckibben.app.pages.{PAGES[name][1]}"
-
-
-def _log(desk: Desk) -> None:
-    """Show the calls behind the clicks, newest first."""
-    with named(ui.expansion("What was done, as calls").classes("w-full"), "log"):
-
-        @ui.refreshable
-        def shown() -> None:
-            lines = [entry for entry in desk.workspace.logged() if entry["call"]][-12:]
-            if not lines:
-                ui.label("Nothing yet.").classes("opacity-70")
-            else:
-                code("\n".join(f"# {entry['did']}\n{entry['call']}" for entry in reversed(lines)))
-
-        desk.when("log", shown.refresh)
-        shown()
-
-
-def _load_the_rest() -> None:
-    """Load what all pages need, in a thread, so that opening one does not wait for it."""
-    for name in PAGES:
-        _module(name)
-    for module in (*PRELOADED, "mckibben.app.work"):
-        import_module(module)
-    for name in registry.names("estimators"):
-        registry.load("estimators", name)
 
 
 def _print(text: str) -> None:
@@ -256,7 +84,7 @@ def serve(
     app.on_shutdown(jobs.close)
     app.timer(TICK, jobs.poll)  # whether or not a page is open
 
-    idle = threading.Timer(IDLE, _load_the_rest)
+    idle = threading.Timer(IDLE, load_the_rest)
     idle.daemon = True
 
     @ui.page("/", title="mckibben", response_timeout=PATIENCE)
@@ -266,6 +94,11 @@ def serve(
         build(workspace, jobs)
         if not idle.is_alive() and not idle.finished.is_set():
             idle.start()
+
+    @app.get("/awake")
+    async def awake() -> Response:
+        """Answer as soon as clicks are answered; see the page's script."""
+        return Response(status_code=204)
 
     told = f"Workbench over {workspace.folder}: {address} (Ctrl-C ends it)"
     if workspace.read_only:

@@ -1,0 +1,116 @@
+"""A workbench and a browser for tests: one of each for all tests of a module."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import time
+import urllib.request
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from tests.tools import where
+
+BROWSER = where("chromium")
+
+SLOW = 60_000
+"""Milliseconds to wait for fits on a busy machine."""
+
+OPTIONS = [
+    "--no-sandbox",
+    "--disable-dev-shm-usage",
+    "--disable-gpu",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+]
+
+TABS = ("data", "look", "models", "compensate", "take")
+
+
+@contextmanager
+def workbench(folder: Path) -> Iterator[str]:
+    """Start the workbench over a folder on a free port, and give its address."""
+    command = [sys.executable, "-m", "mckibben.cli.main", "app", str(folder)]
+    plain = {name: value for name, value in os.environ.items() if "PYTEST" not in name}
+    process = subprocess.Popen(
+        [*command, "--port", "0", "--no-show"], stdout=subprocess.PIPE, text=True, env=plain
+    )
+    assert process.stdout is not None
+    line = process.stdout.readline()
+    assert "Workbench over" in line, line
+    address = next(word for word in line.split() if word.startswith("http"))
+    answering(address)
+    try:
+        yield address
+    finally:
+        process.terminate()
+        process.wait(20)
+        process.stdout.close()
+
+
+def answering(address: str) -> None:
+    """Wait until the server answers."""
+    for _ in range(200):
+        try:
+            urllib.request.urlopen(address, timeout=5).close()
+        except OSError:
+            time.sleep(0.05)
+        else:
+            return
+    raise AssertionError("the workbench does not answer")
+
+
+@contextmanager
+def visited(browser: Any, address: str, **options: Any) -> Iterator[Any]:
+    """Open the workbench in a window of its own, and demand that nobody else is asked nor errs."""
+    window = browser.new_context(**{"viewport": {"width": 1280, "height": 900}} | options)
+    page = window.new_page()
+    foreign: list[str] = []
+    errors: list[str] = []
+
+    def asked(request: Any) -> None:
+        if not request.url.startswith((address, "data:", "blob:")):
+            foreign.append(request.url)
+
+    page.on("request", asked)
+    page.on("console", lambda said: errors.append(said.text) if said.type == "error" else None)
+    page.on("pageerror", lambda error: errors.append(str(error)))
+    page.goto(address)
+    seen(page, "tab-data")
+    try:
+        yield page
+    finally:
+        window.close()
+    assert foreign == []
+    assert errors == []
+
+
+def seen(page: Any, name: str, timeout: float = SLOW) -> Any:
+    """Wait until an element is there, and give it."""
+    place = page.get_by_test_id(name).first
+    place.wait_for(timeout=timeout)
+    return place
+
+
+def idle(page: Any) -> None:
+    """Wait until the header says that nothing runs."""
+    quiet = "document.querySelector('[data-testid=busy]').innerText === ''"
+    page.wait_for_function(quiet, timeout=SLOW)
+
+
+def opened(page: Any, tab: str) -> None:
+    """Open a tab, and wait until what is on it is there."""
+    seen(page, f"tab-{tab}").click()
+    page.wait_for_function(
+        "name => document.querySelector(`[data-testid=tab-${name}]`)"
+        ".getAttribute('aria-selected') === 'true'",
+        arg=tab,
+    )
+    page.wait_for_timeout(150)
+    idle(page)

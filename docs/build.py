@@ -2,8 +2,8 @@
 
     python docs/build.py            # into docs/_build/html; warnings are errors
 
-Nothing is fitted for it but in the gallery: examples of models are kept (docs/models/fits.py), and so are the
-pictures of the workbench (docs/tour.py).
+Nothing is fitted for it but in the gallery: examples of models are kept (docs/models/fits.py), and so
+are the pictures of the workbench (docs/tour.py).
 """
 
 from __future__ import annotations
@@ -32,7 +32,9 @@ def main() -> int:
     """Build everything."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
     parser.add_argument("--clean", action="store_true", help="forget what earlier builds made")
-    parser.add_argument("--into", type=Path, default=DOCS / "_build" / "html", help="folder to build into")
+    parser.add_argument(
+        "--into", type=Path, default=DOCS / "_build" / "html", help="folder to build into"
+    )
     parser.add_argument("--jobs", type=int, default=2, help="processes of Sphinx")
     given = parser.parse_args()
     if given.clean:

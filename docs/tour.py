@@ -1,6 +1,6 @@
-"""Take the pictures of the workbench's tour, with the bundled example, in a headless browser; run by hand.
+"""Take the pictures of the workbench's tour, on the bundled example, in a headless browser.
 
-    python docs/tour.py             # into docs/pictures/tour, and the list of steps in docs/workbench.md
+    python docs/tour.py     # by hand; into docs/pictures/tour and docs/workbench.md
 
 Needs playwright and chromium. A step that this version of the workbench does not have is left out, and said.
 """
@@ -41,31 +41,51 @@ class Step:
 
 
 STEPS = (
-    Step("start", "An empty workspace", "Drop files, open the example, or record a virtual muscle.", (), "empty"),
+    Step(
+        "start",
+        "An empty workspace",
+        "Drop files, open the example, or record a virtual muscle.",
+        (),
+        "empty",
+    ),
     Step(
         "data",
         "Data",
-        "Every recording with its channels and units; columns are mapped by hand where names do not tell, and parts are "
-        "cut by dragging. One recording trains, another tests.",
+        "Every recording with its channels and units; columns are mapped by hand where names do not tell, "
+        "and parts are cut by dragging. One recording trains, another tests.",
         ("example",),
         "preview-plot",
     ),
-    Step("look", "Look", "Loops, cycles, and what the muscle does in words and numbers.", ("tab-look",), "loop-plot"),
+    Step(
+        "look",
+        "Look",
+        "Loops, cycles, and what the muscle does in words and numbers.",
+        ("tab-look",),
+        "loop-plot",
+    ),
     Step(
         "models",
         "Models",
-        "Models are fitted in the background and ranked; the choice is by cross-validation on the training side.",
+        "Models are fitted in the background and ranked; "
+        "the choice is by cross-validation on the training side.",
         ("tab-models", "fit"),
         "closer-0",
     ),
     Step(
         "compensate",
         "Compensate",
-        "Draw a motion, see what can be reached, and close the loop on another model of the muscle, or a rig.",
+        "Draw a motion, see what can be reached, and close the loop on another model of "
+        "the muscle, or a rig.",
         ("tab-compensate", "wave", "run-loop"),
         "runs",
     ),
-    Step("take", "Take away", "The report, figures, the model, its inverse, C99 or an FMU.", ("tab-take",), "take-report"),
+    Step(
+        "take",
+        "Take away",
+        "The report, figures, the model, its inverse, C99 or an FMU.",
+        ("tab-take",),
+        "take-report",
+    ),
 )
 
 
@@ -125,7 +145,16 @@ def main() -> None:
     PICTURES.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory() as folder, sync_playwright() as play:
         process = subprocess.Popen(
-            [sys.executable, "-m", "mckibben.cli.main", "app", f"{folder}/my_muscle", "--port", "0", "--no-show"],
+            [
+                sys.executable,
+                "-m",
+                "mckibben.cli.main",
+                "app",
+                f"{folder}/my_muscle",
+                "--port",
+                "0",
+                "--no-show",
+            ],
             stdout=subprocess.PIPE,
             text=True,
             env=dict(os.environ),

@@ -12,7 +12,12 @@ from making.pages import DOCS, MADE, write
 
 def write_gallery() -> None:
     """Run every script of the gallery that changed, and show its picture beside its text."""
-    lines = ["# Gallery", "", "Every picture is made by the script below it, from `docs/gallery`.", ""]
+    lines = [
+        "# Gallery",
+        "",
+        "Every picture is made by the script below it, from `docs/gallery`.",
+        "",
+    ]
     for script in sorted((DOCS / "gallery").glob("*.py")):
         picture = MADE / "gallery" / f"{script.stem}.png"
         text = script.read_text(encoding="utf-8")

@@ -20,7 +20,9 @@ from mckibben.blocks.core.writing import quantities, written
 from mckibben.comparison.limits import limits
 from mckibben.errors import MckibbenError
 
-NAMES: dict[str, dict[str, str]] = tomllib.loads((DOCS / "models" / "names.toml").read_text("utf-8"))
+NAMES: dict[str, dict[str, str]] = tomllib.loads(
+    (DOCS / "models" / "names.toml").read_text("utf-8")
+)
 """Full names of models, by what they are for."""
 
 HEADS = ("title", "about")
@@ -41,7 +43,10 @@ def named() -> dict[str, tuple[str, str]]:
     if offered != found.keys():
         sys.exit(f"docs/models/names.toml: mend {sorted(offered ^ found.keys())}")
     for model in found:
-        if not example(model).is_file() or not (DOCS / "pictures" / "models" / f"{model}.png").is_file():
+        if (
+            not example(model).is_file()
+            or not (DOCS / "pictures" / "models" / f"{model}.png").is_file()
+        ):
             sys.exit(f"{model} has no example: run python docs/models/fits.py {model}")
     return found
 
@@ -81,9 +86,9 @@ def write_models() -> None:
     lines = [
         "# Models by name",
         "",
-        "A page for every model: equations, parameters with units, settings, what it needs, its inverse, its cost "
-        "and its source. [Which model should I choose?](../../models/choosing.md) compares them. An asterisk "
-        "marks what is good only near the motions it was trained on.",
+        "A page for every model: equations, parameters with units, settings, "
+        "what it needs, its inverse, its cost and its source. [Which model should I choose?](../../models/choosing.md) "
+        "compares them. An asterisk marks what is good only near the motions it was trained on.",
         "",
     ]
     for group in NAMES.values():
@@ -92,7 +97,9 @@ def write_models() -> None:
         for model, name in group.items():
             if model not in HEADS:
                 star = " \\*" if "caution" in all_limits[model] else ""
-                rows.append([f"[{name}]({model}.md){star}", f"`{model}`", plain(all_limits[model]["can"])])
+                rows.append(
+                    [f"[{name}]({model}.md){star}", f"`{model}`", plain(all_limits[model]["can"])]
+                )
         lines += table(["model", "in commands", "what for"], rows)
     lines += ["## All, by the alphabet", ""]
     ordered = sorted((name, model) for model, (name, _) in names.items())
@@ -113,7 +120,10 @@ def page(
             ["in commands", f"`{model}`"],
             ["group", group],
             ["maps", mapped(block)],
-            ["time", "needed" if block.rate_dependent else "not needed: the order of samples is enough"],
+            [
+                "time",
+                "needed" if block.rate_dependent else "not needed: the order of samples is enough",
+            ],
             ["inverse", inverse(block)],
             ["a fit", f"about {estimator.effort:g} s for 10 000 samples"],
             *([["source", "; ".join(sources)]] if (sources := source(block)) else []),
@@ -121,11 +131,14 @@ def page(
     )
     lines += [f"**Can**: {plain(known['can'])}", "", f"**Cannot**: {plain(known['cannot'])}", ""]
     if "caution" in known:
-        lines += [f"**Good only near the motions it was trained on**: {plain(known['caution'])}.", ""]
+        lines += [
+            f"**Good only near the motions it was trained on**: {plain(known['caution'])}.",
+            "",
+        ]
     lines += [f"![Loops of {name}](../../pictures/models/{model}.png)", ""]
     lines += [
-        "*A model fitted to a short recording of a virtual rig, running free on it; nothing here was measured on a "
-        "real muscle.*",
+        "*A model fitted to a short recording of a virtual rig, running free on it; "
+        "nothing here was measured on a real muscle.*",
         "",
         "## How to fit it",
         "",
@@ -154,8 +167,8 @@ def page(
         if kind in cost:
             median, most, first, ram, _, flash, _ = cost[kind]
             lines += [
-                f"On a microcontroller (Cortex-M4F, single precision, a small example): {median} instructions a "
-                f"step, at most {most}, the first {first}; {ram} bytes of RAM, {flash} of flash.",
+                f"On a microcontroller (Cortex-M4F, single precision, a small example): "
+                f"{median} instructions a step, at most {most}, the first {first}; {ram} bytes of RAM, {flash} of flash.",
                 "",
             ]
     return lines
@@ -190,7 +203,10 @@ def source(block: Any) -> list[str]:
     found = []
     for kind in dict.fromkeys(leaf.kind for leaf in leaves(block)):
         text = inspect.getdoc(sys.modules[registry.load("blocks", kind).__module__]) or ""
-        found += [plain(" ".join(part.split())) for part in re.findall(r"Sources?: (.+?)(?:\n\n|\Z)", text, re.S)]
+        found += [
+            plain(" ".join(part.split()))
+            for part in re.findall(r"Sources?: (.+?)(?:\n\n|\Z)", text, re.S)
+        ]
     return list(dict.fromkeys(one.rstrip(".") for one in found))
 
 
@@ -203,7 +219,11 @@ def fitting(model: str, estimator: Any, block: Any) -> list[str]:
         if preset
         else [f"estimator = {cls.__name__}()"]
     )
-    imported = "from mckibben import registry" if preset else f"from {cls.__module__} import {cls.__name__}"
+    imported = (
+        "from mckibben import registry"
+        if preset
+        else f"from {cls.__module__} import {cls.__name__}"
+    )
     lines = ["```bash", f"mckibben fit {model} recording.csv -o model.json"]
     if not block.undoing:
         try:

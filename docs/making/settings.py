@@ -9,14 +9,22 @@ from typing import Annotated, Any, Literal, get_args, get_origin, get_type_hints
 from making.pages import plain, table
 from mckibben.blocks.core.notation import meanings
 
-WORDS = {int: "whole number", float: "number", bool: "true or false", str: "name", type(None): "none"}
+WORDS = {
+    int: "whole number",
+    float: "number",
+    bool: "true or false",
+    str: "name",
+    type(None): "none",
+}
 
 
 def allowed(hint: Any) -> str:
     """Return what a setting may be, in words."""
     if get_origin(hint) is Annotated:
         of, *limits = get_args(hint)
-        return " ".join(filter(None, (allowed(of), " and ".join(filter(None, map(limited, limits))))))
+        return " ".join(
+            filter(None, (allowed(of), " and ".join(filter(None, map(limited, limits)))))
+        )
     if get_origin(hint) is Literal:
         return ", ".join(f"`{value}`" for value in get_args(hint))
     if hint in WORDS:
@@ -35,7 +43,9 @@ def limited(limit: Any) -> str:
     found = [
         text.format(f"{value:g}" if isinstance(value, float) else value)
         for name, text in words.items()
-        if (value := getattr(limit, name, None)) is not None and abs(value) < 2**40 and math.isfinite(value)
+        if (value := getattr(limit, name, None)) is not None
+        and abs(value) < 2**40
+        and math.isfinite(value)
     ]
     return " ".join(found)
 
@@ -45,7 +55,12 @@ def settings_table(estimator: Any) -> list[str]:
     cls = getattr(estimator, "of", estimator)
     hints, said = get_type_hints(cls, include_extras=True), meanings(cls)
     rows = [
-        [f"`{one.name}`", f"`{one.default}`", allowed(hints[one.name]), plain(said.get(one.name, ""))]
+        [
+            f"`{one.name}`",
+            f"`{one.default}`",
+            allowed(hints[one.name]),
+            plain(said.get(one.name, "")),
+        ]
         for one in fields(estimator)
         if one.default is not MISSING
     ]

@@ -2,8 +2,8 @@
 
     python docs/models/fits.py [MODEL ...]      # all by default; some minutes
 
-Writes docs/models/fitted/MODEL.json, a model as `save` does, and docs/pictures/models/MODEL.png, it running
-free on what it was fitted to. `docs/build.py` makes the pages of these, and fits nothing.
+Writes docs/models/fitted/MODEL.json, a model as `save` does, and docs/pictures/models/MODEL.png, it
+running free on what it was fitted to. `docs/build.py` makes the pages of these, and fits nothing.
 """
 
 from __future__ import annotations
@@ -60,7 +60,10 @@ class Task:
 def recorded(name: str) -> list[Recording]:
     """Return some runs of a protocol, of some hundred samples each."""
     plan = protocol(name)
-    runs = [run for _, run in record(plan, load_rig(plan.rig), runs=list(PROTOCOLS[name]), seed=0, jobs=1)]
+    runs = [
+        run
+        for _, run in record(plan, load_rig(plan.rig), runs=list(PROTOCOLS[name]), seed=0, jobs=1)
+    ]
     step = max(run.n_samples // 800 * (run.sample_time or 0.0) for run in runs)
     step = max(step, *(run.sample_time or 0.0 for run in runs))
     return [resample(run, step) for run in runs]
@@ -77,11 +80,14 @@ def lifted() -> list[Recording]:
 def activated() -> list[Recording]:
     """Return runs under loads, with the contraction of a muscle of 530 mm."""
     runs = recorded("activation-pressure")
-    return [run.with_channels({"contraction": ""}, contraction=run["displacement"] / 530.0) for run in runs]
+    return [
+        run.with_channels({"contraction": ""}, contraction=run["displacement"] / 530.0)
+        for run in runs
+    ]
 
 
 def tasks() -> Iterator[Task]:
-    """Give what models are fitted to, recorded when it is asked for: a model gets the first it has a place on."""
+    """Give what models are fitted to, recorded when asked for: a model gets the first that suits it."""
     yield Task(lifted(), ("pressure",), ("displacement",))
     yield Task(recorded("multistate-friction"), ("length",), ("force",))
     yield Task(activated(), ("contraction",), ("pressure",))
@@ -92,7 +98,9 @@ def tasks() -> Iterator[Task]:
     yield Task(loaded, ("voltage",), ("pressure",))
     arm = recorded("sdchm")
     muscles = tuple(name for name in arm[0].channels if name.startswith("pressure"))
-    yield Task(arm, muscles, tuple(name for name in arm[0].channels if name.startswith("displacement")))
+    yield Task(
+        arm, muscles, tuple(name for name in arm[0].channels if name.startswith("displacement"))
+    )
 
 
 def fit(name: str) -> str:
@@ -107,7 +115,12 @@ def fit(name: str) -> str:
                 chosen = estimator.channel_settings(*asked) | SETTINGS.get(name, {})
                 block = estimator(**chosen).fit(task.recordings).model_
                 block.save(MODELS / f"{name}.json")
-                plot_model(load(MODELS / f"{name}.json"), task.recordings[:1], "loops", PICTURES / f"{name}.png")
+                plot_model(
+                    load(MODELS / f"{name}.json"),
+                    task.recordings[:1],
+                    "loops",
+                    PICTURES / f"{name}.png",
+                )
                 smaller(PICTURES / f"{name}.png")
             except MckibbenError as error:
                 reason = str(error)

@@ -2,7 +2,7 @@
 
     python docs/tour.py     # by hand; into docs/pictures/tour and docs/workbench.md
 
-Needs playwright and chromium. A step that this version of the workbench does not have is left out, and said.
+Needs playwright and chromium. A step that this workbench does not have is left out.
 """
 
 from __future__ import annotations
@@ -51,7 +51,8 @@ STEPS = (
     Step(
         "data",
         "Data",
-        "Every recording with its channels and units; columns are mapped by hand where names do not tell, "
+        "Every recording with its channels and units; columns are mapped by hand where names "
+        "do not tell, "
         "and parts are cut by dragging. One recording trains, another tests.",
         ("example",),
         "preview-plot",

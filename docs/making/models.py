@@ -7,6 +7,7 @@ import re
 import sys
 import tomllib
 from collections.abc import Iterator, Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -43,17 +44,19 @@ def named() -> dict[str, tuple[str, str]]:
     if offered != found.keys():
         sys.exit(f"docs/models/names.toml: mend {sorted(offered ^ found.keys())}")
     for model in found:
-        if (
-            not example(model).is_file()
-            or not (DOCS / "pictures" / "models" / f"{model}.png").is_file()
-        ):
+        if not example(model).is_file():
             sys.exit(f"{model} has no example: run python docs/models/fits.py {model}")
     return found
 
 
-def example(model: str) -> Any:
+def example(model: str) -> Path:
     """Return where a model's fitted example is."""
     return DOCS / "models" / "fitted" / f"{model}.json"
+
+
+def pictured(model: str) -> Path:
+    """Return where the picture of a model's loops is; an example that was not fitted has none."""
+    return DOCS / "pictures" / "models" / f"{model}.png"
 
 
 def costs() -> dict[str, list[str]]:
@@ -86,9 +89,10 @@ def write_models() -> None:
     lines = [
         "# Models by name",
         "",
-        "A page for every model: equations, parameters with units, settings, "
-        "what it needs, its inverse, its cost and its source. [Which model should I choose?](../../models/choosing.md) "
-        "compares them. An asterisk marks what is good only near the motions it was trained on.",
+        "A page for every model: equations, parameters with units, settings, what it needs, "
+        "its inverse, its cost and its source. "
+        "[Which model should I choose?](../../models/choosing.md) compares them. "
+        "An asterisk marks what is good only near the motions it was trained on.",
         "",
     ]
     for group in NAMES.values():
@@ -135,11 +139,14 @@ def page(
             f"**Good only near the motions it was trained on**: {plain(known['caution'])}.",
             "",
         ]
-    lines += [f"![Loops of {name}](../../pictures/models/{model}.png)", ""]
+    if pictured(model).is_file():
+        lines += [f"![Loops of {name}](../../pictures/models/{model}.png)", ""]
+        lines += [
+            "*A model fitted to a short recording of a virtual rig, running free on it; "
+            "nothing here was measured on a real muscle.*",
+            "",
+        ]
     lines += [
-        "*A model fitted to a short recording of a virtual rig, running free on it; "
-        "nothing here was measured on a real muscle.*",
-        "",
         "## How to fit it",
         "",
         *fitting(model, estimator, block),
@@ -168,7 +175,8 @@ def page(
             median, most, first, ram, _, flash, _ = cost[kind]
             lines += [
                 f"On a microcontroller (Cortex-M4F, single precision, a small example): "
-                f"{median} instructions a step, at most {most}, the first {first}; {ram} bytes of RAM, {flash} of flash.",
+                f"{median} instructions a step, at most {most}, the first {first}; "
+                f"{ram} bytes of RAM, {flash} of flash.",
                 "",
             ]
     return lines
@@ -296,7 +304,7 @@ def parameters(block: Any) -> list[str]:
     if not rows:
         return ["None.", ""]
     return [
-        f"{len(numbered)} numbers in the example; their ranges there are those of one virtual rig.",
+        f"{len(numbered)} numbers in the example, which is of no real muscle.",
         "",
         *table(["symbol", "name", "what it is", "unit", "how many", "in the example"], rows),
     ]

@@ -11,7 +11,7 @@ from __future__ import annotations
 import sys
 import time
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -86,28 +86,39 @@ def activated() -> list[Recording]:
     ]
 
 
-def tasks() -> Iterator[Task]:
-    """Give what models are fitted to, recorded when asked for: a model gets the first that suits it."""
-    yield Task(lifted(), ("pressure",), ("displacement",))
-    yield Task(recorded("multistate-friction"), ("length",), ("force",))
-    yield Task(activated(), ("contraction",), ("pressure",))
-    yield Task([one.with_channels({"force": "N"}, force=10.0 * one["pressure"]) for one in lifted()],
-               ("force",), ("displacement",))  # fmt: skip
-    loaded = recorded("mpi-narmax")
-    yield Task(loaded, ("voltage",), ("displacement",), ("force",))
-    yield Task(loaded, ("voltage",), ("pressure",))
-    arm = recorded("sdchm")
-    muscles = tuple(name for name in arm[0].channels if name.startswith("pressure"))
-    yield Task(
-        arm, muscles, tuple(name for name in arm[0].channels if name.startswith("displacement"))
-    )
+def pushed() -> list[Recording]:
+    """Return a run with a force made of its pressure, for models from force to displacement."""
+    return [run.with_channels({"force": "N"}, force=10.0 * run["pressure"]) for run in lifted()]
+
+
+MUSCLES = tuple(f"pressure_{place}" for place in (1, 2, 3))
+MOVED = tuple(f"displacement_{place}" for place in (1, 2, 3))
+
+TASKS: dict[str, Callable[[], Task]] = {
+    "muscle": lambda: Task(lifted(), ("pressure",), ("displacement",)),
+    "force": lambda: Task(recorded("multistate-friction"), ("length",), ("force",)),
+    "activation": lambda: Task(activated(), ("contraction",), ("pressure",)),
+    "mass": lambda: Task(pushed(), ("force",), ("displacement",)),
+    "load": lambda: Task(recorded("mpi-narmax"), ("voltage",), ("displacement",), ("force",)),
+    "air": lambda: Task(recorded("mpi-narmax"), ("voltage",), ("pressure",)),
+    "arm": lambda: Task(recorded("sdchm"), MUSCLES, MOVED, ("pressure_extensor",)),
+}
+"""What models are fitted to, recorded when asked for: a model gets the first that suits it."""
+
+PREFERRED = {
+    **dict.fromkeys(("coupled-memory", "coupled-pi", "tsfnn", "sdchm", "sdchm-published"), "arm"),
+    "mpi-narmax": "load",
+    "air": "air",
+}
+"""Tasks that tell more of a model than the first that suits it."""
 
 
 def fit(name: str) -> str:
     """Fit a model to the first task that it has a place on, and write model and picture."""
     estimator = registry.load("estimators", name)
     reasons = []
-    for task in tasks():
+    for key in [PREFERRED[name]] if name in PREFERRED else TASKS:
+        task = TASKS[key]()
         asked = (task.inputs, task.outputs, task.scheduling)
         reason = estimator.objection(task.recordings, *asked)
         if reason is None:

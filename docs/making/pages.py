@@ -51,4 +51,4 @@ def table(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
 
 def toctree(entries: Sequence[str], *options: str) -> list[str]:
     """Return a list of pages below this one."""
-    return ["```{toctree}", *(f":{option}" for option in options), "", *entries, "```", ""]
+    return ["```{toctree}", *(f":{option}:" for option in options), "", *entries, "```", ""]

@@ -42,7 +42,12 @@ PROTOCOLS = {
 }  # fmt: skip
 """Runs of the papers' protocols, on their virtual rigs."""
 
-SETTINGS: dict[str, dict[str, object]] = {"state-network": {"n_states": 2}}
+SHORT = {"particles": 6, "iterations": 8, "n_rounds": 1}
+SETTINGS: dict[str, dict[str, object]] = {
+    "state-network": {"n_states": 2, "n_units": 3},
+    "tsfnn": {"particles": 6, "iterations": 8},
+    **dict.fromkeys(("coupled-pi", "sdchm", "sdchm-published"), SHORT),
+}
 """What is set other than by default, to be quick."""
 
 

@@ -132,7 +132,8 @@ def tell(steps: Sequence[Step]) -> None:
     lines = ["<!-- tour: made by docs/tour.py -->", ""]
     for step in steps:
         lines += [f"## {step.heading}", "", step.text, ""]
-        lines += [f"![The workbench: {step.heading.lower()}](pictures/tour/{step.name}.png)", ""]
+        if (PICTURES / f"{step.name}.png").is_file():
+            lines += [f"![{step.heading} in the workbench](pictures/tour/{step.name}.png)", ""]
     found = path.read_text(encoding="utf-8")
     before, _, rest = found.partition("<!-- tour")
     after = re.split(r"(?m)^(?=## What it keeps to itself)", rest)[1]

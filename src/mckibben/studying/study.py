@@ -145,8 +145,9 @@ def study(
 
     Parameters
     ----------
-    train, test, inputs, outputs, load, validation, models, settings, seed, jobs, most_samples,
-    allow_shared, folder, clear, progress
+    train, test, inputs, outputs, load, validation, models, settings, seed, jobs
+        As for `compare`.
+    most_samples, allow_shared, folder, clear, progress
         As for `compare`.
     rig : str, optional
         Virtual rig to close loops on; default the one that recordings of several muscles say they come

@@ -1,0 +1,310 @@
+"""A page for every model, made of what the model itself declares and of an example fitted before."""
+
+from __future__ import annotations
+
+import inspect
+import re
+import sys
+import tomllib
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import mckibben
+from making.pages import DOCS, MADE, equation, inline, plain, table, toctree, write
+from making.settings import settings_table
+from mckibben import registry
+from mckibben.blocks.core.notation import Written, unit_tex
+from mckibben.blocks.core.writing import quantities, written
+from mckibben.comparison.limits import limits
+from mckibben.errors import MckibbenError
+
+NAMES: dict[str, dict[str, str]] = tomllib.loads(
+    (DOCS / "models" / "names.toml").read_text("utf-8")
+)
+"""Full names of models, by what they are for."""
+
+HEADS = ("title", "about")
+
+
+def named() -> dict[str, tuple[str, str]]:
+    """Return every model's full name, and the title of its group.
+
+    Exits where a model has no name, or no example.
+    """
+    found = {
+        model: (name, group["title"])
+        for group in NAMES.values()
+        for model, name in group.items()
+        if model not in HEADS
+    }
+    offered = set(registry.names("estimators"))
+    if offered != found.keys():
+        sys.exit(f"docs/models/names.toml: mend {sorted(offered ^ found.keys())}")
+    for model in found:
+        if not example(model).is_file():
+            sys.exit(f"{model} has no example: run python docs/models/fits.py {model}")
+    return found
+
+
+def example(model: str) -> Path:
+    """Return where a model's fitted example is."""
+    return DOCS / "models" / "fitted" / f"{model}.json"
+
+
+def pictured(model: str) -> Path:
+    """Return where the picture of a model's loops is; an example that was not fitted has none."""
+    return DOCS / "pictures" / "models" / f"{model}.png"
+
+
+def costs() -> dict[str, list[str]]:
+    """Return the rows of the microcontroller's table, by kind of block."""
+    text = (DOCS / "deploy" / "microcontroller.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| `([\w-]+)` \|(.*)\|$", text, flags=re.M)
+    return {kind: [cell.strip() for cell in row.split("|")] for kind, row in rows}
+
+
+def leaves(block: Any) -> list[Any]:
+    """Return the blocks that a model is made of."""
+    parts = getattr(block, "parts", ())
+    return [leaf for part in parts for leaf in leaves(part)] if parts else [block]
+
+
+def summary(model: str) -> str:
+    """Return what a model is, in a sentence."""
+    return (inspect.getdoc(registry.load("estimators", model)) or "").splitlines()[0]
+
+
+def write_models() -> None:
+    """Write a page for every model, and an index by full name."""
+    cost, all_limits = costs(), limits()
+    names = named()
+    for model, (name, group) in names.items():
+        write(
+            MADE / "models" / f"{model}.md",
+            "\n".join(page(model, name, group, all_limits[model], cost)),
+        )
+    lines = [
+        "# Models by name",
+        "",
+        "A page for every model: equations, parameters with units, settings, what it needs, "
+        "its inverse, its cost and its source. "
+        "[Which model should I choose?](../../models/choosing.md) compares them. "
+        "An asterisk marks what is good only near the motions it was trained on.",
+        "",
+    ]
+    for group in NAMES.values():
+        lines += [f"## {group['title']}", "", group["about"], ""]
+        rows = []
+        for model, name in group.items():
+            if model not in HEADS:
+                star = " \\*" if "caution" in all_limits[model] else ""
+                rows.append(
+                    [f"[{name}]({model}.md){star}", f"`{model}`", plain(all_limits[model]["can"])]
+                )
+        lines += table(["model", "in commands", "what for"], rows)
+    lines += ["## All, by the alphabet", ""]
+    ordered = sorted((name, model) for model, (name, _) in names.items())
+    lines += [", ".join(f"[{name}]({model}.md)" for name, model in ordered) + ".", ""]
+    write(MADE / "models" / "index.md", "\n".join([*lines, *toctree(list(names), "hidden")]))
+
+
+def page(
+    model: str, name: str, group: str, known: Mapping[str, str], cost: Mapping[str, list[str]]
+) -> list[str]:
+    """Return the lines of a model's page."""
+    estimator = registry.load("estimators", model)
+    block = mckibben.load(example(model))
+    lines = [f"# {name}", "", plain(summary(model)), ""]
+    lines += table(
+        ["", ""],
+        [
+            ["in commands", f"`{model}`"],
+            ["group", group],
+            ["maps", mapped(block)],
+            [
+                "time",
+                "needed" if block.rate_dependent else "not needed: the order of samples is enough",
+            ],
+            ["inverse", inverse(block)],
+            ["a fit", f"about {estimator.effort:g} s for 10 000 samples"],
+            *([["source", "; ".join(sources)]] if (sources := source(block)) else []),
+        ],
+    )
+    lines += [f"**Can**: {plain(known['can'])}", "", f"**Cannot**: {plain(known['cannot'])}", ""]
+    if "caution" in known:
+        lines += [
+            f"**Good only near the motions it was trained on**: {plain(known['caution'])}.",
+            "",
+        ]
+    if pictured(model).is_file():
+        lines += [f"![Loops of {name}](../../pictures/models/{model}.png)", ""]
+        lines += [
+            "*A model fitted to a short recording of a virtual rig, running free on it; "
+            "nothing here was measured on a real muscle.*",
+            "",
+        ]
+    lines += [
+        "## How to fit it",
+        "",
+        *fitting(model, estimator, block),
+        "## Equations",
+        "",
+        *paper(written(block)),
+        "## Parameters",
+        "",
+        *parameters(block),
+        "## Settings",
+        "",
+        "In commands `--set NAME=VALUE`, in Python an argument.",
+        "",
+        *settings_table(estimator),
+        "## How it is identified",
+        "",
+        plain(inspect.getdoc(sys.modules[estimator.__module__]) or ""),
+        "",
+        "## In words",
+        "",
+    ]
+    for kind in dict.fromkeys(leaf.kind for leaf in leaves(block)):
+        about = inspect.getdoc(sys.modules[registry.load("blocks", kind).__module__]) or ""
+        lines += [f"### {kind}", "", plain(about), ""]
+        if kind in cost:
+            median, most, first, ram, _, flash, _ = cost[kind]
+            lines += [
+                f"On a microcontroller (Cortex-M4F, single precision, a small example): "
+                f"{median} instructions a step, at most {most}, the first {first}; "
+                f"{ram} bytes of RAM, {flash} of flash.",
+                "",
+            ]
+    return lines
+
+
+def mapped(block: Any) -> str:
+    """Return the channels of a model, with their units."""
+
+    def listed(channels: Any) -> str:
+        return ", ".join(f"{one.name} [{one.unit or '–'}]" for one in channels)
+
+    driven = [one for one in block.inputs if one.name not in block.scheduling]
+    told = [one for one in block.inputs if one.name in block.scheduling]
+    given = f" ; told {listed(told)}" if told else ""
+    return f"{listed(driven)}{given} → {listed(block.outputs)}"
+
+
+def inverse(block: Any) -> str:
+    """Return in words whether a model has an inverse."""
+    if block.undoing:
+        return "is itself a compensator"
+    try:
+        found = block.inverse()
+    except MckibbenError as error:
+        return f"none here: {plain(str(error))}"
+    made_of = dict.fromkeys(leaf.title for leaf in leaves(found))
+    return f"yes: {', '.join(f'`{title}`' for title in made_of)}"
+
+
+def source(block: Any) -> list[str]:
+    """Return what a model's files name as their sources."""
+    found = []
+    for kind in dict.fromkeys(leaf.kind for leaf in leaves(block)):
+        text = inspect.getdoc(sys.modules[registry.load("blocks", kind).__module__]) or ""
+        found += [
+            plain(" ".join(part.split()))
+            for part in re.findall(r"Sources?: (.+?)(?:\n\n|\Z)", text, re.S)
+        ]
+    return list(dict.fromkeys(one.rstrip(".") for one in found))
+
+
+def fitting(model: str, estimator: Any, block: Any) -> list[str]:
+    """Return how a model is fitted, in commands and in Python."""
+    cls = getattr(estimator, "of", estimator)
+    preset = cls is not estimator
+    made = (
+        [f'estimator = registry.load("estimators", "{model}")()']
+        if preset
+        else [f"estimator = {cls.__name__}()"]
+    )
+    imported = (
+        "from mckibben import registry"
+        if preset
+        else f"from {cls.__module__} import {cls.__name__}"
+    )
+    lines = ["```bash", f"mckibben fit {model} recording.csv -o model.json"]
+    if not block.undoing:
+        try:
+            block.inverse()
+            lines.append("mckibben invert model.json -o inverse.json")
+        except MckibbenError:
+            pass
+    return [
+        *lines,
+        "```",
+        "",
+        "```python",
+        "import mckibben",
+        imported,
+        "",
+        'recordings = mckibben.read("recording.csv")',
+        *made,
+        "model = estimator.fit(recordings).model_",
+        'model.save("model.json")',
+        "```",
+        "",
+    ]
+
+
+def paper(one: Written, level: int = 3) -> list[str]:
+    """Return the equations of a model and of its parts, each part of a kind once."""
+    lines, seen = [], set()
+
+    def walk(part: Written, depth: int) -> Iterator[str]:
+        if part.equations in seen:
+            return
+        seen.add(part.equations)
+        if depth and part.equations:
+            title = re.sub(r"^\d+\. ", "", part.title.partition(":")[0])
+            yield from (f"**{plain(title)}**", "")
+        for latex in part.equations:
+            yield from equation(latex)
+        for inner in part.parts:
+            yield from walk(inner, depth + 1)
+
+    lines += list(walk(one, 0))
+    return lines or ["Those of its parts.", ""]
+
+
+def parameters(block: Any) -> list[str]:
+    """Return a table of a model's parameters: symbols, units, and their range in the example."""
+    numbered = list(zip(quantities(block), block.pack().tolist(), strict=True))
+
+    def key(item: tuple[Any, float]) -> tuple[str, str, str]:
+        one = item[0]
+        return re.sub(r"\s*\d+", "", one.name), one.meaning, one.unit
+
+    gathered: dict[tuple[str, str, str], list[tuple[Any, float]]] = {}
+    for item in numbered:
+        gathered.setdefault(key(item), []).append(item)
+    rows = []
+    for (name, meaning, unit), items in gathered.items():
+        symbols = [items[0][0].symbol, *([items[-1][0].symbol] if len(items) > 1 else [])]
+        low, high = float(np.min([v for _, v in items])), float(np.max([v for _, v in items]))
+        rows.append(
+            [
+                inline(r",\ldots,".join(symbols)),
+                plain(name),
+                plain(meaning),
+                inline(unit_tex(unit)) if unit else "–",
+                str(len(items)),
+                f"{low:.4g}" if low == high else f"{low:.4g} to {high:.4g}",
+            ]
+        )
+    if not rows:
+        return ["None.", ""]
+    return [
+        f"{len(numbered)} numbers in the example, which is of no real muscle.",
+        "",
+        *table(["symbol", "name", "what it is", "unit", "how many", "in the example"], rows),
+    ]

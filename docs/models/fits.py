@@ -1,0 +1,170 @@
+"""Fit every model to a short recording of a virtual rig, for the pages of models; run by hand.
+
+    python docs/models/fits.py [MODEL ...]      # all by default; some minutes
+
+Writes docs/models/fitted/MODEL.json, a model as `save` does, and docs/pictures/models/MODEL.png, it
+running free on what it was fitted to. `docs/build.py` makes the pages of these, and fits nothing.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+import warnings
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+
+import mckibben
+from mckibben import registry
+from mckibben.blocks.core.saving import load
+from mckibben.errors import MckibbenError
+from mckibben.recording import Recording
+from mckibben.report.figures import plot_model
+from mckibben.rigs import load_rig, record
+from mckibben.signals import decaying_triangle
+from mckibben.signals.protocol import protocol
+from mckibben.signals.resampling import resample
+
+DOCS = Path(__file__).parents[1]
+MODELS = DOCS / "models" / "fitted"
+PICTURES = DOCS / "pictures" / "models"
+
+PROTOCOLS = {
+    "activation-pressure": ("sine-50N-0.5Hz", "sine-150N-0.5Hz"),
+    "multistate-friction": ("isometric-200mm", "isometric-190mm", "isobaric-2bar", "isobaric-4bar"),
+    "mpi-narmax": ("status-1", "status-2", "status-3"),
+    "sdchm": ("gpi-1", "gpi-2", "gpi-3", *(f"network-p0-{p}-drive-{d}" for p in ("0.4", "1.2", "2.0")
+                                           for d in ("1", "2", "3", "123"))),
+}  # fmt: skip
+"""Runs of the papers' protocols, on their virtual rigs."""
+
+SHORT = {"particles": 6, "iterations": 8, "n_rounds": 1}
+SETTINGS: dict[str, dict[str, object]] = {
+    "state-network": {"n_states": 2, "n_units": 3},
+    "tsfnn": {"particles": 6, "iterations": 8},
+    **dict.fromkeys(("coupled-pi", "sdchm", "sdchm-published"), SHORT),
+}
+"""What is set other than by default, to be quick."""
+
+
+@dataclass(frozen=True)
+class Task:
+    """Recordings, and the channels between which a model is fitted to them."""
+
+    recordings: Sequence[Recording]
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+    scheduling: tuple[str, ...] | None = None
+
+
+@cache
+def recorded(name: str) -> list[Recording]:
+    """Return some runs of a protocol, of some hundred samples each."""
+    plan = protocol(name)
+    runs = [
+        run
+        for _, run in record(plan, load_rig(plan.rig), runs=list(PROTOCOLS[name]), seed=0, jobs=1)
+    ]
+    step = max(run.n_samples // 800 * (run.sample_time or 0.0) for run in runs)
+    step = max(step, *(run.sample_time or 0.0 for run in runs))
+    return [resample(run, step) for run in runs]
+
+
+@cache
+def lifted() -> list[Recording]:
+    """Return a run of one muscle that lifts a mass."""
+    clock = np.arange(800) * 0.05
+    pressure = decaying_triangle(clock, period=10.0, high=5.0, low=1.0)
+    return [load_rig("mas20-hanging").run(mckibben.Recording({"pressure": pressure}, 0.05))]
+
+
+def activated() -> list[Recording]:
+    """Return runs under loads, with the contraction of a muscle of 530 mm."""
+    runs = recorded("activation-pressure")
+    return [
+        run.with_channels({"contraction": ""}, contraction=run["displacement"] / 530.0)
+        for run in runs
+    ]
+
+
+def pushed() -> list[Recording]:
+    """Return a run with a force made of its pressure, for models from force to displacement."""
+    return [run.with_channels({"force": "N"}, force=10.0 * run["pressure"]) for run in lifted()]
+
+
+MUSCLES = tuple(f"pressure_{place}" for place in (1, 2, 3))
+MOVED = tuple(f"displacement_{place}" for place in (1, 2, 3))
+
+TASKS: dict[str, Callable[[], Task]] = {
+    "muscle": lambda: Task(lifted(), ("pressure",), ("displacement",)),
+    "force": lambda: Task(recorded("multistate-friction"), ("length",), ("force",)),
+    "activation": lambda: Task(activated(), ("contraction",), ("pressure",)),
+    "mass": lambda: Task(pushed(), ("force",), ("displacement",)),
+    "load": lambda: Task(recorded("mpi-narmax"), ("voltage",), ("displacement",), ("force",)),
+    "air": lambda: Task(recorded("mpi-narmax"), ("voltage",), ("pressure",)),
+    "arm": lambda: Task(recorded("sdchm"), MUSCLES, MOVED, ("pressure_extensor",)),
+}
+"""What models are fitted to, recorded when asked for: a model gets the first that suits it."""
+
+PREFERRED = {
+    **dict.fromkeys(("coupled-memory", "coupled-pi", "tsfnn", "sdchm", "sdchm-published"), "arm"),
+    "mpi-narmax": "load",
+    "air": "air",
+}
+"""Tasks that tell more of a model than the first that suits it."""
+
+
+def fit(name: str) -> str:
+    """Fit a model to the first task that it has a place on, and write model and picture."""
+    estimator = registry.load("estimators", name)
+    reasons = []
+    for key in [PREFERRED[name]] if name in PREFERRED else TASKS:
+        task = TASKS[key]()
+        asked = (task.inputs, task.outputs, task.scheduling)
+        reason = estimator.objection(task.recordings, *asked)
+        if reason is None:
+            try:
+                chosen = estimator.channel_settings(*asked) | SETTINGS.get(name, {})
+                block = estimator(**chosen).fit(task.recordings).model_
+                block.save(MODELS / f"{name}.json")
+                plot_model(
+                    load(MODELS / f"{name}.json"),
+                    task.recordings[:1],
+                    "loops",
+                    PICTURES / f"{name}.png",
+                )
+                smaller(PICTURES / f"{name}.png")
+            except MckibbenError as error:
+                reason = str(error)
+            else:
+                return f"{', '.join(task.inputs)} to {', '.join(task.outputs)}"
+        reasons.append(reason)
+    sys.exit(f"{name} could not be fitted: {reasons}")
+
+
+def smaller(picture: Path) -> None:
+    """Keep a picture in few colours and at a page's width."""
+    from PIL import Image
+
+    with Image.open(picture) as opened:
+        flat = opened.convert("RGB")
+    flat.thumbnail((900, 700))
+    flat.quantize(48).save(picture, optimize=True)
+
+
+def main() -> None:
+    """Fit the models asked for."""
+    MODELS.mkdir(exist_ok=True)
+    PICTURES.mkdir(exist_ok=True)
+    warnings.simplefilter("ignore")
+    for name in sys.argv[1:] or registry.names("estimators"):
+        started = time.perf_counter()
+        print(f"{name}: {fit(name)}, {time.perf_counter() - started:.1f} s", flush=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -20,6 +20,10 @@ MARGIN = 0.1
 """Share of what can be reached that is shown beyond it."""
 
 
+FEW = 30
+"""Points that are drawn large."""
+
+
 @dataclass(frozen=True)
 class Axes:
     """Where times and values lie in the picture.
@@ -106,9 +110,10 @@ class Axes:
         for other in others:
             parts.append(self._curve(other, ruled, 1.5))
         parts.append(self._curve(points, series, 2.0))
+        size = 4.0 if len(points) <= FEW else 2.0
         for point in points[:200] if dots else ():
             x, y = self.place(*point)
-            parts.append(f'<circle cx="{x:.1f}" cy="{y:.1f}" r="4" fill="{series}" />')
+            parts.append(f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{size}" fill="{series}" />')
         return "".join(parts)
 
     def _curve(self, points: Points, colour: str, width: float) -> str:

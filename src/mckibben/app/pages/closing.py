@@ -212,6 +212,8 @@ def _pictures(desk: Desk, runs: dict[str, Followed]) -> None:
             (run,) = read(paths[name], informative=False)
         except (MckibbenError, ValueError):
             continue
+        if run.duration is not None and run.start_time < 0:  # the approach is not scored
+            run = run.slice(round(-run.start_time / (run.sample_time or 1.0)), len(run))
         for channel in runs[name].rmse:
             wished, plain = f"reference_{channel}", f"uncompensated_{channel}"
             if channel not in run or wished not in run:

@@ -157,6 +157,7 @@ class Editor:
         self.left.clear()
         with self.left:
             self.sketch = Sketch(desk, outputs, reach, held, units)
+        with self.sketch.actions:
             once("Show pressures", self._show, "show-pressures")
 
     async def _turned(self) -> None:

@@ -25,7 +25,7 @@ ROWS = 60
 NEAR = 9.0
 """Distance within which a point is taken hold of [px]."""
 
-SNAPS = 20
+SNAPS = 40
 """Lines that points snap to, at most, in each direction."""
 
 UNDONE = 100
@@ -104,6 +104,7 @@ class Sketch:
             for kind, label in motions.MOTIONS.items():
                 button = ui.button(label, on_click=lambda kind=kind: self.ready(kind))
                 named(button.props("outline dense"), "wave" if kind == "sine" else f"wave-{kind}")
+        self.actions = ui.row().classes("w-full mt-2")
         if held:
             ui.label("Held while it moves").classes("text-sm mt-2")
         with ui.row().classes("gap-2"):

@@ -154,6 +154,7 @@ def look_back(workspace: Workspace, given: dict[str, Any], tell: Tell) -> str:
             {
                 "log": str(given["log"]),
                 "model": str(given["model"]),
+                "form": form,
                 "output": one.output,
                 "unit": one.unit,
                 "achieved": one.achieved,

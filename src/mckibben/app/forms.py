@@ -12,7 +12,7 @@ if TYPE_CHECKING:  # loaded when they are first used, so that the page is there 
     from mckibben.blocks.core.block import Block
 
 FORMS = {
-    "model": "the model, from pressure to motion",
+    "model": "the model itself, as fitted",
     "inverse": "its compensator: the inverse, exact for this model",
     "adaptive": "a compensator that learns while it runs",
     "predictive": "a compensator that looks ahead, for slow valves and limits",

@@ -141,6 +141,7 @@ class Reviewed(Kept):
 
     log: Text
     model: Text
+    form: Text = "inverse"
     output: Text
     unit: Text = ""
     achieved: Number = None

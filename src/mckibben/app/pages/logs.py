@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from pathlib import Path
 
 from nicegui import ui
 from nicegui.events import UploadEventArguments
@@ -43,7 +44,6 @@ def build(desk: Desk) -> None:
                 value="inverse",
                 label="Compensator",
             ).classes("min-w-64")
-            refit = named(ui.checkbox("Try a refit with the log", value=True), "log-refit")
 
         async def loaded(event: UploadEventArguments) -> None:
             if not model.value:
@@ -56,14 +56,7 @@ def build(desk: Desk) -> None:
                     file=path,
                     remedy="name a column reference_displacement_mm",
                 )
-            command = f"mckibben study {path.name} --compensator inverse.json -o study"
-            desk.jobs.submit(
-                "review",
-                {"model": model.value, "form": form.value, "log": path.name}
-                | {"refit": bool(refit.value), "name": path.stem, "call": command},
-            )
-            desk.did(f"looked back on {path.name}", command)
-            desk.changed("jobs")
+            _look_back(desk, str(model.value), str(form.value), path.name, refit=False)
 
         upload = ui.upload(
             label="Drop the log here",
@@ -82,6 +75,19 @@ def build(desk: Desk) -> None:
             value=model.value,
         ),
     )
+
+
+def _look_back(desk: Desk, model: str, form: str, log: str, *, refit: bool) -> None:
+    """Start a look back on a log, unless it is under way."""
+    given = {"model": model, "form": form, "log": log, "refit": refit}
+    for job in desk.jobs.active():
+        if job.kind == "review" and all(job.given.get(key) == given[key] for key in given):
+            return
+    command = f"mckibben study {log} --compensator inverse.json -o study"
+    name = Path(log).stem + ("-with-refit" if refit else "")
+    desk.jobs.submit("review", given | {"name": name, "call": command})
+    desk.did(f"looked back on {log}", command)
+    desk.changed("jobs")
 
 
 def _shown(desk: Desk, name: str, one: Reviewed) -> None:
@@ -105,7 +111,13 @@ def _shown(desk: Desk, name: str, one: Reviewed) -> None:
     for sentence in one.sentences:
         ui.label(sentence).classes("text-sm")
     drawn(desk, one.curves, f"{one.output} [{one.unit}]", f"error [{one.unit}]", "review-plot")
-    if one.refitted:
+    if not one.refitted:
+
+        async def refit() -> None:
+            _look_back(desk, one.model, one.form, one.log, refit=True)
+
+        once("Try a refit with the log", refit, f"refit-{name}").props("outline")
+    else:
 
         async def take() -> None:
             source = desk.workspace.path("reviews", f"{name}-refit.json")

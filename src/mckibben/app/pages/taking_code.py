@@ -24,7 +24,7 @@ CARD = "min-w-0 w-full sm:w-80 gap-2"
 KINDS = {
     "json": "The model as text that this library loads again: mckibben.load(file).",
     "c": "C99 that compiles as it is, with a self-test; for a microcontroller or a PC.",
-    "fmu": "For Simulink and other tools for co-simulation.",
+    "fmu": "For Simulink and other tools; libraries are built here, which takes up to a minute.",
     "ros2": "A package for ros2_control, to be built by colcon; of compensators.",
 }
 """What each file is."""

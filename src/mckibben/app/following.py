@@ -11,7 +11,7 @@ import numpy as np
 from mckibben.app import forms
 from mckibben.app.workspace import Workspace
 from mckibben.arrays import Array
-from mckibben.errors import DataError, MckibbenError, ModelWarning
+from mckibben.errors import DataError, DataWarning, MckibbenError, ModelWarning
 from mckibben.recording import Recording
 
 Tell = Callable[[float, float], None]
@@ -116,7 +116,10 @@ def look_back(workspace: Workspace, given: dict[str, Any], tell: Tell) -> str:
     from mckibben.studying.reviewing import review
 
     name, settings = str(given["name"]), given.get("settings") or {}
-    log = read(workspace.path("uploads", given["log"]), informative=False)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        log = read(workspace.path("uploads", given["log"]), informative=False)
+    notes = [str(one.message) for one in caught if issubclass(one.category, DataWarning)]
     model = workspace.model(given["model"])
     form = given.get("form", "inverse")
     compensator = forms.made(workspace, given["model"], form, settings)
@@ -164,7 +167,7 @@ def look_back(workspace: Workspace, given: dict[str, Any], tell: Tell) -> str:
                     for cause in one.causes
                 ],
                 "verdict": found.verdict,
-                "sentences": [*found.sentences, *found.notes],
+                "sentences": [*found.sentences, *found.notes, *notes],
                 "refitted": refit is not None,
                 "curves": curves,
             },

@@ -19,10 +19,10 @@ from mckibben import DataError
 from mckibben.app import plots, scripts
 from mckibben.app.desk import Desk
 from mckibben.app.jobs import Jobs
-from mckibben.app.pages.compensate import _points
+from mckibben.app.motions import parsed, reference_recording
 from mckibben.app.pages.models import SEPARATOR
 from mckibben.app.shell import build, load_the_rest
-from mckibben.app.work import fit, reference_recording
+from mckibben.app.work import fit
 from mckibben.app.workspace import Workspace
 from mckibben.registry import load
 from mckibben.report import subjects
@@ -219,19 +219,19 @@ def test_a_window_of_a_long_recording_is_thinned_anew(tmp_path: Path) -> None:
 
 
 def test_points_are_read_and_become_a_reference() -> None:
-    points = _points("0 10\n\n 2; 20\n4,10")
+    points = parsed("0 10\n\n 2; 20\n4,10")
     assert points == [(0.0, 10.0), (2.0, 20.0), (4.0, 10.0)]
-    reference = reference_recording(points, 0.5, "displacement")
+    reference = reference_recording({"displacement": points}, 0.5)
     np.testing.assert_allclose(reference["displacement"][[0, 2, 4, 8]], [10, 15, 20, 10])
 
 
 @pytest.mark.parametrize("text", ["1", "a b", "1 2 3"])
 def test_points_that_are_none_are_named(text: str) -> None:
     with pytest.raises(DataError, match="write two numbers a line"):
-        _points(text)
+        parsed(text)
 
 
 @pytest.mark.parametrize("points", [[], [(0.0, 1.0)], [(0.0, 1.0), (0.0, 2.0)], [(0, 1), (1e9, 2)]])
 def test_references_that_cannot_be_are_refused(points: list[tuple[float, float]]) -> None:
     with pytest.raises(DataError, match=r"Remedy:"):
-        reference_recording(points, 0.01, "displacement")
+        reference_recording({"displacement": points}, 0.01)

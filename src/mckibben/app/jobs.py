@@ -32,7 +32,7 @@ ENDED = (DONE, FAILED, CANCELLED, INTERRUPTED)
 KINDNESS = 5
 """Niceness of jobs, so that the page stays quick."""
 
-PLACES = {"fit": "models", "loop": "runs"}
+PLACES = {"fit": "models", "force": "forces", "loop": "runs", "review": "reviews"}
 """Kinds of jobs whose results have a name, and where."""
 
 UNWRITTEN = 74

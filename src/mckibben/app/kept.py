@@ -107,12 +107,64 @@ class Followed(Kept):
     rig: Text = ""
     plant: Text = ""
     controller: Text = ""
+    form: Text = "inverse"
+    reference: Text = ""
     rmse: dict[str, Number] = {}
     largest: dict[str, Number] = {}
     uncompensated: dict[str, Number] = {}
+    units: dict[str, Text] = {}
     notes: list[Text] = []
     clipped: Count | None = None
     step_us: Number = None
+
+
+class Line2D(Kept):
+    """A curve to draw: its name, colour, and whether it stands below."""
+
+    name: Text
+    colour: Text = "series-1"
+    below: bool = False
+    x: list[Number] = []
+    y: list[Number] = []
+
+
+class Cause(Kept):
+    """What a part of an error comes from."""
+
+    kind: Text
+    share: Number = None
+    said: Text = ""
+
+
+class Reviewed(Kept):
+    """What a log of the real rig said of one output."""
+
+    log: Text
+    model: Text
+    form: Text = "inverse"
+    output: Text
+    unit: Text = ""
+    achieved: Number = None
+    predicted: Number = None
+    causes: list[Cause] = []
+    verdict: Text = ""
+    sentences: list[Text] = []
+    refitted: bool = False
+    curves: list[Line2D] = []
+
+
+class Estimated(Kept):
+    """What an estimate of force was beside the measured one."""
+
+    model: Text
+    recording: Text
+    output: Text
+    unit: Text = ""
+    rmse: Number = None
+    largest: Number = None
+    span: Number = None
+    notes: list[Text] = []
+    curves: list[Line2D] = []
 
 
 class Given(Kept):
@@ -129,7 +181,7 @@ class Given(Kept):
 class Noted(Kept):
     """What a job is and how it went."""
 
-    kind: Literal["fit", "loop", "record", "report"]
+    kind: Literal["fit", "force", "loop", "record", "report", "review"]
     state: Text
     message: Text = ""
     given: Given

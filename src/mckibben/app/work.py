@@ -2,18 +2,12 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable
 from typing import Any
 
-import numpy as np
-
+from mckibben.app.following import Tell, estimate, look_back, loop
 from mckibben.app.workspace import Workspace
-from mckibben.errors import DataError, ModelError, ModelWarning
-from mckibben.recording import Recording
-
-Tell = Callable[[float, float], None]
-"""Told the share of the work that is done, and the least cost so far."""
+from mckibben.errors import DataError, ModelError
 
 
 def fit(workspace: Workspace, given: dict[str, Any], tell: Tell) -> str:
@@ -65,54 +59,6 @@ def fit(workspace: Workspace, given: dict[str, Any], tell: Tell) -> str:
     return ". ".join(sentence for sentence in told if sentence)
 
 
-def loop(workspace: Workspace, given: dict[str, Any], tell: Tell) -> str:
-    """Let a controller follow a reference on a model or a virtual rig, and keep the recording."""
-    from mckibben.blocks.core.block import Block
-    from mckibben.control import before, control_law, track, tune_pid
-    from mckibben.files import read, write
-    from mckibben.rigs import load_rig
-
-    inverse, own = workspace.model(given["model"]).inverse(), given.get("plant")
-    plant = workspace.twin(own) if own else load_rig(given["rig"])
-    (reference,) = read(workspace.path("runs", given["reference"]), informative=False)
-    kind = given["controller"]
-    step = reference.sample_time or 0.02
-    controller = control_law(kind, inverse, lambda: tune_pid(plant, sample_time=step))
-    found = track(
-        controller, plant, reference, progress=lambda share: tell(0.5 * share, float("nan"))
-    )
-    without = before(
-        inverse,
-        plant,
-        reference,
-        progress=lambda share: tell(0.5 + 0.5 * share, float("nan")),
-    )
-    name = str(given["name"])
-    recording = without.beside(found.recording).with_meta(name=name)
-    write(recording, workspace.path("runs", f"{name}.csv"))
-    errors = {channel: float(value) for channel, value in found.rmse.items()}
-    workspace.write_json(
-        "runs",
-        name,
-        {
-            "model": given["model"],
-            "rig": given.get("rig") or "",
-            "plant": own or "",
-            "controller": kind,
-            "rmse": errors,
-            "largest": {channel: float(value) for channel, value in found.largest.items()},
-            "uncompensated": {} if without.tracked is None else dict(without.tracked.rmse),
-            "notes": list(without.notes),
-            "clipped": int(found.clipped),
-            "step_us": 1e6 * float(found.step_time[0]),
-            "call": given.get("call", ""),
-        },
-    )
-    if isinstance(controller, Block):
-        controller.save(workspace.path("models", f"{name}-controller.json"))
-    return ", ".join(f"{channel} RMSE {value:.3g} mm" for channel, value in errors.items())
-
-
 def report(workspace: Workspace, given: dict[str, Any], tell: Tell) -> str:
     """Study the recordings with chosen models, and write the report."""
     from mckibben.report import write_report
@@ -159,42 +105,12 @@ def record(workspace: Workspace, given: dict[str, Any], tell: Tell) -> str:
     return f"{len(runs)} recording(s)"
 
 
-def reference_recording(points: list[tuple[float, float]], step: float, channel: str) -> Recording:
-    """Return straight lines through points of time [s] and displacement [mm].
-
-    Raises
-    ------
-    DataError
-        If there are fewer than two points, or their times do not increase.
-    """
-    if len(points) < 2:
-        raise DataError("a reference needs two points or more", remedy="draw some")
-    times, values = np.array(points, dtype=float).T
-    if np.any(np.diff(times) <= 0) or not np.isfinite(values).all():
-        raise DataError(
-            "the times of the reference do not increase", remedy="give points from left to right"
-        )
-    if (times[-1] - times[0]) / step > 1_000_000:
-        raise DataError("the reference is too long", remedy="shorten it, or take longer steps")
-    grid = np.arange(times[0], times[-1] + 0.5 * step, step)
-    return Recording({channel: np.interp(grid, times, values)}, step)
-
-
-def compensated(
-    workspace: Workspace, model: str, reference: Recording
-) -> tuple[Recording, list[str]]:
-    """Return the pressures of a model's inverse for a reference, and what it says of them."""
-    inverse = workspace.model(model).inverse()
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
-        given = inverse.simulate(reference, sample_time=None)
-    return given, [str(one.message) for one in caught if issubclass(one.category, ModelWarning)]
-
-
 WORK: dict[str, Callable[[Workspace, dict[str, Any], Tell], str]] = {
     "fit": fit,
+    "force": estimate,
     "loop": loop,
     "record": record,
     "report": report,
+    "review": look_back,
 }
 """Kinds of jobs."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from importlib.util import find_spec
@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from mckibben.app import kept
 from mckibben.app.caching import Cache
 from mckibben.app.folder import Folder, short
+from mckibben.app.forms import inverse_of
 from mckibben.app.guard import LARGEST_UPLOAD
 from mckibben.comparison.recommending import order
 from mckibben.errors import DataError, MckibbenError
@@ -76,6 +77,7 @@ class Workspace(Folder):
         self._recordings: Cache[Recording] = Cache(MOST_CELLS)
         self._models: Cache[Block] = Cache(MOST_MODELS)
         self._inverses: Cache[bool] = Cache(MOST_MODELS)
+        self._rigs: Cache[list[str]] = Cache(MOST_MODELS)
 
     def keep_upload(self, name: str, content: bytes) -> Path:
         """Keep an uploaded file as it came, and return where; errors are those of `receiving`."""
@@ -276,19 +278,21 @@ class Workspace(Folder):
         return self._models.get(path, make)
 
     def invertible(self, name: str) -> bool:
-        """Tell whether a model has an inverse, and is none itself."""
+        """Tell whether a model has a compensator, and is none itself."""
 
         def make() -> tuple[bool, int]:
-            from mckibben.blocks.core.inverse import Inverse
-
-            block = self.model(name)
-            block.inverse()
-            one = len(block.inputs) == len(block.outputs) == 1
-            return one and not isinstance(block, Inverse), 1
+            inverse_of(self.model(name))
+            return True, 1
 
         with suppress(MckibbenError):
             return self._inverses.get(self.path("models", f"{name}.json"), make)
         return False
+
+    def ranked(self) -> list[str]:
+        """Return the models in the order of the choice; those that were not fitted here come last."""
+        known = self.models()
+        first = [row["name"] for row in self.results() if row["name"] in known]
+        return [*first, *(name for name in known if name not in first)]
 
     def twin(self, name: str) -> Twin:
         """Return a model as a plant, with its band where it has one.
@@ -314,21 +318,31 @@ class Workspace(Folder):
         return Twin(model, limits=limits, name=name)
 
     def plants(self, inverted: str) -> list[str]:
-        """Return the models that a model's compensator can be tried on.
+        """Return the models that a model's compensator can be tried on, in the order of the choice.
 
         Others first, for on its own model a compensator proves nothing.
         """
         undone = self.model(inverted)
+        inputs, outputs = ({c.name for c in ends} for ends in (undone.inputs, undone.outputs))
         found = []
-        for name in self.models():
+        for place, name in enumerate(self.ranked()):
             with suppress(MckibbenError):
                 twin = self.twin(name)
-                if twin.inputs == tuple(c.name for c in undone.inputs) and twin.outputs == tuple(
-                    c.name for c in undone.outputs
-                ):
-                    twin.limits(twin.inputs[0])
-                    found.append((twin.forward == undone, name))
-        return [name for _, name in sorted(found)]
+                if set(twin.inputs) == inputs and set(twin.outputs) == outputs:
+                    for each in inputs.difference(undone.scheduling):
+                        twin.limits(each)
+                    found.append((twin.forward == undone, place, name))
+        return [name for _, _, name in sorted(found)]
+
+    def same(self, inverted: str, plant: str) -> bool:
+        """Tell whether a plant is the very model that a compensator undoes."""
+        from mckibben.control.suiting import of_itself
+
+        return of_itself(self.model(inverted), self.twin(plant))
+
+    def cached_rigs(self, model: str, look: Callable[[], list[str]]) -> list[str]:
+        """Return the virtual rigs of a model's size; they are looked for once, as that takes seconds."""
+        return self._rigs.get(self.path("models", f"{model}.json"), lambda: (look(), 1))
 
     def warm(self) -> None:
         """Read what has changed; what is read is then at hand, for pages that must not wait."""
@@ -354,6 +368,20 @@ class Workspace(Folder):
             for name in self.names("runs")
         }
         return {name: run for name, run in found.items() if run is not None and run.model == model}
+
+    def reviews(self) -> dict[str, kept.Reviewed]:
+        """Return what logs of the real rig said, by their names, newest last."""
+        return self._all("reviews", kept.Reviewed)
+
+    def estimates(self) -> dict[str, kept.Estimated]:
+        """Return estimates of force, by their names, newest last."""
+        return self._all("forces", kept.Estimated)
+
+    def _all(self, kind: str, of: type[kept.Any_]) -> dict[str, kept.Any_]:
+        paths = {name: self.path(kind, f"{name}.json") for name in self.names(kind)}
+        order = sorted(paths, key=lambda name: paths[name].stat().st_mtime_ns)
+        found = {name: kept.checked(of, self.read_json(kind, name)) for name in order}
+        return {name: one for name, one in found.items() if one is not None}
 
 
 def _demand_text(*names: str) -> None:

@@ -1,0 +1,283 @@
+"""Jobs of compensators and estimates of force: loops, looks back on logs, runs over recordings."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from mckibben.app import forms
+from mckibben.app.workspace import Workspace
+from mckibben.arrays import Array
+from mckibben.errors import DataError, DataWarning, MckibbenError, ModelWarning
+from mckibben.recording import Recording
+
+Tell = Callable[[float, float], None]
+"""Told the share of the work that is done, and the least cost so far."""
+
+CURVE = 2000
+"""Most points of a curve that is kept to be drawn."""
+
+
+def loop(workspace: Workspace, given: dict[str, Any], tell: Tell) -> str:
+    """Let a controller follow a reference on a model or a virtual rig, and keep the recording."""
+    from mckibben.blocks.core.block import Block
+    from mckibben.control import before, control_law, track, tune_pid
+    from mckibben.control.loop import wished
+    from mckibben.files import read, write
+    from mckibben.rigs import load_rig
+
+    own, form = given.get("plant"), given.get("form", "inverse")
+    compensator = forms.made(workspace, given["model"], form, given.get("settings") or {})
+    plant = workspace.twin(own) if own else load_rig(given["rig"])
+    (reference,) = read(workspace.path("runs", given["reference"]), informative=False)
+    reference = wished(compensator, reference)
+    kind = given["controller"]
+    step = reference.sample_time or 0.02
+    held = {name: float(reference[name][0]) for name in plant.inputs if name in reference}
+    controller = control_law(
+        kind, compensator, lambda: tune_pid(plant, sample_time=step, scheduled=held)
+    )
+    found = track(
+        controller, plant, reference, progress=lambda share: tell(0.5 * share, float("nan"))
+    )
+    without = before(
+        compensator,
+        plant,
+        reference,
+        progress=lambda share: tell(0.5 + 0.5 * share, float("nan")),
+    )
+    name = str(given["name"])
+    recording = without.beside(found.recording).with_meta(name=name)
+    write(recording, workspace.path("runs", f"{name}.csv"))
+    errors = {channel: float(value) for channel, value in found.rmse.items()}
+    units = {channel: recording.units[channel] for channel in errors}
+    workspace.write_json(
+        "runs",
+        name,
+        {
+            "model": given["model"],
+            "rig": given.get("rig") or "",
+            "plant": own or "",
+            "controller": kind,
+            "form": form,
+            "reference": str(given["reference"]),
+            "rmse": errors,
+            "largest": {channel: float(value) for channel, value in found.largest.items()},
+            "uncompensated": {} if without.tracked is None else dict(without.tracked.rmse),
+            "units": units,
+            "notes": list(without.notes),
+            "clipped": int(found.clipped),
+            "step_us": 1e6 * float(found.step_time[0]),
+            "call": given.get("call", ""),
+        },
+    )
+    if isinstance(controller, Block):
+        controller.save(workspace.path("models", f"{name}-controller.json"))
+    return ", ".join(
+        f"{channel} RMSE {value:.3g} {units[channel]}" for channel, value in errors.items()
+    )
+
+
+def compensated(
+    workspace: Workspace, model: str, reference: Recording, form: str, settings: dict[str, Any]
+) -> tuple[Recording, list[str]]:
+    """Return the pressures that a compensator gives for a reference, and what it says of them.
+
+    Of one that learns they are those that it begins with: what it learns from is measured.
+    """
+    notes = []
+    if form == "adaptive":
+        forms.made(workspace, model, form, settings)
+        notes.append("It begins with these pressures, and learns from what is measured.")
+        form = "inverse"
+    block = forms.made(workspace, model, form, settings)
+    reference = reference.select([channel.name for channel in block.inputs])
+    ahead = block.samples_ahead
+    if ahead:
+        last = {name: np.full(ahead, reference[name][-1]) for name in reference.channels}
+        longer = {name: np.append(reference[name], last[name]) for name in reference.channels}
+        given_early = Recording(longer, reference.sample_time, dict(reference.units))
+    else:
+        given_early = reference
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        found = block.simulate(given_early, sample_time=None)
+    notes += [str(one.message) for one in caught if issubclass(one.category, ModelWarning)]
+    return found.slice(ahead, len(found)) if ahead else found, list(dict.fromkeys(notes))
+
+
+def look_back(workspace: Workspace, given: dict[str, Any], tell: Tell) -> str:
+    """Say how far a log of the real rig was off its reference, and why; keep it, and the refit."""
+    from mckibben.files import read
+    from mckibben.studying.refitting import Refit
+    from mckibben.studying.reviewing import review
+
+    name, settings = str(given["name"]), given.get("settings") or {}
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        log = read(workspace.path("uploads", given["log"]), informative=False)
+    notes = [str(one.message) for one in caught if issubclass(one.category, DataWarning)]
+    model = workspace.model(given["model"])
+    form = given.get("form", "inverse")
+    compensator = forms.made(workspace, given["model"], form, settings)
+    older = workspace.with_role("train") if given.get("refit") else []
+    names = [channel.name for channel in (*model.inputs, *model.outputs)]
+    older = [run for run in older if all(name in run for name in names)]
+    older = [run for run in older if not any(c.startswith("reference_") for c in run.channels)]
+    tell(0.1, float("nan"))
+    found = review(
+        [*log, *older],
+        model=model,
+        compensator=compensator,
+        refit=bool(given.get("refit")),
+        seed=int(given.get("seed", 0)),
+    )
+    tell(0.9, float("nan"))
+    refit = found.refit if isinstance(found.refit, Refit) else None
+    if refit is not None:
+        refit.model.save(workspace.path("reviews", f"{name}-refit.json"))
+    for place, one in enumerate(found.outputs):
+        time, error = one.time, one.measured - one.reference
+        causes = [cause for cause in one.causes if abs(cause.share) >= 0.01][:5]
+        curves = [
+            curve("reference", time, one.reference, "measured"),
+            curve("measured", time, one.measured, "series-1"),
+            curve("error", time, error, "measured", below=True),
+            *(
+                curve(cause.kind, time, cause.signal, f"series-{k + 1}", below=True)
+                for k, cause in enumerate(causes)
+            ),
+        ]
+        workspace.write_json(
+            "reviews",
+            name if place == 0 else f"{name}-{one.output}",
+            {
+                "log": str(given["log"]),
+                "model": str(given["model"]),
+                "form": form,
+                "output": one.output,
+                "unit": one.unit,
+                "achieved": one.achieved,
+                "predicted": one.predicted,
+                "causes": [
+                    {"kind": cause.kind, "share": cause.share, "said": cause.told}
+                    for cause in one.causes
+                ],
+                "verdict": found.verdict,
+                "sentences": [*found.sentences, *found.notes, *notes],
+                "refitted": refit is not None,
+                "curves": curves,
+            },
+        )
+    return found.verdict
+
+
+def estimate(workspace: Workspace, given: dict[str, Any], tell: Tell) -> str:
+    """Estimate a force over a recording that has it measured, and keep both."""
+    name = str(given["name"])
+    block = forms.made(workspace, given["model"], "force", {})
+    recording = workspace.recording(str(given["recording"]))
+    missing = [channel.name for channel in block.inputs if channel.name not in recording]
+    if missing:
+        raise DataError(
+            "the estimate is made from it, and the recording has no such channel",
+            channel=missing[0],
+            remedy="choose a recording that has it",
+        )
+    tell(0.1, float("nan"))
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        found = block.simulate(recording.select([c.name for c in block.inputs]))
+    notes = list(
+        dict.fromkeys(str(w.message) for w in caught if issubclass(w.category, ModelWarning))
+    )
+    said = []
+    time = recording.time
+    for place, channel in enumerate(block.outputs):
+        curves = [curve("estimated", time, found[channel.name], "series-1")]
+        figures: dict[str, float] = {}
+        if channel.name in recording:
+            measured = recording[channel.name]
+            error = found[channel.name] - measured
+            curves.insert(0, curve("measured", time, measured, "measured"))
+            curves.append(curve("error", time, error, "series-2", below=True))
+            figures = {
+                "rmse": float(np.sqrt(np.mean(error**2))),
+                "largest": float(np.abs(error).max()),
+                "span": float(np.ptp(measured)),
+            }
+            said.append(f"{channel.name} RMSE {figures['rmse']:.3g} {channel.unit}")
+        workspace.write_json(
+            "forces",
+            name if place == 0 else f"{name}-{channel.name}",
+            {
+                "model": str(given["model"]),
+                "recording": str(given["recording"]),
+                "output": channel.name,
+                "unit": channel.unit,
+                **figures,
+                "notes": notes,
+                "curves": curves,
+            },
+        )
+    return ", ".join(said) or "estimated; the recording has no measured force to compare with"
+
+
+def curve(
+    name: str, time: Array, values: Array, colour: str, *, below: bool = False
+) -> dict[str, Any]:
+    """Return a curve to draw, thinned."""
+    from mckibben.report.drawing import over_time
+
+    x, y = over_time(np.asarray(time, float), np.asarray(values, float), CURVE)
+    return {"name": name, "colour": colour, "below": below} | {
+        "x": [float(f"{v:.7g}") for v in x],
+        "y": [None if np.isnan(v) else float(f"{v:.7g}") for v in y],
+    }
+
+
+def fitting_rigs(workspace: Workspace, model: str) -> list[str]:
+    """Return the virtual rigs that are of a model's size: same channels, limits and stroke."""
+    from mckibben.control import slow_rise
+    from mckibben.control.suiting import doubts
+    from mckibben.rigs import load_rig, rig_names
+
+    block = workspace.model(model)
+    try:
+        inverse = forms.inverse_of(block)
+        held = held_for(workspace, model)
+    except MckibbenError:
+        return []
+    inputs = tuple(channel.name for channel in block.inputs)
+    outputs = [channel.name for channel in block.outputs]
+    found = []
+    for name in rig_names():
+        rig = load_rig(name)
+        if not (set(inputs) <= set(rig.inputs) and set(outputs) <= set(rig.outputs)):
+            continue
+        driven = [one for one in rig.inputs if one not in inputs]
+        if any(one.startswith(("pressure", "voltage")) for one in driven):
+            continue
+        channels = {one: np.zeros(2) for one in outputs}
+        channels |= {one: np.full(2, value) for one, value in held.items()}
+        channels |= {one: np.zeros(2) for one in driven if one not in channels}
+        try:
+            rise = slow_rise(rig, Recording(channels, 0.05))
+            if not doubts(inverse, rig, rise):
+                found.append(name)
+        except MckibbenError:
+            continue
+    return found
+
+
+def held_for(workspace: Workspace, model: str) -> dict[str, float]:
+    """Return what a compensator needs beside references, at the middle of what was recorded."""
+    block = forms.inverse_of(workspace.model(model))
+    found = {}
+    for name in block.scheduling:
+        runs = [run[name] for run in workspace.readable() if name in run]
+        found[name] = float(np.median(np.concatenate(runs))) if runs else 0.0
+    return found

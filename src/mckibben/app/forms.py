@@ -1,0 +1,164 @@
+"""What a fitted model is used as: itself, a compensator of one kind or another, an estimate of force."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+from mckibben.errors import MckibbenError, ModelError
+
+if TYPE_CHECKING:  # loaded when they are first used, so that the page is there at once
+    from mckibben.app.workspace import Workspace
+    from mckibben.blocks.core.block import Block
+
+FORMS = {
+    "model": "the model itself, as fitted",
+    "inverse": "its compensator: the inverse, exact for this model",
+    "adaptive": "a compensator that learns while it runs",
+    "predictive": "a compensator that looks ahead, for slow valves and limits",
+    "force": "its estimate of force, from motion and pressure",
+    "band": "the model with its band of uncertainty",
+}
+"""What a model is used as, in words."""
+
+COMPENSATORS = ("inverse", "adaptive", "predictive")
+
+SETTINGS = {
+    "adaptive": {"time": "How long it takes to learn [s]"},
+    "predictive": {
+        "rate_limit": "Fastest change of a pressure [bar/s]",
+        "horizon": "Samples it looks ahead",
+    },
+}
+"""Settings of what a model is used as, with what they mean."""
+
+DEFAULTS: dict[str, float | None] = {"time": 60.0, "rate_limit": None, "horizon": 20.0}
+
+
+def inverse_of(block: Block) -> Block:
+    """Return the compensator of a model: its inverse, or of a force in closed form.
+
+    Raises
+    ------
+    ModelError
+        If it has none, or is one already.
+    """
+    from mckibben.blocks.core.commanding import COMMANDS, undoes
+    from mckibben.blocks.force.feedforward import ForceFeedforward
+
+    gives, takes = block.outputs[0].name, block.inputs[0].name
+    if gives.startswith(COMMANDS) or (undoes(block) and not takes.startswith(COMMANDS)):
+        raise ModelError("it is a compensator already. Remedy: choose the model that it undoes.")
+    return ForceFeedforward.of(block) or block.inverse()
+
+
+def force_of(block: Block) -> Block:
+    """Return what tells a force from what is measured: the model itself where it gives one.
+
+    Raises
+    ------
+    ModelError
+        If the model tells none.
+    """
+    from mckibben.blocks.coupled.load_estimate import load_of
+
+    if all(channel.name.startswith("force") for channel in block.outputs):
+        return block
+    return load_of(block)
+
+
+def made(workspace: Workspace, name: str, form: str, settings: Mapping[str, Any]) -> Block:
+    """Return a model of the workspace as what it is to be used as.
+
+    Parameters
+    ----------
+    workspace : Workspace
+    name : str
+        Of the model.
+    form : str
+        One of `FORMS`.
+    settings : mapping
+        Those of `SETTINGS`; what is None is left at its default.
+
+    Raises
+    ------
+    MckibbenError
+        If the model cannot be that, or there is no such model.
+    """
+    if form == "band":
+        return workspace.model(name, "banded")
+    block = workspace.model(name)
+    given = {key: settings[key] for key in SETTINGS.get(form, ()) if settings.get(key) is not None}
+    match form:
+        case "model":
+            return block
+        case "inverse":
+            return inverse_of(block)
+        case "force":
+            return force_of(block)
+        case "adaptive":
+            from mckibben.blocks.adaptive.adaptive_series import adaptive
+
+            time = float(given.get("time", 60.0))
+            if not 0 < time <= 1e6:
+                raise ModelError(f"it cannot learn in {time:g} s. Remedy: give 1 to 1000 s.")
+            return adaptive(block, time)
+        case "predictive":
+            return _predictive(inverse_of(block), given)
+    raise ModelError(
+        f"{form!r:.40} is no use of a model. Remedy: choose one of {', '.join(FORMS)}."
+    )
+
+
+def _predictive(inverse: Block, given: Mapping[str, float]) -> Block:
+    from mckibben.blocks.predictive.predictive import MOST, Predictive
+
+    horizon, rate = int(given.get("horizon", 20)), given.get("rate_limit")
+    if not 1 <= horizon <= 200:
+        raise ModelError(f"it cannot look {horizon} samples ahead. Remedy: give 1 to 200.")
+    if rate is not None and not 0 < rate <= MOST:
+        raise ModelError(
+            f"pressure cannot change by {rate:g} bar/s. Remedy: give what the valve can."
+        )
+    return Predictive(inverse, horizon=horizon, rate_limit=rate)
+
+
+def possible(workspace: Workspace, name: str) -> list[str]:
+    """Return what a model can be used as, of `FORMS`; trying takes a moment."""
+    found = []
+    for form in FORMS:
+        if form == "band" and not workspace.path("banded", f"{name}.json").exists():
+            continue
+        try:
+            block = made(workspace, name, form, {})
+        except MckibbenError:
+            continue
+        if form != "force" or block is not workspace.model(name):
+            found.append(form)
+    return found
+
+
+def written(name: str, form: str, settings: Mapping[str, Any]) -> str:
+    """Return the call that gives a model as what it is used as."""
+    loaded = f"mckibben.load('models/{name}.json')"
+    options = {
+        key: settings[key] for key in SETTINGS.get(form, ()) if settings.get(key) is not None
+    }
+    match form:
+        case "inverse":
+            return f"{loaded}.inverse()"
+        case "band":
+            return f"mckibben.load('banded/{name}.json')"
+        case "adaptive":
+            flags = f" --time {options['time']:g}" if "time" in options else ""
+            return f"mckibben invert models/{name}.json --adaptive{flags} -o {name}-adaptive.json"
+        case "predictive":
+            flags = "".join(
+                f" --{key.replace('_', '-')} {value:g}" for key, value in options.items()
+            )
+            return (
+                f"mckibben invert models/{name}.json --predictive{flags} -o {name}-predictive.json"
+            )
+        case "force":
+            return f"mckibben invert models/{name}.json --for force -o {name}-force.json"
+    return loaded

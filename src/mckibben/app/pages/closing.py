@@ -1,0 +1,234 @@
+"""A closed loop, tried on another model of the muscle or on a virtual rig of its size."""
+
+from __future__ import annotations
+
+import asyncio
+from inspect import getdoc
+from typing import Any
+
+from nicegui import ui
+
+from mckibben import registry
+from mckibben.app import forms, plots
+from mckibben.app.desk import Desk, guarded, named, tell
+from mckibben.app.following import fitting_rigs
+from mckibben.app.jobs import RUNNING
+from mckibben.app.kept import Followed
+from mckibben.app.pages.once import once
+from mckibben.arrays import Array
+from mckibben.errors import MckibbenError
+from mckibben.files import read
+from mckibben.report import wording
+
+OWN = "model "
+"""Before the names of models among those of plants."""
+
+RIG = "rig "
+"""Before the names of virtual rigs."""
+
+DRAWN = 4
+"""Most runs in a picture."""
+
+
+def build(desk: Desk, model: str, form: str, settings: dict[str, Any], reference: str) -> None:
+    """Offer loops with a compensator, and show those that were run.
+
+    Parameters
+    ----------
+    desk : Desk
+    model, form : str
+        What is inverted, and as what.
+    settings : dict
+        Of that.
+    reference : str
+        File of the reference, among the runs.
+    """
+    ui.label("Closed loop").classes("text-lg")
+    place = ui.column().classes("w-full gap-1")
+    with place, ui.row().classes("items-center"):
+        ui.spinner()
+        ui.label("Looking for plants that fit")
+
+    async def ready() -> None:
+        offered = await asyncio.to_thread(_plants, desk, model)
+        place.clear()
+        with place:
+            _offer(desk, model, form, settings, reference, offered)
+
+    ui.timer(0.05, guarded(ready), once=True)
+    _runs(desk, model)
+
+
+def _plants(desk: Desk, model: str) -> dict[str, str]:
+    """Return what the compensator can be tried on: other models of the muscle, rigs, then its own."""
+    others, own = {}, {}
+    for name in desk.workspace.plants(model):
+        if desk.workspace.same(model, name):
+            own[f"{OWN}{name}"] = f"{name}: the model that is inverted; proves nothing"
+        else:
+            others[f"{OWN}{name}"] = f"{name}: another model of your muscle"
+    known = desk.workspace.cached_rigs(model, lambda: fitting_rigs(desk.workspace, model))
+    rigs = {f"{RIG}{name}": f"{name}: a virtual rig of its size" for name in known}
+    return others | rigs | own
+
+
+def _offer(
+    desk: Desk,
+    model: str,
+    form: str,
+    settings: dict[str, Any],
+    reference: str,
+    offered: dict[str, str],
+) -> None:
+    laws = {name: registry.load("controllers", name) for name in registry.names("controllers")}
+    if not offered:
+        ui.label(
+            "No plant fits: fit a second model of another kind under Models, and try it on that."
+        )
+        return
+    if not any(text.endswith(("of your muscle", "of its size")) for text in offered.values()):
+        ui.label(
+            "Only the model that is inverted is there, on which its inverse is right by construction. "
+            "Fit a model of another kind under Models to try it on."
+        ).classes("text-sm border-l-4 border-warning pl-2")
+    with ui.row().classes("items-end w-full gap-3"):
+        plant = named(
+            ui.select(offered, value=next(iter(offered)), label="Plant").classes("min-w-72"),
+            "loop-plant",
+        )
+        kinds = named(
+            ui.select(
+                {name: (getdoc(law) or name).rstrip(".") for name, law in laws.items()},
+                value=["feedforward", "pid", "feedforward-pid"],
+                multiple=True,
+                label="Controllers",
+            ).classes("min-w-64 max-w-full"),
+            "controllers",
+        )
+
+        async def start() -> None:
+            if not plant.value or not kinds.value:
+                tell("Choose a plant and a controller.")
+                return
+            own = str(plant.value).startswith(OWN)
+            name = str(plant.value).removeprefix(OWN).removeprefix(RIG)
+            there = {"plant": name} if own else {"rig": name}
+            on = f"Twin(load('models/{name}.json'))" if own else f"load_rig({name!r})"
+            for kind in kinds.value:
+                given = {"model": model, "controller": kind, "reference": reference} | there
+                given |= {"form": form, "settings": settings}
+                if any(
+                    all(job.given.get(key) == value for key, value in given.items())
+                    for job in desk.jobs.active()
+                ):
+                    continue
+                call = f"track({kind} of {forms.written(model, form, settings)}, {on}, reference)"
+                wish = "-".join([model, *([] if form == "inverse" else [form]), kind])
+                desk.jobs.submit("loop", given | {"name": wish, "call": call})
+                desk.did(f"closed the loop: {wish}", call)
+            desk.changed("jobs")
+
+        once("Run", start, "run-loop")
+
+
+def _runs(desk: Desk, model: str) -> None:
+    """Show what came of loops with a model, as they end."""
+
+    @ui.refreshable
+    def waiting() -> None:
+        for job in desk.jobs.active():
+            if job.kind == "loop" and job.given.get("model") == model:
+                told = desk.jobs.progress(job.name)
+                with ui.row().classes("items-center w-full gap-2 no-wrap"):
+                    ui.label(job.title).classes("w-48 text-xs")
+                    share = told[-1][1] if told and job.state == RUNNING else 0.0
+                    ui.linear_progress(round(share, 2), show_value=False).classes("flex-1")
+                    ui.label(job.state).classes("text-xs")
+
+    @ui.refreshable
+    def shown() -> None:
+        runs = desk.workspace.runs(model)
+        if not runs:
+            return
+        _table(runs)
+        for note in dict.fromkeys(note for run in runs.values() for note in run.notes):
+            named(ui.label(note).classes("text-sm border-l-4 border-warning pl-2"), "loop-note")
+        _pictures(desk, runs)
+
+    desk.when("jobs", waiting.refresh)
+    desk.when("runs", shown.refresh)
+    desk.when("theme", shown.refresh)
+    waiting()
+    shown()
+
+
+def _table(runs: dict[str, Followed]) -> None:
+    labels = {
+        "name": "Run",
+        "plant": "Plant",
+        "rmse": "RMSE",
+        "without": "RMSE without compensation",
+        "largest": "Largest error",
+        "clipped": "Clipped steps",
+        "step": "Step [µs]",
+    }
+    rows: list[dict[str, Any]] = [
+        {"name": name, "plant": run.plant or run.rig}
+        | {"rmse": _listed(run.rmse, run.units), "without": _listed(run.uncompensated, run.units)}
+        | {"largest": _listed(run.largest, run.units), "clipped": run.clipped}
+        | {"step": wording.number(run.step_us, 2)}
+        for name, run in runs.items()
+    ]
+    columns = [
+        {"name": key, "field": key, "label": label, "align": "left"}
+        for key, label in labels.items()
+    ]
+    named(
+        ui.table(rows=rows, columns=columns, row_key="name")
+        .props("dense flat wrap-cells")
+        .classes("w-full"),
+        "runs",
+    )
+
+
+def _listed(values: dict[str, float | None], units: dict[str, str]) -> str:
+    known = [f"{wording.number(value, 3)} {units.get(name, '')}" for name, value in values.items()]
+    return ", ".join(text.strip() for text in known) or "none"
+
+
+def _pictures(desk: Desk, runs: dict[str, Followed]) -> None:
+    """Draw the runs of the latest reference, and what no compensation did, for every coordinate."""
+    latest = list(runs.values())[-1].reference
+    paths = {name: desk.workspace.path("runs", f"{name}.csv") for name in runs}
+    found = [name for name in runs if paths[name].is_file()]
+    newest = max(found, key=lambda name: paths[name].stat().st_mtime_ns, default=None)
+    if newest is not None:
+        latest = runs[newest].reference
+    chosen = [name for name in found if runs[name].reference == latest][-DRAWN:]
+    curves: dict[str, list[tuple[str, Array, Array, str]]] = {}
+    units: dict[str, str] = {}
+    for place, name in enumerate(chosen):
+        try:
+            (run,) = read(paths[name], informative=False)
+        except (MckibbenError, ValueError):
+            continue
+        if run.duration is not None and run.start_time < 0:  # the approach is not scored
+            run = run.slice(round(-run.start_time / (run.sample_time or 1.0)), len(run))
+        for channel in runs[name].rmse:
+            wished, plain = f"reference_{channel}", f"uncompensated_{channel}"
+            if channel not in run or wished not in run:
+                continue
+            units[channel] = run.units[channel]
+            own = curves.setdefault(channel, [("reference", run.time, run[wished], "measured")])
+            if plain in run and not any(curve[0] == "no compensation" for curve in own):
+                own.append(("no compensation", run.time, run[plain], "input"))
+            own.append((name, run.time, run[channel], f"series-{place + 1}"))
+    for place, (channel, own) in enumerate(curves.items()):
+        figure = plots.lines(own, x="time [s]", y=f"{channel} [{units[channel]}]", dark=desk.dark)
+        # many names take two lines, and must not lie over the curves
+        figure["layout"]["margin"] |= {"t": 72}
+        figure["layout"]["legend"] |= {"y": 1.02, "yanchor": "bottom"}
+        named(
+            ui.plotly(figure).classes("w-full"),
+            "loop-runs" if not place else f"loop-runs-{place + 1}",
+        )

@@ -1,0 +1,117 @@
+"""Estimates of force: a model's, over a recording, beside what was measured."""
+
+from __future__ import annotations
+
+import asyncio
+
+from nicegui import ui
+
+from mckibben.app import forms
+from mckibben.app.desk import Desk, guarded, named
+from mckibben.app.kept import Estimated
+from mckibben.app.pages.kept_curves import drawn, showing
+from mckibben.app.pages.once import once
+from mckibben.errors import DataError, MckibbenError
+from mckibben.report import wording
+from mckibben.system.ordinary import read_bytes
+
+LARGEST = 64 * 2**20
+"""Bytes of a model."""
+
+
+def _tells(desk: Desk) -> dict[str, list[str]]:
+    """Return models that tell a force, and what they tell it from."""
+    found = {}
+    for name in desk.workspace.ranked():
+        try:
+            block = forms.made(desk.workspace, name, "force", {})
+        except MckibbenError:
+            continue
+        found[name] = [channel.name for channel in block.inputs]
+    return found
+
+
+def build(desk: Desk) -> None:
+    """Build the section."""
+    known: dict[str, list[str]] = {}
+    with ui.expansion("Estimate a force").classes("w-full text-base") as section:
+        none = ui.label(
+            "No model here tells a force. Under Models, fit balance-force with the force as output, or "
+            "balance on recordings with a measured force."
+        ).classes("text-sm")
+        with ui.row().classes("items-end gap-3") as choice:
+            model = named(ui.select([], label="Model").classes("min-w-52"), "force-model")
+            run = named(ui.select([], label="Recording").classes("min-w-52"), "force-recording")
+
+            async def start() -> None:
+                if not model.value or not run.value:
+                    raise DataError(
+                        "there is nothing to estimate from", remedy="choose a recording"
+                    )
+                given = {"model": model.value, "recording": run.value}
+                if any(
+                    job.kind == "force" and job.given.get("recording") == run.value
+                    for job in desk.jobs.active()
+                ):
+                    return
+                call = f"{forms.written(model.value, 'force', {})} && mckibben simulate"
+                name = f"{model.value}-{run.value}"
+                desk.jobs.submit("force", given | {"name": name, "call": call})
+                desk.did(f"estimated the force of {run.value}", call)
+                desk.changed("jobs")
+
+            async def take() -> None:
+                name = str(model.value)
+                block = forms.made(desk.workspace, name, "force", {})
+                path = desk.workspace.new_path("takeaway", f"{name}-force.json")
+                await asyncio.to_thread(block.save, path)
+                desk.did(f"wrote {path.name}", forms.written(name, "force", {}))
+                ui.download(read_bytes(path, most=LARGEST), path.name)
+
+            once("Estimate", start, "estimate-force")
+            once("Take the estimator (JSON)", take, "take-force").props("outline")
+        ui.label("As C, FMU or for ROS 2: under Take away.").classes("text-xs opacity-70")
+        showing(desk, "force", lambda: desk.workspace.estimates(), lambda *one: _shown(desk, *one))
+    named(section, "forces")
+
+    def runs() -> None:
+        wanted = known.get(str(model.value), [])
+        fit = [one for one in desk.workspace.readable() if all(name in one for name in wanted)]
+        named_first = sorted(fit, key=lambda one: "force" not in one)
+        names = [one.name for one in named_first] if wanted else []
+        run.set_options(names, value=run.value if run.value in names else next(iter(names), None))
+
+    async def look() -> None:
+        found = await asyncio.to_thread(_tells, desk)
+        known.clear()
+        known.update(found)
+        none.set_visibility(not found)
+        choice.set_visibility(bool(found))
+        value = model.value if model.value in found else next(iter(found), None)
+        model.set_options(list(found), value=value)
+        runs()
+
+    def again() -> None:
+        with section:
+            ui.timer(0.05, guarded(look), once=True)
+
+    model.on_value_change(runs)
+    for topic in ("results", "recordings"):
+        desk.when(topic, again)
+    again()
+
+
+def _shown(desk: Desk, name: str, one: Estimated) -> None:
+    """Show an estimate beside what was measured."""
+    ui.label(f"{one.output} of {one.recording} by {one.model}").classes("text-base mt-2")
+    if one.rmse is not None and one.span:
+        said = (
+            f"RMSE {wording.number(one.rmse, 3)} {one.unit}, {100 * one.rmse / one.span:.1f} % of the "
+            f"measured range; largest {wording.number(one.largest, 3)} {one.unit}."
+        )
+    else:
+        said = "The recording has no measured force to compare with."
+    named(ui.label(said).classes("text-sm"), f"force-{name}")
+    for note in one.notes:
+        ui.label(note).classes("text-sm border-l-4 border-warning pl-2")
+    drawn(desk, one.curves, f"{one.output} [{one.unit}]", f"error [{one.unit}]", "force-plot")

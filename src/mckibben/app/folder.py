@@ -24,7 +24,10 @@ from mckibben.errors import DataError
 from mckibben.system.atomic import write_text, written
 from mckibben.system.ordinary import DESCRIPTION, opened, read_bytes
 
-FOLDERS = ("uploads", "recordings", "models", "banded", "results", "jobs", "runs", "takeaway")
+FOLDERS = (
+    *("uploads", "recordings", "history", "models", "banded", "results", "jobs", "runs"),
+    "takeaway",
+)
 
 END_OF_LOG = 2**18
 """Bytes of the log that are read, from its end."""

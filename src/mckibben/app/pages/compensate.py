@@ -172,7 +172,7 @@ class Editor:
 
     async def _loaded(self, event: UploadEventArguments) -> None:
         path = await kept(self.desk, event.file)
-        found = await asyncio.to_thread(read_upload, path, {})
+        found = await asyncio.to_thread(read_upload, path)
         if len(found) != 1:
             raise DataError("it holds several recordings", file=path, remedy="give a file of one")
         self.file = found[0]

@@ -98,7 +98,7 @@ class Intake:
                 tell_of(read)
             if len(problems) == 1 and not read and problems[0].held:
                 await ask(desk, self.place, problems[0].held, problems[0].shown, problems[0].error)
-            elif len(problems) == 1:
+            elif len(problems) == 1 and not problems[0].held:
                 tell(_about(problems[0]))
             elif problems:
                 await _list(desk, self.place, problems)
@@ -162,7 +162,7 @@ async def _list(desk: Desk, place: Any, problems: Sequence[_Problem]) -> None:
     foreign = [each for each in problems if not each.held]
     ours = [each for each in problems if each.held]
     with place, ui.dialog() as dialog, named(ui.card().classes("w-full max-w-3xl"), "not-read"):
-        ui.label(f"{len(problems)} files were not read").classes("text-lg")
+        ui.label(f"{len(problems)} file(s) were not read").classes("text-lg")
         if foreign:
             names = ", ".join(each.shown for each in foreign[:LISTED])
             more = f" and {len(foreign) - LISTED} more" if len(foreign) > LISTED else ""

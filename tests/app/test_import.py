@@ -13,6 +13,8 @@ from mckibben.app.kept import Reading, Step
 from mckibben.app.reading import columns, options, read_upload
 from mckibben.app.recordings import EXAMPLE
 from mckibben.app.workspace import Workspace
+from mckibben.comparison.channels import Channels
+from mckibben.comparison.offered import objections
 from mckibben.files import formats
 
 TABLE = "level,p_kPa,displacement_mm,branch\n" + "\n".join(
@@ -175,3 +177,12 @@ def test_others_see_that_something_has_changed(tmp_path: Path) -> None:
     mine.set_role("rig", "test")
     assert other.stamp() != before
     assert other.entry("rig").role == "test"
+
+
+def test_models_that_need_time_say_so_before_fitting() -> None:
+    recording = Recording({"pressure": np.arange(30) % 7, "displacement": np.arange(30) % 7})
+    found = objections(
+        ["pi", "oe", "narx"], [recording], Channels(("pressure",), ("displacement",))
+    )
+    assert "pi" not in found
+    assert all("needs time" in found[name] for name in ("oe", "narx"))

@@ -230,7 +230,10 @@ def _row(desk: Desk, name: str, dialogs: Any) -> None:
             ui.label(said).classes("text-xs opacity-70 break-words")
             _aside_said(recording, name)
             for note in entry.notes[:SHOWN]:
-                named(ui.label(note[:LONGEST]).classes("text-xs text-warning"), f"note-{name}")
+                named(
+                    ui.label(note[:LONGEST]).classes("text-xs text-amber-900 dark:text-amber-300"),
+                    f"note-{name}",
+                )
         named(
             ui.toggle(
                 ["train", "test", "unused"],

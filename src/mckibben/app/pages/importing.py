@@ -286,7 +286,7 @@ def _column(place: int, column: Seen, reading: Reading) -> dict[str, Any]:
     if column.channel and column.channel not in options:
         options.append(column.channel)
     about = f"of column {column.header:.60}"
-    with ui.row().classes("items-center w-full gap-2 border-b pb-1"):
+    with ui.row().classes("items-center w-full gap-2 border-b border-gray-500/30 pb-1"):
         with ui.column().classes("gap-0 w-44 min-w-0"):
             ui.label(column.header[:80] or f"column {place + 1}").classes("font-medium break-all")
             ui.label(", ".join(column.first)[:60]).classes("text-xs opacity-70 break-all")
@@ -297,9 +297,15 @@ def _column(place: int, column: Seen, reading: Reading) -> dict[str, Any]:
             with_input=True,
             new_value_mode="add-unique",
         ).classes("w-40")
-        unit = ui.input(
-            "Unit", value=reading.units.get(column.channel, ""), placeholder=column.unit or "none"
-        ).classes("w-20")
+        unit = (
+            ui.input(
+                "Unit",
+                value=reading.units.get(column.channel, ""),
+                placeholder=column.unit or "none",
+            )
+            .props("stack-label")
+            .classes("w-20")
+        )
         times = ui.number("Times", value=abs(gain)).classes("w-20")
         plus = ui.number("Plus", value=offset).classes("w-20")
         sign = ui.checkbox("Turn sign", value=gain < 0)

@@ -65,6 +65,9 @@ class Intake:
             await self._take(event, shown)
         except MckibbenError as error:
             self.problems.append(_Problem(shown, error))
+        except Exception as error:  # what nobody has foreseen must not keep the others waiting
+            unforeseen = DataError(f"{type(error).__name__}: {error}", remedy="drop it again")
+            self.problems.append(_Problem(shown, unforeseen))
         finally:
             self.coming -= 1
         seen = self.seen

@@ -106,7 +106,10 @@ def walk(page: Any, address: str, started: float, folder: Path) -> None:
     first, again = clicks[:4], clicks[4:]
     told("first opening of each page while fits run", first, 0.2)
     told(f"change of page while fits run ({busy or 'they had ended'})", again, 0.2)
-    awake = [page.evaluate(AWAKE) / 1e3 for _ in range(40) if not time.sleep(0.1)]
+    awake = []
+    for _ in range(40):
+        time.sleep(0.1)
+        awake.append(page.evaluate(AWAKE) / 1e3)
     told("an answer of the server while fits run", awake, 0.2)
 
 

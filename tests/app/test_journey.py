@@ -113,11 +113,10 @@ def test_a_file_that_needs_help_is_mapped_by_hand(page: Any) -> None:
     upload(page, "rig.csv", ("t_s;P1;laser\n" + "\n".join(rows)).encode())
     problem = seen(page, "problem").inner_text()
     assert "Remedy" in problem
-    for channel, column in (("pressure", "P1"), ("displacement", "laser")):
-        page.get_by_test_id(f"column-{channel}").click()
-        page.get_by_role("option", name=column, exact=True).click()
-    page.get_by_label("Unit").nth(1).fill("kPa")
-    page.get_by_label("Unit").nth(2).fill("mm")
+    for place, channel, unit in ((1, "pressure", "kPa"), (2, "displacement", "mm")):
+        page.get_by_test_id(f"channel-{place}").click()
+        page.get_by_role("option", name=channel, exact=True).click()
+        page.get_by_test_id(f"unit-{place}").fill(unit)
     seen(page, "read-again").click()
     assert "pressure [bar]" in seen(page, "recording-rig").inner_text()
 
@@ -170,12 +169,61 @@ def test_a_part_is_kept_by_dragging_across_the_plot(page: Any) -> None:
     page.mouse.up()
     page.wait_for_timeout(500)
     seen(page, "keep").click()
-    kept = seen(page, "recording-decaying-triangle-2").inner_text()
-    samples = int(kept.split(" samples")[0].split()[-1])
-    assert 1000 < samples < 1250
-    seen(page, "role-decaying-triangle").locator("[aria-pressed=true]").get_by_text(
-        "unused"
-    ).wait_for()
+    seen(page, "steps")
+    assert 1000 < samples(page) < 1250
+    seen(page, "undo").click()
+    seen(page, "steps").wait_for(state="detached")
+    assert samples(page) > 4000
+
+
+def samples(page: Any) -> int:
+    said = seen(page, "recording-decaying-triangle").inner_text()
+    return int(said.split(" samples")[0].split()[-1])
+
+
+def test_a_part_is_kept_by_keys(page: Any) -> None:
+    seen(page, "example").click()
+    seen(page, "preview-plot")
+    before = samples(page)
+    seen(page, "select-part").focus()
+    for key in ("ArrowRight", "Shift+ArrowRight", "ArrowLeft", "Enter"):
+        page.keyboard.press(key)
+    seen(page, "steps")
+    assert abs(samples(page) / before - 0.52) < 0.01
+
+
+def test_how_a_file_was_read_is_come_back_to(page: Any) -> None:
+    rows = "\n".join(f"{k % 20},{300 + k % 40},{-(k % 7)},up" for k in range(200))
+    seen(page, "upload")
+    upload(page, "levels.csv", f"level,p_kPa,displacement_mm,branch\n{rows}".encode())
+    said = seen(page, "understood-levels").inner_text()
+    assert "no time" in said
+    assert "branch" in said
+    page.get_by_label("How it was read: levels").click()
+    seen(page, "sign-2").click()
+    seen(page, "rate").fill("50")
+    seen(page, "read-again").click()
+    page.get_by_test_id("recording-levels").get_by_text("3.98 s").wait_for(timeout=SLOW)
+    page.get_by_label("Remove levels").click()
+    page.get_by_test_id("recording-levels").wait_for(state="detached", timeout=SLOW)
+    page.keyboard.press("Control+z")
+    seen(page, "recording-levels")
+
+
+def test_many_files_get_one_summary(page: Any) -> None:
+    table = b"pressure_bar,displacement_mm\n" + b"1,2\n2,3\n" * 20
+    files = [(f"run {k}.csv", table) for k in range(8)]
+    files += [(f"photo{k}.jpg", b"\xff\xd8") for k in range(10)]
+    files += [("<img src=x onerror=alert(1)>.csv", b"a,b\nx,y\n")]
+    seen(page, "upload")
+    page.locator("input[type=file]").first.set_input_files(
+        [{"name": name, "mimeType": "text/plain", "buffer": data} for name, data in files]
+    )
+    said = seen(page, "not-read").inner_text()
+    assert "11 file(s) were not read" in said
+    assert "10 cannot be recordings" in said
+    assert page.locator("[data-testid^=recording-run]").count() == 8
+    assert page.locator(".q-notification").count() <= 1
 
 
 def test_two_tabs_on_one_workbench(page: Any, address: str) -> None:
@@ -188,6 +236,8 @@ def test_two_tabs_on_one_workbench(page: Any, address: str) -> None:
     page.get_by_label("Remove irregular-triangle").click()
     page.get_by_test_id(run).wait_for(state="detached", timeout=SLOW)
     other.get_by_test_id(run).wait_for(state="detached", timeout=SLOW)
+    other.get_by_label("Undo: remove").click()
+    seen(page, run)
     seen(other, "recording-decaying-triangle")
     seen(page, "recording-decaying-triangle")
 

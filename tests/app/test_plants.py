@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from mckibben import PI, Banded, Recording, read, write
-from mckibben.app.work import loop
+from mckibben.app.following import loop
 from mckibben.app.workspace import Workspace
 from mckibben.registry import load
 

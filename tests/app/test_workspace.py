@@ -67,7 +67,7 @@ def test_recordings_come_back_as_they_were(tmp_path: Path) -> None:
 def test_long_recordings_are_kept_as_parquet(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("mckibben.app.workspace.LONG", 20)
+    monkeypatch.setattr("mckibben.app.recordings.LONG", 20)
     entry = Workspace(tmp_path).add(recording(), origin="", call="")
     assert entry.path.suffix == ".parquet"
 
@@ -87,7 +87,8 @@ def test_roles_and_removal(tmp_path: Path) -> None:
     assert workspace.channels() == []
     workspace.remove("run")
     assert workspace.entries() == []
-    assert not list((tmp_path / "recordings").iterdir())
+    assert workspace.undo() == "remove run"
+    assert [entry.role for entry in workspace.entries()] == ["unused"]
 
 
 def test_damaged_files_are_passed_over(tmp_path: Path) -> None:
@@ -105,7 +106,7 @@ def test_damaged_files_are_passed_over(tmp_path: Path) -> None:
 
 def test_uploads_are_bounded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     workspace = Workspace(tmp_path)
-    monkeypatch.setattr("mckibben.app.workspace.LARGEST_UPLOAD", 100)
+    monkeypatch.setattr("mckibben.app.recordings.LARGEST_UPLOAD", 100)
     with pytest.raises(DataError, match="more than"):
         workspace.keep_upload("big.csv", b"x" * 101)
     with pytest.raises(DataError, match="is empty"):

@@ -16,10 +16,12 @@ import pytest
 from mckibben import Recording
 from mckibben.app.workspace import Workspace
 from mckibben.registry import load
-from tests.app.test_journey import BROWSER, OPTIONS, SLOW, playwright, seen
+from tests.app.browsing import BROWSER, OPTIONS, SLOW, seen
 from tests.tools import needs
 
 pytestmark = needs("chromium")
+
+playwright = pytest.importorskip("playwright.sync_api")
 
 SCRIPTS = (
     '" :x="window.pwned=1" onclick="window.pwned=1',

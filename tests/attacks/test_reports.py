@@ -15,7 +15,7 @@ from mckibben.blocks.play_type.gpi import GPI
 from mckibben.papers.reproduction import Figure, Reproduction, Table
 from mckibben.report import page as report
 from mckibben.report.reproduction import reproduction_page
-from tests.app.test_journey import SLOW
+from tests.app.browsing import SLOW
 from tests.app.test_journey import address as address  # the fixture that starts the workbench
 from tests.attacks.browser import HOSTILE, watched
 from tests.report.studies_by_hand import measured, renamed, study

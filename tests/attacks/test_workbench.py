@@ -173,14 +173,14 @@ def test_a_large_file_is_read_in_a_process_with_bounds(
     write(recording(), path)
     monkeypatch.setattr(reading, "MOST_CELLS", 99)
     with pytest.raises(DataError, match="more than 99 numbers"):
-        reading.read_upload(path, {})
+        reading.read_upload(path)
     monkeypatch.undo()
     monkeypatch.setattr(reading, "LARGE", 0)
-    (found,) = reading.read_upload(path, {})
+    (found,) = reading.read_upload(path)
     assert found == recording().with_meta(**found.meta)
     path.write_text("pressure_bar\nx\n")
     with pytest.raises(DataError, match="Remedy"):
-        reading.read_upload(path, {})
+        reading.read_upload(path)
 
 
 # -- others on this machine ------------------------------------------------------------------

@@ -25,8 +25,8 @@ from mckibben.system.atomic import write_text, written
 from mckibben.system.ordinary import DESCRIPTION, opened, read_bytes
 
 FOLDERS = (
-    *("uploads", "recordings", "models", "banded", "results", "jobs", "runs", "takeaway"),
-    *("reviews", "forces"),
+    *("uploads", "recordings", "history", "models", "banded", "results", "jobs", "runs"),
+    *("takeaway", "reviews", "forces"),
 )
 
 END_OF_LOG = 2**18

@@ -44,14 +44,61 @@ class Line(Kept):
     time: Text = ""
 
 
+class Reading(Kept):
+    """How a file is read: what `mckibben.read` takes, but for ``channels``.
+
+    Of those that are not named, columns are left out; None is all that there are.
+    """
+
+    columns: dict[Text, Text] = {}
+    units: dict[Text, Text] = {}
+    calibration: dict[Text, tuple[float, float]] = {}
+    rate: Number = None
+    gaps: Literal["error", "split", "interpolate"] = "error"
+    channels: list[Text] | None = None
+
+    model_config = ConfigDict(extra="ignore", strict=False)  # JSON has lists for pairs
+
+
+class Step(Kept):
+    """What was done to a recording after it was read; see `mckibben.app.edits`."""
+
+    do: Literal["slice", "low_pass", "detrend", "resample"]
+    start: Count = 0
+    stop: Count = 0
+    cutoff: Number = None
+    sample_time: Number = None
+    channels: list[Text] | None = None
+
+
 class Described(Kept):
-    """What is known of a recording."""
+    """What is known of a recording: its role, its file, and the way from what was read to that."""
 
     role: Literal["train", "test", "unused"]
     origin: Text = ""
     call: Text = ""
     file: Text = ""
     notes: list[Text] = []
+    base: Text = ""
+    upload: Text = ""
+    part: Count = 0
+    reading: Reading | None = None
+    steps: list[Step] = []
+
+
+class Change(Kept):
+    """What was changed of recordings: their descriptions before and after, None where there is none."""
+
+    what: Text
+    before: dict[Text, dict[str, Any] | None]
+    after: dict[Text, dict[str, Any] | None]
+
+
+class History(Kept):
+    """Changes that can be undone, oldest first, and those that were undone."""
+
+    done: list[Change] = []
+    undone: list[Change] = []
 
 
 class Figures(Kept):

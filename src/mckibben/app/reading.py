@@ -3,12 +3,18 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Mapping
+from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
+from mckibben.app.kept import Reading
 from mckibben.errors import DataError
-from mckibben.files import read
+from mckibben.files import formats, read
+from mckibben.files.assigning import assign
+from mckibben.files.headers import channel_of, parse
+from mckibben.files.request import Request
+from mckibben.files.table import Column, Table
 from mckibben.recording import Recording
 from mckibben.system.workers import Tell, Workers
 
@@ -21,10 +27,43 @@ MOST_MEMORY = 4 * 2**30
 MOST_CELLS = 40_000_000
 """Samples times channels of all recordings of a file."""
 
-Options = Mapping[str, Any]
+FIRST = 4
+"""Cells of a column that are shown."""
+
+Result = TypeVar("Result")
+
+AS_FOUND = Reading()
+"""Everything by its header."""
 
 
-def read_upload(path: Path, options: Options) -> list[Recording]:
+@dataclass(frozen=True)
+class Seen:
+    """A column of a file.
+
+    Parameters
+    ----------
+    header : str
+        As it stands in the file.
+    unit : str
+        As the file says it; empty where it does not.
+    first : tuple of str
+        Its first cells.
+    channel : str
+        What it is taken for; empty where it is left out.
+    """
+
+    header: str
+    unit: str
+    first: tuple[str, ...]
+    channel: str
+
+
+def options(reading: Reading) -> dict[str, Any]:
+    """Return what `mckibben.read` is to be told."""
+    return reading.model_dump(exclude_defaults=True)
+
+
+def read_upload(path: Path, reading: Reading = AS_FOUND) -> list[Recording]:
     """Return the recordings of a file.
 
     Raises
@@ -32,24 +71,38 @@ def read_upload(path: Path, options: Options) -> list[Recording]:
     DataError
         If it cannot be read, or holds or takes more than is kept in memory here.
     """
+    return _aside(_read, path, reading)
+
+
+def columns(path: Path, reading: Reading) -> list[Seen]:
+    """Return the columns of a file, and what each is taken for; errors are those of `read_upload`."""
+    return _aside(_columns, path, reading)
+
+
+def _aside(what: Callable[[Path, Reading], Result], path: Path, reading: Reading) -> Result:
     if path.stat().st_size <= LARGE:
-        return _read(path, options)
+        return what(path, reading)
     with Workers(1) as workers:
-        (outcome,) = workers.results(_bounded, [(path, options)])
-        found: list[Recording] = outcome.result()
+        (outcome,) = workers.results(_bounded, [(what, path, reading)])
+        found: Result = outcome.result()
     return found
 
 
-def _bounded(_: object, item: tuple[Path, Options], tell: Tell) -> list[Recording]:
+def _bounded(
+    _: object, item: tuple[Callable[[Path, Reading], Any], Path, Reading], tell: Tell
+) -> Any:
     if sys.platform != "win32":
         import resource
 
         resource.setrlimit(resource.RLIMIT_AS, (MOST_MEMORY, MOST_MEMORY))
-    return _read(*item)
+    what, path, reading = item
+    return what(path, reading)
 
 
-def _read(path: Path, options: Options) -> list[Recording]:
-    found = read(path, informative=False, **options)
+def _read(path: Path, reading: Reading) -> list[Recording]:
+    found = read(path, informative=False, **options(reading))
+    if reading.channels is not None:
+        found = [one.select(reading.channels) for one in found]
     if sum(len(one) * len(one.channels) for one in found) > MOST_CELLS:
         raise DataError(
             f"it holds more than {MOST_CELLS:,} numbers",
@@ -57,3 +110,36 @@ def _read(path: Path, options: Options) -> list[Recording]:
             remedy="cut or thin it, or use the command line",
         )
     return found
+
+
+def _columns(path: Path, reading: Reading) -> list[Seen]:
+    (table, *_) = formats.tables(path)
+    found = _channels(table, reading, path)
+    return [
+        Seen(
+            column.header,
+            column.unit or parse(column.label).unit or "",
+            _first(column),
+            found.get(id(column), ""),
+        )
+        for column in table.columns
+    ]
+
+
+def _channels(table: Table, reading: Reading, path: Path) -> dict[int, str]:
+    request = Request(reading.columns, {}, reading.rate, reading.gaps, None)
+    try:
+        named, _ = assign(table, request, path)
+    except DataError:  # two columns are one channel, say: each is then named by its header alone
+        named = {}
+        for column in table.columns:
+            if column.values is not None:
+                named.setdefault(channel_of(parse(column.label)), column)
+    kept = reading.channels
+    return {id(c): name for name, c in named.items() if kept is None or name in (*kept, "time")}
+
+
+def _first(column: Column) -> tuple[str, ...]:
+    if column.values is None:
+        return tuple(f"{text}"[:40] for text in column.texts[:FIRST])
+    return tuple(f"{value:.6g}" for value in column.values[:FIRST])

@@ -5,13 +5,16 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from mckibben.app import edits
+from mckibben.app.reading import options
+from mckibben.app.recordings import Entry
 from mckibben.app.workspace import Workspace
 
 
-def read_call(path: str, options: Mapping[str, Any]) -> str:
+def read_call(path: str, given: Mapping[str, Any]) -> str:
     """Return the call that reads a file."""
-    given = "".join(f", {name}={value!r}" for name, value in options.items() if value)
-    return f"mckibben.read({path!r}{given})"
+    asked = "".join(f", {name}={value!r}" for name, value in given.items())
+    return f"mckibben.read({path!r}{asked})"
 
 
 def fit_call(
@@ -32,9 +35,7 @@ def script(workspace: Workspace, models: Sequence[str], channels: Mapping[str, A
     """Return a Python script that does again what was done: read, fit, choose, invert, save."""
     lines = ['"""What was done in the workbench, as a script."""', "", "import mckibben", ""]
     for role in ("train", "test"):
-        paths = _files(workspace, role)
-        listed = ", ".join(f"*mckibben.read({path!r}, informative=False)" for path in paths)
-        lines.append(f"{role} = [{listed}]")
+        lines += [f"{role} = [", *(f"    {read}," for read in _reads(workspace, role)), "]"]
     lines += [
         "",
         f"board = mckibben.compare(train, test, {_given(channels)},",
@@ -64,5 +65,18 @@ def script(workspace: Workspace, models: Sequence[str], channels: Mapping[str, A
     return "\n".join(lines)
 
 
-def _files(workspace: Workspace, role: str) -> list[str]:
-    return [str(entry.path) for entry in workspace.entries() if entry.role == role]
+def _reads(workspace: Workspace, role: str) -> list[str]:
+    """Return the calls that read the recordings of a role, and do again what was done to them."""
+    return [_read(workspace, entry) for entry in workspace.entries() if entry.role == role]
+
+
+def _read(workspace: Workspace, entry: Entry) -> str:
+    if not entry.upload:
+        base = read_call(str(entry.base or entry.path), {"informative": False}) + "[0]"
+        return edits.call(base, entry.steps)
+    path = workspace.path("uploads", entry.upload)
+    given = options(entry.reading) | {"informative": False}
+    read = f"{read_call(str(path), given)}[{entry.part}]"
+    if entry.reading.channels is not None:
+        read += f".select({entry.reading.channels!r})"
+    return edits.call(read, entry.steps)

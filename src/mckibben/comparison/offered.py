@@ -9,6 +9,7 @@ from typing import Any
 from mckibben import registry
 from mckibben.comparison.channels import Channels
 from mckibben.errors import ModelError
+from mckibben.estimators.core.estimator import Estimator
 from mckibben.estimators.core.settings import check_settings, setting_value
 from mckibben.recording import Recording
 
@@ -33,12 +34,22 @@ def objections(
     found: dict[str, str] = {}
     for name in models:
         try:
-            reason = registry.load("estimators", name).objection(*asked)
+            estimator = registry.load("estimators", name)
+            reason = estimator.objection(*asked) or _timeless(estimator, recordings)
         except ModelError as error:  # a plug-in that is broken is not the end of all others
             reason = str(error)
         if reason is not None:
             found[name] = reason
     return found
+
+
+def _timeless(estimator: type[Estimator], recordings: Sequence[Recording]) -> str | None:
+    """Return which recordings lack the time that a model needs, or None."""
+    missing = [each.name for each in recordings if each.sample_time is None]
+    if not (missing and estimator.needs_time):
+        return None
+    more = f" and {len(missing) - 1} more" if len(missing) > 1 else ""
+    return f"it needs time, and {missing[0]}{more} has none: give a rate, or a column of times"
 
 
 def settings_of(model: str, written: Iterable[str]) -> dict[str, Any]:

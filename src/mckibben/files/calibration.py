@@ -23,11 +23,14 @@ def constants(described: Described, table: Table) -> dict[str, Column]:
 
 
 def calibrated(
-    named: Mapping[str, Column], described: Described
+    named: Mapping[str, Column],
+    described: Described,
+    asked: Mapping[str, tuple[float, float]],
 ) -> tuple[dict[str, Column], dict[str, Any]]:
     """Return columns in the units that are said, gain times themselves plus offset; and which were.
 
-    A column of text stays one, to be refused as such.
+    Gain and offset that are asked for go before those described. A column of text stays one, to be
+    refused as such.
     """
     columns: dict[str, Column] = {}
     told: dict[str, Any] = {}
@@ -35,8 +38,13 @@ def calibrated(
         given = described.time if name == "time" else described.channels.get(name)
         if given is not None and given.unit is not None:
             column = replace(column, unit=given.unit)
-        if isinstance(given, Channel) and given.is_calibrated and column.values is not None:
-            gain, offset = 1.0 if given.gain is None else given.gain, given.offset or 0.0
+        known = isinstance(given, Channel) and given.is_calibrated
+        if (name in asked or known) and column.values is not None:
+            if name in asked:
+                gain, offset = asked[name]
+            else:
+                assert isinstance(given, Channel)
+                gain, offset = 1.0 if given.gain is None else given.gain, given.offset or 0.0
             with np.errstate(over="ignore"):
                 values = gain * column.values + offset
             column = replace(column, values=values)

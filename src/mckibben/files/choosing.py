@@ -70,7 +70,7 @@ def choose(table: Table, request: Request, path: Path) -> Choice:
     named, left_out = assign(table, request, path)
     named, dropped = clocks.on_one(named, request, path)
     left_out += dropped
-    named, calibration = calibrated(named, request.described)
+    named, calibration = calibrated(named, request.described, request.calibration)
     found = _Findings(ignored=[*table.meta.get("ignored_columns", ()), *left_out])
     time, time_unit = None, "s"
     if "time" in named:

@@ -50,6 +50,7 @@ def read(
     gaps: Literal["error", "split", "interpolate"] = "error",
     channels: Sequence[str] | None = None,
     informative: bool = True,
+    calibration: Mapping[str, tuple[float, float]] | None = None,
 ) -> list[Recording]:
     """Read the recordings in a file, by its ending, or in a folder.
 
@@ -79,6 +80,9 @@ def read(
         Whether there must be something to learn from: at least 10 samples, and no constant pressure
         or other channel asked for that an experiment does not hold, as it does a length or a force.
         Without, two samples will do, as for simulating a model.
+    calibration : mapping of str to (float, float), optional
+        Channel -> gain and offset: the channel is gain times the column, plus offset, in the unit that
+        ``units`` or else the header gives. ``{"displacement": (-1, 0)}`` turns a sign.
 
     Returns
     -------
@@ -102,7 +106,15 @@ def read(
         what was left out.
     """
     path = Path(path)
-    request = Request(dict(columns or {}), dict(units or {}), rate, gaps, channels, informative)
+    request = Request(
+        dict(columns or {}),
+        dict(units or {}),
+        rate,
+        gaps,
+        channels,
+        informative,
+        dict(calibration or {}),
+    )
     request.check(path)
     return [each for one in sources.inside(path) for each in _read(one, request)]
 

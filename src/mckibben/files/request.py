@@ -32,6 +32,7 @@ class Request:
     gaps: Literal["error", "split", "interpolate"]
     channels: Sequence[str] | None
     informative: bool = True
+    calibration: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     described: Described = field(default_factory=Described)
 
     @property
@@ -61,3 +62,11 @@ class Request:
                 file=path,
                 remedy="give a positive number with --rate",
             )
+        for channel, (gain, offset) in self.calibration.items():
+            if not (np.isfinite(gain) and np.isfinite(offset) and gain):
+                raise DataError(
+                    f"it cannot be {gain:g} times a column plus {offset:g}",
+                    file=path,
+                    channel=channel,
+                    remedy="give finite numbers, the gain not 0",
+                )

@@ -72,9 +72,17 @@ def tables(path: Path, request: Request) -> tuple[list[Table], str]:
     digests: list[str] = []
     for each in parts.values():
         with formats.opening(each) as file:
+            before = os.fstat(file.fileno())
             found[each] = formats.read(file, each)
             file.seek(0)
             digests.append(hashlib.file_digest(file, "sha256").hexdigest())
+            after = os.fstat(file.fileno())
+        if (before.st_mtime_ns, before.st_size) != (after.st_mtime_ns, after.st_size):
+            raise DataError(
+                "it changed while it was read",
+                file=each,
+                remedy="wait until whatever writes it is done, then read it again",
+            )
     if len(found) == 1:
         return next(iter(found.values())), digests[0]
     digest = hashlib.sha256("".join(digests).encode()).hexdigest()

@@ -1,4 +1,4 @@
-"""Signals: turning points, branches and cycles; cutting, resampling, thinning; excitations."""
+"""Signals: turning points, branches, cycles; cutting, filtering, resampling, thinning; excitations."""
 
 from mckibben.signals.broadband import chirp as chirp
 from mckibben.signals.broadband import multisine as multisine
@@ -12,6 +12,8 @@ from mckibben.signals.excitations import progressive_sine as progressive_sine
 from mckibben.signals.excitations import progressive_triangle as progressive_triangle
 from mckibben.signals.excitations import sine as sine
 from mckibben.signals.excitations import triangle as triangle
+from mckibben.signals.filtering import detrend as detrend
+from mckibben.signals.filtering import low_pass as low_pass
 from mckibben.signals.loads import constant as constant
 from mckibben.signals.loads import pulls as pulls
 from mckibben.signals.loads import ramps as ramps

@@ -1,21 +1,94 @@
-"""A recording over time, and parts of it kept or split off by dragging."""
+"""A recording over time, and a part of it kept, dropped or split off: by dragging, numbers or keys."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from nicegui import ui
 
-from mckibben.app.desk import Desk, named, tell
+from mckibben.app.desk import Desk, guarded, labelled, named
+from mckibben.app.kept import Step
+from mckibben.app.pages import editing
 from mckibben.errors import DataError, MckibbenError
 
 if TYPE_CHECKING:
     from mckibben.recording import Recording
 
+MOVED = 0.01
+"""Share of the recording that an arrow key moves the selection by."""
+
+KEYS = """(event) => {
+    const moves = {ArrowLeft: -1, ArrowRight: 1, Enter: 0};
+    if (event.key in moves) {
+        event.preventDefault();
+        emit({move: moves[event.key], wide: event.shiftKey});
+    }
+}"""
+
+
+@dataclass
+class Part:
+    """The part of a recording that is selected, in its time or in samples.
+
+    Parameters
+    ----------
+    whole : tuple of float
+        The ends of the recording.
+    low, high : float, optional
+        Those of the part.
+    shown : callable
+        Called when it has changed.
+    """
+
+    whole: tuple[float, float]
+    low: float | None = None
+    high: float | None = None
+    shown: Callable[[], None] = lambda: None
+
+    def choose(self, low: float | None, high: float | None) -> None:
+        """Select a part, of what there is."""
+        if low is not None and high is not None and low > high:
+            low, high = high, low
+        first, last = self.whole
+        self.low = None if low is None else min(max(low, first), last)
+        self.high = None if high is None else min(max(high, first), last)
+        self.shown()
+
+    def move(self, by: float, *, wide: bool) -> None:
+        """Move the part by shares of the recording, or widen it; the first time, take the middle."""
+        first, last = self.whole
+        length = last - first
+        low = first + 0.25 * length if self.low is None else self.low
+        high = last - 0.25 * length if self.high is None else self.high
+        step = by * MOVED * length
+        if wide:
+            low, high = low - step, high + step
+            if low > high:
+                return
+        else:
+            step = min(max(step, first - low), last - high)
+            low, high = low + step, high + step
+        self.choose(low, high)
+
+    def samples(self, recording: Recording) -> tuple[int, int]:
+        """Return the first sample of the part, and the one after its last."""
+        if self.low is None or self.high is None:
+            raise DataError(
+                "nothing is selected", remedy="drag across the plot, or give two numbers, first"
+            )
+        step = recording.sample_time or 1.0
+        low = max(round((self.low - recording.start_time) / step), 0)
+        high = min(round((self.high - recording.start_time) / step) + 1, len(recording))
+        if high - low < 2:
+            raise DataError("the selection holds fewer than two samples", remedy="select more")
+        return low, high
+
 
 def preview(desk: Desk) -> None:
-    """Show a recording over time; dragging across it selects a part to keep or to split at."""
-    part: dict[str, float] = {}
+    """Show a recording over time, what was done to it, and what can be."""
 
     @ui.refreshable
     def shown() -> None:
@@ -25,7 +98,6 @@ def preview(desk: Desk) -> None:
             name = entries[0] if entries else None
         if name is None:
             return
-        part.clear()
         try:
             recording = desk.workspace.recording(name)
         except MckibbenError as error:
@@ -33,15 +105,9 @@ def preview(desk: Desk) -> None:
             return
         ui.label(f"{name}: drag across the plot to select a part").classes("text-lg")
         channels = list(recording.channels)[:4]
-        time_plot(desk, recording, channels, "preview-plot", part)
-        with ui.row():
-            for text, action in (("Keep only the selection", _keep), ("Split there", _split)):
-                named(
-                    ui.button(
-                        text, on_click=lambda action=action: _cut(desk, name, part, action)
-                    ).props("outline"),
-                    text.split()[0].lower(),
-                )
+        part = Part((float(recording.time[0]), float(recording.time[-1])))
+        _plot(desk, name, recording, channels, part)
+        editing.steps(desk, name, recording)
 
     desk.when("recordings", shown.refresh)
     desk.when("preview", shown.refresh)
@@ -49,13 +115,86 @@ def preview(desk: Desk) -> None:
     shown()
 
 
+def _plot(desk: Desk, name: str, recording: Recording, channels: list[str], part: Part) -> None:
+    words = (
+        "Part to cut: arrow keys move it, with shift they make it wider or narrower, Enter keeps it"
+    )
+    with named(ui.element("div").classes("w-full"), "select-part") as area:
+        plot = time_plot(desk, recording, channels, "preview-plot", part)
+    area.props("tabindex=0 role=group")
+    labelled(area, "aria-label", words)
+
+    async def cut(which: str) -> None:
+        low, high = part.samples(recording)
+        await editing.do(desk, name, *_ways(which, low, high, len(recording)))
+
+    async def pressed(event: Any) -> None:
+        given = event.args or {}
+        if given.get("move"):
+            part.move(float(given["move"]), wide=bool(given.get("wide")))
+        else:
+            await guarded(lambda: cut("keep"))()
+
+    area.on("keydown", pressed, js_handler=KEYS)
+    unit = "sample" if recording.sample_time is None else "s"
+    with ui.row().classes("items-end gap-3"):
+        fields = [
+            named(ui.number(f"{word} [{unit}]").props("dense").classes("w-32"), name)
+            for word, name in (("From", "part-from"), ("To", "part-to"))
+        ]
+        for text, which, hint in (
+            ("Keep only the selection", "keep", "Everything outside of it goes"),
+            ("Drop the selection", "drop", "What is before and after it stays, as two recordings"),
+            ("Split there", "split", "Two recordings, before and from its start"),
+        ):
+            button = ui.button(text, on_click=guarded(partial(cut, which)))
+            named(button.props("outline").tooltip(hint), which)
+
+    def drawn() -> None:
+        for field, value in zip(fields, (part.low, part.high), strict=True):
+            wanted = None if value is None else float(f"{value:.6g}")
+            if field.value != wanted:
+                field.set_value(wanted)
+        plot.run_plot_method("relayout", {"shapes": _shapes(part)})
+
+    def typed() -> None:
+        low, high = (field.value for field in fields)
+        part.low = part.whole[0] if low is None else low
+        part.high = part.whole[1] if high is None else high
+        plot.run_plot_method("relayout", {"shapes": _shapes(part)})
+
+    part.shown = drawn
+    for field in fields:
+        field.on("change", typed)
+        field.on("keydown.enter", guarded(lambda: cut("keep")))
+
+
+def _shapes(part: Part) -> list[dict[str, Any]]:
+    if part.low is None or part.high is None:
+        return []
+    look = {"fillcolor": "#56b4e9", "opacity": 0.25, "line": {"width": 1, "color": "#56b4e9"}}
+    return [
+        {"type": "rect", "xref": "x", "yref": "paper", "y0": 0, "y1": 1}
+        | {"x0": part.low, "x1": part.high, **look}
+    ]
+
+
+def _ways(which: str, low: int, high: int, n: int) -> list[Step]:
+    """Return the pieces that are left, each as a step."""
+    pieces = {"keep": [(low, high)], "drop": [(0, low), (high, n)], "split": [(0, low), (low, n)]}
+    kept = [(start, stop) for start, stop in pieces[which] if stop - start >= 2]
+    if not kept:
+        raise DataError("nothing would be left", remedy="select less, or remove the recording")
+    return [Step(do="slice", start=start, stop=stop) for start, stop in kept]
+
+
 def time_plot(
     desk: Desk,
     recording: Recording,
     channels: list[str],
     name: str,
-    part: dict[str, float] | None = None,
-) -> None:
+    part: Part | None = None,
+) -> Any:
     """Plot channels over time; panning and zooming thin the samples anew, on the server."""
     from mckibben.app import plots
     from mckibben.report import subjects
@@ -82,54 +221,8 @@ def time_plot(
         ends = (event.args or {}).get("range", {})
         ends = next((value for key, value in ends.items() if key.startswith("x")), None)
         if part is not None and isinstance(ends, list) and len(ends) == 2:
-            part["low"], part["high"] = sorted(map(float, ends))
+            part.choose(*sorted(map(float, ends)))
 
     plot.on("plotly_relayout", moved)
     plot.on("plotly_selected", selected)
-
-
-def _cut(desk: Desk, name: str, part: dict[str, float], action: Any) -> None:
-    try:
-        if not part:
-            raise DataError("nothing is selected", remedy="drag across the plot first")
-        action(desk, name, part)
-    except MckibbenError as error:
-        tell(error)
-        return
-    desk.changed("recordings", "channels")
-
-
-def _places(recording: Recording, part: dict[str, float]) -> tuple[int, int]:
-    step = recording.sample_time or 1.0
-    low = round((part["low"] - recording.start_time) / step)
-    high = round((part["high"] - recording.start_time) / step) + 1
-    low, high = max(low, 0), min(high, len(recording))
-    if high - low < 2:
-        raise DataError("the selection holds fewer than two samples", remedy="select more")
-    return low, high
-
-
-def _pieces(desk: Desk, name: str, cuts: list[tuple[int, int]]) -> None:
-    entry, recording = desk.workspace.entry(name), desk.workspace.recording(name)
-    for low, high in cuts:
-        if high - low >= 2:
-            desk.workspace.add(
-                recording.slice(low, high),
-                origin=f"samples {low + 1} to {high} of {name}",
-                call=f"{entry.call}[0].slice({low}, {high})",
-                role=entry.role,
-                name=name,
-                notes=entry.notes,
-            )
-    desk.workspace.set_role(name, "unused")
-    desk.did(f"cut {name}", f"recording.slice(...), {cuts}")
-
-
-def _keep(desk: Desk, name: str, part: dict[str, float]) -> None:
-    _pieces(desk, name, [_places(desk.workspace.recording(name), part)])
-
-
-def _split(desk: Desk, name: str, part: dict[str, float]) -> None:
-    recording = desk.workspace.recording(name)
-    low, _ = _places(recording, part)
-    _pieces(desk, name, [(0, low), (low, len(recording))])
+    return plot

@@ -1,66 +1,94 @@
-"""Data: files and virtual rigs in, problems explained, roles, and cutting by dragging."""
+"""Data: files and virtual rigs in, what was understood of them, roles, changes and their undoing."""
 
 from __future__ import annotations
 
 import asyncio
-from typing import TYPE_CHECKING, Any
+from functools import partial
+from typing import Any
 
 from nicegui import ui
-from nicegui.events import UploadEventArguments
 
 from mckibben import registry
-from mckibben.app import scripts
-from mckibben.app.desk import LONGEST, Desk, guarded, kept, labelled, named, on_event, tell
+from mckibben.app.desk import LONGEST, Desk, guarded, labelled, named, on_event, tell
 from mckibben.app.guard import LARGEST_UPLOAD, TOO_LARGE
+from mckibben.app.pages import editing
 from mckibben.app.pages.cutting import preview
+from mckibben.app.pages.importing import Intake, ask_again
 from mckibben.errors import MckibbenError
-
-if TYPE_CHECKING:
-    from mckibben.files.table import Column
+from mckibben.recording import Recording
 
 SHOWN = 6
 """Notes of reading that are shown of a recording."""
 
-EXAMPLE = "field-models"
-"""Protocol whose runs are the example."""
+PROTOCOL = "field-models"
+"""The one that is offered first."""
 
-MAPPED = ("time", "pressure", "displacement", "length", "force", "voltage")
-"""Channels that columns can be mapped to by hand."""
+WATCH = 1.0
+"""How often a page looks whether another one changed recordings [s]."""
 
 
 def build(desk: Desk) -> None:
     """Build the page."""
-    with ui.row().classes("w-full gap-4 items-start"):
-        with ui.column().classes("min-w-64 flex-1"):
-            _sources(desk)
-        with ui.column().classes("min-w-80 flex-[2]"):
-            _list(desk)
-    preview(desk)
+    dialogs = ui.element("div")  # outside of what is drawn anew, which would take them along
+    with ui.column().classes("w-full") as page:
+        with ui.row().classes("w-full gap-4 items-start"):
+            with ui.column().classes("min-w-64 flex-1"):
+                _sources(desk, dialogs)
+            with ui.column().classes("min-w-72 flex-[2]"):
+                with ui.row().classes("items-center"):
+                    ui.label("Recordings").classes("text-lg")
+                    editing.undoing(desk, page)
+                _list(desk, dialogs)
+        preview(desk)
+    _watch(desk)
 
 
-def _sources(desk: Desk) -> None:
+def _watch(desk: Desk) -> None:
+    """Draw anew what other windows, or workbenches over the same folder, have changed."""
+    seen = {"stamp": desk.workspace.stamp()}
+
+    def noted() -> None:
+        seen["stamp"] = desk.workspace.stamp()
+
+    async def look() -> None:
+        if desk.workspace.stamp() != seen["stamp"]:
+            await asyncio.to_thread(desk.workspace.warm)
+            desk.changed("recordings", "channels")
+
+    desk.when("recordings", noted)
+    ui.timer(WATCH, look)
+
+
+def _sources(desk: Desk, dialogs: Any) -> None:
     ui.label("Add recordings").classes("text-lg")
+    intake = Intake(desk, dialogs)
     named(
         ui.upload(
             label="Drop files here: CSV, TSV, Parquet, MAT, HDF5, TDMS",
             multiple=True,
             auto_upload=True,
             max_file_size=LARGEST_UPLOAD,
-            on_upload=on_event(lambda event: _uploaded(desk, event)),
+            on_upload=on_event(intake.uploaded),
             on_rejected=lambda: tell(TOO_LARGE),
         ).classes("w-full"),
         "upload",
     )
+    intake.said = named(ui.label("").classes("text-sm").props("role=status"), "reading")
     with ui.row().classes("items-center"):
-        named(ui.button("Open the example", on_click=lambda: _example(desk)), "example")
+        example = named(ui.button("Open the example"), "example")
+        example.on_click(guarded(lambda: _example(desk)))
         named(ui.button("From a virtual rig", on_click=lambda: _rig(desk)).props("outline"), "rig")
 
 
-def _example(desk: Desk) -> None:
-    from mckibben.signals.protocol import protocol
-
-    runs = [run.name for run in protocol(EXAMPLE).runs]
-    _record(desk, EXAMPLE, runs)
+async def _example(desk: Desk) -> None:
+    added = await asyncio.to_thread(desk.workspace.add_example)
+    desk.settle_channels()
+    desk.did("opened the example", "mckibben.read(mckibben.example.TRAIN)")
+    desk.changed("recordings", "channels")
+    if added:
+        ui.notify("A virtual muscle with a hanging load: one run to train on, one to test on.")
+    else:
+        ui.notify("The example is open already.")
 
 
 def _record(desk: Desk, protocol: str, runs: list[str]) -> None:
@@ -86,7 +114,7 @@ def _rig(desk: Desk) -> None:
         ui.label("Runs of a paper's protocol, on its virtual rig").classes("text-lg")
         names = list(registry.names("protocols"))
         chosen = named(
-            ui.select(names, value=EXAMPLE, label="Protocol").classes("w-full"), "protocol"
+            ui.select(names, value=PROTOCOL, label="Protocol").classes("w-full"), "protocol"
         )
         runs = named(
             ui.select([], multiple=True, label="Runs").classes("w-full").props("use-chips"), "runs"
@@ -110,106 +138,7 @@ def _rig(desk: Desk) -> None:
     dialog.open()
 
 
-async def _uploaded(desk: Desk, event: UploadEventArguments) -> None:
-    path = await kept(desk, event.file)
-    await _take(desk, path.name, event.file.name, {})
-
-
-async def _take(desk: Desk, held: str, shown: str, options: dict[str, Any]) -> bool:
-    """Read an uploaded file and add its recordings; where that fails, ask how it is to be read."""
-    from mckibben.app.reading import read_upload
-
-    path = desk.workspace.path("uploads", held)
-    call = scripts.read_call(str(path), options)
-
-    def taken() -> tuple[int, list[str]]:
-        recordings = read_upload(path, options)
-        added: list[str] = []
-        for recording in recordings:
-            added += desk.workspace.add(recording, origin=f"file {shown}", call=call).notes
-        desk.workspace.warm()
-        return len(recordings), list(dict.fromkeys(added))
-
-    try:
-        number, notes = await asyncio.to_thread(taken)
-    except MckibbenError as error:
-        await _ask(desk, held, shown, options, error)
-        return False
-    desk.settle_channels()
-    desk.did(f"read {shown}", call)
-    desk.changed("recordings")
-    ui.notify(f"{shown}: {number} recording(s)")
-    for note in notes:
-        ui.notify(note[:LONGEST], type="warning", multi_line=True, timeout=10_000)
-    return True
-
-
-async def _ask(
-    desk: Desk, held: str, shown: str, options: dict[str, Any], error: MckibbenError
-) -> None:
-    """Show why a file could not be read, what is in it, and let columns and units be named."""
-    from mckibben.app.reading import LARGE
-    from mckibben.files import formats
-
-    path = desk.workspace.path("uploads", held)
-    try:
-        if path.stat().st_size > LARGE:  # it is not read again in this process
-            raise error
-        tables = await asyncio.to_thread(formats.tables, path)
-        columns = [column.header for column in tables[0].columns]
-        first = [
-            {f"{place}": _cell(column, row)[:80] for place, column in enumerate(tables[0].columns)}
-            for row in range(5)
-        ]
-    except (MckibbenError, IndexError):
-        path.unlink(missing_ok=True)  # nobody can be asked how it is to be read
-        tell(f"{shown}: {error}")
-        return
-    with ui.dialog() as dialog, ui.card().classes("w-full max-w-4xl"):
-        ui.label(f"{shown} needs help").classes("text-lg")
-        named(ui.label(str(error)).classes("text-negative"), "problem")
-        ui.table(
-            rows=first,
-            columns=[
-                {"name": f"{place}", "label": column[:80], "field": f"{place}", "align": "right"}
-                for place, column in enumerate(columns)
-            ],
-        ).classes("w-full").props("dense flat")
-        picks: dict[str, tuple[Any, Any]] = {}
-        with ui.grid(columns=3).classes("items-center"):
-            for channel in MAPPED:
-                ui.label(channel)
-                column = ui.select(["", *columns], value="", label="Column").props("dense")
-                unit = ui.input("Unit", placeholder="as the header says").props("dense")
-                picks[channel] = named(column, f"column-{channel}"), named(unit, f"unit-{channel}")
-        rate = ui.number("Samples per second, without a column of times", min=0).classes("w-80")
-        gaps = ui.select(["error", "split", "interpolate"], value="error", label="Gaps in time")
-
-        async def again() -> None:
-            chosen: dict[str, Any] = {
-                "columns": {name: pick[0].value for name, pick in picks.items() if pick[0].value},
-                "units": {name: pick[1].value for name, pick in picks.items() if pick[1].value},
-                "gaps": gaps.value,
-            }
-            if rate.value:
-                chosen["rate"] = float(rate.value)
-            dialog.close()
-            await _take(desk, held, shown, chosen)
-
-        with ui.row():
-            named(ui.button("Read it so", on_click=guarded(again)), "read-again")
-            ui.button("Leave it", on_click=dialog.close).props("flat")
-    dialog.open()
-
-
-def _cell(column: Column, row: int) -> str:
-    cells = column.texts if column.values is None else column.values.tolist()[:5]
-    return f"{cells[row]}" if row < len(cells) else ""
-
-
-def _list(desk: Desk) -> None:
-    ui.label("Recordings").classes("text-lg")
-
+def _list(desk: Desk, dialogs: Any) -> None:
     @ui.refreshable
     def shown() -> None:
         entries = desk.workspace.entries()
@@ -217,12 +146,13 @@ def _list(desk: Desk) -> None:
             with named(ui.card().classes("w-full"), "empty"):
                 ui.label("Nothing here yet.").classes("text-base")
                 ui.label(
-                    "Drop a recording of your muscle on the left: pressure and displacement over "
-                    "time. Or open the example, a virtual muscle with a hanging load."
+                    "Drop a recording of your muscle: pressure and displacement over time. "
+                    "Or open the example, a virtual muscle with a hanging load."
                 )
             return
+        _different(desk)
         for entry in entries:
-            _row(desk, entry.name)
+            _row(desk, entry.name, dialogs)
         known = desk.workspace.channels()
         desk.settle_channels()
         with ui.row().classes("items-center"):
@@ -243,13 +173,48 @@ def _list(desk: Desk) -> None:
     shown()
 
 
+def _different(desk: Desk) -> None:
+    """Say it where recordings in use have different channels, and offer to set some aside."""
+    kinds: dict[tuple[str, ...], list[str]] = {}
+    for name, recording in desk.workspace.used().items():
+        kinds.setdefault(tuple(sorted(recording.channels)), []).append(name)
+    if len(kinds) < 2:
+        return
+    common = desk.workspace.channels()
+    with named(ui.card().classes("w-full border border-warning gap-1"), "different"):
+        ui.label("These recordings have different channels").classes("font-medium")
+        ui.label(
+            f"All of them have only: {', '.join(common)}."
+            if common
+            else "No channel is in all of them: nothing can be fitted to them together."
+        )
+        for channels, names in sorted(kinds.items(), key=lambda kind: -len(kind[1])):
+            own = [channel for channel in channels if channel not in common]
+            listed = ", ".join(names[:SHOWN]) + (" …" if len(names) > SHOWN else "")
+            with ui.row().classes("items-center w-full"):
+                said = f"{listed}: {', '.join(own) or 'nothing else'}"
+                ui.label(said[:LONGEST]).classes("flex-1 min-w-40 text-sm break-words")
+                button = ui.button(
+                    f"Set {len(names)} unused",
+                    on_click=guarded(partial(_set_aside, desk, names)),
+                )
+                labelled(button.props("outline dense"), "aria-label", f"Set {listed} unused")
+                named(button, f"aside-{names[0]}")
+
+
+async def _set_aside(desk: Desk, names: list[str]) -> None:
+    desk.workspace.set_role(names, "unused")
+    desk.settle_channels()
+    desk.changed("recordings", "channels")
+
+
 def _chosen(desk: Desk, side: str, channels: list[str]) -> None:
     if channels:
         setattr(desk, side, tuple(channels))
         desk.changed("channels", "results")
 
 
-def _row(desk: Desk, name: str) -> None:
+def _row(desk: Desk, name: str, dialogs: Any) -> None:
     entry = desk.workspace.entry(name)
     try:
         recording = desk.workspace.recording(name)
@@ -259,32 +224,55 @@ def _row(desk: Desk, name: str) -> None:
     duration = "" if recording.duration is None else f", {recording.duration:.4g} s"
     with named(ui.row().classes("items-center w-full gap-2"), f"recording-{name}"):
         with ui.column().classes("gap-0 flex-1 min-w-40"):
-            ui.label(name).classes("font-medium")
+            ui.label(name).classes("font-medium break-all")
             listed = ", ".join(f"{c} [{recording.units[c] or '-'}]" for c in recording.channels)
-            ui.label(f"{len(recording)} samples{duration}; {listed}").classes("text-xs opacity-70")
+            said = f"{len(recording)} samples{duration}; {listed}"
+            ui.label(said).classes("text-xs opacity-70 break-words")
+            _aside_said(recording, name)
             for note in entry.notes[:SHOWN]:
-                named(ui.label(note[:LONGEST]).classes("text-xs text-warning"), f"note-{name}")
+                named(
+                    ui.label(note[:LONGEST]).classes("text-xs text-amber-900 dark:text-amber-300"),
+                    f"note-{name}",
+                )
         named(
             ui.toggle(
                 ["train", "test", "unused"],
                 value=entry.role,
                 on_change=lambda event: _set_role(desk, name, event.value),
-            ).props("dense"),
+            ).props(f'dense role=group aria-label="Role of {name}"'),
             f"role-{name}",
         )
-        for icon, word, action in (("show_chart", "Show", _show), ("delete", "Remove", _remove)):
-            button = ui.button(icon=icon, on_click=lambda action=action: action(desk, name))
-            labelled(button.props("flat dense").tooltip(word), "aria-label", f"{word} {name}")
+        for icon, word, action in (
+            ("tune", "How it was read:", guarded(lambda: ask_again(desk, dialogs, name))),
+            ("show_chart", "Show", lambda: _show(desk, name)),
+            ("delete", "Remove", lambda: _remove(desk, name)),
+        ):
+            button = ui.button(icon=icon, on_click=action).props("flat dense")
+            labelled(button.tooltip(word.rstrip(":")), "aria-label", f"{word} {name}")
+
+
+def _aside_said(recording: Recording, name: str) -> None:
+    """Say what is missing: times, and columns that were left out."""
+    ignored = recording.meta.get("ignored_columns") or ()
+    said = []
+    if recording.sample_time is None:
+        said.append("no time: only models without rates take it; give a rate by 'How it was read'")
+    if ignored:
+        said.append(f"left out: {', '.join(map(str, ignored))}")
+    if said:
+        text = "; ".join(said)[:LONGEST]
+        named(ui.label(text).classes("text-xs opacity-70 break-words"), f"understood-{name}")
 
 
 def _set_role(desk: Desk, name: str, role: Any) -> None:
-    desk.workspace.set_role(name, role)
-    desk.changed("channels")
+    desk.workspace.set_role([name], role)
+    desk.changed("recordings", "channels")
 
 
 def _remove(desk: Desk, name: str) -> None:
     desk.workspace.remove(name)
     desk.changed("recordings", "channels")
+    ui.notify(f"{name} is removed; Undo brings it back.")
 
 
 def _show(desk: Desk, name: str) -> None:

@@ -245,7 +245,7 @@ class Sketch:
 
     async def _loaded(self, event: UploadEventArguments) -> None:
         path = await kept(self.desk, event.file)
-        found = await asyncio.to_thread(read_upload, path, {})
+        found = await asyncio.to_thread(read_upload, path)
         if len(found) != 1:
             raise DataError("it holds several recordings", file=path, remedy="give a file of one")
         (given,) = found

@@ -49,7 +49,7 @@ def build(desk: Desk) -> None:
             if not model.value:
                 raise DataError("there is no model to compare with", remedy="fit one under Models")
             path = await kept(desk, event.file)
-            found = await asyncio.to_thread(read_upload, path, {})
+            found = await asyncio.to_thread(read_upload, path)
             if not any(name.startswith("reference_") for run in found for name in run.channels):
                 raise DataError(
                     "it does not say what was wished for",

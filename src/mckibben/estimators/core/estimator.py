@@ -96,6 +96,9 @@ class Estimator(Parametrised, ABC):
     effort: ClassVar[float] = 0.5
     """About how long a fit to 10 000 samples takes [s]: models are compared cheapest first."""
 
+    needs_time: ClassVar[bool] = False
+    """Whether it cannot learn from recordings without time."""
+
     @classmethod
     @abstractmethod
     def objection(

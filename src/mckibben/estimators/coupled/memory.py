@@ -37,6 +37,8 @@ class CoupledMemoryEstimator(CoupledEstimator):
         Damping, relative to the size of what is read out.
     """
 
+    needs_time: ClassVar[bool] = True
+
     lags: tuple[Annotated[float, Gt(0)], ...] = (0.3, 1.0, 8.0)
     thresholds: tuple[Annotated[float, Gt(0)], ...] = (0.04, 0.11, 0.23)
     degree: Annotated[int, Interval(ge=1, le=3)] = 3

@@ -65,6 +65,8 @@ class OscillatorEstimator(SingleEstimator):
         no more than 1/30 rad in each.
     """
 
+    needs_time: ClassVar[bool] = True
+
     input: str = "force"
     output: str = "displacement"
     periodic: bool = False

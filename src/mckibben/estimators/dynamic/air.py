@@ -57,6 +57,8 @@ class AirEstimator(SeparableEstimator):
         0 below, if nothing recorded is, and no limit above.
     """
 
+    needs_time: ClassVar[bool] = True
+
     effort: ClassVar[float] = 1.0
 
     input: str = "voltage"

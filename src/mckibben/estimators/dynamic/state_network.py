@@ -68,6 +68,8 @@ class StateNetworkEstimator(SingleEstimator):
         no more than 1/3 rad in each.
     """
 
+    needs_time: ClassVar[bool] = True
+
     input: str = "force"
     output: str = "displacement"
     n_states: Annotated[int, Interval(ge=2, le=10)] = 3

@@ -38,6 +38,8 @@ class ActivationMemoryEstimator(SeparableEstimator):
         Of the filter of the rate [s]; default three samples.
     """
 
+    needs_time: ClassVar[bool] = True
+
     effort: ClassVar[float] = 1.0
 
     input: str = "contraction"

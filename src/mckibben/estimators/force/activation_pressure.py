@@ -44,6 +44,8 @@ class ActivationPressureEstimator(SearchingEstimator):
         found is set to that of the first run that is not static.
     """
 
+    needs_time: ClassVar[bool] = True
+
     input: str = "contraction"
     output: str = "pressure"
     force: str = "force"

@@ -96,6 +96,8 @@ class MultistateEstimator(SeparableEstimator):
         Whether friction may grow with pressure; wants recordings at several pressures.
     """
 
+    needs_time: ClassVar[bool] = True
+
     input: str = "length"
     output: str = "force"
     initial: Literal["first_sample", "virgin", "fitted"] = "virgin"

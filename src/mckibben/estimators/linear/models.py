@@ -75,6 +75,8 @@ class PredictionErrorEstimator(LinearEstimator):
         Starting points.
     """
 
+    needs_time: ClassVar[bool] = True
+
     n_zeros: Annotated[int, Interval(ge=1, le=20)] = 2
     n_poles: Order = 2
     shared_poles: bool = True

@@ -36,6 +36,8 @@ class ProcessModelEstimator(LinearEstimator, SeparableEstimator):
         What the input does between samples.
     """
 
+    needs_time: ClassVar[bool] = True
+
     effort: ClassVar[float] = 0.3
 
     structure: Structure = "P1"

@@ -66,6 +66,8 @@ class NarxEstimator(SingleEstimator):
         Whether a model that leaves all bounds is returned, with a warning, instead of refused.
     """
 
+    needs_time: ClassVar[bool] = True
+
     output_lags: Annotated[int, Interval(ge=1, le=20)] = 2
     input_lags: Annotated[int, Interval(ge=1, le=20)] = 2
     delay: Annotated[int, Interval(ge=0, le=50)] = 0

@@ -36,6 +36,8 @@ class RDPIEstimator(MappedPIEstimator):
         Default: the best on the training data of none, 5 and 25 samples.
     """
 
+    needs_time: ClassVar[bool] = True
+
     effort: ClassVar[float] = 0.9
 
     rate_time_constant: Annotated[float, Ge(0)] | None = None

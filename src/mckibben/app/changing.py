@@ -1,0 +1,187 @@
+"""Changes of recordings that can be undone: roles, names, steps, other readings, removal.
+
+A change writes new files and descriptions, and keeps the old ones.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+from mckibben.app import kept
+from mckibben.app.folder import short
+from mckibben.app.recordings import Entry, Recordings, Role
+from mckibben.errors import DataError
+
+if TYPE_CHECKING:
+    from mckibben.recording import Recording
+
+MOST_CHANGES = 50
+"""Changes that can be undone."""
+
+HISTORY = "recordings"
+"""Name of the history."""
+
+
+class Changing(Recordings):
+    """Recordings that can be changed, and every change undone.
+
+    Parameters, and errors, are those of `mckibben.app.folder.Folder`.
+    """
+
+    def set_role(self, names: str | Sequence[str], role: Role) -> None:
+        """Say what one recording or several are used for."""
+        entries = [self.entry(name) for name in ([names] if isinstance(names, str) else names)]
+        new = {each.name: replace(each, role=role) for each in entries if each.role != role}
+        if new:
+            self._change(f"{', '.join(new)} as {role}", new)
+
+    def remove(self, *names: str) -> None:
+        """Take recordings out of the workspace; what was uploaded stays."""
+        for name in names:
+            self.entry(name)
+        self._change(f"remove {', '.join(names)}", dict.fromkeys(names))
+
+    def rename(self, name: str, wish: str) -> str:
+        """Give a recording another name, and return that: like the one wished for, and free."""
+        entry, recording = self.entry(name), self.recording(name)
+        chosen = self.new_name("recordings", wish)
+        try:
+            path = self._written(chosen, recording)
+            self._change(
+                f"rename {name} to {chosen}",
+                {name: None, chosen: replace(entry, name=chosen, path=path)},
+            )
+        except BaseException:
+            self.give_back("recordings", chosen)
+            raise
+        return chosen
+
+    def edit(self, name: str, what: str, *ways: Sequence[kept.Step]) -> list[str]:
+        """Give a recording other steps; of several ways, each gives one, and the first keeps its name.
+
+        Raises
+        ------
+        DataError
+            If a step cannot be done.
+        """
+        from mckibben.app import edits
+
+        entry = self.entry(name)
+        base = self._read(entry.base or entry.path)
+        made = [edits.applied(base, steps) for steps in ways]
+        new: dict[str, Entry | None] = {}
+        for each, steps in zip(made, ways, strict=True):
+            chosen = self.new_name("recordings", name) if new else name
+            path = self._written(chosen, each) if steps else entry.base or entry.path
+            new[chosen] = replace(entry, name=chosen, path=path, steps=tuple(steps))
+        self._change(what, new)
+        return list(new)
+
+    def read_again(
+        self, found: Mapping[str, tuple[Sequence[Recording], str]], reading: kept.Reading
+    ) -> list[str]:
+        """Replace what was read by what was read otherwise; steps are done anew.
+
+        Of several recordings, one for each stretch, those that were not there before are added.
+
+        Parameters
+        ----------
+        found : mapping of str to (sequence of Recording, str)
+            By the names of recordings, what is in their files now, and the call that reads it.
+        reading : Reading
+            How it was read.
+        """
+        from mckibben.app import edits
+
+        new: dict[str, Entry | None] = {}
+        for name, (read, call) in found.items():
+            entry = self.entry(name)
+            places = [entry.part] if entry.part < len(read) else [0]
+            if entry.reading.gaps != "split" and reading.gaps == "split":
+                places = list(range(len(read)))
+            made = [(place, edits.applied(read[place], entry.steps)) for place in places]
+            for place, each in made:
+                chosen = name if name not in new else self.new_name("recordings", name)
+                base = path = self._written(chosen, read[place])
+                if entry.steps:
+                    path = self._written(chosen, each)
+                way = replace(entry, name=chosen, path=path, base=base, call=f"{call}[{place}]")
+                new[chosen] = replace(way, part=place, reading=reading, notes=read[place].notes)
+        self._change(f"read {', '.join(found)} otherwise", new)
+        return list(new)
+
+    def _change(self, what: str, new: Mapping[str, Entry | None]) -> None:
+        self.demand()
+        with self._changing:
+            after = {name: None if each is None else each.content() for name, each in new.items()}
+            before = {name: self.read_json("recordings", name) for name in new}
+            self._put(after)
+            history = self._history()
+            change = kept.Change(what=short(what), before=before, after=after)
+            done = [*history.done, change]
+            gone = [*history.undone, *done[:-MOST_CHANGES]]
+            self._keep(kept.History(done=done[-MOST_CHANGES:]), gone)
+        self.log(what)
+
+    def undo(self) -> str | None:
+        """Take the last change back, and return what it was; None if there is none."""
+        return self._step_back(undo=True)
+
+    def redo(self) -> str | None:
+        """Do again what was undone last, and return what it was; None if there is nothing."""
+        return self._step_back(undo=False)
+
+    def _step_back(self, *, undo: bool) -> str | None:
+        self.demand()
+        with self._changing:
+            history = self._history()
+            here, there = (history.done, history.undone) if undo else (history.undone, history.done)
+            if not here:
+                return None
+            change = here.pop()
+            there.append(change)
+            self._put(change.before if undo else change.after)
+            self._keep(history, [])
+        self.log(f"{'undid' if undo else 'did again'}: {change.what}")
+        return change.what
+
+    def history(self) -> tuple[str | None, str | None]:
+        """Return what would be undone, and what would be done again."""
+        history = self._history()
+        done, undone = history.done, history.undone
+        return done[-1].what if done else None, undone[-1].what if undone else None
+
+    def _history(self) -> kept.History:
+        found = kept.checked(kept.History, self.read_json("history", HISTORY))
+        return kept.History() if found is None else found
+
+    def _keep(self, history: kept.History, gone: Iterable[kept.Change]) -> None:
+        """Write the history; samples that only forgotten changes have are removed."""
+        self.write_json("history", HISTORY, history.model_dump(mode="json"))
+        files = {name for change in gone for name in _files(change)}
+        files -= {name for change in (*history.done, *history.undone) for name in _files(change)}
+        for name in files - {
+            path.name for e in self.entries() for path in (e.path, e.base) if path
+        }:
+            with suppress(OSError, DataError):
+                path = self.path("recordings", name)
+                path.unlink()
+                path.with_name(f"{name}-metadata.json").unlink()
+
+    def _put(self, contents: Mapping[str, dict[str, Any] | None]) -> None:
+        for name, content in contents.items():
+            if content is None:
+                self.new_path("recordings", f"{name}.json").unlink(missing_ok=True)
+            else:
+                self.write_json("recordings", name, content)
+
+
+def _files(change: kept.Change) -> set[str]:
+    found = (
+        kept.checked(kept.Described, each)
+        for each in (*change.before.values(), *change.after.values())
+    )
+    return {name for each in found if each for name in (each.file, each.base) if name}

@@ -1,0 +1,86 @@
+"""What can be done to a recording after it was read: steps as plain data, as calls, and in words."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from mckibben import signals
+from mckibben.app.kept import Step
+from mckibben.errors import DataError
+from mckibben.recording import Recording
+
+
+@dataclass(frozen=True)
+class _Edit:
+    """A kind of step.
+
+    Parameters
+    ----------
+    takes : tuple of str
+        Fields of the step, in the order of the function's arguments.
+    do : callable
+        The function.
+    call, words : str
+        With the fields in braces; in a call, ``{x}`` is the recording.
+    """
+
+    takes: tuple[str, ...]
+    do: Callable[..., Recording]
+    call: str
+    words: str
+
+
+EDITS = {
+    "slice": _Edit(
+        ("start", "stop"), Recording.slice, "{x}.slice({start}, {stop})", "samples {start}:{stop}"
+    ),
+    "low_pass": _Edit(
+        ("cutoff", "channels"),
+        signals.low_pass,
+        "mckibben.signals.low_pass({x}, {cutoff}, {channels})",
+        "low-pass {cutoff} Hz",
+    ),
+    "detrend": _Edit(
+        ("channels",), signals.detrend, "mckibben.signals.detrend({x}, {channels})", "drift removed"
+    ),
+    "resample": _Edit(
+        ("sample_time",),
+        signals.resample,
+        "mckibben.signals.resample({x}, {sample_time})",
+        "resampled to {sample_time} s",
+    ),
+}
+"""By their names in a `mckibben.app.kept.Step`."""
+
+
+def applied(recording: Recording, steps: Sequence[Step]) -> Recording:
+    """Return a recording after some steps; errors are those of the functions."""
+    for step in steps:
+        edit = EDITS[step.do]
+        values = _values(step)
+        if step.do != "detrend" and any(values[name] is None for name in edit.takes[:1]):
+            raise DataError(f"{step.do} needs a number", remedy="give one")
+        if step.channels is not None:  # those that are there: they may be named otherwise by now
+            values["channels"] = [name for name in step.channels if name in recording]
+        recording = edit.do(recording, *(values[name] for name in edit.takes))
+    return recording
+
+
+def call(read: str, steps: Sequence[Step]) -> str:
+    """Return the call that reads a recording and repeats the steps."""
+    for step in steps:
+        given = {name: repr(value) for name, value in _values(step).items()}
+        read = EDITS[step.do].call.format(x=read, **given).replace(", None)", ")")
+    return read
+
+
+def words(step: Step) -> str:
+    """Return what a step does, in a few words."""
+    said = EDITS[step.do].words.format(**_values(step))
+    return said if not step.channels else f"{said} ({', '.join(step.channels)})"
+
+
+def _values(step: Step) -> dict[str, Any]:
+    return {name: getattr(step, name) for name in EDITS[step.do].takes}

@@ -1,0 +1,136 @@
+"""What can be done to a recording after it was read, and how each is taken back."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Awaitable, Callable, Sequence
+from typing import Any
+
+from nicegui import ui
+
+from mckibben.app import edits
+from mckibben.app.desk import Desk, guarded, labelled, named
+from mckibben.app.kept import Step
+from mckibben.recording import Recording
+
+UNDO_KEYS = """(event) => {
+    const key = event.key.toLowerCase();
+    if (!(event.ctrlKey || event.metaKey) || event.target.matches('input, textarea')) return;
+    if (key === 'z' || key === 'y') {
+        event.preventDefault();
+        emit(key === 'y' || event.shiftKey);
+    }
+}"""
+"""Ctrl+Z undoes, Ctrl+Y and Ctrl+Shift+Z do again; in a field they are the field's own."""
+
+
+def undoing(desk: Desk, page: Any) -> None:
+    """Show buttons that undo and do again; Ctrl+Z on a page is the same."""
+
+    def step(redo: bool) -> Callable[[], Awaitable[None]]:
+        async def act() -> None:
+            workspace = desk.workspace
+            what = await asyncio.to_thread(workspace.redo if redo else workspace.undo)
+            ui.notify(
+                f"{'Done again' if redo else 'Undone'}: {what}"
+                if what
+                else "There is nothing left."
+            )
+            if what:
+                desk.changed("recordings", "channels")
+
+        return guarded(act)
+
+    async def pressed(event: Any) -> None:
+        await step(bool(event.args))()
+
+    page.props("tabindex=-1")  # what is clicked on then gives it the keys
+    page.on("keydown", pressed, js_handler=UNDO_KEYS)
+
+    @ui.refreshable
+    def shown() -> None:
+        with ui.row().classes("gap-0"):
+            for word, icon, redo in (("Undo", "undo", False), ("Redo", "redo", True)):
+                what = desk.workspace.history()[redo]
+                button = named(ui.button(icon=icon, on_click=step(redo)), word.lower())
+                button.props("flat dense").set_enabled(what is not None)
+                labelled(button, "aria-label", f"{word}: {what}" if what else f"{word}: nothing")
+                button.tooltip(f"{word}: {what}" if what else f"Nothing to {word.lower()}")
+
+    desk.when("recordings", shown.refresh)
+    desk.when("channels", shown.refresh)
+    shown()
+
+
+def steps(desk: Desk, name: str, recording: Recording) -> None:
+    """Show what was done to a recording, and what else can be done."""
+    done = desk.workspace.entry(name).steps
+    if done:
+        with named(ui.row().classes("items-center gap-1"), "steps"):
+            ui.label("Done to it:").classes("text-sm")
+            for place, step in enumerate(done):
+                rest = [*done[:place], *done[place + 1 :]]
+                words = edits.words(step)
+                chip = ui.chip(
+                    words, removable=True, on_value_change=_remover(desk, name, words, rest)
+                )
+                labelled(chip.props("outline dense"), "remove-aria-label", f"Take back {words}")
+    rate = None if recording.sample_time is None else 1 / recording.sample_time
+    with ui.row().classes("items-end gap-3"):
+        channels = ui.select(
+            list(recording.channels),
+            value=list(recording.channels),
+            multiple=True,
+            label="Channels to filter",
+        ).classes("w-56")
+        named(channels, "edit-channels")
+        if rate is not None:
+            cutoff = named(ui.number("Low-pass [Hz]", value=_round(rate / 20), min=0), "cutoff")
+            apply = _button("Low-pass", "low-pass")
+            apply.on_click(
+                guarded(
+                    lambda: do(
+                        desk,
+                        name,
+                        Step(do="low_pass", cutoff=cutoff.value, channels=list(channels.value)),
+                    )
+                )
+            )
+            wanted = named(
+                ui.number("Sample time [s]", value=_round(1 / rate), min=0), "sample-time"
+            )
+            apply = _button("Resample", "resample")
+            apply.on_click(
+                guarded(lambda: do(desk, name, Step(do="resample", sample_time=wanted.value)))
+            )
+        apply = _button("Take drift out", "detrend")
+        apply.on_click(
+            guarded(lambda: do(desk, name, Step(do="detrend", channels=list(channels.value))))
+        )
+
+
+async def do(desk: Desk, name: str, *ways: Step | Sequence[Step]) -> None:
+    """Do a step to a recording; of several ways, each gives a recording."""
+    before = desk.workspace.entry(name).steps
+    given = [(*before, *([way] if isinstance(way, Step) else way)) for way in ways]
+    said = " and ".join(edits.words(steps[-1]) for steps in given)
+    await _change(desk, name, f"{name}: {said}", given)
+
+
+async def _change(desk: Desk, name: str, what: str, ways: Sequence[Sequence[Step]]) -> None:
+    await asyncio.to_thread(desk.workspace.edit, name, what, *ways)
+    desk.preview = name
+    desk.did(what, edits.call("recording", ways[0]))
+    desk.changed("recordings", "channels")
+
+
+def _remover(desk: Desk, name: str, words: str, rest: Sequence[Step]) -> Callable[[], Any]:
+    return guarded(lambda: _change(desk, name, f"{name}: without {words}", [rest]))
+
+
+def _button(text: str, name: str) -> Any:
+    return named(ui.button(text).props("outline"), name)
+
+
+def _round(value: float) -> float:
+    return float(f"{value:.3g}")

@@ -1,0 +1,192 @@
+"""How a file is read can be changed later, and what is done to a recording is taken back."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mckibben import DataError, Recording, read, signals
+from mckibben.app import edits, scripts
+from mckibben.app.kept import Reading, Step
+from mckibben.app.reading import columns, options, read_upload
+from mckibben.app.recordings import EXAMPLE
+from mckibben.app.workspace import Workspace
+from mckibben.comparison.channels import Channels
+from mckibben.comparison.offered import objections
+from mckibben.files import formats
+
+TABLE = "level,p_kPa,displacement_mm,branch\n" + "\n".join(
+    f"{k % 20},{300 + k % 40},{-(k % 7)},up" for k in range(60)
+)
+
+
+def taken(workspace: Workspace, reading: Reading | None = None) -> Recording:
+    path = workspace.keep_upload("rig.csv", TABLE.encode())
+    (recording,) = read_upload(path, reading or Reading())
+    workspace.add(recording, origin="file rig.csv", call="", name="rig", upload=path.name)
+    return recording
+
+
+def test_what_was_recognised_is_told(tmp_path: Path) -> None:
+    path = tmp_path / "rig.csv"
+    path.write_text(TABLE)
+    found = {column.header: (column.channel, column.unit) for column in columns(path, Reading())}
+    assert found["p_kPa"] == ("pressure", "kPa")
+    assert found["branch"][0] == ""
+    assert [c.channel for c in columns(path, Reading(channels=["pressure"]))].count("") == 3
+
+
+def test_a_file_is_read_otherwise_and_steps_are_done_anew(tmp_path: Path) -> None:
+    workspace = Workspace(tmp_path)
+    first = taken(workspace)
+    assert first.sample_time is None
+    workspace.edit("rig", "cut", [Step(do="slice", start=10, stop=30)])
+    reading = Reading(
+        rate=10.0,
+        calibration={"displacement": (-1.0, 2.0)},
+        channels=["pressure", "displacement"],
+    )
+    path = workspace.path("uploads", workspace.entry("rig").upload)
+    workspace.read_again({"rig": (read_upload(path, reading), "")}, reading)
+    again = Workspace(tmp_path).recording("rig")
+    assert again.sample_time == 0.1
+    assert list(again.channels) == ["pressure", "displacement"]
+    np.testing.assert_allclose(again["displacement"], 2 - first["displacement"][10:30])
+    (line,) = scripts._reads(workspace, "train")
+    import mckibben
+
+    repeated = eval(line, {"mckibben": mckibben})
+    assert repeated["displacement"].tolist() == again["displacement"].tolist()
+    assert "steps" not in (workspace.undo() or "")
+    assert workspace.recording("rig").sample_time is None
+
+
+def test_everything_is_undone_and_done_again(tmp_path: Path) -> None:
+    workspace = Workspace(tmp_path)
+    whole = taken(workspace)
+    pieces = [[Step(do="slice", start=0, stop=20)], [Step(do="slice", start=20, stop=60)]]
+    assert workspace.edit("rig", "split", *pieces) == ["rig", "rig-2"]
+    workspace.set_role(["rig", "rig-2"], "test")
+    assert workspace.rename("rig", "<b>'a'\n") == "b-a"
+    workspace.remove("b-a", "rig-2")
+    workspace = Workspace(tmp_path)  # also after a new start
+    undone = 0
+    while workspace.undo():
+        undone += 1
+    assert undone == 4
+    assert [entry.name for entry in workspace.entries()] == ["rig"]
+    np.testing.assert_array_equal(workspace.recording("rig")["pressure"], whole["pressure"])
+    while workspace.redo():
+        undone -= 1
+    assert undone == 0
+    assert workspace.entries() == []
+
+
+def test_forgotten_changes_leave_no_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("mckibben.app.changing.MOST_CHANGES", 2)
+    workspace = Workspace(tmp_path)
+    taken(workspace)
+    for stop in range(20, 30):
+        workspace.edit("rig", "cut", [Step(do="slice", start=0, stop=stop)])
+    assert len(list((tmp_path / "recordings").glob("*.csv"))) <= 4
+    assert len(workspace.recording("rig")) == 29
+
+
+def test_the_example_is_added_once(tmp_path: Path) -> None:
+    workspace = Workspace(tmp_path)
+    assert len(workspace.add_example()) == 2
+    assert workspace.add_example() == []
+    assert [entry.role for entry in workspace.entries()] == ["train", "test"]
+    assert {entry.origin for entry in workspace.entries()} == {EXAMPLE}
+
+
+def test_steps_are_repeated_by_their_calls() -> None:
+    t = np.arange(400) * 0.01
+    recording = Recording({"pressure": t + np.sin(t), "displacement": np.cos(9 * t)}, 0.01)
+    steps = [
+        Step(do="low_pass", cutoff=5.0, channels=["pressure"]),
+        Step(do="detrend", channels=["displacement"]),
+        Step(do="resample", sample_time=0.02),
+        Step(do="slice", start=5, stop=50),
+    ]
+    import mckibben
+
+    called = eval(edits.call("x", steps), {"mckibben": mckibben, "x": recording})
+    assert called == edits.applied(recording, steps)
+    assert all(edits.words(step) for step in steps)
+    with pytest.raises(DataError, match="needs a number"):
+        edits.applied(recording, [Step(do="low_pass")])
+
+
+def test_a_low_pass_damps_what_is_fast_and_delays_nothing() -> None:
+    t = np.linspace(0.0, 19.99, 2000)
+    slow, fast = np.sin(t), 0.3 * np.sin(2 * np.pi * 20 * t)
+    recording = Recording(
+        {"pressure": 2 + slow + fast, "length": np.full(t.size, 3.0)},
+        0.01,
+    )
+    smooth = signals.low_pass(recording, 2.0)
+    assert np.abs(smooth["pressure"] - 2 - slow)[100:-100].max() < 0.01
+    assert np.ptp(smooth["length"]) == 0
+    with pytest.raises(DataError, match="half the sampling rate"):
+        signals.low_pass(recording, 60.0)
+    with pytest.raises(DataError, match="without time"):
+        signals.low_pass(Recording({"pressure": t}), 1.0)
+
+
+def test_drift_is_taken_out_and_the_mean_stays() -> None:
+    t = np.linspace(0, 1, 101)
+    level = signals.detrend(Recording({"pressure": 5 + 2 * t}))
+    np.testing.assert_allclose(level["pressure"], 6.0)
+
+
+def test_calibration_goes_before_all_else(tmp_path: Path) -> None:
+    path = tmp_path / "run.csv"
+    path.write_text("time_s,A0_V\n" + "\n".join(f"{k * 0.1},{k * 0.5}" for k in range(20)))
+    reading = Reading(
+        columns={"pressure": "A0_V"}, units={"pressure": "psi"}, calibration={"pressure": (2, -1)}
+    )
+    (recording,) = read(path, **options(reading))
+    assert recording["pressure"][4] == pytest.approx(3.0 * 0.0689476, rel=1e-5)
+    assert recording.meta["calibration"]["pressure"]["gain"] == 2
+    with pytest.raises(DataError, match="the gain not 0"):
+        read(path, calibration={"pressure": (0.0, 1.0)})
+
+
+def test_a_file_that_changes_while_it_is_read_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "rig.csv"
+    path.write_text(TABLE)
+    reading = formats.read
+
+    def growing(*given):  # type: ignore[no-untyped-def]
+        found = reading(*given)
+        with path.open("a") as file:
+            file.write("\n1,2,3,up")
+        return found
+
+    monkeypatch.setattr(formats, "read", growing)
+    with pytest.raises(DataError, match="changed while it was read"):
+        read(path)
+
+
+def test_others_see_that_something_has_changed(tmp_path: Path) -> None:
+    mine, other = Workspace(tmp_path), Workspace(tmp_path)
+    taken(mine)
+    before = other.stamp()
+    mine.set_role("rig", "test")
+    assert other.stamp() != before
+    assert other.entry("rig").role == "test"
+
+
+def test_models_that_need_time_say_so_before_fitting() -> None:
+    saw = np.tile(np.linspace(0.0, 6.0, 7), 5)
+    recording = Recording({"pressure": saw, "displacement": saw})
+    found = objections(
+        ["pi", "oe", "narx"], [recording], Channels(("pressure",), ("displacement",))
+    )
+    assert "pi" not in found
+    assert all("needs time" in found[name] for name in ("oe", "narx"))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import hashlib
+import lzma
 from importlib import resources
 from typing import TYPE_CHECKING, Any
 
@@ -15,8 +16,8 @@ if TYPE_CHECKING:
     from jinja2 import Template
 
 
-SCRIPTS = ("plotly-basic.min.js", "report.js")
-"""The first is plotly.js 4.1.1 as published (plotly.js-basic-dist-min, MIT): in Python 60 MB."""
+PLOTLY = "plotly-basic.min.js.xz"
+"""plotly.js 4.1.1 as published (plotly.js-basic-dist-min, MIT), packed: in Python 60 MB."""
 
 
 def page(name: str, figures: dict[str, Any], **about: Any) -> str:
@@ -32,7 +33,8 @@ def page(name: str, figures: dict[str, Any], **about: Any) -> str:
         What else the template names.
     """
     folder = resources.files("mckibben.report").joinpath("templates")
-    scripts = [folder.joinpath(script).read_text("utf-8") for script in SCRIPTS]
+    packed = folder.joinpath(PLOTLY).read_bytes()
+    scripts = [lzma.decompress(packed).decode(), folder.joinpath("report.js").read_text("utf-8")]
     return template(name).render(
         figures=figures,
         bar=interactive.BAR,

@@ -5,7 +5,6 @@ from __future__ import annotations
 import inspect
 import re
 import sys
-import tomllib
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -19,14 +18,8 @@ from mckibben import registry
 from mckibben.blocks.core.notation import Written, unit_tex
 from mckibben.blocks.core.writing import quantities, written
 from mckibben.comparison.limits import limits
+from mckibben.comparison.needs import needs
 from mckibben.errors import MckibbenError
-
-NAMES: dict[str, dict[str, str]] = tomllib.loads(
-    (DOCS / "models" / "names.toml").read_text("utf-8")
-)
-"""Full names of models, by what they are for."""
-
-HEADS = ("title", "about")
 
 
 def named() -> dict[str, tuple[str, str]]:
@@ -34,15 +27,10 @@ def named() -> dict[str, tuple[str, str]]:
 
     Exits where a model has no name, or no example.
     """
-    found = {
-        model: (name, group["title"])
-        for group in NAMES.values()
-        for model, name in group.items()
-        if model not in HEADS
-    }
+    found = {model: (name, need.title) for need in needs() for model, name in need.models.items()}
     offered = set(registry.names("estimators"))
     if offered != found.keys():
-        sys.exit(f"docs/models/names.toml: mend {sorted(offered ^ found.keys())}")
+        sys.exit(f"src/mckibben/comparison/needs.toml: mend {sorted(offered ^ found.keys())}")
     for model in found:
         if not example(model).is_file():
             sys.exit(f"{model} has no example: run python docs/models/fits.py {model}")
@@ -95,15 +83,14 @@ def write_models() -> None:
         "An asterisk marks what is good only near the motions it was trained on.",
         "",
     ]
-    for group in NAMES.values():
-        lines += [f"## {group['title']}", "", group["about"], ""]
+    for need in needs():
+        lines += [f"## {need.title}", "", need.about, ""]
         rows = []
-        for model, name in group.items():
-            if model not in HEADS:
-                star = " \\*" if "caution" in all_limits[model] else ""
-                rows.append(
-                    [f"[{name}]({model}.md){star}", f"`{model}`", plain(all_limits[model]["can"])]
-                )
+        for model, name in need.models.items():
+            star = " \\*" if "caution" in all_limits[model] else ""
+            rows.append(
+                [f"[{name}]({model}.md){star}", f"`{model}`", plain(all_limits[model]["can"])]
+            )
         lines += table(["model", "in commands", "what for"], rows)
     lines += ["## All, by the alphabet", ""]
     ordered = sorted((name, model) for model, (name, _) in names.items())

@@ -20,7 +20,6 @@ from mckibben.app import plots, scripts
 from mckibben.app.desk import Desk
 from mckibben.app.jobs import Jobs
 from mckibben.app.motions import parsed, reference_recording
-from mckibben.app.pages.models import SEPARATOR
 from mckibben.app.shell import build, load_the_rest
 from mckibben.app.work import fit
 from mckibben.app.workspace import Workspace
@@ -110,11 +109,13 @@ def test_recordings_of_two_muscles_get_models_that_couple_them(tmp_path: Path) -
     async def look(user: User) -> None:
         user.find(marker="tab-models").click()
         await user.should_see(marker="leaderboard")
-        (offered,) = user.find(marker="models").elements
-        assert isinstance(offered, ui.select)
-        assert models < set(offered.options)
-        assert models == set(offered.value)
-        assert not {"pi", "gpi", "arx"} & set(offered.options)
+        await user.should_see("2 inputs (pressure_1, pressure_2); 2 outputs")
+        for model in models:
+            (box,) = user.find(marker=f"model-{model}").elements
+            assert isinstance(box, ui.checkbox)
+            assert box.value
+        for model in ("pi", "gpi", "arx"):
+            await user.should_not_see(marker=f"model-{model}")
         (table,) = user.find(marker="leaderboard").elements
         assert isinstance(table, ui.table)
         assert {row["name"] for row in table.rows} == {"first", "second"}
@@ -161,15 +162,6 @@ def test_fitting_without_a_recording_is_answered(tmp_path: Path) -> None:
         await user.should_see("There is no recording to train on.")
 
     visit(Workspace(tmp_path), look)
-
-
-def test_settings_are_lines_or_between_commas() -> None:
-    text = "n_operators=12, method=ls\nthresholds=[0, 0.5]"
-    assert [part.strip() for part in SEPARATOR.split(text)] == [
-        "n_operators=12",
-        "method=ls",
-        "thresholds=[0, 0.5]",
-    ]
 
 
 def test_cutting_needs_a_selection(tmp_path: Path) -> None:

@@ -228,7 +228,7 @@ class Given(Kept):
 class Noted(Kept):
     """What a job is and how it went."""
 
-    kind: Literal["fit", "force", "loop", "record", "report", "review"]
+    kind: Literal["check", "fit", "force", "loop", "plan", "record", "report", "review"]
     state: Text
     message: Text = ""
     given: Given

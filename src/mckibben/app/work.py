@@ -81,6 +81,44 @@ def report(workspace: Workspace, given: dict[str, Any], tell: Tell) -> str:
     return f"written: {path}"
 
 
+def check(workspace: Workspace, given: dict[str, Any], tell: Tell) -> str:
+    """Judge a model by the test recordings, or else the training ones, and write the page."""
+    from mckibben.report.check_page import check_page
+    from mckibben.system.atomic import write_text
+    from mckibben.validation.check import check as judged
+    from mckibben.validation.describing import describe
+
+    name = str(given["name"])
+    model = workspace.model(name)
+    recordings = workspace.with_role("test") or workspace.with_role("train")
+    if not recordings:
+        raise DataError("there is no recording to judge by", remedy="add one under Data")
+    found = judged(model, recordings)
+    tell(0.6, float("nan"))
+    description = describe(model, recordings, fitted=False)
+    page = check_page(found, description, f"models/{name}.json")
+    write_text(workspace.new_path("takeaway", str(given["file"])), page)
+    on = "test" if workspace.with_role("test") else "training"
+    return " ".join([f"On {on} recordings:", found.verdict, *found.sentences])
+
+
+def plan(workspace: Workspace, given: dict[str, Any], tell: Tell) -> str:
+    """Plan what to record next, and write it as a file of inputs over time."""
+    from mckibben.excitation.planning import plan as planned
+    from mckibben.files import write
+
+    name = str(given.get("name") or "")
+    found = planned(
+        [*workspace.with_role("train"), *workspace.with_role("test")],
+        model=workspace.model(name) if name else None,
+        minutes=float(given.get("minutes", 3.0)),
+        seed=int(given.get("seed", 0)),
+        progress=lambda share, _: tell(share, float("nan")),
+    )
+    write(found.recording, workspace.new_path("takeaway", str(given["file"])))
+    return " ".join([found.sentence, *found.notes])
+
+
 def record(workspace: Workspace, given: dict[str, Any], tell: Tell) -> str:
     """Run one run of a protocol on a virtual rig, and keep the recording."""
     from mckibben.rigs import load_rig
@@ -106,9 +144,11 @@ def record(workspace: Workspace, given: dict[str, Any], tell: Tell) -> str:
 
 
 WORK: dict[str, Callable[[Workspace, dict[str, Any], Tell], str]] = {
+    "check": check,
     "fit": fit,
     "force": estimate,
     "loop": loop,
+    "plan": plan,
     "record": record,
     "report": report,
     "review": look_back,

@@ -14,7 +14,6 @@ from mckibben.app.desk import Desk, guarded, named, tell
 from mckibben.app.following import fitting_rigs
 from mckibben.app.jobs import RUNNING
 from mckibben.app.kept import Followed
-from mckibben.app.pages.once import once
 from mckibben.arrays import Array
 from mckibben.errors import MckibbenError
 from mckibben.files import read
@@ -128,7 +127,7 @@ def _offer(
                 desk.did(f"closed the loop: {wish}", call)
             desk.changed("jobs")
 
-        once("Run", start, "run-loop")
+        named(ui.button("Run", on_click=guarded(start)), "run-loop")
 
 
 def _runs(desk: Desk, model: str) -> None:

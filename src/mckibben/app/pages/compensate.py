@@ -13,7 +13,6 @@ from mckibben.app.desk import Desk, guarded, named
 from mckibben.app.following import compensated, held_for
 from mckibben.app.pages import closing, forces, logs
 from mckibben.app.pages.drawing_reference import Sketch
-from mckibben.app.pages.once import once
 from mckibben.errors import MckibbenError
 from mckibben.files import write
 from mckibben.recording import Recording
@@ -158,7 +157,7 @@ class Editor:
         with self.left:
             self.sketch = Sketch(desk, outputs, reach, held, units)
         with self.sketch.actions:
-            once("Show pressures", self._show, "show-pressures")
+            named(ui.button("Show pressures", on_click=guarded(self._show)), "show-pressures")
 
     async def _turned(self) -> None:
         kept, was = dict(self.sketch.points), self.sketch.file

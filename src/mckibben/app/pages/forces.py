@@ -10,7 +10,6 @@ from mckibben.app import forms
 from mckibben.app.desk import Desk, guarded, named
 from mckibben.app.kept import Estimated
 from mckibben.app.pages.kept_curves import drawn, showing
-from mckibben.app.pages.once import once
 from mckibben.errors import DataError, MckibbenError
 from mckibben.report import wording
 from mckibben.system.ordinary import read_bytes
@@ -68,8 +67,10 @@ def build(desk: Desk) -> None:
                 desk.did(f"wrote {path.name}", forms.written(name, "force", {}))
                 ui.download(read_bytes(path, most=LARGEST), path.name)
 
-            once("Estimate", start, "estimate-force")
-            once("Take the estimator (JSON)", take, "take-force").props("outline")
+            named(ui.button("Estimate", on_click=guarded(start)), "estimate-force")
+            named(
+                ui.button("Take the estimator (JSON)", on_click=guarded(take)), "take-force"
+            ).props("outline")
         ui.label("As C, FMU or for ROS 2: under Take away.").classes("text-xs opacity-70")
         showing(desk, "force", lambda: desk.workspace.estimates(), lambda *one: _shown(desk, *one))
     named(section, "forces")

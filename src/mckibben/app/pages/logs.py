@@ -9,11 +9,10 @@ from nicegui import ui
 from nicegui.events import UploadEventArguments
 
 from mckibben.app import forms
-from mckibben.app.desk import Desk, kept, labelled, named, on_event, tell
+from mckibben.app.desk import Desk, guarded, kept, labelled, named, on_event, tell
 from mckibben.app.guard import LARGEST_UPLOAD, TOO_LARGE
 from mckibben.app.kept import Reviewed
 from mckibben.app.pages.kept_curves import drawn, showing
-from mckibben.app.pages.once import once
 from mckibben.app.reading import read_upload
 from mckibben.errors import DataError
 from mckibben.report import wording
@@ -116,7 +115,9 @@ def _shown(desk: Desk, name: str, one: Reviewed) -> None:
         async def refit() -> None:
             _look_back(desk, one.model, one.form, one.log, refit=True)
 
-        once("Try a refit with the log", refit, f"refit-{name}").props("outline")
+        named(
+            ui.button("Try a refit with the log", on_click=guarded(refit)), f"refit-{name}"
+        ).props("outline")
     else:
 
         async def take() -> None:
@@ -129,4 +130,4 @@ def _shown(desk: Desk, name: str, one: Reviewed) -> None:
             desk.changed("results")
             ui.notify(f"{new} is among the models now")
 
-        once("Take the refit as a model", take, f"take-refit-{name}")
+        named(ui.button("Take the refit as a model", on_click=guarded(take)), f"take-refit-{name}")

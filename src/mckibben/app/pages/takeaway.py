@@ -11,7 +11,6 @@ from mckibben.app import scripts
 from mckibben.app.desk import Desk, code, guarded, named
 from mckibben.app.jobs import RUNNING
 from mckibben.app.pages import taking_code
-from mckibben.app.pages.once import once
 from mckibben.app.pages.taking_code import CARD, LARGEST, hand_over
 from mckibben.errors import DataError
 from mckibben.system.ordinary import read_bytes
@@ -87,7 +86,7 @@ def _figures(desk: Desk, model: Any) -> None:
             await asyncio.to_thread(save)
             hand_over(desk, path, f"mckibben plot ... --kind {kind.value} -o {path.name}")
 
-        once("Draw it", draw, "take-figure")
+        named(ui.button("Draw it", on_click=guarded(draw)), "take-figure")
 
 
 def _report(desk: Desk) -> None:
@@ -114,7 +113,7 @@ def _report(desk: Desk) -> None:
             desk.did("started the report", call)
             desk.changed("jobs")
 
-        once("Write it", start, "take-report")
+        named(ui.button("Write it", on_click=guarded(start)), "take-report")
 
         @ui.refreshable
         def writing() -> None:

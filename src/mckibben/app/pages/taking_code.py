@@ -10,7 +10,6 @@ from nicegui import ui
 
 from mckibben.app import forms
 from mckibben.app.desk import Desk, guarded, named
-from mckibben.app.pages.once import once
 from mckibben.blocks.core.block import Block
 from mckibben.system.atomic import replacing
 from mckibben.system.ordinary import read_bytes
@@ -133,7 +132,9 @@ def build(desk: Desk, model: Any) -> None:
         rows = {}
         for kind, action in actions.items():
             with ui.column().classes("w-full gap-0") as rows[kind]:
-                once(labels[kind], action, f"take-{kind}").classes("w-full")
+                named(ui.button(labels[kind], on_click=guarded(action)), f"take-{kind}").classes(
+                    "w-full"
+                )
                 ui.label(KINDS[kind]).classes("text-xs opacity-80")
 
         def fitted() -> None:

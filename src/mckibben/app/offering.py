@@ -1,0 +1,126 @@
+"""What the recordings of a workspace are taken for, and the models that have a place on them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from mckibben import registry
+from mckibben.app.desk import Desk
+from mckibben.comparison.channels import Channels
+from mckibben.comparison.inverses import Kind
+from mckibben.comparison.limits import limits
+from mckibben.comparison.needs import Need, full_name, inverse_kind, needs
+from mckibben.comparison.offered import objections
+
+FOLDS = 6
+"""Fits of a model: one, and those of its cross-validation."""
+
+LEAST = 2000
+"""Samples below which a fit gets no quicker."""
+
+
+@dataclass(frozen=True)
+class Offer:
+    """A model that has a place on the recordings.
+
+    Parameters
+    ----------
+    model, title : str
+        Short and full name.
+    can : str
+        What it represents.
+    caution : str
+        Why it is good only near its training; empty where nothing says so.
+    inverse : {"exact", "solved", "none"}
+        How it is undone.
+    needs_time : bool
+    seconds : float
+        About how long it takes to fit and cross-validate it to these recordings.
+    """
+
+    model: str
+    title: str
+    can: str
+    caution: str
+    inverse: Kind
+    needs_time: bool
+    seconds: float
+
+
+@dataclass(frozen=True)
+class Offered:
+    """The models of a workspace.
+
+    Parameters
+    ----------
+    recognised : str
+        What the recordings are taken for, in a sentence.
+    groups : list of (Need, list of Offer)
+        What has a place, by what it is for.
+    start : list of str
+        The models to begin with.
+    against : dict of str to str
+        The others, by full name, and why not.
+    """
+
+    recognised: str
+    groups: list[tuple[Need, list[Offer]]]
+    start: list[str]
+    against: dict[str, str]
+
+
+def offered(desk: Desk) -> Offered:
+    """Return the models that have a place on the channels chosen, by need."""
+    recordings = desk.workspace.readable()
+    names = registry.names("estimators")
+    channels = Channels(desk.inputs, desk.outputs)
+    known = set(desk.inputs + desk.outputs) <= set(desk.workspace.channels())
+    against = objections(names, recordings, channels) if recordings and known else {}
+    train = [run for run in desk.workspace.with_role("train") if run in recordings]
+    samples = max(sum(len(run) for run in train), LEAST)
+    groups = [
+        (need, [_offer(model, samples) for model in need.models if model not in against])
+        for need in needs()
+    ]
+    groups = [(need, offers) for need, offers in groups if offers]
+    start = [offer.model for need, found in groups for offer in found if offer.model in need.start]
+    return Offered(
+        _recognised(desk, len(names) - len(against)) if recordings and known else "",
+        groups,
+        start,
+        {full_name(model): reason for model, reason in against.items()},
+    )
+
+
+def _offer(model: str, samples: int) -> Offer:
+    estimator, said = registry.load("estimators", model), limits().get(model, {})
+    return Offer(
+        model,
+        full_name(model),
+        said.get("can", ""),
+        said.get("caution", ""),
+        inverse_kind(model),
+        estimator.needs_time,
+        estimator.effort * samples / 10_000 * FOLDS,
+    )
+
+
+def _recognised(desk: Desk, n_models: int) -> str:
+    used = desk.workspace.readable()
+    said = [_counted("input", desk.inputs), _counted("output", desk.outputs)]
+    told = Channels(desk.inputs, desk.outputs).scheduled(used)
+    others = set(desk.workspace.channels()).difference(desk.inputs, desk.outputs)
+    if told:
+        said.append(f"told {', '.join(told)}")
+    elif others:
+        said.append(f"not used: {', '.join(sorted(others))}")
+    timeless = sum(run.sample_time is None for run in used)
+    if timeless:
+        said.append(f"{timeless} of {len(used)} without time")
+    models = f"{n_models} models fit" if n_models != 1 else "1 model fits"
+    return f"{'; '.join(said)}: {models}."
+
+
+def _counted(word: str, names: tuple[str, ...]) -> str:
+    many = "" if len(names) == 1 else "s"
+    return f"{len(names)} {word}{many} ({', '.join(names)})"

@@ -1,0 +1,123 @@
+"""Models by what they are for: what each can, needs and costs, and why the others have no place."""
+
+from __future__ import annotations
+
+import asyncio
+from typing import Any
+
+from nicegui import ui
+
+from mckibben.app.desk import LONGEST, Desk, guarded, labelled, named
+from mckibben.app.offering import Offer, Offered, offered
+from mckibben.app.pages.settings import ask
+
+INVERSES = {"exact": "exact inverse", "solved": "inverse by solving", "none": "no inverse"}
+
+
+class Choice:
+    """The models that are to be fitted, and their settings.
+
+    Parameters
+    ----------
+    desk : Desk
+    """
+
+    def __init__(self, desk: Desk) -> None:
+        self.desk = desk
+        self.settings: dict[str, dict[str, str]] = {}
+        self.ticked: list[str] = []
+        self.shown: Offered | None = None
+        self.boxes: dict[str, ui.checkbox] = {}
+        self.heads: list[tuple[Any, str, list[Offer]]] = []
+        self.said = named(ui.label("").classes("text-sm w-full"), "recognised")
+        self.place = ui.element("div").classes("w-full grid gap-x-4 lg:grid-cols-2 items-start")
+        for topic in ("recordings", "channels"):
+            desk.when(topic, guarded(self._offer))
+        ui.timer(0.02, guarded(self._offer), once=True)
+
+    async def _offer(self) -> None:
+        found = await asyncio.to_thread(offered, self.desk)
+        if found == self.shown:
+            return
+        names = [offer.model for _, offers in found.groups for offer in offers]
+        kept = [model for model in self.ticked if model in names]
+        self.shown, self.ticked = found, kept or list(found.start)
+        self.said.set_text(found.recognised)
+        self.place.clear()
+        self.boxes, self.heads = {}, []
+        with self.place:
+            for need, offers in found.groups:
+                self._group(need.title, need.about, offers)
+            self._others(found.against)
+        self._count()
+
+    def only(self, models: list[str]) -> None:
+        """Tick some models and no others."""
+        for model, box in self.boxes.items():
+            box.set_value(model in models)
+
+    def start(self) -> None:
+        """Tick those to begin with."""
+        self.only([] if self.shown is None else self.shown.start)
+
+    def _group(self, title: str, about: str, offers: list[Offer]) -> None:
+        ticked = any(offer.model in self.ticked for offer in offers)
+        head = ui.expansion(title, value=ticked).classes("w-full min-w-0 need")
+        self.heads.append((named(head, f"need-{title.split(':')[0].lower()}"), title, offers))
+        with head:
+            ui.label(about).classes("text-xs opacity-70")
+            for offer in offers:
+                self._model(offer)
+
+    def _model(self, offer: Offer) -> None:
+        with ui.row().classes("w-full items-center gap-x-2 gap-y-0 no-wrap"):
+            box = ui.checkbox(
+                value=offer.model in self.ticked,
+                on_change=lambda event: self._tick(offer.model, event.value),
+            )
+            labelled(named(box.props("dense"), f"model-{offer.model}"), "aria-label", offer.title)
+            self.boxes[offer.model] = box
+            with ui.column().classes("gap-0 flex-1 min-w-0"):
+                ui.label(f"{offer.title} · {offer.model}").classes("text-sm break-words")
+                ui.label(f"{offer.can} {_about(offer)}".strip()).classes(
+                    "text-xs opacity-70 break-words"
+                )
+            button = ui.button(icon="tune", on_click=lambda: ask(offer.model, self.settings))
+            button.props("flat dense").tooltip("Settings")
+            labelled(
+                named(button, f"settings-{offer.model}"), "aria-label", f"Settings of {offer.model}"
+            )
+
+    def _others(self, against: dict[str, str]) -> None:
+        if not against:
+            return
+        with ui.expansion(f"{len(against)} models have no place on these data").classes(
+            "w-full min-w-0"
+        ):
+            for title, reason in against.items():
+                ui.label(f"{title}: {reason}"[:LONGEST]).classes("text-xs opacity-70 break-words")
+
+    def _tick(self, model: str, on: bool) -> None:
+        self.ticked = [name for name in self.ticked if name != model] + [model] * on
+        self._count()
+
+    def _count(self) -> None:
+        for head, title, offers in self.heads:
+            n = sum(offer.model in self.ticked for offer in offers)
+            head.props["label"] = f"{title} ({n} of {len(offers)} chosen)"
+            head.update()
+
+
+def _about(offer: Offer) -> str:
+    said = [INVERSES[offer.inverse], f"about {_time(offer.seconds)}"]
+    if offer.needs_time:
+        said.append("needs time")
+    if offer.caution:
+        said.append(f"good only near its training: {offer.caution}")
+    return f"{'; '.join(said)[0].upper()}{'; '.join(said)[1:]}."
+
+
+def _time(seconds: float) -> str:
+    if seconds < 90:
+        return f"{max(1, round(seconds))} s"
+    return f"{round(seconds / 60)} min"

@@ -1,0 +1,165 @@
+"""The leaderboard, and one model or two of it seen closer."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Sequence
+from typing import Any
+
+from nicegui import ui
+
+from mckibben.app import plots
+from mckibben.app.desk import Desk, guarded, named, on_event
+from mckibben.app.pages import next_steps
+from mckibben.blocks.core.block import Block
+from mckibben.blocks.core.writing import quantities
+from mckibben.comparison.columns import Column, columns_of
+from mckibben.comparison.free_run import run_free
+from mckibben.comparison.needs import full_name
+from mckibben.errors import DataError, MckibbenError, ModelError
+from mckibben.numerals import numeral, typeset
+from mckibben.report import subjects, wording
+
+PARAMETERS = 12
+"""Of a page of the table of parameters."""
+
+
+def build(desk: Desk) -> None:
+    """Build it."""
+    ui.label("Leaderboard: free-running, in the order of the choice").classes("text-lg")
+
+    @ui.refreshable
+    def shown() -> None:
+        results = desk.results()
+        if not results:
+            ui.label("Fit models to see them compared here.").classes("opacity-70")
+            return
+        table = _table(results, desk.outputs)
+        ui.label(
+            "The first is to be chosen: least error in cross-validation on the training side; nothing "
+            "is chosen by the test. "
+            "Gap kept: 100 % where the model keeps rising and falling branches as far apart as the data "
+            "do, 0 where it forgot. Select one or two models to look closer."
+        ).classes("text-xs opacity-70")
+        for said in _judged(results):
+            ui.label(said).classes("text-sm")
+        place = named(ui.column().classes("w-full"), "closer")
+
+        async def closer() -> None:
+            place.clear()
+            names = [row["name"] for row in table.selected][:2]
+            if names:
+                await _closer(desk, names, place)
+
+        table.on_select(on_event(lambda _: closer()))
+        table.selected = table.rows[:1]
+        ui.timer(0.05, guarded(closer), once=True)
+
+    desk.when("results", shown.refresh)
+    desk.when("theme", shown.refresh)
+    shown()
+
+
+def _table(results: Sequence[dict[str, Any]], outputs: Sequence[str]) -> ui.table:
+    columns = columns_of(results, results[0]["unit"], outputs, results[0]["chosen_by"])
+    listed = (("title", "model"), *((c.key, c.label) for c in columns))
+    table = ui.table(
+        rows=[_row(result, columns) for result in results],
+        columns=[
+            {"name": key, "label": label, "field": key, "sortable": True}
+            | {"align": "left" if key == "title" else "right"}
+            for key, label in listed
+        ],
+        row_key="name",
+        selection="multiple",
+    )
+    return named(table.classes("w-full").props("dense flat"), "leaderboard")
+
+
+def _row(result: dict[str, Any], columns: Sequence[Column]) -> dict[str, str]:
+    shown = {column.key: typeset(column.text(result)) for column in columns}
+    full = full_name(result["model"])
+    title = result["name"] if full == result["name"] else f"{result['name']}: {full}"
+    return {"name": result["name"], "title": title} | shown
+
+
+def _judged(results: Sequence[dict[str, Any]]) -> list[str]:
+    """Return what every model has to beat, and what speaks against models or their tests."""
+    said = []
+    for result in results:
+        constant = result.get("constant") or {}
+        tested = wording.number((constant.get("test") or {}).get("rmse"))
+        validated = wording.number(constant.get("validation_rmse"))
+        if constant:
+            said.append(
+                f"constant, the mean of the training output: CV RMSE {validated}, test RMSE {tested}. "
+                "Every model has to beat it."
+            )
+        against = [result.get("not_recommended"), *result.get("shared", ())]
+        said += [f"{result['name']}: {one}" for one in against if one]
+    return list(dict.fromkeys(said))
+
+
+async def _closer(desk: Desk, names: list[str], place: Any) -> None:
+    """Show measured against modelled, residuals and parameters, of one model or two side by side."""
+    recordings = desk.workspace.with_role("test") or desk.workspace.with_role("train")
+    if not recordings:
+        raise DataError("there is no recording to run it on", remedy="add one under Data")
+    recording = recordings[0]
+    blocks = {name: desk.workspace.model(name) for name in names}
+    known = desk.workspace.with_role("train")
+
+    def modelled() -> dict[str, Any]:
+        return {
+            name: run_free(block, recording, desk.outputs, known) for name, block in blocks.items()
+        }
+
+    try:
+        outputs = await asyncio.to_thread(modelled)
+    except MckibbenError as error:
+        raise ModelError(f"{', '.join(names)} on {recording.name}: {error}") from None
+    with place:
+        next_steps.buttons(desk, names[0])
+        ui.label(f"On {recording.name}").classes("text-base")
+        drawings = []
+        for output, pair in enumerate(desk.pairs):
+            own = {name: found[:, output] for name, found in outputs.items()}
+            drawings += [
+                subjects.fit_over_time(recording, pair[1], own),
+                subjects.fit_loops(recording, *pair, own),
+                subjects.residuals(recording, *pair, own),
+            ]
+        for number, drawing in enumerate(drawings):
+            with ui.row().classes("w-full"):
+                for figure in plots.figures(drawing, dark=desk.dark, height=360):
+                    figure["layout"]["showlegend"] = True
+                    plot = ui.plotly(figure).classes("flex-1 min-w-72")
+                    named(plot, f"closer-{number}")
+        with ui.row().classes("w-full items-start"):
+            for name, block in blocks.items():
+                with ui.expansion(f"Parameters of {name}").classes("flex-1 min-w-72"):
+                    named(_parameters(block), f"parameters-{name}")
+
+
+def _parameters(block: Block) -> ui.table:
+    """Show every number of a model, to four digits, with its unit and what it is."""
+    rows = [
+        {
+            "name": one.name,
+            "value": typeset(numeral(value, 4)),
+            "unit": one.unit or "–",
+            "meaning": one.meaning,
+        }
+        for one, value in zip(quantities(block), block.pack().tolist(), strict=True)
+    ]
+    columns = [
+        {"name": key, "label": label, "field": key, "align": "right" if key == "value" else "left"}
+        for key, label in (
+            ("name", "parameter"),
+            ("value", "value"),
+            ("unit", "unit"),
+            ("meaning", "what it is"),
+        )
+    ]
+    table = ui.table(rows=rows, columns=columns, row_key="name", pagination=PARAMETERS)
+    return table.classes("w-full").props("dense flat wrap-cells")

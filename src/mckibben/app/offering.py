@@ -117,8 +117,8 @@ def _recognised(desk: Desk, n_models: int) -> str:
     timeless = sum(run.sample_time is None for run in used)
     if timeless:
         said.append(f"{timeless} of {len(used)} without time")
-    models = f"{n_models} models fit" if n_models != 1 else "1 model fits"
-    return f"{'; '.join(said)}: {models}."
+    models = "model has" if n_models == 1 else "models have"
+    return f"{'; '.join(said)}: {n_models} {models} a place on these data."
 
 
 def _counted(word: str, names: tuple[str, ...]) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import re
 from typing import Any
 
 from nicegui import ui
@@ -10,6 +11,7 @@ from nicegui import ui
 from mckibben.app.desk import LONGEST, Desk, guarded, labelled, named
 from mckibben.app.offering import Offer, Offered, offered
 from mckibben.app.pages.settings import ask
+from mckibben.comparison.needs import Need
 
 INVERSES = {"exact": "exact inverse", "solved": "inverse by solving", "none": "no inverse"}
 
@@ -30,6 +32,7 @@ class Choice:
         self.boxes: dict[str, ui.checkbox] = {}
         self.heads: list[tuple[Any, str, list[Offer]]] = []
         self.said = named(ui.label("").classes("text-sm w-full"), "recognised")
+        self.actions = ui.row().classes("w-full items-center gap-3")
         self.place = ui.element("div").classes("w-full grid gap-x-4 lg:grid-cols-2 items-start")
         for topic in ("recordings", "channels"):
             desk.when(topic, guarded(self._offer))
@@ -47,7 +50,7 @@ class Choice:
         self.boxes, self.heads = {}, []
         with self.place:
             for need, offers in found.groups:
-                self._group(need.title, need.about, offers)
+                self._group(need, offers)
             self._others(found.against)
         self._count()
 
@@ -60,14 +63,24 @@ class Choice:
         """Tick those to begin with."""
         self.only([] if self.shown is None else self.shown.start)
 
-    def _group(self, title: str, about: str, offers: list[Offer]) -> None:
-        ticked = any(offer.model in self.ticked for offer in offers)
-        head = ui.expansion(title, value=ticked).classes("w-full min-w-0 need")
-        self.heads.append((named(head, f"need-{title.split(':')[0].lower()}"), title, offers))
+    def _group(self, need: Need, offers: list[Offer]) -> None:
+        """Show the usual models, and those that are ticked; the others are one click away."""
+        first = [one for one in offers if one.model in (*need.start, *self.ticked)]
+        ticked = any(one.model in self.ticked for one in offers)
+        head = ui.expansion(need.title, value=ticked).classes("w-full min-w-0").props("dense")
+        word = re.split(r"\W", need.title)[0].lower()
+        self.heads.append((named(head, f"need-{word}"), need.title, offers))
         with head:
-            ui.label(about).classes("text-xs opacity-70")
-            for offer in offers:
+            ui.label(need.about).classes("text-xs opacity-70")
+            for offer in first:
                 self._model(offer)
+            rest = [one for one in offers if one not in first]
+            if not rest:
+                return
+            title = f"{len(rest)} more" if first else f"All {len(rest)}"
+            with named(ui.expansion(title).classes("w-full").props("dense"), f"more-{word}"):
+                for offer in rest:
+                    self._model(offer)
 
     def _model(self, offer: Offer) -> None:
         with ui.row().classes("w-full items-center gap-x-2 gap-y-0 no-wrap"):

@@ -20,7 +20,7 @@ def build(desk: Desk) -> None:
     """Build the page."""
     ui.label("Models, by what they are for").classes("text-lg")
     choice = Choice(desk)
-    with ui.row().classes("w-full items-center gap-3"):
+    with choice.actions:
         named(ui.button("Fit", on_click=lambda: _fit(desk, choice)), "fit")
         ui.button("The usual ones", on_click=choice.start).props("flat")
         named(ui.button("None", on_click=lambda: choice.only([])).props("flat"), "untick")

@@ -33,7 +33,7 @@ ABSENCE = 30.0
 OPENING = 0.5
 """After the server has started, when to open a browser [s]."""
 
-IDLE = 1.0
+IDLE = 0.3
 """After the first page is there, when to load what the others need [s]."""
 
 

@@ -248,6 +248,8 @@ def load_the_rest() -> None:
     modules that are half there.
     """
     with _LOADING:
+        for module in FIRST:
+            import_module(module)
         for name in PAGES:
             _module(name)
         for module in (*PRELOADED, *LATER):
@@ -255,6 +257,9 @@ def load_the_rest() -> None:
         for name in registry.names("estimators"):
             registry.load("estimators", name)
 
+
+FIRST = ("mckibben.files", "pandas")
+"""What reads files, which is what a new user does first."""
 
 LATER = ("mckibben.app.work", "mckibben.characterization", "mckibben.excitation")
 """What pages import when they first need it, in threads of their own."""

@@ -1,0 +1,43 @@
+"""Models by need: every model has a place, a full name, and is undone as it is said to be."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+import mckibben
+from mckibben import registry
+from mckibben.comparison.inverses import inverse_of
+from mckibben.comparison.needs import full_name, inverse_kind, needs
+from mckibben.errors import MckibbenError
+
+FITTED = Path(__file__).parents[2] / "docs" / "models" / "fitted"
+
+
+def test_every_model_is_for_one_thing() -> None:
+    named = [model for need in needs() for model in need.models]
+    assert sorted(named) == sorted(registry.names("estimators"))
+    assert "Others" not in [need.title for need in needs()]
+
+
+def test_full_names_are_unlike_and_longer() -> None:
+    names = {full_name(model) for model in registry.names("estimators")}
+    assert len(names) == len(registry.names("estimators"))
+    assert all(full_name(model) != model for model in registry.names("estimators"))
+
+
+def test_what_one_begins_with_is_among_its_kind() -> None:
+    for need in needs():
+        assert set(need.start) <= set(need.models)
+        assert need.start
+
+
+@pytest.mark.parametrize("model", registry.names("estimators"))
+def test_models_are_undone_as_said(model: str) -> None:
+    block = mckibben.load(FITTED / f"{model}.json")
+    try:
+        found = inverse_of(block.inverse())
+    except MckibbenError:
+        found = "none"
+    assert inverse_kind(model) == found

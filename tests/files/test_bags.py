@@ -348,5 +348,5 @@ def test_missing_library_says_what_to_install(
     path = tmp_path / "run.bag"
     path.write_text("#ROSBAG V2.0\n")
     monkeypatch.setitem(sys.modules, "rosbags", None)
-    with pytest.raises(DataError, match=r"not installed. Remedy: pip install mckibben\[ros\]"):
+    with pytest.raises(DataError, match=r"not installed. Remedy: pip install 'mckibben\[ros\]'"):
         mckibben.read(path)

@@ -196,5 +196,5 @@ def test_missing_library_says_what_to_install(
 ) -> None:
     monkeypatch.setitem(sys.modules, module, None)
     (tmp_path / name).write_bytes(b"\x89HDF\r\n\x1a\n" if module == "h5py" else b"TDSm")
-    with pytest.raises(DataError, match=f"not installed. Remedy: pip install {remedy}"):
+    with pytest.raises(DataError, match=f"not installed. Remedy: pip install '{remedy}'"):
         mckibben.read(tmp_path / name)

@@ -195,5 +195,5 @@ def test_missing_library_says_what_to_install(
 ) -> None:
     path = book(tmp_path / "a.xlsx", Data=SOUND)
     monkeypatch.setitem(sys.modules, "openpyxl", None)
-    with pytest.raises(DataError, match=r"not installed. Remedy: pip install mckibben\[xlsx\]"):
+    with pytest.raises(DataError, match=r"not installed. Remedy: pip install 'mckibben\[xlsx\]'"):
         mckibben.read(path)

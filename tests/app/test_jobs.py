@@ -28,11 +28,15 @@ KILLS = int(os.environ.get("MCKIBBEN_KILLS", "2"))
 def filled(folder: Path) -> Workspace:
     """Return a workspace with a short recording to train on."""
     workspace = Workspace(folder)
-    time_ = np.arange(600) * 0.1
-    pressure = decaying_triangle(time_, period=10.0, high=5.0, low=1.0)
-    found = load_rig("mas20-hanging").run(Recording({"pressure": pressure}, 0.1))
-    workspace.add(found, origin="a test", call="", name="run")
+    workspace.add(swung(10.0), origin="a test", call="", name="run")
     return workspace
+
+
+def swung(period: float) -> Recording:
+    """Return a minute of a virtual muscle under triangles that decay."""
+    time_ = np.arange(600) * 0.1
+    pressure = decaying_triangle(time_, period=period, high=5.0, low=1.0)
+    return load_rig("mas20-hanging").run(Recording({"pressure": pressure}, 0.1))
 
 
 def fit(model: str, name: str, **settings: Any) -> dict[str, Any]:

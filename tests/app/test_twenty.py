@@ -14,7 +14,7 @@ import pytest
 
 from mckibben.app.work import fit
 from tests.app.browsing import BROWSER, OPTIONS, SLOW, seen, visited, workbench
-from tests.app.test_jobs import filled
+from tests.app.test_jobs import filled, swung
 from tests.app.test_jobs import fit as asked
 from tests.tools import needs
 
@@ -211,9 +211,7 @@ def address(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
     """A workbench with two recordings and two models."""
     folder = tmp_path_factory.mktemp("twenty") / "ws"
     workspace = filled(folder)
-    workspace.add(
-        workspace.recording("run"), origin="a test", call="spare", name="spare", role="unused"
-    )
+    workspace.add(swung(7.0), origin="a test", call="spare", name="spare", role="unused")
     for model in ("pi", "gpi"):
         fit(workspace, asked(model, model), lambda share, cost: None)
     with workbench(folder) as found:

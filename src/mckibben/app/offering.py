@@ -71,13 +71,14 @@ class Offered:
 
 def offered(desk: Desk) -> Offered:
     """Return the models that have a place on the channels chosen, by need."""
-    recordings = desk.workspace.readable()
+    used = desk.workspace.used()
+    recordings = list(used.values())
     names = registry.names("estimators")
     channels = Channels(desk.inputs, desk.outputs)
     known = set(desk.inputs + desk.outputs) <= set(desk.workspace.channels())
     against = objections(names, recordings, channels) if recordings and known else {}
-    train = [run for run in desk.workspace.with_role("train") if run in recordings]
-    samples = max(sum(len(run) for run in train), LEAST)
+    train = {entry.name for entry in desk.workspace.entries() if entry.role == "train"}
+    samples = max(sum(len(run) for name, run in used.items() if name in train), LEAST)
     groups = [
         (need, [_offer(model, samples) for model in need.models if model not in against])
         for need in needs()

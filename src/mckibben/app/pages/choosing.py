@@ -31,8 +31,9 @@ class Choice:
         self.shown: Offered | None = None
         self.boxes: dict[str, ui.checkbox] = {}
         self.heads: list[tuple[Any, str, list[Offer]]] = []
-        self.said = named(ui.label("").classes("text-sm w-full"), "recognised")
+        self.said = named(ui.label("Looking at the data …"), "recognised").classes("text-sm w-full")
         self.actions = ui.row().classes("w-full items-center gap-3")
+        self.actions.set_visibility(False)
         self.place = ui.element("div").classes("w-full grid gap-x-4 lg:grid-cols-2 items-start")
         for topic in ("recordings", "channels"):
             desk.when(topic, guarded(self._offer))
@@ -46,6 +47,7 @@ class Choice:
         kept = [model for model in self.ticked if model in names]
         self.shown, self.ticked = found, kept or list(found.start)
         self.said.set_text(found.recognised)
+        self.actions.set_visibility(True)
         self.place.clear()
         self.boxes, self.heads = {}, []
         with self.place:

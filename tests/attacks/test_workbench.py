@@ -30,7 +30,7 @@ from mckibben.app.claim import keep_to_the_user
 from mckibben.app.folder import FOLDERS
 from mckibben.app.guard import Guard, checked_token
 from mckibben.app.jobs import Job, Jobs
-from mckibben.app.pages.models import _judged
+from mckibben.app.pages.leaderboard import _judged
 from mckibben.app.workspace import Workspace
 from mckibben.files import write
 from mckibben.registry import load

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Awaitable, Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -48,6 +47,7 @@ class Desk:
     """Whether models are tested on data that they were fitted to, which every result then says."""
     dark: bool = False
     preview: str | None = None
+    _chosen: bool = False
     news: News = field(default_factory=News, repr=False)
     """Who shows what on this page, and hears of changes."""
 
@@ -110,20 +110,19 @@ class Desk:
 
     def settle_channels(self) -> None:
         """Choose inputs and outputs that the recordings have: of several muscles, all of them."""
-        known = self.workspace.channels()
-        if known and not set(self.inputs) <= set(known):
-            self.inputs = _all_of(known, "pressure", "voltage") or (known[0],)
-        if known and (not set(self.outputs) <= set(known) or set(self.outputs) & set(self.inputs)):
-            rest = [name for name in known if name not in self.inputs]
-            wished = _all_of(rest, "displacement", "length", "contraction")
-            self.outputs = wished or ((rest or known)[0],)
+        from mckibben.comparison.recognising import recognised
 
+        known = set(self.workspace.channels())
+        used = self.inputs + self.outputs
+        if known and (not self._chosen or not set(used) <= known or len(set(used)) < len(used)):
+            self._chosen = False
+            found = recognised(self.workspace.readable(), self.workspace.channels())
+            self.inputs, self.outputs = found
 
-def _all_of(known: Sequence[str], *quantities: str) -> tuple[str, ...]:
-    """Return the channels of a quantity that are numbered, else the first of any of them."""
-    several = [name for name in known if re.fullmatch(rf"{quantities[0]}_\d+", name)]
-    one = [name for name in known if name.startswith(quantities)]
-    return tuple(several or one[:1])
+    def choose(self, side: str, channels: Sequence[str]) -> None:
+        """Take what the user has chosen for inputs or outputs; it stays as long as it is there."""
+        setattr(self, side, tuple(channels))
+        self._chosen = True
 
 
 def named(element: Any, name: str) -> Any:

@@ -210,7 +210,7 @@ async def _set_aside(desk: Desk, names: list[str]) -> None:
 
 def _chosen(desk: Desk, side: str, channels: list[str]) -> None:
     if channels:
-        setattr(desk, side, tuple(channels))
+        desk.choose(side, channels)
         desk.changed("channels", "results")
 
 

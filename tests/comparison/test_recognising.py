@@ -1,0 +1,57 @@
+"""What drives and what is moved: of names as people give them, and of nothing but units."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from mckibben import Recording
+from mckibben.comparison.recognising import recognised
+
+T = np.linspace(0.0, 9.0, 50)
+
+
+def run(*channels: str, held: tuple[str, ...] = (), **units: str) -> Recording:
+    samples = {
+        name: np.full(50, 3.0) if name in held else np.sin(T + k) for k, name in enumerate(channels)
+    }
+    return Recording(samples, 0.1, units=units)
+
+
+@pytest.mark.parametrize(
+    ("channels", "inputs", "outputs"),
+    [
+        ("pressure displacement", "pressure", "displacement"),
+        ("level voltage pressure displacement", "pressure", "displacement"),
+        ("u1 u2 u3 y1 y2", "u1 u2 u3", "y1 y2"),
+        (
+            "pressure_1 pressure_2 displacement_1 displacement_2 force",
+            "pressure_1 pressure_2",
+            "displacement_1 displacement_2",
+        ),
+        ("branch input output", "input", "output"),
+        ("length pressure force", "pressure", "length"),
+        ("pressure force", "pressure", "force"),
+        ("reference_displacement pressure displacement", "pressure", "displacement"),
+        ("cuff hand", "cuff", "hand"),
+    ],
+)
+def test_by_name(channels: str, inputs: str, outputs: str) -> None:
+    names = channels.split()
+    assert recognised([run(*names)], names) == (tuple(inputs.split()), tuple(outputs.split()))
+
+
+def test_by_unit() -> None:
+    found = run("left", "right", "tip", left="bar", right="bar", tip="mm")
+    assert recognised([found], ["tip", "left", "right"]) == (("left", "right"), ("tip",))
+
+
+def test_at_a_length_held_the_force_is_modelled() -> None:
+    names = ["pressure", "displacement", "force"]
+    held = [run(*names, held=("displacement",)) for _ in range(2)]
+    assert recognised(held, names) == (("displacement",), ("force",))
+    assert recognised([*held, run(*names)], names) == (("pressure",), ("displacement",))
+
+
+def test_nothing_is_recognised_of_nothing() -> None:
+    assert recognised([], []) == ((), ())

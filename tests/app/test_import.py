@@ -10,7 +10,7 @@ import pytest
 from mckibben import DataError, Recording, read, signals
 from mckibben.app import edits, scripts
 from mckibben.app.kept import Reading, Step
-from mckibben.app.reading import columns, options, read_upload
+from mckibben.app.reading import by_letters, columns, options, read_upload
 from mckibben.app.recordings import EXAMPLE
 from mckibben.app.workspace import Workspace
 from mckibben.comparison.channels import Channels
@@ -190,3 +190,18 @@ def test_models_that_need_time_say_so_before_fitting() -> None:
     )
     assert "pi" not in found
     assert all("needs time" in found[name] for name in ("oe", "narx"))
+
+
+def test_letters_are_taken_for_what_their_units_say(tmp_path: Path) -> None:
+    path = tmp_path / "arm.csv"
+    rows = "\n".join(f"{k * 0.1},{k},{k % 3},{k * 2},{k % 5}" for k in range(20))
+    path.write_text(f"time_s,u1_V,u2_V,y1_cm,q2\n{rows}")
+    reading = by_letters(path, read_upload(path))
+    (recording,) = read_upload(path, reading)
+    assert list(recording.channels) == ["voltage_1", "voltage_2", "displacement_1", "q2"]
+    assert recording["displacement_1"][1] == 20.0
+    plain = tmp_path / "plain.csv"
+    plain.write_text(
+        "time_s,pressure_bar,displacement_mm\n" + "\n".join(f"{k},{k},{k}" for k in range(9))
+    )
+    assert by_letters(plain, read_upload(plain)) == Reading()

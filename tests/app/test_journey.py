@@ -245,7 +245,9 @@ def swung(muscles: int, phase: float, *, load: bool = False) -> bytes:
     """Return a file of muscles that lag behind their pressures, on one arm or under a load."""
     t = np.arange(400) * 0.1
     columns = {"time_s": t}
-    pressures = [2.5 - 1.5 * np.cos(t * (0.5 + 0.13 * k) + phase * k) for k in range(muscles)]
+    pressures = [
+        2.5 - 1.5 * np.cos(t * (0.5 + 0.13 * k + 0.1 * phase) + phase * k) for k in range(muscles)
+    ]
     for k, pressure in enumerate(pressures):
         suffix = f"_{k + 1}" if muscles > 1 else ""
         others = sum(pressures) - pressure

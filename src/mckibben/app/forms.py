@@ -43,11 +43,10 @@ def inverse_of(block: Block) -> Block:
     ModelError
         If it has none, or is one already.
     """
-    from mckibben.blocks.core.commanding import COMMANDS, undoes
+    from mckibben.blocks.core.commanding import drives, undoes
     from mckibben.blocks.force.feedforward import ForceFeedforward
 
-    gives, takes = block.outputs[0].name, block.inputs[0].name
-    if gives.startswith(COMMANDS) or (undoes(block) and not takes.startswith(COMMANDS)):
+    if drives(block.outputs[0]) or (undoes(block) and not drives(block.inputs[0])):
         raise ModelError("it is a compensator already. Remedy: choose the model that it undoes.")
     return ForceFeedforward.of(block) or block.inverse()
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -29,6 +30,9 @@ MOST_CELLS = 40_000_000
 
 FIRST = 4
 """Cells of a column that are shown."""
+
+QUANTITIES = {"bar": "pressure", "V": "voltage", "mm": "displacement", "N": "force"}
+"""What a channel without a telling name is, by its unit."""
 
 Result = TypeVar("Result")
 
@@ -72,6 +76,27 @@ def read_upload(path: Path, reading: Reading = AS_FOUND) -> list[Recording]:
         If it cannot be read, or holds or takes more than is kept in memory here.
     """
     return _aside(_read, path, reading)
+
+
+def by_letters(path: Path, found: list[Recording]) -> Reading:
+    """Return how a file is read whose channels are letters, such as u1 and y1: what their units say.
+
+    Loops, tuning and reports know displacements and what drives them by name.
+    """
+    first = found[0]
+    renamed = {}
+    for name in first.channels:
+        letter = re.fullmatch(r"[a-z](?:_?(\d+))?", name)
+        quantity = QUANTITIES.get(first.units[name])
+        if letter and quantity:
+            renamed[name] = quantity + (f"_{letter[1]}" if letter[1] else "")
+    names = [renamed.get(name, name) for name in first.channels]
+    if not renamed or len(set(names)) < len(names):
+        return AS_FOUND
+    headers = {column.channel: column.header for column in columns(path, AS_FOUND)}
+    if not renamed.keys() <= headers.keys():
+        return AS_FOUND
+    return Reading(columns={new: headers[name] for name, new in renamed.items()})
 
 
 def columns(path: Path, reading: Reading) -> list[Seen]:

@@ -51,6 +51,11 @@ class Steps(ui.tabs):
 
     LOOPBACK = False
 
+    def __init__(self) -> None:
+        super().__init__()
+        # what stands there by then is a list of the value, which is no tab's name
+        self.on("update:model-value", js_handler=SELECTED)
+
 
 def build(workspace: Workspace, jobs: Jobs) -> Desk:
     """Build one page for one browser."""
@@ -260,6 +265,9 @@ def load_the_rest() -> None:
 
 FIRST = ("mckibben.files", "pandas")
 """What reads files, which is what a new user does first."""
+
+SELECTED = '(value) => { element.props["model-value"] = value }'
+"""Where handlers of events are made, ``element`` is what they are of."""
 
 LATER = ("mckibben.app.work", "mckibben.characterization", "mckibben.excitation")
 """What pages import when they first need it, in threads of their own."""

@@ -25,8 +25,7 @@ from mckibben.arrays import Array
 from mckibben.blocks.bands.band import Band
 from mckibben.blocks.bands.banded import Banded, inside
 from mckibben.blocks.core.block import Block
-from mckibben.blocks.core.commanding import COMMANDS as DRIVES
-from mckibben.blocks.core.commanding import commands
+from mckibben.blocks.core.commanding import commands, drives
 from mckibben.blocks.core.running import Stream
 from mckibben.control.identified import known_ranges
 from mckibben.errors import DataError, ModelError
@@ -276,6 +275,10 @@ class Twin:
         else:
             self._stream = self.forward.stream(self.sample_time)
 
+    @property
+    def _driving(self) -> set[str]:
+        return {channel.name for channel in self.forward.inputs if drives(channel)}
+
     def _at_rest(self) -> Array:
         self._rest = np.array([self._resting(name) for name in self.inputs])
         return self._rest
@@ -283,7 +286,7 @@ class Twin:
     def _resting(self, name: str) -> float:
         if name in self.held:
             return self.held[name]
-        if not name.startswith(DRIVES):
+        if name not in self._driving:
             raise DataError(
                 "the plant's model needs it, and nothing says what it is",
                 channel=name,
@@ -294,7 +297,7 @@ class Twin:
     def _limited(self, row: Array) -> Array:
         """Clip commands to what the hardware lets through."""
         for place, name in enumerate(self.inputs):
-            if name.startswith(DRIVES) and name in self._limits and name not in self.held:
+            if name in self._driving and name in self._limits and name not in self.held:
                 row[place] = min(max(row[place], self._limits[name].low), self._limits[name].high)
         return row
 

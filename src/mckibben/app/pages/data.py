@@ -33,25 +33,28 @@ def build(desk: Desk) -> None:
     with ui.column().classes("w-full") as page:
         with ui.row().classes("w-full gap-4 items-start"):
             with ui.column().classes("min-w-64 flex-1"):
-                _sources(desk, dialogs)
+                intake = _sources(desk, dialogs)
             with ui.column().classes("min-w-72 flex-[2]"):
                 with ui.row().classes("items-center"):
                     ui.label("Recordings").classes("text-lg")
                     editing.undoing(desk, page)
                 _list(desk, dialogs)
         preview(desk)
-    _watch(desk)
+    _watch(desk, intake)
 
 
-def _watch(desk: Desk) -> None:
-    """Draw anew what other windows, or workbenches over the same folder, have changed."""
+def _watch(desk: Desk, intake: Intake) -> None:
+    """Draw anew what other windows, or workbenches over the same folder, have changed.
+
+    Not while files are coming in here: what is drawn twice takes the click that came between.
+    """
     seen = {"stamp": desk.workspace.stamp()}
 
     def noted() -> None:
         seen["stamp"] = desk.workspace.stamp()
 
     async def look() -> None:
-        if desk.workspace.stamp() != seen["stamp"]:
+        if not intake.seen and desk.workspace.stamp() != seen["stamp"]:
             await asyncio.to_thread(desk.workspace.warm)
             desk.changed("recordings", "channels")
 
@@ -59,7 +62,7 @@ def _watch(desk: Desk) -> None:
     ui.timer(WATCH, look)
 
 
-def _sources(desk: Desk, dialogs: Any) -> None:
+def _sources(desk: Desk, dialogs: Any) -> Intake:
     ui.label("Add recordings").classes("text-lg")
     intake = Intake(desk, dialogs)
     named(
@@ -78,6 +81,7 @@ def _sources(desk: Desk, dialogs: Any) -> None:
         example = named(ui.button("Open the example"), "example")
         example.on_click(guarded(lambda: _example(desk)))
         named(ui.button("From a virtual rig", on_click=lambda: _rig(desk)).props("outline"), "rig")
+    return intake
 
 
 async def _example(desk: Desk) -> None:

@@ -14,7 +14,7 @@ from nicegui.events import UploadEventArguments
 from mckibben.app import scripts
 from mckibben.app.desk import LONGEST, Desk, guarded, kept, named, tell
 from mckibben.app.kept import Reading
-from mckibben.app.reading import AS_FOUND, Seen, columns, options, read_upload
+from mckibben.app.reading import AS_FOUND, Seen, by_letters, columns, options, read_upload
 from mckibben.errors import DataError, MckibbenError
 from mckibben.recording import STANDARD_UNITS, Recording
 
@@ -88,17 +88,18 @@ class Intake:
                 self.problems.append(_Problem(shown, error, path.name))
 
     async def _sum_up(self) -> None:
-        desk, self.seen = self.desk, 0
+        desk = self.desk
         read, self.read = self.read, {}
         problems, self.problems = self.problems, []
-        if self.said is not None:
-            self.said.set_text("")
+        self.said.set_text("")
         with self.place:
             if read:
                 await asyncio.to_thread(desk.workspace.warm)
                 desk.settle_channels()
                 desk.changed("recordings", "log")
+                self.seen = 0
                 tell_of(read)
+            self.seen = 0
             if len(problems) == 1 and not read and problems[0].held:
                 await ask(desk, self.place, problems[0].held, problems[0].shown, problems[0].error)
             elif len(problems) == 1 and not problems[0].held:
@@ -110,8 +111,10 @@ class Intake:
 def add(desk: Desk, held: str, shown: str, reading: Reading) -> list[Recording]:
     """Read an uploaded file and add its recordings."""
     path = desk.workspace.path("uploads", held)
-    call = scripts.read_call(str(path), options(reading))
     found = read_upload(path, reading)
+    if reading == AS_FOUND and (better := by_letters(path, found)) != AS_FOUND:
+        reading, found = better, read_upload(path, better)
+    call = scripts.read_call(str(path), options(reading))
     for part, recording in enumerate(found):
         recording = recording.with_meta(name=recording.name.replace(path.stem, Path(shown).stem, 1))
         desk.workspace.add(

@@ -69,8 +69,9 @@ def _running(desk: Desk) -> None:
         fits = [job for job in desk.jobs.jobs.values() if job.kind == "fit"]
         if not fits:
             ui.label("None yet.").classes("opacity-70")
+        said: set[str] = set()
         for job in reversed(fits[-12:]):
-            _job(desk, job)
+            _job(desk, job, said)
         _best_so_far(desk, fits)
 
     desk.when("jobs", shown.refresh)
@@ -78,12 +79,15 @@ def _running(desk: Desk) -> None:
     shown()
 
 
-def _job(desk: Desk, job: Job) -> None:
+def _job(desk: Desk, job: Job, said: set[str]) -> None:
+    """Show how a fit does; a reason that was said of another one above is not said again."""
     told = desk.jobs.progress(job.name)
     with named(ui.row().classes("items-center w-full gap-2 no-wrap"), f"job-{job.title}"):
         ui.label(job.title).classes("w-28")
         if job.state in ENDED:
-            ui.label(f"{job.state}: {job.message}").classes("flex-1 text-xs")
+            text = f"{job.state}: {job.message}"
+            ui.label(f"{job.state}, as above" if text in said else text).classes("flex-1 text-xs")
+            said.add(text)
             if job.state != "done":
                 ui.button(icon="replay", on_click=lambda: _again(desk, job)).props(
                     'flat dense aria-label="Again"'

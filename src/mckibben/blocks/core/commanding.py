@@ -4,9 +4,18 @@ from __future__ import annotations
 
 from mckibben.blocks.core.block import Block
 from mckibben.blocks.core.composition import Composition
+from mckibben.blocks.core.fields import Channel
 
 COMMANDS = ("pressure", "voltage")
 """How channels that drive a muscle are called."""
+
+UNITS = ("bar", "V")
+"""Units of channels that drive a muscle, whatever they are called."""
+
+
+def drives(channel: Channel) -> bool:
+    """Tell whether a channel is a command, by its name or unit."""
+    return channel.name.startswith(COMMANDS) or channel.unit in UNITS
 
 
 def undoes(block: Block) -> bool:
@@ -21,4 +30,4 @@ def commands(block: Block) -> bool:
 
     Not every inverse does: a forward model solved from a law of forces is one, and gives a displacement.
     """
-    return undoes(block) and block.outputs[0].name.startswith(COMMANDS)
+    return undoes(block) and drives(block.outputs[0])

@@ -22,7 +22,7 @@ from pydantic.dataclasses import dataclass
 
 from mckibben.arrays import Array
 from mckibben.blocks.core.block import Block, Run
-from mckibben.blocks.core.commanding import COMMANDS
+from mckibben.blocks.core.commanding import drives
 from mckibben.blocks.core.exportable import Cost
 from mckibben.blocks.core.fields import STRICT, Channel, Initial, Vector
 from mckibben.blocks.core.inverse import Inverse
@@ -101,7 +101,7 @@ class Predictive(Block):
     def __post_init__(self) -> None:
         memory_of(self.compensator)
         n = len(self.outputs)
-        if strange := [c.name for c in self.outputs if not c.name.startswith(COMMANDS)]:
+        if strange := [c.name for c in self.outputs if not drives(c)]:
             raise ModelError(
                 f"{self.kind!r} plans what drives muscles, and {self.compensator.title!r} gives "
                 f"{', '.join(strange)}. Remedy: give the compensator, from references to pressures."

@@ -30,14 +30,14 @@ WATCH = 1.0
 def build(desk: Desk) -> None:
     """Build the page."""
     dialogs = ui.element("div")  # outside of what is drawn anew, which would take them along
-    with ui.column().classes("w-full") as page:
+    with ui.column().classes("w-full"):
         with ui.row().classes("w-full gap-4 items-start"):
             with ui.column().classes("min-w-64 flex-1"):
                 intake = _sources(desk, dialogs)
             with ui.column().classes("min-w-72 flex-[2]"):
                 with ui.row().classes("items-center"):
                     ui.label("Recordings").classes("text-lg")
-                    editing.undoing(desk, page)
+                    editing.undoing(desk)
                 _list(desk, dialogs)
         preview(desk)
     _watch(desk, intake)

@@ -4,28 +4,22 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Awaitable, Callable, Sequence
-from typing import Any
+from typing import Any, Literal
 
 from nicegui import ui
+from nicegui.events import KeyEventArguments
 
 from mckibben.app import edits
 from mckibben.app.desk import Desk, guarded, labelled, named
 from mckibben.app.kept import Step
 from mckibben.recording import Recording
 
-UNDO_KEYS = """(event) => {
-    const key = event.key.toLowerCase();
-    if (!(event.ctrlKey || event.metaKey) || event.target.matches('input, textarea')) return;
-    if (key === 'z' || key === 'y') {
-        event.preventDefault();
-        emit(key === 'y' || event.shiftKey);
-    }
-}"""
-"""Ctrl+Z undoes, Ctrl+Y and Ctrl+Shift+Z do again; in a field they are the field's own."""
+FIELDS: list[Literal["input", "select", "button", "textarea"]] = ["input", "select", "textarea"]
+"""Where Ctrl+Z is the field's own."""
 
 
-def undoing(desk: Desk, page: Any) -> None:
-    """Show buttons that undo and do again; Ctrl+Z on a page is the same."""
+def undoing(desk: Desk) -> None:
+    """Show buttons that undo and do again; Ctrl+Z and Ctrl+Y are the same while they are shown."""
 
     def step(redo: bool) -> Callable[[], Awaitable[None]]:
         async def act() -> None:
@@ -41,11 +35,13 @@ def undoing(desk: Desk, page: Any) -> None:
 
         return guarded(act)
 
-    async def pressed(event: Any) -> None:
-        await step(bool(event.args))()
+    async def pressed(event: KeyEventArguments) -> None:
+        held, key = event.modifiers, str(event.key.name).lower()
+        if event.action.keydown and (held.ctrl or held.meta) and key in ("z", "y"):
+            await step(key == "y" or held.shift)()
 
-    page.props("tabindex=-1")  # what is clicked on then gives it the keys
-    page.on("keydown", pressed, js_handler=UNDO_KEYS)
+    # of the whole page: what was removed leaves the focus nowhere
+    ui.keyboard(on_key=pressed, repeating=False, ignore=FIELDS)
 
     @ui.refreshable
     def shown() -> None:

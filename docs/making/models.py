@@ -47,6 +47,16 @@ def pictured(model: str) -> Path:
     return DOCS / "pictures" / "models" / f"{model}.png"
 
 
+def caption(model: str) -> str:
+    """Return what the model in the picture was fitted to (docs/models/fits.py)."""
+    if model in ("bouc-wen-oscillator", "duhem-oscillator", "state-network"):
+        return (
+            "A model fitted to what the system of the Bouc-Wen benchmark "
+            "(no muscle; Noël and Schoukens, 2016) does, computed from its printed numbers"
+        )
+    return "A model fitted to short recordings of a virtual rig"
+
+
 def costs() -> dict[str, list[str]]:
     """Return the rows of the microcontroller's table, by kind of block."""
     text = (DOCS / "deploy" / "microcontroller.md").read_text(encoding="utf-8")
@@ -127,12 +137,8 @@ def page(
             "",
         ]
     if pictured(model).is_file():
-        lines += [f"![Loops of {name}](../../pictures/models/{model}.png)", ""]
-        lines += [
-            "*A model fitted to a short recording of a virtual rig, running free on it; "
-            "nothing here was measured on a real muscle.*",
-            "",
-        ]
+        lines += [f"![{name}, running free](../../pictures/models/{model}.png)", ""]
+        lines += [f"*{caption(model)}, running free on it. Nothing here was measured.*", ""]
     lines += [
         "## How to fit it",
         "",

@@ -20,24 +20,32 @@ from typing import Any
 
 DOCS = Path(__file__).parent
 PICTURES = DOCS / "pictures" / "tour"
-LARGEST = 60_000
+LARGEST = 74_000
 """Bytes of a picture."""
+
+WIDTH, HEIGHT = 1280, 860
+"""Pixels of the window."""
 
 WAIT = 60_000
 """Milliseconds until what a step waits for is there."""
+
+DONE = "!/Fitting|Running/.test(document.querySelector('header').innerText)"
+"""Whether nothing runs any more, in the page's words."""
 
 OPTIONS = ("--no-sandbox", "--disable-dev-shm-usage", "--disable-gpu", "--no-first-run")
 
 
 @dataclass(frozen=True)
 class Step:
-    """A picture: what is clicked before, what is waited for, and what is said below."""
+    """A picture: what is clicked before, what is waited for, shown from where, and said above it."""
 
     name: str
     heading: str
     text: str
     clicks: Sequence[str]
     awaited: str
+    top: str = ""
+    height: int = HEIGHT
 
 
 STEPS = (
@@ -47,59 +55,79 @@ STEPS = (
         "Drop files, open the example, or record a virtual muscle.",
         (),
         "empty",
+        height=360,
     ),
     Step(
         "data",
         "Data",
-        "Every recording with its channels and units; columns are mapped by hand where names "
-        "do not tell, "
-        "and parts are cut by dragging. One recording trains, another tests.",
+        "Every recording with its channels and units. The sliders behind each open its import again: "
+        "columns, units, rate, sign, calibration. One recording trains, another tests; "
+        "parts are cut by dragging, or by numbers.",
         ("example",),
         "preview-plot",
     ),
     Step(
         "look",
         "Look",
-        "Loops, cycles, and what the muscle does in words and numbers.",
+        "Loops, cycles, and what the muscle does, in words and numbers.",
         ("tab-look",),
         "loop-plot",
     ),
     Step(
         "models",
-        "Models",
-        "Models are fitted in the background and ranked; "
-        "the choice is by cross-validation on the training side.",
-        ("tab-models", "fit"),
+        "Models: the choice",
+        "Models stand by what they are for, with what they need and cost. "
+        "Those that suit these data are offered, the usual ones ticked; sliders open settings.",
+        ("tab-models",),
+        "fit",
+        height=740,
+    ),
+    Step(
+        "ranking",
+        "Models: the ranking",
+        "*Fit* runs in the background. The choice is by cross-validation on the training side; "
+        "the test stands beside, and any two can be looked at closer.",
+        ("fit",),
         "closer-0",
+        top="leaderboard",
     ),
     Step(
         "compensate",
-        "Compensate",
-        "Draw a motion, see what can be reached, and close the loop on another model of "
-        "the muscle, or a rig.",
-        ("tab-compensate", "wave", "run-loop"),
+        "Compensate: a motion",
+        "Draw a motion within what can be reached, or take a wave, and see the pressures that make it.",
+        ("tab-compensate", "wave", "show-pressures"),
+        "pressure-plot",
+    ),
+    Step(
+        "loop",
+        "Compensate: the loop",
+        "Try the compensator on another model of the muscle, or a virtual rig of its size, "
+        "beside the uncompensated run.",
+        ("run-loop",),
         "runs",
+        top="loop-plant",
     ),
     Step(
         "take",
         "Take away",
-        "The report, figures, the model, its inverse, C99 or an FMU.",
+        "The model, its inverse, C99 or an FMU; figures; the report; and all that was done as a script.",
         ("tab-take",),
         "take-report",
+        height=650,
     ),
 )
 
 
-def small(page: Any, path: Path) -> None:
+def small(page: Any, path: Path, height: int) -> None:
     """Save what the page shows, in as few colours as it takes."""
     from PIL import Image
 
-    page.screenshot(path=path)
+    page.screenshot(path=path, clip={"x": 0, "y": 0, "width": WIDTH, "height": height})
     with Image.open(path) as opened:
         whole = opened.convert("RGB")
-    for colours, width in ((96, 1280), (64, 1280), (48, 1100), (32, 1000), (24, 900), (16, 800)):
+    for colours, width in ((128, WIDTH), (64, WIDTH), (48, 1100), (32, 1000), (24, 900), (16, 800)):
         size = (width, round(whole.height * width / whole.width))
-        whole.resize(size).quantize(colours).save(path, optimize=True)
+        whole.resize(size).quantize(colours, Image.Quantize.MAXCOVERAGE).save(path, optimize=True)
         if path.stat().st_size < LARGEST:
             return
     sys.exit(f"{path.name} is larger than {LARGEST} bytes")
@@ -114,13 +142,18 @@ def walk(page: Any) -> list[Step]:
         try:
             for name in step.clicks:
                 page.get_by_test_id(name).first.click(timeout=WAIT)
-                page.wait_for_timeout(500)
+                page.wait_for_timeout(1500)
             page.get_by_test_id(step.awaited).first.wait_for(timeout=WAIT)
+            page.wait_for_function(DONE, timeout=WAIT)
         except Error as error:
             print(f"{step.name}: left out, {str(error).splitlines()[0]}")
             continue
+        if step.top:
+            page.get_by_test_id(step.top).first.evaluate(
+                "at => window.scrollTo(0, at.getBoundingClientRect().top + scrollY - 110)"
+            )
         page.wait_for_timeout(2500)  # plots are drawn a little later than they are there
-        small(page, PICTURES / f"{step.name}.png")
+        small(page, PICTURES / f"{step.name}.png", step.height)
         taken.append(step)
         print(f"{step.name}: {(PICTURES / f'{step.name}.png').stat().st_size} bytes")
     return taken
@@ -166,8 +199,9 @@ def main() -> None:
             line = process.stdout.readline()
             address = next(word for word in line.split() if word.startswith("http"))
             browser = play.chromium.launch(executable_path=shutil.which("chromium"), args=OPTIONS)
-            page = browser.new_page(viewport={"width": 1280, "height": 860})
+            page = browser.new_page(viewport={"width": WIDTH, "height": HEIGHT})
             page.goto(address, timeout=WAIT)
+            page.add_style_tag(content=".q-notifications { display: none }")
             steps = walk(page)
             browser.close()
         finally:

@@ -85,7 +85,8 @@ def write_api() -> None:
         )
         lines += [about, ""]
         for module, tree in found:
-            lines += [f"## {module}", "", f"{first_sentence(tree)} [Details]({module}.rst)", ""]
+            lines += [f"## {module.removeprefix(f'mckibben.{part}.')}", ""]
+            lines += [f"{first_sentence(tree)} [Details]({module}.rst)", ""]
             lines += table(
                 ["name", "what it is"],
                 [[f"`{node.name}`", first_sentence(node)] for node in public(tree)],

@@ -47,6 +47,16 @@ def pictured(model: str) -> Path:
     return DOCS / "pictures" / "models" / f"{model}.png"
 
 
+def caption(model: str) -> str:
+    """Return what the model in the picture was fitted to (docs/models/fits.py)."""
+    if model in ("bouc-wen-oscillator", "duhem-oscillator", "state-network"):
+        return (
+            "A model fitted to what the system of the Bouc-Wen benchmark "
+            "(no muscle; Noël and Schoukens, 2016) does, computed from its printed numbers"
+        )
+    return "A model fitted to short recordings of a virtual rig"
+
+
 def costs() -> dict[str, list[str]]:
     """Return the rows of the microcontroller's table, by kind of block."""
     text = (DOCS / "deploy" / "microcontroller.md").read_text(encoding="utf-8")
@@ -127,22 +137,18 @@ def page(
             "",
         ]
     if pictured(model).is_file():
-        lines += [f"![Loops of {name}](../../pictures/models/{model}.png)", ""]
-        lines += [
-            "*A model fitted to a short recording of a virtual rig, running free on it; "
-            "nothing here was measured on a real muscle.*",
-            "",
-        ]
+        lines += [f"![{name}, running free](../../pictures/models/{model}.png)", ""]
+        lines += [f"*{caption(model)}, running free on it. Nothing here was measured.*", ""]
     lines += [
         "## How to fit it",
         "",
         *fitting(model, estimator, block),
         "## Equations",
         "",
-        *paper(written(block)),
+        *paper(written(described(block))),
         "## Parameters",
         "",
-        *parameters(block),
+        *parameters(described(block)),
         "## Settings",
         "",
         "In commands `--set NAME=VALUE`, in Python an argument.",
@@ -155,7 +161,7 @@ def page(
         "## In words",
         "",
     ]
-    for kind in dict.fromkeys(leaf.kind for leaf in leaves(block)):
+    for kind in dict.fromkeys(leaf.kind for leaf in leaves(described(block))):
         about = inspect.getdoc(sys.modules[registry.load("blocks", kind).__module__]) or ""
         lines += [f"### {kind}", "", plain(about), ""]
         if kind in cost:
@@ -181,10 +187,24 @@ def mapped(block: Any) -> str:
     return f"{listed(driven)}{given} → {listed(block.outputs)}"
 
 
+def compensates(block: Any) -> bool:
+    """Return whether a model leads to what drives a muscle: then it is what an inverse is for others."""
+    return all(one.name.startswith("pressure") for one in block.outputs) and not any(
+        one.name.startswith("voltage") for one in block.inputs
+    )
+
+
+def described(block: Any) -> Any:
+    """Return the block whose equations are a model's: `balance` is written as the pressure needed."""
+    return block.forward if block.undoing else block
+
+
 def inverse(block: Any) -> str:
     """Return in words whether a model has an inverse."""
-    if block.undoing:
+    if compensates(block):
         return "is itself a compensator"
+    if block.undoing:
+        return "yes, explicit: the equations give the pressure as they stand"
     try:
         found = block.inverse()
     except MckibbenError as error:
@@ -196,7 +216,7 @@ def inverse(block: Any) -> str:
 def source(block: Any) -> list[str]:
     """Return what a model's files name as their sources."""
     found = []
-    for kind in dict.fromkeys(leaf.kind for leaf in leaves(block)):
+    for kind in dict.fromkeys(leaf.kind for leaf in leaves(described(block))):
         text = inspect.getdoc(sys.modules[registry.load("blocks", kind).__module__]) or ""
         found += [
             plain(" ".join(part.split()))
@@ -220,7 +240,7 @@ def fitting(model: str, estimator: Any, block: Any) -> list[str]:
         else f"from {cls.__module__} import {cls.__name__}"
     )
     lines = ["```bash", f"mckibben fit {model} recording.csv -o model.json"]
-    if not block.undoing:
+    if not compensates(block):
         try:
             block.inverse()
             lines.append("mckibben invert model.json -o inverse.json")

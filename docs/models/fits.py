@@ -1,6 +1,7 @@
 """Fit every model to a short recording of a virtual rig, for the pages of models; run by hand.
 
     python docs/models/fits.py [MODEL ...]      # all by default; some minutes
+    python docs/models/fits.py --draw [MODEL ...]   # the pictures only, of models fitted before
 
 Writes docs/models/fitted/MODEL.json, a model as `save` does, and docs/pictures/models/MODEL.png, it
 running free on what it was fitted to. `docs/build.py` makes the pages of these, and fits nothing.
@@ -21,11 +22,12 @@ import numpy as np
 import mckibben
 from mckibben import registry
 from mckibben.blocks.core.saving import load
+from mckibben.blocks.differential.bouc_wen_oscillator import BoucWenOscillator
 from mckibben.errors import MckibbenError
 from mckibben.recording import Recording
 from mckibben.report.figures import plot_model
 from mckibben.rigs import load_rig, record
-from mckibben.signals import decaying_triangle
+from mckibben.signals import decaying_triangle, multisine
 from mckibben.signals.protocol import protocol
 from mckibben.signals.resampling import resample
 
@@ -44,7 +46,7 @@ PROTOCOLS = {
 
 SHORT = {"particles": 6, "iterations": 8, "n_rounds": 1}
 SETTINGS: dict[str, dict[str, object]] = {
-    "state-network": {"n_states": 2, "n_units": 3},
+    "state-network": {"n_states": 3, "n_units": 6},
     "tsfnn": {"particles": 6, "iterations": 8},
     **dict.fromkeys(("coupled-pi", "sdchm", "sdchm-published"), SHORT),
 }
@@ -59,6 +61,7 @@ class Task:
     inputs: tuple[str, ...]
     outputs: tuple[str, ...]
     scheduling: tuple[str, ...] | None = None
+    picture: str = "loops"
 
 
 @cache
@@ -91,9 +94,15 @@ def activated() -> list[Recording]:
     ]
 
 
-def pushed() -> list[Recording]:
-    """Return a run with a force made of its pressure, for models from force to displacement."""
-    return [run.with_channels({"force": "N"}, force=10.0 * run["pressure"]) for run in lifted()]
+@cache
+def benchmark() -> list[Recording]:
+    """Return what the system of the Bouc-Wen benchmark does (Noel and Schoukens, 2016), as printed."""
+    system = BoucWenOscillator(2.0, 0.01, 50.0, 50.0, 0.8, -1.1)
+    clock = np.arange(1500) / 750.0
+    force = multisine(clock, 1.0, 20.0, 120.0, -120.0, "random", seed=0)
+    given = system.simulate(Recording({"force": force}, 1.0 / 750.0))["displacement"]
+    made = {"rig": "Bouc-Wen benchmark (virtual)"}
+    return [Recording({"force": force, "displacement": given}, 1.0 / 750.0, meta=made)]
 
 
 MUSCLES = tuple(f"pressure_{place}" for place in (1, 2, 3))
@@ -103,7 +112,7 @@ TASKS: dict[str, Callable[[], Task]] = {
     "muscle": lambda: Task(lifted(), ("pressure",), ("displacement",)),
     "force": lambda: Task(recorded("multistate-friction"), ("length",), ("force",)),
     "activation": lambda: Task(activated(), ("contraction",), ("pressure",)),
-    "mass": lambda: Task(pushed(), ("force",), ("displacement",)),
+    "mass": lambda: Task(benchmark(), ("force",), ("displacement",), picture="fit"),
     "load": lambda: Task(recorded("mpi-narmax"), ("voltage",), ("displacement",), ("force",)),
     "air": lambda: Task(recorded("mpi-narmax"), ("voltage",), ("pressure",)),
     "arm": lambda: Task(recorded("sdchm"), MUSCLES, MOVED, ("pressure_extensor",)),
@@ -129,21 +138,43 @@ def fit(name: str) -> str:
         if reason is None:
             try:
                 chosen = estimator.channel_settings(*asked) | SETTINGS.get(name, {})
-                block = estimator(**chosen).fit(task.recordings).model_
-                block.save(MODELS / f"{name}.json")
-                plot_model(
-                    load(MODELS / f"{name}.json"),
-                    task.recordings[:1],
-                    "loops",
-                    PICTURES / f"{name}.png",
-                )
-                smaller(PICTURES / f"{name}.png")
+                estimator(**chosen).fit(task.recordings).model_.save(MODELS / f"{name}.json")
+                draw(name, task)
             except MckibbenError as error:
                 reason = str(error)
             else:
-                return f"{', '.join(task.inputs)} to {', '.join(task.outputs)}"
+                return told(task)
         reasons.append(reason)
     sys.exit(f"{name} could not be fitted: {reasons}")
+
+
+def redraw(name: str) -> str:
+    """Draw a model that was fitted before, on the first task between whose channels it leads."""
+    if not (PICTURES / f"{name}.png").is_file():
+        return "has no picture"
+    block = load(MODELS / f"{name}.json")
+    given, asked = ({one.name for one in side} for side in (block.outputs, block.inputs))
+    for key in [PREFERRED[name]] if name in PREFERRED else TASKS:
+        task = TASKS[key]()
+        if given == set(task.outputs) and set(task.inputs) <= asked <= set(
+            task.recordings[0].units
+        ):
+            draw(name, task)
+            return told(task)
+    sys.exit(f"{name} leads from {asked} to {given}: no task has these")
+
+
+def draw(name: str, task: Task) -> None:
+    """Draw a saved model, running free on the recording that moves its first input most."""
+    picture = PICTURES / f"{name}.png"
+    moving = max(task.recordings, key=lambda recording: np.ptp(recording[task.inputs[0]]))
+    plot_model(load(MODELS / f"{name}.json"), [moving], task.picture, picture)
+    smaller(picture)
+
+
+def told(task: Task) -> str:
+    """Return between which channels a task is."""
+    return f"{', '.join(task.inputs)} to {', '.join(task.outputs)}"
 
 
 def smaller(picture: Path) -> None:
@@ -157,13 +188,15 @@ def smaller(picture: Path) -> None:
 
 
 def main() -> None:
-    """Fit the models asked for."""
+    """Fit the models asked for, or draw them."""
     MODELS.mkdir(exist_ok=True)
     PICTURES.mkdir(exist_ok=True)
     warnings.simplefilter("ignore")
-    for name in sys.argv[1:] or registry.names("estimators"):
+    asked = [name for name in sys.argv[1:] if name != "--draw"]
+    do = redraw if "--draw" in sys.argv else fit
+    for name in asked or registry.names("estimators"):
         started = time.perf_counter()
-        print(f"{name}: {fit(name)}, {time.perf_counter() - started:.1f} s", flush=True)
+        print(f"{name}: {do(name)}, {time.perf_counter() - started:.1f} s", flush=True)
 
 
 if __name__ == "__main__":

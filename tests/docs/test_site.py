@@ -74,6 +74,23 @@ def test_every_model_has_a_page_with_its_equations(site: Path) -> None:
             assert f">{part}<" in text, (model, part)
 
 
+def test_pages_say_what_has_an_inverse_and_what_data_are_of(site: Path) -> None:
+    def said(model: str) -> str:
+        text = (site / "_generated" / "models" / f"{model}.html").read_text(encoding="utf-8")
+        (article,) = re.findall(r"<article.*?</article>", text, flags=re.DOTALL)
+        return re.sub(r"\s+", " ", re.sub(r"<[^>]+>", "", article))
+
+    compensator = "is itself a compensator"
+    assert compensator in said("activation-memory")
+    for model in ("balance", "gpi", "air"):
+        assert compensator not in said(model)
+        assert "mckibben invert model.json" in said(model)
+    assert "recordings of a virtual rig" in said("balance")
+    for model in ("bouc-wen-oscillator", "duhem-oscillator", "state-network"):
+        assert "virtual rig" not in said(model)
+        assert "Bouc-Wen benchmark" in said(model)
+
+
 def test_nothing_is_asked_of_the_internet(site: Path) -> None:
     for path, text in pages(site).items():
         asked = re.findall(

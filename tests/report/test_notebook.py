@@ -123,9 +123,9 @@ def test_a_leaderboard_is_a_table(board: Leaderboard) -> None:
 
 def test_measured_is_drawn_beside_modelled(train: Recording, board: Leaderboard) -> None:
     axis = board.plot(recording=train)
-    assert [text.get_text() for text in axis.get_legend().get_texts()] == ["measured", "gpi"]
+    assert [text.get_text() for text in axis.get_legend().get_texts()] == ["virtual", "gpi"]
     both = board.plot("fit", recording=train, models=["gpi", "pi"])
-    assert {text.get_text() for text in both.get_legend().get_texts()} == {"measured", "gpi", "pi"}
+    assert {text.get_text() for text in both.get_legend().get_texts()} == {"virtual", "gpi", "pi"}
 
 
 def test_it_is_drawn_into_axes_that_are_given(train: Recording) -> None:

@@ -65,6 +65,13 @@ def test_the_best_model_lies_on_top() -> None:
         assert names == ["measured", "third", "second", "best"]
 
 
+def test_what_a_virtual_rig_gave_is_not_called_measured() -> None:
+    virtual = measured(100).with_meta(rig="mas20-hanging v2 (virtual)")
+    outputs = {"best": virtual["displacement"]}
+    drawing = subjects.fit_loops(virtual, "pressure", "displacement", outputs)
+    assert [curve.name for curve in drawing.panels[0].curves] == ["virtual", "best"]
+
+
 def test_a_path_that_jumps_is_drawn_as_dots_without_direction() -> None:
     levels = np.random.default_rng(0).uniform(0, 5, 100)
     recording = Recording({"pressure": levels, "displacement": levels**2}, 4.0)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from mckibben import Recording
+from mckibben.comparison.channels import Channels
 from mckibben.comparison.recognising import recognised
 
 T = np.linspace(0.0, 9.0, 50)
@@ -55,3 +56,18 @@ def test_at_a_length_held_the_force_is_modelled() -> None:
 
 def test_nothing_is_recognised_of_nothing() -> None:
     assert recognised([], []) == ((), ())
+
+
+@pytest.mark.parametrize(
+    ("inputs", "outputs", "own"),
+    [
+        ("u", "y", "u"),
+        ("u1 u2 u3", "y1 y2", "u1 u2"),
+        ("p_2 p_1", "d_1 d_2", "p_1 p_2"),
+        ("left right", "tip elbow", "left right"),
+        ("u", "y1 y2", "u u"),
+    ],
+)
+def test_every_output_has_an_input_of_its_own(inputs: str, outputs: str, own: str) -> None:
+    pairs = Channels(tuple(inputs.split()), tuple(outputs.split())).pairs()
+    assert pairs == tuple(zip(own.split(), outputs.split(), strict=True))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -41,9 +42,16 @@ class Channels:
         return () if self.single else schedules(recordings, (*self.inputs, *self.outputs))
 
     def pairs(self) -> tuple[tuple[str, str], ...]:
-        """Return every output with the input that is its own, or the first."""
-        own = self.inputs if len(self.inputs) == len(self.outputs) else self.inputs[:1]
-        return tuple((own[place % len(own)], output) for place, output in enumerate(self.outputs))
+        """Return every output with the input that is its own: that of its number, else of its place."""
+
+        def own(place: int, output: str) -> str:
+            number = re.search(r"\d*$", output)
+            alike = [
+                name for name in self.inputs if number and number[0] and name.endswith(number[0])
+            ]
+            return alike[0] if len(alike) == 1 else self.inputs[min(place, len(self.inputs) - 1)]
+
+        return tuple((own(place, output), output) for place, output in enumerate(self.outputs))
 
 
 def channels_of(

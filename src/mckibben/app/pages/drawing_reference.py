@@ -289,7 +289,13 @@ class Sketch:
             return self.file.with_channels(units, **rest) if rest else self.file
         if len(self.channels) == 1:  # what is typed and wrong is told now
             motions.parsed(self.text.value or "")
-        return motions.reference_recording(self.points, step, held, self.units)
+        drawn = {name: own for name, own in self.points.items() if own} or self.points
+        for name in self.points.keys() - drawn.keys():
+            held[name] = round(0.5 * sum(self.reach[name]), 3)
+            ui.notify(
+                f"{name} stays at {held[name]:g} {self.units[name]}: nothing is drawn for it."
+            )
+        return motions.reference_recording(drawn, step, held, self.units)
 
     def draw(self, *, text: bool = True, table: bool = True) -> None:
         """Show the points at hand."""

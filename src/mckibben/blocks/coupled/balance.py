@@ -17,6 +17,7 @@ Artificial Muscles"; areas and springs that couple follow what muscles in parall
 
 from __future__ import annotations
 
+import math
 import warnings
 from typing import Annotated, ClassVar, Self
 
@@ -302,8 +303,10 @@ class Balance(ManyChannels, LearntBalance):
         """Warn of references that would need pressures out of range, or muscles that push."""
         if state[-1] > 0:
             pushing = " or muscles to push harder than they can," if self.pushes else ""
+            low, high = self.pressure_range or (-math.inf, math.inf)
+            ends = f"{low:g} to {high:g}"
             warnings.warn(
-                f"{int(state[-1])} samples need {self.given[0].name} beyond {self.pressure_range} "
+                f"{int(state[-1])} samples need {self.given[0].name} beyond {ends} "
                 f"{self.given[0].unit}{pushing} and were clipped there",
                 ModelWarning,
                 stacklevel=4,

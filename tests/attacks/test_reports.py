@@ -12,7 +12,7 @@ import pytest
 from numpy.typing import NDArray
 
 from mckibben.blocks.play_type.gpi import GPI
-from mckibben.papers.reproduction import Figure, Reproduction, Table
+from mckibben.papers.reproduction import Figure, Points, Reproduction, Source, Table
 from mckibben.report import page as report
 from mckibben.report.reproduction import reproduction_page
 from tests.app.browsing import SLOW
@@ -41,12 +41,11 @@ def hostile_reproduction() -> str:
     ramp: NDArray[np.float64] = np.linspace(0.0, 1.0, 5)
     curve = (ramp, ramp)
     figures = (Figure(HOSTILE, HOSTILE, HOSTILE, {"measured": curve, HOSTILE: curve}),)
-    tables = (Table(HOSTILE, (HOSTILE, "x"), ((HOSTILE, 1.0),), HOSTILE),)
+    tables = (Table(HOSTILE, (HOSTILE, "x"), ((HOSTILE, 1.0),), HOSTILE, Points(HOSTILE, ("x",))),)
     return reproduction_page(
         Reproduction(
             name=HOSTILE,
-            title=HOSTILE,
-            lead=HOSTILE,
+            source=Source(HOSTILE, HOSTILE, HOSTILE, HOSTILE, HOSTILE),
             summary=(HOSTILE,),
             notes=(HOSTILE,),
             tables=tables,

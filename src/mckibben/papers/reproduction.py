@@ -21,6 +21,45 @@ Progress = Callable[[float, str], None]
 
 
 @dataclass(frozen=True)
+class Source:
+    """A paper, and what it asks.
+
+    Parameters
+    ----------
+    title : str
+    question : str
+        What its experiment answers, in one sentence.
+    authors, published, doi : str
+        Who, where and when; empty where that is not known.
+    """
+
+    title: str
+    question: str
+    authors: str = ""
+    published: str = ""
+    doi: str = ""
+
+
+@dataclass(frozen=True)
+class Points:
+    """Which columns of a table are drawn, a point for each row.
+
+    Parameters
+    ----------
+    measure : str
+        What they all are, with its unit.
+    columns : tuple of str
+        Headings; those with "printed" in them are drawn as the paper's.
+    bound : float or None
+        What the paper says that its figures are below, where it prints no more.
+    """
+
+    measure: str
+    columns: tuple[str, ...]
+    bound: float | None = None
+
+
+@dataclass(frozen=True)
 class Table:
     """A table.
 
@@ -34,12 +73,15 @@ class Table:
         Words, numbers, or None where there is nothing to say.
     note : str
         How it was made; what "printed" refers to.
+    drawn : Points or None
+        What of it stands in the picture of printed and ours.
     """
 
     title: str
     columns: tuple[str, ...]
     rows: tuple[tuple[Cell, ...], ...]
     note: str = ""
+    drawn: Points | None = None
 
     def filled(self) -> Table:
         """Return the table without columns in which there is nothing to say."""
@@ -86,37 +128,33 @@ class Reproduction:
     ----------
     name : str
         As registered.
-    title : str
-        Of the paper.
+    source : Source
+        The paper.
     summary : sequence of str
         What came out, one sentence each.
     tables : sequence of Table
     figures : sequence of Figure
     notes : sequence of str
         What differs from the paper.
-    lead : str
-        Under the title.
-    notes_title : str
-        Over the notes.
-    command : str
-        What makes it again; default ``mckibben reproduce`` with its name.
+    quick : bool
+        Whether what takes long was left out.
     """
 
     name: str
-    title: str
+    source: Source
     summary: tuple[str, ...]
     tables: tuple[Table, ...]
     figures: tuple[Figure, ...]
     notes: tuple[str, ...]
-    lead: str = "The paper's protocol on its virtual rig, its methods as published, and ours."
-    notes_title: str = "What differs from the paper"
-    command: str = ""
+    quick: bool = False
 
     def to_dict(self) -> dict[str, Any]:
         """Return all but the figures, as ``tables.json`` holds it."""
         return {
             "name": self.name,
-            "title": self.title,
+            "title": self.source.title,
+            "doi": self.source.doi,
+            "quick": self.quick,
             "summary": list(self.summary),
             "tables": [table.to_dict() for table in self.tables],
             "notes": list(self.notes),
@@ -175,7 +213,8 @@ def reproduce(
         )
     if clear:
         kept.clear()
-    return replace(found, tables=tuple(table.filled() for table in found.tables))
+    tables = tuple(table.filled() for table in found.tables)
+    return replace(found, tables=tables, quick=quick)
 
 
 def rms(errors: Array) -> float:

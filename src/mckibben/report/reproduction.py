@@ -4,22 +4,59 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from mckibben.report import interactive, templating, wording
-from mckibben.report.drawing import N_COLOURS, Curve, Drawing, Panel
+from mckibben.report.drawing import N_COLOURS, Curve, Drawing, Mark, Panel
 
 if TYPE_CHECKING:
-    from mckibben.papers.reproduction import Figure, Reproduction
+    from mckibben.papers.reproduction import Figure, Points, Reproduction, Table
 
 
 def reproduction_page(found: Reproduction) -> str:
-    """Return the report of a re-run as HTML."""
-    figures = {
-        f"figure-{place}": [interactive.plots(drawing(figure))]
-        for place, figure in enumerate(found.figures)
-    }
+    """Return the report of a re-run as HTML: what is printed beside ours first, raw signals last."""
+    pictured = [table for table in found.tables if table.drawn is not None]
+    shown = sorted(found.figures, key=lambda figure: len(figure.curves) == 1)
+    drawings = {f"beside-{place}": beside(table) for place, table in enumerate(pictured)}
+    drawings |= {f"figure-{place}": drawing(figure) for place, figure in enumerate(shown)}
     return templating.page(
-        "reproduction.html.j2", figures, found=found, versions=wording.versions()
+        "reproduction.html.j2",
+        {name: [interactive.plots(each)] for name, each in drawings.items()},
+        found=found,
+        pictured=pictured,
+        shown=shown,
+        versions=wording.versions(),
     )
+
+
+def beside(table: Table) -> Drawing:
+    """Return a table's drawn columns: what is printed in rings of ink, what was found in colours."""
+    points: Points | None = table.drawn
+    assert points is not None
+    curves: list[Curve] = []
+    found = n_printed = 0
+    for column in points.columns:
+        if column not in table.columns:  # nothing was to be said in it
+            continue
+        cells = [row[table.columns.index(column)] for row in table.rows]
+        places = [place for place, cell in enumerate(cells) if isinstance(cell, int | float)]
+        printed = "printed" in column
+        n_printed += printed
+        found += not printed
+        curves.append(
+            Curve(
+                np.array([cells[place] for place in places], dtype=float),
+                np.array(places, dtype=float),
+                column,
+                ("measured" if n_printed == 1 else "input")
+                if printed
+                else f"series-{(found - 1) % N_COLOURS + 1}",
+                "rings" if printed else "dots",
+            )
+        )
+    bound = () if points.bound is None else (Mark(points.bound, "printed: below"),)
+    names = tuple(str(row[0]) for row in table.rows)
+    return Drawing((Panel(points.measure, "", tuple(curves), marks=bound, categories=names),))
 
 
 def drawing(figure: Figure) -> Drawing:

@@ -21,9 +21,28 @@ from mckibben.estimators.force.activation_pressure import ActivationPressureEsti
 from mckibben.papers.activation_pressure.protocol import FORCES, FREQUENCIES
 from mckibben.papers.activation_pressure.published import activation_pressure as printed_profile
 from mckibben.papers.keeping import fitted, recorded
-from mckibben.papers.reproduction import Cell, Figure, Progress, Reproduction, Table, rms, thinned
+from mckibben.papers.reproduction import (
+    Cell,
+    Figure,
+    Points,
+    Progress,
+    Reproduction,
+    Source,
+    Table,
+    rms,
+    thinned,
+)
 from mckibben.recording import Recording
 from mckibben.signals.protocol import protocol
+
+SOURCE = Source(
+    "Inverse Modeling of Nonlinear Artificial Muscle Using Polynomial Parameterization and Particle "
+    "Swarm Optimization",
+    "Which pressure gives a wished-for contraction at a force and a frequency, hysteresis included?",
+    authors="Mat Dzahir, Yamamoto",
+    published="Hindawi, 2020",
+    doi="10.1155/2020/8189157",
+)
 
 REST_LENGTH = 530.0
 """Of the muscle [mm]."""
@@ -84,8 +103,7 @@ def activation_pressure(
     printed = printed_profile()
     return Reproduction(
         name="activation-pressure",
-        title="Inverse Modeling of Nonlinear Artificial Muscle Using Polynomial Parameterization and "
-        "Particle Swarm Optimization",
+        source=SOURCE,
         summary=(
             f"The paper's model on the {len(sines)} sines: {_said(on_sines[THEIRS])} "
             "(printed: below 10 % at all conditions, .875 to .988).",
@@ -178,7 +196,13 @@ def _tables(title: str, scores: Scores, forces: tuple[float, ...]) -> Iterator[T
             )
             for force in forces
         ]
-        yield Table(what.format(title), columns, tuple(rows), note)
+        ends = [
+            c
+            for c in columns[1:]
+            if c.endswith((f"{FREQUENCIES[0]:g} Hz", f"{FREQUENCIES[-1]:g} Hz"))
+        ]
+        drawn = None if place else Points("RMSE [% of range]", tuple(ends), PRINTED_BOUND)
+        yield Table(what.format(title), columns, tuple(rows), note, drawn)
 
 
 def _profile(

@@ -41,10 +41,20 @@ from mckibben.papers.mpi_narmax.models import (
     fit_models,
 )
 from mckibben.papers.mpi_narmax.tables import by_status, figures, folded, held, pulls, unrepeated
-from mckibben.papers.reproduction import Progress, Reproduction, Table, rms
+from mckibben.papers.reproduction import Progress, Reproduction, Source, Table, rms
 from mckibben.recording import Recording
 from mckibben.rigs import load_rig
 from mckibben.signals import resample
+
+SOURCE = Source(
+    "High-Precision Displacement and Force Hybrid Modeling of Pneumatic Artificial Muscle Using 3D "
+    "PI-NARMAX Model",
+    "Can one model that is told the force predict the displacement under any load, where a "
+    "Prandtl-Ishlinskii model holds for the load it was identified at?",
+    authors="Qin, Xu, Shi, Han",
+    published="Actuators 11(2), 51, 2022",
+    doi="10.3390/act11020051",
+)
 
 LOOP_TIME = 60.0
 """Of the closed loops [s]."""
@@ -166,8 +176,7 @@ def _reported(found: Found) -> Reproduction:
     tables.append(Table("Identification", headings, tuple(found.facts)))
     return Reproduction(
         name="mpi-narmax",
-        title="High-Precision Displacement and Force Hybrid Modeling of Pneumatic Artificial Muscle "
-        "Using 3D PI-NARMAX Model",
+        source=SOURCE,
         summary=_summary(found),
         tables=tuple(tables),
         figures=figures(found),

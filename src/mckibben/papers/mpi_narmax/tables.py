@@ -27,7 +27,7 @@ from mckibben.papers.mpi_narmax.published import (
     TURNING_POINT,
     modified_prandtl_ishlinskii,
 )
-from mckibben.papers.reproduction import Cell, Figure, Table, thinned
+from mckibben.papers.reproduction import Cell, Figure, Points, Table, thinned
 from mckibben.signals import sine
 
 PRINTED_MAE = {
@@ -94,7 +94,8 @@ def by_status(found: Found) -> Iterator[Table]:
             known: tuple[Cell, ...] = printed.get(name, (None,) * 4)
             rows.append((name, *known, *(found.errors(name, run)[place] for run in STATUSES)))
         title = f"{what} by status [mm] (its Table {2 + place})"
-        yield Table(title, ("model", *headings), tuple(rows), _NOTE)
+        last = Points(f"{what} on status 4 [mm]", ("status 4, printed", "status 4, here"))
+        yield Table(title, ("model", *headings), tuple(rows), _NOTE, last)
 
 
 _NOTE = (

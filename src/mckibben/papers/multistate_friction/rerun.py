@@ -46,11 +46,22 @@ from mckibben.papers.multistate_friction.tables import (
 from mckibben.papers.reproduction import (
     Progress,
     Reproduction,
+    Source,
     Table,
     rms,
 )
 from mckibben.recording import Recording
 from mckibben.signals.protocol import protocol
+
+SOURCE = Source(
+    "A Multistate Friction Model for the Compensation of the Asymmetric Hysteresis in the "
+    "Mechanical Response of Pneumatic Artificial Muscles",
+    "Do a few friction elements, which differ by direction, describe the loop of force over length as "
+    "well as models of four times as many parameters?",
+    authors="Capace, Cosentino, Amato, Merola",
+    published="Actuators 8(2), 49, 2019",
+    doi="10.3390/act8020049",
+)
 
 
 def multistate_friction(
@@ -100,8 +111,7 @@ def multistate_friction(
     worst = {name: _worst(model, isobaric) for name, model in models.items()}
     return Reproduction(
         name="multistate-friction",
-        title="A Multistate Friction Model for the Compensation of the Asymmetric Hysteresis in the "
-        "Mechanical Response of Pneumatic Artificial Muscles",
+        source=SOURCE,
         summary=(
             _headline(worst, models),
             _eighteen(models, worst, isobaric),

@@ -28,6 +28,7 @@ from mckibben.papers.multistate_friction.published import static_force as printe
 from mckibben.papers.reproduction import (
     Cell,
     Figure,
+    Points,
     Table,
     rms,
     thinned,
@@ -70,6 +71,7 @@ def static_laws(laws: Mapping[str, Fitted], isometric: list[Recording]) -> Table
         "Static force from isometric runs (its Section 2)",
         ("law", "RMSE [N], printed", "RMSE [N], here", "r², printed", "r², here", "parameters"),
         tuple(rows),
+        drawn=Points("RMSE [N]", ("RMSE [N], printed", "RMSE [N], here")),
     )
 
 
@@ -86,6 +88,7 @@ def closed_loop(models: Mapping[str, Model], loop: Recording) -> Table:
         tuple(rows),
         "Fitted and scored on the same loop, as the paper does. Ours has one element shared and one for "
         "each direction.",
+        Points("RMSE [N]", ("RMSE [N], printed", "RMSE [N], here")),
     )
 
 

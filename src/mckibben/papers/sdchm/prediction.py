@@ -11,7 +11,7 @@ import numpy as np
 from mckibben.arrays import Array
 from mckibben.metrics import err
 from mckibben.papers.free_runs import FreeRuns
-from mckibben.papers.reproduction import Cell, Figure, Table, rms, thinned
+from mckibben.papers.reproduction import Cell, Figure, Points, Table, rms, thinned
 from mckibben.papers.sdchm import printed
 from mckibben.papers.sdchm.models import (
     BALANCE,
@@ -178,6 +178,7 @@ class Predictions:
                 tuple(rows),
                 "Groups: muscle 1, 2, 3 or all driven, by output 1, 2, 3; peaks of 1.4 bar. This "
                 "stiffness is one of the validation set's.",
+                Points(what, ("printed SDCHM", "printed raw network", *GROUPS)) if place else None,
             )
 
     def _figure_11(self, p0: float) -> Table:

@@ -7,13 +7,22 @@ Pneumatic Artificial Muscle-Driven Soft Manipulator".
 from __future__ import annotations
 
 from mckibben.comparison.kept import Kept
-from mckibben.papers.reproduction import Progress, Reproduction, Table
+from mckibben.papers.reproduction import Progress, Reproduction, Source, Table
 from mckibben.papers.sdchm import printed
 from mckibben.papers.sdchm.compensation import run_loops
 from mckibben.papers.sdchm.models import PUBLISHED, Models, fit_models
 from mckibben.papers.sdchm.parts import gains, orders
 from mckibben.papers.sdchm.prediction import Predictions
 from mckibben.papers.sdchm.recordings import record_arm
+
+SOURCE = Source(
+    "Modeling and Compensation of Stiffness-Dependent Hysteresis Coupling Behavior for Parallel "
+    "Pneumatic Artificial Muscle-Driven Soft Manipulator",
+    "Can the hysteresis of a soft arm, whose muscles move one another and whose stiffness changes, be "
+    "predicted and undone by play operators, couplings and a fuzzy network in series?",
+    published="Applied Sciences 14(22), 10240, 2024",
+    doi="10.3390/app142210240",
+)
 
 NOTES = (
     "The arm's physics is not the paper's: levels differ.",
@@ -69,8 +78,7 @@ def sdchm(*, quick: bool, seed: int, jobs: int | None, tell: Progress, kept: Kep
     ]
     return Reproduction(
         name="sdchm",
-        title="Modeling and Compensation of Stiffness-Dependent Hysteresis Coupling Behavior for "
-        "Parallel Pneumatic Artificial Muscle-Driven Soft Manipulator",
+        source=SOURCE,
         summary=(*predictions.summary(), *loops.summary()),
         tables=tuple(tables),
         figures=(*predictions.figures(), *loops.figures()),

@@ -1,0 +1,54 @@
+"""The report of a re-run: what it asks, printed beside ours first, raw signals last."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+
+from mckibben.papers.reproduction import Figure, Points, Reproduction, Source, Table
+from mckibben.report.reproduction import beside, reproduction_page
+
+SOURCE = Source("A Muscle", "Does it?", authors="Gaylord", published="Patents, 1958", doi="10.1/x")
+
+TABLE = Table(
+    "Errors",
+    ("model", "RMSE, printed", "RMSE, here", "why"),
+    (("play", 2.0, 1.5, ""), ("creep", None, 0.5, ""), ("none", None, None, "failed")),
+    drawn=Points("RMSE [mm]", ("RMSE, printed", "RMSE, here", "not there"), bound=3.0),
+)
+
+RAMP = np.linspace(0.0, 1.0, 5)
+
+
+def page(quick: bool) -> str:
+    """Return the report of a re-run of one table and two figures."""
+    raw = Figure("Pressure", "time [s]", "pressure [bar]", {"": (RAMP, RAMP)})
+    loops = Figure(
+        "Loops", "pressure [bar]", "y [mm]", {"measured": (RAMP, RAMP), "play": (RAMP, RAMP)}
+    )
+    return reproduction_page(
+        Reproduction("muscle", SOURCE, ("It does.",), (TABLE,), (raw, loops), ("Levels.",), quick)
+    )
+
+
+def test_every_number_of_the_drawn_columns_is_a_point_in_its_row() -> None:
+    (panel,) = beside(TABLE).panels
+    printed, here = panel.curves
+    assert panel.categories == ("play", "creep", "none")
+    assert (printed.style, printed.x.tolist(), printed.y.tolist()) == ("rings", [2.0], [0.0])
+    assert (here.style, here.x.tolist(), here.y.tolist()) == ("dots", [1.5, 0.5], [0.0, 1.0])
+    assert [mark.x for mark in panel.marks] == [3.0]
+
+
+@pytest.mark.parametrize("quick", [True, False])
+def test_the_paper_and_its_question_come_first_and_raw_signals_last(quick: bool) -> None:
+    words = page(quick)
+    told = ["A Muscle", "Gaylord. Patents, 1958. doi:10.1/x", "Does it?", "It does."]
+    places = [words.index(word, words.index("<header>")) for word in told]
+    places.append(words.index("Printed beside ours"))
+    places += [words.index(f"<h3>{title}</h3>") for title in ("Errors", "Loops", "Pressure")]
+    assert places == sorted(places)
+    assert ("A quick run" in words) == quick
+    assert bool(re.search(r"reproduce muscle --quick", words)) == quick

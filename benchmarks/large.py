@@ -1,6 +1,6 @@
 """Measure long and many recordings: seconds, and memory of all processes together.
 
-Run: python benchmarks/large.py [--samples 10000000] [--recordings 200] [--only long|many] [--all]
+Run: python benchmarks/large.py [--samples 10000000] [--recordings 200] [--only long|report|many] [--all]
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from mckibben.signals import irregular_triangle
 
 FEW = ("pi", "gpi")
 SEVERAL = ("pi", "mpi", "gpi", "bouc-wen")
+MANY = (*SEVERAL, "p2uz", "cpi")
 
 
 def recording(n: int, sample_time: float, seed: int) -> Recording:
@@ -72,17 +73,31 @@ def memory(session: int) -> int:
     return total
 
 
+def report() -> None:
+    """Print the size of a study's report of a million samples, and the seconds that it takes to make."""
+    from mckibben import study
+    from mckibben.report.page import page
+
+    found = study(recording(1_000_000, 0.001, 0), models=MANY)
+    started = time.perf_counter()
+    size = len(page(found).encode())
+    seconds = time.perf_counter() - started
+    print(f"report of 1000000 samples, {len(MANY)} models: {size / 1e6:.2f} MB, {seconds:.1f} s")
+
+
 def main() -> None:
     """Print everything."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--samples", type=int, default=10_000_000)
     parser.add_argument("--recordings", type=int, default=200)
-    parser.add_argument("--only", choices=("long", "many"))
+    parser.add_argument("--only", choices=("long", "report", "many"))
     parser.add_argument("--all", action="store_true", help="all models on the long recording too")
     given = parser.parse_args()
     with tempfile.TemporaryDirectory() as place:
         folder = Path(place)
-        if given.only != "many":
+        if given.only in (None, "report"):
+            report()
+        if given.only in (None, "long"):
             long = folder / "long.parquet"
             write(recording(given.samples, 0.001, 0), long)
             print(f"one recording of {given.samples} samples, {long.stat().st_size / 1e6:.0f} MB")
@@ -91,7 +106,7 @@ def main() -> None:
             if given.all:
                 measured("study", "study", long)
             long.unlink()
-        if given.only == "long":
+        if given.only in ("long", "report"):
             return
         many = folder / "many"
         many.mkdir()

@@ -87,7 +87,7 @@ def page(study: Study) -> str:
         drawn=pictured,
         left_out=left_out,
         models=_models(study.leaderboard),
-        summaries=_summaries(study.leaderboard),
+        explained=_explained(study.leaderboard),
         failures=failures(study.leaderboard),
         coupling=coupled,
         bars=_bars(study.leaderboard),
@@ -196,13 +196,18 @@ def failures(board: Leaderboard) -> dict[str, list[str]]:
     return found
 
 
-def _summaries(board: Leaderboard) -> dict[str, str]:
-    """Return what every model of a leaderboard is, in one sentence; nothing of what is unknown."""
+def _explained(board: Leaderboard) -> dict[str, str]:
+    """Return the full name of every model of a leaderboard and what it is; nothing of unknown ones."""
     from mckibben import registry
+    from mckibben.comparison.needs import full_name
     from mckibben.comparison.offered import summary
 
     known = registry.names("estimators")
-    return {row.model: summary(row.model) if row.model in known else "" for row in board.ranking}
+    return {
+        row.model: f"{full_name(row.model)}. {summary(row.model)}"
+        for row in board.ranking
+        if row.model in known
+    }
 
 
 def checked(study: Study) -> tuple[OutputCheck, ...]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import suppress
 from typing import Any
 
 import pytest
@@ -170,6 +171,8 @@ def test_screen_readers_are_told_what_everything_is(browser: Any, address: str) 
         for tab in TABS:
             opened(page, tab)
             assert page.get_by_role("tabpanel").count() >= 1
+            with suppress(playwright.Error):  # names come a moment after what they name
+                page.wait_for_function(f"() => ({NAMELESS})().length === 0", timeout=5000)
             found = page.evaluate(NAMELESS)
             if found:
                 nameless[tab] = found

@@ -131,7 +131,7 @@ def compares_two_models(hand: Hand) -> None:
 def reads_parameters(hand: Hand) -> None:
     hand.on("tab-models")
     hand.at(hand.page.get_by_text("Parameters of").first)
-    hand.sees("thresholds 1")
+    hand.sees("weights 1")
 
 
 def changes_settings(hand: Hand) -> None:
@@ -219,6 +219,13 @@ def address(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
 
 
 @pytest.fixture(scope="module")
+def empty(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+    """A workbench with nothing in it: what is brought to it is not in others' way."""
+    with workbench(tmp_path_factory.mktemp("empty") / "ws") as found:
+        yield found
+
+
+@pytest.fixture(scope="module")
 def browser() -> Iterator[Any]:
     with playwright.sync_playwright() as play:
         browser = play.chromium.launch(executable_path=BROWSER, args=OPTIONS)
@@ -227,8 +234,11 @@ def browser() -> Iterator[Any]:
 
 
 @pytest.mark.parametrize("thing", THINGS, ids=lambda thing: str(thing.__name__))
-def test_a_new_user(browser: Any, address: str, thing: Callable[[Hand], None]) -> None:
-    with visited(browser, address) as page:
+def test_a_new_user(
+    browser: Any, request: pytest.FixtureRequest, thing: Callable[[Hand], None]
+) -> None:
+    place = "empty" if thing in (opens_the_example, brings_a_file) else "address"
+    with visited(browser, request.getfixturevalue(place)) as page:
         hand = Hand(page)
         thing(hand)
         assert hand.clicks <= THINGS[thing]

@@ -252,7 +252,7 @@ def test_timeless_recordings_fail_only_the_rate_dependent_model(
         jobs=1,
     )
     assert board.rows[0].model == "pi"
-    assert "no time" in str(board.rows[1].reason)
+    assert "needs time" in str(board.rows[1].reason)
 
 
 def test_bad_input_is_refused_at_once(train: Recording) -> None:

@@ -149,6 +149,20 @@ def test_levels_of_what_schedules_are_held_out() -> None:
     assert few.train[0].n_samples < few.test[0].n_samples
 
 
+def test_of_runs_that_each_hold_the_input_the_last_at_each_level_are_held_out() -> None:
+    def held(length: float) -> Recording:
+        channels = {"length": np.full(50, length), "force": np.linspace(0, length, 50)}
+        return Recording(channels, 0.05, {"length": "mm", "force": "N"})
+
+    channels = Channels(("length",), ("force",))
+    twice = held_out([held(length) for length in (100.0, 90.0, 80.0, 100.0, 80.0, 90.0)], channels)
+    assert [run["length"][0] for run in twice.train] == [100.0, 90.0, 80.0]
+    assert [run["length"][0] for run in twice.test] == [100.0, 80.0, 90.0]
+    once = held_out([held(length) for length in (100.0, 90.0, 80.0)], channels)
+    assert [run["length"][0] for run in once.test] == [90.0]
+    assert "length 90 mm" in once.described
+
+
 def test_rows_hold_every_output_an_interval_and_a_memory() -> None:
     board = compare([run(5.0, 1), run(4.0, 2)], run(4.5, 3), models=["coupled-memory"], jobs=1)
     (row,) = board.rows

@@ -18,8 +18,8 @@ from mckibben import PIEstimator, Recording, example, read
 from mckibben.blocks.dynamic.transfer_function import TransferFunction
 from mckibben.cli.main import run
 from mckibben.papers.field_models import rerun as field_models
+from mckibben.papers.field_models.methods import LEAST_SQUARES, PRINTED
 from mckibben.papers.field_models.published import THRESHOLDS, prandtl_ishlinskii
-from mckibben.papers.field_models.rerun import LEAST_SQUARES, PRINTED
 from mckibben.papers.reproduction import Reproduction, reproduce
 from mckibben.registry import load
 from tests.cli.conftest import files  # noqa: F401  # a fixture

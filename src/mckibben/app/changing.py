@@ -80,6 +80,19 @@ class Changing(Recordings):
         self._change(what, new)
         return list(new)
 
+    def edit_each(self, names: Iterable[str], what: str, step: kept.Step) -> None:
+        """Do one more step to each of some recordings, as one change; errors are those of `edit`."""
+        from mckibben.app import edits
+
+        new = {}
+        for name in names:
+            entry = self.entry(name)
+            path = self._written(name, edits.applied(self.recording(name), [step]))
+            new[name] = replace(
+                entry, path=path, base=entry.base or entry.path, steps=(*entry.steps, step)
+            )
+        self._change(what, new)
+
     def read_again(
         self, found: Mapping[str, tuple[Sequence[Recording], str]], reading: kept.Reading
     ) -> list[str]:

@@ -74,6 +74,15 @@ class Desk:
 
         return Channels(self.inputs, self.outputs).pairs()
 
+    @property
+    def looked_at(self) -> tuple[tuple[str, str], ...]:
+        """Every output with what moves it: where its input is held, as in isometric runs, another."""
+        from mckibben.comparison.recognising import moved_by
+
+        used = list(self.workspace.used().values())
+        others = [name for name in self.workspace.channels() if name not in self.outputs]
+        return tuple((moved_by(used, given, others), wanted) for given, wanted in self.pairs)
+
     def results(self) -> list[dict[str, Any]]:
         """Return what is known of the models of these channels: other errors do not compare."""
         named = ", ".join(self.inputs), ", ".join(self.outputs)

@@ -11,6 +11,7 @@ from mckibben.comparison.inverses import Kind
 from mckibben.comparison.limits import limits
 from mckibben.comparison.needs import Need, full_name, inverse_kind, needs
 from mckibben.comparison.offered import objections
+from mckibben.comparison.recognising import DRIVING, FORCE
 
 FOLDS = 6
 """Fits of a model: one, and those of its cross-validation."""
@@ -113,6 +114,8 @@ def _recognised(desk: Desk, n_models: int) -> str:
     others = set(desk.workspace.channels()).difference(desk.inputs, desk.outputs)
     if told:
         said.append(f"told {', '.join(told)}")
+    elif desk.outputs == (FORCE,) and (driving := others.intersection(DRIVING)):
+        said.append(f"told {', '.join(sorted(driving))}")  # which balance-force takes
     elif others:
         said.append(f"not used: {', '.join(sorted(others))}")
     timeless = sum(run.sample_time is None for run in used)

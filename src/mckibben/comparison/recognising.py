@@ -51,6 +51,23 @@ def recognised(recordings: Sequence[Recording], channels: Sequence[str]) -> Side
     return inputs, outputs or ((FORCE,) if FORCE in rest else tuple((rest or list(channels))[:1]))
 
 
+def moved_by(recordings: Sequence[Recording], given: str, channels: Sequence[str]) -> str:
+    """Return the channel over which an output loops: its input, or what moves where that is held.
+
+    Parameters
+    ----------
+    recordings : sequence of Recording
+    given : str
+        The input.
+    channels : sequence of str
+        Those that may stand in for it.
+    """
+    if _any_moves(recordings, (given,)):
+        return given
+    driving = _called(channels, DRIVING)
+    return driving[0] if driving and _any_moves(recordings, driving[:1]) else given
+
+
 def _called(channels: Sequence[str], words: Sequence[str]) -> tuple[str, ...]:
     """Return the channels that are called by the first of some words that any is, numbered or not."""
     for word in words:

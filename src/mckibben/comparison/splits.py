@@ -98,9 +98,12 @@ def given_split(train: Sequence[Recording], test: Sequence[Recording]) -> Split:
 def held_out(recordings: Sequence[Recording], channels: Channels) -> Split:
     """Return the split of recordings where the user gave nothing to test on.
 
-    Of one muscle, the last part. Of several, or under loads, every third level of what schedules, ends
-    excepted; without several levels, every third run; of fewer, the last part as well.
+    Of one muscle, the last part; where every run holds the input, such as a length, the last runs at
+    its levels, or levels within. Of several muscles, or under loads, every third level of what
+    schedules, ends excepted; without several levels, every third run; of fewer, the last part as well.
     """
+    if channels.single and len(recordings) > 1 and (held := _held(recordings, channels.inputs[0])):
+        return held
     if not channels.single:
         for name in channels.scheduled(recordings):
             means = [round(float(recording[name].mean()), 1) for recording in recordings]
@@ -119,6 +122,21 @@ def held_out(recordings: Sequence[Recording], channels: Channels) -> Split:
             chosen = [place % EVERY == EVERY - 1 for place in range(len(recordings))]
             return _parted(recordings, chosen, "every third run held out")
     return held_out_tail(recordings, channels.inputs[0], HELD_OUT)
+
+
+def _held(recordings: Sequence[Recording], channel: str) -> Split | None:
+    """Return the split of runs that each hold the input; None where one moves it, or all are alike."""
+    groups = _repeats(recordings, channel, EVERY)
+    if len(groups) > 1:
+        tested = [place in groups[-1] for place in range(len(recordings))]
+        return _parted(recordings, tested, f"the last run at each {channel} held out")
+    if any(np.ptp(recording[channel]) > 0 for recording in recordings):
+        return None
+    levels = [float(recording[channel][0]) for recording in recordings]
+    unseen = sorted(set(levels))[1:-1][::EVERY]
+    listed = ", ".join(f"{level:g}" for level in unseen)
+    how = f"runs at {channel} {listed} {recordings[0].units[channel]} held out"
+    return _parted(recordings, [level in unseen for level in levels], how) if unseen else None
 
 
 def _parted(recordings: Sequence[Recording], tested: Sequence[bool], how: str) -> Split:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-from functools import partial
 from typing import Any
 
 from nicegui import ui
@@ -11,7 +10,7 @@ from nicegui import ui
 from mckibben import registry
 from mckibben.app.desk import LONGEST, Desk, guarded, labelled, named, on_event, tell
 from mckibben.app.guard import LARGEST_UPLOAD, TOO_LARGE
-from mckibben.app.pages import editing
+from mckibben.app.pages import apart, editing
 from mckibben.app.pages.cutting import preview
 from mckibben.app.pages.importing import Intake, ask_again
 from mckibben.errors import MckibbenError
@@ -154,7 +153,7 @@ def _list(desk: Desk, dialogs: Any) -> None:
                     "Or open the example, a virtual muscle with a hanging load."
                 )
             return
-        _different(desk)
+        apart.build(desk)
         for entry in entries:
             _row(desk, entry.name, dialogs)
         known = desk.workspace.channels()
@@ -175,41 +174,6 @@ def _list(desk: Desk, dialogs: Any) -> None:
 
     desk.when("recordings", shown.refresh)
     shown()
-
-
-def _different(desk: Desk) -> None:
-    """Say it where recordings in use have different channels, and offer to set some aside."""
-    kinds: dict[tuple[str, ...], list[str]] = {}
-    for name, recording in desk.workspace.used().items():
-        kinds.setdefault(tuple(sorted(recording.channels)), []).append(name)
-    if len(kinds) < 2:
-        return
-    common = desk.workspace.channels()
-    with named(ui.card().classes("w-full border border-warning gap-1"), "different"):
-        ui.label("These recordings have different channels").classes("font-medium")
-        ui.label(
-            f"All of them have only: {', '.join(common)}."
-            if common
-            else "No channel is in all of them: nothing can be fitted to them together."
-        )
-        for channels, names in sorted(kinds.items(), key=lambda kind: -len(kind[1])):
-            own = [channel for channel in channels if channel not in common]
-            listed = ", ".join(names[:SHOWN]) + (" …" if len(names) > SHOWN else "")
-            with ui.row().classes("items-center w-full"):
-                said = f"{listed}: {', '.join(own) or 'nothing else'}"
-                ui.label(said[:LONGEST]).classes("flex-1 min-w-40 text-sm break-words")
-                button = ui.button(
-                    f"Set {len(names)} unused",
-                    on_click=guarded(partial(_set_aside, desk, names)),
-                )
-                labelled(button.props("outline dense"), "aria-label", f"Set {listed} unused")
-                named(button, f"aside-{names[0]}")
-
-
-async def _set_aside(desk: Desk, names: list[str]) -> None:
-    desk.workspace.set_role(names, "unused")
-    desk.settle_channels()
-    desk.changed("recordings", "channels")
 
 
 def _chosen(desk: Desk, side: str, channels: list[str]) -> None:

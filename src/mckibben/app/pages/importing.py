@@ -352,13 +352,11 @@ def _chosen(
             mapped[channel] = column.header
         if line["unit"].value:
             units[channel] = str(line["unit"].value).strip()
-        gain = (1.0 if line["gain"].value is None else line["gain"].value) * (
-            -1 if line["sign"].value else 1
-        )
-        if (gain, line["offset"].value or 0.0) != (1.0, 0.0):
-            calibration[channel] = (float(gain), float(line["offset"].value or 0.0))
-    signals = [channel for channel in kept if channel != "time"]
-    if not signals:
+        times = 1.0 if line["gain"].value is None else float(line["gain"].value)
+        turned = -times if line["sign"].value else times
+        if (way := (turned, float(line["offset"].value or 0.0))) != (1.0, 0.0):
+            calibration[channel] = way
+    if not (signals := [channel for channel in kept if channel != "time"]):
         raise DataError("no column is left", remedy="say of one at least which channel it is")
     return Reading(
         columns=mapped,
@@ -386,12 +384,12 @@ def _replace(desk: Desk, names: Sequence[str], reading: Reading) -> list[Recordi
 
 def _alike(desk: Desk, name: str | None) -> list[str]:
     """Return other recordings with the same channels, of files that are kept."""
+    workspace, found = desk.workspace, list[str]()
     if name is None:
-        return []
-    workspace, found = desk.workspace, []
-    own = workspace.entry(name)
+        return found
     for entry in workspace.entries():
-        if entry.name == name or not entry.upload or entry.reading != own.reading:
+        known = entry.upload and entry.reading == workspace.entry(name).reading
+        if entry.name == name or not known:
             continue
         try:
             same = list(workspace.recording(entry.name).channels)

@@ -38,9 +38,9 @@ def build(desk: Desk) -> None:
                 if len(desk.inputs) > 1 or len(desk.outputs) > 1:
                     _matrix(desk, chosen)
                 else:
-                    _plots(desk, chosen, desk.input, desk.output)
+                    _plots(desk, chosen, *desk.looked_at[0])
             with ui.column().classes("min-w-72 flex-[2]"):
-                for given, wanted in desk.pairs:
+                for given, wanted in desk.looked_at:
                     _words(desk, given, wanted)
                     _untold(desk, given, wanted)
 
@@ -127,7 +127,7 @@ def _plots(desk: Desk, chosen: ui.select, given: str, wanted: str) -> None:
             ui.label(str(error)).classes("text-negative")
             return
         found = cycles(recording[given])
-        used = (*desk.inputs, *desk.outputs)
+        used = (*desk.inputs, *desk.outputs, given)
         others = coupling_subjects.third_channels(recording, used)
         with ui.row().classes("items-center w-full"):
             colour = named(

@@ -10,7 +10,7 @@ from nicegui import ui
 from mckibben.app import plots, scripts
 from mckibben.app.desk import Desk, named, tell
 from mckibben.app.jobs import ENDED, RUNNING, Job
-from mckibben.app.pages import leaderboard
+from mckibben.app.pages import apart, leaderboard
 from mckibben.app.pages.choosing import Choice
 from mckibben.comparison.offered import settings_of
 from mckibben.errors import ModelError
@@ -43,6 +43,12 @@ def _fit(desk: Desk, choice: Choice) -> None:
         return
     if not choice.ticked:
         tell("No model is chosen. Remedy: tick one at least.")
+        return
+    if (times := apart.sample_times(desk)) is not None:
+        tell(
+            f"Recordings have sample times from {times[0]:.4g} to {times[1]:.4g} s, and models need "
+            f"one. Remedy: press 'Resample all to {apart.common(times):g} s' under Data."
+        )
         return
     for model in choice.ticked:
         written = choice.settings.get(model, {})

@@ -35,8 +35,18 @@ class BalanceForceEstimator(ErrorsUnknown, SingleEstimator):
     ----------
     pressure : str
         Channel of the pressure.
-    n_stops, n_lags, elasticity, area, contact, prior
-        As of `balance`.
+    n_stops : int
+        Friction elements.
+    n_lags : int
+        Time constants of what relaxes; 0 for a muscle without time.
+    elasticity : int
+        Degree of the elastic polynomial.
+    area : int
+        Degree of the area's.
+    contact : bool
+        Whether a dead zone of small pressures is looked for.
+    prior : str, Path, Sheet or Prior, optional
+        What is likely before, as `balance` takes it.
     """
 
     input: str = "length"

@@ -1,0 +1,97 @@
+"""What keeps recordings from being fitted together, and a button that mends it."""
+
+from __future__ import annotations
+
+import asyncio
+from functools import partial
+
+from nicegui import ui
+
+from mckibben.app.desk import LONGEST, Desk, guarded, labelled, named
+from mckibben.app.kept import Step
+
+SHOWN = 6
+"""Names of recordings in a line."""
+
+
+def build(desk: Desk) -> None:
+    """Show what differs, where something does."""
+    _channels(desk)
+    _sample_times(desk)
+
+
+def sample_times(desk: Desk) -> tuple[float, float] | None:
+    """Return the shortest and the longest sample time in use [s]; None where they are one."""
+    used = desk.workspace.used().values()
+    times = [run.sample_time for run in used if run.sample_time is not None]
+    if not times or max(times) - min(times) <= 1e-3 * min(times):
+        return None
+    return min(times), max(times)
+
+
+def common(times: tuple[float, float]) -> float:
+    """Return the sample time to bring all to: the longest, in three digits [s].
+
+    >>> common((0.01684, 0.01692))
+    0.0169
+    """
+    return float(f"{times[1]:.3g}")
+
+
+def _channels(desk: Desk) -> None:
+    """Offer to set recordings aside where channels differ."""
+    kinds: dict[tuple[str, ...], list[str]] = {}
+    for name, recording in desk.workspace.used().items():
+        kinds.setdefault(tuple(sorted(recording.channels)), []).append(name)
+    if len(kinds) < 2:
+        return
+    common = desk.workspace.channels()
+    with named(ui.card().classes("w-full border border-warning gap-1"), "different"):
+        ui.label("These recordings have different channels").classes("font-medium")
+        ui.label(
+            f"All of them have only: {', '.join(common)}."
+            if common
+            else "No channel is in all of them: nothing can be fitted to them together."
+        )
+        for channels, names in sorted(kinds.items(), key=lambda kind: -len(kind[1])):
+            own = [channel for channel in channels if channel not in common]
+            listed = ", ".join(names[:SHOWN]) + (" …" if len(names) > SHOWN else "")
+            with ui.row().classes("items-center w-full"):
+                said = f"{listed}: {', '.join(own) or 'nothing else'}"
+                ui.label(said[:LONGEST]).classes("flex-1 min-w-40 text-sm break-words")
+                button = ui.button(
+                    f"Set {len(names)} unused",
+                    on_click=guarded(partial(_set_aside, desk, names)),
+                )
+                labelled(button.props("outline dense"), "aria-label", f"Set {listed} unused")
+                named(button, f"aside-{names[0]}")
+
+
+async def _set_aside(desk: Desk, names: list[str]) -> None:
+    desk.workspace.set_role(names, "unused")
+    desk.settle_channels()
+    desk.changed("recordings", "channels")
+
+
+def _sample_times(desk: Desk) -> None:
+    """Offer one sample time where there are several: operators of rates and lags need one."""
+    times = sample_times(desk)
+    if times is None:
+        return
+    wanted = common(times)
+    with named(ui.card().classes("w-full border border-warning gap-1"), "sample-times"):
+        ui.label("These recordings have different sample times").classes("font-medium")
+        ui.label(f"From {times[0]:.4g} to {times[1]:.4g} s; models need one.").classes("text-sm")
+        button = ui.button(
+            f"Resample all to {wanted:g} s", on_click=guarded(partial(_resample, desk, wanted))
+        )
+        named(button.props("outline dense no-caps"), "resample-all")
+
+
+async def _resample(desk: Desk, wanted: float) -> None:
+    used = desk.workspace.used()
+    names = [name for name, run in used.items() if run.sample_time not in (None, wanted)]
+    said, step = f"all resampled to {wanted:g} s", Step(do="resample", sample_time=wanted)
+    await asyncio.to_thread(desk.workspace.edit_each, names, said, step)
+    desk.did(said, f"[mckibben.signals.resample(one, {wanted!r}) for one in recordings]")
+    desk.changed("recordings", "channels")

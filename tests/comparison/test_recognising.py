@@ -7,7 +7,7 @@ import pytest
 
 from mckibben import Recording
 from mckibben.comparison.channels import Channels
-from mckibben.comparison.recognising import recognised
+from mckibben.comparison.recognising import moved_by, recognised
 
 T = np.linspace(0.0, 9.0, 50)
 
@@ -71,3 +71,14 @@ def test_nothing_is_recognised_of_nothing() -> None:
 def test_every_output_has_an_input_of_its_own(inputs: str, outputs: str, own: str) -> None:
     pairs = Channels(tuple(inputs.split()), tuple(outputs.split())).pairs()
     assert pairs == tuple(zip(own.split(), outputs.split(), strict=True))
+
+
+def test_a_held_input_is_looked_at_over_what_moves() -> None:
+    names = ["displacement", "pressure"]
+    held = run("pressure", "displacement", "force", held=("displacement",))
+    assert moved_by([held], "displacement", names) == "pressure"
+    assert moved_by([held, run("pressure", "displacement", "force")], "displacement", names) == (
+        "displacement"
+    )
+    still = run("pressure", "displacement", "force", held=("displacement", "pressure"))
+    assert moved_by([still], "displacement", names) == "displacement"

@@ -1,0 +1,35 @@
+"""Recordings of different sample times are brought to one, as one change that can be undone."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mckibben import Recording
+from mckibben.app.desk import Desk
+from mckibben.app.jobs import Jobs
+from mckibben.app.kept import Step
+from mckibben.app.pages import apart
+from mckibben.app.workspace import Workspace
+
+
+def test_each_gets_one_step_more_and_one_undo_takes_all_back(tmp_path: Path) -> None:
+    workspace = Workspace(tmp_path)
+    desk = Desk(workspace, Jobs(workspace))
+    for name, step in (("slow", 0.0169), ("fast", 0.0168)):
+        time = np.arange(400) * step
+        channels = {"pressure": 2 + np.sin(time), "displacement": np.cos(time)}
+        workspace.add(Recording(channels, step), origin="a test", call="", name=name)
+    times = apart.sample_times(desk)
+    assert times == pytest.approx((0.0168, 0.0169))
+    assert times is not None
+    wanted = apart.common(times)
+    workspace.edit_each(["fast"], "all resampled", Step(do="resample", sample_time=wanted))
+    assert workspace.recording("fast").sample_time == wanted
+    assert apart.sample_times(desk) is None
+    assert len(workspace.entry("fast").steps) == 1
+    assert workspace.undo() == "all resampled"
+    assert apart.sample_times(desk) == times
+    desk.jobs.close()

@@ -21,7 +21,9 @@ def build(desk: Desk) -> None:
 
 
 def sample_times(desk: Desk) -> tuple[float, float] | None:
-    """Return the shortest and the longest sample time in use [s]; None where they are one."""
+    """Return the shortest and the longest sample time in use [s]; None where they may be as they are."""
+    if len(desk.inputs) > 1 or len(desk.outputs) > 1:
+        return None  # models of several muscles take several
     used = desk.workspace.used().values()
     times = [run.sample_time for run in used if run.sample_time is not None]
     if not times or max(times) - min(times) <= 1e-3 * min(times):
@@ -81,7 +83,8 @@ def _sample_times(desk: Desk) -> None:
     wanted = common(times)
     with named(ui.card().classes("w-full border border-warning gap-1"), "sample-times"):
         ui.label("These recordings have different sample times").classes("font-medium")
-        ui.label(f"From {times[0]:.4g} to {times[1]:.4g} s; models need one.").classes("text-sm")
+        said = f"From {times[0]:.4g} to {times[1]:.4g} s; models of one muscle need one."
+        ui.label(said).classes("text-sm")
         button = ui.button(
             f"Resample all to {wanted:g} s", on_click=guarded(partial(_resample, desk, wanted))
         )

@@ -153,11 +153,11 @@ def _list(desk: Desk, dialogs: Any) -> None:
                     "Or open the example, a virtual muscle with a hanging load."
                 )
             return
+        desk.settle_channels()
         apart.build(desk)
         for entry in entries:
             _row(desk, entry.name, dialogs)
         known = desk.workspace.channels()
-        desk.settle_channels()
         with ui.row().classes("items-center"):
             for side in ("inputs", "outputs"):
                 chosen = list(getattr(desk, side))

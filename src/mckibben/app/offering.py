@@ -10,7 +10,7 @@ from mckibben.comparison.channels import Channels
 from mckibben.comparison.inverses import Kind
 from mckibben.comparison.limits import limits
 from mckibben.comparison.needs import Need, full_name, inverse_kind, needs
-from mckibben.comparison.offered import objections
+from mckibben.comparison.offered import defaults, objections
 from mckibben.comparison.recognising import DRIVING, FORCE
 
 FOLDS = 6
@@ -85,7 +85,13 @@ def offered(desk: Desk) -> Offered:
         for need in needs()
     ]
     groups = [(need, offers) for need, offers in groups if offers]
-    start = [offer.model for need, found in groups for offer in found if offer.model in need.start]
+    timeless = any(run.sample_time is None for run in recordings)
+    start = [
+        offer.model
+        for need, found in groups
+        for offer in found
+        if offer.model in need.start and not (timeless and defaults(offer.model).get("n_creep"))
+    ]
     return Offered(
         _recognised(desk, len(names) - len(against)) if recordings and known else "",
         groups,

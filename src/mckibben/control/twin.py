@@ -25,7 +25,7 @@ from mckibben.arrays import Array
 from mckibben.blocks.bands.band import Band
 from mckibben.blocks.bands.banded import Banded, inside
 from mckibben.blocks.core.block import Block
-from mckibben.blocks.core.commanding import drives
+from mckibben.blocks.core.commanding import commands, drives
 from mckibben.blocks.core.running import Stream
 from mckibben.control.identified import known_ranges
 from mckibben.errors import DataError, ModelError
@@ -100,10 +100,11 @@ class Twin:
         self.model, self.name, self.scatter_after = model, name, scatter_after
         self.forward = inside(model)
         outputs = tuple(channel.name for channel in self.forward.outputs)
-        if any(map(drives, self.forward.outputs)):
+        if commands(self.forward) or not all(o.startswith(("displ", "force")) for o in outputs):
             raise ModelError(
-                f"{self.forward.title!r} gives {', '.join(outputs)}, and loops follow what is moved. "
-                "Remedy: give the model of a muscle, not its inverse."
+                f"{self.forward.title!r} gives {', '.join(outputs)}, and loops follow displacements or "
+                "a force. Remedy: give the model of a muscle, not its inverse; or name what it moves "
+                "'displacement' where recordings are read."
             )
         self.outputs = outputs
         self.inputs = tuple(plain(c.name) for c in self.forward.inputs)

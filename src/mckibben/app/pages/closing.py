@@ -81,9 +81,12 @@ def _offer(
 ) -> None:
     laws = {name: registry.load("controllers", name) for name in registry.names("controllers")}
     if not offered:
-        ui.label(
-            "No plant fits: fit a second model of another kind under Models, and try it on that."
-        )
+        said = "No plant fits: fit a second model of another kind under Models, and try it on that."
+        try:
+            desk.workspace.twin(model)
+        except MckibbenError as error:
+            said = str(error)
+        named(ui.label(said), "no-plant")
         return
     if not any(text.endswith(("of your muscle", "of its size")) for text in offered.values()):
         ui.label(

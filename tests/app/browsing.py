@@ -83,12 +83,14 @@ def visited(browser: Any, address: str, **options: Any) -> Iterator[Any]:
     page.on("pageerror", lambda error: errors.append(str(error)))
     page.goto(address)
     seen(page, "tab-data")
+    met: list[str] = []
     try:
         yield page
+        met = list(errors)  # not those of what was under way when the window was closed
     finally:
         window.close()
-    assert foreign == []
-    assert errors == []
+    assert foreign == [], foreign
+    assert met == [], met
 
 
 def seen(page: Any, name: str, timeout: float = SLOW) -> Any:

@@ -87,6 +87,9 @@ def visited(browser: Any, address: str, **options: Any) -> Iterator[Any]:
     try:
         yield page
         met = list(errors)  # not those of what was under way when the window was closed
+    except Exception as error:
+        error.add_note(f"{page.inner_text('body')}\n\nConsole: {errors}")
+        raise
     finally:
         window.close()
     assert foreign == [], foreign

@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 
 from mckibben.app.work import fit
-from tests.app.browsing import BROWSER, OPTIONS, SLOW, seen, visited, workbench
+from tests.app.browsing import BROWSER, OPTIONS, SLOW, opened, seen, visited, workbench
 from tests.app.test_jobs import filled, swung
 from tests.app.test_jobs import fit as asked
 from tests.tools import needs
@@ -35,7 +35,10 @@ class Hand:
     clicks: int = 0
 
     def on(self, name: str) -> Any:
-        """Click what has a name for tests."""
+        """Click what has a name for tests; of a tab, wait until what is on it is there."""
+        if name.startswith("tab-"):
+            self.clicks += 1
+            return opened(self.page, name.removeprefix("tab-"))
         return self.at(seen(self.page, name))
 
     def at(self, place: Any) -> Any:

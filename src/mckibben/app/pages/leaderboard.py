@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from nicegui import ui
@@ -27,6 +27,7 @@ PARAMETERS = 12
 def build(desk: Desk) -> None:
     """Build it."""
     ui.label("Leaderboard: free-running, in the order of the choice").classes("text-lg")
+    ticked: list[str] = []  # what is seen closer stays so when the table is shown anew
 
     @ui.refreshable
     def shown() -> None:
@@ -45,14 +46,20 @@ def build(desk: Desk) -> None:
             ui.label(said).classes("text-sm")
         place = named(ui.column().classes("w-full"), "closer")
 
+        def chosen() -> list[str]:
+            return [row["name"] for row in table.selected][:2]
+
         async def closer() -> None:
-            place.clear()
-            names = [row["name"] for row in table.selected][:2]
-            if names:
-                await _closer(desk, names, place)
+            names = ticked[:] = chosen()
+            draw = await _closer(desk, names)
+            if names == chosen() and not place.is_deleted:  # else a later click draws
+                place.clear()
+                with place:
+                    draw()
 
         table.on_select(on_event(lambda _: closer()))
-        table.selected = table.rows[:1]
+        kept = [row for row in table.rows if row["name"] in ticked]
+        table.selected = kept or table.rows[:1]
         ui.timer(0.05, guarded(closer), once=True)
 
     desk.when("results", shown.refresh)
@@ -100,8 +107,10 @@ def _judged(results: Sequence[dict[str, Any]]) -> list[str]:
     return list(dict.fromkeys(said))
 
 
-async def _closer(desk: Desk, names: list[str], place: Any) -> None:
-    """Show measured against modelled, residuals and parameters, of one model or two side by side."""
+async def _closer(desk: Desk, names: list[str]) -> Callable[[], None]:
+    """Return what draws measured against modelled, residuals and parameters, of one model or two."""
+    if not names:
+        return lambda: None
     recordings = desk.workspace.with_role("test") or desk.workspace.with_role("train")
     if not recordings:
         raise DataError("there is no recording to run it on", remedy="add one under Data")
@@ -118,7 +127,8 @@ async def _closer(desk: Desk, names: list[str], place: Any) -> None:
         outputs = await asyncio.to_thread(modelled)
     except MckibbenError as error:
         raise ModelError(f"{', '.join(names)} on {recording.name}: {error}") from None
-    with place:
+
+    def draw() -> None:
         next_steps.buttons(desk, names[0])
         ui.label(f"On {recording.name}").classes("text-base")
         drawings = []
@@ -139,6 +149,8 @@ async def _closer(desk: Desk, names: list[str], place: Any) -> None:
             for name, block in blocks.items():
                 with ui.expansion(f"Parameters of {name}").classes("flex-1 min-w-72"):
                     named(_parameters(block), f"parameters-{name}")
+
+    return draw
 
 
 def _parameters(block: Block) -> ui.table:

@@ -10,7 +10,7 @@ import pytest
 from mckibben import DataError, Recording, read, signals
 from mckibben.app import edits, scripts
 from mckibben.app.kept import Reading, Step
-from mckibben.app.reading import by_letters, columns, options, read_upload
+from mckibben.app.reading import by_units, columns, options, read_upload
 from mckibben.app.recordings import EXAMPLE
 from mckibben.app.workspace import Workspace
 from mckibben.comparison.channels import Channels
@@ -192,16 +192,20 @@ def test_models_that_need_time_say_so_before_fitting() -> None:
     assert all("needs time" in found[name] for name in ("oe", "narx"))
 
 
-def test_letters_are_taken_for_what_their_units_say(tmp_path: Path) -> None:
+def test_names_that_tell_nothing_are_taken_for_what_their_units_say(tmp_path: Path) -> None:
     path = tmp_path / "arm.csv"
     rows = "\n".join(f"{k * 0.1},{k},{k % 3},{k * 2},{k % 5}" for k in range(20))
     path.write_text(f"time_s,u1_V,u2_V,y1_cm,q2\n{rows}")
-    reading = by_letters(path, read_upload(path))
+    reading = by_units(path, read_upload(path))
     (recording,) = read_upload(path, reading)
     assert list(recording.channels) == ["voltage_1", "voltage_2", "displacement_1", "q2"]
     assert recording["displacement_1"][1] == 20.0
+    wing = tmp_path / "wing.csv"
+    wing.write_text("input_V,output_deg\n" + "\n".join(f"{k % 5},{k % 3}" for k in range(20)))
+    (recording,) = read_upload(wing, by_units(wing, read_upload(wing)))
+    assert list(recording.channels) == ["voltage", "angle"]
     plain = tmp_path / "plain.csv"
     plain.write_text(
         "time_s,pressure_bar,displacement_mm\n" + "\n".join(f"{k},{k},{k}" for k in range(9))
     )
-    assert by_letters(plain, read_upload(plain)) == Reading()
+    assert by_units(plain, read_upload(plain)) == Reading()

@@ -14,6 +14,7 @@ import pytest
 from mckibben import PI, Banded, DataError, ModelError, Recording, Series, load_rig, write
 from mckibben.blocks.bands.band import Band
 from mckibben.blocks.core.block import Block
+from mckibben.blocks.core.fields import Channel
 from mckibben.blocks.feedback.pid import PIDFeedback
 from mckibben.control import Twin, before, track, tune_pid
 from mckibben.registry import load as registered
@@ -225,6 +226,25 @@ def test_pid_is_tuned_on_a_twin() -> None:
     pid = tune_pid(Twin(lagging), sample_time=STEP)
     assert isinstance(pid, PIDFeedback)
     assert track(pid, Twin(lagging), wave()).rmse["displacement"] < 0.2 * (HIGH - LOW)
+
+
+@pytest.mark.parametrize(("given", "moved"), [("voltage", "angle"), ("input", "output")])
+def test_loops_are_closed_whatever_the_channels_are_called(given: str, moved: str) -> None:
+    model = replace(MODEL, input=Channel(given, "V"), output=Channel(moved, "rad"))
+    twin = Twin(model, limits={given: (0.0, 8.0)})
+    reference = Recording({moved: wave()["displacement"]}, STEP, units={moved: "rad"})
+    tracked = track(model.inverse(), twin, reference, approach=5.0, settle=2.0)
+    assert tracked.rmse[moved] < 1e-9
+    lagging = Series(
+        (
+            model,
+            replace(
+                registered("blocks", "creep").example(), input=model.output, output=model.output
+            ),
+        )
+    )
+    pid = tune_pid(Twin(lagging, limits={given: (0.0, 8.0)}), sample_time=STEP)
+    assert pid.outputs[0].name == given
 
 
 def test_bad_twins_are_refused() -> None:

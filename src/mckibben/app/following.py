@@ -25,7 +25,7 @@ def loop(workspace: Workspace, given: dict[str, Any], tell: Tell) -> str:
     """Let a controller follow a reference on a model or a virtual rig, and keep the recording."""
     from mckibben.blocks.core.block import Block
     from mckibben.control import before, control_law, track, tune_pid
-    from mckibben.control.loop import wished
+    from mckibben.control.roles import wished
     from mckibben.files import read, write
     from mckibben.rigs import load_rig
 

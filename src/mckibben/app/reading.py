@@ -13,7 +13,7 @@ from mckibben.app.kept import Reading
 from mckibben.errors import DataError
 from mckibben.files import formats, read
 from mckibben.files.assigning import assign
-from mckibben.files.headers import channel_of, parse
+from mckibben.files.headers import QUANTITIES, channel_of, parse
 from mckibben.files.request import Request
 from mckibben.files.table import Column, Table
 from mckibben.recording import Recording
@@ -30,9 +30,6 @@ MOST_CELLS = 40_000_000
 
 FIRST = 4
 """Cells of a column that are shown."""
-
-QUANTITIES = {"bar": "pressure", "V": "voltage", "mm": "displacement", "N": "force"}
-"""What a channel without a telling name is, by its unit."""
 
 Result = TypeVar("Result")
 
@@ -78,18 +75,18 @@ def read_upload(path: Path, reading: Reading = AS_FOUND) -> list[Recording]:
     return _aside(_read, path, reading)
 
 
-def by_letters(path: Path, found: list[Recording]) -> Reading:
-    """Return how a file is read whose channels are letters, such as u1 and y1: what their units say.
+def by_units(path: Path, found: list[Recording]) -> Reading:
+    """Return how a file is read whose channels have no telling names, such as u1, or output.
 
-    Loops, tuning and reports know displacements and what drives them by name.
+    Loops, tuning and reports know motions and what drives them by name, which their units give.
     """
     first = found[0]
     renamed = {}
     for name in first.channels:
-        letter = re.fullmatch(r"[a-z](?:_?(\d+))?", name)
+        untelling = re.fullmatch(r"(?:[a-z]|input|output)(?:_?(\d+))?", name)
         quantity = QUANTITIES.get(first.units[name])
-        if letter and quantity:
-            renamed[name] = quantity + (f"_{letter[1]}" if letter[1] else "")
+        if untelling and quantity:
+            renamed[name] = quantity + (f"_{untelling[1]}" if untelling[1] else "")
     names = [renamed.get(name, name) for name in first.channels]
     if not renamed or len(set(names)) < len(names):
         return AS_FOUND

@@ -15,7 +15,8 @@ from mckibben.numerals import numeral
 
 if TYPE_CHECKING:
     from mckibben.blocks.core.block import Block
-    from mckibben.control.loop import Plant, Tracked
+    from mckibben.control.loop import Tracked
+    from mckibben.control.roles import Plant
     from mckibben.recording import Recording
 
 
@@ -98,7 +99,7 @@ def track(
         tune_pid,
     )
     from mckibben.control import track as close
-    from mckibben.control.loop import wished
+    from mckibben.control.roles import wished
     from mckibben.control.twin import COMMAND
     from mckibben.files import write
     from mckibben.outputs import claim_model, claim_recording
@@ -275,7 +276,7 @@ def _figures(tracked: Tracked | None) -> dict[str, object] | None:
 def _fits(block: Block, plant: Plant, reference: Recording) -> None:
     """Refuse a model in place of an inverse, and references without what the inverse needs."""
     from mckibben.blocks.feedback.pid import MEASURED
-    from mckibben.control.loop import driven_by
+    from mckibben.control.roles import driven_by
 
     for name in driven_by(block):
         if name not in plant.inputs:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mckibben.arrays import Array
-from mckibben.control.loop import Plant
+from mckibben.control.roles import Plant
 from mckibben.errors import ModelError
 
 GROUPS = ("stiffness", "friction", "gain")

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any, ClassVar, Protocol
+from typing import ClassVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from mckibben.arrays import Array
 from mckibben.blocks.core.block import Block
@@ -16,40 +16,13 @@ from mckibben.control.controller import BlockController, Controller
 from mckibben.control.pressure_loop import PressureLoop
 from mckibben.control.preview import samples_ahead
 from mckibben.control.reach import Beyond, beyond, ends, outside
-from mckibben.control.twin import Twin, plain
+from mckibben.control.roles import Plant, followed_by, roles, wished
+from mckibben.control.twin import Twin
 from mckibben.errors import DataError, ModelError
 from mckibben.recording import Recording, standard_unit
 from mckibben.signals.checking import generator
 from mckibben.system.progress import telling
 from mckibben.system.showing import DrawsItself
-
-
-class Plant(Protocol):
-    """What can be controlled: the step interface of rigs."""
-
-    @property
-    def name(self) -> str:
-        """Short name."""
-
-    @property
-    def inputs(self) -> tuple[str, ...]:
-        """Channels that drive it."""
-
-    @property
-    def outputs(self) -> tuple[str, ...]:
-        """Channels that it measures."""
-
-    def reset(self, seed: int = 0) -> Array:
-        """Bring it to rest and return the first measurement."""
-
-    def step(self, action: ArrayLike | Mapping[str, float]) -> Array:
-        """Hold commands for one sample time and return the next measurement."""
-
-    def limits(self, name: str) -> Any:
-        """Return what the hardware lets through on an input channel: ``low`` and ``high``."""
-
-    def changed(self, settings: Mapping[str, Any]) -> Any:
-        """Return the same plant with other settings."""
 
 
 @dataclass(frozen=True)
@@ -112,7 +85,7 @@ def track(
     seed: int = 0,
     progress: bool | Callable[[float], None] | None = None,
 ) -> Tracked:
-    """Let a controller make a plant's displacements, or its force, follow references.
+    """Let a controller make a plant's motions, or its force, follow references.
 
     Parameters
     ----------
@@ -121,7 +94,7 @@ def track(
     plant : Plant
         A rig; it is run at the reference's sample time, which is the control rate.
     reference : Recording
-        Channels of displacement to follow [mm], or without any the force [N], and of what schedules the
+        Channels of motion to follow [mm or rad], or without any the force [N], and of what schedules the
         controller and is held on the plant, such as ``pressure_extensor`` or the length in a test stand,
         as they should be. What a block drives, as pressures recorded with it, is passed over.
     approach : float
@@ -170,7 +143,7 @@ def track(
     further += controller.samples_ahead
     rng = generator(seed)
     followed = followed_by(plant, reference)
-    driven, held = _roles(plant, reference)
+    driven, held = roles(plant, reference)
     starts = {f"start.{name}": float(reference[name][0]) for name in held}
     settings = {"sample_time": step, **starts}
     scatters = isinstance(plant, Twin) and plant.scatters
@@ -276,55 +249,6 @@ def _check(
             raise ModelError(f"{name} is {value}. Remedy: give 0 to {most:g} {unit}.")
     if slew is not None and not 0 < slew < np.inf:
         raise ModelError(f"slew is {slew}. Remedy: give a positive number, in bar/s.")
-
-
-def driven_by(compensator: Block) -> list[str]:
-    """Return the inputs of a plant that a compensator drives; commands are recorded under such names."""
-    return [plain(channel.name) for channel in compensator.outputs]
-
-
-def wished(compensator: Block, reference: Recording) -> Recording:
-    """Return a reference without pressures recorded with it, which the compensator is to give."""
-    given = {channel.name for channel in compensator.outputs} | set(driven_by(compensator))
-    kept = [name for name in reference.channels if name not in given]
-    # A reference of pressures alone stays as it is, for whoever follows it to say what is missing.
-    return reference.select(kept) if 0 < len(kept) < len(reference.channels) else reference
-
-
-def followed_by(plant: Plant, reference: Recording) -> list[str]:
-    """Return the displacements, or the force, of a reference that a plant measures.
-
-    Raises
-    ------
-    DataError
-        If there are none.
-    """
-    measured_too = [name for name in plant.outputs if name in reference]
-    followed = [name for name in measured_too if name.startswith("displ")]
-    followed = followed or [name for name in measured_too if name == "force"]
-    if not followed:
-        raise DataError(
-            f"it has no displacement or force that {plant.name!r} measures",
-            file=reference.source,
-            remedy=f"give channels among {', '.join(plant.outputs)}",
-        )
-    return followed
-
-
-def _roles(plant: Plant, reference: Recording) -> tuple[list[str], list[str]]:
-    """Return the inputs that the controller drives, and those that the reference holds."""
-    held = [name for name in plant.inputs if name in reference]
-    return actuated(plant, held), held
-
-
-def actuated(plant: Plant, held: Collection[str]) -> list[str]:
-    """Return the inputs of a plant that move its muscles: pressures or voltages that are not held."""
-    driven = [
-        name
-        for name in plant.inputs
-        if name.startswith(("pressure", "voltage")) and name not in held
-    ]
-    return [name for name in driven if name.rpartition("_")[2].isdigit()] or driven
 
 
 def _cost(errors: Array, at_limit: NDArray[np.bool_]) -> float:

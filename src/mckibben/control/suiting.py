@@ -9,7 +9,7 @@ import numpy as np
 from mckibben.blocks.bands.banded import inside
 from mckibben.blocks.core.block import Block
 from mckibben.control.identified import known_ranges
-from mckibben.control.loop import Plant
+from mckibben.control.roles import Plant
 from mckibben.control.twin import Twin, plain
 from mckibben.errors import MckibbenError, ModelWarning
 from mckibben.numerals import numeral

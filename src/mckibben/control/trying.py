@@ -7,7 +7,8 @@ from typing import Any
 
 from mckibben.blocks.core.block import Block
 from mckibben.control.controller import Controller
-from mckibben.control.loop import Plant, Tracked, track, wished
+from mckibben.control.loop import Tracked, track
+from mckibben.control.roles import Plant, wished
 from mckibben.control.suiting import doubts
 from mckibben.control.uncompensated import slow_rise, uncompensated
 from mckibben.errors import MckibbenError

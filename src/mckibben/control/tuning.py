@@ -12,9 +12,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from mckibben.arrays import Array
+from mckibben.blocks.core.commanding import COMMANDS
 from mckibben.blocks.core.fields import Channel
 from mckibben.blocks.feedback.pid import PIDFeedback
-from mckibben.control.loop import Plant, actuated
+from mckibben.control.roles import MOVED, Plant, actuated
+from mckibben.control.twin import Twin
 from mckibben.errors import ModelError
 from mckibben.recording import standard_unit
 from mckibben.system.progress import Tell, one_by_one, telling
@@ -38,7 +40,7 @@ def tune_pid(
     Parameters
     ----------
     plant : Plant
-        A rig with as many pressures as displacements.
+        A rig with as many pressures as motions.
     sample_time : float
         Of the control to come [s].
     closed_loop_time : float, optional
@@ -70,12 +72,7 @@ def tune_pid(
     with telling(progress, "tuning") as tell:
         for name, limit in one_by_one(zip(driven, limits, strict=True), tell):
             rig.reset(seed)
-            followed = name.replace("pressure", "displacement").replace("voltage", "displacement")
-            if followed not in rig.outputs:
-                raise ModelError(
-                    f"PID follows a displacement, and {plant.name} gives {', '.join(rig.outputs)}. "
-                    "Remedy: use the compensator alone, or another rig."
-                )
+            followed = _moved_by(name, rig, len(driven))
             references.append(followed)
             place = rig.outputs.index(followed)
             for _ in range(n):
@@ -91,6 +88,20 @@ def tune_pid(
     )
 
 
+def _moved_by(name: str, rig: Plant, muscles: int) -> str:
+    """Return the motion that an input of a plant makes: that of its number, or the only one there is."""
+    end = name[name.find("_") :] if "_" in name else ""
+    found = [stem + end for stem in MOVED if stem + end in rig.outputs]
+    if muscles == 1 and not found and isinstance(rig, Twin):
+        found = [one for one in rig.outputs if not one.startswith((*COMMANDS, "force"))]
+    if len(found) != 1:
+        raise ModelError(
+            f"PID follows a displacement or an angle, and {rig.name} gives {', '.join(rig.outputs)}. "
+            "Remedy: use the compensator alone, or another rig."
+        )
+    return found[0]
+
+
 def _channels(names: Sequence[str]) -> tuple[Channel, ...]:
     return tuple(Channel(name, standard_unit(name) or "") for name in names)
 
@@ -101,7 +112,7 @@ def _simc(
     final = float(response[-max(len(response) // 10, 1) :].mean())
     if not final > 0:
         raise ModelError(
-            f"displacement does not rise with {name}. Remedy: check the plant, or its middle pressure."
+            f"{name} moves nothing upwards. Remedy: check the plant, or its middle pressure."
         )
     early = (np.argmax(response >= 0.283 * final) + 1) * step
     late = (np.argmax(response >= 0.632 * final) + 1) * step

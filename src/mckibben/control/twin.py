@@ -54,7 +54,7 @@ class Twin:
     Parameters
     ----------
     model : Block
-        From pressures, or commands, and what is held, to displacements or a force. With a band
+        From pressures, or commands, and what is held, to motions or a force. With a band
         (`mckibben.calibrate`), outputs scatter as that says.
     limits : mapping of str to (float, float), optional
         Lowest and highest pressure [bar], or command, by input; default what the model was identified
@@ -72,7 +72,7 @@ class Twin:
     Raises
     ------
     ModelError
-        If the model gives neither displacement nor force, or does not take the sample time.
+        If the model gives pressures or commands, or does not take the sample time.
     DataError
         On limits or held values of what is no input, or out of order.
 
@@ -100,11 +100,10 @@ class Twin:
         self.model, self.name, self.scatter_after = model, name, scatter_after
         self.forward = inside(model)
         outputs = tuple(channel.name for channel in self.forward.outputs)
-        if commands(self.forward) or not all(o.startswith(("displ", "force")) for o in outputs):
+        if commands(self.forward) or any(map(drives, self.forward.outputs)):
             raise ModelError(
-                f"{self.forward.title!r} gives {', '.join(outputs)}, and loops follow displacements or "
-                "a force. Remedy: give the model of a muscle, not its inverse; or name what it moves "
-                "'displacement' where recordings are read."
+                f"{self.forward.title!r} gives {', '.join(outputs)}, and loops follow motions or a "
+                "force. Remedy: give the model of a muscle, not its inverse."
             )
         self.outputs = outputs
         self.inputs = tuple(plain(c.name) for c in self.forward.inputs)

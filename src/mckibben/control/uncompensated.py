@@ -13,7 +13,8 @@ import numpy as np
 
 from mckibben.arrays import Array
 from mckibben.control.controller import Controller
-from mckibben.control.loop import Plant, actuated, followed_by, track
+from mckibben.control.loop import track
+from mckibben.control.roles import Plant, actuated, followed_by
 from mckibben.errors import ModelError
 from mckibben.recording import Recording
 

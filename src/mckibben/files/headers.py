@@ -29,8 +29,8 @@ ROLES: dict[str, str] = {
 }
 """What a loop is told and what it sends -> the words for it beside, or instead of, a channel's name."""
 
-FOLLOWED = {"mm": "displacement", "N": "force", "bar": "pressure", "V": "voltage", "rad": "angle"}
-"""Unit -> the channel of a role that names none."""
+QUANTITIES = {"mm": "displacement", "N": "force", "bar": "pressure", "V": "voltage", "rad": "angle"}
+"""Unit -> the channel of what has no telling name."""
 
 _ROLES = {word: role for role, words in ROLES.items() for word in words.split()}
 _CHANNELS = {alias: channel for channel, names in ALIASES.items() for alias in names.split()}
@@ -134,7 +134,7 @@ def _of_loop(name: str, header: Header) -> str | None:
     number = rest if rest.isdigit() else ""
     if not rest or number:
         target = "" if unit is None else unit.target or ""
-        channel = usual if unit is None else FOLLOWED.get(target)
+        channel = usual if unit is None else QUANTITIES.get(target)
         channel = f"{channel}_{number}" if channel and number else channel
     else:
         channel = channel_of(Header(rest, header.unit)) if _standard(rest) else None

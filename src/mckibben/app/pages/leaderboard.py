@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Sequence
+from collections.abc import Awaitable, Callable, Sequence
 from typing import Any
 
 from nicegui import ui
@@ -27,7 +27,7 @@ PARAMETERS = 12
 def build(desk: Desk) -> None:
     """Build it."""
     ui.label("Leaderboard: free-running, in the order of the choice").classes("text-lg")
-    ticked: list[str] = []  # what is seen closer stays so when the table is shown anew
+    ticked: list[str] = []  # what a user has chosen stays so when the table is shown anew
 
     @ui.refreshable
     def shown() -> None:
@@ -50,14 +50,18 @@ def build(desk: Desk) -> None:
             return [row["name"] for row in table.selected][:2]
 
         async def closer() -> None:
-            names = ticked[:] = chosen()
+            names = chosen()
             draw = await _closer(desk, names)
             if names == chosen() and not place.is_deleted:  # else a later click draws
                 place.clear()
                 with place:
                     draw()
 
-        table.on_select(on_event(lambda _: closer()))
+        def choose(_: Any) -> Awaitable[None]:
+            ticked[:] = chosen()
+            return closer()
+
+        table.on_select(on_event(choose))
         kept = [row for row in table.rows if row["name"] in ticked]
         table.selected = kept or table.rows[:1]
         ui.timer(0.05, guarded(closer), once=True)

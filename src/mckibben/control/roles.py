@@ -1,0 +1,100 @@
+"""What of a plant is driven, what is followed, and what is held: by names of channels."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from typing import Any, Protocol
+
+from numpy.typing import ArrayLike
+
+from mckibben.arrays import Array
+from mckibben.blocks.core.block import Block
+from mckibben.blocks.core.commanding import COMMANDS
+from mckibben.control.twin import Twin, plain
+from mckibben.errors import DataError
+from mckibben.recording import Recording
+
+MOVED = ("displacement", "angle")
+"""What motions are called: of a muscle, and of a joint."""
+
+
+class Plant(Protocol):
+    """What can be controlled: the step interface of rigs."""
+
+    @property
+    def name(self) -> str:
+        """Short name."""
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """Channels that drive it."""
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """Channels that it measures."""
+
+    def reset(self, seed: int = 0) -> Array:
+        """Bring it to rest and return the first measurement."""
+
+    def step(self, action: ArrayLike | Mapping[str, float]) -> Array:
+        """Hold commands for one sample time and return the next measurement."""
+
+    def limits(self, name: str) -> Any:
+        """Return what the hardware lets through on an input channel: ``low`` and ``high``."""
+
+    def changed(self, settings: Mapping[str, Any]) -> Any:
+        """Return the same plant with other settings."""
+
+
+def driven_by(compensator: Block) -> list[str]:
+    """Return the inputs of a plant that a compensator drives; commands are recorded under such names."""
+    return [plain(channel.name) for channel in compensator.outputs]
+
+
+def wished(compensator: Block, reference: Recording) -> Recording:
+    """Return a reference without pressures recorded with it, which the compensator is to give."""
+    given = {channel.name for channel in compensator.outputs} | set(driven_by(compensator))
+    kept = [name for name in reference.channels if name not in given]
+    # A reference of pressures alone stays as it is, for whoever follows it to say what is missing.
+    return reference.select(kept) if 0 < len(kept) < len(reference.channels) else reference
+
+
+def followed_by(plant: Plant, reference: Recording) -> list[str]:
+    """Return the motions, or the force, of a reference that a plant measures; of a twin, all it gives.
+
+    Raises
+    ------
+    DataError
+        If there are none.
+    """
+    measured_too = [name for name in plant.outputs if name in reference]
+    followed = [name for name in measured_too if name.startswith(MOVED)]
+    followed = followed or [name for name in measured_too if name == "force"]
+    if isinstance(plant, Twin):
+        followed = followed or measured_too
+    if not followed:
+        raise DataError(
+            f"it has no displacement, angle or force that {plant.name!r} measures",
+            file=reference.source,
+            remedy=f"give channels among {', '.join(plant.outputs)}",
+        )
+    return followed
+
+
+def roles(plant: Plant, reference: Recording) -> tuple[list[str], list[str]]:
+    """Return the inputs that a controller drives, and those that a reference holds."""
+    held = [name for name in plant.inputs if name in reference]
+    return actuated(plant, held), held
+
+
+def actuated(plant: Plant, held: Collection[str]) -> list[str]:
+    """Return the inputs of a plant that move its muscles, and are not held.
+
+    They are called pressures or voltages, or, in a twin of what has other names, are all that nothing
+    holds.
+    """
+    free = [name for name in plant.inputs if name not in held]
+    driven = [name for name in free if name.startswith(COMMANDS)]
+    if isinstance(plant, Twin):
+        driven = driven or [name for name in free if name not in plant.held]
+    return [name for name in driven if name.rpartition("_")[2].isdigit()] or driven

@@ -11,12 +11,23 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mckibben import PI, Banded, DataError, ModelError, Recording, Series, load_rig, write
+from mckibben import (
+    PI,
+    Banded,
+    DataError,
+    ModelError,
+    PiecewiseLinear,
+    Recording,
+    Series,
+    load_rig,
+    write,
+)
 from mckibben.blocks.bands.band import Band
 from mckibben.blocks.core.block import Block
 from mckibben.blocks.core.fields import Channel
 from mckibben.blocks.feedback.pid import PIDFeedback
 from mckibben.control import Twin, before, track, tune_pid
+from mckibben.control.suiting import doubts_of_feedback
 from mckibben.registry import load as registered
 from mckibben.registry import names
 from tests.cli.conftest import Cli
@@ -226,6 +237,25 @@ def test_pid_is_tuned_on_a_twin() -> None:
     pid = tune_pid(Twin(lagging), sample_time=STEP)
     assert isinstance(pid, PIDFeedback)
     assert track(pid, Twin(lagging), wave()).rmse["displacement"] < 0.2 * (HIGH - LOW)
+
+
+def test_pid_is_tuned_for_the_steepest_part_of_a_muscle_that_is_flat_in_its_middle() -> None:
+    bar, mm = MODEL.input, MODEL.output
+    flat = PiecewiseLinear((0.0, 3.0, 5.0, 8.0), (0.0, 10.0, 10.1, 20.0), bar, mm)
+    twin = Twin(flat, limits={"pressure": (0.0, 8.0)})
+    wanted = Recording(
+        {"displacement": 10.0 - 9.0 * np.cos(0.2 * np.pi * STEP * np.arange(1000))}, STEP
+    )
+    tracked = track(tune_pid(twin, sample_time=STEP), twin, wanted, approach=5.0, settle=2.0)
+    assert tracked.rmse["displacement"] < 1.0
+
+
+def test_feedback_on_a_model_without_time_is_doubted() -> None:
+    lagging = Series((MODEL, registered("blocks", "creep").example()))
+    assert "answers at once" in doubts_of_feedback("pid", Twin(MODEL))[0]
+    assert not doubts_of_feedback("feedforward", Twin(MODEL))
+    assert not doubts_of_feedback("pid", Twin(lagging))
+    assert not doubts_of_feedback("pid", load_rig("mas20-hanging"))
 
 
 @pytest.mark.parametrize(("given", "moved"), [("voltage", "angle"), ("input", "output")])

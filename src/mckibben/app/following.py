@@ -26,6 +26,7 @@ def loop(workspace: Workspace, given: dict[str, Any], tell: Tell) -> str:
     from mckibben.blocks.core.block import Block
     from mckibben.control import before, control_law, track, tune_pid
     from mckibben.control.roles import wished
+    from mckibben.control.suiting import doubts_of_feedback
     from mckibben.files import read, write
     from mckibben.rigs import load_rig
 
@@ -68,7 +69,7 @@ def loop(workspace: Workspace, given: dict[str, Any], tell: Tell) -> str:
             "largest": {channel: float(value) for channel, value in found.largest.items()},
             "uncompensated": {} if without.tracked is None else dict(without.tracked.rmse),
             "units": units,
-            "notes": list(without.notes),
+            "notes": [*without.notes, *doubts_of_feedback(kind, plant)],
             "clipped": int(found.clipped),
             "step_us": 1e6 * float(found.step_time[0]),
             "call": given.get("call", ""),

@@ -100,6 +100,7 @@ def track(
     )
     from mckibben.control import track as close
     from mckibben.control.roles import wished
+    from mckibben.control.suiting import doubts_of_feedback
     from mckibben.control.twin import COMMAND
     from mckibben.files import write
     from mckibben.outputs import claim_model, claim_recording
@@ -164,7 +165,7 @@ def track(
             seed=seed,
             progress=lambda share: tell(0.5 + 0.5 * share, ""),
         )
-    notes += without.notes
+    notes += [*without.notes, *doubts_of_feedback(controller, plant)]
     if out is not None:
         write(without.beside(found.recording), out)
     if controller_out is not None and isinstance(chosen, Block):

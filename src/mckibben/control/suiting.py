@@ -1,4 +1,4 @@
-"""Whether a compensator is of the plant it is tried on: another muscle, or the very model it undoes."""
+"""Whether what a plant tells of a controller holds: it may be another muscle, or know no time."""
 
 from __future__ import annotations
 
@@ -69,6 +69,23 @@ def doubts(compensator: Block, plant: Plant, rise: Recording) -> list[str]:
             "calibrate model.json FILES -o banded.json; --plant banded.json)"
         ]
     return [*_pressures(model, plant, rise), *_strokes(model, plant, rise)]
+
+
+def doubts_of_feedback(law: str, plant: Plant) -> list[str]:
+    """Return what speaks against feedback's errors on a plant: a model without time has no lag.
+
+    Parameters
+    ----------
+    law : str
+        Of the control law; see `mckibben.control.control_law`.
+    plant : Plant
+    """
+    if law == "feedforward" or not isinstance(plant, Twin) or plant.forward.rate_dependent:
+        return []
+    return [
+        "the plant is a model without time, which answers at once: feedback is better on it than it "
+        "will be on the muscle. Remedy: compare feedback on a model with time, such as balance"
+    ]
 
 
 def _pressures(model: Block, plant: Plant, rise: Recording) -> list[str]:

@@ -2,7 +2,9 @@
 
 A step of every pressure from the middle of its range gives gain, time constant and dead time (at 28 and
 63 % of the response); from them SIMC's rules (Skogestad, "Simple analytic rules for model reduction and
-PID controller tuning", 2003) give the gains, with a closed-loop time constant of one's choosing.
+PID controller tuning", 2003) give the gains, with a closed-loop time constant of one's choosing. They
+leave a gain margin of about three, so a slow ramp over the whole range tells whether the muscle is
+steeper somewhere than twice what the step met: a dead zone in the middle would have feedback oscillate.
 """
 
 from __future__ import annotations
@@ -23,6 +25,8 @@ from mckibben.system.progress import Tell, one_by_one, telling
 
 STEP = 0.1
 """Of pressure, relative to its range."""
+STEEPER = 2.0
+"""How many times steeper than at the step a muscle may be; more, and gains are for the steepest part."""
 
 
 def tune_pid(
@@ -80,7 +84,11 @@ def tune_pid(
             size = STEP * (limit.high - limit.low)
             moved = {**middle, name: middle[name] + size, **scheduled}
             response = np.array([rig.step(moved)[place] for _ in range(n)]) - before
-            gains.append(_simc(response, size, sample_time, closed_loop_time, name))
+            held = {**middle, **scheduled}
+            ramp = np.linspace(limit.low, limit.high, n)
+            slow = np.array([rig.step({**held, name: at})[place] for at in (*ramp, *ramp[::-1])])
+            steepest = _steepest(slow, ramp, size)
+            gains.append(_simc(response, size, steepest, sample_time, closed_loop_time, name))
     kp, ki = zip(*gains, strict=True)
     lowest, highest = min(limit.low for limit in limits), max(limit.high for limit in limits)
     return PIDFeedback.of(
@@ -106,8 +114,16 @@ def _channels(names: Sequence[str]) -> tuple[Channel, ...]:
     return tuple(Channel(name, standard_unit(name) or "") for name in names)
 
 
+def _steepest(response: Array, ramp: Array, size: float) -> float:
+    """Return the largest gain over steps of a size, of a response to a ramp up and down."""
+    apart = max(round(size / float(ramp[1] - ramp[0])), 1)
+    up, down = np.split(response, 2)
+    run = float(ramp[apart] - ramp[0])
+    return float(max((one[apart:] - one[:-apart]).max() for one in (up, down[::-1]))) / run
+
+
 def _simc(
-    response: Array, size: float, step: float, wanted: float | None, name: str
+    response: Array, size: float, steepest: float, step: float, wanted: float | None, name: str
 ) -> tuple[float, float]:
     final = float(response[-max(len(response) // 10, 1) :].mean())
     if not final > 0:
@@ -119,6 +135,6 @@ def _simc(
     time = max(1.5 * (late - early), step)
     dead = max(late - time, 0.5 * step)
     closed = wanted or max(dead, 3 * step)
-    gain = final / size
+    gain = max(final / size, steepest / STEEPER)
     kp = time / (gain * (closed + dead))
     return float(kp), float(kp / min(time, 4 * (closed + dead)))

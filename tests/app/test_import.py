@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,7 +12,7 @@ import pytest
 from mckibben import DataError, Recording, read, signals
 from mckibben.app import edits, scripts
 from mckibben.app.kept import Reading, Step
-from mckibben.app.reading import by_units, columns, options, read_upload
+from mckibben.app.reading import columns, options, read_upload, untold
 from mckibben.app.recordings import EXAMPLE
 from mckibben.app.workspace import Workspace
 from mckibben.comparison.channels import Channels
@@ -100,6 +102,61 @@ def test_the_example_is_added_once(tmp_path: Path) -> None:
     assert workspace.add_example() == []
     assert [entry.role for entry in workspace.entries()] == ["train", "test"]
     assert {entry.origin for entry in workspace.entries()} == {EXAMPLE}
+
+
+def test_a_part_keeps_its_time_when_an_earlier_step_is_taken_back(tmp_path: Path) -> None:
+    workspace = Workspace(tmp_path / "ws")
+    name = workspace.add_example()[0]
+    cut = Step(do="slice", start=100, stop=150)
+    for before, ends in (
+        (Step(do="resample", sample_time=0.1), (10.0, 14.9)),
+        (Step(do="slice", start=1000, stop=2000), (22.0, 22.98)),
+    ):
+        workspace.edit(name, "cut", [before, cut])
+        time = workspace.recording(name).time
+        assert (time[0], time[-1]) == pytest.approx(ends)
+        left = workspace.take_back(name, "back", [before, cut], 0)
+        time = workspace.recording(name).time
+        assert (time[0], time[-1]) == pytest.approx(ends)
+        assert workspace.entry(name).steps == left
+    with pytest.raises(DataError, match="changed or removed meanwhile"):
+        workspace.take_back(name, "back", [cut], 0)
+    assert workspace.take_back(name, "back", left, 0) == ()
+    assert workspace.recording(name).time[0] == 0.0
+
+
+def test_what_is_changed_during_an_edit_stays(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    workspace = Workspace(tmp_path / "ws")
+    workspace.add_example()
+    name, other = (entry.name for entry in workspace.entries())
+    applied = edits.applied
+    meanwhile: list[Callable[[], object]] = []
+
+    def slow(*given: Any) -> Recording:
+        meanwhile.pop()()
+        return applied(*given)
+
+    monkeypatch.setattr(edits, "applied", slow)
+    step = Step(do="low_pass", cutoff=2.0)
+    meanwhile[:] = [lambda: workspace.set_role(name, "unused")]
+    workspace.edit(name, "filter", [step])
+    assert (workspace.entry(name).role, workspace.entry(name).steps) == ("unused", (step,))
+    files = set((tmp_path / "ws" / "recordings").glob("*.csv"))
+    for change in (
+        lambda: workspace.remove(name),
+        lambda: workspace.rename(name, "renamed"),
+    ):
+        meanwhile[:] = [change]
+        with pytest.raises(DataError, match=r"was changed or removed meanwhile.*filter again"):
+            workspace.edit_each([name], "filter again", step)
+        assert name not in [entry.name for entry in workspace.entries()]
+        workspace.undo()
+        assert workspace.entry(name).steps == (step,)
+    left = set((tmp_path / "ws" / "recordings").glob("*.csv"))
+    assert {path.stem for path in left - files} <= {"renamed"}
+    assert workspace.entry(other).steps == ()
 
 
 def test_steps_are_repeated_by_their_calls() -> None:
@@ -196,16 +253,16 @@ def test_names_that_tell_nothing_are_taken_for_what_their_units_say(tmp_path: Pa
     path = tmp_path / "arm.csv"
     rows = "\n".join(f"{k * 0.1},{k},{k % 3},{k * 2},{k % 5}" for k in range(20))
     path.write_text(f"time_s,u1_V,u2_V,y1_cm,q2\n{rows}")
-    reading = by_units(path, read_upload(path))
+    reading = untold(path, read_upload(path))
     (recording,) = read_upload(path, reading)
     assert list(recording.channels) == ["voltage_1", "voltage_2", "displacement_1", "q2"]
     assert recording["displacement_1"][1] == 20.0
     wing = tmp_path / "wing.csv"
     wing.write_text("input_V,output_deg\n" + "\n".join(f"{k % 5},{k % 3}" for k in range(20)))
-    (recording,) = read_upload(wing, by_units(wing, read_upload(wing)))
+    (recording,) = read_upload(wing, untold(wing, read_upload(wing)))
     assert list(recording.channels) == ["voltage", "angle"]
     plain = tmp_path / "plain.csv"
     plain.write_text(
         "time_s,pressure_bar,displacement_mm\n" + "\n".join(f"{k},{k},{k}" for k in range(9))
     )
-    assert by_units(plain, read_upload(plain)) == Reading()
+    assert untold(plain, read_upload(plain)) == Reading()

@@ -34,6 +34,12 @@ def test_channels_are_found_by_name() -> None:
     single = Recording(dict.fromkeys(names, TIME.astype(np.float64)))
     assert channels_of([single], None, None, None).inputs == ("pressure",)
     assert channels_of([single], None, None, "force").inputs == ("voltage",)
+    t = TIME.astype(np.float64)
+    wing = Recording({"voltage": t, "angle": t}, 0.1)
+    assert channels_of([wing], None, None, None) == Channels(("voltage",), ("angle",))
+    arm = Recording({"voltage_1": t, "voltage_2": t, "angle_1": t, "angle_2": t}, 0.1)
+    found = channels_of([arm], None, None, None)
+    assert found == Channels(("voltage_1", "voltage_2"), ("angle_1", "angle_2"))
     with pytest.raises(DataError, match="weight"):
         channels_of([single], None, None, "weight")
 

@@ -137,6 +137,14 @@ def test_parquet_changed_by_another_program_is_read_as_foreign(
         assert mckibben.read(path, units=UNITS)[0].n_samples == 20
 
 
+def test_columns_of_no_telling_name_are_proposed_by_their_units(tmp_path: Path) -> None:
+    path = tmp_path / "arm.csv"
+    path.write_text("t_s,u1_V,u2_V,y1_cm,q\n" + "\n".join(f"{k},{k},{k},{k},{k}" for k in range(9)))
+    said = "--column voltage_1=u1_V --column voltage_2=u2_V --column displacement_1=y1_cm as"
+    with pytest.raises(DataError, match=said):
+        mckibben.read(path, channels=["pressure"])
+
+
 def test_own_files_follow_columns_units_rate_and_channels(tmp_path: Path) -> None:
     path = tmp_path / "sim.csv"
     k = np.arange(20, dtype=float)

@@ -33,10 +33,11 @@ class Changing(Recordings):
 
     def set_role(self, names: str | Sequence[str], role: Role) -> None:
         """Say what one recording or several are used for."""
-        entries = [self.entry(name) for name in ([names] if isinstance(names, str) else names)]
-        new = {each.name: replace(each, role=role) for each in entries if each.role != role}
-        if new:
-            self._change(f"{', '.join(new)} as {role}", new)
+        with self._changing:
+            entries = [self.entry(name) for name in ([names] if isinstance(names, str) else names)]
+            new = {each.name: replace(each, role=role) for each in entries if each.role != role}
+            if new:
+                self._change(f"{', '.join(new)} as {role}", new)
 
     def remove(self, *names: str) -> None:
         """Take recordings out of the workspace; what was uploaded stays."""
@@ -53,6 +54,7 @@ class Changing(Recordings):
             self._change(
                 f"rename {name} to {chosen}",
                 {name: None, chosen: replace(entry, name=chosen, path=path)},
+                {name: entry, chosen: entry},
             )
         except BaseException:
             self.give_back("recordings", chosen)
@@ -77,28 +79,55 @@ class Changing(Recordings):
             chosen = self.new_name("recordings", name) if new else name
             path = self._written(chosen, each) if steps else entry.base or entry.path
             new[chosen] = replace(entry, name=chosen, path=path, steps=tuple(steps))
-        self._change(what, new)
+        self._change(what, new, dict.fromkeys(new, entry))
         return list(new)
+
+    def take_back(
+        self, name: str, what: str, seen: Sequence[kept.Step], place: int
+    ) -> tuple[kept.Step, ...]:
+        """Take back one of a recording's steps, and return those left; errors are those of `edit`.
+
+        Parts cut out later span the time that they did, and not the samples of those numbers.
+
+        Parameters
+        ----------
+        name, what : str
+            Of the recording, and of the change, in words.
+        seen : sequence of Step
+            Those it had when one was chosen.
+        place : int
+            Of that one among them.
+        """
+        from mckibben.app import edits
+
+        entry = self._unchanged(replace(self.entry(name), steps=tuple(seen)), what)
+        base = self._read(entry.base or entry.path)
+        spans = edits.spans(base, entry.steps)
+        left = [(k, s) for k, s in enumerate(zip(entry.steps, spans, strict=True)) if k != place]
+        steps = edits.spanning(base, *zip(*(pair for _, pair in left), strict=True)) if left else ()
+        self.edit(name, what, steps)
+        return steps
 
     def edit_each(self, names: Iterable[str], what: str, step: kept.Step) -> None:
         """Do one more step to each of some recordings, as one change; errors are those of `edit`."""
         from mckibben.app import edits
 
-        new = {}
+        new, begun = {}, {}
         for name in names:
-            entry = self.entry(name)
+            entry = begun[name] = self.entry(name)
             path = self._written(name, edits.applied(self.recording(name), [step]))
             new[name] = replace(
                 entry, path=path, base=entry.base or entry.path, steps=(*entry.steps, step)
             )
-        self._change(what, new)
+        self._change(what, new, begun)
 
     def read_again(
         self, found: Mapping[str, tuple[Sequence[Recording], str]], reading: kept.Reading
     ) -> list[str]:
         """Replace what was read by what was read otherwise; steps are done anew.
 
-        Of several recordings, one for each stretch, those that were not there before are added.
+        Parts that were cut out span the time that they did, unless the rate was read otherwise. Of
+        several recordings, one for each stretch, those that were not there before are added.
 
         Parameters
         ----------
@@ -110,25 +139,65 @@ class Changing(Recordings):
         from mckibben.app import edits
 
         new: dict[str, Entry | None] = {}
+        begun = {}
         for name, (read, call) in found.items():
             entry = self.entry(name)
             places = [entry.part] if entry.part < len(read) else [0]
             if entry.reading.gaps != "split" and reading.gaps == "split":
                 places = list(range(len(read)))
-            made = [(place, edits.applied(read[place], entry.steps)) for place in places]
-            for place, each in made:
+            for place in places:
+                steps = self._again(entry, read[place])
+                each = edits.applied(read[place], steps)
                 chosen = name if name not in new else self.new_name("recordings", name)
                 base = path = self._written(chosen, read[place])
-                if entry.steps:
+                if steps:
                     path = self._written(chosen, each)
                 way = replace(entry, name=chosen, path=path, base=base, call=f"{call}[{place}]")
-                new[chosen] = replace(way, part=place, reading=reading, notes=read[place].notes)
-        self._change(f"read {', '.join(found)} otherwise", new)
+                way = replace(way, part=place, reading=reading, steps=steps)
+                new[chosen], begun[chosen] = replace(way, notes=read[place].notes), entry
+        self._change(f"read {', '.join(found)} otherwise", new, begun)
         return list(new)
 
-    def _change(self, what: str, new: Mapping[str, Entry | None]) -> None:
+    def _again(self, entry: Entry, read: Recording) -> tuple[kept.Step, ...]:
+        """Return the steps of a recording for what was read otherwise."""
+        from mckibben.app import edits
+
+        try:
+            before = self._read(entry.base or entry.path)
+            if before.sample_time == read.sample_time and len(before) != len(read):
+                return edits.spanning(read, entry.steps, edits.spans(before, entry.steps))
+        except (
+            DataError
+        ):  # what was read before is damaged, or its parts are not in what is read now
+            pass
+        return entry.steps
+
+    def _change(
+        self, what: str, new: Mapping[str, Entry | None], begun: Mapping[str, Entry] | None = None
+    ) -> None:
+        """Put what is new, unless that of which it was made is not there any more.
+
+        Parameters
+        ----------
+        what : str
+            In words.
+        new : mapping
+            By name; None where there is none.
+        begun : mapping, optional
+            By name, that of which it was made; only roles may have changed since, and are kept.
+        """
         self.demand()
         with self._changing:
+            try:
+                roles = {
+                    name: self._unchanged(one, what).role for name, one in (begun or {}).items()
+                }
+            except DataError:
+                self._drop(
+                    path.name for e in new.values() if e for path in (e.path, e.base) if path
+                )
+                raise
+            new = {n: replace(e, role=roles.get(n, e.role)) if e else e for n, e in new.items()}
             after = {name: None if each is None else each.content() for name, each in new.items()}
             before = {name: self.read_json("recordings", name) for name in new}
             self._put(after)
@@ -138,6 +207,16 @@ class Changing(Recordings):
             gone = [*history.undone, *done[:-MOST_CHANGES]]
             self._keep(kept.History(done=done[-MOST_CHANGES:]), gone)
         self.log(what)
+
+    def _unchanged(self, entry: Entry, what: str) -> Entry:
+        """Return what a recording is now, of which nothing but the role may have changed."""
+        now = self.entry(entry.name) if entry.name in self.names("recordings") else None
+        if now is None or replace(now, role=entry.role) != entry:
+            raise DataError(
+                f"{entry.name!r} was changed or removed meanwhile, so that this was not done: {what}",
+                remedy="do it to what is there now",
+            )
+        return now
 
     def undo(self) -> str | None:
         """Take the last change back, and return what it was; None if there is none."""
@@ -176,7 +255,11 @@ class Changing(Recordings):
         self.write_json("history", HISTORY, history.model_dump(mode="json"))
         files = {name for change in gone for name in _files(change)}
         files -= {name for change in (*history.done, *history.undone) for name in _files(change)}
-        for name in files - {
+        self._drop(files)
+
+    def _drop(self, files: Iterable[str]) -> None:
+        """Remove files of samples that no recording has."""
+        for name in set(files) - {
             path.name for e in self.entries() for path in (e.path, e.base) if path
         }:
             with suppress(OSError, DataError):

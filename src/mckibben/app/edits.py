@@ -6,6 +6,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from mckibben import signals
 from mckibben.app.kept import Step
 from mckibben.errors import DataError
@@ -66,6 +68,39 @@ def applied(recording: Recording, steps: Sequence[Step]) -> Recording:
             values["channels"] = [name for name in step.channels if name in recording]
         recording = edit.do(recording, *(values[name] for name in edit.takes))
     return recording
+
+
+Span = tuple[float, float] | None
+"""First and last time of what a step cuts out; None of others."""
+
+
+def spans(recording: Recording, steps: Sequence[Step]) -> list[Span]:
+    """Return the times that steps cut out of a recording; errors are those of `applied`."""
+    found: list[Span] = []
+    for step in steps:
+        cut = step.do == "slice"
+        found.append(_ends(recording.slice(step.start, step.stop)) if cut else None)
+        recording = applied(recording, [step])
+    return found
+
+
+def spanning(
+    recording: Recording, steps: Sequence[Step], spans: Sequence[Span]
+) -> tuple[Step, ...]:
+    """Return steps whose cuts span some times of a recording; errors are those of `applied`."""
+    found: list[Step] = []
+    for step, span in zip(steps, spans, strict=True):
+        if span is not None:
+            half = 0.5 * (recording.sample_time or 1.0)
+            start, stop = np.searchsorted(recording.time, (span[0] - half, span[1] + half))
+            step = step.model_copy(update={"start": int(start), "stop": int(stop)})
+        found.append(step)
+        recording = applied(recording, [step])
+    return tuple(found)
+
+
+def _ends(recording: Recording) -> tuple[float, float]:
+    return float(recording.time[0]), float(recording.time[-1])
 
 
 def call(read: str, steps: Sequence[Step]) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -13,7 +12,7 @@ from mckibben.app.kept import Reading
 from mckibben.errors import DataError
 from mckibben.files import formats, read
 from mckibben.files.assigning import assign
-from mckibben.files.headers import QUANTITIES, channel_of, parse
+from mckibben.files.headers import by_units, channel_of, parse
 from mckibben.files.request import Request
 from mckibben.files.table import Column, Table
 from mckibben.recording import Recording
@@ -75,23 +74,14 @@ def read_upload(path: Path, reading: Reading = AS_FOUND) -> list[Recording]:
     return _aside(_read, path, reading)
 
 
-def by_units(path: Path, found: list[Recording]) -> Reading:
+def untold(path: Path, found: list[Recording]) -> Reading:
     """Return how a file is read whose channels have no telling names, such as u1, or output.
 
     Loops, tuning and reports know motions and what drives them by name, which their units give.
     """
-    first = found[0]
-    renamed = {}
-    for name in first.channels:
-        untelling = re.fullmatch(r"(?:[a-z]|input|output)(?:_?(\d+))?", name)
-        quantity = QUANTITIES.get(first.units[name])
-        if untelling and quantity:
-            renamed[name] = quantity + (f"_{untelling[1]}" if untelling[1] else "")
-    names = [renamed.get(name, name) for name in first.channels]
-    if not renamed or len(set(names)) < len(names):
-        return AS_FOUND
+    renamed = by_units(found[0].units)
     headers = {column.channel: column.header for column in columns(path, AS_FOUND)}
-    if not renamed.keys() <= headers.keys():
+    if not renamed or not renamed.keys() <= headers.keys():
         return AS_FOUND
     return Reading(columns={new: headers[name] for name, new in renamed.items()})
 

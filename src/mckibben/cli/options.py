@@ -41,7 +41,7 @@ Inputs = Annotated[
     typer.Option(
         "--input",
         metavar="CHANNEL",
-        help="Input channel; repeatable. Default: pressure, pressure_1 ...",
+        help="Input channel; repeatable. Default: pressure, pressure_1 ..., or voltage ...",
     ),
 ]
 Outputs = Annotated[
@@ -49,7 +49,7 @@ Outputs = Annotated[
     typer.Option(
         "--output",
         metavar="CHANNEL",
-        help="Output channel; repeatable. Default: displacement, displacement_1 ...",
+        help="Output channel; repeatable. Default: displacement, displacement_1 ..., or angle ...",
     ),
 ]
 Load = Annotated[
@@ -127,8 +127,8 @@ _POLICIES: dict[Gaps, Literal["error", "split", "interpolate"]] = {
 }
 
 
-SEVERAL = re.compile(r"(pressure|displacement)_\d+|command_.+")
-"""Names of channels by which recordings of several muscles, and logs of loops, are told."""
+SEVERAL = re.compile(r"(pressure|voltage|displacement|angle)_\d+|voltage|angle|command_.+")
+"""Names of channels by which recordings of several muscles, of voltages or angles, and logs are told."""
 
 
 @dataclass(frozen=True)

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from mckibben.errors import DataError
-from mckibben.estimators.coupled.base import driving, numbered, schedules
+from mckibben.estimators.coupled.base import driving, moved, schedules
 from mckibben.recording import Recording
 
 Names = str | Sequence[str] | None
@@ -67,14 +67,8 @@ def channels_of(
     DataError
         If a recording lacks the load, or a channel is named twice.
     """
-    driven = {
-        name: None
-        for r in recordings
-        for name in (driving(r) if load is not None else numbered(r, "pressure"))
-    }
-    moved = {name: None for r in recordings for name in numbered(r, "displacement")}
-    given = _named(recordings, inputs, tuple(driven) or ("pressure",))
-    wanted = _named(recordings, outputs, tuple(moved) or ("displacement",))
+    given = _named(recordings, inputs, _by_name(recordings, driving, "pressure", load is None))
+    wanted = _named(recordings, outputs, _by_name(recordings, moved, "displacement", True))
     named = (*given, *wanted, *((load,) if load else ()))
     if twice := [name for name in named if named.count(name) > 1]:
         raise DataError(
@@ -93,6 +87,20 @@ def channels_of(
                 remedy="name it with --column, or leave --load out",
             )
     return Channels(given, wanted, (load,))
+
+
+def _by_name(
+    recordings: Sequence[Recording],
+    named: Callable[[Recording], tuple[str, ...]],
+    usual: str,
+    prefers: bool,
+) -> tuple[str, ...]:
+    """Return what recordings call several muscles' channels, or one's: the usual, where preferred."""
+    found = tuple(dict.fromkeys(name for recording in recordings for name in named(recording)))
+    several = tuple(name for name in found if name.rpartition("_")[2].isdigit())
+    if several or not found:
+        return several or (usual,)
+    return (usual,) if prefers and any(usual in recording for recording in recordings) else found
 
 
 def _named(

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Mapping
 from pathlib import Path
 
 from mckibben.errors import DataError
 from mckibben.files.calibration import constants
 from mckibben.files.channels import NAME
-from mckibben.files.headers import LONGEST, channel_of, parse, snake_case
+from mckibben.files.headers import LONGEST, by_units, channel_of, parse, snake_case
 from mckibben.files.notices import warn
 from mckibben.files.request import Request
 from mckibben.files.table import Column, Table
+from mckibben.files.units import find
 
 _LISTED = 30
 
@@ -133,7 +135,7 @@ def _require(named: Mapping[str, Column], table: Table, request: Request, path: 
                 f"there is no such channel; the columns are {_listed(table)}",
                 file=path,
                 channel=channel,
-                remedy=f"name its column with --column {channel}=COLUMN",
+                remedy=f"name its column with --column {channel}=COLUMN{_proposed(named)}",
             )
     for channel in request.units:
         if channel not in named:
@@ -143,6 +145,19 @@ def _require(named: Mapping[str, Column], table: Table, request: Request, path: 
                 channel=channel,
                 remedy="give --unit for one of them",
             )
+
+
+def _proposed(named: Mapping[str, Column]) -> str:
+    """Return what columns without telling names are by their units, as the options that say so."""
+    units = {}
+    for channel, column in named.items():
+        unit = find(column.unit or parse(column.label).unit or "")
+        units[channel] = (unit.target or "") if unit else ""
+    options = [
+        f"--column {channel}={shlex.quote(named[name].header)}"
+        for name, channel in by_units(units).items()
+    ]
+    return f", or say {' '.join(options)} as their units tell" if options else ""
 
 
 def _listed(table: Table) -> str:

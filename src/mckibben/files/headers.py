@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -142,6 +143,24 @@ def _of_loop(name: str, header: Header) -> str | None:
         return None
     sent = channel.startswith(("pressure", "voltage"))
     return f"{'command' if sent else role}_{channel}"
+
+
+def by_units(units: Mapping[str, str]) -> dict[str, str]:
+    """Return the channels of what has no telling name, such as u1, or output: by its unit and number.
+
+    Parameters
+    ----------
+    units : mapping
+        Of all channels of a recording, by name.
+    """
+    found = {}
+    for name, unit in units.items():
+        untelling = re.fullmatch(r"(?:[a-z]|input|output)(?:_?(\d+))?", name)
+        quantity = QUANTITIES.get(unit)
+        if untelling and quantity:
+            found[name] = quantity + (f"_{untelling[1]}" if untelling[1] else "")
+    names = [found.get(name, name) for name in units]
+    return found if len(set(names)) == len(names) else {}
 
 
 def unit_of(channel: str) -> str | None:

@@ -65,11 +65,9 @@ def steps(desk: Desk, name: str, recording: Recording) -> None:
         with named(ui.row().classes("items-center gap-1"), "steps"):
             ui.label("Done to it:").classes("text-sm")
             for place, step in enumerate(done):
-                rest = [*done[:place], *done[place + 1 :]]
                 words = edits.words(step)
-                chip = ui.chip(
-                    words, removable=True, on_value_change=_remover(desk, name, words, rest)
-                )
+                back = _remover(desk, name, f"{name}: without {words}", done, place)
+                chip = ui.chip(words, removable=True, on_value_change=back)
                 labelled(chip.props("outline dense"), "remove-aria-label", f"Take back {words}")
     rate = None if recording.sample_time is None else 1 / recording.sample_time
     with ui.row().classes("items-end gap-3"):
@@ -110,18 +108,25 @@ async def do(desk: Desk, name: str, *ways: Step | Sequence[Step]) -> None:
     before = desk.workspace.entry(name).steps
     given = [(*before, *([way] if isinstance(way, Step) else way)) for way in ways]
     said = " and ".join(edits.words(steps[-1]) for steps in given)
-    await _change(desk, name, f"{name}: {said}", given)
+    what = f"{name}: {said}"
+    await asyncio.to_thread(desk.workspace.edit, name, what, *given)
+    _done(desk, name, what, given[0])
 
 
-async def _change(desk: Desk, name: str, what: str, ways: Sequence[Sequence[Step]]) -> None:
-    await asyncio.to_thread(desk.workspace.edit, name, what, *ways)
+def _remover(
+    desk: Desk, name: str, what: str, seen: Sequence[Step], place: int
+) -> Callable[[], Any]:
+    async def back() -> None:
+        left = await asyncio.to_thread(desk.workspace.take_back, name, what, seen, place)
+        _done(desk, name, what, left)
+
+    return guarded(back)
+
+
+def _done(desk: Desk, name: str, what: str, steps: Sequence[Step]) -> None:
     desk.preview = name
-    desk.did(what, edits.call("recording", ways[0]))
+    desk.did(what, edits.call("recording", steps))
     desk.changed("recordings", "channels")
-
-
-def _remover(desk: Desk, name: str, words: str, rest: Sequence[Step]) -> Callable[[], Any]:
-    return guarded(lambda: _change(desk, name, f"{name}: without {words}", [rest]))
 
 
 def _button(text: str, name: str) -> Any:

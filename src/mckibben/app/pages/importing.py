@@ -14,7 +14,7 @@ from nicegui.events import UploadEventArguments
 from mckibben.app import scripts
 from mckibben.app.desk import LONGEST, Desk, guarded, kept, named, tell
 from mckibben.app.kept import Reading
-from mckibben.app.reading import AS_FOUND, Seen, by_units, columns, options, read_upload
+from mckibben.app.reading import AS_FOUND, Seen, columns, options, read_upload, untold
 from mckibben.errors import DataError, MckibbenError
 from mckibben.recording import STANDARD_UNITS, Recording
 
@@ -112,7 +112,7 @@ def add(desk: Desk, held: str, shown: str, reading: Reading) -> list[Recording]:
     """Read an uploaded file and add its recordings."""
     path = desk.workspace.path("uploads", held)
     found = read_upload(path, reading)
-    if reading == AS_FOUND and (better := by_units(path, found)) != AS_FOUND:
+    if reading == AS_FOUND and (better := untold(path, found)) != AS_FOUND:
         reading, found = better, read_upload(path, better)
     call = scripts.read_call(str(path), options(reading))
     for part, recording in enumerate(found):

@@ -174,12 +174,14 @@ class CoupledEstimator(ErrorsUnknown, Estimator):
 
 def driving(recording: Recording) -> tuple[str, ...]:
     """Return the channels that drive the muscles of a recording, by their names."""
-    return numbered(recording, "pressure") or one(recording, "voltage", "pressure")
+    several = numbered(recording, "pressure") or numbered(recording, "voltage")
+    return several or one(recording, "voltage", "pressure")
 
 
 def moved(recording: Recording) -> tuple[str, ...]:
-    """Return the displacements of a recording, by their names."""
-    return numbered(recording, "displacement") or one(recording, "displacement")
+    """Return the displacements of a recording, or its angles, by their names."""
+    several = numbered(recording, "displacement") or numbered(recording, "angle")
+    return several or one(recording, "displacement", "angle")
 
 
 def in_any(

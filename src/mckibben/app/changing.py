@@ -5,8 +5,8 @@ A change writes new files and descriptions, and keeps the old ones.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -24,12 +24,26 @@ MOST_CHANGES = 50
 HISTORY = "recordings"
 """Name of the history."""
 
+_Contents = Mapping[str, dict[str, Any] | None]
+
 
 class Changing(Recordings):
     """Recordings that can be changed, and every change undone.
 
     Parameters, and errors, are those of `mckibben.app.folder.Folder`.
     """
+
+    @contextmanager
+    def adding(self, what: str) -> Iterator[list[str]]:
+        """Give a list for the names of recordings that are added, as one change that can be undone."""
+        added: list[str] = []
+        try:
+            yield added
+        finally:
+            if added:
+                with self._changing:
+                    after = {name: self.read_json("recordings", name) for name in added}
+                    self._remember(what, dict.fromkeys(added), after)
 
     def set_role(self, names: str | Sequence[str], role: Role) -> None:
         """Say what one recording or several are used for."""
@@ -127,7 +141,8 @@ class Changing(Recordings):
         """Replace what was read by what was read otherwise; steps are done anew.
 
         Parts that were cut out span the time that they did, unless the rate was read otherwise. Of
-        several recordings, one for each stretch, those that were not there before are added.
+        several recordings, one for each stretch, those that were not there before are added; stretches
+        that are not cut out any more go.
 
         Parameters
         ----------
@@ -141,14 +156,19 @@ class Changing(Recordings):
         new: dict[str, Entry | None] = {}
         begun = {}
         for name, (read, call) in found.items():
+            if name in new:  # a stretch of what was read otherwise already
+                continue
             entry = self.entry(name)
             places = [entry.part] if entry.part < len(read) else [0]
             if entry.reading.gaps != "split" and reading.gaps == "split":
                 places = list(range(len(read)))
+            elif entry.reading.gaps == "split" and reading.gaps != "split":
+                new.update(dict.fromkeys(self._stretches(entry)))
             for place in places:
                 steps = self._again(entry, read[place])
                 each = edits.applied(read[place], steps)
-                chosen = name if name not in new else self.new_name("recordings", name)
+                again = name in new and new[name] is not None
+                chosen = self.new_name("recordings", name) if again else name
                 base = path = self._written(chosen, read[place])
                 if steps:
                     path = self._written(chosen, each)
@@ -156,7 +176,15 @@ class Changing(Recordings):
                 way = replace(way, part=place, reading=reading, steps=steps)
                 new[chosen], begun[chosen] = replace(way, notes=read[place].notes), entry
         self._change(f"read {', '.join(found)} otherwise", new, begun)
-        return list(new)
+        return [name for name, each in new.items() if each]
+
+    def _stretches(self, entry: Entry) -> list[str]:
+        """Return the recordings that were cut out of the same reading of a file, this one among them."""
+        return [
+            each.name
+            for each in self.entries()
+            if (each.upload, each.reading) == (entry.upload, entry.reading)
+        ]
 
     def _again(self, entry: Entry, read: Recording) -> tuple[kept.Step, ...]:
         """Return the steps of a recording for what was read otherwise."""
@@ -201,12 +229,15 @@ class Changing(Recordings):
             after = {name: None if each is None else each.content() for name, each in new.items()}
             before = {name: self.read_json("recordings", name) for name in new}
             self._put(after)
-            history = self._history()
-            change = kept.Change(what=short(what), before=before, after=after)
-            done = [*history.done, change]
-            gone = [*history.undone, *done[:-MOST_CHANGES]]
-            self._keep(kept.History(done=done[-MOST_CHANGES:]), gone)
+            self._remember(what, before, after)
         self.log(what)
+
+    def _remember(self, what: str, before: _Contents, after: _Contents) -> None:
+        history = self._history()
+        change = kept.Change(what=short(what), before=dict(before), after=dict(after))
+        done = [*history.done, change]
+        gone = [*history.undone, *done[:-MOST_CHANGES]]
+        self._keep(kept.History(done=done[-MOST_CHANGES:]), gone)
 
     def _unchanged(self, entry: Entry, what: str) -> Entry:
         """Return what a recording is now, of which nothing but the role may have changed."""
@@ -267,7 +298,7 @@ class Changing(Recordings):
                 path.unlink()
                 path.with_name(f"{name}-metadata.json").unlink()
 
-    def _put(self, contents: Mapping[str, dict[str, Any] | None]) -> None:
+    def _put(self, contents: _Contents) -> None:
         for name, content in contents.items():
             if content is None:
                 self.new_path("recordings", f"{name}.json").unlink(missing_ok=True)

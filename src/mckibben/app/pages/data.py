@@ -11,8 +11,9 @@ from mckibben import registry
 from mckibben.app.desk import LONGEST, Desk, guarded, labelled, named, on_event, tell
 from mckibben.app.guard import LARGEST_UPLOAD, TOO_LARGE
 from mckibben.app.pages import apart, editing
+from mckibben.app.pages.asking import ask_again
 from mckibben.app.pages.cutting import preview
-from mckibben.app.pages.importing import Intake, ask_again
+from mckibben.app.pages.importing import Intake
 from mckibben.errors import MckibbenError
 from mckibben.recording import Recording
 
@@ -75,7 +76,9 @@ def _sources(desk: Desk, dialogs: Any) -> Intake:
         ).classes("w-full"),
         "upload",
     )
-    intake.said = named(ui.label("").classes("text-sm").props("role=status"), "reading")
+    intake.reading = named(ui.label("").classes("text-sm").props("role=status"), "reading")
+    intake.pending = named(ui.button(on_click=lambda: intake.list()).props("flat"), "left-unread")
+    intake.show_left()
     with ui.row().classes("items-center"):
         example = named(ui.button("Open the example"), "example")
         example.on_click(guarded(lambda: _example(desk)))

@@ -1,0 +1,141 @@
+"""Recordings of uploaded files: added as they are read, or read otherwise later."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from mckibben.app import scripts
+from mckibben.app.desk import LONGEST, Desk
+from mckibben.app.kept import Reading
+from mckibben.app.reading import AS_FOUND, options, read_upload, untold
+from mckibben.errors import DataError, MckibbenError
+from mckibben.recording import Recording
+
+MANY = 20
+"""Stretches of a file beyond which it is asked whether they are meant."""
+
+GAPS = {"error": "refuse", "split": "split there", "interpolate": "bridge by straight lines"}
+"""What is done about gaps, in words."""
+
+_FIELDS = (
+    (r"--gaps split or (--gaps )?interpolate", f"“{GAPS['split']}” or “{GAPS['interpolate']}”"),
+    (r"--gaps interpolate or split", f"“{GAPS['interpolate']}” or “{GAPS['split']}”"),
+    (r"--gaps split", f"“{GAPS['split']}”"),
+    (r"--gaps interpolate", f"“{GAPS['interpolate']}”"),
+    (r"--column (\w+)=('[^']*'|\S+\b)", r"the field Channel (\1)"),
+    (r"--unit (\w+)=(\S+\b)", r"the field Unit (\2, say, of \1)"),
+    (r"--unit\b", "the field Unit"),
+    (r"--rate\b", "samples per second"),
+)
+"""Options of the command line, and the fields that stand for them."""
+
+
+@dataclass
+class Problem:
+    """A file that was not read: why, and where it is kept, if it can be asked how it is read."""
+
+    shown: str
+    error: MckibbenError
+    held: str = ""
+
+    def __str__(self) -> str:
+        text = said(self.error)
+        return text if self.shown in text else f"{self.shown}: {text}"
+
+
+def said(error: MckibbenError) -> str:
+    """Return what is wrong with a file, its folder aside, with fields instead of options."""
+    text = str(error)
+    if isinstance(error, DataError):
+        text = text.replace(f"{error.file}, ", "").replace(f"{error.file}: ", "")
+    for option, field in _FIELDS:
+        text = re.sub(option, field, text)
+    return text[:LONGEST]
+
+
+def about_gaps(error: MckibbenError | None) -> bool:
+    """Tell whether a file was not read because of gaps."""
+    return isinstance(error, DataError) and "--gaps" in error.remedy
+
+
+def add(
+    desk: Desk, held: str, shown: str, reading: Reading, *, many: bool = True
+) -> list[Recording]:
+    """Read an uploaded file and add its recordings, which can be undone.
+
+    Raises
+    ------
+    DataError
+        If it cannot be read; or is cut into more than `MANY` stretches, unless many are meant.
+    """
+    path = desk.workspace.path("uploads", held)
+    found = read_upload(path, reading)
+    if len(found) > MANY and not many:
+        longest = max(len(one) for one in found)
+        raise DataError(
+            f"that would make {len(found)} recordings, of {longest} samples at most",
+            remedy=f"“{GAPS['interpolate']}”, or press again for so many",
+        )
+    if reading == AS_FOUND and (better := untold(path, found)) != AS_FOUND:
+        reading, found = better, read_upload(path, better)
+    call = scripts.read_call(str(path), options(reading))
+    with desk.workspace.adding(f"add {shown}") as added:
+        for part, one in enumerate(found):
+            entry = desk.workspace.add(
+                one.with_meta(name=one.name.replace(path.stem, Path(shown).stem, 1)),
+                origin=f"file {shown}",
+                call=call,
+                upload=held,
+                part=part,
+                reading=reading,
+            )
+            added.append(entry.name)
+    desk.workspace.log(f"read {shown}", call)
+    return found
+
+
+def understood(recording: Recording) -> str:
+    """Return what was understood of a file: channels, time, and columns that were left out."""
+    said = ", ".join(f"{c} in {recording.units[c] or 'no unit'}" for c in recording.channels)
+    said += "; no time column" if recording.sample_time is None else ""
+    ignored = recording.meta.get("ignored_columns") or ()
+    if ignored:
+        said += f"; left out: {', '.join(map(str, ignored))}"
+    return said[:LONGEST]
+
+
+def replaced(desk: Desk, names: Sequence[str], reading: Reading) -> list[Recording]:
+    """Read the files of recordings otherwise, all or none, and return what came of the first."""
+    workspace = desk.workspace
+    read: dict[str, list[Recording]] = {}
+    calls = {}
+    for name in names:
+        upload = workspace.entry(name).upload
+        path = workspace.path("uploads", upload)
+        calls[name] = scripts.read_call(str(path), options(reading))
+        if upload not in read:
+            read[upload] = read_upload(path, reading)
+    made = {name: (read[workspace.entry(name).upload], call) for name, call in calls.items()}
+    workspace.read_again(made, reading)
+    for call in dict.fromkeys(calls.values()):
+        workspace.log(f"read {', '.join(names)} again", call)
+    return made[names[0]][0]
+
+
+def alike(desk: Desk, name: str) -> list[str]:
+    """Return other recordings with the same channels, of files that are kept."""
+    workspace, found = desk.workspace, list[str]()
+    for entry in workspace.entries():
+        known = entry.upload and entry.reading == workspace.entry(name).reading
+        if entry.name == name or not known:
+            continue
+        try:
+            same = list(workspace.recording(entry.name).channels)
+        except MckibbenError:
+            continue
+        if same == list(workspace.recording(name).channels):
+            found.append(entry.name)
+    return found

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from mckibben import DataError, Recording
+from mckibben.app.kept import Step
 from mckibben.app.workspace import Workspace
 from mckibben.registry import load
 
@@ -136,6 +137,32 @@ def test_results_are_in_the_order_of_the_choice(tmp_path: Path) -> None:
     workspace.write_json("results", "c", {"status": "failed"})
     assert [row["name"] for row in workspace.results()] == ["a", "b", "d"]
     assert json.loads((tmp_path / "results" / "a.json").read_text())["test"]["rmse"] == 2.0
+
+
+def test_models_of_recordings_changed_since_are_not_ranked_with_the_others(tmp_path: Path) -> None:
+    workspace = Workspace(tmp_path)
+    for name in ("one", "two"):
+        workspace.add(recording(), origin="", call="", name=name)
+    before = workspace.data()
+    for name, validated in (("a", 0.2), ("b", 0.3)):
+        content = {"status": "ok", "validation_rmse": validated, "data": before}
+        workspace.write_json("results", name, content)
+    workspace.rename("two", "three")
+    assert workspace.data() == before
+    assert all(row["current"] for row in workspace.results())
+    for change in (
+        lambda: workspace.set_role("one", "test"),
+        lambda: workspace.edit("three", "cut", [Step(do="slice", start=0, stop=20)]),
+        lambda: workspace.remove("one"),
+    ):
+        change()
+        assert workspace.data() != before
+        content = {"status": "ok", "validation_rmse": 0.9, "data": workspace.data()}
+        workspace.write_json("results", "c", content)
+        found = [(row["name"], row["current"]) for row in workspace.results()]
+        assert found == [("c", True), ("a", False), ("b", False)]
+        workspace.undo()
+        assert workspace.data() == before
 
 
 def test_notes_of_reading_stay_with_a_recording(tmp_path: Path) -> None:

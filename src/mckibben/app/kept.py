@@ -145,6 +145,7 @@ class Fitted(Kept):
     constant: Constant | None = None
     not_recommended: Text | None = None
     shared: list[Text] = []
+    data: Text = ""
 
 
 class Followed(Kept):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 import re
 import threading
 from collections.abc import Iterable, Iterator
@@ -91,6 +93,11 @@ class Entry:
             "reading": self.reading.model_dump(mode="json", exclude_defaults=True),
             "steps": [step.model_dump(mode="json", exclude_defaults=True) for step in self.steps],
         }
+
+    def samples(self) -> list[Any]:
+        """Return what tells its samples, and what they are used for, whatever it is called."""
+        content = self.content()
+        return [content[key] for key in ("role", "base", "upload", "part", "reading", "steps")]
 
 
 class Recordings(Folder):
@@ -269,9 +276,16 @@ class Recordings(Folder):
 
         return self._recordings.get(path, make)
 
-    def with_role(self, role: Role) -> list[Recording]:
-        """Return the recordings of a role."""
-        return [self.recording(entry.name) for entry in self.entries() if entry.role == role]
+    def with_role(self, role: Role, entries: Iterable[Entry] | None = None) -> list[Recording]:
+        """Return the recordings of a role, of all or of some entries."""
+        entries = self.entries() if entries is None else entries
+        return [self._read(entry.path) for entry in entries if entry.role == role]
+
+    def data(self, entries: Iterable[Entry] | None = None) -> str:
+        """Return what differs whenever what is trained or tested on does, of all or of some entries."""
+        entries = self.entries() if entries is None else entries
+        told = sorted(json.dumps(each.samples()) for each in entries if each.role != "unused")
+        return hashlib.sha256("\n".join(told).encode()).hexdigest()[:16]
 
     def readable(self) -> list[Recording]:
         """Return the recordings in use that are not damaged."""

@@ -14,7 +14,8 @@ def fit(workspace: Workspace, given: dict[str, Any], tell: Tell) -> str:
     """Fit, validate and test a model as `mckibben.compare` does, and keep it with its figures."""
     from mckibben.comparison.ranking import compare
 
-    train, test = workspace.with_role("train"), workspace.with_role("test")
+    entries = workspace.entries()
+    train, test = workspace.with_role("train", entries), workspace.with_role("test", entries)
     if not train:
         raise DataError("there is no recording to train on", remedy="give one the role 'train'")
     model = str(given["model"])
@@ -50,6 +51,7 @@ def fit(workspace: Workspace, given: dict[str, Any], tell: Tell) -> str:
         "not_recommended": board.not_recommended,
         "shared": list(board.shared),
         "settings": given.get("settings", {}),
+        "data": workspace.data(entries),
         "call": given.get("call", ""),
     }
     workspace.write_json("results", name, result)

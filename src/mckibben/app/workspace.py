@@ -140,12 +140,16 @@ class Workspace(Changing):
             self.invertible(name)
 
     def results(self) -> list[dict[str, Any]]:
-        """Return what is known of every model fitted, in the order of the choice: not by the test."""
-        found = []
+        """Return what is known of every model fitted, in the order of the choice: not by the test.
+
+        Those fitted and tested on recordings as they are now come first, and are ``"current"``.
+        """
+        found, data = [], self.data()
         for name in self.names("results"):
             result = kept.checked(kept.Fitted, self.read_json("results", name))
             if result is not None:
-                found.append(result.model_dump() | {"name": name})
+                current = result.data in ("", data)
+                found.append(result.model_dump() | {"name": name, "current": current})
         return sorted(found, key=_as_in_a_leaderboard)
 
     def runs(self, model: str) -> dict[str, kept.Followed]:
@@ -171,6 +175,7 @@ class Workspace(Changing):
         return {name: one for name, one in found.items() if one is not None}
 
 
-def _as_in_a_leaderboard(result: dict[str, Any]) -> tuple[bool, bool, float, str]:
+def _as_in_a_leaderboard(result: dict[str, Any]) -> tuple[Any, ...]:
     fitted = (result["train"] or {}).get("rmse")
-    return order(result["model"], result["validation_rmse"], fitted)
+    ranked = order(result["model"], result["validation_rmse"], fitted)
+    return not result["current"], "" if result["current"] else result["data"], *ranked

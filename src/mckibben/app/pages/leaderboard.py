@@ -24,6 +24,12 @@ PARAMETERS = 12
 """Of a page of the table of parameters."""
 
 
+OTHER_DATA = (
+    "Models marked “other data” were fitted or tested on recordings that have been added, changed, or "
+    "given another role since: their errors do not compare with the others'. Fit them again."
+)
+
+
 def build(desk: Desk) -> None:
     """Build it."""
     ui.label("Leaderboard: free-running, in the order of the choice").classes("text-lg")
@@ -35,6 +41,11 @@ def build(desk: Desk) -> None:
         if not results:
             ui.label("Fit models to see them compared here.").classes("opacity-70")
             return
+        if not all(result["current"] for result in results):
+            named(
+                ui.label(OTHER_DATA).classes("text-sm text-amber-900 dark:text-amber-300"),
+                "other-data",
+            )
         table = _table(results, desk.outputs)
         ui.label(
             "The first is to be chosen: least error in cross-validation on the training side; nothing "
@@ -66,6 +77,14 @@ def build(desk: Desk) -> None:
         table.selected = kept or table.rows[:1]
         ui.timer(0.05, guarded(closer), once=True)
 
+    data = {"known": desk.workspace.data()}
+
+    def changed() -> None:
+        if data["known"] != (now := desk.workspace.data()):
+            data["known"] = now
+            shown.refresh()
+
+    desk.when("recordings", changed)
     desk.when("results", shown.refresh)
     desk.when("theme", shown.refresh)
     shown()
@@ -91,7 +110,11 @@ def _row(result: dict[str, Any], columns: Sequence[Column]) -> dict[str, str]:
     shown = {column.key: typeset(column.text(result)) for column in columns}
     full = full_name(result["model"])
     title = result["name"] if full == result["name"] else f"{result['name']}: {full}"
-    return {"name": result["name"], "title": title} | shown
+    return {"name": result["name"], "title": title + _other(result)} | shown
+
+
+def _other(result: dict[str, Any]) -> str:
+    return "" if result["current"] else " (other data)"
 
 
 def _judged(results: Sequence[dict[str, Any]]) -> list[str]:
@@ -103,11 +126,11 @@ def _judged(results: Sequence[dict[str, Any]]) -> list[str]:
         validated = wording.number(constant.get("validation_rmse"))
         if constant:
             said.append(
-                f"constant, the mean of the training output: CV RMSE {validated}, test RMSE {tested}. "
-                "Every model has to beat it."
+                f"constant{_other(result)}, the mean of the training output: CV RMSE {validated}, "
+                f"test RMSE {tested}. Every model has to beat it."
             )
         against = [result.get("not_recommended"), *result.get("shared", ())]
-        said += [f"{result['name']}: {one}" for one in against if one]
+        said += [f"{result['name']}{_other(result)}: {one}" for one in against if one]
     return list(dict.fromkeys(said))
 
 

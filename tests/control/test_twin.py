@@ -13,6 +13,7 @@ import pytest
 
 from mckibben import (
     PI,
+    Affine,
     Banded,
     DataError,
     ModelError,
@@ -248,6 +249,31 @@ def test_pid_is_tuned_for_the_steepest_part_of_a_muscle_that_is_flat_in_its_midd
     )
     tracked = track(tune_pid(twin, sample_time=STEP), twin, wanted, approach=5.0, settle=2.0)
     assert tracked.rmse["displacement"] < 1.0
+
+
+def test_pid_is_tuned_where_displacement_falls_as_pressure_rises() -> None:
+    turned = Affine(gain=-1.0, offset=20.0, input=MODEL.output, output=MODEL.output)
+    twin = Twin(Series((MODEL, turned)), limits={"pressure": (0.0, 8.0)})
+    pid = tune_pid(twin, sample_time=STEP)
+    assert pid.kp[0] < 0.0
+    wanted = Recording({"displacement": 20.0 - wave()["displacement"]}, STEP)
+    tracked = track(pid, twin, wanted, approach=5.0, settle=2.0)
+    assert tracked.rmse["displacement"] < 0.05 * (HIGH - LOW)
+    still = replace(turned, gain=1e-300)
+    with pytest.raises(ModelError, match="pressure moves nothing"):
+        tune_pid(Twin(Series((MODEL, still)), limits={"pressure": (0.0, 8.0)}), sample_time=STEP)
+
+
+def test_feedback_is_the_same_where_everything_counts_the_other_way() -> None:
+    def pid(way: float) -> PIDFeedback:
+        channels = ((MODEL.output,), (MODEL.input,), (way * 0.5,), (way * 2.0,))
+        return PIDFeedback.of(*channels, limits=(0.0, 6.0))
+
+    rng = np.random.default_rng(1)
+    inputs = np.cumsum(rng.normal(size=(3000, 2)), axis=0)  # far beyond the limits, both ways
+    here, there = pid(1.0).stream(STEP), pid(-1.0).stream(STEP)
+    for row in inputs:
+        assert np.array_equal(here.step(row), there.step(-row))
 
 
 def test_feedback_on_a_model_without_time_is_doubted() -> None:

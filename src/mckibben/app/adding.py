@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from mckibben.app import scripts
 from mckibben.app.desk import LONGEST, Desk
+from mckibben.app.fields import GAPS, said
 from mckibben.app.kept import Reading
 from mckibben.app.reading import AS_FOUND, options, read_upload, untold
 from mckibben.errors import DataError, MckibbenError
@@ -16,21 +16,6 @@ from mckibben.recording import Recording
 
 MANY = 20
 """Stretches of a file beyond which it is asked whether they are meant."""
-
-GAPS = {"error": "refuse", "split": "split there", "interpolate": "bridge by straight lines"}
-"""What is done about gaps, in words."""
-
-_FIELDS = (
-    (r"--gaps split or (--gaps )?interpolate", f"“{GAPS['split']}” or “{GAPS['interpolate']}”"),
-    (r"--gaps interpolate or split", f"“{GAPS['interpolate']}” or “{GAPS['split']}”"),
-    (r"--gaps split", f"“{GAPS['split']}”"),
-    (r"--gaps interpolate", f"“{GAPS['interpolate']}”"),
-    (r"--column (\w+)=('[^']*'|\S+\b)", r"the field Channel (\1)"),
-    (r"--unit (\w+)=(\S+\b)", r"the field Unit (\2, say, of \1)"),
-    (r"--unit\b", "the field Unit"),
-    (r"--rate\b", "samples per second"),
-)
-"""Options of the command line, and the fields that stand for them."""
 
 
 @dataclass
@@ -44,16 +29,6 @@ class Problem:
     def __str__(self) -> str:
         text = said(self.error)
         return text if self.shown in text else f"{self.shown}: {text}"
-
-
-def said(error: MckibbenError) -> str:
-    """Return what is wrong with a file, its folder aside, with fields instead of options."""
-    text = str(error)
-    if isinstance(error, DataError):
-        text = text.replace(f"{error.file}, ", "").replace(f"{error.file}: ", "")
-    for option, field in _FIELDS:
-        text = re.sub(option, field, text)
-    return text[:LONGEST]
 
 
 def about_gaps(error: MckibbenError | None) -> bool:

@@ -12,6 +12,8 @@ from weakref import WeakSet
 from nicegui import ui
 
 from mckibben.app.busy import Answer
+from mckibben.app.fields import LONGEST as LONGEST
+from mckibben.app.fields import said
 from mckibben.app.jobs import Jobs
 from mckibben.app.news import News, Refresh
 from mckibben.app.workspace import Workspace
@@ -19,9 +21,6 @@ from mckibben.errors import MckibbenError
 
 if TYPE_CHECKING:
     from nicegui.elements.upload_files import FileUpload
-
-LONGEST = 2000
-"""Characters of a message."""
 
 SHARED = ("recordings", "results", "runs", "log")
 """Topics of the workspace; the others are of one page."""
@@ -158,13 +157,18 @@ def code(text: str) -> Any:
 def tell(error: Exception | str) -> None:
     """Show a problem with its remedy until it is closed."""
     ui.notify(
-        str(error)[:LONGEST].encode("utf-8", "replace").decode(),
+        said(error),
         type="negative",
         multi_line=True,
         close_button="Close",
         timeout=0,
-        position="top",
+        position="bottom",  # the tabs stay free, where the remedy may be
     )
+
+
+def refused(error: Exception, what: str = "") -> None:
+    """Show a problem with its remedy in the place of what cannot be shown."""
+    ui.label(f"{what}: {said(error)}" if what else said(error)).classes("text-negative")
 
 
 def guarded(action: Callable[[], Awaitable[Any]], what: str = "") -> Callable[..., Awaitable[None]]:

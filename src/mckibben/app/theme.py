@@ -77,6 +77,7 @@ body.body--dark {{ {_variables(DARK)} }}
   :is({filled}) :is(.text-white, .text-black) {{ color: var(--on) !important }}
   .bar {{ background: var(--bar) !important; color: var(--on-bar) !important }}
   .q-uploader__header {{ color: var(--on) !important }}
+  .q-notification .q-btn {{ color: inherit !important }}
   .text-grey, .q-table__bottom {{ color: var(--muted) !important }}
 }}
 {SHEET}"""
@@ -119,6 +120,8 @@ body { background: var(--paper); color: var(--ink) }
   .nicegui-content > *, .nicegui-column, .nicegui-row { max-width: 100% }
   .nicegui-content [class*="min-w-"] { min-width: min(100%, 12rem) }
   .nicegui-content .q-btn { min-height: 40px }
+  .q-table td.text-left { white-space: normal; max-width: 34vw; overflow-wrap: anywhere }
+  .q-table th, .q-table td { padding: 4px 6px }
   .q-dialog__inner { padding: 8px }
 }
 @media (prefers-reduced-motion: reduce) {

@@ -61,7 +61,7 @@ def tune_pid(
     Raises
     ------
     ModelError
-        If a muscle does not move with its own pressure, or the rig imposes its length.
+        If nothing moves with a muscle's own pressure, or the rig imposes its length.
     """
     scheduled = scheduled or {}
     driven = actuated(plant, scheduled)
@@ -87,8 +87,7 @@ def tune_pid(
             held = {**middle, **scheduled}
             ramp = np.linspace(limit.low, limit.high, n)
             slow = np.array([rig.step({**held, name: at})[place] for at in (*ramp, *ramp[::-1])])
-            steepest = _steepest(slow, ramp, size)
-            gains.append(_simc(response, size, steepest, sample_time, closed_loop_time, name))
+            gains.append(_simc(response, size, (slow, ramp), sample_time, closed_loop_time, name))
     kp, ki = zip(*gains, strict=True)
     lowest, highest = min(limit.low for limit in limits), max(limit.high for limit in limits)
     return PIDFeedback.of(
@@ -123,18 +122,27 @@ def _steepest(response: Array, ramp: Array, size: float) -> float:
 
 
 def _simc(
-    response: Array, size: float, steepest: float, step: float, wanted: float | None, name: str
+    response: Array,
+    size: float,
+    slowly: tuple[Array, Array],
+    step: float,
+    wanted: float | None,
+    name: str,
 ) -> tuple[float, float]:
-    final = float(response[-max(len(response) // 10, 1) :].mean())
-    if not final > 0:
+    settled = response[-max(len(response) // 10, 1) :]
+    final = float(settled.mean())
+    if not abs(final) > settled.std():
         raise ModelError(
-            f"{name} moves nothing upwards. Remedy: check the plant, or its middle pressure."
+            f"{name} moves nothing. Remedy: check the plant, or its middle {name.partition('_')[0]}."
         )
+    way = np.sign(final)  # a displacement that counts stretching falls as pressure rises
+    final, response = way * final, way * response
     early = (np.argmax(response >= 0.283 * final) + 1) * step
     late = (np.argmax(response >= 0.632 * final) + 1) * step
     time = max(1.5 * (late - early), step)
     dead = max(late - time, 0.5 * step)
     closed = wanted or max(dead, 3 * step)
-    gain = max(final / size, steepest / STEEPER)
-    kp = time / (gain * (closed + dead))
+    slow, ramp = slowly
+    gain = max(final / size, _steepest(way * slow, ramp, size) / STEEPER)
+    kp = way * time / (gain * (closed + dead))
     return float(kp), float(kp / min(time, 4 * (closed + dead)))

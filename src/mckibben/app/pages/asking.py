@@ -8,8 +8,9 @@ from typing import Any
 
 from nicegui import ui
 
-from mckibben.app.adding import GAPS, Problem, about_gaps, add, alike, replaced, said, understood
+from mckibben.app.adding import Problem, about_gaps, add, alike, replaced, understood
 from mckibben.app.desk import LONGEST, Desk, guarded, named, tell
+from mckibben.app.fields import GAPS, said
 from mckibben.app.kept import Reading
 from mckibben.app.reading import AS_FOUND, Seen, columns
 from mckibben.errors import DataError, MckibbenError

@@ -79,7 +79,9 @@ class Axes:
         _, lower = self.place(0.0, self.low)
         parts = [
             f'<rect x="{LEFT}" y="{upper:.1f}" width="{right - LEFT}" height="{lower - upper:.1f}" '
-            f'fill="{palette["accent"]}" opacity="0.14" />'
+            f'fill="{palette["accent"]}" opacity="0.18" />',
+            _line(LEFT, upper, right, upper, palette["accent"]),
+            _line(LEFT, lower, right, lower, palette["accent"]),
         ]
         style = f'fill="{ink}" font-size="12" font-family="system-ui, sans-serif"'
         for time in _ticks(0.0, self.seconds):

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from nicegui import ui
 
-from mckibben.app.desk import Desk, guarded, labelled, named
+from mckibben.app.desk import Desk, guarded, labelled, named, refused
 from mckibben.app.kept import Step
 from mckibben.app.pages import editing
 from mckibben.errors import DataError, MckibbenError
@@ -101,7 +101,7 @@ def preview(desk: Desk) -> None:
         try:
             recording = desk.workspace.recording(name)
         except MckibbenError as error:
-            ui.label(f"{name}: {error}").classes("text-negative")
+            refused(error, name)
             return
         ui.label(f"{name}: drag across the plot to select a part").classes("text-lg")
         channels = list(recording.channels)[:4]

@@ -8,7 +8,7 @@ from typing import Any
 from nicegui import ui
 
 from mckibben import registry
-from mckibben.app.desk import LONGEST, Desk, guarded, labelled, named, on_event, tell
+from mckibben.app.desk import LONGEST, Desk, guarded, labelled, named, on_event, refused, tell
 from mckibben.app.guard import LARGEST_UPLOAD, TOO_LARGE
 from mckibben.app.pages import apart, editing
 from mckibben.app.pages.asking import ask_again
@@ -190,7 +190,7 @@ def _row(desk: Desk, name: str, dialogs: Any) -> None:
     try:
         recording = desk.workspace.recording(name)
     except MckibbenError as error:
-        ui.label(f"{name}: {error}").classes("text-negative")
+        refused(error, name)
         return
     duration = "" if recording.duration is None else f", {recording.duration:.4g} s"
     with named(ui.row().classes("items-center w-full gap-2"), f"recording-{name}"):

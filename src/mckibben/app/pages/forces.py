@@ -71,7 +71,7 @@ def build(desk: Desk) -> None:
             named(
                 ui.button("Take the estimator (JSON)", on_click=guarded(take)), "take-force"
             ).props("outline")
-        ui.label("As C, FMU or for ROS 2: under Take away.").classes("text-xs opacity-70")
+        ui.label("As C or FMU: under Take away.").classes("text-xs opacity-70")
         showing(desk, "force", lambda: desk.workspace.estimates(), lambda *one: _shown(desk, *one))
     named(section, "forces")
 

@@ -10,8 +10,9 @@ from typing import Any
 from nicegui import ui
 from nicegui.events import UploadEventArguments
 
-from mckibben.app.adding import Problem, add, said
+from mckibben.app.adding import Problem, add
 from mckibben.app.desk import Desk, guarded, kept, named, tell
+from mckibben.app.fields import said
 from mckibben.app.pages.asking import ask, tell_of
 from mckibben.app.reading import AS_FOUND
 from mckibben.errors import DataError, MckibbenError

@@ -24,6 +24,12 @@ PARAMETERS = 12
 """Of a page of the table of parameters."""
 
 
+BY_VALUE = """(a, b, one, other) => {
+    const [x, y] = [one, other].map((row) => row["%s"] ?? Infinity);
+    return x < y ? -1 : x > y ? 1 : 0;
+}"""
+"""How a column is sorted: by what its rows hold, not as it is shown."""
+
 OTHER_DATA = (
     "Models marked “other data” were fitted or tested on recordings that have been added, changed, or "
     "given another role since: their errors do not compare with the others'. Fit them again."
@@ -97,7 +103,7 @@ def _table(results: Sequence[dict[str, Any]], outputs: Sequence[str]) -> ui.tabl
         rows=[_row(result, columns) for result in results],
         columns=[
             {"name": key, "label": label, "field": key, "sortable": True}
-            | {"align": "left" if key == "title" else "right"}
+            | {"align": "left" if key == "title" else "right", ":sort": BY_VALUE % f"{key}_by"}
             for key, label in listed
         ],
         row_key="name",
@@ -106,11 +112,13 @@ def _table(results: Sequence[dict[str, Any]], outputs: Sequence[str]) -> ui.tabl
     return named(table.classes("w-full").props("dense flat"), "leaderboard")
 
 
-def _row(result: dict[str, Any], columns: Sequence[Column]) -> dict[str, str]:
-    shown = {column.key: typeset(column.text(result)) for column in columns}
+def _row(result: dict[str, Any], columns: Sequence[Column]) -> dict[str, Any]:
+    shown: dict[str, Any] = {column.key: typeset(column.text(result)) for column in columns}
+    shown |= {f"{column.key}_by": column.sorted_by(result) for column in columns}
     full = full_name(result["model"])
     title = result["name"] if full == result["name"] else f"{result['name']}: {full}"
-    return {"name": result["name"], "title": title + _other(result)} | shown
+    title += _other(result)
+    return {"name": result["name"], "title": title, "title_by": title} | shown
 
 
 def _other(result: dict[str, Any]) -> str:

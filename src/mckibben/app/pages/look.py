@@ -9,7 +9,7 @@ import numpy as np
 from nicegui import ui
 
 from mckibben.app import plots
-from mckibben.app.desk import Desk, guarded, named
+from mckibben.app.desk import Desk, guarded, named, refused
 from mckibben.app.pages.cutting import time_plot
 from mckibben.errors import MckibbenError
 from mckibben.recording import Recording
@@ -70,7 +70,7 @@ def _matrix(desk: Desk, chosen: ui.select) -> None:
             recording = desk.workspace.recording(str(chosen.value))
             found = coupling_subjects.coupling([recording], desk.inputs, desk.outputs)
         except (MckibbenError, KeyError) as error:
-            ui.label(str(error)).classes("text-negative")
+            refused(error)
             return
         ui.label("What moves what: every output over every input").classes("text-lg")
         small = plots.figures(
@@ -124,7 +124,7 @@ def _plots(desk: Desk, chosen: ui.select, given: str, wanted: str) -> None:
         try:
             recording = desk.workspace.recording(str(chosen.value))
         except MckibbenError as error:
-            ui.label(str(error)).classes("text-negative")
+            refused(error)
             return
         found = cycles(recording[given])
         used = (*desk.inputs, *desk.outputs, given)
@@ -208,7 +208,7 @@ def _words(desk: Desk, given: str, wanted: str) -> None:
             found = await asyncio.to_thread(characterize, recordings, given, wanted)
         except MckibbenError as error:
             with place:
-                ui.label(str(error)).classes("text-negative")
+                refused(error)
             return
         with place:
             for sentence in found.sentences:
@@ -254,7 +254,7 @@ def _untold(desk: Desk, given: str, wanted: str) -> None:
             )
         except MckibbenError as error:
             with place:
-                ui.label(str(error)).classes("text-negative")
+                refused(error)
             return
         with place:
             if not gaps:

@@ -134,11 +134,11 @@ def _best_so_far(desk: Desk, fits: list[Job]) -> None:
         told = [(s, cost) for s, _, cost in desk.jobs.progress(job.name) if math.isfinite(cost)]
         if len(told) >= 2:
             seconds, costs = np.array(told).T
+            begun = np.flatnonzero(np.diff(costs) > 0) + 1  # each fold is searched anew
+            seconds, costs = np.insert(seconds, begun, np.nan), np.insert(costs, begun, np.nan)
             curves.append((job.title, seconds, costs, f"series-{place % 6 + 1}"))
     if curves:
-        ui.label("Best so far").classes("text-sm")
-        figure = plots.lines(
-            curves, x="time [s]", y=f"training RMSE of {', '.join(desk.outputs)}", dark=desk.dark
-        )
+        ui.label("Best so far, in each fold of the cross-validation anew").classes("text-sm")
+        figure = plots.lines(curves, x="time [s]", y="cost of the search", dark=desk.dark)
         figure["layout"]["yaxis"]["type"] = "log"
         named(ui.plotly(figure).classes("w-full"), "best-so-far")

@@ -51,7 +51,8 @@ def pid_kernel(coefficients: Array, state: Array, inputs: Array, outputs: Array)
             state[2 * n + k], state[3 * n + k] = measured, reference
             base = inputs[t, 2 * n + k] if based else 0.0
             wanted = base + kp[k] * error + state[k] - kd[k] * state[n + k]
-            further = (wanted > highest and error > 0.0) or (wanted < lowest and error < 0.0)
+            way = ki[k] * error
+            further = (wanted > highest and way > 0.0) or (wanted < lowest and way < 0.0)
             if not further:
                 state[k] += ki[k] * step * error
             outputs[t, k] = min(max(wanted, lowest), highest)

@@ -40,8 +40,9 @@ void mck_pid_step(const mck_part *part, mck_real *state, const mck_real *in, mck
         due[k] = reference;
         const mck_real wanted = base + kp[k] * error + integral[k] - kd[k] * rate[k];
         /* the integral stops where the output is at a limit and would be driven further */
-        const int further = (wanted > highest && error > MCK_R(0.0)) ||
-                            (wanted < lowest && error < MCK_R(0.0));
+        const mck_real way = ki[k] * error;
+        const int further = (wanted > highest && way > MCK_R(0.0)) ||
+                            (wanted < lowest && way < MCK_R(0.0));
         if (!further) {
             mck_accumulate(&integral[k], &lost[k], ki[k] * step * error);
         }

@@ -48,6 +48,7 @@ def test_a_compensator_that_looks_ahead_gives_pressures_when_they_are_due(
 ) -> None:
     exact, _ = compensated(workspace, "pi", wave(), "inverse", {})
     ahead, _ = compensated(workspace, "pi", wave(), "predictive", {"horizon": 5})
+    assert np.array_equal(ahead.time, wave().time)
     np.testing.assert_allclose(ahead["pressure"], exact["pressure"], atol=1e-9)
     slow, _ = compensated(workspace, "pi", wave(), "predictive", {"rate_limit": 0.5})
     assert np.abs(np.diff(slow["pressure"])).max() <= 0.5 * 0.02 + 1e-12

@@ -9,8 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mckibben import DataError, Recording, read, signals
-from mckibben.app import edits, scripts
+from mckibben import DataError, DataWarning, Recording, read, signals
+from mckibben.app import adding, edits, scripts
+from mckibben.app.desk import Desk
+from mckibben.app.jobs import Jobs
 from mckibben.app.kept import Reading, Step
 from mckibben.app.reading import columns, options, read_upload, untold
 from mckibben.app.recordings import EXAMPLE
@@ -157,6 +159,69 @@ def test_what_is_changed_during_an_edit_stays(
     left = set((tmp_path / "ws" / "recordings").glob("*.csv"))
     assert {path.stem for path in left - files} <= {"renamed"}
     assert workspace.entry(other).steps == ()
+
+
+def test_files_of_one_channel_each_are_joined(tmp_path: Path) -> None:
+    workspace = Workspace(tmp_path / "ws")
+    desk = Desk(workspace, Jobs(workspace))
+    rng = np.random.default_rng(0)
+    sent: dict[str, Recording] = {}
+    for name, channel, n in (("u1", "force", 40), ("u2", "force", 30), ("y1", "displacement", 40)):
+        sent[name] = Recording({channel: rng.normal(size=n)}, 0.1)
+        workspace.add(sent[name], origin="", call="", name=name)
+    assert adding.pairs(workspace) == []
+    sent["y2"] = Recording({"displacement": rng.normal(size=30)}, 0.1)
+    workspace.add(sent["y2"], origin="", call="", name="y2", role="test")
+    workspace.set_role("u2", "test")
+    pairs = adding.pairs(workspace)
+    assert pairs == [("u1", "y1"), ("u2", "y2")]
+    for pair in pairs:
+        adding.join(desk, pair)
+    assert [(e.name, e.role) for e in workspace.entries()] == [
+        ("u1-y1", "train"),
+        ("u2-y2", "test"),
+    ]
+    whole = workspace.recording("u1-y1")
+    assert np.allclose(whole["force"], sent["u1"]["force"])
+    assert np.allclose(whole["displacement"], sent["y1"]["displacement"])
+    assert adding.pairs(workspace) == []
+
+
+def test_stretches_that_are_not_cut_out_any_more_go(tmp_path: Path) -> None:
+    workspace = Workspace(tmp_path / "ws")
+    desk = Desk(workspace, Jobs(workspace))
+    times = [0.1 * k + 5.0 * (k >= 30) + 5.0 * (k >= 60) for k in range(90)]
+    rows = "".join(f"{t:g},{k % 7},{k % 5}\n" for k, t in enumerate(times))
+    path = workspace.keep_upload("rig.csv", f"time_s,p_bar,displacement_mm\n{rows}".encode())
+    with pytest.raises(DataError, match="gap") as error:
+        adding.add(desk, path.name, "rig.csv", Reading())
+    assert adding.about_gaps(error.value)
+    assert "“split there”" in str(adding.Problem("rig.csv", error.value))
+    assert "--gaps" not in str(adding.Problem("rig.csv", error.value))
+    assert str(tmp_path) not in str(adding.Problem("rig.csv", error.value))
+    adding.add(desk, path.name, "rig.csv", Reading(gaps="split"))
+    names = [entry.name for entry in workspace.entries()]
+    assert len(names) == 3
+    with pytest.warns(DataWarning, match="interpolated over"):
+        adding.replaced(desk, [names[1]], Reading(gaps="interpolate"))
+    assert [entry.name for entry in workspace.entries()] == [names[1]]
+    assert len(workspace.recording(names[1])) == 190
+    assert workspace.undo()
+    assert [entry.name for entry in workspace.entries()] == names
+    assert workspace.undo() == "add rig.csv"
+    assert workspace.entries() == []
+
+
+def test_so_many_stretches_are_asked_about(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    workspace = Workspace(tmp_path / "ws")
+    desk = Desk(workspace, Jobs(workspace))
+    monkeypatch.setattr(adding, "MANY", 1)
+    rows = "".join(f"{0.1 * k + 5.0 * (k >= 30):g},{k % 7},{k % 5}\n" for k in range(60))
+    path = workspace.keep_upload("rig.csv", f"time_s,p_bar,displacement_mm\n{rows}".encode())
+    with pytest.raises(DataError, match="that would make 2 recordings, of 30 samples at most"):
+        adding.add(desk, path.name, "rig.csv", Reading(gaps="split"), many=False)
+    assert workspace.entries() == []
+    assert len(adding.add(desk, path.name, "rig.csv", Reading(gaps="split"))) == 2
 
 
 def test_steps_are_repeated_by_their_calls() -> None:

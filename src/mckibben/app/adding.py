@@ -11,6 +11,7 @@ from mckibben.app.desk import LONGEST, Desk
 from mckibben.app.fields import GAPS, said
 from mckibben.app.kept import Reading
 from mckibben.app.reading import AS_FOUND, options, read_upload, untold
+from mckibben.app.workspace import Workspace
 from mckibben.errors import DataError, MckibbenError
 from mckibben.recording import Recording
 
@@ -70,6 +71,48 @@ def add(
             added.append(entry.name)
     desk.workspace.log(f"read {shown}", call)
     return found
+
+
+def pairs(workspace: Workspace) -> list[tuple[str, ...]]:
+    """Return recordings in use that may be channels of one: as long, at one rate, no channel twice.
+
+    They are paired in the order of their names, and only where each has its other.
+    """
+    kinds: dict[tuple[str, ...], dict[tuple[int, float | None], list[str]]] = {}
+    for name, run in sorted(workspace.used().items()):
+        alike = kinds.setdefault(tuple(run.channels), {})
+        alike.setdefault((len(run), run.sample_time), []).append(name)
+    channels = [channel for kind in kinds for channel in kind]
+    first, *others = kinds.values() or [{}]
+    counts = {size: len(names) for size, names in first.items()}
+    fit = all({size: len(names) for size, names in o.items()} == counts for o in others)
+    if not others or not fit or len(set(channels)) < len(channels):
+        return []
+    return [each for size in first for each in zip(*(k[size] for k in kinds.values()), strict=True)]
+
+
+def join(desk: Desk, names: Sequence[str]) -> None:
+    """Make one recording of several that hold its channels; it is kept as a file of its own.
+
+    Raises
+    ------
+    DataError
+        If nothing can be written.
+    """
+    from mckibben.files import write
+
+    workspace = desk.workspace
+    whole, *others = (workspace.recording(name) for name in names)
+    for other in others:
+        whole = whole.with_channels(other.units, **other.channels)
+    path = workspace.path(
+        "uploads", f"{workspace.new_name('uploads', '-'.join(names), '.csv')}.csv"
+    )
+    write(whole.with_meta(name=path.stem), path)
+    role = workspace.entry(names[0]).role
+    add(desk, path.name, path.name, AS_FOUND)
+    workspace.set_role(path.stem, role)
+    workspace.remove(*names)
 
 
 def understood(recording: Recording) -> str:

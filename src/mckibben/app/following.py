@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -107,7 +108,9 @@ def compensated(
         warnings.simplefilter("always")
         found = block.simulate(given_early, sample_time=None)
     notes += [str(one.message) for one in caught if issubclass(one.category, ModelWarning)]
-    return found.slice(ahead, len(found)) if ahead else found, list(dict.fromkeys(notes))
+    if ahead:  # each is due when its reference is
+        found = replace(found.slice(ahead, len(found)), start_time=reference.start_time)
+    return found, list(dict.fromkeys(notes))
 
 
 def look_back(workspace: Workspace, given: dict[str, Any], tell: Tell) -> str:

@@ -77,7 +77,7 @@ body.body--dark {{ {_variables(DARK)} }}
   :is({filled}) :is(.text-white, .text-black) {{ color: var(--on) !important }}
   .bar {{ background: var(--bar) !important; color: var(--on-bar) !important }}
   .q-uploader__header {{ color: var(--on) !important }}
-  .q-notification .q-btn {{ color: inherit !important }}
+  .q-notification :is(.q-notification__actions, .q-btn) {{ color: inherit !important }}
   .text-grey, .q-table__bottom {{ color: var(--muted) !important }}
 }}
 {SHEET}"""

@@ -1,4 +1,4 @@
-"""What keeps recordings from being fitted together, and a button that mends it."""
+"""What keeps recordings from being fitted together, and buttons that mend it."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from functools import partial
 
 from nicegui import ui
 
+from mckibben.app import adding
 from mckibben.app.desk import LONGEST, Desk, guarded, labelled, named
 from mckibben.app.kept import Step
 
@@ -55,6 +56,15 @@ def _channels(desk: Desk) -> None:
             if common
             else "No channel is in all of them: nothing can be fitted to them together."
         )
+        if pairs := adding.pairs(desk.workspace):
+            said = "; ".join(" with ".join(names) for names in pairs[:SHOWN])
+            more = " …" if len(pairs) > SHOWN else ""
+            with ui.row().classes("items-center w-full"):
+                ui.label(f"As long, and of other channels: {said}{more}").classes(
+                    "flex-1 min-w-40 text-sm break-words"
+                )
+                button = ui.button("Join them", on_click=guarded(partial(_join, desk, pairs)))
+                named(button.props("outline dense"), "join")
         for channels, names in sorted(kinds.items(), key=lambda kind: -len(kind[1])):
             own = [channel for channel in channels if channel not in common]
             listed = ", ".join(names[:SHOWN]) + (" …" if len(names) > SHOWN else "")
@@ -67,6 +77,13 @@ def _channels(desk: Desk) -> None:
                 )
                 labelled(button.props("outline dense"), "aria-label", f"Set {listed} unused")
                 named(button, f"aside-{names[0]}")
+
+
+async def _join(desk: Desk, pairs: list[tuple[str, ...]]) -> None:
+    for names in pairs:
+        await asyncio.to_thread(adding.join, desk, names)
+    desk.settle_channels()
+    desk.changed("recordings", "channels", "log")
 
 
 async def _set_aside(desk: Desk, names: list[str]) -> None:

@@ -169,7 +169,7 @@ def test_files_of_one_channel_each_are_joined(tmp_path: Path) -> None:
     for name, channel, n in (("u1", "force", 40), ("u2", "force", 30), ("y1", "displacement", 40)):
         sent[name] = Recording({channel: rng.normal(size=n)}, 0.1)
         workspace.add(sent[name], origin="", call="", name=name)
-    assert adding.pairs(workspace) == []
+    assert adding.pairs(workspace) == [("u1", "y1")]
     sent["y2"] = Recording({"displacement": rng.normal(size=30)}, 0.1)
     workspace.add(sent["y2"], origin="", call="", name="y2", role="test")
     workspace.set_role("u2", "test")

@@ -76,19 +76,19 @@ def add(
 def pairs(workspace: Workspace) -> list[tuple[str, ...]]:
     """Return recordings in use that may be channels of one: as long, at one rate, no channel twice.
 
-    They are paired in the order of their names, and only where each has its other.
+    They are paired in the order of their names, where each has its other.
     """
-    kinds: dict[tuple[str, ...], dict[tuple[int, float | None], list[str]]] = {}
+    sizes: dict[tuple[int, float | None], dict[tuple[str, ...], list[str]]] = {}
     for name, run in sorted(workspace.used().items()):
-        alike = kinds.setdefault(tuple(run.channels), {})
-        alike.setdefault((len(run), run.sample_time), []).append(name)
-    channels = [channel for kind in kinds for channel in kind]
-    first, *others = kinds.values() or [{}]
-    counts = {size: len(names) for size, names in first.items()}
-    fit = all({size: len(names) for size, names in o.items()} == counts for o in others)
-    if not others or not fit or len(set(channels)) < len(channels):
-        return []
-    return [each for size in first for each in zip(*(k[size] for k in kinds.values()), strict=True)]
+        kinds = sizes.setdefault((len(run), run.sample_time), {})
+        kinds.setdefault(tuple(run.channels), []).append(name)
+    found: list[tuple[str, ...]] = []
+    for kinds in sizes.values():
+        channels = [channel for kind in kinds for channel in kind]
+        as_many = len({len(names) for names in kinds.values()}) == 1
+        if len(kinds) > 1 and as_many and len(set(channels)) == len(channels):
+            found += zip(*kinds.values(), strict=True)
+    return found
 
 
 def join(desk: Desk, names: Sequence[str]) -> None:

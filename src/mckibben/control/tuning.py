@@ -23,8 +23,8 @@ from mckibben.errors import ModelError
 from mckibben.recording import standard_unit
 from mckibben.system.progress import Tell, one_by_one, telling
 
-STEP = 0.1
-"""Of pressure, relative to its range."""
+STEPS = (0.1, 0.2, 0.4)
+"""Of pressure, relative to its range: larger ones only where smaller ones move nothing."""
 STEEPER = 2.0
 """How many times steeper than at the step a muscle may be; more, and gains are for the steepest part."""
 
@@ -79,14 +79,17 @@ def tune_pid(
             followed = _moved_by(name, rig, len(driven))
             references.append(followed)
             place = rig.outputs.index(followed)
-            for _ in range(n):
-                before = rig.step({**middle, **scheduled})[place]
-            size = STEP * (limit.high - limit.low)
-            moved = {**middle, name: middle[name] + size, **scheduled}
-            response = np.array([rig.step(moved)[place] for _ in range(n)]) - before
-            held = {**middle, **scheduled}
+            rest, limit_range = {**middle, **scheduled}, limit.high - limit.low
+            for share in STEPS:
+                for _ in range(n):
+                    before = rig.step(rest)[place]
+                size = share * limit_range
+                moved = {**rest, name: middle[name] + size}
+                response = np.array([rig.step(moved)[place] for _ in range(n)]) - before
+                if _moves(response):
+                    break
             ramp = np.linspace(limit.low, limit.high, n)
-            slow = np.array([rig.step({**held, name: at})[place] for at in (*ramp, *ramp[::-1])])
+            slow = np.array([rig.step({**rest, name: at})[place] for at in (*ramp, *ramp[::-1])])
             gains.append(_simc(response, size, (slow, ramp), sample_time, closed_loop_time, name))
     kp, ki = zip(*gains, strict=True)
     lowest, highest = min(limit.low for limit in limits), max(limit.high for limit in limits)
@@ -121,6 +124,16 @@ def _steepest(response: Array, ramp: Array, size: float) -> float:
     return float(max((one[apart:] - one[:-apart]).max() for one in (up, down[::-1]))) / run
 
 
+def _settled(response: Array) -> Array:
+    return response[-max(len(response) // 10, 1) :]
+
+
+def _moves(response: Array) -> bool:
+    """Tell whether something has moved, by more than it scatters."""
+    settled = _settled(response)
+    return abs(float(settled.mean())) > float(settled.std())
+
+
 def _simc(
     response: Array,
     size: float,
@@ -129,9 +142,8 @@ def _simc(
     wanted: float | None,
     name: str,
 ) -> tuple[float, float]:
-    settled = response[-max(len(response) // 10, 1) :]
-    final = float(settled.mean())
-    if not abs(final) > settled.std():
+    final = float(_settled(response).mean())
+    if not _moves(response):
         raise ModelError(
             f"{name} moves nothing. Remedy: check the plant, or its middle {name.partition('_')[0]}."
         )

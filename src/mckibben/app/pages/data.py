@@ -9,6 +9,7 @@ from nicegui import ui
 
 from mckibben import registry
 from mckibben.app.desk import LONGEST, Desk, guarded, labelled, named, on_event, refused, tell
+from mckibben.app.fields import said
 from mckibben.app.guard import LARGEST_UPLOAD, TOO_LARGE
 from mckibben.app.pages import apart, editing
 from mckibben.app.pages.asking import ask_again
@@ -197,12 +198,12 @@ def _row(desk: Desk, name: str, dialogs: Any) -> None:
         with ui.column().classes("gap-0 flex-1 min-w-40"):
             ui.label(name).classes("font-medium break-all")
             listed = ", ".join(f"{c} [{recording.units[c] or '-'}]" for c in recording.channels)
-            said = f"{len(recording)} samples{duration}; {listed}"
-            ui.label(said).classes("text-xs opacity-70 break-words")
+            told = f"{len(recording)} samples{duration}; {listed}"
+            ui.label(told).classes("text-xs opacity-70 break-words")
             _aside_said(recording, name)
             for note in entry.notes[:SHOWN]:
                 named(
-                    ui.label(note[:LONGEST]).classes("text-xs text-amber-900 dark:text-amber-300"),
+                    ui.label(said(note)).classes("text-xs text-amber-900 dark:text-amber-300"),
                     f"note-{name}",
                 )
         named(
@@ -225,13 +226,13 @@ def _row(desk: Desk, name: str, dialogs: Any) -> None:
 def _aside_said(recording: Recording, name: str) -> None:
     """Say what is missing: times, and columns that were left out."""
     ignored = recording.meta.get("ignored_columns") or ()
-    said = []
+    told = []
     if recording.sample_time is None:
-        said.append("no time: only models without rates take it; give a rate by 'How it was read'")
+        told.append("no time: only models without rates take it; give a rate by 'How it was read'")
     if ignored:
-        said.append(f"left out: {', '.join(map(str, ignored))}")
-    if said:
-        text = "; ".join(said)[:LONGEST]
+        told.append(f"left out: {', '.join(map(str, ignored))}")
+    if told:
+        text = "; ".join(told)[:LONGEST]
         named(ui.label(text).classes("text-xs opacity-70 break-words"), f"understood-{name}")
 
 

@@ -74,6 +74,10 @@ class Job:
         return str(given.get("title") or given.get("name") or given.get("model") or self.kind)
 
 
+def _nothing() -> None:
+    """Do nothing, in a process that shows that processes can be started."""
+
+
 class Jobs:
     """The jobs of a workspace.
 
@@ -90,7 +94,7 @@ class Jobs:
         self.at_once = at_once or cores()
         self.untold: list[str] = []
         """What could not be written down, for the page to tell."""
-        self._seen = -1
+        self._seen, self._warmed = -1, False
         self._asked: list[tuple[str, Job]] = []
         self.jobs = self._kept()
 
@@ -217,6 +221,15 @@ class Jobs:
 
     def _progress(self, name: str) -> Path:
         return self.workspace.path("jobs", f"{name}.progress")
+
+    def warm(self) -> None:
+        """Load what processes will need, so that the first job starts at once; it takes seconds."""
+        if not self._warmed and not self.workspace.read_only:
+            self._warmed = True
+            prepare()
+            first = context().Process(target=_nothing, daemon=True)
+            first.start()
+            first.join()
 
     def _start(self, job: Job) -> None:
         prepare()

@@ -127,6 +127,17 @@ def test_recordings_of_two_muscles_get_models_that_couple_them(tmp_path: Path) -
     visit(workspace, look)
 
 
+def test_a_channel_is_on_one_side(tmp_path: Path) -> None:
+    workspace = filled(tmp_path)
+    desk = Desk(workspace, Jobs(workspace))
+    desk.settle_channels()
+    assert (desk.inputs, desk.outputs) == (("pressure",), ("displacement",))
+    desk.choose("outputs", ["pressure"])
+    assert (desk.inputs, desk.outputs) == (("displacement",), ("pressure",))
+    desk.choose("inputs", ["displacement", "pressure"])
+    assert (desk.inputs, desk.outputs) == (("displacement",), ("pressure",))
+
+
 def test_models_of_other_channels_are_not_compared(tmp_path: Path) -> None:
     workspace = filled(tmp_path)
     figures = {"rmse": 0.5}

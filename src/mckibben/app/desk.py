@@ -128,8 +128,16 @@ class Desk:
             self.inputs, self.outputs = found
 
     def choose(self, side: str, channels: Sequence[str]) -> None:
-        """Take what the user has chosen for inputs or outputs; it stays as long as it is there."""
-        setattr(self, side, tuple(channels))
+        """Take what the user has chosen for inputs or outputs; it stays as long as it is there.
+
+        What is on one side is not on the other, and neither is left without any.
+        """
+        other = "outputs" if side == "inputs" else "inputs"
+        taken, given = getattr(self, other), getattr(self, side)
+        left = tuple(name for name in taken if name not in channels)
+        left = left or tuple(name for name in given if name not in channels) or taken
+        setattr(self, other, left)
+        setattr(self, side, tuple(name for name in channels if name not in left))
         self._chosen = True
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import logging
 import socket
 import threading
 import webbrowser
@@ -84,7 +85,14 @@ def serve(
     app.on_shutdown(jobs.close)
     app.timer(TICK, jobs.poll)  # whether or not a page is open
 
-    idle = threading.Timer(IDLE, load_the_rest)
+    # what a page tells a person with its remedy is no news for the terminal
+    logging.getLogger("nicegui").addFilter(_unforeseen)
+
+    def prepare() -> None:
+        load_the_rest()
+        jobs.warm()
+
+    idle = threading.Timer(IDLE, prepare)
     idle.daemon = True
 
     @ui.page("/", title="mckibben", response_timeout=PATIENCE)
@@ -117,6 +125,12 @@ def serve(
             reconnect_timeout=ABSENCE,
             favicon="🦾",
         )
+
+
+def _unforeseen(record: logging.LogRecord) -> bool:
+    """Tell whether what is logged is no error of ours."""
+    error = record.exc_info[1] if record.exc_info else record.msg
+    return not isinstance(error, MckibbenError)
 
 
 def _make_room() -> None:

@@ -34,9 +34,6 @@ TICK = 0.4
 SENT = 0.03
 """For the browser to be told that a tab was opened, before what is on it is made [s]."""
 
-WARM = 1.0
-"""After a page is asked for, when it has been drawn: when processes of jobs are prepared [s]."""
-
 TOPICS = {"fit": "results", "loop": "runs", "record": "recordings", "report": "jobs"}
 """What changes when a job of a kind has ended."""
 
@@ -79,7 +76,6 @@ def build(workspace: Workspace, jobs: Jobs) -> Desk:
         _log(desk)
     _watch(desk)
     ui.timer(0.1, lambda: _match(desk, dark), once=True)
-    ui.timer(WARM, lambda: asyncio.to_thread(jobs.warm), once=True)
     return desk
 
 

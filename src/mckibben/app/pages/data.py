@@ -237,8 +237,10 @@ def _aside_said(recording: Recording, name: str) -> None:
 
 
 def _set_role(desk: Desk, name: str, role: Any) -> None:
-    desk.workspace.set_role([name], role)
-    desk.changed("recordings", "channels")
+    try:
+        desk.workspace.set_role([name], role)
+    finally:  # where that is refused, the role is shown as it stays
+        desk.changed("recordings", "channels")
 
 
 def _remove(desk: Desk, name: str) -> None:

@@ -385,7 +385,9 @@ def test_an_unpaired_plant_says_why_nothing_stands_beside() -> None:
     wanted = Recording({"displacement_1": np.full(50, 3.0)}, STEP)
     found = before(MODEL.inverse(), twin, wanted, approach=0.2)
     assert found.tracked is None
-    assert "2 commands move 1 displacements" in " ".join(found.notes)
+    said = " ".join(found.notes)
+    assert "pressure_1, pressure_2 together move displacement_1" in said
+    assert "pid" not in said  # which cannot run there either
 
 
 def test_rigs_stand_beside_no_compensation_too() -> None:

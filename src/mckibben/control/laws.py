@@ -14,7 +14,9 @@ from mckibben.blocks.feedback.feedforward_feedback import FeedforwardFeedback
 from mckibben.blocks.feedback.pid import PIDFeedback
 from mckibben.control.controller import Controller
 from mckibben.control.observer import DisturbanceObserver
-from mckibben.errors import ModelError
+from mckibben.control.roles import Plant
+from mckibben.control.tuning import untuned_pid
+from mckibben.errors import MckibbenError, ModelError
 
 Tuned = Callable[[], PIDFeedback]
 
@@ -38,6 +40,26 @@ def control_law(name: str, compensator: Block, tuned: Tuned) -> Block | Controll
     """
     made: Block | Controller = registry.load("controllers", name)(compensator, tuned)
     return made
+
+
+def refusal(name: str, compensator: Block, plant: Plant) -> str:
+    """Return why a law closes no loop of a compensator on a plant, or an empty string.
+
+    It is told by channels alone: nothing is run, and feedback is not tuned.
+
+    Parameters
+    ----------
+    name : str
+        Of the law.
+    compensator : Block
+    plant : Plant
+    """
+    held = [channel.name for channel in compensator.inputs if channel.name in plant.inputs]
+    try:
+        control_law(name, compensator, lambda: untuned_pid(plant, held))
+    except MckibbenError as error:
+        return str(error)
+    return ""
 
 
 def feedforward(compensator: Block, tuned: Tuned) -> Block:

@@ -112,6 +112,10 @@ def _strokes(model: Block, plant: Plant, rise: Recording) -> list[str]:
     known, within = known_ranges(model), np.ones(len(rise), dtype=bool)
     given = {channel.name: rise[plain(channel.name)] for channel in model.inputs}
     driven = [name for name, values in given.items() if np.ptp(values) > 0]
+    if len(driven) != len(
+        model.outputs
+    ):  # of an arm, those that pull against each other move nothing
+        return []
     for name in driven:
         low, high = known.get(name, (-np.inf, np.inf))
         within &= (given[name] >= low) & (given[name] <= high)

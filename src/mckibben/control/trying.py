@@ -60,10 +60,11 @@ def before(compensator: Block, plant: Plant, reference: Recording, **settings: A
     settings.pop("preview", None)
     reference = wished(compensator, reference)
     few = {name: settings[name] for name in ("pressure_loop", "seed") if name in settings}
+    notes: list[str] = []
     try:
         rise = slow_rise(plant, reference, **few)
-        notes = doubts(compensator, plant, rise)
+        notes += doubts(compensator, plant, rise)
         controller: Controller = uncompensated(plant, reference, rise)
         return Before(track(controller, plant, reference, **settings), tuple(notes))
     except MckibbenError as error:
-        return Before(None, (f"there is no run without compensation: {error}",))
+        return Before(None, (*notes, f"there is no run without compensation: {error}"))

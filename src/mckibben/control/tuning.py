@@ -9,7 +9,8 @@ steeper somewhere than twice what the step met: a dead zone in the middle would 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -64,7 +65,9 @@ def tune_pid(
         If nothing moves with a muscle's own pressure, or the rig imposes its length.
     """
     scheduled = scheduled or {}
-    driven = actuated(plant, scheduled)
+    untuned = untuned_pid(plant, scheduled)
+    followed = [channel.name for channel in untuned.driven]
+    driven = [channel.name for channel in untuned.given]
     starts = {f"start.{name}": value for name, value in scheduled.items()}
     rig = plant.changed({"sample_time": sample_time, **starts})
     limits = [rig.limits(name) for name in driven]
@@ -72,41 +75,61 @@ def tune_pid(
         name: 0.5 * (limit.low + limit.high) for name, limit in zip(driven, limits, strict=True)
     }
     n = round(hold / sample_time)
-    gains, references = [], []
+    gains = []
     with telling(progress, "tuning") as tell:
-        for name, limit in one_by_one(zip(driven, limits, strict=True), tell):
+        for name, moved, limit in one_by_one(zip(driven, followed, limits, strict=True), tell):
             rig.reset(seed)
-            followed = _moved_by(name, rig, len(driven))
-            references.append(followed)
-            place = rig.outputs.index(followed)
+            place = rig.outputs.index(moved)
             rest, limit_range = {**middle, **scheduled}, limit.high - limit.low
             for share in STEPS:
                 for _ in range(n):
                     before = rig.step(rest)[place]
                 size = share * limit_range
-                moved = {**rest, name: middle[name] + size}
-                response = np.array([rig.step(moved)[place] for _ in range(n)]) - before
+                higher = {**rest, name: middle[name] + size}
+                response = np.array([rig.step(higher)[place] for _ in range(n)]) - before
                 if _moves(response):
                     break
             ramp = np.linspace(limit.low, limit.high, n)
             slow = np.array([rig.step({**rest, name: at})[place] for at in (*ramp, *ramp[::-1])])
             gains.append(_simc(response, size, (slow, ramp), sample_time, closed_loop_time, name))
     kp, ki = zip(*gains, strict=True)
+    return replace(untuned, kp=kp, ki=ki)
+
+
+def untuned_pid(plant: Plant, scheduled: Collection[str] = ()) -> PIDFeedback:
+    """Return PID feedback of a plant's channels, without gains.
+
+    Parameters
+    ----------
+    plant : Plant
+        A rig with as many pressures as motions.
+    scheduled : collection of str
+        Other inputs, held.
+
+    Raises
+    ------
+    ModelError
+        If a pressure has no motion of its own.
+    """
+    driven = actuated(plant, scheduled)
+    followed = [_moved_by(name, plant, driven) for name in driven]
+    limits, none = [plant.limits(name) for name in driven], [0.0] * len(driven)
     lowest, highest = min(limit.low for limit in limits), max(limit.high for limit in limits)
     return PIDFeedback.of(
-        _channels(references), _channels(driven), kp, ki, limits=(float(lowest), float(highest))
+        _channels(followed), _channels(driven), none, none, limits=(float(lowest), float(highest))
     )
 
 
-def _moved_by(name: str, rig: Plant, muscles: int) -> str:
+def _moved_by(name: str, rig: Plant, driven: Sequence[str]) -> str:
     """Return the motion that an input of a plant makes: that of its number, or the only one there is."""
     end = name[name.find("_") :] if "_" in name else ""
     found = [stem + end for stem in MOVED if stem + end in rig.outputs]
-    if muscles == 1 and not found and isinstance(rig, Twin):
+    if len(driven) == 1 and not found and isinstance(rig, Twin):
         found = [one for one in rig.outputs if not one.startswith((*COMMANDS, "force"))]
     if len(found) != 1:
         raise ModelError(
-            f"PID follows a displacement or an angle, and {rig.name} gives {', '.join(rig.outputs)}. "
+            "PID follows a displacement or an angle for every pressure or voltage, each moved by its "
+            f"own; {rig.name} is driven by {', '.join(driven)} and gives {', '.join(rig.outputs)}. "
             "Remedy: use the compensator alone, or another rig."
         )
     return found[0]

@@ -127,8 +127,8 @@ def uncompensated(plant: Plant, reference: Recording, rise: Recording) -> Static
     driven = actuated(plant, [name for name in plant.inputs if name in reference])
     if len(followed) != len(driven):
         raise ModelError(
-            f"{len(driven)} commands move {len(followed)} displacements, so no command is read off a "
-            "curve. Remedy: compare with PID (--controller pid)."
+            f"{', '.join(driven)} together move {', '.join(followed)}, so no command belongs to one "
+            "motion and is read off its curve. Remedy: compare controllers with one another."
         )
     return StaticMap([curve(rise[u], rise[y], y) for u, y in zip(driven, followed, strict=True)])
 

@@ -44,6 +44,17 @@ def test_other_models_are_offered_before_the_one_inverted(tmp_path: Path) -> Non
     assert tuple(workspace.twin("unlimited").limits("pressure")) == (0.5, 4.0)
 
 
+def test_models_that_know_time_are_the_first_plants(tmp_path: Path) -> None:
+    workspace = workspace_of(tmp_path)
+    lagging = load("blocks", "process-model").example()
+    assert lagging.rate_dependent
+    lagging.save(workspace.path("models", "later.json"))
+    rising = np.asarray(np.linspace(0.5, 4.0, 50), dtype=np.float64)
+    run = Recording({"pressure": rising, "displacement": 5.0 * rising}, 0.1)
+    workspace.add(run, origin="", call="", role="train")  # tells the limits of what knows none
+    assert workspace.plants("mine") == ["later", "bigger", "unlimited", "mine"]
+
+
 @pytest.mark.parametrize(
     ("plant", "words"), [("bigger", "another muscle"), ("mine", "right by construction")]
 )

@@ -107,7 +107,8 @@ class Workspace(Changing):
     def plants(self, inverted: str) -> list[str]:
         """Return the models that a model's compensator can be tried on, in the order of the choice.
 
-        Others first, for on its own model a compensator proves nothing.
+        Others first, for on its own model a compensator proves nothing; of these, models that know time,
+        for on those that do not, feedback is better than it will be.
         """
         undone = self.model(inverted)
         inputs, outputs = ({c.name for c in ends} for ends in (undone.inputs, undone.outputs))
@@ -118,8 +119,9 @@ class Workspace(Changing):
                 if set(twin.inputs) == inputs and set(twin.outputs) == outputs:
                     for each in inputs.difference(undone.scheduling):
                         twin.limits(each)
-                    found.append((twin.forward == undone, place, name))
-        return [name for _, _, name in sorted(found)]
+                    itself, timed = twin.forward == undone, twin.forward.rate_dependent
+                    found.append((itself, not timed, place, name))
+        return [name for *_, name in sorted(found)]
 
     def same(self, inverted: str, plant: str) -> bool:
         """Tell whether a plant is the very model that a compensator undoes."""

@@ -26,6 +26,7 @@ from mckibben.app.workspace import Workspace
 from mckibben.registry import load
 from mckibben.report import subjects
 from tests.app.test_jobs import filled
+from tests.app.test_jobs import fit as asked
 from tests.comparison.test_several import run as two_muscles
 
 
@@ -182,6 +183,28 @@ def test_cutting_needs_a_selection(tmp_path: Path) -> None:
         await user.should_see("nothing is selected")
 
     visit(filled(tmp_path), look)
+
+
+def test_what_was_cancelled_is_said_once(tmp_path: Path) -> None:
+    workspace = Workspace(tmp_path)
+    jobs = Jobs(workspace, at_once=1)
+    jobs.at_once = 0  # none is started
+    for name in ("one", "two"):
+        jobs.cancel(jobs.submit("fit", asked("pi", name)).name)
+    old = jobs.submit("fit", asked("pi", "old")).name
+    jobs.cancel(old)
+    told = workspace.read_json("jobs", old) or {}
+    workspace.write_json("jobs", old, told | {"message": "cancelled"})  # as it was once kept
+
+    async def look(user: User) -> None:
+        user.find(marker="tab-models").click()
+        for name in ("one", "two", "old"):
+            await user.should_see(marker=f"job-{name}", retries=100)
+            (line,) = user.find(marker=f"job-{name}").elements
+            said = [one.text for one in line.descendants() if isinstance(one, ui.label)]
+            assert said == [name, "cancelled"]
+
+    visit(workspace, look)
 
 
 def test_the_script_runs(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -73,6 +73,11 @@ class Job:
         given = self.given
         return str(given.get("title") or given.get("name") or given.get("model") or self.kind)
 
+    @property
+    def said(self) -> str:
+        """How it ended, each word once."""
+        return self.state if self.message in ("", self.state) else f"{self.state}: {self.message}"
+
 
 def _nothing() -> None:
     """Do nothing, in a process that shows that processes can be started."""
@@ -190,7 +195,7 @@ class Jobs:
             job.process.join(2.0)
             if job.process.is_alive():
                 job.process.kill()
-        job.state, job.message, job.process = CANCELLED, "cancelled", None
+        job.state, job.message, job.process = CANCELLED, "", None
         self._note(job)
         self._give_back(job)
         self.poll()

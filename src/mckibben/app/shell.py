@@ -199,7 +199,7 @@ def _watch(desk: Desk) -> None:
 
 
 def _say(job: Job) -> None:
-    text = f"{job.title:.80}: {job.state}. {job.message}"[:300]
+    text = f"{job.title:.80}: {job.said}"[:300]
     if job.state == "failed":
         ui.notify(text, type="negative", multi_line=True, timeout=10_000)
     else:

@@ -91,9 +91,9 @@ def _job(desk: Desk, job: Job, said: set[str]) -> None:
     with named(ui.row().classes("items-center w-full gap-2 no-wrap"), f"job-{job.title}"):
         ui.label(job.title).classes("w-28")
         if job.state in ENDED:
-            text = f"{job.state}: {job.message}"
-            ui.label(f"{job.state}, as above" if text in said else text).classes("flex-1 text-xs")
-            said.add(text)
+            again = job.said in said and job.said != job.state
+            ui.label(f"{job.state}, as above" if again else job.said).classes("flex-1 text-xs")
+            said.add(job.said)
             if job.state != "done":
                 ui.button(icon="replay", on_click=lambda: _again(desk, job)).props(
                     'flat dense aria-label="Again"'

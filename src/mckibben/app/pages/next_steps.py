@@ -76,7 +76,7 @@ def _line(desk: Desk, job: Job) -> None:
             ui.spinner()
             ui.label(f"{job.title}: {100 * share:.0f} %").classes("text-sm flex-1")
             return
-        text = job.message if job.state == DONE else f"{job.state}: {job.message}"
+        text = job.message if job.state == DONE else job.said
         said = ui.label(f"{job.title}: {text}"[:LONGEST]).classes(
             "text-sm flex-1 min-w-0 break-words"
         )

@@ -46,6 +46,8 @@ class Desk:
     """Whether models are tested on data that they were fitted to, which every result then says."""
     dark: bool = False
     preview: str | None = None
+    compensator: tuple[str, str, dict[str, Any]] | None = None
+    """The model, use and settings whose pressures were shown last; see `mckibben.app.forms`."""
     _chosen: bool = False
     news: News = field(default_factory=News, repr=False)
     """Who shows what on this page, and hears of changes."""
@@ -90,6 +92,18 @@ class Desk:
             for result in self.workspace.results()
             if result["input"] in ("", named[0]) and result["output"] in ("", named[1])
         ]
+
+    @property
+    def not_recommended(self) -> str:
+        """Why none of these models is recommended; empty where one is, or there is none.
+
+        Each was fitted by itself and says so of itself; which one it depends on is a matter of all, as
+        in `mckibben.comparison.recommending.recommended`.
+        """
+        results = self.results()
+        better = [result for result in results if (result["skill_least"] or 0.0) > 0]
+        first = next(iter(better or results), None)
+        return str(first["not_recommended"] or "") if first else ""
 
     def __post_init__(self) -> None:
         _DESKS.add(self)

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Collection
+from contextlib import suppress
 from dataclasses import replace
 from typing import Any
 
@@ -111,6 +112,31 @@ def compensated(
     if ahead:  # each is due when its reference is
         found = replace(found.slice(ahead, len(found)), start_time=reference.start_time)
     return found, list(dict.fromkeys(notes))
+
+
+def kept_motion(
+    workspace: Workspace, model: str, reference: Recording, others: Collection[str] = ()
+) -> str:
+    """Return the file of a reference among the runs, written where no run of a model has that motion.
+
+    Parameters
+    ----------
+    workspace : Workspace
+    model : str
+    reference : Recording
+    others : collection of str
+        Files of loops that have not ended.
+    """
+    from mckibben.files import read, write
+
+    for file in {*others, *(run.reference for run in workspace.runs(model).values())} - {""}:
+        with suppress(MckibbenError):
+            (known,) = read(workspace.path("runs", file), informative=False)
+            if known == reference:
+                return file
+    file = f"{workspace.new_name('runs', 'reference', '.csv')}.csv"
+    write(reference, workspace.new_path("runs", file))
+    return file
 
 
 def look_back(workspace: Workspace, given: dict[str, Any], tell: Tell) -> str:

@@ -143,6 +143,7 @@ class Fitted(Kept):
     fit_seconds: Number = None
     step_ns: Number = None
     constant: Constant | None = None
+    skill_least: Number = None
     not_recommended: Text | None = None
     shared: list[Text] = []
     data: Text = ""

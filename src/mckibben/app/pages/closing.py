@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Callable
 from inspect import getdoc
 from typing import Any
 
@@ -10,7 +11,7 @@ from nicegui import ui
 
 from mckibben import registry
 from mckibben.app import forms, plots
-from mckibben.app.desk import Desk, guarded, named, tell
+from mckibben.app.desk import Desk, guarded, named, on_event, tell
 from mckibben.app.following import fitting_rigs
 from mckibben.app.jobs import RUNNING
 from mckibben.app.kept import Followed
@@ -25,12 +26,15 @@ OWN = "model "
 RIG = "rig "
 """Before the names of virtual rigs."""
 
+USUAL = ("feedforward", "pid", "feedforward-pid")
+"""Controllers that are compared where they can be."""
+
 DRAWN = 4
 """Most runs in a picture."""
 
 
 def build(desk: Desk, model: str, form: str, settings: dict[str, Any], reference: str) -> None:
-    """Offer loops with a compensator, and show those that were run.
+    """Offer loops with a compensator.
 
     Parameters
     ----------
@@ -50,12 +54,14 @@ def build(desk: Desk, model: str, form: str, settings: dict[str, Any], reference
 
     async def ready() -> None:
         offered = await asyncio.to_thread(_plants, desk, model)
-        place.clear()
-        with place:
-            _offer(desk, model, form, settings, reference, offered)
+        first = next(iter(offered), "")
+        reasons = await asyncio.to_thread(_refused, desk, model, form, settings, first)
+        if not place.is_deleted:
+            place.clear()
+            with place:
+                _offer(desk, model, form, settings, reference, offered, reasons)
 
     ui.timer(0.05, guarded(ready), once=True)
-    _runs(desk, model)
 
 
 def _plants(desk: Desk, model: str) -> dict[str, str]:
@@ -78,8 +84,8 @@ def _offer(
     settings: dict[str, Any],
     reference: str,
     offered: dict[str, str],
+    reasons: dict[str, str],
 ) -> None:
-    laws = {name: registry.load("controllers", name) for name in registry.names("controllers")}
     if not offered:
         said = "No plant fits: fit a second model of another kind under Models, and try it on that."
         try:
@@ -93,18 +99,17 @@ def _offer(
             "Only the model that is inverted is there, on which its inverse is right by construction. "
             "Fit a model of another kind under Models to try it on."
         ).classes("text-sm border-l-4 border-warning pl-2")
+    laws = {name: registry.load("controllers", name) for name in registry.names("controllers")}
+    titles = {name: (getdoc(law) or name).rstrip(".") for name, law in laws.items()}
     with ui.row().classes("items-end w-full gap-3"):
         plant = named(
             ui.select(offered, value=next(iter(offered)), label="Plant").classes("min-w-72"),
             "loop-plant",
         )
         kinds = named(
-            ui.select(
-                {name: (getdoc(law) or name).rstrip(".") for name, law in laws.items()},
-                value=["feedforward", "pid", "feedforward-pid"],
-                multiple=True,
-                label="Controllers",
-            ).classes("min-w-64 max-w-full"),
+            ui.select({}, value=[], multiple=True, label="Controllers").classes(
+                "min-w-64 max-w-full"
+            ),
             "controllers",
         )
 
@@ -131,10 +136,54 @@ def _offer(
             desk.changed("jobs")
 
         named(ui.button("Run", on_click=guarded(start)), "run-loop")
+    against = ui.column().classes("gap-1")
+
+    def suit(reasons: dict[str, str]) -> None:
+        fits = {law: title for law, title in titles.items() if not reasons[law]}
+        kinds.set_options(fits, value=[law for law in kinds.value or USUAL if law in fits])
+        against.clear()
+        with against:
+            for reason in dict.fromkeys(filter(None, reasons.values())):
+                out = "; ".join(titles[law] for law in titles if reasons[law] == reason)
+                named(ui.label(f"Not here: {out}. {reason}").classes("text-xs"), "law-refused")
+
+    async def turned() -> None:
+        chosen = str(plant.value)
+        reasons = await asyncio.to_thread(_refused, desk, model, form, settings, chosen)
+        if chosen == plant.value and not against.is_deleted:
+            suit(reasons)
+
+    plant.on_value_change(on_event(lambda _: turned()))
+    suit(reasons)
 
 
-def _runs(desk: Desk, model: str) -> None:
-    """Show what came of loops with a model, as they end."""
+def _refused(
+    desk: Desk, model: str, form: str, settings: dict[str, Any], plant: str
+) -> dict[str, str]:
+    """Return of every control law why it cannot run on a plant, or an empty string; no plant, none."""
+    from mckibben.control.laws import refusal
+    from mckibben.rigs import load_rig
+
+    if not plant:
+        return {}
+    compensator = forms.made(desk.workspace, model, form, settings)
+    own = plant.startswith(OWN)
+    name = plant.removeprefix(OWN).removeprefix(RIG)
+    there = desk.workspace.twin(name) if own else load_rig(name)
+    return {law: refusal(law, compensator, there) for law in registry.names("controllers")}
+
+
+def runs(desk: Desk, model: str, drawn: Callable[[], str]) -> None:
+    """Show what came of loops with a model, as they end.
+
+    Parameters
+    ----------
+    desk : Desk
+    model : str
+        What was inverted.
+    drawn : callable
+        Returns the file of the motion that is drawn now, empty where none is known.
+    """
 
     @ui.refreshable
     def waiting() -> None:
@@ -149,13 +198,19 @@ def _runs(desk: Desk, model: str) -> None:
 
     @ui.refreshable
     def shown() -> None:
-        runs = desk.workspace.runs(model)
-        if not runs:
+        found = desk.workspace.runs(model)
+        if not found:
             return
-        _table(runs)
-        for note in dict.fromkeys(note for run in runs.values() for note in run.notes):
+        motions = {run.reference: _motion(run, drawn()) for run in found.values()}
+        pictured = drawn() if drawn() in motions else _latest(desk, found)
+        _table(found, motions)
+        if len(motions) > 1 or drawn() not in ("", pictured):
+            text = f"Errors compare only within a motion. In the picture: {motions[pictured]}."
+            named(ui.label(text).classes("text-sm"), "motions")
+        for note in dict.fromkeys(note for run in found.values() for note in run.notes):
             named(ui.label(note).classes("text-sm border-l-4 border-warning pl-2"), "loop-note")
-        _pictures(desk, runs)
+        alike = {name: run for name, run in found.items() if run.reference == pictured}
+        _pictures(desk, dict(list(alike.items())[-DRAWN:]))
 
     desk.when("jobs", waiting.refresh)
     desk.when("runs", shown.refresh)
@@ -164,9 +219,26 @@ def _runs(desk: Desk, model: str) -> None:
     shown()
 
 
-def _table(runs: dict[str, Followed]) -> None:
+def _motion(run: Followed, drawn: str) -> str:
+    """Return what a motion is called: its file, and whether it is the one that is drawn."""
+    name = run.reference.removesuffix(".csv") or "unknown"
+    if not drawn:
+        return name
+    return f"{name}, as drawn" if run.reference == drawn else f"{name}, another"
+
+
+def _latest(desk: Desk, runs: dict[str, Followed]) -> str:
+    """Return the motion of the latest run."""
+    paths = {name: desk.workspace.path("runs", f"{name}.csv") for name in runs}
+    ended = {name: path.stat().st_mtime_ns for name, path in paths.items() if path.is_file()}
+    return runs[max(ended or runs, key=lambda name: ended.get(name, 0))].reference
+
+
+def _table(runs: dict[str, Followed], motions: dict[str, str]) -> None:
+    """Show runs, those of the same motion together."""
     labels = {
         "name": "Run",
+        "motion": "Motion",
         "plant": "Plant",
         "rmse": "RMSE",
         "without": "RMSE without compensation",
@@ -175,11 +247,11 @@ def _table(runs: dict[str, Followed]) -> None:
         "step": "Step [µs]",
     }
     rows: list[dict[str, Any]] = [
-        {"name": name, "plant": run.plant or run.rig}
+        {"name": name, "motion": motions[run.reference], "plant": run.plant or run.rig}
         | {"rmse": _listed(run.rmse, run.units), "without": _listed(run.uncompensated, run.units)}
         | {"largest": _listed(run.largest, run.units), "clipped": run.clipped}
         | {"step": wording.number(run.step_us, 2)}
-        for name, run in runs.items()
+        for name, run in sorted(runs.items(), key=lambda one: one[1].reference)
     ]
     columns = [
         {"name": key, "field": key, "label": label, "align": "left"}
@@ -199,19 +271,12 @@ def _listed(values: dict[str, float | None], units: dict[str, str]) -> str:
 
 
 def _pictures(desk: Desk, runs: dict[str, Followed]) -> None:
-    """Draw the runs of the latest reference, and what no compensation did, for every coordinate."""
-    latest = list(runs.values())[-1].reference
-    paths = {name: desk.workspace.path("runs", f"{name}.csv") for name in runs}
-    found = [name for name in runs if paths[name].is_file()]
-    newest = max(found, key=lambda name: paths[name].stat().st_mtime_ns, default=None)
-    if newest is not None:
-        latest = runs[newest].reference
-    chosen = [name for name in found if runs[name].reference == latest][-DRAWN:]
+    """Draw runs of one motion, and what no compensation did, for every coordinate."""
     curves: dict[str, list[tuple[str, Array, Array, str]]] = {}
     units: dict[str, str] = {}
-    for place, name in enumerate(chosen):
+    for place, name in enumerate(runs):
         try:
-            (run,) = read(paths[name], informative=False)
+            (run,) = read(desk.workspace.path("runs", f"{name}.csv"), informative=False)
         except (MckibbenError, ValueError):
             continue
         if run.duration is not None and run.start_time < 0:  # the approach is not scored

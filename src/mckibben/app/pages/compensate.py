@@ -9,12 +9,11 @@ import numpy as np
 from nicegui import ui
 
 from mckibben.app import forms, plots
-from mckibben.app.desk import Desk, guarded, named
-from mckibben.app.following import compensated, held_for
-from mckibben.app.pages import closing, forces, logs
+from mckibben.app.desk import Desk, guarded, named, on_event
+from mckibben.app.following import compensated, held_for, kept_motion
+from mckibben.app.pages import closing, forces, leaderboard, logs
 from mckibben.app.pages.drawing_reference import Sketch
 from mckibben.errors import MckibbenError
-from mckibben.files import write
 from mckibben.recording import Recording
 
 STEP = 0.02
@@ -37,6 +36,7 @@ def build(desk: Desk) -> None:
                 "of several muscles, balance."
             )
             return
+        leaderboard.unrecommended(desk)
         editors[:] = [Editor(desk, names)]
 
     def more() -> None:
@@ -81,6 +81,7 @@ class Editor:
     def __init__(self, desk: Desk, names: list[str]) -> None:
         self.desk = desk
         self.sketch: Sketch
+        self._asked: tuple[Any, ...] | None = None  # what is shown, or being worked out
         with ui.row().classes("w-full items-end gap-3"):
             self.model = named(
                 ui.select(self._titles(names), value=names[0], label="Model to invert").classes(
@@ -95,23 +96,27 @@ class Editor:
                 "compensator",
             )
             self.fields = {
-                key: ui.number(label, value=forms.DEFAULTS[key], min=0).classes("w-56")
+                key: ui.number(
+                    label, value=forms.DEFAULTS[key], min=0, on_change=self._changed
+                ).classes("w-56")
                 for own in forms.SETTINGS.values()
                 for key, label in own.items()
             }
             self.step = ui.number("Time between steps [s]", value=STEP, min=1e-4, max=10.0)
-            self.step.classes("w-44")
+            self.step.classes("w-44").on_value_change(self._changed)
         self.form.on_value_change(self._fields)
+        self.form.on_value_change(self._changed)
         self._fields()
         with ui.row().classes("w-full items-start gap-4"):
             self.left = ui.column().classes("min-w-0 w-full lg:w-[34rem] gap-2")
-            self.results = ui.column().classes("min-w-0 flex-1 basis-80 gap-2")
-        self.model.on_value_change(guarded(self._turned))
+            with ui.column().classes("min-w-0 flex-1 basis-80 gap-2"):
+                self.shown, self.runs = (ui.column().classes("w-full gap-2") for _ in range(2))
+        self.model.on_value_change(on_event(lambda _: self._turned()))
         self._sketch()
         ui.timer(0.05, guarded(self._forms), once=True)
 
     def _titles(self, names: list[str]) -> dict[str, str]:
-        best = next((row["name"] for row in self.desk.workspace.results()), None)
+        best = next((row["name"] for row in self.desk.results()), None)
         return {
             name: f"{name} (first of the leaderboard)" if name == best else name for name in names
         }
@@ -155,17 +160,17 @@ class Editor:
         held = held_for(desk.workspace, name)
         self.left.clear()
         with self.left:
-            self.sketch = Sketch(desk, outputs, reach, held, units)
+            self.sketch = Sketch(desk, outputs, reach, held, units, self._changed)
         with self.sketch.actions:
             named(ui.button("Show pressures", on_click=guarded(self._show)), "show-pressures")
 
     async def _turned(self) -> None:
-        kept, was = dict(self.sketch.points), self.sketch.file
+        self._asked = None
+        before = self.sketch
         self._sketch()
-        if set(kept) == set(self.sketch.points):
-            self.sketch.points, self.sketch.file = kept, was
-            self.sketch.draw()
-        self.results.clear()
+        self.sketch.resume(before)
+        self.shown.clear()
+        self.runs.clear()
         await self._forms()
 
     async def _forms(self) -> None:
@@ -177,24 +182,51 @@ class Editor:
             value = self.form.value if self.form.value in offered else next(iter(offered))
             self.form.set_options(offered, value=value)
 
+    @property
+    def wish(self) -> tuple[Any, ...]:
+        """All that pressures come from."""
+        return self.name, self.form.value, self.settings, self.step.value, *self.sketch.wish
+
+    def _changed(self) -> None:
+        """Take pressures away that are of another wish than what is drawn, and what would run it."""
+        if self._asked is None or self._asked == self.wish:
+            return
+        self._asked = None
+        self.shown.clear()
+        with self.shown:
+            text = "The motion or its compensator has changed: press Show pressures again."
+            named(ui.label(text), "wish-changed")
+        self.desk.news.changed("runs")
+
     async def _show(self) -> None:
-        desk, name, form = self.desk, self.name, str(self.form.value)
-        reference = self.sketch.reference(float(self.step.value or STEP))
+        desk, sketch, asked = self.desk, self.sketch, self.wish
+        name, form, settings = self.name, str(self.form.value), self.settings
+        reference = sketch.reference(float(self.step.value or STEP))
+        self._asked = asked
         given, notes = await asyncio.to_thread(
-            compensated, desk.workspace, name, reference, form, self.settings
+            compensated, desk.workspace, name, reference, form, settings
         )
-        file = f"{desk.workspace.new_name('runs', 'reference', '.csv')}.csv"
-        await asyncio.to_thread(write, reference, desk.workspace.new_path("runs", file))
-        call = forms.written(name, form, self.settings)
+        under_way = [str(job.given.get("reference", "")) for job in desk.jobs.active()]
+        file = await asyncio.to_thread(kept_motion, desk.workspace, name, reference, under_way)
+        if self._asked is not asked or self.wish != asked:  # a later click shows what is now wished
+            return
+        call = forms.written(name, form, settings)
         if form == "inverse":
             call += ".simulate(reference)"
         desk.did(f"inverted {name}", call)
-        self.results.clear()
-        with self.results:
-            self._pressures(reference, given, notes)
-            closing.build(desk, name, form, self.settings, file)
+        desk.compensator = name, form, settings
+        desk.changed("compensator")
+        self.shown.clear()
+        with self.shown:
+            self._pressures(name, reference, given, notes)
+            closing.build(desk, name, form, settings, file)
+        self.runs.clear()
+        with self.runs:
+            closing.runs(desk, name, lambda: file if self._asked is asked else "")
 
-    def _pressures(self, reference: Recording, given: Recording, notes: list[str]) -> None:
+    def _pressures(
+        self, model: str, reference: Recording, given: Recording, notes: list[str]
+    ) -> None:
         dark, sketch = self.desk.dark, self.sketch
         ui.label("Shaded: what can be reached whatever happened before").classes(
             "text-xs opacity-70"
@@ -210,7 +242,7 @@ class Editor:
             )
             mark = "reference-plot" if place == 0 else f"reference-plot-{place + 1}"
             named(ui.plotly(figure).classes("w-full"), mark)
-        block = forms.inverse_of(self.desk.workspace.model(self.name))
+        block = forms.inverse_of(self.desk.workspace.model(model))
         pressures = [channel for channel in block.outputs if channel.name in given]
         figure = plots.lines(
             [
@@ -231,6 +263,6 @@ class Editor:
         content = "\n".join([header, *rows])
         button = ui.button(
             "Pressures as CSV",
-            on_click=lambda: ui.download(content.encode(), f"{self.name}-pressures.csv"),
+            on_click=lambda: ui.download(content.encode(), f"{model}-pressures.csv"),
         )
         named(button.props("outline"), "take-pressures")

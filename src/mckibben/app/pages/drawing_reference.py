@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from nicegui import ui
@@ -44,6 +44,10 @@ class Sketch:
         What can be reached of each.
     held : mapping of str to float
         What a compensator needs beside, as it is held.
+    units : mapping of str to str
+        Of all these.
+    changed : callable
+        Told of every change.
     """
 
     def __init__(
@@ -53,7 +57,9 @@ class Sketch:
         reach: dict[str, tuple[float, float]],
         held: dict[str, float],
         units: dict[str, str],
+        changed: Callable[[], None],
     ) -> None:
+        self.changed = changed
         self.desk, self.channels, self.reach = desk, {c.name: c for c in channels}, reach
         self.units = {channel.name: channel.unit for channel in channels} | units
         self.points: dict[str, Points] = {name: [] for name in self.channels}
@@ -110,7 +116,10 @@ class Sketch:
         with ui.row().classes("gap-2"):
             self.held = {
                 name: ui.number(
-                    f"{name} [{self.units.get(name, '')}]", value=round(value, 4), format="%.5g"
+                    f"{name} [{self.units.get(name, '')}]",
+                    value=round(value, 4),
+                    format="%.5g",
+                    on_change=self.changed,
                 ).classes("w-40")
                 for name, value in held.items()
             }
@@ -151,6 +160,12 @@ class Sketch:
         low, high = self.reach[self.now]
         return motions.grid_of(0.0, self.seconds, SNAPS), motions.grid_of(low, high, SNAPS)
 
+    @property
+    def wish(self) -> tuple[object, ...]:
+        """What a reference is made of, to tell whether it has changed."""
+        points = {name: tuple(own) for name, own in self.points.items()}
+        return points, self.file, {name: field.value for name, field in self.held.items()}
+
     # -- changes ---------------------------------------------------------------------------------
 
     def _turn(self, name: str) -> None:
@@ -177,6 +192,13 @@ class Sketch:
     def clear(self) -> None:
         """Start over, in the coordinate at hand."""
         self._set([])
+
+    def resume(self, other: Sketch) -> None:
+        """Go on with what was drawn in another of the same coordinates, over the same time."""
+        if set(other.points) == set(self.points):
+            self.points, self.file, self._before = other.points, other.file, other._before
+            self.duration.set_value(other.duration.value)
+            self.draw()
 
     def ready(self, kind: str) -> None:
         """Put a ready-made motion there."""
@@ -321,6 +343,7 @@ class Sketch:
             self._quiet = False
         if table:
             self._tabulate()
+        self.changed()
 
     def _tabulate(self) -> None:
         own, unit = self.points[self.now], self.channels[self.now].unit

@@ -96,6 +96,20 @@ def build(desk: Desk) -> None:
     shown()
 
 
+def unrecommended(desk: Desk) -> None:
+    """Say where a model is chosen that none is recommended, and why, in the words of the leaderboard."""
+
+    @ui.refreshable
+    def shown() -> None:
+        if why := desk.not_recommended:
+            text = ui.label(f"{why}.").classes("text-sm border-l-4 border-warning pl-2")
+            named(text, "not-recommended")
+
+    for topic in ("results", "channels"):
+        desk.when(topic, shown.refresh)
+    shown()
+
+
 def _table(results: Sequence[dict[str, Any]], outputs: Sequence[str]) -> ui.table:
     columns = columns_of(results, results[0]["unit"], outputs, results[0]["chosen_by"])
     listed = (("title", "model"), *((c.key, c.label) for c in columns))

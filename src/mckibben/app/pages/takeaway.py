@@ -10,7 +10,7 @@ from nicegui import ui
 from mckibben.app import scripts
 from mckibben.app.desk import Desk, code, guarded, named
 from mckibben.app.jobs import RUNNING
-from mckibben.app.pages import taking_code
+from mckibben.app.pages import leaderboard, taking_code
 from mckibben.app.pages.taking_code import CARD, LARGEST, hand_over
 from mckibben.errors import DataError
 from mckibben.system.ordinary import read_bytes
@@ -35,11 +35,13 @@ def build(desk: Desk) -> None:
         if not names:
             ui.label("Fit a model first, under Models.")
             return
+        leaderboard.unrecommended(desk)
         model = named(
             ui.select(names, value=names[0], label="Model").classes("w-full max-w-xs"),
             "take-model",
         )
         selects[:] = [model]
+        come()
         with ui.row().classes("w-full gap-4 items-stretch"):
             taking_code.build(desk, model)
             _figures(desk, model)
@@ -52,7 +54,13 @@ def build(desk: Desk) -> None:
         else:
             shown.refresh()
 
+    def come() -> None:
+        """Choose the model whose compensator was shown last."""
+        if selects and desk.compensator is not None and desk.compensator[0] in selects[0].options:
+            selects[0].set_value(desk.compensator[0])
+
     desk.when("results", more)
+    desk.when("compensator", come)
     shown()
 
 

@@ -9,7 +9,7 @@ from typing import Any
 from nicegui import ui
 
 from mckibben.app import forms
-from mckibben.app.desk import Desk, guarded, named
+from mckibben.app.desk import Desk, guarded, named, on_event
 from mckibben.blocks.core.block import Block
 from mckibben.system.atomic import replacing
 from mckibben.system.ordinary import read_bytes
@@ -150,11 +150,17 @@ def build(desk: Desk, model: Any) -> None:
             offered = {key: forms.FORMS[key] for key in found}
             if offered and name == str(model.value):
                 value = form.value if form.value in offered else next(iter(offered))
+                shown, use, settings = desk.compensator or ("", "", {})
+                if shown == name and use in offered:
+                    value = use
+                    for key, number in settings.items():
+                        fields[key].set_value(number)
                 form.set_options(offered, value=value)
                 fitted()
 
         form.on_value_change(fitted)
-        model.on_value_change(guarded(offer))
+        model.on_value_change(on_event(lambda _: offer()))
+        desk.when("compensator", offer)
         fitted()
         ui.timer(0.05, guarded(offer), once=True)
 

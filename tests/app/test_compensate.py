@@ -1,0 +1,279 @@
+"""What Compensate shows and runs is what is drawn there, of the model chosen there."""
+
+from __future__ import annotations
+
+import asyncio
+import threading
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+pytest.importorskip("nicegui")
+
+from nicegui import ui
+from nicegui.testing import User
+
+from mckibben import PI
+from mckibben.app.following import compensated, kept_motion
+from mckibben.app.motions import reference_recording
+from mckibben.app.pages import compensate
+from mckibben.app.workspace import Workspace
+from mckibben.blocks.core.block import Block
+from mckibben.blocks.core.fields import Channel
+from mckibben.control import Twin, before
+from mckibben.registry import load
+from tests.app.test_pages import visit
+
+WEAKER = replace(PI.example(), weights=tuple(0.9 * weight for weight in PI.example().weights))
+
+
+def arm(scale: float = 1.0) -> Block:
+    """Return three muscles that move a tip in two coordinates."""
+    muscles = tuple(
+        replace(
+            PI.example(),
+            input=Channel(f"pressure_{k}", "bar"),
+            output=Channel(f"shortening_{k}", "mm"),
+        )
+        for k in (1, 2, 3)
+    )
+    tip = tuple(Channel(f"displacement_{k}", "mm") for k in (1, 2))
+    gains = ((0.5 * scale, 0.0), (-0.25, 0.4), (-0.25, -0.4))
+    coupling = load("blocks", "coupling")(gains, tuple(one.output for one in muscles), tip)
+    whole: Block = load("blocks", "series")((load("blocks", "per-channel")(muscles), coupling))
+    return whole
+
+
+def workspace_with(folder: Path, **models: Block) -> Workspace:
+    workspace = Workspace(folder)
+    for name, model in models.items():
+        model.save(workspace.path("models", f"{name}.json"))
+    return workspace
+
+
+def only(user: User, marker: str) -> Any:
+    """Return the one element of a name for tests."""
+    (element,) = user.find(marker=marker).elements
+    return element
+
+
+def field(user: User, label: str) -> ui.number:
+    (found,) = [one for one in user.find(ui.number).elements if one.props.get("label") == label]
+    return found
+
+
+async def until(user: User, marker: str) -> None:
+    await user.should_see(marker=marker, retries=200)
+
+
+async def later(true: Callable[[], bool]) -> None:
+    """Wait until something is so."""
+    for _ in range(200):
+        if true():
+            return
+        await asyncio.sleep(0.05)
+    raise AssertionError("it is not so")
+
+
+async def drawn(user: User) -> None:
+    """Open the page, and show the pressures for a sine."""
+    user.find(marker="tab-compensate").click()
+    await until(user, "wave")
+    user.find(marker="wave").click()
+    user.find(marker="show-pressures").click()
+    await until(user, "pressure-plot")
+
+
+async def turn(user: User, model: str) -> None:
+    """Choose another model."""
+    before = only(user, "show-pressures")
+    only(user, "invert").set_value(model)
+    await later(lambda: only(user, "show-pressures") is not before)
+
+
+def held_back(
+    monkeypatch: pytest.MonkeyPatch, model: str
+) -> tuple[threading.Event, threading.Event]:
+    """Have pressures of a model wait; return what says that they do, and what lets them go."""
+    begun, go = threading.Event(), threading.Event()
+
+    def slow(workspace: Workspace, name: str, *rest: Any) -> Any:
+        found = compensated(workspace, name, *rest)
+        if name == model:
+            begun.set()
+            assert go.wait(30.0)
+        return found
+
+    monkeypatch.setattr(compensate, "compensated", slow)
+    return begun, go
+
+
+@pytest.mark.parametrize("change", ["model", "motion", "compensator"])
+def test_pressures_of_what_has_changed_meanwhile_are_not_shown(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, change: str
+) -> None:
+    workspace = workspace_with(tmp_path, a=PI.example(), b=WEAKER)
+    begun, go = held_back(monkeypatch, "a")
+    shown: list[str] = []
+    pressures = compensate.Editor._pressures
+
+    def noted(self: compensate.Editor, model: str, *rest: Any) -> None:
+        shown.append(model)
+        pressures(self, model, *rest)
+
+    monkeypatch.setattr(compensate.Editor, "_pressures", noted)
+
+    async def look(user: User) -> None:
+        user.find(marker="tab-compensate").click()
+        await until(user, "wave")
+        user.find(marker="wave").click()
+        user.find(marker="show-pressures").click()
+        await later(begun.is_set)
+        if change == "model":
+            await turn(user, "b")
+            user.find(marker="show-pressures").click()
+            await until(user, "pressure-plot")
+        elif change == "motion":
+            user.find(marker="wave-triangle").click()
+            await until(user, "wish-changed")
+        else:
+            only(user, "compensator").set_options({"inverse": "", "predictive": ""})
+            only(user, "compensator").set_value("predictive")
+            await until(user, "wish-changed")
+        go.set()
+        await asyncio.sleep(0.5)
+        assert shown == (["b"] if change == "model" else [])
+
+    try:
+        visit(workspace, look)
+    finally:
+        go.set()
+
+
+def test_what_runs_is_what_is_drawn(tmp_path: Path) -> None:
+    workspace = workspace_with(tmp_path, a=PI.example(), b=WEAKER)
+    run = {"model": "a", "plant": "b", "controller": "pid", "rmse": {"displacement": 1.0}}
+    workspace.write_json("runs", "a-pid", run | {"reference": "earlier.csv"})
+
+    async def look(user: User) -> None:
+        await drawn(user)
+        await until(user, "run-loop")
+        (row,) = only(user, "runs").rows
+        assert row["motion"] == "earlier, another"
+        workspace.write_json("runs", "a-now", run | {"reference": "reference.csv"})
+        user.find(marker="show-pressures").click()  # the same motion keeps its file
+        await later(lambda: len(only(user, "runs").rows) == 2)
+        motions = {row["name"]: row["motion"] for row in only(user, "runs").rows}
+        assert motions == {"a-pid": "earlier, another", "a-now": "reference, as drawn"}
+        assert "Errors compare only within a motion" in only(user, "motions").text
+        assert "reference, as drawn" in only(user, "motions").text
+        user.find(marker="wave-triangle").click()
+        await until(user, "wish-changed")
+        await user.should_not_see(marker="run-loop")
+        await user.should_not_see(marker="pressure-plot")
+        await later(lambda: "as drawn" not in str(only(user, "runs").rows))
+        user.find(marker="show-pressures").click()
+        await until(user, "run-loop")
+        assert {row["motion"] for row in only(user, "runs").rows} == {
+            "earlier, another",
+            "reference, another",
+        }
+
+    visit(workspace, look)
+
+
+def test_the_same_motion_has_one_file(tmp_path: Path) -> None:
+    workspace = workspace_with(tmp_path, a=PI.example())
+    up, down = (
+        reference_recording({"displacement": [(0.0, 1.0), (2.0, to)]}, 0.02) for to in (5.0, 0.5)
+    )
+    first = kept_motion(workspace, "a", up)
+    assert kept_motion(workspace, "a", up, [first]) == first
+    assert kept_motion(workspace, "a", down, [first]) != first
+    workspace.write_json("runs", "a-pid", {"model": "a", "reference": first})
+    assert kept_motion(workspace, "a", up) == first
+
+
+def test_another_model_goes_on_with_the_motion_and_its_duration(tmp_path: Path) -> None:
+    async def look(user: User) -> None:
+        user.find(marker="tab-compensate").click()
+        await until(user, "wave")
+        field(user, "Duration [s]").set_value(120.0)
+        user.find(marker="wave").click()
+        before = only(user, "points").value
+        assert "\n120 " in before
+        await turn(user, "b")
+        assert field(user, "Duration [s]").value == 120.0
+        assert only(user, "points").value == before
+
+    visit(workspace_with(tmp_path, a=PI.example(), b=WEAKER), look)
+
+
+def test_where_no_model_is_recommended_the_pages_say_so(tmp_path: Path) -> None:
+    workspace = workspace_with(tmp_path, a=PI.example(), b=WEAKER)
+    why = "No model is recommended: on what was left out to validate them, none predicts better"
+    row = {"status": "ok", "model": "pi", "validation_rmse": 1.0, "not_recommended": why}
+    workspace.write_json("results", "a", row | {"skill_least": -0.1})
+
+    async def look(user: User) -> None:
+        for tab, choice in (("compensate", "invert"), ("take", "take-model")):
+            user.find(marker=f"tab-{tab}").click()
+            await until(user, choice)
+            await until(user, "not-recommended")
+            said = user.find(kind=ui.label, marker="not-recommended").elements
+            assert {one.text for one in said} == {f"{why}."}
+
+    visit(workspace, look)
+    better = {"skill_least": 0.5, "validation_rmse": 2.0, "not_recommended": ""}
+    workspace.write_json("results", "b", row | better)
+
+    async def look_again(user: User) -> None:
+        user.find(marker="tab-compensate").click()
+        await until(user, "invert")
+        await user.should_not_see(marker="not-recommended")
+
+    visit(workspace, look_again)
+
+
+def test_controllers_that_cannot_run_on_an_arm_are_not_offered(tmp_path: Path) -> None:
+    async def look(user: User) -> None:
+        await drawn(user)
+        await until(user, "run-loop")
+        kinds = only(user, "controllers")
+        assert set(kinds.options) == {"feedforward", "observer"}
+        assert kinds.value == ["feedforward"]
+        said = only(user, "law-refused").text
+        assert "PID alone" in said
+        assert "is driven by pressure_1, pressure_2, pressure_3 and gives displacement_1" in said
+
+    visit(workspace_with(tmp_path, a=arm(), b=arm(0.9)), look)
+
+
+def test_an_arm_without_a_run_to_compare_with_still_hears_what_else_is_to_be_known() -> None:
+    ends = [(0.0, 0.0), (2.0, 3.0)]
+    wanted = reference_recording({f"displacement_{k}": ends for k in (1, 2)}, 0.02)
+    weak = Twin(arm(), limits={f"pressure_{k}": (0.0, 5.0 if k > 1 else 2.0) for k in (1, 2, 3)})
+    found = before(arm().inverse(), weak, wanted, approach=1.0)
+    assert found.tracked is None
+    other, without = found.notes
+    assert "twin takes 0 to 2.00: it may be of another muscle" in other
+    assert without.startswith("there is no run without compensation: pressure_1, pressure_2")
+
+
+def test_the_compensator_shown_is_taken_away(tmp_path: Path) -> None:
+    async def look(user: User) -> None:
+        user.find(marker="tab-take").click()
+        await until(user, "take-form")
+        assert (only(user, "take-model").value, only(user, "take-form").value) == ("a", "model")
+        user.find(marker="tab-compensate").click()
+        await until(user, "wave")
+        await turn(user, "b")
+        await drawn(user)
+        user.find(marker="tab-take").click()
+        await later(lambda: only(user, "take-form").value == "inverse")
+        assert only(user, "take-model").value == "b"
+
+    visit(workspace_with(tmp_path, a=PI.example(), b=WEAKER), look)

@@ -158,3 +158,15 @@ def test_any_bytes_are_a_recording_or_a_data_error(
     path.write_bytes(content)
     with pytest.raises(DataError):
         mckibben.read(path)
+
+
+def test_composite_units_are_read_whole(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text(
+        "time_s,flow_l/min,q_deg/s,velocity_m/s,torque_N_m,flow_Nl/min\n"
+        + "".join(f"{0.1 * k:.1f},60,180,0.5,2,3\n" for k in range(20))
+    )
+    (found,) = mckibben.read(path)
+    units = {"flow": "l/min", "q": "deg/s", "velocity": "mm/s", "torque_n_m": "", "flow_nl_min": ""}
+    assert found.units == units
+    assert [float(found[name][1]) for name in units] == [60.0, 180.0, 500.0, 2.0, 3.0]

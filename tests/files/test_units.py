@@ -52,6 +52,11 @@ def test_factor(text: str, target: str, factor: float) -> None:
     assert convert(np.array([1.0, -3.0]), unit.name, target) == pytest.approx([factor, -3 * factor])
 
 
+@pytest.mark.parametrize("text", ["deg/s", "rad/s", "rpm", "mm/deg", "N/rad", "l/min", "mm/count"])
+def test_what_the_package_has_no_unit_for_is_kept_as_it_is(text: str) -> None:
+    assert known(text).target is None
+
+
 def test_temperatures_have_an_offset() -> None:
     assert convert(np.array([300.0]), known("K").name, "degC") == pytest.approx([26.85])
     assert convert(np.array([212.0]), known("°F").name, "degC") == pytest.approx([100.0])

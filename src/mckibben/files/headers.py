@@ -41,14 +41,21 @@ _DOUBTFUL = {"in", "min", "rev", "turn"}
 """Endings that are units only where the channel suits: ``pressure_in`` is that of an inlet."""
 _LETTERS = {"m", "s", "N", "V"}
 """Single letters that are units after any name but a standard one: ``u1_V``, not ``pressure_A``."""
+_SYMBOLS = {
+    *("bar", "mbar", "Pa", "hPa", "kPa", "MPa", "psi", "mm", "cm", "m", "um", "N", "kN", "mN"),
+    *("s", "ms", "us", "deg", "rad", "mrad", "V", "mV", "mA", "Hz"),
+}
+"""Words that are a part of a unit where another one follows: ``torque_N_m``, ``q_deg_s``."""
+_AMOUNTS = {"l", "L", "ml", "g", "kg"}
+"""What flows in a time, where it is no name: ``flow_l_s``, but ``muscle_l_mm``."""
 _GAUGE_ENDINGS = {"barg", "bara", "psig", "psia"}
 
 _BRACKETED = re.compile(r"(?P<name>.*?)[\s_,/]*[\[(](?P<unit>[^\[\]()]*(?:\([^()]*\))?)[\])]")
-_STATED = (
-    re.compile(r"(?P<name>.*\S)\s+in\s+(?P<unit>\S+)"),  # Kraft in N
-    re.compile(r"(?P<name>.*\S)\s+(?P<unit>[^\s/]+/[^\s/]+)"),  # speed mm/s
-    re.compile(r"(?P<name>[^/]*[^/\s])\s*/\s*\(?(?P<unit>[^()]*)\)?"),  # length/mm
+_IN = re.compile(r"(?P<name>.*\S)\s+in\s+(?P<unit>\S+)")  # Kraft in N
+_COMPOSITE = re.compile(  # speed mm/s, flow_l/min
+    r"(?P<name>.*[^\s_,.:;-])[\s_,.:;-]+(?P<unit>[^\s_,.:;/*·^-]+[/*·^][^\s_,:;]+)"
 )
+_OVER = re.compile(r"(?P<name>[^/]*[^/\s])\s*/\s*\(?(?P<unit>[^()]*)\)?")  # length/mm
 _ENDINGS = (
     re.compile(r"(?P<name>.*[^\s_])[\s_]*(?P<unit>%|°C|°F|°)"),  # contraction_%, angle°
     re.compile(r"(?P<name>.*[^\s_])[\s_]+(?P<unit>[^\s_]+_s)"),  # velocity_mm_s
@@ -83,13 +90,20 @@ def parse(text: str) -> Header:
     bracketed = _BRACKETED.fullmatch(text)
     if bracketed and bracketed["name"] and not _EXTENSOR & set(_words(bracketed["unit"])):
         return Header(bracketed["name"], bracketed["unit"].strip())
-    for form in _STATED:
+    over = _OVER.fullmatch(text)
+    named = over is not None and _names(_last(over["name"]), over["unit"])
+    for form in (_IN, *(() if named else (_COMPOSITE,))):
         match = form.fullmatch(text)
         if match and find(match["unit"]) is not None:
             return Header(match["name"], match["unit"].strip())
+    if over and find(over["unit"]) is not None:
+        part = not named and _is_part(over["name"], over["unit"])
+        return Header(text, None) if part else Header(over["name"], over["unit"].strip())
     for form in _ENDINGS:
         match = form.fullmatch(text)
         if match and _is_unit(match["unit"], match["name"]):
+            if _goes_on(match["name"], match["unit"]):
+                return Header(text, None)
             return Header(match["name"], match["unit"])
     return Header(text, None)
 
@@ -211,3 +225,31 @@ def _is_unit(text: str, name: str) -> bool:
     if text.casefold() in _DOUBTFUL or (len(text) == 1 and text.isalpha()):
         return expected is None and text in _LETTERS
     return True
+
+
+def _last(name: str) -> str:
+    return re.split(r"[\s_,.:;-]+", name)[-1]
+
+
+def _names(word: str, unit: str) -> bool:
+    """Tell whether a word is the name of what has a unit: the l of ``muscle_l/mm`` is no litre."""
+    channel, found = _CHANNELS.get(word.casefold()), find(unit)
+    if found is not None and word.casefold() in _DOUBTFUL:  # pressure_in/bar, but speed_in/s
+        return found.target != "s"
+    return channel is not None and found is not None and unit_of(channel) == found.target
+
+
+def _is_part(name: str, unit: str) -> bool:
+    """Tell whether what is before a stroke belongs to the unit, as in ``flow_Nl/min``, ``rate_1/s``."""
+    word, found = _last(name), find(unit)
+    timed = found is not None and found.target == "s"
+    return word != name and (word in _SYMBOLS or (timed and (len(word) <= 4 or word.isdigit())))
+
+
+def _goes_on(name: str, unit: str) -> bool:
+    """Tell whether a unit is the last part of one, as in ``torque_N_m`` and ``q_deg_per_s``."""
+    word, found = _last(name), find(unit)
+    if word == name or _names(word, unit):
+        return False
+    timed = found is not None and found.target == "s"
+    return word == "per" or word in _SYMBOLS or (timed and word in _AMOUNTS)

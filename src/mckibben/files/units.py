@@ -170,7 +170,12 @@ def _ask_pint(text: str) -> Unit | None:
         unit = registry.Unit(text)
     except Exception:  # pint raises a dozen types at what it cannot read, AssertionError among them
         return None
+    parts = [name for name, _ in registry.Quantity(1.0, unit).unit_items()]
+    if any(registry.Unit(name).dimensionless for name in parts):  # mm/deg is no length
+        return Unit(text, None)
     for target in SPELLINGS:
+        if target == "Hz" and "hertz" not in str(unit):  # turns in a minute are no frequency
+            continue
         if target in ("", "rad"):  # pint takes angles for pure numbers; those in use are listed
             continue
         if unit.dimensionality == registry.Unit(target).dimensionality:

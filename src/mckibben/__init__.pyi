@@ -1,6 +1,10 @@
 """The face of the package: what is here can be had from it, and is imported when it is first used."""
 
+from . import control as control
+from . import example as example
 from . import muscles as muscles
+from . import rigs as rigs
+from . import signals as signals
 from .blocks.bands.banded import Banded as Banded
 from .blocks.compose import Parallel as Parallel
 from .blocks.compose import PerChannel as PerChannel

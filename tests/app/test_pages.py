@@ -16,7 +16,7 @@ from nicegui import Client, ui
 from nicegui.testing import User, user_simulation
 
 from mckibben import DataError
-from mckibben.app import plots, scripts
+from mckibben.app import plots
 from mckibben.app.desk import Desk
 from mckibben.app.jobs import Jobs
 from mckibben.app.motions import parsed, reference_recording
@@ -205,21 +205,6 @@ def test_what_was_cancelled_is_said_once(tmp_path: Path) -> None:
             assert said == [name, "cancelled"]
 
     visit(workspace, look)
-
-
-def test_the_script_runs(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    workspace = filled(tmp_path)
-    workspace.write_json("results", "mine", {"status": "ok", "model": "pi", "settings": {}})
-    channels = {"input": "pressure", "output": "displacement"}
-    text = scripts.script(workspace, ["mine"], channels)
-    here = Path.cwd()
-    os.chdir(tmp_path)
-    try:
-        exec(compile(text, "script.py", "exec"), {})
-    finally:
-        os.chdir(here)
-    assert "pi" in capsys.readouterr().out
-    assert (tmp_path / "inverse.json").is_file()
 
 
 def test_figures_hold_plain_numbers_and_colours(tmp_path: Path) -> None:

@@ -137,27 +137,31 @@ def possible(workspace: Workspace, name: str) -> list[str]:
     return found
 
 
-def written(name: str, form: str, settings: Mapping[str, Any]) -> str:
-    """Return the call that gives a model as what it is used as."""
-    loaded = f"mckibben.load('models/{name}.json')"
+def written(workspace: Workspace, name: str, form: str, settings: Mapping[str, Any]) -> str:
+    """Return the call that gives a model as what it is used as; what makes its file stands before."""
+    from mckibben.blocks.force.feedforward import ForceFeedforward
+
     options = {
         key: settings[key] for key in SETTINGS.get(form, ()) if settings.get(key) is not None
     }
-    match form:
-        case "inverse":
-            return f"{loaded}.inverse()"
-        case "band":
-            return f"mckibben.load('banded/{name}.json')"
-        case "adaptive":
-            flags = f" --time {options['time']:g}" if "time" in options else ""
-            return f"mckibben invert models/{name}.json --adaptive{flags} -o {name}-adaptive.json"
-        case "predictive":
-            flags = "".join(
-                f" --{key.replace('_', '-')} {value:g}" for key, value in options.items()
-            )
-            return (
-                f"mckibben invert models/{name}.json --predictive{flags} -o {name}-predictive.json"
-            )
-        case "force":
-            return f"mckibben invert models/{name}.json --for force -o {name}-force.json"
-    return loaded
+    flags = "".join(f" --{key.replace('_', '-')} {value:g}" for key, value in options.items())
+    asked = {
+        "inverse": "",
+        "adaptive": " --adaptive",
+        "predictive": " --predictive",
+        "force": " --for force",
+    }
+    if form == "band":
+        return f"mckibben.load('banded/{name}.json')"
+    if form not in asked:
+        return f"mckibben.load('models/{name}.json')"
+    if form == "inverse" and ForceFeedforward.of(workspace.model(name)) is None:
+        return f"mckibben.load('models/{name}.json').inverse()"
+    made = f"{name}-{form}.json"
+    invert = in_a_shell(f"mckibben invert models/{name}.json{asked[form]}{flags} -o {made}")
+    return f"{invert}\nmckibben.load({made!r})"
+
+
+def in_a_shell(command: str) -> str:
+    """Return a command as a comment among calls."""
+    return f"# in a shell: {command}"

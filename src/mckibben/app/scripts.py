@@ -18,33 +18,106 @@ def read_call(path: str, given: Mapping[str, Any]) -> str:
 
 
 def fit_call(
-    model: str, channels: Mapping[str, Any], settings: Mapping[str, Any], seed: int
+    model: str,
+    channels: Mapping[str, Any],
+    settings: Mapping[str, Any],
+    seed: int,
+    allow_shared: bool,
 ) -> str:
     """Return the call that fits and tests a model on the recordings in use."""
-    given = f", settings={ {model: dict(settings)}!r}" if settings else ""
+    asked = _asked([model], {model: dict(settings)} if settings else {}, allow_shared)
+    return f"mckibben.compare(train, test, {_given(channels)}, {asked}, seed={seed})"
+
+
+def report_call(
+    models: Sequence[str],
+    channels: Mapping[str, Any],
+    settings: Mapping[str, Mapping[str, Any]],
+    allow_shared: bool,
+) -> str:
+    """Return the calls that study the recordings in use, and write the report."""
+    told = {model: dict(given) for model, given in settings.items() if given}
+    asked = f"{_given(channels)}, {_asked(models, told, allow_shared)}"
     return (
-        f"mckibben.compare(train, test, {_given(channels)}, models=[{model!r}]{given}, seed={seed})"
+        f"study = mckibben.study(train, test, {asked})\nmckibben.write_report(study, 'report.html')"
     )
+
+
+def twin_call(workspace: Workspace, name: str) -> str:
+    """Return the call that gives a model as a plant."""
+    folder, limits = workspace.twin_of(name)
+    asked = f", limits={limits!r}" if limits else ""
+    return f"mckibben.control.Twin(mckibben.load('{folder}/{name}.json'){asked})"
+
+
+def track_call(law: str, compensator: str, plant: str, reference: str) -> str:
+    """Return the calls that let a controller follow a reference, in a file, on a plant."""
+    tuned = "mckibben.control.tune_pid(plant, sample_time=reference.sample_time, scheduled=held)"
+    return "\n".join(
+        [
+            *_assigned("compensator", compensator),
+            f"plant = {plant}",
+            f"(reference,) = {read_call(reference, {})}",
+            "held = {name: reference[name][0] for name in plant.inputs if name in reference}",
+            f"law = mckibben.control.control_law({law!r}, compensator, lambda: {tuned})",
+            "mckibben.control.track(law, plant, reference)",
+        ]
+    )
+
+
+def simulate_call(block: str, file: str) -> str:
+    """Return the calls that run a block over a recording in a file."""
+    return "\n".join(
+        [
+            *_assigned("block", block),
+            f"(recording,) = {read_call(file, {})}",
+            "block.simulate(recording.select([channel.name for channel in block.inputs]))",
+        ]
+    )
+
+
+def _assigned(name: str, call: str) -> list[str]:
+    """Return the lines of a call, the last of them with a name for what it gives."""
+    *before, last = call.splitlines()
+    return [*before, f"{name} = {last}"]
 
 
 def _given(channels: Mapping[str, Any]) -> str:
     return ", ".join(f"{name}s={value!r}" for name, value in channels.items())
 
 
-def script(workspace: Workspace, models: Sequence[str], channels: Mapping[str, Any]) -> str:
-    """Return a Python script that does again what was done: read, fit, choose, invert, save."""
+def _asked(models: Sequence[str], settings: Mapping[str, Any], allow_shared: bool) -> str:
+    told = f", settings={settings!r}" if settings else ""
+    return f"models={list(models)!r}{told}{', allow_shared=True' if allow_shared else ''}"
+
+
+def script(
+    workspace: Workspace, results: Sequence[Mapping[str, Any]], channels: Mapping[str, Any]
+) -> str:
+    """Return a Python script that does again what was done: read, fit, choose, invert, save.
+
+    Parameters
+    ----------
+    workspace : Workspace
+    results : sequence of mapping
+        What came of fits, best first. Of those of one model, the best is fitted again.
+    channels : mapping
+        Input and output.
+    """
     lines = ['"""What was done in the workbench, as a script."""', "", "import mckibben", ""]
     for role in ("train", "test"):
         lines += [f"{role} = [", *(f"    {read}," for read in _reads(workspace, role)), "]"]
+    fitted, said = _of_one_split(results)
+    best: dict[str, Mapping[str, Any]] = {}
+    for row in fitted:
+        best.setdefault(row["model"], row)
+    settings = {model: row["settings"] for model, row in best.items() if row["settings"]}
+    shared = any(row["shared"] for row in best.values())
     lines += [
         "",
+        *said,
         f"board = mckibben.compare(train, test, {_given(channels)},",
-    ]
-    chosen = [row for row in workspace.results() if row["name"] in models]
-    settings = {row["model"]: row["settings"] for row in chosen if row["settings"]}
-    kinds = [row["model"] for row in chosen]
-    lines.append(f"    models={kinds!r}, settings={settings!r})")
-    lines += [
+        f"    {_asked(list(best), settings, shared)})",
         'print(board.to_frame()[["model", "validation_rmse", "test.rmse"]])',
         "print(board.chosen)",
         "",
@@ -63,6 +136,16 @@ def script(workspace: Workspace, models: Sequence[str], channels: Mapping[str, A
         "",
     ]
     return "\n".join(lines)
+
+
+def _of_one_split(
+    results: Sequence[Mapping[str, Any]],
+) -> tuple[Sequence[Mapping[str, Any]], list[str]]:
+    """Return what was fitted and tested on the recordings as they are; if nothing was, all, and that."""
+    same = [row for row in results if row["current"]]
+    if same or not results:
+        return same, []
+    return results, ["# These models were fitted to, or tested on, other data than is in use now."]
 
 
 def _reads(workspace: Workspace, role: str) -> list[str]:

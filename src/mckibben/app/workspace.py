@@ -92,17 +92,23 @@ class Workspace(Changing):
             If it cannot be one.
         """
         from mckibben.control import Twin
+
+        folder, limits = self.twin_of(name)
+        return Twin(self.model(name, folder), limits=limits, name=name)
+
+    def twin_of(self, name: str) -> tuple[str, dict[str, tuple[float, float]]]:
+        """Return the folder of the model that is a plant, and limits that it does not know itself."""
         from mckibben.control.identified import known_ranges
 
-        banded = self.path("banded", f"{name}.json").exists()
-        model, limits = self.model(name, "banded" if banded else "models"), {}
+        folder = "banded" if self.path("banded", f"{name}.json").exists() else "models"
+        model, limits = self.model(name, folder), {}
         for channel in model.inputs:
             runs = [run[channel.name] for run in self.readable() if channel.name in run]
             if runs and channel.name not in known_ranges(model):
                 ends = min(float(u.min()) for u in runs), max(float(u.max()) for u in runs)
                 if ends[0] < ends[1]:
                     limits[channel.name] = ends
-        return Twin(model, limits=limits, name=name)
+        return folder, limits
 
     def plants(self, inverted: str) -> list[str]:
         """Return the models that a model's compensator can be tried on, in the order of the choice.

@@ -10,7 +10,7 @@ from typing import Any
 from nicegui import ui
 
 from mckibben import registry
-from mckibben.app import forms, plots
+from mckibben.app import forms, plots, scripts
 from mckibben.app.desk import Desk, guarded, named, on_event, tell
 from mckibben.app.following import fitting_rigs
 from mckibben.app.jobs import RUNNING
@@ -120,7 +120,10 @@ def _offer(
             own = str(plant.value).startswith(OWN)
             name = str(plant.value).removeprefix(OWN).removeprefix(RIG)
             there = {"plant": name} if own else {"rig": name}
-            on = f"Twin(load('models/{name}.json'))" if own else f"load_rig({name!r})"
+            plant_call = (
+                scripts.twin_call(desk.workspace, name) if own else f"mckibben.load_rig({name!r})"
+            )
+            compensator = forms.written(desk.workspace, model, form, settings)
             for kind in kinds.value:
                 given = {"model": model, "controller": kind, "reference": reference} | there
                 given |= {"form": form, "settings": settings}
@@ -129,7 +132,7 @@ def _offer(
                     for job in desk.jobs.active()
                 ):
                     continue
-                call = f"track({kind} of {forms.written(model, form, settings)}, {on}, reference)"
+                call = scripts.track_call(kind, compensator, plant_call, f"runs/{reference}")
                 wish = "-".join([model, *([] if form == "inverse" else [form]), kind])
                 desk.jobs.submit("loop", given | {"name": wish, "call": call})
                 desk.did(f"closed the loop: {wish}", call)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from nicegui import ui
 
-from mckibben.app import forms, plots
+from mckibben.app import forms, plots, scripts
 from mckibben.app.desk import Desk, guarded, named, on_event
 from mckibben.app.following import compensated, held_for, kept_motion
 from mckibben.app.pages import closing, forces, leaderboard, logs
@@ -210,9 +210,9 @@ class Editor:
         file = await asyncio.to_thread(kept_motion, desk.workspace, name, reference, under_way)
         if self._asked is not asked or self.wish != asked:  # a later click shows what is now wished
             return
-        call = forms.written(name, form, settings)
+        call = forms.written(desk.workspace, name, form, settings)
         if form == "inverse":
-            call += ".simulate(reference)"
+            call = scripts.simulate_call(call, f"runs/{file}")
         desk.did(f"inverted {name}", call)
         desk.compensator = name, form, settings
         desk.changed("compensator")

@@ -6,7 +6,7 @@ import asyncio
 
 from nicegui import ui
 
-from mckibben.app import forms
+from mckibben.app import forms, scripts
 from mckibben.app.desk import Desk, guarded, named
 from mckibben.app.kept import Estimated
 from mckibben.app.pages.kept_curves import drawn, showing
@@ -53,7 +53,9 @@ def build(desk: Desk) -> None:
                     for job in desk.jobs.active()
                 ):
                     return
-                call = f"{forms.written(model.value, 'force', {})} && mckibben simulate"
+                written = forms.written(desk.workspace, model.value, "force", {})
+                source = desk.workspace.entry(run.value).path.name
+                call = scripts.simulate_call(written, f"recordings/{source}")
                 name = f"{model.value}-{run.value}"
                 desk.jobs.submit("force", given | {"name": name, "call": call})
                 desk.did(f"estimated the force of {run.value}", call)
@@ -64,7 +66,7 @@ def build(desk: Desk) -> None:
                 block = forms.made(desk.workspace, name, "force", {})
                 path = desk.workspace.new_path("takeaway", f"{name}-force.json")
                 await asyncio.to_thread(block.save, path)
-                desk.did(f"wrote {path.name}", forms.written(name, "force", {}))
+                desk.did(f"wrote {path.name}", forms.written(desk.workspace, name, "force", {}))
                 ui.download(read_bytes(path, most=LARGEST), path.name)
 
             named(ui.button("Estimate", on_click=guarded(start)), "estimate-force")

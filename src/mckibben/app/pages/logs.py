@@ -82,7 +82,7 @@ def _look_back(desk: Desk, model: str, form: str, log: str, *, refit: bool) -> N
     for job in desk.jobs.active():
         if job.kind == "review" and all(job.given.get(key) == given[key] for key in given):
             return
-    command = f"mckibben study {log} --compensator inverse.json -o study"
+    command = forms.in_a_shell(f"mckibben study {log} --compensator inverse.json -o study")
     name = Path(log).stem + ("-with-refit" if refit else "")
     desk.jobs.submit("review", given | {"name": name, "call": command})
     desk.did(f"looked back on {log}", command)

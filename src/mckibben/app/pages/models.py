@@ -57,7 +57,7 @@ def _fit(desk: Desk, choice: Choice) -> None:
         except ModelError as error:
             tell(error)
             continue
-        call = scripts.fit_call(model, desk.channels, given, 0)
+        call = scripts.fit_call(model, desk.channels, given, 0, desk.allow_shared)
         desk.jobs.submit(
             "fit",
             {"model": model, "name": model, **desk.channels}

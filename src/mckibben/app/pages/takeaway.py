@@ -112,7 +112,7 @@ def _report(desk: Desk) -> None:
                 if row["model"] not in models:
                     models.append(row["model"])
                     settings[row["model"]] = row["settings"]
-            call = f"write_report(mckibben.study(train, test, models={models!r}), 'report.html')"
+            call = scripts.report_call(models, desk.channels, settings, desk.allow_shared)
             desk.jobs.submit(
                 "report",
                 {"models": models, "settings": settings, **desk.channels}
@@ -149,8 +149,7 @@ def _report(desk: Desk) -> None:
 
 def _script(desk: Desk) -> None:
     def text() -> str:
-        models = [row["name"] for row in desk.results()]
-        return scripts.script(desk.workspace, models, desk.channels)
+        return scripts.script(desk.workspace, desk.results(), desk.channels)
 
     with ui.card().classes("w-full"):
         ui.label("The same as a script").classes("text-lg")

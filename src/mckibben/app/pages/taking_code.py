@@ -78,7 +78,7 @@ def build(desk: Desk, model: Any) -> None:
             path = desk.workspace.new_path("takeaway", f"{stem()}.json")
             block, _ = await asyncio.to_thread(block_and_options)
             await asyncio.to_thread(block.save, path)
-            hand_over(desk, path, forms.written(*chosen()))
+            hand_over(desk, path, forms.written(desk.workspace, *chosen()))
 
         async def as_c() -> None:
             from mckibben.export import export_c
@@ -178,7 +178,8 @@ async def _zipped(desk: Desk, folder: Path, call: str) -> None:
 
 def hand_over(desk: Desk, path: Path, call: str) -> None:
     """Give a file to the browser, and say where it is kept."""
-    desk.did(f"wrote {path.name}", call)
+    shown = forms.in_a_shell(call) if call.startswith("mckibben ") else call
+    desk.did(f"wrote {path.name}", shown)
     ui.download(read_bytes(path, most=LARGEST), path.name)
     ui.notify(f"Also kept as {path}")
 

@@ -16,6 +16,7 @@ from mckibben.report import write_report
 from mckibben.report.page import page
 from mckibben.studying.study import Study
 from tests.report.studies_by_hand import measured, models, renamed, study
+from tests.tools import needs, where
 
 SECTIONS = (
     "headline",
@@ -219,3 +220,21 @@ def test_a_page_is_whole_before_any_model_is_fitted(whole: Study) -> None:
     assert {"time", "loop"} <= set(parsed.figures)
     assert "pi and gpi to come" in parsed.words
     assert "No model worked" not in parsed.words
+
+
+@needs("chromium")
+def test_nothing_is_wider_than_a_phone(tmp_path: Path) -> None:
+    playwright = pytest.importorskip("playwright.sync_api")
+    long = "/".join(["", *(f"{'folder_of_measurements' * 2}{k}" for k in range(3)), "run.csv"])
+    noted = measured(source=long).with_meta(notes=[f"column {'a' * 90} is left out"])
+    path = tmp_path / "report.html"
+    write_report(study((noted,), notes=(f"{long} is shared",)), path)
+    with playwright.sync_playwright() as play:
+        browser = play.chromium.launch(
+            executable_path=where("chromium"), args=["--no-sandbox", "--disable-gpu"]
+        )
+        page = browser.new_page(viewport={"width": 400, "height": 800})
+        page.goto(path.as_uri())
+        width = page.evaluate("document.documentElement.scrollWidth")
+        browser.close()
+    assert width <= 400

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import re
+import sys
+from html import unescape
 
 import numpy as np
 import pytest
 
+from mckibben import registry
 from mckibben.papers.reproduction import Figure, Points, Reproduction, Source, Table
 from mckibben.report.reproduction import beside, reproduction_page
 
@@ -52,3 +55,14 @@ def test_the_paper_and_its_question_come_first_and_raw_signals_last(quick: bool)
     assert places == sorted(places)
     assert ("A quick run" in words) == quick
     assert bool(re.search(r"reproduce muscle --quick", words)) == quick
+
+
+@pytest.mark.parametrize("paper", registry.names("papers"))
+def test_every_paper_says_who_wrote_it_where_and_what_it_asks(paper: str) -> None:
+    source = sys.modules[registry.load("papers", paper).__module__].SOURCE
+    html = reproduction_page(Reproduction(paper, source, (), (), (), (), quick=True))
+    header = unescape(html[html.index("<header>") : html.index("</header>")])
+    assert source.title in header
+    assert source.question in header
+    assert (source.authors or "Authors: not known here") in header
+    assert (f"doi:{source.doi}" if source.doi else "DOI: not known here") in header

@@ -219,3 +219,14 @@ def test_the_keyboard_skips_to_the_content_and_sees_where_it_is(browser: Any, ad
         assert page.evaluate(outline) != "none"
         moves = "getComputedStyle(document.querySelector('.q-btn')).transitionProperty"
         assert page.evaluate(moves) == "none"
+
+
+def test_what_cannot_be_pressed_is_plainly_lighter(browser: Any, address: str) -> None:
+    with visited(browser, address) as page:
+        seen(page, "recording-run").scroll_into_view_if_needed()
+        redo = seen(page, "redo")
+        assert redo.is_disabled()
+        assert redo.evaluate("one => Number(getComputedStyle(one).opacity)") <= 0.4
+        subtitles = page.locator("[data-testid=upload] .q-uploader__subtitle")
+        assert subtitles.count() == 1
+        assert not subtitles.first.is_visible()

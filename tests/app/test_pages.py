@@ -20,6 +20,7 @@ from mckibben.app import plots
 from mckibben.app.desk import Desk
 from mckibben.app.jobs import Jobs
 from mckibben.app.motions import parsed, reference_recording
+from mckibben.app.pages import data
 from mckibben.app.shell import build, load_the_rest
 from mckibben.app.work import fit
 from mckibben.app.workspace import Workspace
@@ -246,3 +247,9 @@ def test_points_that_are_none_are_named(text: str) -> None:
 def test_references_that_cannot_be_are_refused(points: list[tuple[float, float]]) -> None:
     with pytest.raises(DataError, match=r"Remedy:"):
         reference_recording({"displacement": points}, 0.01)
+
+
+def test_the_kinds_of_files_are_those_that_are_read_here(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert "Excel (.xlsx)" in data.taken()
+    monkeypatch.setattr(data, "find_spec", lambda name: None if name == "openpyxl" else object())
+    assert data.taken() == ["CSV", "TSV", *(kind for kind in data.KINDS if "Excel" not in kind)]

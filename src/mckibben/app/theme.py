@@ -78,6 +78,8 @@ body.body--dark {{ {_variables(DARK)} }}
   .bar {{ background: var(--bar) !important; color: var(--on-bar) !important }}
   .q-uploader__header {{ color: var(--on) !important }}
   .q-notification :is(.q-notification__actions, .q-btn) {{ color: inherit !important }}
+  .q-uploader:not(:has(.q-uploader__list > *)) .q-uploader__subtitle {{ display: none }}
+  .q-btn--flat.disabled {{ color: var(--muted) !important; opacity: 0.35 !important }}
   .text-grey, .q-table__bottom {{ color: var(--muted) !important }}
 }}
 {SHEET}"""

@@ -169,7 +169,9 @@ def _column(place: int, column: Seen, reading: Reading) -> dict[str, Any]:
     with ui.row().classes("items-center w-full gap-2 border-b border-gray-500/30 pb-1"):
         with ui.column().classes("gap-0 w-44 min-w-0"):
             ui.label(column.header[:80] or f"column {place + 1}").classes("font-medium break-all")
-            ui.label(", ".join(column.first)[:60]).classes("text-xs opacity-70 break-all")
+            with named(ui.row().classes("gap-x-1 gap-y-0 text-xs opacity-70"), f"first-{place}"):
+                for text in column.first:  # each on one line, for half a number is another one
+                    ui.label(text).classes("max-w-full truncate")
         channel = ui.select(
             options,
             value=column.channel or LEFT_OUT,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from importlib.util import find_spec
 from typing import Any
 
 from nicegui import ui
@@ -23,6 +24,16 @@ SHOWN = 6
 
 PROTOCOL = "field-models"
 """The one that is offered first."""
+
+KINDS = {
+    "Excel (.xlsx)": "openpyxl",
+    "Parquet": "pyarrow",
+    "MAT": "scipy",
+    "HDF5": "h5py",
+    "TDMS": "nptdms",
+    "ROS bags": "rosbags",
+}
+"""Kinds of files beside text, and the libraries that read them."""
 
 WATCH = 1.0
 """How often a page looks whether another one changed recordings [s]."""
@@ -63,12 +74,17 @@ def _watch(desk: Desk, intake: Intake) -> None:
     ui.timer(WATCH, look)
 
 
+def taken() -> list[str]:
+    """Return the kinds of files that are read here, by the libraries that are installed."""
+    return ["CSV", "TSV", *(kind for kind, library in KINDS.items() if find_spec(library))]
+
+
 def _sources(desk: Desk, dialogs: Any) -> Intake:
     ui.label("Add recordings").classes("text-lg")
     intake = Intake(desk, dialogs)
     named(
         ui.upload(
-            label="Drop files here: CSV, TSV, Parquet, MAT, HDF5, TDMS",
+            label=f"Drop files here: {', '.join(taken())}",
             multiple=True,
             auto_upload=True,
             max_file_size=LARGEST_UPLOAD,
@@ -90,7 +106,8 @@ def _sources(desk: Desk, dialogs: Any) -> Intake:
 async def _example(desk: Desk) -> None:
     added = await asyncio.to_thread(desk.workspace.add_example)
     desk.settle_channels()
-    desk.did("opened the example", "mckibben.read(mckibben.example.TRAIN)")
+    call = "mckibben.read(mckibben.example.TRAIN), mckibben.read(mckibben.example.TEST)"
+    desk.did("opened the example", call)
     desk.changed("recordings", "channels")
     if added:
         ui.notify("A virtual muscle with a hanging load: one run to train on, one to test on.")
@@ -99,7 +116,7 @@ async def _example(desk: Desk) -> None:
 
 
 def _record(desk: Desk, protocol: str, runs: list[str]) -> None:
-    call = f"mckibben.rigs.record(protocol({protocol!r}), load_rig(...), runs={runs!r}, seed=0)"
+    call = f"list(mckibben.rigs.record({protocol!r}, runs={runs!r}, seed=0))"
     desk.jobs.submit(
         "record",
         {

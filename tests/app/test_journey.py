@@ -112,6 +112,9 @@ def test_a_file_that_needs_help_is_mapped_by_hand(page: Any) -> None:
     upload(page, "rig.csv", ("t_s;P1;laser\n" + "\n".join(rows)).encode())
     problem = seen(page, "problem").inner_text()
     assert "Remedy" in problem
+    numbers = seen(page, "first-1").locator(":scope > *").all()  # whole, each on one line
+    assert len(numbers) > 1
+    assert max(one.bounding_box()["height"] for one in numbers) < 24
     for place, channel, unit in ((1, "pressure", "kPa"), (2, "displacement", "mm")):
         page.get_by_test_id(f"channel-{place}").click()
         page.get_by_role("option", name=channel, exact=True).click()

@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mckibben import GPI, load
+from mckibben import GPI, Recording, load, write
+from mckibben.signals import irregular_triangle
 from tests.cli.conftest import Cli
 
 
@@ -146,3 +147,19 @@ def test_info_lists_models_and_tells_about_files(
     assert "rate" in {gap["what"] for gap in told["untold"]}
     assert recording["channels"]["pressure"]["unit"] == "bar"
     assert cli("info", "--models").code == cli("info", model).code == 0
+
+
+def test_of_held_lengths_the_force_is_compared(cli: Cli, tmp_path: Path) -> None:
+    time = np.arange(0, 20, 0.02)
+    u = irregular_triangle(time, 8, 5.0, seed=1)
+    for place, held in enumerate((0.0, 10.0, 20.0)):
+        samples = {
+            "pressure": u,
+            "displacement": np.full(u.size, held),
+            "force": 40 * u - 2 * held,
+        }
+        write(Recording(samples, 0.02), tmp_path / f"held{place}.csv")
+    files = [str(tmp_path / f"held{place}.csv") for place in range(3)]
+    done = cli("compare", files[0], files[2], "--test", files[1], "--models", "balance-force")
+    assert done.code == 0, done.err
+    assert "displacement is held throughout, and so force is modelled" in done.out + done.err

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mckibben import Recording
-from mckibben.comparison.channels import Channels
+from mckibben.comparison.channels import Channels, channels_of, where_held
 from mckibben.comparison.recognising import moved_by, recognised
 
 T = np.linspace(0.0, 9.0, 50)
@@ -82,3 +82,13 @@ def test_a_held_input_is_looked_at_over_what_moves() -> None:
     )
     still = run("pressure", "displacement", "force", held=("displacement", "pressure"))
     assert moved_by([still], "displacement", names) == "displacement"
+
+
+def test_a_comparison_of_held_lengths_is_of_force() -> None:
+    names = ("pressure", "displacement", "force")
+    held = [run(*names, held=("displacement",)) for _ in range(2)]
+    found = channels_of(held, None, None, None)
+    assert where_held(held, found) == Channels(("displacement",), ("force",))
+    assert where_held([*held, run(*names)], found) == found
+    slack = [run(*names, held=("displacement", "force"))]
+    assert where_held(slack, found) == found

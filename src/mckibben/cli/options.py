@@ -173,8 +173,8 @@ class Reading:
     ) -> list[list[Recording]]:
         """Return the recordings in several lists of files, to compare models on.
 
-        Those of one muscle are asked for, or what is named instead, unless the first file is of several:
-        which of theirs are meant, the comparison finds by name.
+        Those of one muscle are asked for, or what is named instead, unless the first file is of several
+        or of one that is held: which of theirs are meant, the comparison finds.
         """
         asked = [*(inputs or ["pressure"]), *(outputs or ["displacement"])]
         if load is not None or len(asked) > 2:
@@ -182,9 +182,12 @@ class Reading:
         (first, *rest), *others = files
         try:
             begun = self.read([first], asked)
+            every = inputs is None and outputs is None and _is_held(begun)
         except DataError:
             if not self._finds_its_own(first):
                 raise
+            every = True
+        if every:
             return [self.read(some, None, informative=False) for some in files]
         return [begun + self.read(rest, asked), *(self.read(some, asked) for some in others)]
 
@@ -199,6 +202,13 @@ class Reading:
                     raise
                 return False  # what is wrong with one muscle's file is said by whoever asks
         return any(map(SEVERAL.fullmatch, found.channels))
+
+
+def _is_held(recordings: Sequence[Recording]) -> bool:
+    """Tell whether nothing moves, so that the force may be what is to be modelled."""
+    from mckibben.comparison.recognising import any_moves
+
+    return not any_moves(recordings, ("displacement",))
 
 
 def _pairs(option: str, given: list[str] | None) -> dict[str, str]:

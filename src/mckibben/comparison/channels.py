@@ -6,6 +6,7 @@ import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+from mckibben.comparison.recognising import FORCE, any_moves
 from mckibben.errors import DataError
 from mckibben.estimators.coupled.base import driving, moved, schedules
 from mckibben.recording import Recording
@@ -87,6 +88,13 @@ def channels_of(
                 remedy="name it with --column, or leave --load out",
             )
     return Channels(given, wanted, (load,))
+
+
+def where_held(recordings: Sequence[Recording], found: Channels) -> Channels:
+    """Return force over what is held, where nothing that is found moves while a force does."""
+    held = len(found.outputs) == 1 and not any_moves(recordings, found.outputs)
+    forced = all(FORCE in one for one in recordings) and any_moves(recordings, (FORCE,))
+    return Channels(found.outputs, (FORCE,)) if held and forced else found
 
 
 def _by_name(

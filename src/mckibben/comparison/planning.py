@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from mckibben import registry
-from mckibben.comparison.channels import Channels, Names, channels_of
+from mckibben.comparison.channels import Channels, Names, channels_of, where_held
 from mckibben.comparison.constant import constant_of
 from mckibben.comparison.coverage import Coverage, coverage_of
 from mckibben.comparison.kept import Kept, source
@@ -148,7 +148,15 @@ def plan_of(
     recordings, tests, checks = listed(train), listed(test), listed(validation)
     if not recordings:
         raise DataError("there are no recordings to fit", remedy="give at least one")
-    channels = channels_of([*recordings, *tests, *checks], inputs, outputs, load)
+    every = [*recordings, *tests, *checks]
+    channels = channels_of(every, inputs, outputs, load)
+    held: tuple[str, ...] = ()
+    if inputs is None and outputs is None and load is None:
+        named, channels = channels, where_held(every, channels)
+        if channels != named:
+            held = (
+                f"{named.outputs[0]} is held throughout, and so {channels.outputs[0]} is modelled",
+            )
     unit = _checked(recordings, [*tests, *checks], channels)
     roles = {"fit": recordings, "validate": checks, "test": tests}
     shared = told(
@@ -173,7 +181,6 @@ def plan_of(
     if chosen_by == "cross-validation":
         validated = f", cross-validated on {len(parts)} part(s) within the range of the rest"
     marked = f"; {TESTED}" if any(one.startswith(TESTED) for one in shared) else ""
-    every = [*recordings, *tests, *checks]
     chosen, left_out = _chosen(models, every, channels)
     if not chosen:
         raise ModelError(
@@ -199,6 +206,7 @@ def plan_of(
         left_out=left_out,
         notes=(
             *notes,
+            *held,
             *_about_load(every, channels, load, chosen),
             *_beyond_training(split.train, tests, channels),
             *shared,

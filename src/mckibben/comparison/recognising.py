@@ -46,7 +46,7 @@ def recognised(recordings: Sequence[Recording], channels: Sequence[str]) -> Side
     inputs = inputs or tuple(channels[:1])
     rest = [name for name in channels if name not in inputs]
     outputs = _called(rest, MOVED) or _in_units(rest, units, UNITS_MOVED)
-    if FORCE in rest and outputs and not _any_moves(recordings, outputs):
+    if FORCE in rest and outputs and not any_moves(recordings, outputs):
         return outputs[:1], (FORCE,)
     return inputs, outputs or ((FORCE,) if FORCE in rest else tuple((rest or list(channels))[:1]))
 
@@ -62,10 +62,10 @@ def moved_by(recordings: Sequence[Recording], given: str, channels: Sequence[str
     channels : sequence of str
         Those that may stand in for it.
     """
-    if _any_moves(recordings, (given,)):
+    if any_moves(recordings, (given,)):
         return given
     driving = _called(channels, DRIVING)
-    return driving[0] if driving and _any_moves(recordings, driving[:1]) else given
+    return driving[0] if driving and any_moves(recordings, driving[:1]) else given
 
 
 def _called(channels: Sequence[str], words: Sequence[str]) -> tuple[str, ...]:
@@ -89,7 +89,7 @@ def _in_units(
     return ()
 
 
-def _any_moves(recordings: Sequence[Recording], channels: Sequence[str]) -> bool:
+def any_moves(recordings: Sequence[Recording], channels: Sequence[str]) -> bool:
     """Tell whether any channel moves within any recording, by more than its offset would round to."""
     return any(
         float(np.ptp(run[name])) > 1e-6 * (1.0 + float(np.abs(run[name]).max()))

@@ -58,9 +58,14 @@ def shown(study: Study) -> tuple[Shown, ...]:
     that is not repeated here.
     """
     from mckibben.comparison.channels import Channels
+    from mckibben.comparison.recognising import moved_by
 
-    board = study.leaderboard
-    pairs = Channels(board.inputs, board.outputs).pairs()
+    board, runs = study.leaderboard, [*study.train, *study.test]
+    every = list(runs[0].channels)
+    pairs = [
+        (moved_by(runs, given, every), wanted)
+        for given, wanted in Channels(board.inputs, board.outputs).pairs()
+    ]
     ranked = [row.model for row in study.leaderboard.rows if row.model in study.predictions]
     n_train = len(study.train)
     parts = [_part_of(study, recording) for recording in study.test]

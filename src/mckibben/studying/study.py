@@ -14,6 +14,7 @@ from mckibben.characterization import Characterization, characterize
 from mckibben.comparison.channels import Names
 from mckibben.comparison.planning import Settings, plan_of
 from mckibben.comparison.ranking import ranked
+from mckibben.comparison.recognising import moved_by
 from mckibben.comparison.results import Leaderboard
 from mckibben.comparison.splits import listed
 from mckibben.comparison.standing import Standing
@@ -195,20 +196,21 @@ def study(
             remedy="leave --rig out, or use mckibben track",
         )
     one = len(channels.inputs) == len(channels.outputs) == 1
+    looped = channels.inputs
+    if one:
+        looped = (moved_by([*recordings, *tests], looped[0], list(recordings[0].channels)),)
     so_far = Study(
         train=plan.data.split.train,
         test=plan.data.split.test,
         characterization=(
-            characterize([*recordings, *tests], channels.inputs[0], channels.outputs[0])
-            if one
-            else None
+            characterize([*recordings, *tests], looped[0], channels.outputs[0]) if one else None
         ),
         leaderboard=plan.board(),
         predictions={},
         inverse=None,
         load=load,
         notes=(*notes, *plan.notes),
-        untold=untold(recordings, channels.inputs, channels.outputs, tests=tests),
+        untold=untold(recordings, looped, channels.outputs, tests=tests),
         review=reviewed,
     )
     if found is not None:
@@ -232,7 +234,7 @@ def study(
         on_test = so_far.predictions[board.best.model][len(split.train) :]
         so_far = replace(
             so_far,
-            untold=untold(recordings, channels.inputs, names, block, tests=tests),
+            untold=untold(recordings, looped, names, block, tests=tests),
             check=check_on_test(block, split, on_test, names),
             description=describe(block, split.train, fitted=True),
         )

@@ -395,3 +395,28 @@ def test_a_hanging_load_swings_as_newton_says() -> None:
 def test_what_makes_no_balance_is_refused(change: dict[str, Any], about: str) -> None:
     with pytest.raises(ModelError, match=rf"(?s){about}"):
         replace(Balance.example(), **change)
+
+
+def test_numbers_are_in_the_units_of_its_channels() -> None:
+    metric = Balance.example()
+    turning = replace(
+        metric,
+        driven=tuple(Channel(one.name, "rad") for one in metric.driven),
+        given=tuple(Channel(f"voltage_{k}", "V") for k, _ in enumerate(metric.driven)),
+    )
+    relative = replace(turning, areas=((1.0, -0.1, 0.0), (1.1, -0.1, 0.0)))
+    for block, friction, walls in (
+        (metric, "N/mm", "mm/bar"),
+        (turning, "N/rad", "rad/V"),
+        (relative, "V/rad", "rad/V"),
+    ):
+        assert block.unit_of("friction", (0, 0)) == friction
+        assert block.unit_of("walls", (0,)) == walls
+    assert turning.unit_of("springs", (0, 1)) == "N/rad"
+
+
+def test_what_is_clipped_is_told_of_all_muscles() -> None:
+    block = replace(Balance.example(), pressure_range=(0.0, 1.0))
+    far = 40.0 * np.ones((20, len(block.inputs)))
+    with pytest.warns(ModelWarning, match=r"20 samples need .* or .* beyond 0 to 1 bar"):
+        block.simulate(far, sample_time=0.1)

@@ -135,8 +135,10 @@ def _conclude(study: Study, folder: Path) -> None:
             f"{check.error:.1e} of that range."
         )
     elif check is not None:
+        tested = study.test[0].name
+        followed = f"what it makes of {study.input} in {tested}" if check.own else tested
         say(
-            f"Inverse of {check.model}: follows {study.test[0].name} on the model itself, largest "
+            f"Inverse of {check.model}: follows {followed} on the model itself, largest "
             f"error {numeral(100 * check.error, 2)} % of its range."
         )
     elif study.leaderboard.not_recommended:

@@ -118,10 +118,9 @@ def _invertibility(study: Study, best: Row) -> str:
     else:
         which = f"It cannot be inverted here; the next of the leaderboard that can is {check.model}"
     if check.reachable is None:
+        motion = "what the model makes of the test" if check.own else "the test's motion"
         share = percent(check.error)
-        return (
-            f"{which}: on the model itself, it follows the test's motion to {share} of its range."
-        )
+        return f"{which}: on the model itself, it follows {motion} to {share} of its range."
     low, high = check.reachable
     return (
         f"{which}: any {study.output} from {number(low)} to {number(high)} "

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -25,14 +25,15 @@ FOLLOWED = 1e-6
 """Largest error of an inverse that counts as one, relative to the reachable range."""
 
 NEARLY = 0.01
-"""The same on a measured motion, whose noise and start may be out of reach."""
+"""The same on what a model makes of a recording, whose start may be out of reach."""
 
 
 @dataclass(frozen=True)
 class InverseCheck:
     """The inverse of a model, tried on the model itself.
 
-    Of one muscle, on a reference it can reach; of several, on a measured motion, which it may not.
+    Of one muscle, on a reference it can reach: where nothing is known of that, on what the model makes
+    of a recording. Of several, on a measured motion, which it may not reach.
 
     Parameters
     ----------
@@ -53,6 +54,8 @@ class InverseCheck:
         (`mckibben.control.uncompensated`); None where inputs and outputs do not pair.
     uncompensated_error : float or None
         As ``error``.
+    own : bool
+        Whether the reference is what the model makes of a recording.
     """
 
     model: str
@@ -65,6 +68,7 @@ class InverseCheck:
     error: float
     uncompensated: Array | None = None
     uncompensated_error: float | None = None
+    own: bool = False
 
     def to_dict(self) -> dict[str, Any]:
         """Return which model is inverted, and how well."""
@@ -93,7 +97,8 @@ def invert_best(board: Leaderboard, recording: Recording) -> InverseCheck | None
 def check_inverse(model: str, block: Block, recording: Recording) -> InverseCheck:
     """Send a reference with minor loops through the inverse and back through the model.
 
-    Of a model of several inputs, the reference is the recording's own motion, which may be out of reach.
+    Of a model of several inputs, the reference is the recording's own motion, which may be out of reach;
+    of one that does not say what it can reach, it is what the model makes of the recording.
 
     Parameters
     ----------
@@ -116,9 +121,13 @@ def check_inverse(model: str, block: Block, recording: Recording) -> InverseChec
     lows, highs = block.reachable()
     low, high = float(lows[0]), float(highs[0])
     if np.isinf([low, high]).all():  # as far as its own inputs know
-        found = _check_on_motion(model, block, inverse, recording)
+        names = [channel.name for channel in block.inputs]
+        made = block.simulate(recording.select(names))
+        found = _check_on_motion(
+            model, block, inverse, made.select([*names, block.outputs[0].name])
+        )
         _followed(model, found.error, NEARLY)
-        return found
+        return replace(found, own=True)
     if not (np.isfinite([low, high]).all() and low < high):
         raise ModelError(
             f"{model!r} has no output that it can reach whatever happened before. "

@@ -238,10 +238,8 @@ def study(
             check=check_on_test(block, split, on_test, names),
             description=describe(block, split.train, fitted=True),
         )
-    if channels.single:
-        so_far = replace(so_far, inverse=invert_best(board, recordings[0]))
-    else:
-        so_far = replace(so_far, inverse=invert_best(board, so_far.test[0]))
+    so_far = replace(so_far, inverse=invert_best(board, so_far.test[0]))
+    if not channels.single:
         plant = rig or published_rig(recordings)
         if so_far.inverse is not None and plant is not None:
             loops = closed_loops(board, so_far.inverse.model, plant, so_far.test, seed)

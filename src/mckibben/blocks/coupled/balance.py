@@ -17,8 +17,7 @@ Artificial Muscles"; areas and springs that couple follow what muscles in parall
 
 from __future__ import annotations
 
-import math
-import warnings
+import re
 from typing import Annotated, ClassVar, Self
 
 import numpy as np
@@ -44,11 +43,10 @@ from mckibben.blocks.core.many_channels import ManyChannels
 from mckibben.blocks.core.notation import Notation
 from mckibben.blocks.core.refusals import explicit_state, needs_sample_time
 from mckibben.blocks.coupled.balance_equations import balance_of_forces
-from mckibben.blocks.coupled.balance_fields import check_fields
+from mckibben.blocks.coupled.balance_fields import check_fields, tell_clipped
 from mckibben.blocks.coupled.balance_law import NEARLY, NEVER, begin, keep, press, pressed, settle
 from mckibben.blocks.coupled.balance_learning import LearntBalance
 from mckibben.blocks.coupled.balance_terms import AT_REST, FROM_REST, IN_TIME
-from mckibben.errors import ModelWarning
 
 
 @kernel
@@ -301,16 +299,8 @@ class Balance(ManyChannels, LearntBalance):
 
     def report(self, state: Array) -> None:
         """Warn of references that would need pressures out of range, or muscles that push."""
-        if state[-1] > 0:
-            pushing = " or muscles to push harder than they can," if self.pushes else ""
-            low, high = self.pressure_range or (-math.inf, math.inf)
-            ends = f"{low:g} to {high:g}"
-            warnings.warn(
-                f"{int(state[-1])} samples need {self.given[0].name} beyond {ends} "
-                f"{self.given[0].unit}{pushing} and were clipped there",
-                ModelWarning,
-                stacklevel=4,
-            )
+        pushing = " or muscles to push harder than they can," if self.pushes else ""
+        tell_clipped(state[-1], self.given, self.pressure_range, pushing)
 
     def inverse_complaint(self, state: Array) -> str:
         """Tell of pressures for which no equilibrium was found."""
@@ -331,19 +321,21 @@ class Balance(ManyChannels, LearntBalance):
         return newton_cost(4 * self.c_numbers(sample_time).size + len(self.driven) ** 3)
 
     def unit_of(self, field: str, index: tuple[int, ...]) -> str | None:
-        """Return the unit of a number: forces are in N, or in bar where areas are relative."""
-        declared = super().unit_of(field, index)
-        force = "bar" if self.areas[0][0] == 1.0 else "N"
+        """Return the unit of a number: forces are in N, or, of relative areas, in the input's."""
+        moved, driving = self.driven[0].unit, self.given[0].unit
+        force = driving if self.areas[0][0] == 1.0 else "N"
         if field == "springs":
             power, place = divmod(index[-1], 1 + len(self.driven))
             by, degree = divmod(power - 1, self.degree)
-            below = "mm" * (place > 0)
+            below = moved * (place > 0)
             if power > 0:
                 below += f"{' ' if below else ''}{self.scheduled[by].unit}^{degree + 1}"
             return f"{force}/{below.replace('^1', '')}" if below else force
         if field == "loads":
             return f"{force}/{self.scheduled[index[-1] - self.n_loads].unit}"
-        return (declared or "").replace("N", force)
+        units = {"N": force, "mm": moved, "bar": driving}
+        declared = super().unit_of(field, index) or ""
+        return re.sub(r"\b(N|mm|bar)\b", lambda unit: units[unit[0]], declared)
 
     @classmethod
     def example(cls) -> Self:

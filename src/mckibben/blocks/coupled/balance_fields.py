@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import math
+import warnings
+from collections.abc import Sequence
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mckibben.errors import ModelError
+from mckibben.blocks.core.fields import Channel
+from mckibben.errors import ModelError, ModelWarning
 
 if TYPE_CHECKING:
     from mckibben.blocks.coupled.balance import Balance
@@ -87,3 +91,22 @@ def check_fields(balance: Balance) -> None:
         )
     if any(not low < high for low, high in balance.hull):
         raise ModelError(f"hull of {balance.kind!r} is {balance.hull}. Remedy: lower ends first.")
+
+
+def tell_clipped(
+    n_samples: float,
+    given: Sequence[Channel],
+    reach: tuple[float, float] | None,
+    pushing: str = "",
+) -> None:
+    """Warn of samples that a balance's range of pressures did not reach, if there are any."""
+    if not n_samples > 0:
+        return
+    low, high = reach or (-math.inf, math.inf)
+    names = " or ".join(channel.name for channel in given)
+    warnings.warn(
+        f"{int(n_samples)} samples need {names} beyond {low:.4g} to {high:.4g} {given[0].unit} "
+        f"(less what a dead zone takes){pushing} and were clipped there",
+        ModelWarning,
+        stacklevel=5,
+    )

@@ -14,7 +14,6 @@ names the sources, does its work: it is here for files.
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import replace
 from typing import Annotated, ClassVar, Self
 
@@ -45,7 +44,8 @@ from mckibben.blocks.core.many_channels import ManyChannels
 from mckibben.blocks.core.notation import Notation
 from mckibben.blocks.core.parametrised import parameter_vector
 from mckibben.blocks.core.refusals import explicit_state
-from mckibben.errors import ModelError, ModelWarning
+from mckibben.blocks.coupled.balance_fields import tell_clipped
+from mckibben.errors import ModelError
 
 ELASTIC, AREA = 3, 3
 """Own elastic terms, y^2 to y^4; terms of the area, y to y^3."""
@@ -332,13 +332,7 @@ class ForceBalance(ManyChannels, Invertible):
 
     def report(self, state: Array) -> None:
         """Warn of references that would need pressures out of range."""
-        if state[-1] > 0:
-            warnings.warn(
-                f"{int(state[-1])} samples need {self.given[0].name} beyond {self.pressure_range} "
-                f"{self.given[0].unit} and were clipped there",
-                ModelWarning,
-                stacklevel=4,
-            )
+        tell_clipped(state[-1], self.given, self.pressure_range)
 
     def cost(self, sample_time: float | None) -> Cost:
         """Return about four operations a number, for those of stops come again."""

@@ -28,7 +28,7 @@ def sentences(block: Balance, structure: Structure) -> list[str]:
     times = " and ".join(f"{lag:.3g} s" for lag in block.lags)
     found = []
     for k, channel in enumerate(block.driven):
-        y = float(np.mean(block.hull[k]))
+        y, mm = float(np.mean(block.hull[k])), channel.unit
         rest, middle = (_area(block, k, place) for place in (0.0, y))
         stiff = _slope(block.elasticity[k], y / block.scale) / block.scale + _spring(
             block, k, x, structure
@@ -42,11 +42,11 @@ def sentences(block: Balance, structure: Structure) -> list[str]:
                 stiff += h
         fading = sum(block.relaxation[k])
         found.append(
-            f"{channel.name} at {y:.3g} mm and {p:.3g} {driving}{at}: area {middle:.3g}{per} "
-            f"({rest:.3g} at rest); springs and rubber {stiff:.3g} {unit}/mm; friction up to "
+            f"{channel.name} at {y:.3g} {mm} and {p:.3g} {driving}{at}: area {middle:.3g}{per} "
+            f"({rest:.3g} at rest); springs and rubber {stiff:.3g} {unit}/{mm}; friction up to "
             f"{rubbing:.3g} {unit} either way, {100 * rubbing / max(middle * p, 1e-12):.2g} % of the "
             "pull"
-            + (f"; {fading:.3g} {unit}/mm more that fades within {times}" if block.lags else "")
+            + (f"; {fading:.3g} {unit}/{mm} more that fades within {times}" if block.lags else "")
             + (f"; {1e3 * block.mass[k]:.3g} kg are moved" if block.mass and unit == "N" else "")
             + (
                 f"; it pushes up to {block.pushes[k]:.3g} {unit}, then goes slack"
@@ -71,6 +71,7 @@ def held_back(block: Balance, structure: Structure) -> list[str]:
     """Return which conditions of physics hold the fit back."""
     found = []
     for k, channel in enumerate(block.driven):
+        mm = channel.unit
         places = np.linspace(block.hull[k][0], block.hull[k][1], GRID)
         taken = sum(
             h * (r + block.walls[k]) for h, r in zip(block.friction[k], block.limits, strict=True)
@@ -79,7 +80,7 @@ def held_back(block: Balance, structure: Structure) -> list[str]:
         worst = int(np.argmin(left))
         if left[worst] < NEAR * LEAST_LEFT * block.areas[k][0]:
             found.append(
-                f"{channel.name}: friction would outweigh the area at {places[worst]:.3g} mm, and "
+                f"{channel.name}: friction would outweigh the area at {places[worst]:.3g} {mm}, and "
                 "is kept from it; beware of pressures there"
             )
         stiff = [_stiffness(block, k, at, p) for at in places for p in (0.0, structure.highest)]
@@ -89,8 +90,8 @@ def held_back(block: Balance, structure: Structure) -> list[str]:
             < 2.0 * LEAST_STIFF * block.areas[k][0] * structure.highest / structure.scale
         ):
             found.append(
-                f"{channel.name}: it would have no stiffness left at {places[softest // 2]:.3g} mm, and "
-                "is kept from it"
+                f"{channel.name}: it would have no stiffness left at {places[softest // 2]:.3g} {mm}, "
+                "and is kept from it"
             )
         if block.walls[k] > 0.099 * structure.scale / structure.highest / NEAR:
             found.append(f"{channel.name}: its wall's stretch is at its bound")

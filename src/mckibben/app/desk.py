@@ -46,8 +46,8 @@ class Desk:
     """Whether models are tested on data that they were fitted to, which every result then says."""
     dark: bool = False
     preview: str | None = None
-    compensator: tuple[str, str, dict[str, Any]] | None = None
-    """The model, use and settings whose pressures were shown last; see `mckibben.app.forms`."""
+    compensator: tuple[str, str, dict[str, Any], float] | None = None
+    """The model, use, settings and step whose pressures were shown last; see `mckibben.app.forms`."""
     _chosen: bool = False
     news: News = field(default_factory=News, repr=False)
     """Who shows what on this page, and hears of changes."""

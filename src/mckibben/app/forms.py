@@ -32,6 +32,9 @@ SETTINGS = {
 }
 """Settings of what a model is used as, with what they mean."""
 
+STEP = 0.02
+"""Time between steps, where the model has none of its own [s]."""
+
 DEFAULTS: dict[str, float | None] = {"time": 60.0, "rate_limit": None, "horizon": 20.0}
 
 

@@ -119,9 +119,9 @@ def _recognised(desk: Desk, n_models: int) -> str:
     told = Channels(desk.inputs, desk.outputs).scheduled(used)
     others = set(desk.workspace.channels()).difference(desk.inputs, desk.outputs)
     if told:
-        said.append(f"told {', '.join(told)}")
+        said.append(f"given beside: {', '.join(told)}")
     elif desk.outputs == (FORCE,) and (driving := others.intersection(DRIVING)):
-        said.append(f"told {', '.join(sorted(driving))}")  # which balance-force takes
+        said.append(f"given beside: {', '.join(sorted(driving))}")  # which balance-force takes
     elif others:
         said.append(f"not used: {', '.join(sorted(others))}")
     timeless = sum(run.sample_time is None for run in used)

@@ -84,7 +84,8 @@ def doubts_of_feedback(law: str, plant: Plant) -> list[str]:
         return []
     return [
         "the plant is a model without time, which answers at once: feedback is better on it than it "
-        "will be on the muscle. Remedy: compare feedback on a model with time, such as balance"
+        "will be on the muscle. Remedy: compare feedback on a model with time, such as balance of "
+        "recordings that have time"
     ]
 
 

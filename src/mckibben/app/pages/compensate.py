@@ -13,11 +13,19 @@ from mckibben.app.desk import Desk, guarded, named, on_event
 from mckibben.app.following import compensated, held_for, kept_motion
 from mckibben.app.pages import closing, forces, leaderboard, logs
 from mckibben.app.pages.drawing_reference import Sketch
+from mckibben.comparison.recognising import FORCE
 from mckibben.errors import MckibbenError
 from mckibben.recording import Recording
 
-STEP = 0.02
-"""Time between steps, where the model has none of its own [s]."""
+NONE_YET = (
+    "Fit a model that can be inverted first, under Models: pi, gpi, mpi, cpi, preisach; of several "
+    "muscles, balance."
+)
+
+FORCED = (
+    "What is modelled is a force: it is estimated while the muscle is held, below, and no motion is "
+    "asked for. For a compensator, add recordings in which the muscle moves."
+)
 
 
 def build(desk: Desk) -> None:
@@ -31,10 +39,7 @@ def build(desk: Desk) -> None:
     def shown() -> None:
         names = found()
         if not names:
-            ui.label(
-                "Fit a model that can be inverted first, under Models: pi, gpi, mpi, cpi, preisach; "
-                "of several muscles, balance."
-            )
+            ui.label(FORCED if FORCE in desk.outputs else NONE_YET)
             return
         leaderboard.unrecommended(desk)
         editors[:] = [Editor(desk, names)]
@@ -102,7 +107,7 @@ class Editor:
                 for own in forms.SETTINGS.values()
                 for key, label in own.items()
             }
-            self.step = ui.number("Time between steps [s]", value=STEP, min=1e-4, max=10.0)
+            self.step = ui.number("Time between steps [s]", value=forms.STEP, min=1e-4, max=10.0)
             self.step.classes("w-44").on_value_change(self._changed)
         self.form.on_value_change(self._fields)
         self.form.on_value_change(self._changed)
@@ -201,7 +206,8 @@ class Editor:
     async def _show(self) -> None:
         desk, sketch, asked = self.desk, self.sketch, self.wish
         name, form, settings = self.name, str(self.form.value), self.settings
-        reference = sketch.reference(float(self.step.value or STEP))
+        step = float(self.step.value or forms.STEP)
+        reference = sketch.reference(step)
         self._asked = asked
         given, notes = await asyncio.to_thread(
             compensated, desk.workspace, name, reference, form, settings
@@ -214,7 +220,7 @@ class Editor:
         if form == "inverse":
             call = scripts.simulate_call(call, f"runs/{file}")
         desk.did(f"inverted {name}", call)
-        desk.compensator = name, form, settings
+        desk.compensator = name, form, settings, step
         desk.changed("compensator")
         self.shown.clear()
         with self.shown:

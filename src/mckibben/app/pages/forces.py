@@ -10,6 +10,7 @@ from mckibben.app import forms, scripts
 from mckibben.app.desk import Desk, guarded, named
 from mckibben.app.kept import Estimated
 from mckibben.app.pages.kept_curves import drawn, showing
+from mckibben.comparison.recognising import FORCE
 from mckibben.errors import DataError, MckibbenError
 from mckibben.report import wording
 from mckibben.system.ordinary import read_bytes
@@ -31,7 +32,7 @@ def _tells(desk: Desk) -> dict[str, list[str]]:
 
 
 def build(desk: Desk) -> None:
-    """Build the section."""
+    """Build the section, which opens where a force is what is modelled."""
     known: dict[str, list[str]] = {}
     with ui.expansion("Estimate a force").classes("w-full text-base") as section:
         none = ui.label(
@@ -86,6 +87,8 @@ def build(desk: Desk) -> None:
 
     async def look() -> None:
         found = await asyncio.to_thread(_tells, desk)
+        if found and not known and FORCE in desk.outputs:
+            section.open()
         known.clear()
         known.update(found)
         none.set_visibility(not found)

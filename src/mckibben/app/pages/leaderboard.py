@@ -174,6 +174,7 @@ async def _closer(desk: Desk, names: list[str]) -> Callable[[], None]:
 
     try:
         outputs = await asyncio.to_thread(modelled)
+        pairs = await asyncio.to_thread(lambda: desk.looked_at)
     except MckibbenError as error:
         raise ModelError(f"{', '.join(names)} on {recording.name}: {error}") from None
 
@@ -181,7 +182,7 @@ async def _closer(desk: Desk, names: list[str]) -> Callable[[], None]:
         next_steps.buttons(desk, names[0])
         ui.label(f"On {recording.name}").classes("text-base")
         drawings = []
-        for output, pair in enumerate(desk.pairs):
+        for output, pair in enumerate(pairs):
             own = {name: found[:, output] for name, found in outputs.items()}
             drawings += [
                 subjects.fit_over_time(recording, pair[1], own),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -51,7 +52,7 @@ def build(desk: Desk, model: Any) -> None:
             for own in forms.SETTINGS.values()
             for key, label in own.items()
         }
-        step = ui.number("Time between steps [s]", value=0.01, min=1e-6).classes("w-full")
+        step = ui.number("Time between steps [s]", value=forms.STEP, min=1e-6).classes("w-full")
         single = ui.switch("single precision (C)", value=False)
         with ui.row().classes("items-center gap-2"):
             ui.label("FMI").classes("text-sm")
@@ -71,8 +72,14 @@ def build(desk: Desk, model: Any) -> None:
 
         def block_and_options() -> tuple[Block, dict[str, Any]]:
             block = forms.made(desk.workspace, *chosen())
-            timed = block.rate_dependent
-            return block, {"sample_time": float(step.value or 0.01)} if timed else {}
+            return block, {"sample_time": between()} if block.rate_dependent else {}
+
+        def between() -> float:
+            return float(step.value or forms.STEP)
+
+        def exported(kind: str, target: str, options: Mapping[str, Any], flags: str = "") -> str:
+            told = f" --sample-time {between():g}" if "sample_time" in options else ""
+            return f"mckibben export {kind} {stem()}.json -o {target}{told}{flags}"
 
         async def as_json() -> None:
             path = desk.workspace.new_path("takeaway", f"{stem()}.json")
@@ -87,15 +94,13 @@ def build(desk: Desk, model: Any) -> None:
             name = name_from(Path(f"{stem()}.json"))
             folder = desk.workspace.new_path("takeaway", f"{name}-c")
 
-            def write() -> None:
+            def write() -> str:
                 block, options = block_and_options()
-                options |= {"name": name, "single": bool(single.value), "overwrite": True}
-                export_c(block, folder, **options)
+                only = bool(single.value)
+                export_c(block, folder, name=name, single=only, overwrite=True, **options)
+                return exported("c", folder.name, options, " --float32" if only else "")
 
-            await asyncio.to_thread(write)
-            flag = " --float32" if single.value else ""
-            call = f"mckibben export c {stem()}.json -o {folder.name}{flag}"
-            await _zipped(desk, folder, call)
+            await _zipped(desk, folder, await asyncio.to_thread(write))
 
         async def as_fmu() -> None:
             from mckibben.export import export_fmu
@@ -104,13 +109,13 @@ def build(desk: Desk, model: Any) -> None:
             name = name_from(Path(f"{stem()}.json"))
             path = desk.workspace.new_path("takeaway", f"{name}.fmu")
 
-            def write() -> None:
+            def write() -> str:
                 block, options = block_and_options()
-                options |= {"name": name, "version": version.value, "overwrite": True}
-                export_fmu(block, path, **options)
+                fmi = version.value
+                export_fmu(block, path, name=name, version=fmi, overwrite=True, **options)
+                return exported("fmu", path.name, options, f" --fmi {fmi}")
 
-            await asyncio.to_thread(write)
-            hand_over(desk, path, f"mckibben export fmu {stem()}.json -o {path.name}")
+            hand_over(desk, path, await asyncio.to_thread(write))
 
         async def as_ros2() -> None:
             from mckibben.export import export_ros2
@@ -119,12 +124,12 @@ def build(desk: Desk, model: Any) -> None:
             name = name_from(Path(f"{stem()}.json"))
             folder = desk.workspace.new_path("takeaway", f"{name}-ros2")
 
-            def write() -> None:
+            def write() -> str:
                 block, options = block_and_options()
                 export_ros2(block, folder, name=name, overwrite=True, **options)
+                return exported("ros2", folder.name, options)
 
-            await asyncio.to_thread(write)
-            await _zipped(desk, folder, f"mckibben export ros2 {stem()}.json -o {folder.name}")
+            await _zipped(desk, folder, await asyncio.to_thread(write))
 
         labels = {"json": "Model (JSON)", "c": "C99 (folder, zipped)", "fmu": "FMU"}
         labels["ros2"] = "ROS 2 (folder, zipped)"
@@ -147,12 +152,16 @@ def build(desk: Desk, model: Any) -> None:
         async def offer() -> None:
             name = str(model.value)
             found = await asyncio.to_thread(forms.possible, desk.workspace, name)
+            fixed = await asyncio.to_thread(_own_step, desk, name) if found else None
             offered = {key: forms.FORMS[key] for key in found}
             if offered and name == str(model.value):
                 value = form.value if form.value in offered else next(iter(offered))
-                shown, use, settings = desk.compensator or ("", "", {})
+                shown, use, settings, own = desk.compensator or ("", "", {}, forms.STEP)
                 if shown == name and use in offered:
                     value = use
+                    step.set_value(own)
+                elif fixed:
+                    step.set_value(fixed)
                     for key, number in settings.items():
                         fields[key].set_value(number)
                 form.set_options(offered, value=value)
@@ -163,6 +172,11 @@ def build(desk: Desk, model: Any) -> None:
         desk.when("compensator", offer)
         fitted()
         ui.timer(0.05, guarded(offer), once=True)
+
+
+def _own_step(desk: Desk, name: str) -> float | None:
+    """Return the time between steps that a model was made for, if there is one [s]."""
+    return desk.workspace.model(name).sample_time
 
 
 async def _zipped(desk: Desk, folder: Path, call: str) -> None:

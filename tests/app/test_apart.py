@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from nicegui.testing import User
 
 from mckibben import Recording
 from mckibben.app.desk import Desk
@@ -13,6 +14,7 @@ from mckibben.app.jobs import Jobs
 from mckibben.app.kept import Step
 from mckibben.app.pages import apart
 from mckibben.app.workspace import Workspace
+from tests.app.test_pages import visit
 
 
 def test_each_gets_one_step_more_and_one_undo_takes_all_back(tmp_path: Path) -> None:
@@ -33,3 +35,28 @@ def test_each_gets_one_step_more_and_one_undo_takes_all_back(tmp_path: Path) -> 
     assert workspace.undo() == "all resampled"
     assert apart.sample_times(desk) == times
     desk.jobs.close()
+
+
+def test_recordings_of_several_zeros_get_one(tmp_path: Path) -> None:
+    workspace = Workspace(tmp_path)
+    time = np.arange(400) * 0.05
+    for name, zero in (("one", 0.0), ("two", 30.0)):
+        u = 2 - 2 * np.cos(time)
+        workspace.add(
+            Recording({"pressure": u, "displacement": u + zero}, 0.05),
+            origin="",
+            call="",
+            name=name,
+        )
+
+    async def look(user: User) -> None:
+        await user.should_see(marker="zeros", retries=100)
+        await user.should_see("where pressure is lowest")
+        user.find(marker="zero-all").click()
+        await user.should_not_see(marker="zeros", retries=100)
+
+    visit(workspace, look)
+    assert np.allclose(workspace.recording("two")["displacement"], 2 - 2 * np.cos(time), atol=0.1)
+    assert "zeroed" in workspace.entry("two").call or workspace.entry("two").steps[-1].do == "zero"
+    assert workspace.undo() == "displacement zeroed"
+    assert workspace.recording("two")["displacement"].min() > 29

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from mckibben import read, write
 from tests.cli.conftest import Cli
 
 ASSUMED = "no unit is given, so these are assumed: pressure in bar, displacement in mm"
@@ -45,3 +46,16 @@ def test_compare_and_characterize(cli: Cli, folder: Path) -> None:
     assert f"Note: {told}" in spoken.out
     assert spoken.err.count(told) == 1
     assert f"Note: {ASSUMED}" in cli("info", folder / "a.csv").out
+
+
+def test_several_zeros_are_told_and_taken_out(
+    cli: Cli, files: tuple[Path, Path], tmp_path: Path
+) -> None:
+    first = read(files[0])[0]
+    moved = first.with_channels(displacement=first["displacement"] + 300.0)
+    write(moved, tmp_path / "moved.csv")
+    given = ("compare", files[0], tmp_path / "moved.csv", "--models", "pi", "--jobs", 1)
+    rests = "displacement rests at"
+    assert rests in cli(*given, "--allow-shared").out
+    assert rests not in cli(*given, "--allow-shared", "--zero", "displacement").out
+    assert "no such channel" in cli(*given, "--zero", "length").err

@@ -53,6 +53,12 @@ EDITS = {
         "mckibben.signals.resample({x}, {sample_time})",
         "resampled to {sample_time} s",
     ),
+    "zero": _Edit(
+        ("channels", "over"),
+        signals.zeroed,
+        "mckibben.signals.zeroed({x}, {channels}, {over})",
+        "zero where {over} is lowest",
+    ),
 }
 """By their names in a `mckibben.app.kept.Step`."""
 
@@ -63,7 +69,7 @@ def applied(recording: Recording, steps: Sequence[Step]) -> Recording:
         edit = EDITS[step.do]
         values = _values(step)
         if step.do != "detrend" and any(values[name] is None for name in edit.takes[:1]):
-            raise DataError(f"{step.do} needs a number", remedy="give one")
+            raise DataError(f"{step.do} needs {edit.takes[0]}", remedy="give it")
         if step.channels is not None:  # those that are there: they may be named otherwise by now
             values["channels"] = [name for name in step.channels if name in recording]
         recording = edit.do(recording, *(values[name] for name in edit.takes))

@@ -63,11 +63,12 @@ class Reading(Kept):
 class Step(Kept):
     """What was done to a recording after it was read; see `mckibben.app.edits`."""
 
-    do: Literal["slice", "low_pass", "detrend", "resample"]
+    do: Literal["slice", "low_pass", "detrend", "resample", "zero"]
     start: Count = 0
     stop: Count = 0
     cutoff: Number = None
     sample_time: Number = None
+    over: Text | None = None
     channels: list[Text] | None = None
 
 

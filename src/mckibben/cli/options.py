@@ -74,6 +74,14 @@ Resample = Annotated[
         "--resample", metavar="SECONDS", help="Sample time to resample to, without aliasing."
     ),
 ]
+Zero = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--zero",
+        metavar="CHANNEL",
+        help="Count it from where the input is lowest, in each recording.",
+    ),
+]
 Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON on standard output.")]
 Seed = Annotated[int, typer.Option("--seed", help="Of everything random.")]
 Models = Annotated[
@@ -140,6 +148,7 @@ class Reading:
     rate: Rate = None
     gaps: GapPolicy = Gaps.ERROR
     resample: Resample = None
+    zero: Zero = None
 
     def read(
         self, files: Sequence[Path], channels: Sequence[str] | None, *, informative: bool = True
@@ -162,6 +171,13 @@ class Reading:
             from mckibben.signals import resample
 
             recordings = [resample(recording, self.resample) for recording in recordings]
+        if self.zero:
+            from mckibben.comparison.recognising import recognised
+            from mckibben.signals import zeroed
+
+            for place, one in enumerate(recordings):
+                (over, *_), _ = recognised([one], list(one.channels))
+                recordings[place] = zeroed(one, self.zero, over)
         return recordings
 
     def read_all(

@@ -25,6 +25,7 @@ from mckibben.errors import DataError, ModelError
 from mckibben.estimators.coupled.base import CoupledEstimator, schedules
 from mckibben.recording import Recording, reading_notes
 from mckibben.signals import made_manageable
+from mckibben.signals.zeroing import apart
 
 Settings = Mapping[str, Mapping[str, Any]]
 
@@ -207,6 +208,7 @@ def plan_of(
         notes=(
             *notes,
             *held,
+            *_of_several_zeros(every, channels),
             *_about_load(every, channels, load, chosen),
             *_beyond_training(split.train, tests, channels),
             *shared,
@@ -264,6 +266,19 @@ def _about_load(
         elif channels.single and moves:
             told_of = f"no model but {', '.join(finding)}" if finding else "no model"
             yield f"{name} is there, and {told_of} is told it: see --load {name}"
+
+
+def _of_several_zeros(recordings: Sequence[Recording], channels: Channels) -> Iterator[str]:
+    """Tell of recordings that rest at different outputs, where no load tells why."""
+    if not channels.single or schedules(recordings):
+        return
+    (given,), (wanted,) = channels.inputs, channels.outputs
+    if found := apart(recordings, wanted, given):
+        yield (
+            f"{wanted} rests at {found[0]:.3g} to {found[1]:.3g} {recordings[0].units[wanted]} where "
+            f"{given} is lowest: a sensor was zeroed anew, or another load hung there. Models take it "
+            f"for what {given} does; see --zero {wanted} and mckibben.signals.zeroed"
+        )
 
 
 def _beyond_training(

@@ -32,3 +32,4 @@ from mckibben.signals.steps import binary_steps as binary_steps
 from mckibben.signals.steps import random_steps as random_steps
 from mckibben.signals.steps import staircase as staircase
 from mckibben.signals.thinning import decimate_minmax as decimate_minmax
+from mckibben.signals.zeroing import zeroed as zeroed

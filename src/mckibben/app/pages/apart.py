@@ -10,6 +10,7 @@ from nicegui import ui
 from mckibben.app import adding
 from mckibben.app.desk import LONGEST, Desk, guarded, labelled, named
 from mckibben.app.kept import Step
+from mckibben.signals.zeroing import apart as zeros_apart
 
 SHOWN = 6
 """Names of recordings in a line."""
@@ -19,6 +20,7 @@ def build(desk: Desk) -> None:
     """Show what differs, where something does."""
     _channels(desk)
     _sample_times(desk)
+    _zeros(desk)
 
 
 def sample_times(desk: Desk) -> tuple[float, float] | None:
@@ -107,6 +109,38 @@ def _sample_times(desk: Desk) -> None:
             f"Resample all to {wanted:g} s", on_click=guarded(partial(_resample, desk, wanted))
         )
         named(button.props("outline dense no-caps"), "resample-all")
+
+
+def _zeros(desk: Desk) -> None:
+    """Offer one zero where one muscle's recordings rest at several, and no load tells why."""
+    from mckibben.estimators.coupled.base import schedules
+
+    used = list(desk.workspace.used().values())
+    (given, *more), (wanted, *others) = desk.inputs, desk.outputs
+    known = all(given in one and wanted in one for one in used)
+    if more or others or not known or schedules(used):
+        return
+    found = zeros_apart(used, wanted, given)
+    if found is None:
+        return
+    unit = used[0].units[wanted]
+    with named(ui.card().classes("w-full border border-warning gap-1"), "zeros"):
+        ui.label(f"These recordings rest at different {wanted}").classes("font-medium")
+        ui.label(
+            f"From {found[0]:.3g} to {found[1]:.3g} {unit} where {given} is lowest: a sensor was zeroed "
+            f"anew, or another load hung there. Models that are not told take it for what {given} does."
+        ).classes("text-sm")
+        button = ui.button(f"Zero {wanted} there", on_click=guarded(partial(_zero, desk)))
+        named(button.props("outline dense no-caps"), "zero-all")
+
+
+async def _zero(desk: Desk) -> None:
+    (given,), channels = desk.inputs, list(desk.outputs)
+    said, step = f"{channels[0]} zeroed", Step(do="zero", channels=channels, over=given)
+    names = list(desk.workspace.used())
+    await asyncio.to_thread(desk.workspace.edit_each, names, said, step)
+    desk.did(said, f"[mckibben.signals.zeroed(one, {channels!r}, {given!r}) for one in recordings]")
+    desk.changed("recordings", "channels")
 
 
 async def _resample(desk: Desk, wanted: float) -> None:

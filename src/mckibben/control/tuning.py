@@ -24,6 +24,9 @@ from mckibben.errors import ModelError
 from mckibben.recording import standard_unit
 from mckibben.system.progress import Tell, one_by_one, telling
 
+NEVER = 1e9
+"""Longer than any tuning [s]."""
+
 STEPS = (0.1, 0.2, 0.4)
 """Of pressure, relative to its range: larger ones only where smaller ones move nothing."""
 STEEPER = 2.0
@@ -69,6 +72,8 @@ def tune_pid(
     followed = [channel.name for channel in untuned.driven]
     driven = [channel.name for channel in untuned.given]
     starts = {f"start.{name}": value for name, value in scheduled.items()}
+    if isinstance(plant, Twin):  # what differs from run to run is no gain
+        starts["scatter_after"] = NEVER
     rig = plant.changed({"sample_time": sample_time, **starts})
     limits = [rig.limits(name) for name in driven]
     middle = {

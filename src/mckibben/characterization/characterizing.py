@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from mckibben.arrays import Array
+from mckibben.characterization.beside import alone, levelled, of_one_zero
 from mckibben.characterization.evidence import evidence
 from mckibben.characterization.loops import Loop, largest_of, loops_of, pooled_curves
 from mckibben.characterization.mean_curve import mean_curve
@@ -38,6 +39,8 @@ def characterize(
     recordings: Recording | Sequence[Recording],
     input: str = "pressure",  # noqa: A002
     output: str = "displacement",
+    *,
+    beside: Sequence[str] = (),
 ) -> Characterization:
     """Measure what a muscle does: width and shape of its loop, memory, creep, dependence on rate.
 
@@ -45,6 +48,7 @@ def characterize(
     half a percent of its range. Ranges are those of all recordings together. What the recordings
     cannot tell is None: widths without a whole cycle, rates and creep without time, and all of it where
     the output does not depend on the input by more than noise would give, tested at a level of 1 %.
+    Recordings that rest at different outputs are counted from a zero of their own, which is said.
 
     Parameters
     ----------
@@ -52,6 +56,8 @@ def characterize(
         One muscle; every recording starts with unknown memory.
     input, output : str
         Channels.
+    beside : sequence of str
+        Other inputs that move the output: only stretches in which they rest are looked at.
 
     Returns
     -------
@@ -60,8 +66,8 @@ def characterize(
     Raises
     ------
     DataError
-        On no recordings, a missing or constant channel, units that differ between recordings, or
-        fewer than ten samples.
+        On no recordings, a missing or constant channel, units that differ between recordings, fewer
+        than ten samples, or an input that never moves while those beside rest.
 
     Examples
     --------
@@ -76,6 +82,14 @@ def characterize(
     (2, 1.0)
     """
     runs = [recordings] if isinstance(recordings, Recording) else list(recordings)
+    assumed = []
+    if beside and runs:
+        runs, said = alone(runs, input, beside)
+        assumed.append(said)
+        runs = levelled(runs, input, output)
+    else:
+        runs, said = of_one_zero(runs, input, output)
+        assumed += [said] * bool(said)
     scale, tracks = prepare(runs, input, output)
     units = tuple(_unit(runs, channel) for channel in (input, output))
     loops = loops_of(tracks, scale)
@@ -123,7 +137,7 @@ def characterize(
         gain=curve.gain,
         onset=curve.onset,
         saturation=curve.saturation,
-        branch_gap=curve.gap,
+        branch_gap=None if beside else curve.gap,  # stretches that only rise have an offset, too
         creep=crept,
         creep_time=creep_time,
         drift=drift(loops),
@@ -133,6 +147,8 @@ def characterize(
         wiping_out_error=wiping_out,
         p_dependence=seen.dependence,
         p_loop=seen.loop,
+        falls=scale.sign < 0 and (curve.gain is None or curve.gain < 0),
+        assumed=tuple(assumed),
     )
     if found.depends:
         return found

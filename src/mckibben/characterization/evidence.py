@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -55,9 +56,16 @@ class Evidence:
 
 
 def evidence(tracks: Sequence[Track], scale: Scale) -> Evidence:
-    """Test the output of recordings for dependence on the input, and for a loop."""
+    """Test the output of recordings for dependence on the input, and for a loop.
+
+    Each has a curve of its own: at another zero, length or load it is another.
+    """
+    from scipy.linalg import block_diag
+
     every = -(-sum(track.u.size for track in tracks) // MOST)
-    parts = [_means(track, every) for track in tracks]
+    parts = [_means(track, every) for track in tracks if track.u.size >= every]
+    if not parts:
+        return Evidence(None, None)
     u, y, way = (np.concatenate(some) for some in zip(*parts, strict=True))
     n = u.size
     if n < FEWEST:
@@ -65,8 +73,11 @@ def evidence(tracks: Sequence[Track], scale: Scale) -> Evidence:
     x = 2 * (u - scale.u_low) / scale.u_span - 1
     y = (y - y.mean()) / scale.y_span
     turned = [way, way * x]
-    static = _hats(x)
-    curve = _added(np.column_stack([np.ones(n), x, x**2, x**3, *turned]), 1)
+    ends = np.cumsum([0, *(part[0].size for part in parts)])
+    knots = KNOTS if len(parts) == 1 else int(np.clip(n // (20 * len(parts)), 2, KNOTS))
+    own = [hats(x[start:stop], knots) for start, stop in pairwise(ends)]
+    static, level = block_diag(*own), block_diag(*(np.ones((part.shape[0], 1)) for part in own))
+    curve = _added(np.column_stack([level, x, x**2, x**3, *turned]), level.shape[1])
     loop = _added(np.column_stack([static, *turned]), static.shape[1])
     spectrum = _spectrum_left(_basis(np.column_stack([static, *turned])), y)
     return Evidence(_p_value(curve, y, spectrum), _p_value(loop, y, spectrum))
@@ -84,9 +95,9 @@ def _means(track: Track, every: int) -> tuple[Array, Array, Array]:
     return u, y, ways[np.clip(branch, 0, ways.size - 1)]
 
 
-def _hats(x: Array) -> Array:
+def hats(x: Array, n_knots: int) -> Array:
     """Return piecewise-linear functions on levels between which samples are equally many."""
-    knots = np.unique(np.quantile(x, np.linspace(0, 1, KNOTS)))
+    knots = np.unique(np.quantile(x, np.linspace(0, 1, n_knots)))
     return np.column_stack([np.interp(x, knots, row) for row in np.eye(knots.size)])
 
 

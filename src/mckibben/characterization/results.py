@@ -70,6 +70,10 @@ class Characterization(DrawsItself):
     p_dependence, p_loop : float or None
         How likely noise alone would show as much dependence of the output on the input, and on its
         direction beside a curve without memory; None where there are too few samples.
+    falls : bool
+        Whether the output falls as the input rises.
+    assumed : tuple of str
+        Sentences on what is looked at: where other inputs rest, counted from which zero.
     """
 
     face: ClassVar[str] = "characterization"
@@ -111,6 +115,8 @@ class Characterization(DrawsItself):
     wiping_out_error: float | None
     p_dependence: float | None = None
     p_loop: float | None = None
+    falls: bool = False
+    assumed: tuple[str, ...] = ()
 
     @property
     def has_loop(self) -> bool:

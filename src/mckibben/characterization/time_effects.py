@@ -50,7 +50,7 @@ def creep(tracks: Sequence[Track], scale: Scale) -> tuple[float | None, float | 
         if track.sample_time is None:
             continue
         settled = swing_threshold(track.u_noise, scale.u_span, track.u.size)
-        for start, stop in _holds(track, scale):
+        for start, stop in holds(track, scale):
             before = track.u[max(0, start - (stop - start)) : start]
             if before.size == 0 or np.ptp(before) < settled:
                 continue
@@ -121,7 +121,8 @@ def _alike(one: Cycle, other: Cycle) -> bool:
     return abs(one.low - other.low) <= limit and abs(one.high - other.high) <= limit
 
 
-def _holds(track: Track, scale: Scale) -> list[tuple[int, int]]:
+def holds(track: Track, scale: Scale) -> list[tuple[int, int]]:
+    """Return first and last samples between which the input is held; see `creep`."""
     from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
     u = track.u

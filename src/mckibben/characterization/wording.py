@@ -29,9 +29,9 @@ Row = tuple[str, float | int | str | None, str, str]
 def sentences(found: Characterization) -> list[str]:
     """Return what the muscle does, in plain words, most important first."""
     if not found.depends:
-        return [_independent(found)]
+        return [_independent(found), *found.assumed]
     said = [_headline(found), _motion(found), _memory(found), _rate(found), _trust(found)]
-    return [sentence for sentence in said if sentence]
+    return [*(sentence for sentence in said if sentence), *found.assumed]
 
 
 def table(found: Characterization) -> list[Row]:
@@ -176,7 +176,11 @@ def _headline(found: Characterization) -> str:
             f"{_value(abs(found.branch_gap), found.output_unit)} ({_percent(share)}) apart"
         )
     else:
-        parts.append("the input never reaches a level from both sides, so no loop is seen")
+        parts.append(
+            "the input never reaches a level from both sides, so no loop is seen"
+            if found.p_loop is None
+            else f"there is a loop ({_level(found.p_loop)}), and no whole cycle tells how wide it is"
+        )
     if found.saturation is not None:
         parts.append(f"saturates above {_value(found.saturation, found.input_unit)}")
     if found.onset is not None:
@@ -194,12 +198,17 @@ def _crept(found: Characterization, creep: float, time: float) -> str:
 
 
 def _motion(found: Characterization) -> str:
-    moves = _range(found.output_range, found.output_unit)
-    text = f"{found.output} goes {moves} as {found.input} goes "
+    ends = found.output_range[::-1] if found.falls else found.output_range
+    text = (
+        f"{found.output} {'falls' if found.falls else 'goes'} {_range(ends, found.output_unit)} as "
+    )
+    text += f"{found.input} {'rises' if found.falls else 'goes'} "
     text += _range(found.input_range, found.input_unit)
     if found.gain is not None:
         unit = f"{found.output_unit}/{found.input_unit}" if found.input_unit else found.output_unit
         text += f", {_value(found.gain, unit)} at mid input"
+    if found.falls and found.output == "displacement":
+        text += " (with its sign turned, it counts contraction)"
     zones = [zone for zone in (found.dead_zone_upper, found.dead_zone_lower) if zone is not None]
     if (
         found.has_loop
@@ -258,7 +267,7 @@ def _trust(found: Characterization) -> str:
 
 def _range(limits: tuple[float, float], unit: str) -> str:
     """Return limits to about a percent of their distance, so that noise at 0 is not spelled out."""
-    digits = 2 - math.floor(math.log10(limits[1] - limits[0]))
+    digits = 2 - math.floor(math.log10(abs(limits[1] - limits[0])))
     low, high = (f"{round(limit, digits) + 0.0:.6g}" for limit in limits)
     return f"from {low} to {high} {unit}".rstrip()
 

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from typing import Annotated
+
+import typer
+
 from mckibben.cli.grouping import spread
 from mckibben.cli.options import (
     Files,
@@ -13,6 +17,13 @@ from mckibben.cli.options import (
 from mckibben.cli.output import print_json, print_table, say
 from mckibben.numerals import numeral
 
+Beside = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--beside", metavar="CHANNEL", help="Another input: look where it rests; repeatable."
+    ),
+]
+
 
 @spread
 def characterize(
@@ -20,14 +31,16 @@ def characterize(
     reading: Reading,
     input: Input = "pressure",  # noqa: A002
     output: Output = "displacement",
+    beside: Beside = None,
     as_json: Json = False,
 ) -> None:
     """Say what the muscle does: loop width, asymmetry, dead zone, creep, rate dependence."""
-    recordings = reading.read(files, [input, output])
+    others = beside or []
+    recordings = reading.read(files, [input, output, *others])
     from mckibben.characterization import characterize as find
     from mckibben.recording import notes_by_file, reading_notes
 
-    found = find(recordings, input, output)
+    found = find(recordings, input, output, beside=others)
     if as_json:
         print_json(found.to_dict() | {"notes": notes_by_file(recordings)})
         return

@@ -14,6 +14,14 @@ Indices = NDArray[np.int64]
 NOISE_SHARE = 0.05
 """Sample-to-sample scatter above this share of the range is taken for movement, not for noise."""
 
+SLIGHT = 1e-3
+"""Scatter below this share of the range is small whatever makes it."""
+
+GROWS = 1.5
+"""Scatter that grows so much over every second of so many samples is of movement."""
+
+FEWEST = 32
+
 RANGE_SHARE = 0.01
 """Smallest swing that counts as a movement, relative to the range."""
 
@@ -39,7 +47,8 @@ def noise_level(x: ArrayLike, span: float | None = None) -> float:
     -------
     float
         NaN where noise cannot be told from movement: fewer than eight samples, or a scatter above
-        5 % of the range, as in levels chosen at random of which each was recorded once.
+        5 % of the range, as in levels chosen at random of which each was recorded once; or one above
+        0.1 % that grows where every second sample is left out, as that of fast motion does.
 
     Raises
     ------
@@ -49,11 +58,12 @@ def noise_level(x: ArrayLike, span: float | None = None) -> float:
     values = _checked(x)
     if values.size < 8:
         return float("nan")
-    scatter = float(np.median(np.abs(np.diff(values, 3))))
+    scatter, twice = (float(np.median(np.abs(np.diff(values[::k], 3)))) for k in (1, 2))
     # 0.6745 is the median of |N(0, 1)|, and 20 the variance that third differences give to N(0, 1).
     noise = scatter / (0.6745 * np.sqrt(20.0))
     span = float(np.ptp(values)) if span is None else span
-    return noise if noise <= NOISE_SHARE * span else float("nan")
+    moves = values.size >= FEWEST and noise > SLIGHT * span and twice > GROWS * scatter
+    return noise if noise <= NOISE_SHARE * span and not moves else float("nan")
 
 
 def swing_threshold(noise: float, span: float, n: int) -> float:

@@ -204,8 +204,9 @@ def _words(desk: Desk, given: str, wanted: str) -> None:
 
     async def find() -> None:
         recordings = desk.workspace.with_role("train") + desk.workspace.with_role("test")
+        beside = [name for name in desk.inputs if name != given and given in desk.inputs]
         try:
-            found = await asyncio.to_thread(characterize, recordings, given, wanted)
+            found = await asyncio.to_thread(characterize, recordings, given, wanted, beside=beside)
         except MckibbenError as error:
             with place:
                 refused(error)
@@ -234,7 +235,8 @@ def _words(desk: Desk, given: str, wanted: str) -> None:
             ui.table(rows=rows, columns=columns, row_key="what").classes("w-full").props(
                 "dense flat"
             )
-            call = f"mckibben.characterize(recordings, {given!r}, {wanted!r})"
+            told = f", beside={beside!r}" if beside else ""
+            call = f"mckibben.characterize(recordings, {given!r}, {wanted!r}{told})"
             desk.did("characterized the recordings", call)
 
     ui.timer(0.05, guarded(find), once=True)

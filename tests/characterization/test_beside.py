@@ -1,0 +1,128 @@
+"""What is not the muscle's own changes no verdict: zeros of sensors, and other inputs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mckibben import PI, DataError, Recording, read
+from mckibben.characterization import characterize
+from mckibben.signals import multisine, noise_level
+from tests.characterization.test_measured import DATA
+
+STEP = 0.01
+TIME = np.arange(3000) * STEP
+SLOW = 2.5 - 2.5 * np.cos(2 * np.pi * TIME / 10.0)
+MUSCLE = PI((0.0, 0.4), (2.0, 4.0), 0.0, (0.0, 5.0))
+
+
+def run(zero: float, seed: int) -> Recording:
+    noise = 0.01 * np.random.default_rng(seed).standard_normal(TIME.size)
+    return Recording({"pressure": SLOW, "displacement": MUSCLE.simulate(SLOW) + noise + zero}, STEP)
+
+
+@given(st.lists(st.floats(-300, 300), min_size=2, max_size=4))
+@settings(max_examples=10, deadline=None)
+def test_zeros_of_recordings_change_no_verdict(zeros: list[float]) -> None:
+    same = characterize([run(0.0, seed) for seed, _ in enumerate(zeros)])
+    moved = characterize([run(zero, seed) for seed, zero in enumerate(zeros)])
+    assert moved.depends
+    assert moved.has_loop
+    for name in ("loop_width", "gain", "dead_zone_upper", "branch_gap"):
+        assert getattr(moved, name) == pytest.approx(getattr(same, name), rel=0.05, abs=0.02), name
+    assert not same.assumed
+
+
+def test_zeros_that_differ_are_told() -> None:
+    found = characterize([run(0.0, 1), run(80.0, 2)])
+    assert "rest at different displacement, from" in found.sentences[-1]
+    low, high = found.output_range
+    assert high - low == pytest.approx(np.ptp(run(0.0, 1)["displacement"]), rel=0.02)
+
+
+def test_curves_that_differ_from_length_to_length_hide_no_loop() -> None:
+    steep = [
+        Recording(
+            {"pressure": SLOW, "force": gain * SLOW + 5 * np.sin(2 * np.pi * TIME / 10)}, STEP
+        )
+        for gain in (20.0, 60.0, 180.0)
+    ]
+    found = characterize(steep, output="force")
+    assert found.has_loop
+    assert found.p_loop is not None
+    assert found.p_loop < 1e-6
+
+
+def two(other: np.ndarray) -> Recording:
+    """Return three cycles of one input, a rest, and whatever another input does in all that."""
+    u = np.concatenate([SLOW, np.zeros(1000)])
+    y = MUSCLE.simulate(u) + 7.0 * other
+    noise = 0.005 * np.random.default_rng(3).standard_normal(u.size)
+    return Recording({"pressure_1": u, "pressure_2": other, "displacement": y + noise}, STEP)
+
+
+def test_what_another_input_does_is_not_taken_for_the_own() -> None:
+    still = two(np.zeros(4000))
+    ramps = np.concatenate([np.zeros(3000), np.linspace(0, 4, 500), np.full(500, 4.0)])
+    clean = characterize(still, "pressure_1", "displacement")
+    mixed = characterize(two(ramps), "pressure_1", "displacement")
+    apart = characterize(two(ramps), "pressure_1", "displacement", beside=["pressure_2"])
+    assert mixed.creep is not None
+    assert abs(mixed.creep) > 5.0  # which is the other input's
+    assert apart.creep is None or abs(apart.creep) < 0.1
+    assert apart.loop_width == pytest.approx(clean.loop_width, rel=0.02)
+    assert apart.sentences[-1].startswith("Told where pressure_2 rest")
+
+
+def test_inputs_that_never_move_alone_are_refused() -> None:
+    together = two(np.concatenate([SLOW[::-1] * (1 + TIME / 30), np.zeros(1000)]))
+    with pytest.raises(DataError, match="never moves while pressure_2 rest"):
+        characterize(together.slice(0, 3000), "pressure_1", "displacement", beside=["pressure_2"])
+
+
+def test_fast_motion_is_no_noise() -> None:
+    wave = multisine(np.arange(8192) / 750, 8192 / 750, 150.0, 100.0, -100.0)
+    assert np.isnan(noise_level(wave))
+    hiss = np.random.default_rng(2).standard_normal(8192)
+    assert noise_level(100 * np.sin(TIME) + hiss[: TIME.size]) == pytest.approx(1.0, rel=0.1)
+    found = characterize(
+        Recording({"pressure": wave, "displacement": MUSCLE.simulate(wave)}, 1 / 750)
+    )
+    assert found.input_noise is None
+    assert found.n_reversals > 500
+
+
+def test_an_output_that_falls_is_said_to() -> None:
+    one = run(0.0, 1)
+    turned = characterize(one.with_channels(displacement=-one["displacement"]))
+    assert turned.falls
+    assert "Displacement falls from" in turned.sentences[1]
+    assert "with its sign turned" in turned.sentences[1]
+    assert not characterize(one).falls
+
+
+@pytest.mark.filterwarnings("ignore::mckibben.DataWarning")
+def test_measured_muscles_of_several_zeros() -> None:
+    files = sorted(Path(DATA / "cavatappi_loads").glob("*.csv"))
+    if not files:
+        pytest.skip("the measured recordings are not here")
+    found = characterize([one for file in files for one in read(file, gaps="interpolate")])
+    assert found.p_dependence is not None
+    assert found.p_dependence < 1e-6
+    assert found.falls
+
+
+@pytest.mark.filterwarnings("ignore::mckibben.DataWarning")
+def test_a_measured_arm_creeps_little() -> None:
+    files = sorted(Path(DATA / "soft_arm_three_muscles").glob("*.csv"))
+    if not files:
+        pytest.skip("the measured recordings are not here")
+    arm = [one for file in files for one in read(file)]
+    found = characterize(arm, "u1", "y1", beside=["u2", "u3"])
+    assert found.creep is not None
+    assert abs(found.creep) < 5.0
+    assert found.has_loop

@@ -15,11 +15,12 @@ pytest.importorskip("nicegui")
 from nicegui import Client, ui
 from nicegui.testing import User, user_simulation
 
-from mckibben import DataError
+from mckibben import DataError, Recording
 from mckibben.app import plots
 from mckibben.app.desk import Desk
 from mckibben.app.jobs import Jobs
 from mckibben.app.motions import parsed, reference_recording
+from mckibben.app.offering import offered
 from mckibben.app.pages import data
 from mckibben.app.shell import build, load_the_rest
 from mckibben.app.work import fit
@@ -253,3 +254,15 @@ def test_the_kinds_of_files_are_those_that_are_read_here(monkeypatch: pytest.Mon
     assert "Excel (.xlsx)" in data.taken()
     monkeypatch.setattr(data, "find_spec", lambda name: None if name == "openpyxl" else object())
     assert data.taken() == ["CSV", "TSV", *(kind for kind in data.KINDS if "Excel" not in kind)]
+
+
+def test_of_one_channel_no_model_is_offered(tmp_path: Path) -> None:
+    workspace = Workspace(tmp_path)
+    workspace.add(
+        Recording({"pressure": np.sin(np.arange(200))}, 0.1), origin="", call="", name="a"
+    )
+    desk = Desk(workspace, Jobs(workspace), inputs=("pressure",), outputs=("pressure",))
+    found = offered(desk)
+    assert found.groups == []
+    assert found.recognised.startswith("pressure would be input and output")
+    desk.jobs.close()

@@ -74,6 +74,9 @@ def offered(desk: Desk) -> Offered:
     """Return the models that have a place on the channels chosen, by need."""
     used = desk.workspace.used()
     recordings = list(used.values())
+    if recordings and (same := set(desk.inputs) & set(desk.outputs)):
+        said = f"{', '.join(sorted(same))} would be input and output: choose other channels under Data."
+        return Offered(said, [], [], {})
     names = registry.names("estimators")
     channels = Channels(desk.inputs, desk.outputs)
     known = set(desk.inputs + desk.outputs) <= set(desk.workspace.channels())

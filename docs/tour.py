@@ -148,11 +148,12 @@ def walk(page: Any) -> list[Step]:
         except Error as error:
             print(f"{step.name}: left out, {str(error).splitlines()[0]}")
             continue
+        page.wait_for_timeout(2500)  # plots are drawn a little later than they are there
         if step.top:
             page.get_by_test_id(step.top).first.evaluate(
                 "at => window.scrollTo(0, at.getBoundingClientRect().top + scrollY - 110)"
             )
-        page.wait_for_timeout(2500)  # plots are drawn a little later than they are there
+            page.wait_for_timeout(500)
         small(page, PICTURES / f"{step.name}.png", step.height)
         taken.append(step)
         print(f"{step.name}: {(PICTURES / f'{step.name}.png').stat().st_size} bytes")

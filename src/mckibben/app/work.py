@@ -57,8 +57,8 @@ def fit(workspace: Workspace, given: dict[str, Any], tell: Tell) -> str:
     workspace.write_json("results", name, result)
     validated = "none" if row.validation_rmse is None else f"{row.validation_rmse:.4g} {board.unit}"
     tested = "none" if row.test is None else f"{row.test.rmse:.4g} {board.unit}"
-    told = [f"CV RMSE {validated}, test RMSE {tested}", board.not_recommended, *board.shared]
-    return ". ".join(sentence for sentence in told if sentence)
+    doubt = ["not recommended: see the leaderboard"] if board.not_recommended else []
+    return ". ".join([f"CV RMSE {validated}, test RMSE {tested}", *doubt, *board.shared])
 
 
 def report(workspace: Workspace, given: dict[str, Any], tell: Tell) -> str:

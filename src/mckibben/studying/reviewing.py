@@ -279,7 +279,7 @@ def _followed(
         output=one.output,
         unit=one.unit,
         achieved=_rms(measured - reference),
-        predicted=_rms(foreseen),
+        predicted=_rms(foreseen) if _rms(foreseen) > ROUNDING * np.ptp(reference) else 0.0,
         residual=one.rmse,
         gain=float(about @ measured) / power if power > 0 else 1.0,
         causes=(),

@@ -141,7 +141,8 @@ def _other(result: dict[str, Any]) -> str:
 
 def _judged(results: Sequence[dict[str, Any]]) -> list[str]:
     """Return what every model has to beat, and what speaks against models or their tests."""
-    said = []
+    said: list[str] = []
+    against: dict[str, list[str]] = {}
     for result in results:
         constant = result.get("constant") or {}
         tested = wording.number((constant.get("test") or {}).get("rmse"))
@@ -151,8 +152,10 @@ def _judged(results: Sequence[dict[str, Any]]) -> list[str]:
                 f"constant{_other(result)}, the mean of the training output: CV RMSE {validated}, "
                 f"test RMSE {tested}. Every model has to beat it."
             )
-        against = [result.get("not_recommended"), *result.get("shared", ())]
-        said += [f"{result['name']}{_other(result)}: {one}" for one in against if one]
+        for why in (result.get("not_recommended"), *result.get("shared", ())):
+            if why:
+                against.setdefault(why, []).append(f"{result['name']}{_other(result)}")
+    said += [f"{', '.join(names)}: {why}" for why, names in against.items()]
     return list(dict.fromkeys(said))
 
 

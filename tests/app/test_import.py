@@ -238,7 +238,7 @@ def test_steps_are_repeated_by_their_calls() -> None:
     called = eval(edits.call("x", steps), {"mckibben": mckibben, "x": recording})
     assert called == edits.applied(recording, steps)
     assert all(edits.words(step) for step in steps)
-    with pytest.raises(DataError, match="needs a number"):
+    with pytest.raises(DataError, match="low_pass needs cutoff"):
         edits.applied(recording, [Step(do="low_pass")])
 
 

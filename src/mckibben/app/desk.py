@@ -166,6 +166,15 @@ def labelled(element: Any, attribute: str, text: str) -> Any:
     return element
 
 
+def hinted(element: Any, text: str) -> Any:
+    """Say what an element is for where a pointer rests on it.
+
+    The browser does so itself: Quasar's tooltips complain, and stay away, where a page is hidden while
+    its elements are made.
+    """
+    return labelled(element, "title", text)
+
+
 def code(text: str) -> Any:
     """Show Python as it stands, with a button that copies it; nothing in it is read as markup."""
     with ui.row().classes("w-full no-wrap items-start") as row:

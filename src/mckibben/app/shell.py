@@ -14,7 +14,7 @@ from nicegui import context, ui
 
 from mckibben import registry
 from mckibben.app import busy, theme
-from mckibben.app.desk import Desk, code, labelled, named, tell, told, unexpected
+from mckibben.app.desk import Desk, code, hinted, labelled, named, tell, told, unexpected
 from mckibben.app.jobs import ENDED, RUNNING, Job, Jobs
 from mckibben.app.workspace import Workspace
 from mckibben.system.workers import PRELOADED
@@ -93,7 +93,7 @@ def _header(desk: Desk, dark: ui.dark_mode) -> tuple[ui.tabs, dict[str, ui.tab]]
         spinner = ui.spinner(size="1.2em", color="currentColor")
         said = named(ui.label("").classes("text-xs"), "busy").props("role=status")
         switch = ui.button(icon="contrast", color=None, on_click=lambda: _switch(desk, dark))
-        labelled(switch.props("flat dense").tooltip("Light or dark"), "aria-label", "Light or dark")
+        labelled(hinted(switch.props("flat dense"), word := "Light or dark"), "aria-label", word)
     client = context.client
 
     def show() -> None:

@@ -8,7 +8,7 @@ from typing import Any
 
 from nicegui import ui
 
-from mckibben.app.desk import LONGEST, Desk, guarded, labelled, named
+from mckibben.app.desk import LONGEST, Desk, guarded, hinted, labelled, named
 from mckibben.app.offering import Offer, Offered, offered
 from mckibben.app.pages.settings import ask
 from mckibben.comparison.needs import Need
@@ -98,7 +98,7 @@ class Choice:
                     "text-xs opacity-70 break-words"
                 )
             button = ui.button(icon="tune", on_click=lambda: ask(offer.model, self.settings))
-            button.props("flat dense").tooltip("Settings")
+            hinted(button.props("flat dense"), "Settings")
             labelled(
                 named(button, f"settings-{offer.model}"), "aria-label", f"Settings of {offer.model}"
             )

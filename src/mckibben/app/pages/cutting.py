@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from nicegui import ui
 
-from mckibben.app.desk import Desk, guarded, labelled, named, refused
+from mckibben.app.desk import Desk, guarded, hinted, labelled, named, refused
 from mckibben.app.kept import Step
 from mckibben.app.pages import editing
 from mckibben.errors import DataError, MckibbenError
@@ -148,7 +148,7 @@ def _plot(desk: Desk, name: str, recording: Recording, channels: list[str], part
             ("Split there", "split", "Two recordings, before and from its start"),
         ):
             button = ui.button(text, on_click=guarded(partial(cut, which)))
-            named(button.props("outline").tooltip(hint), which)
+            named(hinted(button.props("outline"), hint), which)
 
     def drawn() -> None:
         for field, value in zip(fields, (part.low, part.high), strict=True):

@@ -9,7 +9,17 @@ from typing import Any
 from nicegui import ui
 
 from mckibben import registry
-from mckibben.app.desk import LONGEST, Desk, guarded, labelled, named, on_event, refused, tell
+from mckibben.app.desk import (
+    LONGEST,
+    Desk,
+    guarded,
+    hinted,
+    labelled,
+    named,
+    on_event,
+    refused,
+    tell,
+)
 from mckibben.app.fields import said
 from mckibben.app.guard import LARGEST_UPLOAD, TOO_LARGE
 from mckibben.app.pages import apart, editing
@@ -237,7 +247,7 @@ def _row(desk: Desk, name: str, dialogs: Any) -> None:
             ("delete", "Remove", lambda: _remove(desk, name)),
         ):
             button = ui.button(icon=icon, on_click=action).props("flat dense")
-            labelled(button.tooltip(word.rstrip(":")), "aria-label", f"{word} {name}")
+            labelled(hinted(button, word.rstrip(":")), "aria-label", f"{word} {name}")
 
 
 def _aside_said(recording: Recording, name: str) -> None:

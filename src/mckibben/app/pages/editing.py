@@ -10,7 +10,7 @@ from nicegui import ui
 from nicegui.events import KeyEventArguments
 
 from mckibben.app import edits
-from mckibben.app.desk import Desk, guarded, labelled, named
+from mckibben.app.desk import Desk, guarded, hinted, labelled, named
 from mckibben.app.kept import Step
 from mckibben.recording import Recording
 
@@ -51,7 +51,7 @@ def undoing(desk: Desk) -> None:
                 button = named(ui.button(icon=icon, on_click=step(redo)), word.lower())
                 button.props("flat dense").set_enabled(what is not None)
                 labelled(button, "aria-label", f"{word}: {what}" if what else f"{word}: nothing")
-                button.tooltip(f"{word}: {what}" if what else f"Nothing to {word.lower()}")
+                hinted(button, f"{word}: {what}" if what else f"Nothing to {word.lower()}")
 
     desk.when("recordings", shown.refresh)
     desk.when("channels", shown.refresh)

@@ -36,18 +36,26 @@ TABS = ("data", "look", "models", "compensate", "take")
 @contextmanager
 def workbench(folder: Path) -> Iterator[str]:
     """Start the workbench over a folder on a free port, and give its address."""
+    with starting(folder) as process:
+        assert process.stdout is not None
+        line = process.stdout.readline()
+        assert "Workbench over" in line, line
+        address = next(word for word in line.split() if word.startswith("http"))
+        answering(address)
+        yield address
+
+
+@contextmanager
+def starting(folder: Path) -> Iterator[subprocess.Popen[str]]:
+    """Start the workbench over a folder on a free port, and do not wait for it."""
     command = [sys.executable, "-m", "mckibben.cli.main", "app", str(folder)]
     plain = {name: value for name, value in os.environ.items() if "PYTEST" not in name}
     process = subprocess.Popen(
         [*command, "--port", "0", "--no-show"], stdout=subprocess.PIPE, text=True, env=plain
     )
     assert process.stdout is not None
-    line = process.stdout.readline()
-    assert "Workbench over" in line, line
-    address = next(word for word in line.split() if word.startswith("http"))
-    answering(address)
     try:
-        yield address
+        yield process
     finally:
         process.terminate()
         process.wait(20)

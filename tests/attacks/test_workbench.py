@@ -48,6 +48,7 @@ def asked(
     path: str = f"/{TOKEN}/",
     body: list[bytes] | None = None,
     page: bytes = b"in",
+    method: str = "GET",
 ) -> tuple[int, dict[bytes, bytes], bytes, int]:
     """Ask a guard, and return status, headers and content of the answer, and the parts it read."""
     parts = list(body or [b""])
@@ -71,7 +72,7 @@ def asked(
         )
         await send({"type": "http.response.body", "body": page})
 
-    scope = {"type": "http", "path": path, "headers": [HOST, *headers]}
+    scope = {"type": "http", "method": method, "path": path, "headers": [HOST, *headers]}
     before = len(parts)
     made = Guard(inner, host="127.0.0.1", token=TOKEN)
     asyncio.run(made(scope, receive, send))
@@ -117,6 +118,23 @@ def test_cookies_of_other_applications_lock_nobody_out(others: bytes) -> None:
 def test_foreign_pages_are_refused_with_the_token_too() -> None:
     for site, status in ((b"cross-site", 403), (b"same-site", 403), (b"same-origin", 200)):
         assert asked((b"sec-fetch-site", site))[0] == status
+
+
+@pytest.mark.parametrize(
+    ("method", "mode", "place", "status"),
+    [
+        ("GET", b"navigate", b"document", 200),
+        ("POST", b"navigate", b"document", 403),
+        ("GET", b"navigate", b"iframe", 403),
+        ("GET", b"no-cors", b"image", 403),
+        ("GET", b"websocket", b"websocket", 403),
+    ],
+)
+def test_other_pages_may_lead_a_window_here_and_no_more(
+    method: str, mode: bytes, place: bytes, status: int
+) -> None:
+    told = [(b"sec-fetch-site", b"cross-site"), (b"sec-fetch-mode", mode)]
+    assert asked(*told, (b"sec-fetch-dest", place), method=method)[0] == status
 
 
 def test_a_page_runs_its_own_scripts_alone() -> None:

@@ -98,8 +98,8 @@ class Guard:
             reason = (
                 "This workbench wants its token: open the address that it printed when it started."
             )
-        if reason is None and _first(headers, b"sec-fetch-site") in (b"cross-site", b"same-site"):
-            reason = "Another page may not use the workbench."
+        if reason is None and _steered(scope, headers):
+            reason = FOREIGN
         if reason is not None:
             await _refuse(scope, receive, send, 403, reason)
         elif scope["type"] == "websocket":
@@ -117,7 +117,7 @@ class Guard:
             return "This address is not the workbench's."
         for name, value in headers:
             if name == b"origin" and value.decode("latin1").partition("://")[2] != given:
-                return "Another page may not use the workbench."
+                return FOREIGN
         return None
 
     def _knows(self, scope: Scope) -> bool:
@@ -163,6 +163,8 @@ class Guard:
             await _refuse(scope, receive, send, 413, TOO_LARGE)
 
 
+FOREIGN = "Another page may not use the workbench."
+
 TOO_LARGE = (
     f"This is more than {LARGEST_UPLOAD // 2**20} MiB, or too much is being sent at once: "
     "put large files into a folder and use the command line."
@@ -203,6 +205,17 @@ class _Answer:
             await self._send({**start, "headers": [*kept, length]})
             message = {"type": "http.response.body", "body": body}
         await self._send(message)
+
+
+def _steered(scope: Scope, headers: Headers) -> bool:
+    """Tell whether a page from elsewhere asks, and does more than lead a whole window here.
+
+    The page that waits for the workbench to start is a file, which browsers take for elsewhere.
+    """
+    if _first(headers, b"sec-fetch-site") not in (b"cross-site", b"same-site"):
+        return False
+    led = (_first(headers, b"sec-fetch-mode"), _first(headers, b"sec-fetch-dest"))
+    return scope.get("method") != "GET" or led != (b"navigate", b"document")
 
 
 def _first(headers: Headers, name: bytes) -> bytes:

@@ -132,7 +132,7 @@ def _panels(desk: Desk, tabs: ui.tabs, tab: dict[str, ui.tab]) -> None:
     built = {"Data"}
     desk.news.open_tab = "Data"
     with desk.news.tabs["Data"]:
-        _module("Data").build(desk)
+        page_module("Data").build(desk)
 
     async def opened(event: Any) -> None:
         """Show a page: it is made when it is first opened, and anew where that did not work."""
@@ -154,7 +154,7 @@ def _panels(desk: Desk, tabs: ui.tabs, tab: dict[str, ui.tab]) -> None:
                     else:
                         await asyncio.to_thread(load_the_rest)
                     wait.delete()
-                    _module(name).build(desk)
+                    page_module(name).build(desk)
             except BaseException:
                 built.discard(name)
                 raise
@@ -238,7 +238,8 @@ def _log(desk: Desk) -> None:
         shown()
 
 
-def _module(name: str) -> ModuleType:
+def page_module(name: str) -> ModuleType:
+    """Return what builds a page, loaded."""
     return import_module(_place(name))
 
 
@@ -256,7 +257,7 @@ def load_the_rest() -> None:
         for module in FIRST:
             import_module(module)
         for name in PAGES:
-            _module(name)
+            page_module(name)
         for module in (*PRELOADED, *LATER):
             import_module(module)
         for name in registry.names("estimators"):

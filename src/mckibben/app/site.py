@@ -8,11 +8,12 @@ import threading
 from collections.abc import Callable
 
 from nicegui import Client, app, ui
+from starlette.middleware.gzip import GZipMiddleware
 from starlette.responses import Response
 
-from mckibben.app.guard import Guard
+from mckibben.app.guard import LOCAL, Guard
 from mckibben.app.jobs import Jobs
-from mckibben.app.shell import TICK, build, load_the_rest
+from mckibben.app.shell import TICK, build, load_the_rest, page_module
 from mckibben.app.workspace import Workspace
 from mckibben.errors import MckibbenError
 
@@ -26,7 +27,7 @@ ABSENCE = 30.0
 """For which a page that has lost the server is kept as it was [s]; on a busy machine seconds pass."""
 
 IDLE = 0.3
-"""After the first page is there, when to load what the others need [s]."""
+"""After the first page is shown, when to load what the others need [s]."""
 
 
 def run(
@@ -60,19 +61,24 @@ def run(
     idle = threading.Timer(IDLE, prepare)
     idle.daemon = True
 
+    def spend() -> None:
+        """Use the time of who looks at the first page."""
+        if not idle.is_alive() and not idle.finished.is_set():
+            idle.start()
+
     @ui.page("/", title="mckibben", response_timeout=PATIENCE)
     async def page() -> None:
         _make_room()
         await asyncio.to_thread(workspace.warm)
         build(workspace, jobs)
-        if not idle.is_alive() and not idle.finished.is_set():
-            idle.start()
+        ui.context.client.on_connect(spend)
 
     @app.get("/awake")
     async def awake() -> Response:
         """Answer as soon as clicks are answered; see the page's script."""
         return Response(status_code=204)
 
+    page_module("Data")  # which is the first to be seen
     app.on_startup(started)
     ui.run(
         host=host,
@@ -83,6 +89,7 @@ def run(
         show_welcome_message=False,
         reconnect_timeout=ABSENCE,
         favicon="🦾",
+        gzip_middleware_factory=None if host in LOCAL else GZipMiddleware,  # which only takes time
     )
 
 

@@ -137,6 +137,14 @@ def test_other_pages_may_lead_a_window_here_and_no_more(
     assert asked(*told, (b"sec-fetch-dest", place), method=method)[0] == status
 
 
+def test_only_who_has_the_token_is_told_that_there_is_an_answer() -> None:
+    """By which the page that waits for the start, a file, knows when to go on."""
+    foreign, name = (b"sec-fetch-site", b"cross-site"), b"cross-origin-resource-policy"
+    assert asked(foreign)[1][name] == b"cross-origin"
+    assert asked(foreign, path="/a-guess-of-mine/")[1][name] == b"same-origin"
+    assert asked((b"sec-fetch-site", b"same-origin"))[1][name] == b"same-origin"
+
+
 def test_a_page_runs_its_own_scripts_alone() -> None:
     page = b'<head><script type="module">1</script></head>'
     status, headers, content, _ = asked(page=page)

@@ -63,6 +63,10 @@ PRECAUTIONS: Headers = [
     (b"cross-origin-resource-policy", b"same-origin"),
 ]
 
+HEARD: Headers = [(b"cross-origin-resource-policy", b"cross-origin")]
+"""That there is an answer, and no more, is told to pages from elsewhere that have the token: the one that
+waits for the workbench to start is one of them."""
+
 
 class Guard:
     """ASGI middleware that lets in or turns away.
@@ -98,10 +102,10 @@ class Guard:
             reason = (
                 "This workbench wants its token: open the address that it printed when it started."
             )
-        if reason is None and _steered(scope, headers):
-            reason = FOREIGN
         if reason is not None:
             await _refuse(scope, receive, send, 403, reason)
+        elif _steered(scope, headers):
+            await _refuse(scope, receive, send, 403, FOREIGN, HEARD)
         elif scope["type"] == "websocket":
             await self.app(scope, receive, send)
         else:
@@ -222,21 +226,27 @@ def _first(headers: Headers, name: bytes) -> bytes:
     return next((value for key, value in headers if key.lower() == name), b"")
 
 
-async def _refuse(scope: Scope, receive: Receive, send: Send, status: int, reason: str) -> None:
+async def _refuse(
+    scope: Scope,
+    receive: Receive,
+    send: Send,
+    status: int,
+    reason: str,
+    more: Headers | None = None,
+) -> None:
     if scope["type"] == "websocket":
         await receive()
         await send({"type": "websocket.close", "code": 1008})
     else:
         plain = (b"content-type", b"text/plain; charset=utf-8")
-        await _answer(send, status, reason, [plain, (b"connection", b"close")])
-
-
-async def _answer(send: Send, status: int, text: str, headers: Headers) -> None:
-    policy = (b"content-security-policy", b"default-src 'none'; frame-ancestors 'none'")
-    length = (b"content-length", str(len(text.encode())).encode())
-    start = {"type": "http.response.start", "status": status}
-    await send(start | {"headers": [*headers, length, *PRECAUTIONS, policy]})
-    await send({"type": "http.response.body", "body": text.encode()})
+        policy = (b"content-security-policy", b"default-src 'none'; frame-ancestors 'none'")
+        length = (b"content-length", str(len(reason.encode())).encode())
+        about = dict(
+            [plain, (b"connection", b"close"), length, *PRECAUTIONS, policy, *(more or [])]
+        )
+        start = {"type": "http.response.start", "status": status}
+        await send(start | {"headers": list(about.items())})
+        await send({"type": "http.response.body", "body": reason.encode()})
 
 
 def new_token() -> str:

@@ -64,8 +64,8 @@ PRECAUTIONS: Headers = [
 ]
 
 HEARD: Headers = [(b"cross-origin-resource-policy", b"cross-origin")]
-"""That there is an answer, and no more, is told to pages from elsewhere that have the token: the one that
-waits for the workbench to start is one of them."""
+"""That there is an answer, and no more, is told to pages from elsewhere that have the token: one of them
+waits for the workbench to start."""
 
 
 class Guard:

@@ -11,9 +11,9 @@ def naive_rmse(errors: np.ndarray, n: int, seed: int) -> np.ndarray:
     """Draw the same blocks one after another and take the RMSE of each resample, spread as by t."""
     block = int(np.ceil(np.sqrt(n)))
     count = int(np.ceil(n / block))
-    starts = np.random.default_rng(seed).integers(0, n - block + 1, (1000, count))
-    drawn = [np.concatenate([errors[s : s + block] for s in row]) for row in starts]
-    found = np.array([np.sqrt(np.mean(one**2)) for one in drawn])
+    starts = np.random.default_rng(seed).integers(0, n, (1000, count))
+    drawn = [[errors[(s + k) % n] for s in row for k in range(block)] for row in starts]
+    found = np.array([np.sqrt(np.mean(np.square(one))) for one in drawn])
     blocks = n / block
     wider = student.ppf(0.975, blocks - 1) / 1.96 * np.sqrt(blocks / (blocks - 1))
     return found.mean() + wider * (found - found.mean())
@@ -47,8 +47,21 @@ def test_models_are_paired_on_the_same_blocks() -> None:
 def test_blocks_stay_inside_their_recording() -> None:
     bootstrap = BlockBootstrap([40, 60], seed=0)
     only_second = np.concatenate([np.zeros(40), np.ones(60)])
-    # 6 blocks of 7 samples of zeros, 8 of 8 of ones: any block across the border would break this.
-    np.testing.assert_allclose(bootstrap.rmse(only_second), np.sqrt(64 / 106))
+    # any block across the border would break this
+    np.testing.assert_allclose(bootstrap.rmse(only_second), np.sqrt(60 / 100))
+
+
+@pytest.mark.parametrize("at", ["middle", "ends"])
+def test_what_happens_at_the_ends_counts_as_what_happens_amid(at: str) -> None:
+    """Many short runs that begin and end at rest have their errors amid, or the other way round."""
+    amid = np.r_[np.zeros(20), np.ones(60), np.zeros(20)]
+    errors = np.tile(amid if at == "middle" else 1 - amid, 30)
+    errors *= 1 + 0.1 * np.random.default_rng(0).standard_normal(errors.size)
+    found = np.sqrt(np.mean(errors**2))
+    samples = BlockBootstrap([100] * 30, 0).rmse(errors)
+    low, high = interval(samples)
+    assert low < found < high
+    assert samples.mean() == pytest.approx(found, rel=0.01)
 
 
 @pytest.mark.parametrize("n", [1, 2, 3])

@@ -1,4 +1,4 @@
-"""Moving-block bootstrap: intervals of errors whose samples depend on their neighbours."""
+"""Circular moving-block bootstrap: intervals of errors whose samples depend on their neighbours."""
 
 from __future__ import annotations
 
@@ -24,8 +24,9 @@ class BlockBootstrap:
     """Resamples of blocks of consecutive samples, the same for every model, so that they pair.
 
     Blocks are as long as is best for an autoregression of that memory (Andrews, Econometrica 59, 1991),
-    rounded up to doublings of the square root of the samples. Where that leaves few blocks, resamples
-    are spread as Student's t is wider than Gauss.
+    rounded up to doublings of the square root of the samples; they go on from the end of a recording at
+    its start, so that its ends count as often as its middle (Politis and Romano's circular blocks).
+    Where that leaves few blocks, resamples are spread as Student's t is wider than Gauss.
 
     Parameters
     ----------
@@ -45,7 +46,7 @@ class BlockBootstrap:
             block = max(int(np.ceil(np.sqrt(n))), 1) << doublings(n, memory)
             block = min(block, max(n // 2, 1))
             count = int(np.ceil(n / block))
-            starts = rng.integers(0, n - block + 1, (RESAMPLES, count))
+            starts = rng.integers(0, n, (RESAMPLES, count))
             self._parts.append((offset, n, block, starts))
             offset += n
             n_blocks += n / block
@@ -65,9 +66,10 @@ class BlockBootstrap:
             return found
         total, count = np.zeros(RESAMPLES), 0
         for offset, n, block, starts in self._parts:
-            squares = np.concatenate([[0.0], np.cumsum(errors[offset : offset + n] ** 2)])
-            total += (squares[starts + block] - squares[starts]).sum(axis=1)
-            count += block * starts.shape[1]
+            around = np.resize(errors[offset : offset + n] ** 2, n + block)
+            squares = np.concatenate([[0.0], np.cumsum(around)])
+            total += n * (squares[starts + block] - squares[starts]).mean(axis=1) / block
+            count += n
         found = np.sqrt(total / count)
         middle = found.mean()
         return np.maximum(middle + self._wider * (found - middle), 0.0)

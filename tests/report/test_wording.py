@@ -7,8 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mckibben.comparison.row import Memory
+from mckibben.report.commands import Typed, commands
 from mckibben.report.wording import (
-    commands,
     duration,
     next_steps,
     number,
@@ -113,6 +113,15 @@ def test_commands_are_quoted_and_name_every_file_once() -> None:
     assert with_test["Fit gpi to whole recordings"].startswith(
         "mckibben fit gpi 'my data/run 1.csv'"
     )
+
+
+def test_a_study_is_repeated_as_it_was_typed() -> None:
+    words = ["study", "a b.csv", "--column", "pressure=P (1)", "--zero", "displacement"]
+    lines = dict(commands(study(), Typed(words, ["--column", "pressure=P (1)"])))
+    assert lines["Repeat this study"] == (
+        "mckibben study 'a b.csv' --column 'pressure=P (1)' --zero displacement"
+    )
+    assert "--column 'pressure=P (1)'" in lines["Fit gpi to whole recordings"]
 
 
 def test_there_is_no_command_for_an_absent_inverse() -> None:

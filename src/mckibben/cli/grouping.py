@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import MISSING, fields, is_dataclass
+from enum import Enum
 from functools import wraps
 from inspect import Parameter, Signature, signature
 from typing import Any, get_type_hints
@@ -41,3 +42,24 @@ def spread(command: Callable[..., None]) -> Callable[..., None]:
     found.__signature__ = Signature(asked)
     found.__annotations__ = {one.name: one.annotation for one in asked}
     return run
+
+
+def typed(group: Any) -> list[str]:
+    """Return a group of options as it is typed: what is not by default.
+
+    >>> from mckibben.cli.options import Reading
+    >>> typed(Reading(column=["pressure=P1"], rate=100.0))
+    ['--column', 'pressure=P1', '--rate', '100.0']
+    """
+    own = get_type_hints(type(group), include_extras=True)
+    words: list[str] = []
+    for field in fields(group):
+        value = getattr(group, field.name)
+        if value == field.default:
+            continue
+        asked = own[field.name].__metadata__[0]
+        option = next(word for word in (asked.default, *asked.param_decls) if str(word)[:2] == "--")
+        for one in value if isinstance(value, list) else [value]:
+            told = one.value if isinstance(one, Enum) else one
+            words += [option] if told is True else [option, str(told)]
+    return words

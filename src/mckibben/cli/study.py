@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from mckibben.cli.comparing import Asked
-from mckibben.cli.grouping import spread
+from mckibben.cli.grouping import spread, typed
 from mckibben.cli.leaderboards import print_leaderboard, told
 from mckibben.cli.options import Files, Reading
 from mckibben.cli.output import make_folder, print_json, say
@@ -60,6 +60,7 @@ def study(
         begun = asked.begin(files, reading, folder, study_files, beside=given)
         from mckibben.recording import notes_by_file
         from mckibben.report import StudyFolder
+        from mckibben.report.commands import Typed
         from mckibben.studying.log import REFERENCE
         from mckibben.studying.study import study as find
 
@@ -68,7 +69,18 @@ def study(
             say(
                 "A reference is recorded: --compensator inverse.json, what ran, tells why it was missed."
             )
-        results = StudyFolder(begun.results or folder)
+        results = StudyFolder(
+            begun.results or folder,
+            Typed(
+                study=[
+                    *("study", *map(str, files), *typed(asked), *typed(reading), "-o", str(out)),
+                    *([] if rig is None else ["--rig", rig]),
+                    *([] if compensator is None else ["--compensator", str(compensator)]),
+                    *([] if model is None else ["--model", str(model)]),
+                ],
+                reading=typed(reading),
+            ),
+        )
 
         def found(so_far: Study) -> None:
             results.take(so_far)

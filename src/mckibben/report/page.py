@@ -19,6 +19,7 @@ from mckibben.report import (
     wording,
 )
 from mckibben.report.answers import answers
+from mckibben.report.commands import Typed, commands
 from mckibben.report.drawing import N_COLOURS, POINTS, Drawing, series_colour
 from mckibben.report.shown import Shown, drawn, shown, unique
 
@@ -64,8 +65,8 @@ def write_report(study: Study, path: str | Path) -> None:
     write_text(path, page(study))
 
 
-def page(study: Study) -> str:
-    """Return the report of a study as HTML."""
+def page(study: Study, typed: Typed | None = None) -> str:
+    """Return the report of a study as HTML, with how it was asked for on the command line, if it was."""
     from mckibben.comparison.columns import columns_of_board
     from mckibben.comparison.results import CHOICES
 
@@ -96,6 +97,8 @@ def page(study: Study) -> str:
         reading=notes_by_file(measured),
         notes=[note for note in study.notes if note not in reading_notes(measured)],
         wording=wording,
+        typed=typed or Typed(),
+        commands=commands(study, typed),
         answers=answers(study),
         checked=checked(study),
         description=study.description,

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from mckibben.blocks.core.saving import to_text
 from mckibben.outputs import Results
+from mckibben.report.commands import Typed
 from mckibben.report.page import page
 from mckibben.studying.refitting import Refit
 from mckibben.system.atomic import to_json
@@ -62,9 +63,12 @@ class StudyFolder:
     ----------
     results : Results or Path
         The folder, which exists.
+    typed : Typed, optional
+        How the study was asked for on the command line.
     """
 
-    def __init__(self, results: Results | Path) -> None:
+    def __init__(self, results: Results | Path, typed: Typed | None = None) -> None:
+        self._typed = typed
         self._results = Results(results) if isinstance(results, Path) else results
         self._saved: set[str] = set()
         self._next_page = 0.0
@@ -96,7 +100,7 @@ class StudyFolder:
                 write("banded.json", to_text(best.banded))
         started = time.monotonic()
         if last or not board.pending or started >= self._next_page:
-            write("report.html", page(study))
+            write("report.html", page(study, self._typed))
             ended = time.monotonic()
             first = not board.rows  # the page of the first model is never waited for
             self._next_page = ended if first else ended + (ended - started) / PAGE_SHARE

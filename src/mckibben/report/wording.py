@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mckibben import registry
 from mckibben.numerals import numeral, typeset
 
 if TYPE_CHECKING:
@@ -25,10 +23,6 @@ FORGETFUL = 0.7
 
 MISLEADING = 0.05
 """RMSE over range from which the chosen model is said to miss something."""
-
-
-MINUTES = 3
-"""Of the plan that is proposed."""
 
 
 def number(value: float | None, digits: int = 3) -> str:
@@ -178,63 +172,6 @@ def next_steps(study: Study) -> list[str]:
     return steps
 
 
-def commands(study: Study) -> list[tuple[str, str]]:
-    """Return what to type to repeat the study and to use its results, each with what it does."""
-    board = study.leaderboard
-    train, test = _files(study.train), _files(study.test)
-    named = [("--input", name) for name in board.inputs]
-    named += [("--output", name) for name in board.outputs]
-    channels = " ".join(f"{option} {shlex.quote(name)}" for option, name in named)
-    tested = "".join(f" --test {file}" for file in test if file not in train)
-    told = "" if study.load is None else f" --load {shlex.quote(study.load)}"
-    known = registry.names("estimators")
-    rows = {*(row.model for row in board.rows), *board.pending}
-    models = ",".join(sorted(rows.intersection(known)))
-    lines = [
-        (
-            "Repeat this study",
-            f"mckibben study {' '.join(train)}{tested} {channels}{told} --models {models} "
-            f"--seed {board.seed} -o study",
-        )
-    ]
-    if board.best is not None and board.best.model in known:
-        model = board.best.model
-        lines.append(
-            (
-                f"Fit {model} to whole recordings",
-                f"mckibben fit {model} {' '.join(train)} {channels} --seed {board.seed} "
-                f"-o {model}.json",
-            )
-        )
-        lines.append(
-            (
-                f"Plan {MINUTES} minutes that tell most of what is not known yet",
-                f"mckibben plan {' '.join(train)} --minutes {MINUTES} -o next.csv",
-            )
-        )
-        lines.append(
-            (
-                f"Run it on another {board.input}",
-                f"mckibben simulate {model}.json new.csv -o modelled.csv",
-            )
-        )
-    if study.inverse is not None:
-        lines.append(
-            (
-                f"From a wished-for {board.output} to {board.input}",
-                "mckibben simulate inverse.json reference.csv -o feedforward.csv",
-            )
-        )
-    if board.best is not None and board.best.banded is not None:
-        lines.append(
-            (
-                f"{board.output} with the ends of its band, on another {board.input}",
-                "mckibben simulate banded.json new.csv --interval 0.9 -o modelled.csv",
-            )
-        )
-    return lines
-
-
 def versions() -> dict[str, str]:
     """Return the versions of Python, this package, and those that its numbers come from."""
     import platform
@@ -242,11 +179,6 @@ def versions() -> dict[str, str]:
 
     packages = ("mckibben", "numpy", "scipy", "numba")
     return {"Python": platform.python_version()} | {name: version(name) for name in packages}
-
-
-def _files(recordings: Sequence[Recording]) -> list[str]:
-    sources = [recording.source or f"{recording.name}.csv" for recording in recordings]
-    return [shlex.quote(source) for source in dict.fromkeys(sources)]
 
 
 def _listed(names: Sequence[str]) -> str:

@@ -98,11 +98,15 @@ def build(folder: Path) -> tuple[Path, Path]:
 
 
 def look_through(wheel: Path, source: Path) -> None:
-    """Refuse archives that are too large, lack a file of the package, or hold anything else."""
+    """Refuse archives that are too large, lack a file, hold anything else, or have links to nowhere."""
     told = run("git", "ls-files", "src/mckibben", within=ROOT).splitlines()
     package = {name.removeprefix("src/") for name in told}
     with zipfile.ZipFile(wheel) as archive:
         held = {name for name in archive.namelist() if ".dist-info/" not in name}
+        (about,) = (name for name in archive.namelist() if name.endswith(".dist-info/METADATA"))
+        loose = re.findall(r"\]\((?!https?:|#)([^)]*)\)", archive.read(about).decode("utf-8"))
+    if loose:
+        raise ReleaseError(f"{wheel.name}: on the index's page links lead nowhere: {loose[:5]}")
     refuse_differences(wheel, held, package)
     with tarfile.open(source) as archive:
         held = {name.partition("/")[2] for name in archive.getnames()}

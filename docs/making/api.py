@@ -16,7 +16,8 @@ SOURCE = Path(mckibben.__file__).parent
 PARTS = (
     *("recording", "signals", "metrics", "characterization", "files", "rigs", "environments"),
     *("blocks", "estimators", "control", "comparison", "excitation", "validation", "muscles"),
-    *("papers", "report", "studying", "export", "stream", "link"),
+    *("papers", "report", "studying", "export", "stream", "link", "simulators", "ros"),
+    *("bands", "measured", "example", "errors"),
 )
 """Of the package, in the order of its layers."""
 

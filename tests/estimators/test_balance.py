@@ -396,6 +396,9 @@ def test_least_squares_within_inequalities_meet_the_conditions_of_optimality() -
     assert (pressed >= 0).all()
     np.testing.assert_allclose(pressed * (sides @ x - least), 0.0, atol=1e-9)
     np.testing.assert_allclose(slopes.T @ (slopes @ x - target), sides.T @ pressed, atol=1e-9)
+    x, pressed = constrained_least_squares(slopes, target, np.eye(6), np.zeros(6))
+    assert (pressed > 0).any()
+    assert (x[pressed > 0] == 0.0).all()
     with pytest.raises(ModelError, match="no parameters"):
         constrained_least_squares(slopes, target, np.eye(6)[[0, 0]] * [[1.0], [-1.0]], np.ones(2))
 

@@ -32,3 +32,12 @@ def test_a_loop_is_coloured_by_a_third_channel() -> None:
     panel = coupling_subjects.loop_by(arm(), "u1", "y2", "u2").panels[0]
     assert len(panel.curves) == 5
     assert panel.x_label == "u1 [bar]"
+
+
+def test_the_recording_in_which_all_inputs_move_is_drawn() -> None:
+    wave = np.sin(np.arange(100) / 5)
+    runs = [
+        Recording({"pressure_1": a * wave, "pressure_2": b * wave, "displacement_1": wave}, 0.1)
+        for a, b in ((3.0, 0.0), (1.0, 2.0), (0.5, 3.0))
+    ]
+    assert coupling_subjects.fullest(runs, ["pressure_1", "pressure_2"]) is runs[1]

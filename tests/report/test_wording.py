@@ -43,7 +43,7 @@ def test_the_verdict_names_the_model_its_error_with_unit_and_range_and_the_inver
     assert "Chosen by cross-validation on the training side: gpi" in words
     assert "neither fitted to nor chosen by, gpi is off by" in words
     assert f"{number(best.test.rmse)} mm" in words
-    assert "% of the measured range" in words
+    assert "% of the recorded range" in words
     assert "It can be inverted" in words
 
 
@@ -90,7 +90,7 @@ def test_next_steps_answer_what_is_wrong() -> None:
     words = " ".join(next_steps(worse))
     assert "misses something" in words
     assert "record more varied movements" in words
-    assert "20 % of the measured gap" in words
+    assert "20 % of the recorded gap" in words
     assert "feedforward" in words
     assert len(next_steps(replace(found, inverse=None))) == 1
 

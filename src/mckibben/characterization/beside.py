@@ -50,7 +50,7 @@ def alone(
             remedy="record one in which it moves alone; models of several inputs need no such recording",
         )
     share = sum(map(len, found)) / sum(map(len, recordings))
-    return found, f"Told where {others} rest, {100 * share:.2g} % of the samples."
+    return found, f"Told where {others} rest, {100 * share:.0f} % of the samples."
 
 
 def levelled(recordings: Sequence[Recording], given: str, wanted: str) -> list[Recording]:

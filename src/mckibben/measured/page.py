@@ -25,7 +25,7 @@ BEST = 1.1
 
 PER_CENT = 100.0
 
-HEAD = """# Every model on measured recordings
+HEAD = """# Every model on recordings
 
 Made by `{command}`; do not edit. Models are fitted and chosen on one side of each split and
 tested free-running on the other; the test decides nothing. All rows are in `measured.csv` beside this.

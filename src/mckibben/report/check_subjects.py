@@ -61,7 +61,7 @@ def pattern(one: OutputCheck, against: Pattern) -> Drawing:
     what = "rate of " if against.against == "rate" else ""
     what = "modelled " if against.against == "output" else what
     x_label = axis_label(f"{what}{against.channel}", against.unit)
-    y_label = axis_label("measured − model", one.unit)
+    y_label = axis_label("recorded − model", one.unit)
     return Drawing((Panel(x_label, y_label, tuple(curves), zero=True),))
 
 

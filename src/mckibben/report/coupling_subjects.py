@@ -93,6 +93,17 @@ def coupling(
     return Coupling(tuple(inputs), tuple(outputs), effects, units, tuple(explained.tolist()))
 
 
+def fullest(recordings: Sequence[Recording], inputs: Sequence[str]) -> Recording:
+    """Return the recording whose least moved input moves the most; of equals the first."""
+
+    def least(recording: Recording) -> float:
+        return float(min(np.ptp(recording[name]) / whole[name] for name in inputs))
+
+    spans = {name: np.concatenate([r[name] for r in recordings]) for name in inputs}
+    whole = {name: max(float(np.ptp(x)), np.finfo(float).tiny) for name, x in spans.items()}
+    return max(recordings, key=least)
+
+
 def matrix(recording: Recording, found: Coupling, points: int = SMALL) -> Drawing:
     """Draw every output (rows) over every input (columns), small; own pairs are in colour."""
     panels = []

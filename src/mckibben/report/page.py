@@ -75,7 +75,8 @@ def page(study: Study, typed: Typed | None = None) -> str:
     figures, left_out = _figures(study, pictured)
     coupled = _coupled(study, pictured)
     if coupled is not None:
-        drawing = coupling_subjects.matrix(pictured[0].recording, coupled)
+        runs = [one.recording for one in unique(every)]
+        drawing = coupling_subjects.matrix(coupling_subjects.fullest(runs, coupled.inputs), coupled)
         figures["coupling"] = [interactive.plots(drawing)]
     measured = [one.recording for one in unique(every)]
     return templating.page(
@@ -83,6 +84,7 @@ def page(study: Study, typed: Typed | None = None) -> str:
         figures,
         study=study,
         board=study.leaderboard,
+        source=subjects.source(pictured[0].recording),
         shown=unique(every),
         listed_drawn=unique(pictured),
         drawn=pictured,
@@ -207,10 +209,16 @@ def _explained(board: Leaderboard) -> dict[str, str]:
 
     known = registry.names("estimators")
     return {
-        row.model: f"{full_name(row.model)}. {summary(row.model)}"
+        row.model: _once(full_name(row.model), summary(row.model))
         for row in board.ranking
         if row.model in known
     }
+
+
+def _once(name: str, told: str) -> str:
+    """Return a full name and a summary, less the name where the summary begins with it."""
+    stem, plain = (text.split(" (")[0].replace("–", "-") for text in (name, told))
+    return told if plain.startswith(stem) else f"{name}. {told}"
 
 
 def checked(study: Study) -> tuple[OutputCheck, ...]:

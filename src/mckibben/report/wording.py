@@ -25,6 +25,10 @@ MISLEADING = 0.05
 """RMSE over range from which the chosen model is said to miss something."""
 
 
+ROUNDING = 1e-9
+"""Share that is rounding, and shown as none."""
+
+
 def number(value: float | None, digits: int = 3) -> str:
     """Return a number to so many significant digits, as it is printed.
 
@@ -37,10 +41,13 @@ def number(value: float | None, digits: int = 3) -> str:
 def percent(value: float | None, digits: int = 2) -> str:
     """Return a share as a percentage.
 
-    >>> percent(0.0123), percent(None)
-    ('1.2 %', '–')
+    >>> percent(0.0123), percent(-1.8e-15), percent(None)
+    ('1.2 %', '0 %', '–')
     """
-    return "–" if value is None else f"{number(100 * value, digits)} %"
+    if value is None:
+        return "–"
+    shown = 0.0 if abs(value) < ROUNDING else value
+    return f"{number(100 * shown, digits)} %"
 
 
 def output_range(study: Study) -> float:
@@ -73,7 +80,7 @@ def verdict(study: Study) -> list[str]:
     sentences = [
         f"Models that worked{so_far}: {n_ok}. {board.chosen}",
         f"Free-running on the test data{_untouched(board)}, {best.model} is "
-        f"off by {number(best.test.rmse)} {board.unit} RMSE{between}, {share} of the measured range; "
+        f"off by {number(best.test.rmse)} {board.unit} RMSE{between}, {share} of the recorded range; "
         f"at worst by {number(best.test.max_error)} {board.unit}.",
     ]
     if board.level:
@@ -162,7 +169,7 @@ def next_steps(study: Study) -> list[str]:
     memory = best.memory
     if memory is not None and memory.gap_ratio is not None and memory.gap_ratio < FORGETFUL:
         steps.append(
-            f"It keeps only {percent(memory.gap_ratio)} of the measured gap between branches: do "
+            f"It keeps only {percent(memory.gap_ratio)} of the recorded gap between branches: do "
             "not rely on it where the input is held."
         )
     if not steps:

@@ -110,12 +110,16 @@ def residuals(block: Block, recordings: Sequence[Recording]) -> list[Array]:
 
 
 def parameters(block: Block, sure: Sureness) -> tuple[Parameter, ...]:
-    """Return every number of ``block.pack()``, in its order, with what it is and how sure it is."""
+    """Return every number of ``block.pack()``, in its order, with what it is and how sure it is.
+
+    What is rounding beside the others, as a weight of 1e-17, is shown as 0.
+    """
     found = []
     deviations = np.sqrt(np.diag(sure.covariance))
-    values = block.pack().tolist()
+    values = block.pack()
+    shown = np.where(np.abs(values) <= NOTHING * relative_sizes(values), 0.0, values).tolist()
     for what, value, own, said in zip(
-        quantities(block), values, deviations.tolist(), sure.said, strict=True
+        quantities(block), shown, deviations.tolist(), sure.said, strict=True
     ):
         half = own * sure.half_width
         told = not said

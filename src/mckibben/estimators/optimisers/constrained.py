@@ -65,4 +65,8 @@ def constrained_least_squares(
             "wider range"
         )
     shift = -residual[:p] / residual[p] * unit
-    return solve_triangular(upper, right + shift) / size, pressed / residual[p] * unit / lengths
+    x = solve_triangular(upper, right + shift) / size
+    bounds = np.flatnonzero((np.count_nonzero(sides, axis=1) == 1) & (pressed > 0))
+    bounded = np.abs(sides[bounds]).argmax(axis=1)
+    x[bounded] = least[bounds] / sides[bounds, bounded]  # to the bit: 0, where rounding left 1e-17
+    return x, pressed / residual[p] * unit / lengths

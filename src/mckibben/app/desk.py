@@ -46,6 +46,8 @@ class Desk:
     """Whether models are tested on data that they were fitted to, which every result then says."""
     dark: bool = False
     preview: str | None = None
+    drawn: Sequence[str] = ()
+    """Channels over time that were chosen to be drawn."""
     compensator: tuple[str, str, dict[str, Any], float] | None = None
     """The model, use, settings and step whose pressures were shown last; see `mckibben.app.forms`."""
     _chosen: bool = False

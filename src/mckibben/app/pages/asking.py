@@ -18,6 +18,9 @@ from mckibben.recording import STANDARD_UNITS, Recording
 
 LEFT_OUT = "(left out)"
 
+READING = "How it was read"
+"""What stands on the button that opens the dialog."""
+
 
 async def ask_again(desk: Desk, place: Any, name: str) -> None:
     """Ask how the file of a recording is to be read, with what was understood filled in."""

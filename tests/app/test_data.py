@@ -1,0 +1,95 @@
+"""The page of recordings, in a real browser: no click and nothing typed is lost, and all is said."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from mckibben import Recording
+from mckibben.app.workspace import Workspace
+from tests.app.browsing import BROWSER, OPTIONS, SLOW, seen, visited, workbench
+from tests.tools import needs
+
+playwright = pytest.importorskip("playwright.sync_api")
+
+pytestmark = needs("chromium")
+
+RUNS = [f"run-{k}" for k in range(9)]
+
+
+def recording(seed: int) -> Recording:
+    t = np.arange(300) * 0.02
+    pressure = 2 + np.sin(t + seed)
+    names = ("flow", "temperature", "voltage", "force", "displacement")
+    others = {name: pressure * k for k, name in enumerate(names, start=1)}
+    return Recording({"pressure": pressure} | others, 0.02)
+
+
+@pytest.fixture
+def workspace(tmp_path: Path) -> Workspace:
+    workspace = Workspace(tmp_path / "ws")
+    for seed, name in enumerate(RUNS):
+        workspace.add(recording(seed), origin="a test", call="", name=name)
+    return workspace
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    with playwright.sync_playwright() as play:
+        browser = play.chromium.launch(executable_path=BROWSER, args=OPTIONS)
+        yield browser
+        browser.close()
+
+
+@pytest.fixture
+def page(browser: Any, workspace: Workspace) -> Iterator[Any]:
+    with workbench(workspace.folder) as address, visited(browser, address) as page:
+        yield page
+
+
+def until(page: Any, holds: Any) -> None:
+    """Wait until something holds."""
+    for _ in range(SLOW // 100):
+        if holds():
+            return
+        page.wait_for_timeout(100)
+    raise AssertionError("it never held")
+
+
+def test_clicks_count_and_typed_values_stay_while_others_change(
+    page: Any, workspace: Workspace
+) -> None:
+    for name in RUNS:
+        seen(page, f"role-{name}")
+    seen(page, "sample-time").fill("0.01")
+    page.evaluate(
+        """([gone, ...names]) => {
+            document.querySelector(`[aria-label="Remove ${gone}"]`).click()
+            for (const name of names) {
+                const role = document.querySelector(`[data-testid="role-${name}"]`)
+                const buttons = [...role.querySelectorAll("button")]
+                buttons.find((button) => button.innerText.toLowerCase() === "unused").click()
+            }
+        }""",
+        RUNS[::-1],
+    )
+    page.get_by_test_id("recording-run-8").wait_for(state="detached", timeout=SLOW)
+    until(page, lambda: {entry.role for entry in workspace.entries()} == {"unused"})
+    assert seen(page, "sample-time").input_value() == "0.01"
+    page.get_by_text("Resample", exact=True).click()
+    seen(page, "steps").get_by_text("resampled to 0.01 s").wait_for(timeout=SLOW)
+
+
+def test_what_is_driven_and_moves_is_drawn_and_the_rest_is_named(page: Any) -> None:
+    plot = seen(page, "preview-plot")
+    for name in ("pressure", "displacement"):
+        plot.get_by_text(name).first.wait_for(timeout=SLOW)
+    assert seen(page, "not-drawn").inner_text() == "Not drawn: voltage, force"
+    seen(page, "draw-channels").click()
+    page.get_by_role("option", name="force").click()
+    page.get_by_text("Not drawn: voltage", exact=True).wait_for(timeout=SLOW)
+    plot.get_by_text("force").first.wait_for(timeout=SLOW)

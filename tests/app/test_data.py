@@ -93,3 +93,32 @@ def test_what_is_driven_and_moves_is_drawn_and_the_rest_is_named(page: Any) -> N
     page.get_by_role("option", name="force").click()
     page.get_by_text("Not drawn: voltage", exact=True).wait_for(timeout=SLOW)
     plot.get_by_text("force").first.wait_for(timeout=SLOW)
+
+
+def test_what_came_from_no_file_is_read_otherwise_and_a_load_is_told(
+    page: Any, workspace: Workspace
+) -> None:
+    def ask(name: str) -> None:
+        page.get_by_role("button", name=f"How it was read: {name}").click()
+        seen(page, "add-constant")
+
+    ask("run-3")
+    seen(page, "rename").fill("mine")
+    seen(page, "read-again").click()
+    seen(page, "recording-mine")
+    ask("mine")
+    seen(page, "add-constant").click()
+    seen(page, "constant-value-0").fill("200")
+    seen(page, "constant-unit-0").fill("g")
+    seen(page, "read-again").click()
+    seen(page, "problem").get_by_text("a constant are to be force").wait_for(timeout=SLOW)
+    seen(page, "channel-4").click()
+    seen(page, "channel-4").fill("pull")
+    page.keyboard.press("Enter")
+    seen(page, "read-again").click()
+    until(page, lambda: "pull" in workspace.recording("mine"))
+    assert workspace.recording("mine")["force"] == pytest.approx(1.96133)
+    page.get_by_test_id("read-again").wait_for(state="detached", timeout=SLOW)
+    ask("mine")
+    assert seen(page, "constant-value-0").input_value() == "200"
+    assert seen(page, "constant-unit-0").input_value() == "g"

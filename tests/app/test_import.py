@@ -331,3 +331,60 @@ def test_names_that_tell_nothing_are_taken_for_what_their_units_say(tmp_path: Pa
         "time_s,pressure_bar,displacement_mm\n" + "\n".join(f"{k},{k},{k}" for k in range(9))
     )
     assert untold(plain, read_upload(plain)) == Reading()
+
+
+def held(desk: Desk, constants: dict[str, tuple[float, str]], **other: Any) -> Recording:
+    """Read the only recording otherwise, as the dialog does."""
+    (entry,) = desk.workspace.entries()
+    adding.replaced(desk, [entry.name], Reading(constants=constants, **other))
+    return desk.workspace.recording(entry.name)
+
+
+def test_a_load_that_is_in_no_column_is_said_changed_and_undone(tmp_path: Path) -> None:
+    workspace = Workspace(tmp_path / "ws")
+    desk = Desk(workspace, Jobs(workspace))
+    before = taken(workspace)
+    assert held(desk, {"force": (200.0, "g")})["force"] == pytest.approx(1.96133)
+    found = held(desk, {"force": (0.4, "kg")}, channels=["pressure", "displacement", "force"])
+    assert list(found.channels) == ["pressure", "displacement", "force"]
+    assert found.units["force"] == "N"
+    assert found["force"] == pytest.approx(3.92266)
+    again = Workspace(workspace.folder).entry("rig")
+    assert again.reading.constants == {"force": (0.4, "kg")}
+    (line,) = scripts._reads(workspace, "train")
+    import mckibben
+
+    assert eval(line, {"mckibben": mckibben})["force"] == pytest.approx(found["force"])
+    assert workspace.undo()
+    assert workspace.recording("rig")["force"] == pytest.approx(1.96133)
+    assert workspace.undo()
+    assert list(workspace.recording("rig").channels) == list(before.channels)
+    with pytest.raises(DataError, match="no column and not time"):
+        held(desk, {"time": (1.0, "s")})
+    with pytest.raises(DataError, match="cannot be in 'mm'"):
+        held(desk, {"force": (1.0, "mm")})
+
+
+def test_samples_that_came_from_no_file_are_read_otherwise_again_and_again(tmp_path: Path) -> None:
+    workspace = Workspace(tmp_path / "ws")
+    desk = Desk(workspace, Jobs(workspace))
+    name, other = workspace.add_example()
+    before, data = workspace.recording(name), workspace.data()
+    assert adding.alike(desk, name) == [other]
+    turn = {"displacement": (-1.0, 0.0)}
+    adding.replaced(desk, [name], Reading(calibration=turn))
+    np.testing.assert_allclose(workspace.recording(name)["displacement"], -before["displacement"])
+    # from what it was, not from what it has become
+    adding.replaced(desk, [name], Reading(calibration=turn, constants={"force": (2.0, "kg")}))
+    found = workspace.recording(name)
+    np.testing.assert_allclose(found["displacement"], -before["displacement"])
+    assert found["force"] == pytest.approx(2 * 9.80665)
+    assert found.sample_time == before.sample_time
+    (line, *_) = scripts._reads(workspace, "train")
+    import mckibben
+
+    assert eval(line, {"mckibben": mckibben})["force"] == pytest.approx(found["force"])
+    assert workspace.undo()
+    assert workspace.undo()
+    assert workspace.recording(name) == before
+    assert workspace.data() == data

@@ -65,8 +65,8 @@ def choose(table: Table, request: Request, path: Path) -> Choice:
         If a channel asked for is missing, two columns are one channel, a cell is no number, or a
         unit is unknown or of the wrong dimension.
     """
-    if table.own:
-        request = replace(request, described=Described())
+    described = Described() if table.own else request.described
+    request = replace(request, described=request.describing(described))
     named, left_out = assign(table, request, path)
     named, dropped = clocks.on_one(named, request, path)
     left_out += dropped

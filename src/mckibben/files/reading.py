@@ -51,6 +51,7 @@ def read(
     channels: Sequence[str] | None = None,
     informative: bool = True,
     calibration: Mapping[str, tuple[float, float]] | None = None,
+    constants: Mapping[str, tuple[float, str]] | None = None,
 ) -> list[Recording]:
     """Read the recordings in a file, by its ending, or in a folder.
 
@@ -83,6 +84,9 @@ def read(
     calibration : mapping of str to (float, float), optional
         Channel -> gain and offset: the channel is gain times the column, plus offset, in the unit that
         ``units`` or else the header gives. ``{"displacement": (-1, 0)}`` turns a sign.
+    constants : mapping of str to (float, str), optional
+        Channel -> value and unit of what was held and stands in no column, such as the force
+        ``{"force": (200, "g")}``: a mass is the weight that it hangs with. Go before columns.
 
     Returns
     -------
@@ -114,6 +118,7 @@ def read(
         channels,
         informative,
         dict(calibration or {}),
+        dict(constants or {}),
     )
     request.check(path)
     return [each for one in sources.inside(path) for each in _read(one, request)]
@@ -254,7 +259,7 @@ def _announce_bridges(
 def _refuse_constant(channels: Channels, spans: list[Span], request: Request, path: Path) -> None:
     for name in request.channels or ():
         samples = np.concatenate([channels[name][start:stop] for start, stop in spans])
-        held = name.partition("_")[0] in MAY_BE_HELD
+        held = name.partition("_")[0] in MAY_BE_HELD or name in request.constants
         if not held and samples.size and np.ptp(samples) == 0:
             raise DataError(
                 f"it is constant, at {samples[0]:g}",

@@ -134,7 +134,7 @@ def _channels(desk: Desk, name: str, recording: Recording) -> None:
         multiple=True,
         label="Channels to draw",
     )
-    named(field.classes("min-w-56 max-w-full").props("use-chips dense"), "draw-channels")
+    named(field.classes("min-w-56 max-w-full"), "draw-channels")
     field.set_visibility(len(every) > 1)
     left = named(ui.label("").classes("text-sm opacity-70 break-words"), "not-drawn")
 

@@ -117,7 +117,8 @@ class Intake:
             if fewer and left:
                 self.list()
 
-        await ask(self.desk, self.place, one.held, one.shown, one.error, unread=rest, then=then)
+        path = self.desk.workspace.path("uploads", one.held)
+        await ask(self.desk, self.place, path, one.shown, one.error, unread=rest, then=then)
 
     def list(self, foreign: Sequence[Problem] = ()) -> None:
         """Show all files that were not read; those that cannot be recordings in one line."""

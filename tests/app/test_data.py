@@ -122,3 +122,27 @@ def test_what_came_from_no_file_is_read_otherwise_and_a_load_is_told(
     ask("mine")
     assert seen(page, "constant-value-0").input_value() == "200"
     assert seen(page, "constant-unit-0").input_value() == "g"
+
+
+def test_of_files_that_come_slowly_there_is_one_summary(page: Any, workspace: Workspace) -> None:
+    seen(page, "upload")
+    late: list[Any] = []
+
+    def hold(route: Any) -> None:
+        """Let all but the last file in at once, and that when the others have long been read."""
+        late.append(route)
+        if len(late) < 6:
+            route.continue_()
+
+    page.route("**/upload/**", hold)
+    names = [f"photo{k}.jpg" for k in range(6)]
+    page.locator("input[type=file]").first.set_input_files(
+        [{"name": name, "mimeType": "image/jpeg", "buffer": b"\xff\xd8"} for name in names]
+    )
+    until(page, lambda: len(late) == 6)
+    page.wait_for_timeout(1500)
+    assert page.get_by_test_id("not-read").count() == 0
+    late[-1].continue_()
+    said = seen(page, "not-read").inner_text()
+    assert "6 file(s) were not read" in said
+    assert page.get_by_test_id("not-read").count() == 1

@@ -11,6 +11,7 @@ import pytest
 
 from mckibben import DataError, DataWarning, Recording, read, signals
 from mckibben.app import adding, edits, scripts
+from mckibben.app import reading as app_reading
 from mckibben.app.desk import Desk
 from mckibben.app.jobs import Jobs
 from mckibben.app.kept import Reading, Step
@@ -19,6 +20,7 @@ from mckibben.app.recordings import EXAMPLE
 from mckibben.app.workspace import Workspace
 from mckibben.comparison.channels import Channels
 from mckibben.comparison.offered import objections
+from mckibben.errors import TooLargeError
 from mckibben.files import formats
 
 TABLE = "level,p_kPa,displacement_mm,branch\n" + "\n".join(
@@ -388,3 +390,34 @@ def test_samples_that_came_from_no_file_are_read_otherwise_again_and_again(tmp_p
     assert workspace.undo()
     assert workspace.recording(name) == before
     assert workspace.data() == data
+
+
+def test_the_first_lines_of_a_long_text_tell_its_columns(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "long.csv"
+    path.write_text(TABLE)
+    monkeypatch.setattr(app_reading, "START", 200)
+    whole = columns(path, Reading())
+    monkeypatch.setattr(app_reading, "LARGE", 500)
+    read_at_once: list[int] = []
+    tables = formats.tables
+
+    def sized(path: Path) -> Any:
+        read_at_once.append(path.stat().st_size)
+        return tables(path)
+
+    monkeypatch.setattr(formats, "tables", sized)
+    assert columns(path, Reading()) == whole
+    assert read_at_once[0] <= 200 < path.stat().st_size
+    given = Reading(columns={"force": "level"}, channels=["force"])
+    (level, *_) = columns(path, given)
+    assert (level.channel, level.unasked) == ("force", "level")
+
+
+def test_what_is_too_large_is_told_as_that(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "rig.csv"
+    path.write_text(TABLE)
+    monkeypatch.setattr(app_reading, "MOST_CELLS", 20)
+    with pytest.raises(TooLargeError, match="holds more than 20 numbers"):
+        read_upload(path)

@@ -44,7 +44,7 @@ def read_one(path: Path, **options: Any) -> Recording:
 
 
 def test_what_was_held_is_a_channel_whatever_the_columns(table: Write) -> None:
-    path = table(time=K * 0.1, pressure_bar=PRESSURE, force_N=PRESSURE)
+    path = table(time_s=K * 0.1, pressure_bar=PRESSURE, force_N=PRESSURE)
     found = read_one(path, constants={"force": (200, "g"), "angle_1": (90, "deg")})
     assert found["force"].tolist() == pytest.approx([1.96133] * N)
     assert found["angle_1"].tolist() == pytest.approx([np.pi / 2] * N)

@@ -65,7 +65,6 @@ async def ask(
     left = list(unread)
     try:
         found = await asyncio.to_thread(columns, path, reading)
-        plain = await asyncio.to_thread(columns, path, AS_FOUND)
         if not any(column.first for column in found):
             raise DataError("there are no columns in it", remedy="export it again")
     except MckibbenError as damaged:
@@ -81,7 +80,7 @@ async def ask(
         words = "" if error is None else said(error)
         problem = named(ui.label(words).classes("text-negative break-words"), "problem")
         problem.set_visibility(error is not None)
-        fields = ReadingFields(found, plain, reading)
+        fields = ReadingFields(found, reading)
         with ui.row().classes("items-end gap-4"):
             rate = named(
                 ui.number("Samples per second", value=reading.rate, min=0)
@@ -156,7 +155,10 @@ async def ask(
                 await then([Problem(shown, error, path.name), *left] if error else left)
 
         with ui.row():
-            named(ui.button("Read it so", on_click=guarded(again)), "read-again")
+            named(
+                ui.button("Read it so", on_click=guarded(again, f"Reading {shown:.40}")),
+                "read-again",
+            )
             ui.button("Leave it", on_click=guarded(leave)).props("flat")
     dialog.open()
 

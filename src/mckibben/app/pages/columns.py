@@ -21,14 +21,14 @@ class ReadingFields:
 
     Parameters
     ----------
-    found, plain : sequence of Seen
-        The columns as they are read now, and as they are without being told anything.
+    found : sequence of Seen
+        The columns as they are read now.
     reading : Reading
         How the file is read now.
     """
 
-    def __init__(self, found: Sequence[Seen], plain: Sequence[Seen], reading: Reading) -> None:
-        self._found, self._plain = found, plain
+    def __init__(self, found: Sequence[Seen], reading: Reading) -> None:
+        self._found = found
         self._lines = [_column(place, column, reading) for place, column in enumerate(found)]
         self._held: list[dict[str, Any]] = []
         self._constants = ui.column().classes("w-full gap-2")
@@ -74,11 +74,11 @@ class ReadingFields:
         kept: list[str] = []
         dropped = False
         constants = self._said_constants()
-        for column, as_found, line in zip(self._found, self._plain, self._lines, strict=True):
+        for column, line in zip(self._found, self._lines, strict=True):
             channel = str(line["channel"].value or LEFT_OUT).strip()
             if channel == LEFT_OUT:
-                dropped = dropped or as_found.channel not in ("", "time", *constants)
-                if as_found.channel == "time":  # or it would be found again
+                dropped = dropped or column.unasked not in ("", "time", *constants)
+                if column.unasked == "time":  # or it would be found again
                     mapped["unused_time"], dropped = column.header, True
                 continue
             if channel in kept or channel in constants:
@@ -88,7 +88,7 @@ class ReadingFields:
                     remedy="leave one out, or name it otherwise",
                 )
             kept.append(channel)
-            if explicit or channel != as_found.channel:
+            if explicit or channel != column.unasked:
                 mapped[channel] = column.header
             if line["unit"].value:
                 units[channel] = str(line["unit"].value).strip()

@@ -9,7 +9,7 @@ from typing import Any
 from nicegui import ui
 
 from mckibben import registry
-from mckibben.app.desk import Desk, guarded, named, on_event, tell
+from mckibben.app.desk import Desk, guarded, named, tell
 from mckibben.app.drawn import Drawn
 from mckibben.app.guard import LARGEST_UPLOAD, TOO_LARGE
 from mckibben.app.pages import apart, editing
@@ -77,17 +77,17 @@ def taken() -> list[str]:
 def _sources(desk: Desk, dialogs: Any) -> Intake:
     ui.label("Add recordings").classes("text-lg")
     intake = Intake(desk, dialogs)
-    named(
+    upload = named(
         ui.upload(
             label=f"Drop files here: {', '.join(taken())}",
             multiple=True,
             auto_upload=True,
             max_file_size=LARGEST_UPLOAD,
-            on_upload=on_event(intake.uploaded),
             on_rejected=lambda: tell(TOO_LARGE),
         ).classes("w-full"),
         "upload",
     )
+    intake.watch(upload)
     intake.reading = named(ui.label("").classes("text-sm").props("role=status"), "reading")
     intake.pending = named(ui.button(on_click=lambda: intake.list()).props("flat"), "left-unread")
     intake.show_left()

@@ -421,3 +421,14 @@ def test_what_is_too_large_is_told_as_that(tmp_path: Path, monkeypatch: pytest.M
     monkeypatch.setattr(app_reading, "MOST_CELLS", 20)
     with pytest.raises(TooLargeError, match="holds more than 20 numbers"):
         read_upload(path)
+
+
+def test_a_unit_that_was_assumed_is_not_where_it_is_said_later(tmp_path: Path) -> None:
+    workspace = Workspace(tmp_path / "ws")
+    desk = Desk(workspace, Jobs(workspace))
+    assumed = "no unit is given, so these are assumed: voltage in V; say --unit CHANNEL=UNIT"
+    told = Recording({"voltage": np.arange(20.0)}, 0.1, meta={"notes": [assumed, "mended"]})
+    workspace.add(told, origin="", call="", name="rig")
+    assert workspace.entry("rig").notes == (assumed, "mended")
+    adding.replaced(desk, ["rig"], Reading(columns={"force": "voltage"}, units={"force": "N"}))
+    assert workspace.entry("rig").notes == ("mended",)

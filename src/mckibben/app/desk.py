@@ -199,6 +199,11 @@ def tell(error: Exception | str) -> None:
     )
 
 
+def caution(text: str) -> Any:
+    """Show what is to be known of a result, in the words of a page."""
+    return ui.label(said(text)).classes("text-sm border-l-4 border-warning pl-2")
+
+
 def refused(error: Exception, what: str = "") -> None:
     """Show a problem with its remedy in the place of what cannot be shown."""
     ui.label(f"{what}: {said(error)}" if what else said(error)).classes("text-negative")

@@ -23,6 +23,9 @@ from mckibben.files.units import Unit, convert, find
 IMPLAUSIBLE_BAR = 50.0
 """No muscle sees this pressure; larger numbers without a unit are kPa, psi or the like."""
 
+ASSUMED = "no unit is given, so these are assumed: "
+"""What a note on assumed units begins with."""
+
 _LISTED = 30
 
 
@@ -97,8 +100,7 @@ def choose(table: Table, request: Request, path: Path) -> Choice:
     if found.assumed:
         warn(
             path,
-            f"no unit is given, so these are assumed: {_listed(found.assumed)}; "
-            "say --unit CHANNEL=UNIT where that is wrong",
+            f"{ASSUMED}{_listed(found.assumed)}; say --unit CHANNEL=UNIT where that is wrong",
         )
     notes = {
         "ignored_columns": found.ignored,

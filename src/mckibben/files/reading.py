@@ -14,7 +14,7 @@ from mckibben.arrays import Array
 from mckibben.errors import DataError
 from mckibben.files import sources, timebase
 from mckibben.files.channels import about
-from mckibben.files.choosing import Choice, choose
+from mckibben.files.choosing import ASSUMED, Choice, choose
 from mckibben.files.holes import Channels, treat
 from mckibben.files.notices import noted, warn
 from mckibben.files.request import Request
@@ -129,14 +129,18 @@ def _read(path: Path, request: Request) -> list[Recording]:
     with noted() as notes:
         tables, digest = sources.tables(path, request)
         found = [each for table in tables for each in _recordings(table, request, path, digest)]
-    return [_with_notes(recording, notes) for recording in found]
+    said = bool(request.columns or request.units)
+    return [_with_notes(recording, notes, said) for recording in found]
 
 
-def _with_notes(recording: Recording, notes: list[str]) -> Recording:
-    """Return a recording that tells what was assumed or mended when it was read, now or before."""
-    known = list(recording.notes)
-    new = [note for note in notes if note not in known]
-    return recording.with_meta(notes=known + new) if new else recording
+def _with_notes(recording: Recording, notes: list[str], said: bool) -> Recording:
+    """Return a recording that tells what was assumed or mended when it was read, now or before.
+
+    Units that were assumed before are not, where it is said now what the columns are.
+    """
+    known = [note for note in recording.notes if not (said and note.startswith(ASSUMED))]
+    told = known + [note for note in notes if note not in known]
+    return recording if told == list(recording.notes) else recording.with_meta(notes=told)
 
 
 def _recordings(table: Table, request: Request, path: Path, digest: str) -> list[Recording]:

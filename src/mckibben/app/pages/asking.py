@@ -18,9 +18,6 @@ from mckibben.app.reading import AS_FOUND, columns
 from mckibben.errors import DataError, MckibbenError
 from mckibben.recording import Recording
 
-READING = "How it was read"
-"""What stands on the button that opens the dialog."""
-
 
 async def ask_again(desk: Desk, place: Any, name: str) -> None:
     """Ask how the file of a recording is to be read, with what was understood filled in."""

@@ -9,8 +9,8 @@ from typing import Any
 from nicegui import ui
 
 from mckibben.app.desk import LONGEST, Desk, guarded, hinted, labelled, named, refused, told
-from mckibben.app.fields import said
-from mckibben.app.pages.asking import READING, ask_again
+from mckibben.app.fields import READING, said
+from mckibben.app.pages.asking import ask_again
 from mckibben.app.recordings import Entry
 from mckibben.errors import MckibbenError
 from mckibben.recording import Recording

@@ -11,7 +11,7 @@ import pytest
 
 from mckibben import Recording
 from mckibben.app.workspace import Workspace
-from tests.app.browsing import BROWSER, OPTIONS, SLOW, seen, visited, workbench
+from tests.app.browsing import BROWSER, OPTIONS, SLOW, opened, seen, visited, workbench
 from tests.tools import needs
 
 playwright = pytest.importorskip("playwright.sync_api")
@@ -57,7 +57,7 @@ def until(page: Any, holds: Any) -> None:
         if holds():
             return
         page.wait_for_timeout(100)
-    raise AssertionError("it never held")
+    raise AssertionError("it never held:\n" + page.inner_text("body"))
 
 
 def test_clicks_count_and_typed_values_stay_while_others_change(
@@ -113,10 +113,9 @@ def test_what_came_from_no_file_is_read_otherwise_and_a_load_is_told(
     seen(page, "read-again").click()
     seen(page, "problem").get_by_text("a constant are to be force").wait_for(timeout=SLOW)
     seen(page, "channel-4").click()
-    seen(page, "channel-4").fill("pull")
-    page.keyboard.press("Enter")
+    page.get_by_role("option").filter(has_text="(left out)").click()
     seen(page, "read-again").click()
-    until(page, lambda: "pull" in workspace.recording("mine"))
+    until(page, lambda: np.ptp(workspace.recording("mine")["force"]) == 0)
     assert workspace.recording("mine")["force"] == pytest.approx(1.96133)
     page.get_by_test_id("read-again").wait_for(state="detached", timeout=SLOW)
     ask("mine")
@@ -146,3 +145,25 @@ def test_of_files_that_come_slowly_there_is_one_summary(page: Any, workspace: Wo
     said = seen(page, "not-read").inner_text()
     assert "6 file(s) were not read" in said
     assert page.get_by_test_id("not-read").count() == 1
+
+
+def test_a_rig_is_told_in_words_and_its_runs_are_found_by_a_part_of_their_names(page: Any) -> None:
+    seen(page, "rig").click()
+    seen(page, "protocol").click()
+    page.get_by_role("option").filter(has_text="soft arm of three muscles").click()
+    page.get_by_text("143 runs").wait_for(timeout=SLOW)
+    seen(page, "runs").fill("network-p0-0.0-drive-1")
+    options = page.get_by_role("option")
+    options.filter(has_text="network-p0-0.0-drive-1").first.wait_for(timeout=SLOW)
+    assert options.filter(has_text="gpi").count() == 0
+
+
+def test_the_open_page_stays_when_it_is_loaded_again(page: Any) -> None:
+    opened(page, "take")
+    page.wait_for_url("**?tab=Take+away")
+    page.reload()
+    selected = page.get_by_test_id("tab-take").and_(page.locator("[aria-selected=true]"))
+    selected.wait_for(timeout=SLOW)
+    page.get_by_text("Fit a model first").first.wait_for(timeout=SLOW)
+    opened(page, "data")
+    seen(page, "recording-run-0")

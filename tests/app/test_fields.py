@@ -62,7 +62,10 @@ def test_no_option_of_the_command_line_reaches_a_page() -> None:
         ),
         ("as in --unit force=kN", "as in the field Unit (kN, say, of force)"),
         ("as in --unit force=UNIT", "as in the field Unit of force"),
-        ("on a model of your own muscle (--plant model.json), or", "on a model of your own muscle, or"),
+        (
+            "on a model of your own muscle (--plant model.json), or",
+            "on a model of your own muscle, or",
+        ),
         ("say --gaps split to cut there", "say “split there” to cut there"),
     ],
 )

@@ -427,7 +427,9 @@ def test_a_unit_that_was_assumed_is_not_where_it_is_said_later(tmp_path: Path) -
     workspace = Workspace(tmp_path / "ws")
     desk = Desk(workspace, Jobs(workspace))
     assumed = "no unit is given, so these are assumed: voltage in V; say --unit CHANNEL=UNIT"
-    told = Recording({"voltage": np.arange(20.0)}, 0.1, meta={"notes": [assumed, "mended"]})
+    told = Recording(
+        {"voltage": np.linspace(0.0, 1.0, 20)}, 0.1, meta={"notes": [assumed, "mended"]}
+    )
     workspace.add(told, origin="", call="", name="rig")
     assert workspace.entry("rig").notes == (assumed, "mended")
     adding.replaced(desk, ["rig"], Reading(columns={"force": "voltage"}, units={"force": "N"}))

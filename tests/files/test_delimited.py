@@ -170,3 +170,15 @@ def test_composite_units_are_read_whole(tmp_path: Path) -> None:
     units = {"flow": "l/min", "q": "deg/s", "velocity": "mm/s", "torque_n_m": "", "flow_nl_min": ""}
     assert found.units == units
     assert [float(found[name][1]) for name in units] == [60.0, 180.0, 500.0, 2.0, 3.0]
+
+
+def test_three_decimals_everywhere_are_plain_where_another_column_shows_the_mark(
+    tmp_path: Path, recwarn: pytest.WarningsRecorder
+) -> None:
+    rows = [f"{k % 9 + 1}.000,{1.5 + k % 4}" for k in range(30)]
+    found = read(tmp_path, "\n".join(["pressure_bar,displacement_mm", *rows]))
+    assert found["pressure"][1] == 2.0
+    assert found.notes == ()
+    with pytest.warns(DataWarning, match="not 1000"):
+        found = read(tmp_path, "\n".join(["pressure_bar", *(row[:5] for row in rows)]))
+    assert found["pressure"][1] == 2.0

@@ -256,7 +256,9 @@ def _columns(
         lines,
         dialect,
     )
-    _say_understood(columns, doubted, dialect.decimal, path)
+    plain = (cells.has_fractions() for i, cells in enumerate(columns) if i not in doubted)
+    if not any(plain):  # a file has one decimal mark, which other columns may show
+        _say_understood(columns, doubted, dialect.decimal, path)
     found = (cells.column(i, doubted.get(i)) for i, cells in enumerate(columns))
     return tuple(column for column in found if column is not None)
 

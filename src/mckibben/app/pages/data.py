@@ -8,17 +8,13 @@ from typing import Any
 
 from nicegui import ui
 
-from mckibben import registry
 from mckibben.app.desk import Desk, guarded, named, tell
 from mckibben.app.drawn import Drawn
 from mckibben.app.guard import LARGEST_UPLOAD, TOO_LARGE
-from mckibben.app.pages import apart, editing
+from mckibben.app.pages import apart, editing, rigs
 from mckibben.app.pages.cutting import preview
 from mckibben.app.pages.importing import Intake
 from mckibben.app.pages.rows import Rows, state_of
-
-PROTOCOL = "field-models"
-"""The one that is offered first."""
 
 KINDS = {
     "Excel (.xlsx)": "openpyxl",
@@ -94,7 +90,9 @@ def _sources(desk: Desk, dialogs: Any) -> Intake:
     with ui.row().classes("items-center"):
         example = named(ui.button("Open the example"), "example")
         example.on_click(guarded(lambda: _example(desk)))
-        named(ui.button("From a virtual rig", on_click=lambda: _rig(desk)).props("outline"), "rig")
+        named(
+            ui.button("From a virtual rig", on_click=lambda: rigs.ask(desk)).props("outline"), "rig"
+        )
     return intake
 
 
@@ -108,53 +106,6 @@ async def _example(desk: Desk) -> None:
         ui.notify("A virtual muscle with a hanging load: one run to train on, one to test on.")
     else:
         ui.notify("The example is open already.")
-
-
-def _record(desk: Desk, protocol: str, runs: list[str]) -> None:
-    call = f"list(mckibben.rigs.record({protocol!r}, runs={runs!r}, seed=0))"
-    desk.jobs.submit(
-        "record",
-        {
-            "protocol": protocol,
-            "runs": runs,
-            "seed": 0,
-            "call": call,
-            "title": f"record {protocol}",
-        },
-    )
-    desk.changed("jobs")
-    ui.notify("Recording in the background.")
-
-
-def _rig(desk: Desk) -> None:
-    from mckibben.signals.protocol import protocol
-
-    with ui.dialog() as dialog, ui.card().classes("w-96"):
-        ui.label("Runs of a paper's protocol, on its virtual rig").classes("text-lg")
-        names = list(registry.names("protocols"))
-        chosen = named(
-            ui.select(names, value=PROTOCOL, label="Protocol").classes("w-full"), "protocol"
-        )
-        runs = named(
-            ui.select([], multiple=True, label="Runs").classes("w-full").props("use-chips"), "runs"
-        )
-
-        def listed() -> None:
-            found = [run.name for run in protocol(str(chosen.value)).runs]
-            runs.set_options(found, value=found[: min(2, len(found))])
-
-        chosen.on_value_change(listed)
-        listed()
-
-        def record() -> None:
-            if runs.value:
-                _record(desk, str(chosen.value), list(runs.value))
-                dialog.close()
-
-        with ui.row():
-            named(ui.button("Record", on_click=record), "record")
-            ui.button("Close", on_click=dialog.close).props("flat")
-    dialog.open()
 
 
 def _list(desk: Desk, dialogs: Any) -> None:

@@ -22,6 +22,7 @@ from mckibben.comparison.channels import Channels
 from mckibben.comparison.offered import objections
 from mckibben.errors import TooLargeError
 from mckibben.files import formats
+from mckibben.files.notices import is_plain
 
 TABLE = "level,p_kPa,displacement_mm,branch\n" + "\n".join(
     f"{k % 20},{300 + k % 40},{-(k % 7)},up" for k in range(60)
@@ -434,3 +435,12 @@ def test_a_unit_that_was_assumed_is_not_where_it_is_said_later(tmp_path: Path) -
     assert workspace.entry("rig").notes == (assumed, "mended")
     adding.replaced(desk, ["rig"], Reading(columns={"force": "voltage"}, units={"force": "N"}))
     assert workspace.entry("rig").notes == ("mended",)
+
+
+def test_what_is_plain_is_no_warning(tmp_path: Path) -> None:
+    path = tmp_path / "rig.csv"
+    rows = "\n".join(f"{0.1 * k:.1f},{k % 9 + 1}.000,{k % 7}" for k in range(40))
+    path.write_text(f"time_s,pressure_bar,displacement_mm\n{rows}")
+    with pytest.warns(DataWarning, match="three digits"):
+        (recording,) = read_upload(path)
+    assert [is_plain(note) for note in recording.notes] == [True]

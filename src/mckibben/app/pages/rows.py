@@ -13,6 +13,7 @@ from mckibben.app.fields import READING, said
 from mckibben.app.pages.asking import ask_again
 from mckibben.app.recordings import Entry
 from mckibben.errors import MckibbenError
+from mckibben.files.notices import is_plain
 from mckibben.recording import Recording
 
 SHOWN = 6
@@ -83,7 +84,7 @@ class Rows:
             words = f"{len(recording)} samples{duration}; {listed}"
             ui.label(words).classes("text-xs opacity-70 break-words")
             _aside_said(recording, name)
-            for note in entry.notes[:SHOWN]:
+            for note in [note for note in entry.notes if not is_plain(note)][:SHOWN]:
                 named(
                     ui.label(said(note)).classes("text-xs text-amber-900 dark:text-amber-300"),
                     f"note-{name}",

@@ -71,6 +71,10 @@ def _short(text: str, most: int = 1000) -> str:
     return text if len(text) <= most else f"{text[:half]} ... {text[-half:]}"
 
 
+class TooLargeError(DataError):
+    """A file that holds more than is read: however it is read, that does not help."""
+
+
 class ModelError(MckibbenError):
     """A model, or a file with one, that cannot do what was asked; the text ends with a remedy."""
 

@@ -11,6 +11,7 @@ import pytest
 
 from mckibben import DataError, DataWarning, Recording, read, signals
 from mckibben.app import adding, edits, scripts
+from mckibben.app import reading as app_reading
 from mckibben.app.desk import Desk
 from mckibben.app.jobs import Jobs
 from mckibben.app.kept import Reading, Step
@@ -19,7 +20,9 @@ from mckibben.app.recordings import EXAMPLE
 from mckibben.app.workspace import Workspace
 from mckibben.comparison.channels import Channels
 from mckibben.comparison.offered import objections
+from mckibben.errors import TooLargeError
 from mckibben.files import formats
+from mckibben.files.notices import is_plain
 
 TABLE = "level,p_kPa,displacement_mm,branch\n" + "\n".join(
     f"{k % 20},{300 + k % 40},{-(k % 7)},up" for k in range(60)
@@ -331,3 +334,113 @@ def test_names_that_tell_nothing_are_taken_for_what_their_units_say(tmp_path: Pa
         "time_s,pressure_bar,displacement_mm\n" + "\n".join(f"{k},{k},{k}" for k in range(9))
     )
     assert untold(plain, read_upload(plain)) == Reading()
+
+
+def held(desk: Desk, constants: dict[str, tuple[float, str]], **other: Any) -> Recording:
+    """Read the only recording otherwise, as the dialog does."""
+    (entry,) = desk.workspace.entries()
+    adding.replaced(desk, [entry.name], Reading(constants=constants, **other))
+    return desk.workspace.recording(entry.name)
+
+
+def test_a_load_that_is_in_no_column_is_said_changed_and_undone(tmp_path: Path) -> None:
+    workspace = Workspace(tmp_path / "ws")
+    desk = Desk(workspace, Jobs(workspace))
+    before = taken(workspace)
+    assert held(desk, {"force": (200.0, "g")})["force"] == pytest.approx(1.96133)
+    found = held(desk, {"force": (0.4, "kg")}, channels=["pressure", "displacement", "force"])
+    assert list(found.channels) == ["pressure", "displacement", "force"]
+    assert found.units["force"] == "N"
+    assert found["force"] == pytest.approx(3.92266)
+    again = Workspace(workspace.folder).entry("rig")
+    assert again.reading.constants == {"force": (0.4, "kg")}
+    (line,) = scripts._reads(workspace, "train")
+    import mckibben
+
+    assert eval(line, {"mckibben": mckibben})["force"] == pytest.approx(found["force"])
+    assert workspace.undo()
+    assert workspace.recording("rig")["force"] == pytest.approx(1.96133)
+    assert workspace.undo()
+    assert list(workspace.recording("rig").channels) == list(before.channels)
+    with pytest.raises(DataError, match="no column and not time"):
+        held(desk, {"time": (1.0, "s")})
+    with pytest.raises(DataError, match="cannot be in 'mm'"):
+        held(desk, {"force": (1.0, "mm")})
+
+
+def test_samples_that_came_from_no_file_are_read_otherwise_again_and_again(tmp_path: Path) -> None:
+    workspace = Workspace(tmp_path / "ws")
+    desk = Desk(workspace, Jobs(workspace))
+    name, other = workspace.add_example()
+    before, data = workspace.recording(name), workspace.data()
+    assert adding.alike(desk, name) == [other]
+    turn = {"displacement": (-1.0, 0.0)}
+    adding.replaced(desk, [name], Reading(calibration=turn))
+    np.testing.assert_allclose(workspace.recording(name)["displacement"], -before["displacement"])
+    # from what it was, not from what it has become
+    adding.replaced(desk, [name], Reading(calibration=turn, constants={"force": (2.0, "kg")}))
+    found = workspace.recording(name)
+    np.testing.assert_allclose(found["displacement"], -before["displacement"])
+    assert found["force"] == pytest.approx(2 * 9.80665)
+    assert found.sample_time == before.sample_time
+    (line, *_) = scripts._reads(workspace, "train")
+    import mckibben
+
+    assert eval(line, {"mckibben": mckibben})["force"] == pytest.approx(found["force"])
+    assert workspace.undo()
+    assert workspace.undo()
+    assert workspace.recording(name) == before
+    assert workspace.data() == data
+
+
+def test_the_first_lines_of_a_long_text_tell_its_columns(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "long.csv"
+    path.write_text(TABLE)
+    monkeypatch.setattr(app_reading, "START", 200)
+    whole = columns(path, Reading())
+    monkeypatch.setattr(app_reading, "LARGE", 500)
+    read_at_once: list[int] = []
+    tables = formats.tables
+
+    def sized(path: Path) -> Any:
+        read_at_once.append(path.stat().st_size)
+        return tables(path)
+
+    monkeypatch.setattr(formats, "tables", sized)
+    assert columns(path, Reading()) == whole
+    assert read_at_once[0] <= 200 < path.stat().st_size
+    given = Reading(columns={"force": "level"}, channels=["force"])
+    (level, *_) = columns(path, given)
+    assert (level.channel, level.unasked) == ("force", "level")
+
+
+def test_what_is_too_large_is_told_as_that(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "rig.csv"
+    path.write_text(TABLE)
+    monkeypatch.setattr(app_reading, "MOST_CELLS", 20)
+    with pytest.raises(TooLargeError, match="holds more than 20 numbers"):
+        read_upload(path)
+
+
+def test_a_unit_that_was_assumed_is_not_where_it_is_said_later(tmp_path: Path) -> None:
+    workspace = Workspace(tmp_path / "ws")
+    desk = Desk(workspace, Jobs(workspace))
+    assumed = "no unit is given, so these are assumed: voltage in V; say --unit CHANNEL=UNIT"
+    told = Recording(
+        {"voltage": np.linspace(0.0, 1.0, 20)}, 0.1, meta={"notes": [assumed, "mended"]}
+    )
+    workspace.add(told, origin="", call="", name="rig")
+    assert workspace.entry("rig").notes == (assumed, "mended")
+    adding.replaced(desk, ["rig"], Reading(columns={"force": "voltage"}, units={"force": "N"}))
+    assert workspace.entry("rig").notes == ("mended",)
+
+
+def test_what_is_plain_is_no_warning(tmp_path: Path) -> None:
+    path = tmp_path / "rig.csv"
+    rows = "\n".join(f"{0.1 * k:.1f},{k % 9 + 1}.000,{k % 7}" for k in range(40))
+    path.write_text(f"time_s,pressure_bar,displacement_mm\n{rows}")
+    with pytest.warns(DataWarning, match="three digits"):
+        (recording,) = read_upload(path)
+    assert [is_plain(note) for note in recording.notes] == [True]

@@ -125,6 +125,8 @@ def test_a_protocol_is_recorded(tmp_path: Path) -> None:
     (entry,) = workspace.entries()
     assert entry.role == "train"
     assert "mas20-hanging" in entry.origin
+    assert workspace.undo() == "record field-models"
+    assert workspace.entries() == []
 
 
 SCRIPT = """

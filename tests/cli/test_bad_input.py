@@ -46,6 +46,7 @@ def test_malformed_files_leave_with_a_remedy_and_nothing_lost(
         (["fit", "pi", "FILE", "-o", "x.json", "--output", "pressure"], "same channel"),
         (["fit", "pi", "FILE", "-o", "x.json", "--unit", "pressure"], "--unit 'pressure'"),
         (["fit", "pi", "FILE", "-o", "x.json", "--unit", "pressure=mm"], "mm"),
+        (["fit", "pi", "FILE", "-o", "x.json", "--constant", "force=g"], "force=200 g"),
         (["fit", "pi", "FILE", "-o", "x.json", "--rate", "-5"], "rate"),
         (["compare", "FILE", "--models", "pi,what"], "no estimator named 'what'"),
         (["compare", "FILE", "--models", ","], "no models"),

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 import mckibben
 from mckibben import DataError, DataWarning, Recording
 from mckibben.files.dialect import detect
+from mckibben.files.notices import is_plain
 
 P = [0.0, 1.5, 2.25, 3.0, 4.125, 5.0, 4.0, 3.0, 2.0, 1.0, 0.5]
 L = [0.0, -1.25, 12.5, 20.0, 21.0, 22.0, 1e-3, 3.5e2, 4.0, 2.0, 1.0]
@@ -170,3 +171,17 @@ def test_composite_units_are_read_whole(tmp_path: Path) -> None:
     units = {"flow": "l/min", "q": "deg/s", "velocity": "mm/s", "torque_n_m": "", "flow_nl_min": ""}
     assert found.units == units
     assert [float(found[name][1]) for name in units] == [60.0, 180.0, 500.0, 2.0, 3.0]
+
+
+def test_three_decimals_everywhere_are_plain_where_another_column_shows_the_mark(
+    tmp_path: Path,
+) -> None:
+    rows = [f"{k % 9 + 1}.000,{1.5 + k % 4}" for k in range(30)]
+    for content, plain in (
+        (["pressure_bar,displacement_mm", *rows], True),
+        (["pressure_bar", *(row[:5] for row in rows)], False),
+    ):
+        with pytest.warns(DataWarning, match="not 1000"):
+            found = read(tmp_path, "\n".join(content))
+        assert found["pressure"][1] == 2.0
+        assert [is_plain(note) for note in found.notes] == [plain]

@@ -43,6 +43,21 @@ def read_one(path: Path, **options: Any) -> Recording:
     return recording
 
 
+def test_what_was_held_is_a_channel_whatever_the_columns(table: Write) -> None:
+    path = table(time_s=K * 0.1, pressure_bar=PRESSURE, force_N=PRESSURE)
+    found = read_one(path, constants={"force": (200, "g"), "angle_1": (90, "deg")})
+    assert found["force"].tolist() == pytest.approx([1.96133] * N)
+    assert found["angle_1"].tolist() == pytest.approx([np.pi / 2] * N)
+    assert found.units["force"] == "N"
+    assert read_one(path, constants={"flow": (2, "")}, channels=["flow"])["flow"][0] == 2
+    mckibben.write(found, path)
+    assert read_one(path, constants={"force": (1, "kN")})["force"][0] == 1000
+    with pytest.raises(DataError, match="no column and not time"):
+        read_one(path, constants={"load": (1, "N")}, columns={"load": "force"})
+    with pytest.raises(DataError, match="does not convert to N"):
+        read_one(path, constants={"force": (1, "mm")})
+
+
 # Columns -------------------------------------------------------------------------------------
 
 

@@ -11,6 +11,7 @@ from mckibben.app.desk import LONGEST, Desk
 from mckibben.app.fields import GAPS, said
 from mckibben.app.kept import Reading
 from mckibben.app.reading import AS_FOUND, options, read_upload, untold
+from mckibben.app.recordings import Entry
 from mckibben.app.workspace import Workspace
 from mckibben.errors import DataError, MckibbenError
 from mckibben.recording import Recording
@@ -125,30 +126,53 @@ def understood(recording: Recording) -> str:
     return said[:LONGEST]
 
 
+def source(workspace: Workspace, entry: Entry) -> Path:
+    """Return the file that a recording is read from: as it came, or else its samples as they came."""
+    if entry.upload:
+        return workspace.path("uploads", entry.upload)
+    return entry.base or entry.path
+
+
 def replaced(desk: Desk, names: Sequence[str], reading: Reading) -> list[Recording]:
     """Read the files of recordings otherwise, all or none, and return what came of the first."""
     workspace = desk.workspace
-    read: dict[str, list[Recording]] = {}
-    calls = {}
+    read: dict[Path, list[Recording]] = {}
+    paths = {}
     for name in names:
-        upload = workspace.entry(name).upload
-        path = workspace.path("uploads", upload)
-        calls[name] = scripts.read_call(str(path), options(reading))
-        if upload not in read:
-            read[upload] = read_upload(path, reading)
-    made = {name: (read[workspace.entry(name).upload], call) for name, call in calls.items()}
-    workspace.read_again(made, reading)
+        entry = workspace.entry(name)
+        path = paths[name] = source(workspace, entry)
+        if path not in read:
+            read[path] = read_upload(path, reading)
+        if (
+            not entry.upload
+        ):  # its samples become a file that it came from, to be read otherwise again
+            paths[name] = _as_upload(workspace, entry)
+            read[paths[name]] = read.pop(path)
+    calls = {name: scripts.read_call(str(path), options(reading)) for name, path in paths.items()}
+    made = {name: (read[paths[name]], call) for name, call in calls.items()}
+    workspace.read_again(made, reading, {name: path.name for name, path in paths.items()})
     for call in dict.fromkeys(calls.values()):
         workspace.log(f"read {', '.join(names)} again", call)
     return made[names[0]][0]
 
 
+def _as_upload(workspace: Workspace, entry: Entry) -> Path:
+    """Keep the samples of a recording as they came, as a file of its own, and return where."""
+    from mckibben.files import write
+
+    before = entry.base or entry.path
+    chosen = workspace.new_name("uploads", entry.name, before.suffix)
+    path = workspace.path("uploads", f"{chosen}{before.suffix}")
+    (samples,) = read_upload(before)
+    write(samples, path)
+    return path
+
+
 def alike(desk: Desk, name: str) -> list[str]:
-    """Return other recordings with the same channels, of files that are kept."""
+    """Return other recordings with the same channels, read in the same way."""
     workspace, found = desk.workspace, list[str]()
     for entry in workspace.entries():
-        known = entry.upload and entry.reading == workspace.entry(name).reading
-        if entry.name == name or not known:
+        if entry.name == name or entry.reading != workspace.entry(name).reading:
             continue
         try:
             same = list(workspace.recording(entry.name).channels)

@@ -136,7 +136,10 @@ class Changing(Recordings):
         self._change(what, new, begun)
 
     def read_again(
-        self, found: Mapping[str, tuple[Sequence[Recording], str]], reading: kept.Reading
+        self,
+        found: Mapping[str, tuple[Sequence[Recording], str]],
+        reading: kept.Reading,
+        uploads: Mapping[str, str] | None = None,
     ) -> list[str]:
         """Replace what was read by what was read otherwise; steps are done anew.
 
@@ -150,6 +153,8 @@ class Changing(Recordings):
             By the names of recordings, what is in their files now, and the call that reads it.
         reading : Reading
             How it was read.
+        uploads : mapping of str to str, optional
+            The files among the uploads, where they are others than before.
         """
         from mckibben.app import edits
 
@@ -173,7 +178,8 @@ class Changing(Recordings):
                 if steps:
                     path = self._written(chosen, each)
                 way = replace(entry, name=chosen, path=path, base=base, call=f"{call}[{place}]")
-                way = replace(way, part=place, reading=reading, steps=steps)
+                upload = (uploads or {}).get(name, entry.upload)
+                way = replace(way, part=place, reading=reading, steps=steps, upload=upload)
                 new[chosen], begun[chosen] = replace(way, notes=read[place].notes), entry
         self._change(f"read {', '.join(found)} otherwise", new, begun)
         return [name for name, each in new.items() if each]

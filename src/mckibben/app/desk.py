@@ -46,6 +46,8 @@ class Desk:
     """Whether models are tested on data that they were fitted to, which every result then says."""
     dark: bool = False
     preview: str | None = None
+    drawn: Sequence[str] = ()
+    """Channels over time that were chosen to be drawn."""
     compensator: tuple[str, str, dict[str, Any], float] | None = None
     """The model, use, settings and step whose pressures were shown last; see `mckibben.app.forms`."""
     _chosen: bool = False
@@ -195,6 +197,11 @@ def tell(error: Exception | str) -> None:
         timeout=0,
         position="bottom",  # the tabs stay free, where the remedy may be
     )
+
+
+def caution(text: str) -> Any:
+    """Show what is to be known of a result, in the words of a page."""
+    return ui.label(said(text)).classes("text-sm border-l-4 border-warning pl-2")
 
 
 def refused(error: Exception, what: str = "") -> None:

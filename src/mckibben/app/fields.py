@@ -12,17 +12,60 @@ LONGEST = 2000
 GAPS = {"error": "refuse", "split": "split there", "interpolate": "bridge by straight lines"}
 """What is done about gaps, in words."""
 
-_FIELDS = (
+READING = "How it was read"
+"""What stands on the button that opens the dialog on a file."""
+
+_WAYS = (
     (r"--gaps split or (--gaps )?interpolate", f"“{GAPS['split']}” or “{GAPS['interpolate']}”"),
     (r"--gaps interpolate or split", f"“{GAPS['interpolate']}” or “{GAPS['split']}”"),
     (r"--gaps split", f"“{GAPS['split']}”"),
     (r"--gaps interpolate", f"“{GAPS['interpolate']}”"),
-    (r"--column (\w+)=('[^']*'|\S+\b)", r"the field Channel (\1)"),
+    (r"say --unit CHANNEL=UNIT", f"give units by “{READING}”"),
+    (r"say --unit (\w+)=UNIT", rf"give the unit of \1 by “{READING}”"),
+    (r"--unit (\w+)=UNIT", r"the field Unit of \1"),
     (r"--unit (\w+)=(\S+\b)", r"the field Unit (\2, say, of \1)"),
-    (r"--unit\b", "the field Unit"),
-    (r"--rate\b", "samples per second"),
+    (r"--column CHANNEL=COLUMN", "the field Channel"),
+    (r"--column (\w+)=('[^']*'|\S+\b)", r"the field Channel (\1)"),
+    (r" \([^()]*--[a-z][^()]*(\([^()]*\)[^()]*)?\)", ""),  # what is to be done is said before
+    (r"--minutes (\d[\d.]*)", r"\1 minutes"),
+    (r"--(sample-time|resample) SECONDS", "the field of the sample time"),
+    (r"--limits? (\w+)=\S+:[^\s.,]+", r"limits of \1"),
+    (r"--load (\w+)", r"\1 among the inputs"),
+    (r"--zero (\w+)", r"the button that zeroes \1"),
+    (r"--set ", "the setting "),
+    (r"see mckibben info --models", "see the settings of the models"),
 )
-"""Options of the command line, and the fields that stand for them."""
+"""Options with their values, and what they are on a page."""
+
+_WORDS = {
+    "adjustable": "coefficients that are adjustable",
+    "allow-shared": "“Go on where recordings share data”",
+    "check": "the check",
+    "column": f"“{READING}”",
+    "float32": "“single precision”",
+    "force": "“replace”",
+    "input": "the field Inputs",
+    "inverse": "“its compensator”",
+    "jobs": "fewer at a time",
+    "limits": "the limits",
+    "load": "the load",
+    "measured": "the topic measured",
+    "minutes": "minutes to record",
+    "model": "the model",
+    "muscle": "the muscle",
+    "name": "name",
+    "output": "the field Outputs",
+    "overwrite": "replace it",
+    "plant": "the plant",
+    "rate": f"samples per second (“{READING}”)",
+    "resample": "the button “Resample”",
+    "rig": "the rig",
+    "sample-time": "the time between steps",
+    "samples": "the most samples",
+    "test": "a test recording",
+    "unit": f"the field Unit (“{READING}”)",
+}
+"""All other options, and what stands for them."""
 
 
 def said(error: Exception | str) -> str:
@@ -30,6 +73,11 @@ def said(error: Exception | str) -> str:
     text = str(error)
     if isinstance(error, DataError):
         text = text.replace(f"{error.file}, ", "").replace(f"{error.file}: ", "")
-    for option, field in _FIELDS:
+    for option, field in _WAYS:
         text = re.sub(option, field, text)
+    text = re.sub(r"(?<![\w-])--([a-z][a-z0-9-]*)", _word, text)
     return text[:LONGEST].encode("utf-8", "replace").decode()
+
+
+def _word(option: re.Match[str]) -> str:
+    return _WORDS.get(option[1], option[0])

@@ -53,6 +53,7 @@ class Reading(Kept):
     columns: dict[Text, Text] = {}
     units: dict[Text, Text] = {}
     calibration: dict[Text, tuple[float, float]] = {}
+    constants: dict[Text, tuple[float, Text]] = {}
     rate: Number = None
     gaps: Literal["error", "split", "interpolate"] = "error"
     channels: list[Text] | None = None

@@ -6,13 +6,15 @@ import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any, TypeVar
 
 from mckibben.app.kept import Reading
-from mckibben.errors import DataError
+from mckibben.errors import DataError, TooLargeError
 from mckibben.files import formats, read
 from mckibben.files.assigning import assign
 from mckibben.files.headers import by_units, channel_of, parse
+from mckibben.files.own import description
 from mckibben.files.request import Request
 from mckibben.files.table import Column, Table
 from mckibben.recording import Recording
@@ -26,6 +28,9 @@ MOST_MEMORY = 4 * 2**30
 
 MOST_CELLS = 40_000_000
 """Samples times channels of all recordings of a file."""
+
+START = 2**18
+"""Bytes of a long text that tell its columns."""
 
 FIRST = 4
 """Cells of a column that are shown."""
@@ -50,12 +55,15 @@ class Seen:
         Its first cells.
     channel : str
         What it is taken for; empty where it is left out.
+    unasked : str
+        What it is taken for by its header alone.
     """
 
     header: str
     unit: str
     first: tuple[str, ...]
     channel: str
+    unasked: str
 
 
 def options(reading: Reading) -> dict[str, Any]:
@@ -87,8 +95,28 @@ def untold(path: Path, found: list[Recording]) -> Reading:
 
 
 def columns(path: Path, reading: Reading) -> list[Seen]:
-    """Return the columns of a file, and what each is taken for; errors are those of `read_upload`."""
-    return _aside(_columns, path, reading)
+    """Return the columns of a file, and what each is taken for; errors are those of `read_upload`.
+
+    Of a long text, the first lines do.
+    """
+    start = _start(path)
+    if start is None:
+        return _aside(_columns, path, reading)
+    with TemporaryDirectory() as folder:
+        short = Path(folder, path.name)
+        short.write_bytes(start)
+        return _columns(short, reading)
+
+
+def _start(path: Path) -> bytes | None:
+    """Return the first lines of a long text without a description; None of all other files."""
+    beside = description(path)
+    if path.stat().st_size <= LARGE or beside is None or beside.exists():
+        return None
+    with path.open("rb") as file:
+        start = file.read(START)
+    wide = start.startswith((b"\xff\xfe", b"\xfe\xff"))
+    return None if wide else start[: start.rfind(b"\n") + 1] or None
 
 
 def _aside(what: Callable[[Path, Reading], Result], path: Path, reading: Reading) -> Result:
@@ -116,23 +144,24 @@ def _read(path: Path, reading: Reading) -> list[Recording]:
     if reading.channels is not None:
         found = [one.select(reading.channels) for one in found]
     if sum(len(one) * len(one.channels) for one in found) > MOST_CELLS:
-        raise DataError(
+        raise TooLargeError(
             f"it holds more than {MOST_CELLS:,} numbers",
             file=path,
-            remedy="cut or thin it, or use the command line",
+            remedy="cut or thin it before it is dropped here",
         )
     return found
 
 
 def _columns(path: Path, reading: Reading) -> list[Seen]:
     (table, *_) = formats.tables(path)
-    found = _channels(table, reading, path)
+    found, unasked = _channels(table, reading, path), _channels(table, AS_FOUND, path)
     return [
         Seen(
             column.header,
             column.unit or parse(column.label).unit or "",
             _first(column),
             found.get(id(column), ""),
+            unasked.get(id(column), ""),
         )
         for column in table.columns
     ]

@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import json
 import sys
 import threading
 from importlib import import_module
 from types import ModuleType
 from typing import Any
+from urllib.parse import urlencode
 
 from nicegui import context, ui
 
 from mckibben import registry
-from mckibben.app import busy, theme
+from mckibben.app import busy, fields, theme
 from mckibben.app.desk import Desk, code, hinted, labelled, named, tell, told, unexpected
 from mckibben.app.jobs import ENDED, RUNNING, Job, Jobs
 from mckibben.app.workspace import Workspace
@@ -27,6 +29,9 @@ PAGES = {
     "Take away": ("download", "takeaway"),
 }
 """Icon and module of each page; a module is loaded when its page is opened, or nothing else is to do."""
+
+TAB = "tab"
+"""What the open page is called in the address, so that it stays when that is loaded again."""
 
 TICK = 0.4
 """How often a page looks how its jobs do [s]."""
@@ -124,21 +129,17 @@ def _under_way(here: list[busy.Doing], jobs: Jobs) -> str:
 
 
 def _panels(desk: Desk, tabs: ui.tabs, tab: dict[str, ui.tab]) -> None:
-    panels = ui.tab_panels(tabs, value=tab["Data"], animated=False)
+    begun = _asked_for()
+    panels = ui.tab_panels(tabs, value=tab[begun], animated=False)
     with panels.classes("w-full bg-transparent"):
         for name in PAGES:
             with ui.tab_panel(tab[name]).classes("p-2"):
                 desk.news.tabs[name] = ui.column().classes("w-full")
-    built = {"Data"}
-    desk.news.open_tab = "Data"
-    with desk.news.tabs["Data"]:
-        page_module("Data").build(desk)
+    built: set[str] = set()
+    desk.news.open_tab = begun
 
-    async def opened(event: Any) -> None:
+    async def show(name: str) -> None:
         """Show a page: it is made when it is first opened, and anew where that did not work."""
-        name = str(event.value)
-        if name not in PAGES:
-            return
         desk.news.opened(name)
         if name in built:
             return
@@ -159,7 +160,27 @@ def _panels(desk: Desk, tabs: ui.tabs, tab: dict[str, ui.tab]) -> None:
                 built.discard(name)
                 raise
 
+    async def opened(event: Any) -> None:
+        name = str(event.value)
+        if name in PAGES:
+            address = json.dumps(f"?{urlencode({TAB: name})}")
+            ui.run_javascript(f"history.replaceState(history.state, '', {address})")
+            await show(name)
+
     panels.on_value_change(opened)
+    if begun == "Data":
+        built.add(begun)
+        with desk.news.tabs[begun]:
+            page_module(begun).build(desk)
+    else:  # what it needs may not be loaded yet
+        ui.timer(SENT, lambda: show(begun), once=True)
+
+
+def _asked_for() -> str:
+    """Return the page that the address names, as it does when it is loaded again."""
+    request = context.client.request
+    name = request.query_params.get(TAB, "") if request is not None else ""
+    return name if name in PAGES else "Data"
 
 
 def _watch(desk: Desk) -> None:
@@ -199,7 +220,7 @@ def _watch(desk: Desk) -> None:
 
 
 def _say(job: Job) -> None:
-    text = f"{job.title:.80}: {job.said}"[:300]
+    text = fields.said(f"{job.title:.80}: {job.said}")[:300]
     if job.state == "failed":
         ui.notify(text, type="negative", multi_line=True, timeout=10_000)
     else:
@@ -240,7 +261,7 @@ def _log(desk: Desk) -> None:
 
 def page_module(name: str) -> ModuleType:
     """Return what builds a page, loaded."""
-    return import_module(_place(name))
+    return importpage_module(_place(name))
 
 
 def _place(name: str) -> str:
@@ -255,11 +276,11 @@ def load_the_rest() -> None:
     """
     with _LOADING:
         for module in FIRST:
-            import_module(module)
+            importpage_module(module)
         for name in PAGES:
             page_module(name)
         for module in (*PRELOADED, *LATER):
-            import_module(module)
+            importpage_module(module)
         for name in registry.names("estimators"):
             registry.load("estimators", name)
 

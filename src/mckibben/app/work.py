@@ -130,18 +130,18 @@ def record(workspace: Workspace, given: dict[str, Any], tell: Tell) -> str:
     plan = protocol(given["protocol"])
     runs = list(given["runs"])
     rig = load_rig(given.get("rig") or plan.rig)
-    for done, (run, recording) in enumerate(
-        record_runs(plan, rig, runs=runs, seed=int(given.get("seed", 0)), jobs=1), start=1
-    ):
-        role = run.role if run.role in ("train", "test") else "train"
-        workspace.add(
-            recording,
-            origin=f"rig {rig.name}, protocol {plan.name}, run {run.name}",
-            call=given.get("call", ""),
-            role=role,
-            name=run.name,
-        )
-        tell(done / len(runs), float("nan"))
+    recorded = record_runs(plan, rig, runs=runs, seed=int(given.get("seed", 0)), jobs=1)
+    with workspace.adding(f"record {plan.name}") as added:
+        for done, (run, recording) in enumerate(recorded, start=1):
+            entry = workspace.add(
+                recording,
+                origin=f"rig {rig.name}, protocol {plan.name}, run {run.name}",
+                call=given.get("call", ""),
+                role=run.role if run.role in ("train", "test") else "train",
+                name=run.name,
+            )
+            added.append(entry.name)
+            tell(done / len(runs), float("nan"))
     return f"{len(runs)} recording(s)"
 
 

@@ -63,6 +63,14 @@ Columns = Annotated[
 Units = Annotated[
     list[str] | None, typer.Option("--unit", metavar="CHANNEL=UNIT", help="Unit of a channel.")
 ]
+Constants = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--constant",
+        metavar="CHANNEL=VALUE UNIT",
+        help="What was held and is in no column, as 'force=200 g'.",
+    ),
+]
 Rate = Annotated[
     float | None,
     typer.Option("--rate", metavar="HZ", help="Samples per second, without a time column."),
@@ -145,6 +153,7 @@ class Reading:
 
     column: Columns = None
     unit: Units = None
+    constant: Constants = None
     rate: Rate = None
     gaps: GapPolicy = Gaps.ERROR
     resample: Resample = None
@@ -162,6 +171,7 @@ class Reading:
                 file,
                 columns=_pairs("--column", self.column),
                 units=_pairs("--unit", self.unit),
+                constants=_constants(self.constant),
                 rate=self.rate,
                 gaps=_POLICIES[self.gaps],
                 channels=channels,
@@ -239,6 +249,22 @@ def _pairs(option: str, given: list[str] | None) -> dict[str, str]:
             )
         pairs[name] = value
     return pairs
+
+
+def _constants(given: list[str] | None) -> dict[str, tuple[float, str]]:
+    """Return channels that were held, with value and unit: ``force=200 g``."""
+    found = {}
+    for item in given or []:
+        said = re.fullmatch(
+            r"([^=]+)=\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(\D.*)?", item
+        )
+        if said is None:
+            raise DataError(
+                f"--constant {item!r} is not of the form CHANNEL=VALUE UNIT",
+                remedy="write for instance --constant 'force=200 g'",
+            )
+        found[said[1].strip()] = float(said[2]), said[3] or ""
+    return found
 
 
 def chosen_models(given: str, quick: bool = False) -> str | list[str]:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from mckibben import registry
-from mckibben.cli.options import Columns, Force, Gaps, Json, Rate, Reading, Seed, Units
+from mckibben.cli.options import Columns, Force, Json, Rate, Reading, Seed, Units
 from mckibben.cli.output import print_json, print_table, progress_bar, say
 from mckibben.errors import DataError, ModelError
 from mckibben.numerals import numeral
@@ -113,7 +113,7 @@ def track(
         claim_model(controller_out, inputs=inputs, force=force)
     block = load(compensator)
     plant = _plant(rig, twin, limits or [])
-    runs = Reading(column, unit, rate, Gaps.ERROR).read([reference], None, informative=False)
+    runs = Reading(column, unit, rate=rate).read([reference], None, informative=False)
     wanted = runs[0]
     _fits(block, plant, wanted)
     wanted = wished(block, wanted)

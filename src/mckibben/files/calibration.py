@@ -9,17 +9,24 @@ from typing import Any
 import numpy as np
 
 from mckibben.files.channels import Channel, Described
+from mckibben.files.headers import unit_of
 from mckibben.files.table import Column, Table
+from mckibben.files.units import weight
 
 
 def constants(described: Described, table: Table) -> dict[str, Column]:
-    """Return columns for the channels that are constants, by channel; the header is the channel's."""
-    n = table.n_samples
-    return {
-        name: Column(name, np.full(n, given.value), given.unit)
-        for name, given in described.channels.items()
-        if given.value is not None
-    }
+    """Return columns for the channels that are constants, by channel; the header is the channel's.
+
+    Of a force, a mass is the weight that hangs there: nobody measured it.
+    """
+    n, found = table.n_samples, {}
+    for name, given in described.channels.items():
+        if given.value is not None:
+            unit = given.unit
+            if unit is not None and unit_of(name) == "N":
+                unit = weight(unit)
+            found[name] = Column(name, np.full(n, given.value), unit)
+    return found
 
 
 def calibrated(
@@ -36,7 +43,8 @@ def calibrated(
     told: dict[str, Any] = {}
     for name, column in named.items():
         given = described.time if name == "time" else described.channels.get(name)
-        if given is not None and given.unit is not None:
+        held = isinstance(given, Channel) and given.value is not None and column.header == name
+        if given is not None and given.unit is not None and not held:
             column = replace(column, unit=given.unit)
         known = isinstance(given, Channel) and given.is_calibrated
         if (name in asked or known) and column.values is not None:
@@ -49,7 +57,7 @@ def calibrated(
                 values = gain * column.values + offset
             column = replace(column, values=values)
             told[name] = {"column": column.header, "gain": gain, "offset": offset}
-        elif isinstance(given, Channel) and given.value is not None and column.header == name:
+        elif held and isinstance(given, Channel):
             told[name] = {"value": given.value, "unit": given.unit}
         columns[name] = column
     return columns, told

@@ -63,6 +63,11 @@ class Cells:
         self._parts = [np.concatenate(self._parts)]
         return may_be_doubted(self._parts[0])
 
+    def has_fractions(self) -> bool:
+        """Tell whether there are numbers that are not whole, which none is without a decimal mark."""
+        parts = (part[np.isfinite(part)] for part in self._parts)
+        return any(bool(np.any(part != np.rint(part))) for part in parts)
+
     def column(self, place: int, doubt: Doubt | None) -> Column | None:
         """Return the column, the one of this place; None for a blank one without a header."""
         if not self._filled:

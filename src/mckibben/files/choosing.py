@@ -23,6 +23,9 @@ from mckibben.files.units import Unit, convert, find
 IMPLAUSIBLE_BAR = 50.0
 """No muscle sees this pressure; larger numbers without a unit are kPa, psi or the like."""
 
+ASSUMED = "no unit is given, so these are assumed: "
+"""What a note on assumed units begins with."""
+
 _LISTED = 30
 
 
@@ -65,8 +68,8 @@ def choose(table: Table, request: Request, path: Path) -> Choice:
         If a channel asked for is missing, two columns are one channel, a cell is no number, or a
         unit is unknown or of the wrong dimension.
     """
-    if table.own:
-        request = replace(request, described=Described())
+    described = Described() if table.own else request.described
+    request = replace(request, described=request.describing(described))
     named, left_out = assign(table, request, path)
     named, dropped = clocks.on_one(named, request, path)
     left_out += dropped
@@ -97,8 +100,7 @@ def choose(table: Table, request: Request, path: Path) -> Choice:
     if found.assumed:
         warn(
             path,
-            f"no unit is given, so these are assumed: {_listed(found.assumed)}; "
-            "say --unit CHANNEL=UNIT where that is wrong",
+            f"{ASSUMED}{_listed(found.assumed)}; say --unit CHANNEL=UNIT where that is wrong",
         )
     notes = {
         "ignored_columns": found.ignored,

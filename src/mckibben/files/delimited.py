@@ -24,7 +24,7 @@ from mckibben.files.dialect import SEPARATORS, Dialect, detect
 from mckibben.files.limits import Budget
 from mckibben.files.lines import Lines
 from mckibben.files.marks import Doubt, doubts
-from mckibben.files.notices import warn
+from mckibben.files.notices import PLAIN, warn
 from mckibben.files.stored import Stored
 from mckibben.files.table import Column, Table
 from mckibben.recording import Recording
@@ -269,11 +269,12 @@ def _say_understood(columns: list[Cells], doubted: dict[int, Doubt], mark: str, 
     names = ", ".join(repr(columns[i].header) for i in listed[:_LISTED])
     more = f" and {len(listed) - _LISTED} more" if len(listed) > _LISTED else ""
     cell = doubted[listed[0]].cell
+    shown = any(cells.has_fractions() for i, cells in enumerate(columns) if i not in doubted)
     warn(
         path,
         f"all numbers of column(s) {names}{more} have three digits after the mark {mark!r}, which was "
         f"taken for the decimal mark: {cell} is {float(cell.replace(mark, '.')):.6g}, "
-        f"not {cell.replace(mark, '')}",
+        f"not {cell.replace(mark, '')}{PLAIN if shown else ''}",
     )
 
 

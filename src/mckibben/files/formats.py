@@ -9,7 +9,7 @@ from io import BufferedReader
 from pathlib import Path
 from types import ModuleType
 
-from mckibben.errors import DataError, MckibbenError
+from mckibben.errors import DataError, MckibbenError, TooLargeError
 from mckibben.files.limits import MOST_BYTES
 from mckibben.files.table import Table, printable
 from mckibben.system.ordinary import opened
@@ -86,7 +86,7 @@ def read(file: BufferedReader, path: Path) -> list[Table]:
             remedy="check the path and its rights",
         ) from None
     except MemoryError:
-        raise DataError(
+        raise TooLargeError(
             "it needs more memory than there is",
             file=path,
             remedy="split it into shorter recordings",

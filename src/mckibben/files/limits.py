@@ -11,7 +11,7 @@ import os
 from io import BufferedReader
 from pathlib import Path
 
-from mckibben.errors import DataError
+from mckibben.errors import DataError, TooLargeError
 
 MOST_BYTES = 2**30
 """Bytes that a file may have: ten channels of ten million samples, 8 bytes each, and some more."""
@@ -68,7 +68,7 @@ class Budget:
     def at_once(self, samples: int) -> None:
         """Refuse what unpacks to that many samples at once, which are not kept."""
         if samples > MOST_SAMPLES:
-            raise DataError(
+            raise TooLargeError(
                 f"it declares {samples} samples, more than the {MOST_SAMPLES} that are read at once",
                 file=self._path,
                 remedy="split the file, or check that it is not damaged",

@@ -14,6 +14,14 @@ from mckibben.errors import DataWarning
 _HERE = str(Path(__file__).parent)
 _NOTED: ContextVar[list[str] | None] = ContextVar("noted", default=None)
 
+PLAIN = "; other columns of the file show that mark"
+"""End of a note on what was understood and is hardly in doubt, so that nothing was assumed."""
+
+
+def is_plain(note: str) -> bool:
+    """Tell whether a note is of what was understood, not of what was assumed or mended."""
+    return note.endswith(PLAIN)
+
 
 @contextmanager
 def noted() -> Iterator[list[str]]:

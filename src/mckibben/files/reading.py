@@ -14,7 +14,7 @@ from mckibben.arrays import Array
 from mckibben.errors import DataError
 from mckibben.files import sources, timebase
 from mckibben.files.channels import about
-from mckibben.files.choosing import Choice, choose
+from mckibben.files.choosing import ASSUMED, Choice, choose
 from mckibben.files.holes import Channels, treat
 from mckibben.files.notices import noted, warn
 from mckibben.files.request import Request
@@ -51,6 +51,7 @@ def read(
     channels: Sequence[str] | None = None,
     informative: bool = True,
     calibration: Mapping[str, tuple[float, float]] | None = None,
+    constants: Mapping[str, tuple[float, str]] | None = None,
 ) -> list[Recording]:
     """Read the recordings in a file, by its ending, or in a folder.
 
@@ -83,6 +84,9 @@ def read(
     calibration : mapping of str to (float, float), optional
         Channel -> gain and offset: the channel is gain times the column, plus offset, in the unit that
         ``units`` or else the header gives. ``{"displacement": (-1, 0)}`` turns a sign.
+    constants : mapping of str to (float, str), optional
+        Channel -> value and unit of what was held and stands in no column, such as the force
+        ``{"force": (200, "g")}``: a mass is the weight that it hangs with. Go before columns.
 
     Returns
     -------
@@ -114,6 +118,7 @@ def read(
         channels,
         informative,
         dict(calibration or {}),
+        dict(constants or {}),
     )
     request.check(path)
     return [each for one in sources.inside(path) for each in _read(one, request)]
@@ -124,14 +129,18 @@ def _read(path: Path, request: Request) -> list[Recording]:
     with noted() as notes:
         tables, digest = sources.tables(path, request)
         found = [each for table in tables for each in _recordings(table, request, path, digest)]
-    return [_with_notes(recording, notes) for recording in found]
+    said = bool(request.columns or request.units)
+    return [_with_notes(recording, notes, said) for recording in found]
 
 
-def _with_notes(recording: Recording, notes: list[str]) -> Recording:
-    """Return a recording that tells what was assumed or mended when it was read, now or before."""
-    known = list(recording.notes)
-    new = [note for note in notes if note not in known]
-    return recording.with_meta(notes=known + new) if new else recording
+def _with_notes(recording: Recording, notes: list[str], said: bool) -> Recording:
+    """Return a recording that tells what was assumed or mended when it was read, now or before.
+
+    Units that were assumed before are not, where it is said now what the columns are.
+    """
+    known = [note for note in recording.notes if not (said and note.startswith(ASSUMED))]
+    told = known + [note for note in notes if note not in known]
+    return recording if told == list(recording.notes) else recording.with_meta(notes=told)
 
 
 def _recordings(table: Table, request: Request, path: Path, digest: str) -> list[Recording]:
@@ -254,7 +263,7 @@ def _announce_bridges(
 def _refuse_constant(channels: Channels, spans: list[Span], request: Request, path: Path) -> None:
     for name in request.channels or ():
         samples = np.concatenate([channels[name][start:stop] for start, stop in spans])
-        held = name.partition("_")[0] in MAY_BE_HELD
+        held = name.partition("_")[0] in MAY_BE_HELD or name in request.constants
         if not held and samples.size and np.ptp(samples) == 0:
             raise DataError(
                 f"it is constant, at {samples[0]:g}",

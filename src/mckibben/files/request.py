@@ -10,7 +10,7 @@ from typing import Literal
 import numpy as np
 
 from mckibben.errors import DataError
-from mckibben.files.channels import Described
+from mckibben.files.channels import Channel, Described
 
 FEWEST = 10
 """Samples; a shorter recording, or stretch of one, shows no loop."""
@@ -33,6 +33,7 @@ class Request:
     channels: Sequence[str] | None
     informative: bool = True
     calibration: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    constants: Mapping[str, tuple[float, str]] = field(default_factory=dict)
     described: Described = field(default_factory=Described)
 
     @property
@@ -43,6 +44,14 @@ class Request:
     def asks_for(self, channel: str) -> bool:
         """Tell whether a channel was named by the caller."""
         return channel in (self.channels or ()) or channel in self.columns
+
+    def describing(self, described: Described) -> Described:
+        """Return what is said of a file, with the constants that were asked for."""
+        said = {
+            name: Channel(value=value, unit=unit.strip() or None)
+            for name, (value, unit) in self.constants.items()
+        }
+        return described.model_copy(update={"channels": described.channels | said})
 
     def needs(self, channel: str) -> bool:
         """Tell whether a channel with flaws is an error rather than left out."""
@@ -62,6 +71,14 @@ class Request:
                 file=path,
                 remedy="give a positive number with --rate",
             )
+        for channel, (value, _) in self.constants.items():
+            if not np.isfinite(value) or channel in ("", "time", *self.columns):
+                raise DataError(
+                    f"it cannot be the constant {value:g}",
+                    file=path,
+                    channel=channel,
+                    remedy="give a finite number, to a channel that is no column and not time",
+                )
         for channel, (gain, offset) in self.calibration.items():
             if not (np.isfinite(gain) and np.isfinite(offset) and gain):
                 raise DataError(

@@ -32,7 +32,14 @@ SPELLINGS: dict[str, dict[str, str]] = {
         "um": "um micron microns",
         "inch": "in inch inches",
     },
-    "N": {"N": "N newton newtons", "kN": "kN", "mN": "mN", "kgf": "kgf kp", "lbf": "lbf"},
+    "N": {
+        "N": "N newton newtons",
+        "kN": "kN",
+        "mN": "mN",
+        "gf": "gf",
+        "kgf": "kgf kp",
+        "lbf": "lbf",
+    },
     "s": {
         "s": "s sec secs second seconds",
         "ms": "ms msec millisecond milliseconds",
@@ -60,6 +67,13 @@ SPELLINGS: dict[str, dict[str, str]] = {
     "Hz": {"Hz": "Hz", "kHz": "kHz"},
 }
 """Package unit -> unit as pint calls it -> spellings, separated by blanks."""
+
+MASSES = {
+    "gf": ("g", "gram", "grams"),
+    "kgf": ("kg", "kilogram", "kilograms"),
+    "lbf": ("lb", "lbs", "pound", "pounds"),
+}
+"""Unit of force -> those of the mass that hangs with it."""
 
 _GAUGE = re.compile(
     r"(?P<unit>m?bar|[hkM]?Pa|psi)[\s_(\[]*(?P<kind>gauge|absolute|abs|g|a)[)\]]?", re.IGNORECASE
@@ -125,6 +139,15 @@ def find(text: str) -> Unit | None:
             return Unit(unit.name, unit.target, "gauge" if kind == "gauge" else "absolute")
     # pint evaluates numbers, so only products of words with small exponents are handed to it.
     return _ask_pint(text) if _READABLE.fullmatch(text) else None
+
+
+def weight(text: str) -> str:
+    """Return the unit of the force by which a mass hangs for that of a mass; others as they are.
+
+    >>> weight("kg"), weight("kN")
+    ('kgf', 'kN')
+    """
+    return next((force for force, mass in MASSES.items() if text.strip() in mass), text)
 
 
 def convert(samples: Array, unit: str, target: str) -> Array:

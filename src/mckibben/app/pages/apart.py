@@ -57,7 +57,7 @@ def _channels(desk: Desk) -> None:
             f"All of them have only: {', '.join(common)}."
             if common
             else "No channel is in all of them: nothing can be fitted to them together. Where one is "
-            "called otherwise, say so by 'How it was read'."
+            "called otherwise, say so by “How it was read”."
         )
         if pairs := adding.pairs(desk.workspace):
             said = "; ".join(" with ".join(names) for names in pairs[:SHOWN])

@@ -4,37 +4,33 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Awaitable, Callable, Sequence
+from pathlib import Path
 from typing import Any
 
 from nicegui import ui
 
-from mckibben.app.adding import Problem, about_gaps, add, alike, replaced, understood
+from mckibben.app.adding import Problem, about_gaps, add, alike, replaced, source, understood
 from mckibben.app.desk import LONGEST, Desk, guarded, named, tell
 from mckibben.app.fields import GAPS, said
 from mckibben.app.kept import Reading
-from mckibben.app.reading import AS_FOUND, Seen, columns
+from mckibben.app.pages.columns import ReadingFields
+from mckibben.app.reading import AS_FOUND, columns
 from mckibben.errors import DataError, MckibbenError
-from mckibben.recording import STANDARD_UNITS, Recording
-
-LEFT_OUT = "(left out)"
+from mckibben.files.notices import is_plain
+from mckibben.recording import Recording
 
 
 async def ask_again(desk: Desk, place: Any, name: str) -> None:
     """Ask how the file of a recording is to be read, with what was understood filled in."""
     entry = desk.workspace.entry(name)
-    if not entry.upload:
-        raise DataError(
-            f"{name} came from {entry.origin}, not from a file that is kept here",
-            remedy="drop a file to say how it is read; edits below work for all recordings",
-        )
-    shown = entry.origin.removeprefix("file ")
-    await ask(desk, place, entry.upload, shown, None, entry.reading, name)
+    shown = entry.origin.removeprefix("file ") if entry.upload else name
+    await ask(desk, place, source(desk.workspace, entry), shown, None, entry.reading, name)
 
 
 async def ask(
     desk: Desk,
     place: Any,
-    held: str,
+    path: Path,
     shown: str,
     error: MckibbenError | None,
     reading: Reading = AS_FOUND,
@@ -49,8 +45,10 @@ async def ask(
     desk : Desk
     place : element
         Where the dialog goes.
-    held, shown : str
-        What the file is called among the uploads, and to a person.
+    path : Path
+        The file.
+    shown : str
+        What it is called to a person.
     error : MckibbenError, optional
         Why it was not read.
     reading : Reading
@@ -62,10 +60,9 @@ async def ask(
     then : callable, optional
         Given those that still were not.
     """
-    path, left = desk.workspace.path("uploads", held), list(unread)
+    left = list(unread)
     try:
         found = await asyncio.to_thread(columns, path, reading)
-        plain = await asyncio.to_thread(columns, path, AS_FOUND)
         if not any(column.first for column in found):
             raise DataError("there are no columns in it", remedy="export it again")
     except MckibbenError as damaged:
@@ -81,7 +78,7 @@ async def ask(
         words = "" if error is None else said(error)
         problem = named(ui.label(words).classes("text-negative break-words"), "problem")
         problem.set_visibility(error is not None)
-        lines = [_column(place_, column, reading) for place_, column in enumerate(found)]
+        fields = ReadingFields(found, reading)
         with ui.row().classes("items-end gap-4"):
             rate = named(
                 ui.number("Samples per second", value=reading.rate, min=0)
@@ -116,7 +113,7 @@ async def ask(
                 names = [name, *(others if too else [])]
                 return {shown: await asyncio.to_thread(replaced, desk, names, chosen)}
             many, asked["many"] = asked["many"], True
-            read = {shown: await asyncio.to_thread(add, desk, held, shown, chosen, many=many)}
+            read = {shown: await asyncio.to_thread(add, desk, path.name, shown, chosen, many=many)}
             for one in list(left) if too else []:
                 problem.set_text(f"Reading {one.shown:.60} …")
                 problem.set_visibility(True)
@@ -131,8 +128,9 @@ async def ask(
 
         async def again() -> None:
             try:
-                chosen = _chosen(found, plain, lines, rate.value, gaps.value, error is not None)
-                read = await read_so(chosen)
+                chosen = fields.reading(rate.value, gaps.value, explicit=error is not None)
+                same = name is not None and chosen == reading and not so_too.value
+                read = {} if same else await read_so(chosen)
                 if name is not None and title_field and title_field.value not in ("", name):
                     desk.preview = await asyncio.to_thread(
                         desk.workspace.rename, name, title_field.value
@@ -144,104 +142,23 @@ async def ask(
             dialog.close()
             desk.settle_channels()
             desk.changed("recordings", "channels", "log")
-            tell_of(read)
+            if read:
+                tell_of(read)
             if then is not None:
                 await then(left)
 
         async def leave() -> None:
             dialog.close()
             if then is not None:
-                await then([Problem(shown, error, held), *left] if error else left)
+                await then([Problem(shown, error, path.name), *left] if error else left)
 
         with ui.row():
-            named(ui.button("Read it so", on_click=guarded(again)), "read-again")
+            named(
+                ui.button("Read it so", on_click=guarded(again, f"Reading {shown:.40}")),
+                "read-again",
+            )
             ui.button("Leave it", on_click=guarded(leave)).props("flat")
     dialog.open()
-
-
-def _column(place: int, column: Seen, reading: Reading) -> dict[str, Any]:
-    """Show a column and the fields that say what it is."""
-    gain, offset = reading.calibration.get(column.channel, (1.0, 0.0))
-    options = [LEFT_OUT, "time", *STANDARD_UNITS]
-    if column.channel and column.channel not in options:
-        options.append(column.channel)
-    about = f"of column {column.header:.60}"
-    with ui.row().classes("items-center w-full gap-2 border-b border-gray-500/30 pb-1"):
-        with ui.column().classes("gap-0 w-44 min-w-0"):
-            ui.label(column.header[:80] or f"column {place + 1}").classes("font-medium break-all")
-            with named(ui.row().classes("gap-x-1 gap-y-0 text-xs opacity-70"), f"first-{place}"):
-                for text in column.first:  # each on one line, for half a number is another one
-                    ui.label(text).classes("max-w-full truncate")
-        channel = ui.select(
-            options,
-            value=column.channel or LEFT_OUT,
-            label="Channel",
-            with_input=True,
-            new_value_mode="add-unique",
-        ).classes("w-40")
-        unit = (
-            ui.input(
-                "Unit",
-                value=reading.units.get(column.channel, ""),
-                placeholder=column.unit or "none",
-            )
-            .props("stack-label")
-            .classes("w-20")
-        )
-        times = ui.number("Times", value=abs(gain)).classes("w-20")
-        plus = ui.number("Plus", value=offset).classes("w-20")
-        sign = ui.checkbox("Turn sign", value=gain < 0)
-    fields = {"channel": channel, "unit": unit, "gain": times, "offset": plus, "sign": sign}
-    for word, element in fields.items():
-        named(element, f"{word}-{place}")
-        element.props["aria-label"] = f"{word} {about}"
-    return fields
-
-
-def _chosen(
-    found: Sequence[Seen],
-    plain: Sequence[Seen],
-    lines: Sequence[dict[str, Any]],
-    rate: float | None,
-    gaps: Any,
-    explicit: bool,
-) -> Reading:
-    """Return what the fields say; what goes without saying is left unsaid."""
-    mapped: dict[str, str] = {}
-    units: dict[str, str] = {}
-    calibration: dict[str, tuple[float, float]] = {}
-    kept: list[str] = []
-    dropped = False
-    for column, as_found, line in zip(found, plain, lines, strict=True):
-        channel = str(line["channel"].value or LEFT_OUT).strip()
-        if channel == LEFT_OUT:
-            dropped = dropped or as_found.channel not in ("", "time")
-            if as_found.channel == "time":  # or it would be found again
-                mapped["unused_time"], dropped = column.header, True
-            continue
-        if channel in kept:
-            raise DataError(
-                f"two columns are to be {channel}", remedy="leave one out, or name it otherwise"
-            )
-        kept.append(channel)
-        if explicit or channel != as_found.channel:
-            mapped[channel] = column.header
-        if line["unit"].value:
-            units[channel] = str(line["unit"].value).strip()
-        times = 1.0 if line["gain"].value is None else float(line["gain"].value)
-        turned = -times if line["sign"].value else times
-        if (way := (turned, float(line["offset"].value or 0.0))) != (1.0, 0.0):
-            calibration[channel] = way
-    if not (signals := [channel for channel in kept if channel != "time"]):
-        raise DataError("no column is left", remedy="say of one at least which channel it is")
-    return Reading(
-        columns=mapped,
-        units=units,
-        calibration=calibration,
-        rate=float(rate) if rate else None,
-        gaps=gaps,
-        channels=signals if dropped else None,
-    )
 
 
 def tell_of(read: dict[str, list[Recording]]) -> None:
@@ -257,7 +174,7 @@ def tell_of(read: dict[str, list[Recording]]) -> None:
         timeless = sum(one.sample_time is None for one in recordings)
         if timeless:
             said += f" {timeless} without time."
-        noted = sum(bool(one.notes) for one in recordings)
+        noted = sum(not all(map(is_plain, one.notes)) for one in recordings)
         if noted:
             said += f" Something was assumed or mended in {noted} of them: see their lines."
     ui.notify(said[:LONGEST], multi_line=True, timeout=8000, type="info")

@@ -8,7 +8,8 @@ from typing import Any
 
 from nicegui import ui
 
-from mckibben.app.desk import LONGEST, Desk, guarded, hinted, labelled, named
+from mckibben.app.desk import Desk, guarded, hinted, labelled, named
+from mckibben.app.fields import said
 from mckibben.app.offering import Offer, Offered, offered
 from mckibben.app.pages.settings import ask
 from mckibben.comparison.needs import Need
@@ -46,7 +47,7 @@ class Choice:
         names = [offer.model for _, offers in found.groups for offer in offers]
         kept = [model for model in self.ticked if model in names]
         self.shown, self.ticked = found, kept or list(found.start)
-        self.said.set_text(found.recognised)
+        self.said.set_text(said(found.recognised))
         self.actions.set_visibility(True)
         self.place.clear()
         self.boxes, self.heads = {}, []
@@ -110,7 +111,7 @@ class Choice:
             "w-full min-w-0"
         ):
             for title, reason in against.items():
-                ui.label(f"{title}: {reason}"[:LONGEST]).classes("text-xs opacity-70 break-words")
+                ui.label(said(f"{title}: {reason}")).classes("text-xs opacity-70 break-words")
 
     def _tick(self, model: str, on: bool) -> None:
         self.ticked = [name for name in self.ticked if name != model] + [model] * on
@@ -124,12 +125,12 @@ class Choice:
 
 
 def _about(offer: Offer) -> str:
-    said = [INVERSES[offer.inverse], f"about {_time(offer.seconds)}"]
+    words = [INVERSES[offer.inverse], f"about {_time(offer.seconds)}"]
     if offer.needs_time:
-        said.append("needs time")
+        words.append("needs time")
     if offer.caution:
-        said.append(f"good only near its training: {offer.caution}")
-    return f"{'; '.join(said)[0].upper()}{'; '.join(said)[1:]}."
+        words.append(f"good only near its training: {offer.caution}")
+    return f"{'; '.join(words)[0].upper()}{'; '.join(words)[1:]}."
 
 
 def _time(seconds: float) -> str:

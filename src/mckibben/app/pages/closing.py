@@ -10,8 +10,8 @@ from typing import Any
 from nicegui import ui
 
 from mckibben import registry
-from mckibben.app import forms, plots, scripts
-from mckibben.app.desk import Desk, guarded, named, on_event, tell
+from mckibben.app import fields, forms, plots, scripts
+from mckibben.app.desk import Desk, caution, guarded, named, on_event, tell
 from mckibben.app.following import fitting_rigs
 from mckibben.app.jobs import RUNNING
 from mckibben.app.kept import Followed
@@ -91,7 +91,7 @@ def _offer(
         try:
             desk.workspace.twin(model)
         except MckibbenError as error:
-            said = str(error)
+            said = fields.said(error)
         named(ui.label(said), "no-plant")
         return
     if not any(text.endswith(("of your muscle", "of its size")) for text in offered.values()):
@@ -148,7 +148,10 @@ def _offer(
         with against:
             for reason in dict.fromkeys(filter(None, reasons.values())):
                 out = "; ".join(titles[law] for law in titles if reasons[law] == reason)
-                named(ui.label(f"Not here: {out}. {reason}").classes("text-xs"), "law-refused")
+                named(
+                    ui.label(f"Not here: {out}. {fields.said(reason)}").classes("text-xs"),
+                    "law-refused",
+                )
 
     async def turned() -> None:
         chosen = str(plant.value)
@@ -211,7 +214,7 @@ def runs(desk: Desk, model: str, drawn: Callable[[], str]) -> None:
             text = f"Errors compare only within a motion. In the picture: {motions[pictured]}."
             named(ui.label(text).classes("text-sm"), "motions")
         for note in dict.fromkeys(note for run in found.values() for note in run.notes):
-            named(ui.label(note).classes("text-sm border-l-4 border-warning pl-2"), "loop-note")
+            named(caution(note), "loop-note")
         alike = {name: run for name, run in found.items() if run.reference == pictured}
         _pictures(desk, dict(list(alike.items())[-DRAWN:]))
 

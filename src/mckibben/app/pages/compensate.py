@@ -9,7 +9,7 @@ import numpy as np
 from nicegui import ui
 
 from mckibben.app import forms, plots, scripts
-from mckibben.app.desk import Desk, guarded, named, on_event
+from mckibben.app.desk import Desk, caution, guarded, named, on_event
 from mckibben.app.following import compensated, held_for, kept_motion
 from mckibben.app.pages import closing, forces, leaderboard, logs
 from mckibben.app.pages.drawing_reference import Sketch
@@ -262,7 +262,7 @@ class Editor:
         )
         named(ui.plotly(figure).classes("w-full"), "pressure-plot")
         for note in notes:
-            ui.label(note).classes("text-sm border-l-4 border-warning pl-2")
+            caution(note)
         header = ",".join(["time_s", *(f"{c.name}_{c.unit}" for c in pressures)])
         columns = zip(given.time, *(given[c.name] for c in pressures), strict=True)
         rows = [",".join(f"{number:.9g}" for number in row) for row in columns]

@@ -10,12 +10,17 @@ from typing import TYPE_CHECKING, Any
 from nicegui import ui
 
 from mckibben.app.desk import Desk, guarded, hinted, labelled, named, refused
+from mckibben.app.drawn import Drawn
 from mckibben.app.kept import Step
 from mckibben.app.pages import editing
+from mckibben.app.pages.rows import state_of
 from mckibben.errors import DataError, MckibbenError
 
 if TYPE_CHECKING:
     from mckibben.recording import Recording
+
+FEW, MOST = 4, 12
+"""Channels that are drawn unasked: as many as this, or as are chosen, up to the second."""
 
 MOVED = 0.01
 """Share of the recording that an arrow key moves the selection by."""
@@ -90,12 +95,13 @@ class Part:
 def preview(desk: Desk) -> None:
     """Show a recording over time, what was done to it, and what can be."""
 
-    @ui.refreshable
+    def state() -> Any:
+        entries = {entry.name: entry for entry in desk.workspace.entries()}
+        name = desk.preview if desk.preview in entries else next(iter(entries), None)
+        return name, state_of(entries[name]) if name else None, desk.dark
+
     def shown() -> None:
-        name = desk.preview
-        entries = [entry.name for entry in desk.workspace.entries()]
-        if name not in entries:
-            name = entries[0] if entries else None
+        name, _, _ = state()
         if name is None:
             return
         try:
@@ -104,15 +110,47 @@ def preview(desk: Desk) -> None:
             refused(error, name)
             return
         ui.label(f"{name}: drag across the plot to select a part").classes("text-lg")
-        channels = list(recording.channels)[:4]
-        part = Part((float(recording.time[0]), float(recording.time[-1])))
-        _plot(desk, name, recording, channels, part)
+        _channels(desk, name, recording)
         editing.steps(desk, name, recording)
 
-    desk.when("recordings", shown.refresh)
-    desk.when("preview", shown.refresh)
-    desk.when("theme", shown.refresh)
-    shown()
+    Drawn(desk, state, shown, "recordings", "preview", "theme")
+
+
+def first_shown(desk: Desk, recording: Recording) -> list[str]:
+    """Return the channels that are drawn unasked: what is chosen, else what there is, a few."""
+    chosen = [name for name in (*desk.inputs, *desk.outputs) if name in recording]
+    others = [name for name in recording.channels if name not in chosen]
+    return [*chosen, *others][: max(FEW, min(len(chosen), MOST))]
+
+
+def _channels(desk: Desk, name: str, recording: Recording) -> None:
+    """Let the channels to draw be chosen, and draw them."""
+    every = list(recording.channels)
+    part = Part((float(recording.time[0]), float(recording.time[-1])))
+    asked = [each for each in desk.drawn if each in every]
+    field = ui.select(
+        every,
+        value=asked or first_shown(desk, recording),
+        multiple=True,
+        label="Channels to draw",
+    )
+    named(field.classes("min-w-56 max-w-full"), "draw-channels")
+    field.set_visibility(len(every) > 1)
+    left = named(ui.label("").classes("text-sm opacity-70 break-words"), "not-drawn")
+
+    @ui.refreshable
+    def drawn() -> None:
+        rest = [each for each in every if each not in field.value]
+        left.set_text(f"Not drawn: {', '.join(rest)}" if rest else "")
+        if field.value:
+            _plot(desk, name, recording, list(field.value), part)
+
+    def chosen() -> None:
+        desk.drawn = list(field.value)
+        drawn.refresh()
+
+    field.on_value_change(chosen)
+    drawn()
 
 
 def _plot(desk: Desk, name: str, recording: Recording, channels: list[str], part: Part) -> None:

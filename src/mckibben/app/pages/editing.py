@@ -43,19 +43,21 @@ def undoing(desk: Desk) -> None:
     # of the whole page: what was removed leaves the focus nowhere
     ui.keyboard(on_key=pressed, repeating=False, ignore=FIELDS)
 
-    @ui.refreshable
-    def shown() -> None:
-        with ui.row().classes("gap-0"):
-            for word, icon, redo in (("Undo", "undo", False), ("Redo", "redo", True)):
-                what = desk.workspace.history()[redo]
-                button = named(ui.button(icon=icon, on_click=step(redo)), word.lower())
-                button.props("flat dense").set_enabled(what is not None)
-                labelled(button, "aria-label", f"{word}: {what}" if what else f"{word}: nothing")
-                hinted(button, f"{word}: {what}" if what else f"Nothing to {word.lower()}")
+    buttons = {}
+    with ui.row().classes("gap-0"):
+        for word, icon, redo in (("Undo", "undo", False), ("Redo", "redo", True)):
+            button = named(ui.button(icon=icon, on_click=step(redo)), word.lower())
+            buttons[word] = button.props("flat dense")
 
-    desk.when("recordings", shown.refresh)
-    desk.when("channels", shown.refresh)
-    shown()
+    def update() -> None:
+        for (word, button), what in zip(buttons.items(), desk.workspace.history(), strict=True):
+            button.set_enabled(what is not None)
+            labelled(button, "aria-label", f"{word}: {what}" if what else f"{word}: nothing")
+            hinted(button, f"{word}: {what}" if what else f"Nothing to {word.lower()}")
+
+    update()
+    desk.when("recordings", update)
+    desk.when("channels", update)
 
 
 def steps(desk: Desk, name: str, recording: Recording) -> None:

@@ -7,7 +7,7 @@ import asyncio
 from nicegui import ui
 
 from mckibben.app import forms, scripts
-from mckibben.app.desk import Desk, guarded, named
+from mckibben.app.desk import Desk, caution, guarded, named
 from mckibben.app.kept import Estimated
 from mckibben.app.pages.kept_curves import drawn, showing
 from mckibben.comparison.recognising import FORCE
@@ -119,5 +119,5 @@ def _shown(desk: Desk, name: str, one: Estimated) -> None:
         said = "The recording has no measured force to compare with."
     named(ui.label(said).classes("text-sm"), f"force-{name}")
     for note in one.notes:
-        ui.label(note).classes("text-sm border-l-4 border-warning pl-2")
+        caution(note)
     drawn(desk, one.curves, f"{one.output} [{one.unit}]", f"error [{one.unit}]", "force-plot")

@@ -11,15 +11,13 @@ from nicegui import ui
 from nicegui.events import UploadEventArguments
 
 from mckibben.app.adding import Problem, add
-from mckibben.app.desk import Desk, guarded, kept, named, tell
+from mckibben.app.busy import doing
+from mckibben.app.desk import Desk, guarded, kept, named, tell, told
 from mckibben.app.fields import said
 from mckibben.app.pages.asking import ask, tell_of
 from mckibben.app.reading import AS_FOUND
-from mckibben.errors import DataError, MckibbenError
+from mckibben.errors import DataError, MckibbenError, TooLargeError
 from mckibben.recording import Recording
-
-QUIET = 0.4
-"""After a file, for which no other may come before all are summed up [s]."""
 
 LISTED = 12
 """Problems that are listed one by one."""
@@ -40,6 +38,7 @@ class Intake:
     place: Any
     coming: int = 0
     seen: int = 0
+    sending: bool = False
     read: dict[str, list[Recording]] = field(default_factory=dict)
     problems: list[Problem] = field(default_factory=list)
     one: asyncio.Lock = field(default_factory=asyncio.Lock)
@@ -47,13 +46,24 @@ class Intake:
     reading: Any = None
     pending: Any = None
 
+    def watch(self, upload: Any) -> None:
+        """Take the files of an uploader, which tells when all are here."""
+        upload.on_upload(self.uploaded)
+        upload.on("finish", self._sent)
+
+    async def _sent(self) -> None:
+        self.sending = False
+        await self._sum_up_after_the_last()
+
     async def uploaded(self, event: UploadEventArguments) -> None:
         """Keep a file and read it; after the last, say what became of them."""
         self.coming += 1
         self.seen += 1
+        self.sending = True  # until the browser says that it has sent all
         shown = event.file.name
         try:
-            await self._take(event, shown)
+            with doing(f"Reading {shown:.40}"):
+                await self._take(event, shown)
         except MckibbenError as error:
             self.problems.append(Problem(shown, error))
         except Exception as error:  # what nobody has foreseen must not keep the others waiting
@@ -61,10 +71,12 @@ class Intake:
             self.problems.append(Problem(shown, unforeseen))
         finally:
             self.coming -= 1
-        seen = self.seen
-        await asyncio.sleep(QUIET)
-        if not self.coming and seen == self.seen:
-            await self._sum_up()
+        await self._sum_up_after_the_last()
+
+    async def _sum_up_after_the_last(self) -> None:
+        if (self.read or self.problems) and not self.coming and not self.sending:
+            with told():
+                await self._sum_up()
 
     async def _take(self, event: UploadEventArguments, shown: str) -> None:
         path = await kept(self.desk, event.file)
@@ -75,6 +87,9 @@ class Intake:
             try:
                 found = await asyncio.to_thread(add, self.desk, path.name, shown, AS_FOUND)
                 self.read.setdefault(shown, []).extend(found)
+            except TooLargeError as error:  # nobody can be asked how it is to be read
+                path.unlink(missing_ok=True)
+                self.problems.append(Problem(shown, error))
             except MckibbenError as error:
                 self.problems.append(Problem(shown, error, path.name))
 
@@ -117,7 +132,8 @@ class Intake:
             if fewer and left:
                 self.list()
 
-        await ask(self.desk, self.place, one.held, one.shown, one.error, unread=rest, then=then)
+        path = self.desk.workspace.path("uploads", one.held)
+        await ask(self.desk, self.place, path, one.shown, one.error, unread=rest, then=then)
 
     def list(self, foreign: Sequence[Problem] = ()) -> None:
         """Show all files that were not read; those that cannot be recordings in one line."""

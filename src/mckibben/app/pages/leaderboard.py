@@ -9,7 +9,7 @@ from typing import Any
 from nicegui import ui
 
 from mckibben.app import plots
-from mckibben.app.desk import Desk, guarded, named, on_event
+from mckibben.app.desk import Desk, caution, guarded, named, on_event
 from mckibben.app.pages import next_steps
 from mckibben.blocks.core.block import Block
 from mckibben.blocks.core.writing import quantities
@@ -102,7 +102,7 @@ def unrecommended(desk: Desk) -> None:
     @ui.refreshable
     def shown() -> None:
         if why := desk.not_recommended:
-            text = ui.label(f"{why}.").classes("text-sm border-l-4 border-warning pl-2")
+            text = caution(f"{why}.")
             named(text, "not-recommended")
 
     for topic in ("results", "channels"):

@@ -10,6 +10,7 @@ from nicegui import ui
 
 from mckibben.app import plots
 from mckibben.app.desk import Desk, guarded, named, refused
+from mckibben.app.fields import said
 from mckibben.app.pages.cutting import time_plot
 from mckibben.errors import MckibbenError
 from mckibben.recording import Recording
@@ -263,7 +264,7 @@ def _untold(desk: Desk, given: str, wanted: str) -> None:
                 ui.label("Nothing that a model would need.")
             for gap in gaps:
                 ui.label(gap.sentence)
-                ui.label(gap.remedy).classes("text-caption pl-4")
+                ui.label(said(gap.remedy)).classes("text-caption pl-4")
             desk.did(
                 "asked what the recordings cannot tell",
                 f"mckibben.untold(train, {given!r}, {wanted!r}, tests=test)",

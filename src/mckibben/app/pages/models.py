@@ -7,7 +7,7 @@ import math
 import numpy as np
 from nicegui import ui
 
-from mckibben.app import plots, scripts
+from mckibben.app import fields, plots, scripts
 from mckibben.app.desk import Desk, named, tell
 from mckibben.app.jobs import ENDED, RUNNING, Job
 from mckibben.app.pages import apart, leaderboard
@@ -92,7 +92,9 @@ def _job(desk: Desk, job: Job, said: set[str]) -> None:
         ui.label(job.title).classes("w-28")
         if job.state in ENDED:
             again = job.said in said and job.said != job.state
-            ui.label(f"{job.state}, as above" if again else job.said).classes("flex-1 text-xs")
+            ui.label(f"{job.state}, as above" if again else fields.said(job.said)).classes(
+                "flex-1 text-xs"
+            )
             said.add(job.said)
             if job.state != "done":
                 ui.button(icon="replay", on_click=lambda: _again(desk, job)).props(

@@ -6,7 +6,8 @@ import asyncio
 
 from nicegui import ui
 
-from mckibben.app.desk import LONGEST, Desk, guarded, named
+from mckibben.app import fields
+from mckibben.app.desk import Desk, guarded, named
 from mckibben.app.jobs import DONE, ENDED, RUNNING, Job
 from mckibben.app.pages.taking_code import LARGEST
 from mckibben.system.ordinary import read_bytes
@@ -77,7 +78,7 @@ def _line(desk: Desk, job: Job) -> None:
             ui.label(f"{job.title}: {100 * share:.0f} %").classes("text-sm flex-1")
             return
         text = job.message if job.state == DONE else job.said
-        said = ui.label(f"{job.title}: {text}"[:LONGEST]).classes(
+        said = ui.label(fields.said(f"{job.title}: {text}")).classes(
             "text-sm flex-1 min-w-0 break-words"
         )
         named(said, f"{job.kind}-said")

@@ -1,0 +1,148 @@
+"""The recordings, a row for each: only what has changed is made anew, so that no click is lost."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+from nicegui import ui
+
+from mckibben.app.desk import LONGEST, Desk, guarded, hinted, labelled, named, refused, told
+from mckibben.app.fields import READING, said
+from mckibben.app.pages.asking import ask_again
+from mckibben.app.recordings import Entry
+from mckibben.errors import MckibbenError
+from mckibben.files.notices import is_plain
+from mckibben.recording import Recording
+
+SHOWN = 6
+"""Notes of reading that are shown of a recording."""
+
+
+@dataclass
+class _Row:
+    """What a row was made for, what holds it, and what gives its role another value."""
+
+    state: tuple[Entry, int]
+    place: ui.row
+    role: Callable[[str], Any]
+
+
+class Rows:
+    """The rows of all recordings.
+
+    Parameters
+    ----------
+    desk : Desk
+    dialogs : element
+        Where dialogs go.
+    """
+
+    def __init__(self, desk: Desk, dialogs: Any) -> None:
+        self.desk, self.dialogs = desk, dialogs
+        self._rows: dict[str, _Row] = {}
+        with named(ui.card().classes("w-full"), "empty") as self._empty:
+            ui.label("Nothing here yet.").classes("text-base")
+            ui.label(
+                "Drop a recording of your muscle: pressure and displacement over time. "
+                "Or open the example, a virtual muscle with a hanging load."
+            )
+        self._place = ui.column().classes("w-full gap-3")
+        self.update()
+        desk.when("recordings", self.update)
+
+    def update(self) -> None:
+        """Show what is there now."""
+        entries = {entry.name: entry for entry in self.desk.workspace.entries()}
+        states = {name: state_of(entry) for name, entry in entries.items()}
+        self._empty.set_visibility(not entries)
+        for name in [name for name, row in self._rows.items() if row.state != states.get(name)]:
+            self._rows.pop(name).place.delete()
+        for at, (name, entry) in enumerate(entries.items()):
+            if name in self._rows:
+                self._rows[name].role(entry.role)
+                continue
+            with self._place, ui.row().classes("items-center w-full gap-2") as place:
+                role = self._filled(entry)
+            named(place, f"recording-{name}")
+            self._rows[name] = _Row(states[name], place, role)
+            if at < len(self._rows) - 1:
+                place.move(target_index=at)
+
+    def _filled(self, entry: Entry) -> Callable[[str], Any]:
+        desk, name = self.desk, entry.name
+        try:
+            recording = desk.workspace.recording(name)
+        except MckibbenError as error:
+            refused(error, name)
+            return lambda role: None
+        duration = "" if recording.duration is None else f", {recording.duration:.4g} s"
+        with ui.column().classes("gap-0 flex-1 min-w-40"):
+            ui.label(name).classes("font-medium break-all")
+            listed = ", ".join(f"{c} [{recording.units[c] or '-'}]" for c in recording.channels)
+            words = f"{len(recording)} samples{duration}; {listed}"
+            ui.label(words).classes("text-xs opacity-70 break-words")
+            _aside_said(recording, name)
+            for note in [note for note in entry.notes if not is_plain(note)][:SHOWN]:
+                named(
+                    ui.label(said(note)).classes("text-xs text-amber-900 dark:text-amber-300"),
+                    f"note-{name}",
+                )
+        toggle = ui.toggle(["train", "test", "unused"], value=entry.role)
+        toggle.props(f'dense role=group aria-label="Role of {name}"')
+        toggle.on_value_change(lambda event: _set_role(desk, name, event.value))
+        named(toggle, f"role-{name}")
+        with ui.row().classes("gap-0 items-center"):
+            ask = guarded(lambda: ask_again(desk, self.dialogs, name))
+            button = ui.button(READING, icon="tune", on_click=ask).props("flat dense no-caps")
+            labelled(button, "aria-label", f"{READING}: {name}")
+            for icon, word, action in (
+                ("show_chart", "Show", lambda: _show(desk, name)),
+                ("delete", "Remove", lambda: _remove(desk, name)),
+            ):
+                button = ui.button(icon=icon, on_click=action).props("flat dense")
+                labelled(hinted(button, word), "aria-label", f"{word} {name}")
+        return toggle.set_value
+
+
+def state_of(entry: Entry) -> tuple[Entry, int]:
+    """Return what is shown of a recording, its role aside, to be compared."""
+    try:
+        stamp = entry.path.stat().st_mtime_ns
+    except OSError:
+        stamp = 0
+    return replace(entry, role="train"), stamp
+
+
+def _aside_said(recording: Recording, name: str) -> None:
+    """Say what is missing: times, and columns that were left out."""
+    ignored = recording.meta.get("ignored_columns") or ()
+    words = []
+    if recording.sample_time is None:
+        words.append(f"no time: only models without rates take it; give a rate by “{READING}”")
+    if ignored:
+        words.append(f"left out: {', '.join(map(str, ignored))}")
+    if words:
+        text = "; ".join(words)[:LONGEST]
+        named(ui.label(text).classes("text-xs opacity-70 break-words"), f"understood-{name}")
+
+
+def _set_role(desk: Desk, name: str, role: Any) -> None:
+    with told():
+        if role != desk.workspace.entry(name).role:
+            try:
+                desk.workspace.set_role([name], role)
+            finally:  # where that is refused, the role is shown as it stays
+                desk.changed("recordings", "channels")
+
+
+def _remove(desk: Desk, name: str) -> None:
+    desk.workspace.remove(name)
+    desk.changed("recordings", "channels")
+    ui.notify(f"{name} is removed; Undo brings it back.")
+
+
+def _show(desk: Desk, name: str) -> None:
+    desk.preview = name
+    desk.changed("preview")

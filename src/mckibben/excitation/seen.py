@@ -17,8 +17,8 @@ from mckibben.signals.reversals import noise_level, reversals, swing_threshold
 STILL = 0.01
 """An input whose range is below this share of its largest value is held; an output likewise."""
 
-HELD = 0.003
-"""Share of its range within which an input counts as held."""
+HELD = 0.005
+"""Share of its range within which an input counts as held: a regulated pressure ripples by as much."""
 
 SHORTEST_HOLD = 10
 """Samples of a hold, at least."""

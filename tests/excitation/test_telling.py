@@ -246,6 +246,15 @@ def test_a_muscle_that_is_held_is_judged_by_its_force() -> None:
     assert "force" not in " ".join(gap.what for gap in untold(held))
 
 
+def test_a_force_that_creeps_ends_no_hold() -> None:
+    u = drive([(4.0, 1.0, 20.0), (1.0, 1.0, 20.0)])
+    force = 100.0 * u + 40.0 * lag(u, 8.0)
+    one = Recording({"pressure": u, "force": force}, STEP)
+    creep = next(gap for gap in untold(one, "pressure", "force") if gap.what == "creep")
+    assert creep.evidence["hold"] > 18.0
+    assert creep.evidence["moved"] > 0.01
+
+
 def test_a_model_without_parameters_that_tell_is_said() -> None:
     many = PI(tuple(np.linspace(0, 3, 200)), (0.01,) * 200)
     (gap,) = [gap for gap in untold(pair(COMPLETE), model=many) if gap.what == "parameters"]

@@ -147,6 +147,8 @@ def characterize(
         wiping_out_error=wiping_out,
         p_dependence=seen.dependence,
         p_loop=seen.loop,
+        widest_gap=None if seen.widest is None else seen.widest * scale.y_span,
+        drift_excluded=sum(track.major_turns.size - 1 for track in tracks) > 2,
         falls=scale.sign < 0 and (curve.gain is None or curve.gain < 0),
         assumed=tuple(assumed),
     )

@@ -49,10 +49,14 @@ class Evidence:
         p-value of the output depending on the input, or on its direction.
     loop : float or None
         p-value of the output depending on the direction of the input, beside a curve without memory.
+    widest : float or None
+        How far apart the branches may be on average, beside what is seen of that, before noise would
+        no longer pass for it [share of the output range].
     """
 
     dependence: float | None
     loop: float | None
+    widest: float | None = None
 
 
 def evidence(tracks: Sequence[Track], scale: Scale) -> Evidence:
@@ -80,18 +84,25 @@ def evidence(tracks: Sequence[Track], scale: Scale) -> Evidence:
     curve = _added(np.column_stack([level, x, x**2, x**3, *turned]), level.shape[1])
     loop = _added(np.column_stack([static, *turned]), static.shape[1])
     spectrum = _spectrum_left(_basis(np.column_stack([static, *turned])), y)
-    return Evidence(_p_value(curve, y, spectrum), _p_value(loop, y, spectrum))
+    return Evidence(
+        _p_value(curve, y, spectrum),
+        _p_value(loop, y, spectrum),
+        _widest(loop, way, y, spectrum),
+    )
 
 
 def _means(track: Track, every: int) -> tuple[Array, Array, Array]:
-    """Return input and output, means over so many samples each, and the direction amid them."""
+    """Return input and output, means over so many samples each, and the direction amid them.
+
+    Only swings of some size have a direction: on a way up in steps that overshoot, it is up.
+    """
     n = track.u.size // every
     u, y = (x[: n * every].reshape(n, every).mean(axis=1) for x in (track.u, track.y))
     amid = every * np.arange(n) + every // 2
     branch = (
-        np.searchsorted(track.turns, amid) - 1
+        np.searchsorted(track.major_turns, amid) - 1
     )  # a turning point is reached by what is before it
-    ways = np.sign(np.diff(track.heights))
+    ways = np.sign(np.diff(track.u[track.major_turns]))
     return u, y, ways[np.clip(branch, 0, ways.size - 1)]
 
 
@@ -132,9 +143,27 @@ def _p_value(basis: Array, y: Array, spectrum: Array) -> float | None:
     if basis.shape[1] == 0:
         return None
     fitted = float(np.sum((basis.T @ y) ** 2))
-    waves = np.fft.fft(basis, axis=0)
-    covariance = np.real(waves.conj().T @ (spectrum[:, np.newaxis] * waves)) / y.size
-    mean, variance = float(np.trace(covariance)), 2 * float(np.sum(covariance**2))
+    mean, freedom = _of_noise(basis, spectrum)
     if mean <= 1e-20:
         return 0.0 if fitted > 1e-20 else 1.0
-    return float(fdtrc(2 * mean**2 / variance, min(BAND, y.size // 2), fitted / mean))
+    return float(fdtrc(freedom, min(BAND, y.size // 2), fitted / mean))
+
+
+def _widest(basis: Array, way: Array, y: Array, spectrum: Array) -> float | None:
+    """Return the largest distance of branches that what is fitted, and noise beside it, may hide."""
+    from scipy.special import fdtri
+
+    reach = float(np.linalg.norm(basis.T @ way)) if basis.shape[1] else 0.0
+    if reach == 0.0:
+        return None
+    mean, freedom = _of_noise(basis, spectrum)
+    hidden = mean * float(fdtri(freedom, min(BAND, y.size // 2), 1 - LEVEL))
+    return 2 * (float(np.linalg.norm(basis.T @ y)) + float(np.sqrt(hidden))) / reach
+
+
+def _of_noise(basis: Array, spectrum: Array) -> tuple[float, float]:
+    """Return the energy that a basis fits to noise of a spectrum, and its degrees of freedom."""
+    waves = np.fft.fft(basis, axis=0)
+    covariance = np.real(waves.conj().T @ (spectrum[:, np.newaxis] * waves)) / spectrum.size
+    mean, variance = float(np.trace(covariance)), 2 * float(np.sum(covariance**2))
+    return mean, 2 * mean**2 / max(variance, 1e-300)

@@ -27,6 +27,9 @@ FEWEST = 8
 EQUAL = 0.98
 """Amplitudes from this share of the largest on are as large."""
 
+PART = 0.5
+"""Share of the other branch that a branch at either end of a recording must have to make a loop."""
+
 SLIGHT = 1.0
 """Loop width below which a loop has no shape worth measuring [% of the output range]."""
 
@@ -34,6 +37,9 @@ SLIGHT = 1.0
 @dataclass(frozen=True)
 class Cycle:
     """One cycle of the input, minimum to minimum, of at least a tenth of the input range.
+
+    The first and the last of a recording may lack half of a branch, as where a muscle is vented part of
+    the way: what is told of them is between the levels that both branches cover.
 
     Parameters
     ----------
@@ -111,13 +117,13 @@ class Loop:
 
 
 def loops_of(tracks: Sequence[Track], scale: Scale) -> list[Loop]:
-    """Return the whole cycles with at least eight samples on each branch, in order of time.
+    """Return the cycles with at least eight samples on each branch, in order of time.
 
     Minor loops within a branch are left out of it.
     """
     found = []
     for number, track in enumerate(tracks):
-        for piece in whole_cycles(track.u, track.major_turns):
+        for piece in whole_cycles(track.u, track.major_turns, PART):
             loop = _loop(number, track, piece, STILL * scale.u_span)
             if loop is not None:
                 found.append(loop)
@@ -173,8 +179,10 @@ def pooled_curves(tracks: Sequence[Track], scale: Scale) -> tuple[Array, Array, 
     that led to it. NaN where the input never went that way.
     """
     levels = scale.u_low + SHARES * scale.u_span
-    ways = [np.sign(np.diff(track.heights)) for track in tracks]
-    ways = [np.repeat(way, np.diff(track.turns)) for way, track in zip(ways, tracks, strict=True)]
+    ways = [np.sign(np.diff(track.u[track.major_turns])) for track in tracks]
+    ways = [
+        np.repeat(way, np.diff(track.major_turns)) for way, track in zip(ways, tracks, strict=True)
+    ]
     curves = []
     for direction in (1, -1):
         chosen = [way == direction for way in ways]
@@ -197,15 +205,18 @@ def _loop(number: int, track: Track, piece: slice, tolerance: float) -> Loop | N
     levels = low + SHARES * (high - low)
     half = WINDOW * (high - low)
     up, down = curve(u[rise], y[rise], levels, half), curve(u[fall], y[fall], levels, half)
-    span = float(np.ptp(y))
-    if span == 0 or not np.isfinite(up + down).all():
+    if not np.isfinite(up + down).all():
+        return None
+    covered = u >= low
+    span = float(np.ptp(y[covered]))
+    if span == 0:
         return None
     rate = None
     if track.sample_time is not None:
         rate = (2 * u[top] - u[0] - u[-1]) / (track.sample_time * (u.size - 1))
     width = 100 * float(abs(down[MIDDLE] - up[MIDDLE])) / span
     cycle = Cycle(number, low, high, None if rate is None else float(rate), width)
-    return Loop(cycle, levels, up, down, span, loop_area(u, y))
+    return Loop(cycle, levels, up, down, span, loop_area(u[covered], y[covered]))
 
 
 def _sums(q: Array, first: NDArray[np.intp], stop: NDArray[np.intp]) -> Array:

@@ -12,6 +12,9 @@ from mckibben.system.showing import DrawsItself
 
 Range = tuple[float, float]
 
+NO_GAP = 0.01
+"""Branches that are on average at most so far apart, over the output range, are no loop."""
+
 
 @dataclass(frozen=True)
 class Characterization(DrawsItself):
@@ -70,6 +73,11 @@ class Characterization(DrawsItself):
     p_dependence, p_loop : float or None
         How likely noise alone would show as much dependence of the output on the input, and on its
         direction beside a curve without memory; None where there are too few samples.
+    widest_gap : float or None
+        How far apart the branches may be on average for all that the test tells [output unit].
+    drift_excluded : bool
+        Whether the input went up or down more than once, so that drift over a single cycle is not
+        taken for a loop.
     falls : bool
         Whether the output falls as the input rises.
     assumed : tuple of str
@@ -115,18 +123,27 @@ class Characterization(DrawsItself):
     wiping_out_error: float | None
     p_dependence: float | None = None
     p_loop: float | None = None
+    widest_gap: float | None = None
+    drift_excluded: bool = True
     falls: bool = False
     assumed: tuple[str, ...] = ()
 
     @property
-    def has_loop(self) -> bool:
-        """Whether there is a loop that noise would not give, or no test that says otherwise."""
-        return self.p_loop is None or self.p_loop <= LEVEL
+    def has_loop(self) -> bool | None:
+        """Whether there is a loop that noise would not give, or no test that says otherwise.
+
+        False only where a loop of any size that matters would have been seen; None where it cannot be
+        told.
+        """
+        if self.p_loop is None or self.p_loop <= LEVEL:
+            return True
+        seen = self.widest_gap is not None and self.widest_gap <= NO_GAP * self.output_span
+        return False if seen else None
 
     @property
     def depends(self) -> bool:
         """Whether the output depends on the input by more than noise would give, likewise."""
-        return self.p_dependence is None or self.p_dependence <= LEVEL or self.has_loop
+        return self.p_dependence is None or self.p_dependence <= LEVEL or self.has_loop is True
 
     @property
     def output_span(self) -> float:

@@ -50,7 +50,7 @@ def table(found: Characterization) -> list[Row]:
             "reversals",
             found.n_reversals,
             "",
-            "turning points of the input, those of minor loops too",
+            "where the input turns back by 1 % of its range or more, minor loops too",
         ),
         (f"lowest {found.input}", found.input_range[0], u, "input range"),
         (f"highest {found.input}", found.input_range[1], u, "input range"),
@@ -59,12 +59,23 @@ def table(found: Characterization) -> list[Row]:
         (f"noise of {found.input}", found.input_noise, u, "standard deviation of a sample"),
         (f"noise of {found.output}", found.output_noise, y, "standard deviation of a sample"),
         (
-            "p of the dependence",
-            found.p_dependence,
+            "chance that noise looks so dependent",
+            _chance(found.p_dependence),
             "",
-            "how likely noise alone makes the output depend on the input as much",
+            "p-value: how likely noise alone makes the output depend on the input as much",
         ),
-        ("p of the loop", found.p_loop, "", "the same of its direction, beside a curve"),
+        (
+            "chance that noise looks so much like a loop",
+            _chance(found.p_loop),
+            "",
+            "p-value: the same of the input's direction, beside a curve without memory",
+        ),
+        (
+            "largest gap that noise hides",
+            found.widest_gap,
+            y,
+            "branches may be as far apart on average for all that this test tells",
+        ),
         (
             "loop width e_w",
             found.loop_width,
@@ -86,10 +97,10 @@ def table(found: Characterization) -> list[Row]:
             "Prandtl-Ishlinskii model",
         ),
         (
-            "width centroid",
+            "where the loop is widest",
             found.width_centroid,
             "",
-            "where the loop is wide: -1 at low, 0 at mid, 1 at high input",
+            "centroid of its width: −1 at low, 0 at mid, 1 at high input",
         ),
         ("loop area", found.loop_area, area, "enclosed by the largest cycle"),
         (
@@ -142,6 +153,11 @@ def _independent(found: Characterization) -> str:
     )
 
 
+def _chance(p: float | None) -> float | str | None:
+    """Return a p-value, without figures that no test has."""
+    return "< 0.001" if p is not None and p < 0.001 else p
+
+
 def _level(p: float | None) -> str:
     shown = "" if p is None else "p < 0.001, " if p < 0.001 else f"p = {p:.2g}, "
     return f"{shown}tested at {100 * LEVEL:g} %"
@@ -150,10 +166,13 @@ def _level(p: float | None) -> str:
 def _headline(found: Characterization) -> str:
     parts = []
     width = found.loop_width
-    if not found.has_loop:
+    if found.has_loop is None:
+        parts.append(_undecided(found))
+    elif not found.has_loop:
         parts.append(
             f"no loop that noise would not give ({_level(found.p_loop)}): {found.output} follows "
-            f"{found.input} along a curve without memory, as far as these recordings tell"
+            f"{found.input} along a curve without memory, the branches on average at most "
+            f"{_apart(found, found.widest_gap or 0.0)} apart"
         )
     elif width is not None:
         size = (
@@ -170,10 +189,9 @@ def _headline(found: Characterization) -> str:
             shape = ", asymmetric" if found.asymmetry >= ASYMMETRIC else ", symmetric"
         parts.append(f"{size} ({_percent(width)}){shape} loop")
     elif found.branch_gap is not None:
-        share = 100 * abs(found.branch_gap) / found.output_span
         parts.append(
             f"no cycle is sampled finely enough for a loop width; on average the branches are "
-            f"{_value(abs(found.branch_gap), found.output_unit)} ({_percent(share)}) apart"
+            f"{_apart(found, found.branch_gap)} apart"
         )
     else:
         parts.append(
@@ -188,6 +206,29 @@ def _headline(found: Characterization) -> str:
     if found.creep is not None and found.creep_time is not None:
         parts.append(_crept(found, found.creep, found.creep_time))
     return _sentence("; ".join(parts))
+
+
+def _undecided(found: Characterization) -> str:
+    """Return that there may be a loop: what is seen of it, and what may be."""
+    seen = ""
+    if found.branch_gap is not None:
+        seen = (
+            f"the branches seem {_apart(found, found.branch_gap)} apart, which noise or drift "
+            "would give as well"
+        )
+    most = ""
+    if found.widest_gap is not None and found.widest_gap < found.output_span:
+        most = f"on average they may be up to {_apart(found, found.widest_gap)} apart"
+    told = ", and ".join(part for part in (seen, most) if part)
+    return (
+        f"whether there is a loop cannot be told ({_level(found.p_loop)})"
+        f"{': ' if told else ''}{told}; record several cycles, whole and alike"
+    )
+
+
+def _apart(found: Characterization, gap: float) -> str:
+    share = _percent(100 * abs(gap) / found.output_span)
+    return f"{_value(abs(gap), found.output_unit)} ({share})"
 
 
 def _crept(found: Characterization, creep: float, time: float) -> str:
@@ -257,12 +298,24 @@ def _rate(found: Characterization) -> str:
 
 
 def _trust(found: Characterization) -> str:
-    if found.n_cycles == 0:
-        return (
+    said = []
+    if found.n_cycles == 0 and not found.cycles:
+        said.append(
             "There is no whole cycle of the input: record at least one, minimum to minimum, for loop "
             "width, area and shape."
         )
-    return ""
+    elif found.n_cycles == 0:
+        one = max(found.cycles, key=lambda cycle: cycle.amplitude)
+        said.append(
+            f"No cycle of the input is whole: width, area and shape of the loop are those "
+            f"{_range((one.low, one.high), found.input_unit)}, where both branches are."
+        )
+    if found.has_loop and not found.drift_excluded:
+        said.append(
+            "The input went up and down once, and drift would part the branches as well: record "
+            "several cycles to tell them apart."
+        )
+    return " ".join(said)
 
 
 def _range(limits: tuple[float, float], unit: str) -> str:

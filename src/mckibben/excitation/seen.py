@@ -185,7 +185,9 @@ def seen(
         scales=scales,
         branches={name: _branches(recordings, name, turns[name], scales[name]) for name in moving},
         turns={name: _heights(recordings, name, turns[name], scales[name]) for name in moving},
-        holds=_holds(recordings, _held_with(recordings, {name: scales[name] for name in moving})),
+        holds=_holds(
+            recordings, _held_with(recordings, {name: scales[name] for name in moving}, outputs)
+        ),
     )
 
 
@@ -223,12 +225,14 @@ def _scale(recordings: Sequence[Recording], channel: str) -> Scale:
     return Scale(low, high, noise)
 
 
-def _held_with(recordings: Sequence[Recording], scales: Mapping[str, Scale]) -> dict[str, Scale]:
-    """Return the inputs with what schedules and moves: in a hold, it is held too."""
+def _held_with(
+    recordings: Sequence[Recording], scales: Mapping[str, Scale], outputs: Sequence[str]
+) -> dict[str, Scale]:
+    """Return the inputs with what schedules and moves: in a hold, it is held too; outputs may creep."""
     beside = [
         name
         for name in SCHEDULES
-        if name not in scales and all(name in recording for recording in recordings)
+        if name not in (*scales, *outputs) and all(name in recording for recording in recordings)
     ]
     known = {name: _scale(recordings, name) for name in beside}
     return {**scales, **{name: scale for name, scale in known.items() if scale.moves}}

@@ -173,8 +173,11 @@ def cycles(x: ArrayLike, threshold: float | None = None) -> list[slice]:
     return whole_cycles(values, reversals(values, threshold))
 
 
-def whole_cycles(x: Array, turns: Indices) -> list[slice]:
-    """Return the whole cycles between turning points that are known already."""
+def whole_cycles(x: Array, turns: Indices, whole: float = WHOLE) -> list[slice]:
+    """Return the whole cycles between turning points that are known already.
+
+    At either end of the signal, so much of the other branch as ``whole`` says is enough.
+    """
     heights = x[turns]
     # A minimum, a maximum and a minimum in a row, wherever the first two rise.
     first = 0 if heights[1] > heights[0] else 1
@@ -182,8 +185,8 @@ def whole_cycles(x: Array, turns: Indices) -> list[slice]:
     found = []
     for i in range(first, last + 1, 2):
         rise, fall = heights[i + 1] - heights[i], heights[i + 1] - heights[i + 2]
-        begun = i > 0 or rise >= WHOLE * fall
-        ended = i < last or fall >= WHOLE * rise
+        begun = i > 0 or rise >= whole * fall
+        ended = i < last or fall >= whole * rise
         if begun and ended:
             found.append(slice(int(turns[i]), int(turns[i + 2]) + 1))
     return found

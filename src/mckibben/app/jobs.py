@@ -298,7 +298,7 @@ def note(
 def run(folder: str, name: str, kind: str, given: dict[str, Any]) -> None:
     """Do a job; this is what its process runs."""
     from mckibben.app.work import WORK
-    from mckibben.errors import MckibbenError
+    from mckibben.errors import MckibbenError, unforeseen
 
     end_with_parent()
     if hasattr(os, "nice"):
@@ -324,7 +324,7 @@ def run(folder: str, name: str, kind: str, given: dict[str, Any]) -> None:
     except MckibbenError as error:
         message, state = str(error), FAILED
     except Exception as error:  # a job that fails must say so, whatever it did
-        message, state = f"{type(error).__name__}: {error}", FAILED
+        message, state = unforeseen(error), FAILED
     try:
         note(workspace, name, kind, given, state, message[: kept.LONGEST])
     except DataError:

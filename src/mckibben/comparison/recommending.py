@@ -81,7 +81,7 @@ def recommended(rows: Sequence[R], constant: Ranked | None, unit: str) -> tuple[
             "No model is recommended: on what was left out to validate them, none predicts better than "
             "the mean of the training output beyond what chance gives. As far as these models can tell "
             "from so much data, the output does not depend on the input; where it does, it may be by "
-            "lags or dynamics that they lack, and models of rate have (oe, narx, bouc-wen)"
+            "lags or dynamics that they lack, and models of rate have (oe, narx, bouc-wen-oscillator)"
         )
     first = (better or working)[0]
     if constant is not None and not first.test_error < constant.test_error:

@@ -22,7 +22,7 @@ from mckibben.comparison.offered import objections
 from mckibben.comparison.pieces import PIECES, squares_of
 from mckibben.comparison.row import Row
 from mckibben.comparison.splits import Fold, Mask, Split
-from mckibben.errors import MckibbenError
+from mckibben.errors import MckibbenError, unforeseen
 from mckibben.estimators.optimisers.tracker import Progress, whole_searches
 from mckibben.metrics import Scores, mean_scores, score
 from mckibben.recording import Recording
@@ -146,7 +146,7 @@ def try_part(data: Data, part: Part, tell: Callable[..., None]) -> Tried:
     except MckibbenError as error:
         return Tried(Row(part.name, reason=str(error)))
     except Exception as error:  # one model must not take the comparison down, whatever it does
-        return Tried(Row(part.name, reason=f"{type(error).__name__}: {error}"))
+        return Tried(Row(part.name, reason=unforeseen(error)))
 
 
 def _refused(model: str, data: Data) -> str | None:

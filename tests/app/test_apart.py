@@ -13,6 +13,7 @@ from mckibben.app.desk import Desk
 from mckibben.app.jobs import Jobs
 from mckibben.app.kept import Step
 from mckibben.app.pages import apart
+from mckibben.app.together import sample_times
 from mckibben.app.workspace import Workspace
 from tests.app.test_pages import visit
 
@@ -24,16 +25,16 @@ def test_each_gets_one_step_more_and_one_undo_takes_all_back(tmp_path: Path) -> 
         time = np.arange(400) * step
         channels = {"pressure": 2 + np.sin(time), "displacement": np.cos(time)}
         workspace.add(Recording(channels, step), origin="a test", call="", name=name)
-    times = apart.sample_times(desk)
+    times = sample_times(desk)
     assert times == pytest.approx((0.0168, 0.0169))
     assert times is not None
     wanted = apart.common(times)
     workspace.edit_each(["fast"], "all resampled", Step(do="resample", sample_time=wanted))
     assert workspace.recording("fast").sample_time == wanted
-    assert apart.sample_times(desk) is None
+    assert sample_times(desk) is None
     assert len(workspace.entry("fast").steps) == 1
     assert workspace.undo() == "all resampled"
-    assert apart.sample_times(desk) == times
+    assert sample_times(desk) == times
     desk.jobs.close()
 
 

@@ -13,6 +13,7 @@ from mckibben.errors import DataError, ModelError
 def fit(workspace: Workspace, given: dict[str, Any], tell: Tell) -> str:
     """Fit, validate and test a model as `mckibben.compare` does, and keep it with its figures."""
     from mckibben.comparison.ranking import compare
+    from mckibben.comparison.results import CHOICES
 
     entries = workspace.entries()
     train, test = workspace.with_role("train", entries), workspace.with_role("test", entries)
@@ -55,10 +56,11 @@ def fit(workspace: Workspace, given: dict[str, Any], tell: Tell) -> str:
         "call": given.get("call", ""),
     }
     workspace.write_json("results", name, result)
+    heading = CHOICES[board.chosen_by][0]
     validated = "none" if row.validation_rmse is None else f"{row.validation_rmse:.4g} {board.unit}"
     tested = "none" if row.test is None else f"{row.test.rmse:.4g} {board.unit}"
     doubt = ["not recommended: see the leaderboard"] if board.not_recommended else []
-    return ". ".join([f"CV RMSE {validated}, test RMSE {tested}", *doubt, *board.shared])
+    return ". ".join([f"{heading} {validated}, test RMSE {tested}", *doubt, *board.shared])
 
 
 def report(workspace: Workspace, given: dict[str, Any], tell: Tell) -> str:

@@ -346,7 +346,7 @@ def _choice(rows: Sequence[Row], plan: Plan) -> Choice | None:
     rivals = [
         row
         for row in rows
-        if row.order[:2] == rows[0].order[:2] and (row.skill_least is None or row.skill_least > 0)
+        if row.order[:3] == rows[0].order[:3] and (row.skill_least is None or row.skill_least > 0)
     ]
     squares = {row.model: row.squares for row in rivals if row.squares}
     return choice_of(squares, counts_of(plan.data.folds), plan.seed)

@@ -161,6 +161,13 @@ def test_what_is_good_only_near_its_training_says_so(train: Recording, test_set:
     plain = replace(row, model="pi", validation_rmse=0.2)
     failed = replace(row, model="gpi", validation_rmse=None)
     assert sorted([failed, careful, plain], key=lambda row: row.order) == [plain, careful, failed]
+    idle = replace(plain, skill_least=-0.1)
+    works = replace(careful, skill_least=0.4)
+    assert sorted([idle, failed, works], key=lambda row: row.order) == [works, idle, failed]
+    assert board.constant is not None
+    last = replace(board.constant, validation_rmse=0.21)
+    shown = replace(board, rows=(works, idle), constant=last).ranking
+    assert [one.model for one in shown] == ["narx", "constant", "pi"]
 
 
 def test_same_seed_same_table_whatever_the_number_of_processes(

@@ -11,7 +11,7 @@ from mckibben.app.together import obstacle
 from mckibben.comparison.channels import Channels
 from mckibben.comparison.inverses import Kind
 from mckibben.comparison.limits import limits
-from mckibben.comparison.needs import Need, full_name, inverse_kind, needs
+from mckibben.comparison.needs import Need, full_name, inverse_kind, inverse_may_lack, needs
 from mckibben.comparison.offered import defaults, objections
 from mckibben.comparison.recognising import DRIVING, FORCE
 from mckibben.comparison.splits import held_out
@@ -39,6 +39,8 @@ class Offer:
         Why it is good only near its training; empty where nothing says so.
     inverse : {"exact", "solved", "none"}
         How it is undone.
+    inverse_may_lack : bool
+        Whether it depends on the fit that it can be.
     needs_time : bool
     seconds : float
         About how long it takes to fit and cross-validate it to these recordings.
@@ -49,6 +51,7 @@ class Offer:
     can: str
     caution: str
     inverse: Kind
+    inverse_may_lack: bool
     needs_time: bool
     seconds: float
 
@@ -126,6 +129,7 @@ def _offer(model: str, samples: int) -> Offer:
         said.get("can", ""),
         said.get("caution", ""),
         inverse_kind(model),
+        inverse_may_lack(model),
         estimator.needs_time,
         estimator.effort * samples / 10_000 * FOLDS,
     )

@@ -10,10 +10,15 @@ from nicegui import ui
 
 from mckibben.app.desk import LONGEST, Desk, guarded, hinted, labelled, named
 from mckibben.app.offering import Offer, Offered, offered
+from mckibben.app.pages import apart
 from mckibben.app.pages.settings import ask
 from mckibben.comparison.needs import Need
 
-INVERSES = {"exact": "exact inverse", "solved": "inverse by solving", "none": "no inverse"}
+INVERSES = {
+    "exact": "exact inverse",
+    "solved": "inverse by solving",
+    "none": "no inverse",
+}
 
 
 class Choice:
@@ -29,6 +34,8 @@ class Choice:
         self.settings: dict[str, dict[str, str]] = {}
         self.ticked: list[str] = []
         self.shown: Offered | None = None
+        self.possible = False
+        """Whether there is anything to fit."""
         self.boxes: dict[str, ui.checkbox] = {}
         self.heads: list[tuple[Any, str, list[Offer]]] = []
         self.said = named(ui.label("Looking at the data …"), "recognised").classes("text-sm w-full")
@@ -47,10 +54,13 @@ class Choice:
         kept = [model for model in self.ticked if model in names]
         self.shown, self.ticked = found, kept or list(found.start)
         self.said.set_text(found.recognised)
+        self.possible = bool(found.groups)
         self.actions.set_visibility(True)
         self.place.clear()
         self.boxes, self.heads = {}, []
         with self.place:
+            if not found.groups:
+                apart.hindering(self.desk)
             for need, offers in found.groups:
                 self._group(need, offers)
             self._others(found.against)
@@ -124,7 +134,8 @@ class Choice:
 
 
 def _about(offer: Offer) -> str:
-    said = [INVERSES[offer.inverse], f"about {_time(offer.seconds)}"]
+    said = [f"{INVERSES[offer.inverse]}{', where that is stable' * offer.inverse_may_lack}"]
+    said.append(_time(offer.seconds))
     if offer.needs_time:
         said.append("needs time")
     if offer.caution:
@@ -133,6 +144,7 @@ def _about(offer: Offer) -> str:
 
 
 def _time(seconds: float) -> str:
-    if seconds < 90:
-        return f"{max(1, round(seconds))} s"
-    return f"{round(seconds / 60)} min"
+    """Return about how long a fit takes: how busy the machine is, nobody knows."""
+    if seconds < 15:
+        return "seconds"
+    return "about a minute" if seconds < 90 else "minutes" if seconds < 1800 else "an hour or more"

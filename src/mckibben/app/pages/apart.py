@@ -24,9 +24,10 @@ def build(desk: Desk) -> None:
 
 
 def hindering(desk: Desk) -> None:
-    """Show what differs so that nothing may be fitted, and buttons that mend it."""
+    """Show what differs so that nothing may be fitted, and buttons that mend it; one thing at a time."""
     _channels(desk)
-    _sample_times(desk)
+    if desk.workspace.channels():
+        _sample_times(desk)
 
 
 def common(times: tuple[float, float]) -> float:

@@ -6,7 +6,7 @@ import asyncio
 import re
 from typing import Any
 
-from nicegui import ui
+from nicegui import binding, ui
 
 from mckibben.app.desk import LONGEST, Desk, guarded, hinted, labelled, named
 from mckibben.app.offering import Offer, Offered, offered
@@ -29,13 +29,15 @@ class Choice:
     desk : Desk
     """
 
+    possible = binding.BindableProperty()
+    """Whether there is anything to fit."""
+
     def __init__(self, desk: Desk) -> None:
+        self.possible = False
         self.desk = desk
         self.settings: dict[str, dict[str, str]] = {}
         self.ticked: list[str] = []
         self.shown: Offered | None = None
-        self.possible = False
-        """Whether there is anything to fit."""
         self.boxes: dict[str, ui.checkbox] = {}
         self.heads: list[tuple[Any, str, list[Offer]]] = []
         self.said = named(ui.label("Looking at the data …"), "recognised").classes("text-sm w-full")

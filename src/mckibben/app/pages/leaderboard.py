@@ -45,6 +45,15 @@ CAREFUL = (
     "others that do better than the constant, whatever its error. "
 )
 
+NARROW = {"classes": "!px-2", "headerClasses": "!px-2 !whitespace-normal"}
+"""Of columns of figures, so that all are seen on a wide screen."""
+
+STAYING = dict.fromkeys(
+    ("classes", "headerClasses"),
+    "sticky left-0 z-10 min-w-32 bg-[var(--paper)] dark:bg-[var(--q-dark)] !whitespace-normal",
+)
+"""Of names, which stay while the rest is scrolled on a narrow one."""
+
 OTHER_DATA = (
     "Models marked “other data” were fitted or tested on recordings that have been added, changed, or "
     "given another role since: their errors do not compare with the others'. Fit them again."
@@ -59,6 +68,7 @@ def build(desk: Desk) -> None:
     def shown() -> None:
         results = desk.results()
         if not results:
+            ui.label("Fit models to see them compared here.").classes("opacity-70")
             return
         ui.label("Leaderboard").classes("text-lg")
         if not all(result["current"] for result in results):
@@ -130,6 +140,7 @@ def _table(results: Sequence[dict[str, Any]], outputs: Sequence[str]) -> ui.tabl
         columns=[
             {"name": key, "label": label, "field": key, "sortable": True}
             | {"align": "left" if key == "title" else "right", ":sort": BY_VALUE % f"{key}_by"}
+            | (STAYING if key == "title" else NARROW)
             for key, label in listed
         ],
         row_key="name",

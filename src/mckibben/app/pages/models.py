@@ -34,8 +34,8 @@ def build(desk: Desk) -> None:
             _running(desk)
         with board:
             leaderboard.build(desk)
-        head = ui.expansion(FIT, value=True)
-        with named(head.classes("w-full text-lg").props("dense"), "choose-models"):
+        head = ui.expansion(FIT, value=True).props("dense header-class=text-lg")
+        with named(head.classes("w-full"), "choose-models"):
             _choosing(desk)
 
     def arrange() -> None:

@@ -33,3 +33,13 @@ def said(error: Exception | str) -> str:
     for option, field in _FIELDS:
         text = re.sub(option, field, text)
     return text[:LONGEST].encode("utf-8", "replace").decode()
+
+
+def shortened(text: str, most: int) -> str:
+    """Return a text without its middle where it is long: what tells names apart is often at the end.
+
+    >>> shortened("balance-force-muscle12cm_contracted10mm_2", 21)
+    'balance-fo…cted10mm_2'
+    """
+    half = (most - 1) // 2
+    return text if len(text) <= most else f"{text[:half]}…{text[half + 1 - most :]}"

@@ -19,6 +19,7 @@ from typing import Any
 
 from mckibben.app import kept
 from mckibben.app.claim import keep_to_the_user
+from mckibben.app.fields import said
 from mckibben.app.workspace import Workspace
 from mckibben.errors import DataError
 from mckibben.system.ordinary import DESCRIPTION, read_bytes
@@ -295,6 +296,14 @@ def note(
     workspace.write_json("jobs", name, content)
 
 
+def by_name(workspace: Workspace, text: str) -> str:
+    """Return a text in the words of the workbench: recordings by their names, not by their files."""
+    for entry in workspace.entries():
+        for file in (str(entry.path), f"{entry.path.parent.name}/{entry.path.name}"):
+            text = text.replace(file, entry.name)
+    return said(text)
+
+
 def run(folder: str, name: str, kind: str, given: dict[str, Any]) -> None:
     """Do a job; this is what its process runs."""
     from mckibben.app.work import WORK
@@ -326,7 +335,7 @@ def run(folder: str, name: str, kind: str, given: dict[str, Any]) -> None:
     except Exception as error:  # a job that fails must say so, whatever it did
         message, state = unforeseen(error), FAILED
     try:
-        note(workspace, name, kind, given, state, message[: kept.LONGEST])
+        note(workspace, name, kind, given, state, by_name(workspace, message)[: kept.LONGEST])
     except DataError:
         sys.exit(UNWRITTEN)
     held.leave()

@@ -89,3 +89,11 @@ class DataWarning(UserWarning):
 
 class ModelWarning(UserWarning):
     """Something a model did that its user should know, such as clipping a reference."""
+
+
+def unforeseen(error: Exception) -> str:
+    """Return in words what nobody has foreseen: it is a fault of the program."""
+    return (
+        f"this is a fault of the program, not of the data ({type(error).__name__}: {error}). "
+        "Remedy: try other settings or another model, and report it."
+    )

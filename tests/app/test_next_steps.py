@@ -6,10 +6,10 @@ from pathlib import Path
 
 from mckibben import read
 from mckibben.app.desk import Desk
-from mckibben.app.jobs import Jobs
+from mckibben.app.jobs import Jobs, by_name
 from mckibben.app.offering import offered
 from mckibben.app.work import check, fit, plan
-from tests.app.test_jobs import filled
+from tests.app.test_jobs import filled, swung
 from tests.app.test_jobs import fit as asked
 
 
@@ -21,7 +21,12 @@ def test_a_model_is_judged_on_a_page(tmp_path: Path) -> None:
     workspace = filled(tmp_path)
     fit(workspace, asked("pi", "mine"), silent)
     said = check(workspace, {"name": "mine", "file": "mine-check.html"}, silent)
-    assert said.startswith("On training recordings: ")
+    assert said.startswith("On training recordings, which it was fitted to: ")
+    workspace.add(swung(7.0).slice(0, 30), origin="", call="", name="short", role="test")
+    said = check(workspace, {"name": "mine", "file": "again.html"}, silent)
+    assert said.startswith("Test recordings tell too little: ")
+    assert "On training recordings, which it was fitted to: " in said
+    assert by_name(workspace, said).startswith("Test recordings tell too little: short: ")
     page = workspace.path("takeaway", "mine-check.html").read_text("utf-8")
     assert "models/mine.json" in page
 

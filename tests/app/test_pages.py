@@ -104,7 +104,7 @@ def test_recordings_of_two_muscles_get_models_that_couple_them(tmp_path: Path) -
     desk.settle_channels()
     assert desk.inputs == ("pressure_1", "pressure_2")
     assert desk.channels["output"] == ["displacement_1", "displacement_2"]
-    models = {"balance", "coupled-memory", "coupled-pi"}
+    models = {"balance", "coupled-memory"}
     for seed, name in enumerate(("first", "second")):
         given = {"model": "coupled-memory", "name": name, "seed": seed}
         fit(workspace, given | desk.channels, lambda share, cost: None)
@@ -117,8 +117,9 @@ def test_recordings_of_two_muscles_get_models_that_couple_them(tmp_path: Path) -
             (box,) = user.find(marker=f"model-{model}").elements
             assert isinstance(box, ui.checkbox)
             assert box.value
-        for model in ("pi", "gpi", "arx"):
+        for model in ("pi", "gpi", "arx", "coupled-pi"):
             await user.should_not_see(marker=f"model-{model}")
+        await user.should_see("pressure_1 moves alone in no run")
         (table,) = user.find(marker="leaderboard").elements
         assert isinstance(table, ui.table)
         assert {row["name"] for row in table.rows} == {"first", "second"}

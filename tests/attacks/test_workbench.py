@@ -621,4 +621,4 @@ def test_what_speaks_against_a_model_reaches_the_page(tmp_path: Path) -> None:
     workspace.write_json("results", "pi", result)
     constant, *said = _judged(workspace.results())
     assert "test RMSE 3" in constant
-    assert said == ["pi: Nothing speaks for it.", "pi: It was fitted to."]
+    assert said == ["Nothing speaks for it.", "pi: It was fitted to."]

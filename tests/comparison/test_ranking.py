@@ -161,6 +161,13 @@ def test_what_is_good_only_near_its_training_says_so(train: Recording, test_set:
     plain = replace(row, model="pi", validation_rmse=0.2)
     failed = replace(row, model="gpi", validation_rmse=None)
     assert sorted([failed, careful, plain], key=lambda row: row.order) == [plain, careful, failed]
+    idle = replace(plain, skill_least=-0.1)
+    works = replace(careful, skill_least=0.4)
+    assert sorted([idle, failed, works], key=lambda row: row.order) == [works, idle, failed]
+    assert board.constant is not None
+    last = replace(board.constant, validation_rmse=0.21)
+    shown = replace(board, rows=(works, idle), constant=last).ranking
+    assert [one.model for one in shown] == ["narx", "constant", "pi"]
 
 
 def test_same_seed_same_table_whatever_the_number_of_processes(
@@ -231,13 +238,14 @@ def test_a_model_that_fails_is_a_row_with_its_reason(
         registry._locations.cache_clear()
     assert [row.model for row in board.rows] == ["pi", "failing", "overflowing"]
     reasons = {row.model: row.reason for row in board.rows}
-    assert reasons["failing"] == "ZeroDivisionError: of all things"
+    said = "this is a fault of the program, not of the data (ZeroDivisionError: of all things)"
+    assert str(reasons["failing"]).startswith(f"{said}. Remedy: ")
     assert "not finite" in str(reasons["overflowing"])
     assert [row["model"] for row in board.to_dict()["rows"]][1] == "constant"
     assert board.to_dict()["rows"][2] == {
         "model": "failing",
         "status": "failed",
-        "reason": "ZeroDivisionError: of all things",
+        "reason": reasons["failing"],
     }
 
 

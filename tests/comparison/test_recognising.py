@@ -35,6 +35,20 @@ def run(*channels: str, held: tuple[str, ...] = (), **units: str) -> Recording:
         ("pressure force", "pressure", "force"),
         ("reference_displacement pressure displacement", "pressure", "displacement"),
         ("cuff hand", "cuff", "hand"),
+        ("pressure_1 pressure_2 pressure_3 x y", "pressure_1 pressure_2 pressure_3", "x y"),
+        ("pressure_1 pressure_2 x y angle", "pressure_1 pressure_2", "x y"),
+        ("u1 u2 x_1 y_1 x_2 y_2", "u1 u2", "x_1 y_1 x_2 y_2"),
+        ("pressure x y", "pressure", "x y"),
+        ("u y", "u", "y"),
+        ("pressure_1 pressure_2 displacement angle", "pressure_1 pressure_2", "displacement"),
+        ("pressure displacement angle", "pressure", "displacement"),
+        ("pressure_1 pressure_2 angle_1 angle_2 x", "pressure_1 pressure_2", "angle_1 angle_2"),
+        ("pressure_1 pressure_2 displacement length", "pressure_1 pressure_2", "displacement"),
+        ("pressure_left pressure_right angle", "pressure_left pressure_right", "angle"),
+        ("pressure pressure_left displacement", "pressure", "displacement"),
+        ("pressure pressure_2 angle angle_2", "pressure pressure_2", "angle angle_2"),
+        ("pressure pressure_1 pressure_2 angle", "pressure_1 pressure_2", "angle"),
+        ("p_a p_b displacement_x displacement_y", "p_a p_b", "displacement_x displacement_y"),
     ],
 )
 def test_by_name(channels: str, inputs: str, outputs: str) -> None:
@@ -45,6 +59,12 @@ def test_by_name(channels: str, inputs: str, outputs: str) -> None:
 def test_by_unit() -> None:
     found = run("left", "right", "tip", left="bar", right="bar", tip="mm")
     assert recognised([found], ["tip", "left", "right"]) == (("left", "right"), ("tip",))
+
+
+def test_of_several_muscles_the_most_of_one_unit_is_moved() -> None:
+    names = ["pressure_1", "pressure_2", "displacement", "elbow", "shoulder", "reference_angle"]
+    found = run(*names, displacement="mm", elbow="rad", shoulder="rad", reference_angle="rad")
+    assert recognised([found], names) == (("pressure_1", "pressure_2"), ("elbow", "shoulder"))
 
 
 def test_at_a_length_held_the_force_is_modelled() -> None:

@@ -126,6 +126,11 @@ def test_muscles_that_never_move_alone_are_said() -> None:
     both = runs(ForceBalance.example().inverse())[2::3]
     with pytest.raises(DataError, match=r"pressure_1.*alone.*fit balance"):
         registry.load("estimators", "sdchm")().fit(both)
+    names = ["pressure_1", "pressure_2"], ["displacement_1", "displacement_2"]
+    for model in ("sdchm", "sdchm-published", "coupled-pi"):
+        objection = registry.load("estimators", model).objection
+        assert "pressure_1 moves alone in no run" in str(objection(both, *names))
+        assert objection(runs(ForceBalance.example().inverse()), *names) is None
     registry.load("estimators", "balance")(n_lags=0, steps=2).fit(both)
 
 

@@ -230,6 +230,17 @@ def test_a_start_of_which_the_known_outputs_tell_nothing_is_rest() -> None:
     np.testing.assert_allclose(lag.fitted_state(u, y, STEP), at_rest + 2.0, atol=0.4)
 
 
+def test_a_start_that_is_forgotten_before_samples_count_is_not_solved_for() -> None:
+    run = recorded(0, 9000)
+    rows = np.arange(9000) >= 8000  # by when a start has decayed to next to nothing
+    data = training_data([run], ("pressure",), ("displacement",), [rows])
+    theta = np.array([*B, -0.9, 0.07, 0.0])  # poles at 0.81 and 0.09
+    e, slopes, _ = evaluate(theta, Orders(b=2, f=2), data.runs)
+    still = evaluate(theta, Orders(b=2, f=2), data.runs, "virgin")[0]
+    assert np.isfinite(slopes).all()
+    np.testing.assert_allclose(e, still, atol=1e-9)
+
+
 def warm(seed: int, n: int = 1000) -> Recording:
     rng = np.random.default_rng(seed)
     u = np.repeat(rng.uniform(0, 5, (n + 500) // 50), 50)

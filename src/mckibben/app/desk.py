@@ -102,10 +102,7 @@ class Desk:
         Each was fitted by itself and says so of itself; which one it depends on is a matter of all, as
         in `mckibben.comparison.recommending.recommended`.
         """
-        results = self.results()
-        better = [result for result in results if (result["skill_least"] or 0.0) > 0]
-        first = next(iter(better or results), None)
-        return str(first["not_recommended"] or "") if first else ""
+        return not_recommended(self.results())
 
     def __post_init__(self) -> None:
         _DESKS.add(self)
@@ -155,6 +152,13 @@ class Desk:
         setattr(self, other, left)
         setattr(self, side, tuple(name for name in channels if name not in left))
         self._chosen = True
+
+
+def not_recommended(results: Sequence[dict[str, Any]]) -> str:
+    """Return why none of some models, in the order of the choice, is recommended; empty where one is."""
+    better = [result for result in results if (result["skill_least"] or 0.0) > 0]
+    first = next(iter(better or results), None)
+    return str(first["not_recommended"] or "") if first else ""
 
 
 def named(element: Any, name: str) -> Any:

@@ -81,3 +81,13 @@ def said(error: Exception | str) -> str:
 
 def _word(option: re.Match[str]) -> str:
     return _WORDS.get(option[1], option[0])
+
+
+def shortened(text: str, most: int) -> str:
+    """Return a text without its middle where it is long: what tells names apart is often at the end.
+
+    >>> shortened("balance-force-muscle12cm_contracted10mm_2", 21)
+    'balance-fo…cted10mm_2'
+    """
+    half = (most - 1) // 2
+    return text if len(text) <= most else f"{text[:half]}…{text[half + 1 - most :]}"

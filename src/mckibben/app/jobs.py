@@ -19,6 +19,7 @@ from typing import Any
 
 from mckibben.app import kept
 from mckibben.app.claim import keep_to_the_user
+from mckibben.app.fields import said
 from mckibben.app.workspace import Workspace
 from mckibben.errors import DataError
 from mckibben.system.ordinary import DESCRIPTION, read_bytes
@@ -295,10 +296,18 @@ def note(
     workspace.write_json("jobs", name, content)
 
 
+def by_name(workspace: Workspace, text: str) -> str:
+    """Return a text in the words of the workbench: recordings by their names, not by their files."""
+    for entry in workspace.entries():
+        for file in (str(entry.path), f"{entry.path.parent.name}/{entry.path.name}"):
+            text = text.replace(file, entry.name)
+    return said(text)
+
+
 def run(folder: str, name: str, kind: str, given: dict[str, Any]) -> None:
     """Do a job; this is what its process runs."""
     from mckibben.app.work import WORK
-    from mckibben.errors import MckibbenError
+    from mckibben.errors import MckibbenError, unforeseen
 
     end_with_parent()
     if hasattr(os, "nice"):
@@ -324,9 +333,9 @@ def run(folder: str, name: str, kind: str, given: dict[str, Any]) -> None:
     except MckibbenError as error:
         message, state = str(error), FAILED
     except Exception as error:  # a job that fails must say so, whatever it did
-        message, state = f"{type(error).__name__}: {error}", FAILED
+        message, state = unforeseen(error), FAILED
     try:
-        note(workspace, name, kind, given, state, message[: kept.LONGEST])
+        note(workspace, name, kind, given, state, by_name(workspace, message)[: kept.LONGEST])
     except DataError:
         sys.exit(UNWRITTEN)
     held.leave()

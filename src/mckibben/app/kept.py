@@ -146,6 +146,7 @@ class Fitted(Kept):
     step_ns: Number = None
     constant: Constant | None = None
     skill_least: Number = None
+    inverse: Literal["exact", "solved", "none"] | None = None
     not_recommended: Text | None = None
     shared: list[Text] = []
     data: Text = ""

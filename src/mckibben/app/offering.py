@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass
 
 from mckibben import registry
 from mckibben.app.desk import Desk
+from mckibben.app.together import obstacle
 from mckibben.comparison.channels import Channels
 from mckibben.comparison.inverses import Kind
 from mckibben.comparison.limits import limits
-from mckibben.comparison.needs import Need, full_name, inverse_kind, needs
+from mckibben.comparison.needs import Need, full_name, inverse_kind, inverse_may_lack, needs
 from mckibben.comparison.offered import defaults, objections
 from mckibben.comparison.recognising import DRIVING, FORCE
+from mckibben.comparison.splits import held_out
+from mckibben.errors import DataError
+from mckibben.recording import Recording
 
 FOLDS = 6
 """Fits of a model: one, and those of its cross-validation."""
@@ -34,6 +39,8 @@ class Offer:
         Why it is good only near its training; empty where nothing says so.
     inverse : {"exact", "solved", "none"}
         How it is undone.
+    inverse_may_lack : bool
+        Whether it depends on the fit that it can be.
     needs_time : bool
     seconds : float
         About how long it takes to fit and cross-validate it to these recordings.
@@ -44,6 +51,7 @@ class Offer:
     can: str
     caution: str
     inverse: Kind
+    inverse_may_lack: bool
     needs_time: bool
     seconds: float
 
@@ -72,17 +80,20 @@ class Offered:
 
 def offered(desk: Desk) -> Offered:
     """Return the models that have a place on the channels chosen, by need."""
+    if hindered := obstacle(desk):
+        return Offered(hindered, [], [], {})
     used = desk.workspace.used()
-    recordings = list(used.values())
-    if recordings and (same := set(desk.inputs) & set(desk.outputs)):
-        said = f"{', '.join(sorted(same))} would be input and output: choose other channels under Data."
-        return Offered(said, [], [], {})
-    names = registry.names("estimators")
+    names, recordings = registry.names("estimators"), list(used.values())
     channels = Channels(desk.inputs, desk.outputs)
-    known = set(desk.inputs + desk.outputs) <= set(desk.workspace.channels())
-    against = objections(names, recordings, channels) if recordings and known else {}
-    train = {entry.name for entry in desk.workspace.entries() if entry.role == "train"}
-    samples = max(sum(len(run) for name, run in used.items() if name in train), LEAST)
+    against = objections(names, recordings, channels) if recordings else {}
+    roles = {entry.name: entry.role for entry in desk.workspace.entries()}
+    train = [run for name, run in used.items() if roles.get(name) == "train"]
+    if train:  # of what is fitted to, there may be too little
+        against = (
+            objections(names, _fitted(train, "test" in roles.values(), channels), channels)
+            | against
+        )
+    samples = max(sum(map(len, train)), LEAST)
     groups = [
         (need, [_offer(model, samples) for model in need.models if model not in against])
         for need in needs()
@@ -96,11 +107,18 @@ def offered(desk: Desk) -> Offered:
         if offer.model in need.start and not (timeless and defaults(offer.model).get("n_creep"))
     ]
     return Offered(
-        _recognised(desk, len(names) - len(against)) if recordings and known else "",
+        _recognised(desk, len(names) - len(against)) if recordings else "",
         groups,
         start,
         {full_name(model): reason for model, reason in against.items()},
     )
+
+
+def _fitted(train: list[Recording], tested: bool, channels: Channels) -> list[Recording]:
+    """Return what models are fitted to where, without recordings to test on, some are held out."""
+    with suppress(DataError):  # too little to hold anything out: the fit will say so
+        return train if tested else list(held_out(train, channels).train)
+    return train
 
 
 def _offer(model: str, samples: int) -> Offer:
@@ -111,6 +129,7 @@ def _offer(model: str, samples: int) -> Offer:
         said.get("can", ""),
         said.get("caution", ""),
         inverse_kind(model),
+        inverse_may_lack(model),
         estimator.needs_time,
         estimator.effort * samples / 10_000 * FOLDS,
     )

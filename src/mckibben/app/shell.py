@@ -17,6 +17,7 @@ from nicegui import context, ui
 from mckibben import registry
 from mckibben.app import busy, fields, theme
 from mckibben.app.desk import Desk, code, hinted, labelled, named, tell, told, unexpected
+from mckibben.app.fields import shortened
 from mckibben.app.jobs import ENDED, RUNNING, Job, Jobs
 from mckibben.app.workspace import Workspace
 from mckibben.system.workers import PRELOADED
@@ -123,7 +124,9 @@ def _under_way(here: list[busy.Doing], jobs: Jobs) -> str:
         told = jobs.progress(job.name)
         share = told[-1][1] if told else 0.0
         word = WORDS.get(job.kind, "Working on")
-        said.append(f"{word} {job.title:.24}{f' {100 * share:.0f} %' if share > 0 else ''}")
+        said.append(
+            f"{word} {shortened(job.title, 24)}{f' {100 * share:.0f} %' if share > 0 else ''}"
+        )
     more = len(active) + len(here) - len(said)
     return ", ".join(said) + (f", {more} more" if more else "")
 
@@ -220,11 +223,12 @@ def _watch(desk: Desk) -> None:
 
 
 def _say(job: Job) -> None:
-    text = fields.said(f"{job.title:.80}: {job.said}")[:300]
+    text = fields.said(f"{shortened(job.title, 40)}: {job.said}")[:300]
     if job.state == "failed":
         ui.notify(text, type="negative", multi_line=True, timeout=10_000)
     else:
-        ui.notify(text, type="info")
+        text = f"{shortened(job.title, 40)}: {job.state}"  # what came of it is on the page
+        ui.notify(text, type="info", position="bottom-right", timeout=2500)
 
 
 async def _match(desk: Desk, dark: ui.dark_mode) -> None:
@@ -261,7 +265,7 @@ def _log(desk: Desk) -> None:
 
 def page_module(name: str) -> ModuleType:
     """Return what builds a page, loaded."""
-    return importpage_module(_place(name))
+    return import_module(_place(name))
 
 
 def _place(name: str) -> str:
@@ -276,11 +280,11 @@ def load_the_rest() -> None:
     """
     with _LOADING:
         for module in FIRST:
-            importpage_module(module)
+            import_module(module)
         for name in PAGES:
             page_module(name)
         for module in (*PRELOADED, *LATER):
-            importpage_module(module)
+            import_module(module)
         for name in registry.names("estimators"):
             registry.load("estimators", name)
 

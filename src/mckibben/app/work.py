@@ -9,10 +9,14 @@ from mckibben.app.following import Tell, estimate, look_back, loop
 from mckibben.app.workspace import Workspace
 from mckibben.errors import DataError, ModelError
 
+TRAINED_ON = "On training recordings, which it was fitted to:"
+"""Where there is nothing else to judge by."""
+
 
 def fit(workspace: Workspace, given: dict[str, Any], tell: Tell) -> str:
     """Fit, validate and test a model as `mckibben.compare` does, and keep it with its figures."""
     from mckibben.comparison.ranking import compare
+    from mckibben.comparison.results import CHOICES
 
     entries = workspace.entries()
     train, test = workspace.with_role("train", entries), workspace.with_role("test", entries)
@@ -55,10 +59,11 @@ def fit(workspace: Workspace, given: dict[str, Any], tell: Tell) -> str:
         "call": given.get("call", ""),
     }
     workspace.write_json("results", name, result)
+    heading = CHOICES[board.chosen_by][0]
     validated = "none" if row.validation_rmse is None else f"{row.validation_rmse:.4g} {board.unit}"
     tested = "none" if row.test is None else f"{row.test.rmse:.4g} {board.unit}"
     doubt = ["not recommended: see the leaderboard"] if board.not_recommended else []
-    return ". ".join([f"CV RMSE {validated}, test RMSE {tested}", *doubt, *board.shared])
+    return ". ".join([f"{heading} {validated}, test RMSE {tested}", *doubt, *board.shared])
 
 
 def report(workspace: Workspace, given: dict[str, Any], tell: Tell) -> str:
@@ -92,16 +97,22 @@ def check(workspace: Workspace, given: dict[str, Any], tell: Tell) -> str:
 
     name = str(given["name"])
     model = workspace.model(name)
-    recordings = workspace.with_role("test") or workspace.with_role("train")
-    if not recordings:
+    tests, train = workspace.with_role("test"), workspace.with_role("train")
+    if not tests and not train:
         raise DataError("there is no recording to judge by", remedy="add one under Data")
-    found = judged(model, recordings)
+    recordings, on = (tests, "On test recordings:") if tests else (train, TRAINED_ON)
+    try:
+        found = judged(model, recordings)
+    except DataError as error:  # a short test tells too little
+        if not tests or not train:
+            raise
+        recordings, on = train, f"Test recordings tell too little: {error} {TRAINED_ON}"
+        found = judged(model, recordings)
     tell(0.6, float("nan"))
     description = describe(model, recordings, fitted=False)
     page = check_page(found, description, f"models/{name}.json")
     write_text(workspace.new_path("takeaway", str(given["file"])), page)
-    on = "test" if workspace.with_role("test") else "training"
-    return " ".join([f"On {on} recordings:", found.verdict, *found.sentences])
+    return " ".join([on, found.verdict, *found.sentences])
 
 
 def plan(workspace: Workspace, given: dict[str, Any], tell: Tell) -> str:

@@ -185,5 +185,5 @@ class Workspace(Changing):
 
 def _as_in_a_leaderboard(result: dict[str, Any]) -> tuple[Any, ...]:
     fitted = (result["train"] or {}).get("rmse")
-    ranked = order(result["model"], result["validation_rmse"], fitted)
+    ranked = order(result["model"], result["validation_rmse"], fitted, result["skill_least"])
     return not result["current"], "" if result["current"] else result["data"], *ranked

@@ -70,3 +70,12 @@ def inverse_kind(model: str) -> Kind:
     """
     kinds: tuple[Kind, ...] = ("exact", "solved")
     return next((kind for kind in kinds if model in _read()["inverse"][kind]), "none")
+
+
+def inverse_may_lack(model: str) -> bool:
+    """Tell whether it depends on the fit that a model can be undone: a filter's inverse may be unstable.
+
+    >>> inverse_may_lack("arx"), inverse_may_lack("pi")
+    (True, False)
+    """
+    return model in _read()["inverse"]["where_stable"]

@@ -122,8 +122,9 @@ def compare(
     found : callable, optional
         Told the leaderboard of the models finished, whenever one is.
     watch : callable, optional
-        Told, while a model is fitted to all of the training set, its name, the share of the search that
-        is done, and the least cost so far; not on joblib's backends.
+        Told, while a model is fitted, its name, the share of its searches that is done, those of the
+        cross-validation before that of all the training set, and the least cost so far of the present
+        one; where parts of a model are shared among processes, of one of them; not on joblib's backends.
 
     Returns
     -------
@@ -346,7 +347,7 @@ def _choice(rows: Sequence[Row], plan: Plan) -> Choice | None:
     rivals = [
         row
         for row in rows
-        if row.order[:2] == rows[0].order[:2] and (row.skill_least is None or row.skill_least > 0)
+        if row.order[:3] == rows[0].order[:3] and (row.skill_least is None or row.skill_least > 0)
     ]
     squares = {row.model: row.squares for row in rivals if row.squares}
     return choice_of(squares, counts_of(plan.data.folds), plan.seed)

@@ -12,11 +12,23 @@ from mckibben.recording import Recording
 DRIVING = ("pressure", "voltage", "command", "input", "u", "p")
 """What inputs are called, those nearest to the muscle first."""
 
-MOVED = ("displacement", "length", "contraction", "position", "angle", "output", "y", "x")
+ALONG, TURNED = ("displacement", "length", "contraction", "position"), ("angle",)
+"""What goes along a way, and what turns."""
+
+COORDINATES = "[xyz]"
+"""Of one place; each is an output of its own."""
+
+MOVED = (*ALONG, *TURNED, "output", COORDINATES)
 """What outputs are called."""
 
 UNITS_DRIVING, UNITS_MOVED = ("bar", "V"), ("mm", "rad")
 """Units of either, where names say nothing."""
+
+PLACES = "[a-z]|left|right|top|bottom|upper|lower|front|back|rear|flexor|extensor"
+"""What tells channels of one quantity apart, where numbers do not."""
+
+ASKED = ("reference_", "command_")
+"""Beginnings of the names of what a loop is told: these are no measurements."""
 
 FORCE = "force"
 
@@ -45,7 +57,7 @@ def recognised(recordings: Sequence[Recording], channels: Sequence[str]) -> Side
     inputs = _called(channels, DRIVING) or _in_units(channels, units, UNITS_DRIVING)
     inputs = inputs or tuple(channels[:1])
     rest = [name for name in channels if name not in inputs]
-    outputs = _called(rest, MOVED) or _in_units(rest, units, UNITS_MOVED)
+    outputs = _moved(rest, units, len(inputs))
     if FORCE in rest and outputs and not any_moves(recordings, outputs):
         return outputs[:1], (FORCE,)
     return inputs, outputs or ((FORCE,) if FORCE in rest else tuple((rest or list(channels))[:1]))
@@ -68,13 +80,35 @@ def moved_by(recordings: Sequence[Recording], given: str, channels: Sequence[str
     return driving[0] if driving and any_moves(recordings, driving[:1]) else given
 
 
+def _moved(channels: Sequence[str], units: Mapping[str, str], n_inputs: int) -> tuple[str, ...]:
+    """Return what is moved: the first kind of it, or where that is less than inputs, the most of a kind.
+
+    Kinds are not mixed: errors in mm and in rad have no mean.
+    """
+    first = _called(channels, MOVED) or _in_units(channels, units, UNITS_MOVED)
+    if len(first) >= n_inputs:
+        return first
+    along = _called(channels, (*ALONG, COORDINATES)) or _in_units(channels, units, ("mm",))
+    turned = _called(channels, TURNED) or _in_units(channels, units, ("rad",))
+    return max(first, along, turned, key=len)
+
+
 def _called(channels: Sequence[str], words: Sequence[str]) -> tuple[str, ...]:
-    """Return the channels that are called by the first of some words that any is, numbered or not."""
+    """Return the channels that are called by the first of some words that any is: one, or several.
+
+    Several are told apart by numbers, of which the first may be missing, or by places.
+    """
     for word in words:
-        several = [name for name in channels if re.fullmatch(rf"{word}_?\d+", name)]
-        alone = [name for name in channels if name == word or name.startswith(f"{word}_")]
-        found = several or (alone if len(word) > 1 else [n for n in channels if n == word])[:1]
-        if found:
+        plain = [name for name in channels if re.fullmatch(word, name)]
+        numbered = [name for name in channels if re.fullmatch(rf"{word}_?\d+", name)]
+        placed = [name for name in channels if re.fullmatch(rf"{word}_({PLACES})", name)]
+        if word == COORDINATES or (
+            numbered and all(re.search(r"[a-z_][2-9]$", n) for n in numbered)
+        ):
+            numbered = [name for name in channels if name in (*plain, *numbered)]
+        begun = [name for name in channels if len(word) > 1 and name.startswith(f"{word}_")]
+        several = numbered or (placed if len(placed) > 1 and not plain else [])
+        if found := several or (plain or begun)[:1]:
             return tuple(found)
     return ()
 
@@ -82,8 +116,9 @@ def _called(channels: Sequence[str], words: Sequence[str]) -> tuple[str, ...]:
 def _in_units(
     channels: Sequence[str], units: Mapping[str, str], wanted: Sequence[str]
 ) -> tuple[str, ...]:
+    measured = [name for name in channels if not name.startswith(ASKED)]
     for unit in wanted:
-        found = tuple(name for name in channels if units.get(name) == unit)
+        found = tuple(name for name in measured if units.get(name) == unit)
         if found:
             return found
     return ()

@@ -35,12 +35,15 @@ R = TypeVar("R", bound=Ranked)
 
 
 def order(
-    model: str, validated: float | None, fitted: float | None
-) -> tuple[bool, bool, float, str]:
+    model: str,
+    validated: float | None,
+    fitted: float | None,
+    skill_least: float | None = None,
+) -> tuple[bool, bool, bool, float, str]:
     """Return what models are sorted by: the validated ones first, by that; nothing of the test is in it.
 
-    Those that are good only near what they were trained on come after the others, since parts of the
-    same motion cannot tell.
+    Those that are known to say no more than the constant come last. Of the others, those that are good
+    only near what they were trained on come after the rest, since parts of the same motion cannot tell.
 
     Parameters
     ----------
@@ -48,10 +51,13 @@ def order(
         Short name.
     validated, fitted : float or None
         Error of the cross-validation, and on the data fitted, by which the others are sorted.
+    skill_least : float or None
+        Lower bound of the skill over the constant.
     """
     error = fitted if validated is None else validated
     last = float("inf") if error is None else error
-    return validated is None, caution(model) is not None, last, model
+    idle = skill_least is not None and not skill_least > 0
+    return validated is None, idle, caution(model) is not None, last, model
 
 
 def recommended(rows: Sequence[R], constant: Ranked | None, unit: str) -> tuple[R | None, str]:
@@ -81,7 +87,7 @@ def recommended(rows: Sequence[R], constant: Ranked | None, unit: str) -> tuple[
             "No model is recommended: on what was left out to validate them, none predicts better than "
             "the mean of the training output beyond what chance gives. As far as these models can tell "
             "from so much data, the output does not depend on the input; where it does, it may be by "
-            "lags or dynamics that they lack, and models of rate have (oe, narx, bouc-wen)"
+            "lags or dynamics that they lack, and models of rate have (oe, narx, bouc-wen-oscillator)"
         )
     first = (better or working)[0]
     if constant is not None and not first.test_error < constant.test_error:

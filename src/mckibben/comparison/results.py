@@ -153,11 +153,14 @@ class Leaderboard(DrawsItself):
 
     @property
     def ranking(self) -> tuple[Row, ...]:
-        """The rows with the constant in its place."""
+        """The rows with the constant in its place: behind all that are known to say more."""
         if self.constant is None or not self.rows:
             return self.rows
         order = self.constant.order
-        place = sum(row.test is not None and row.order <= order for row in self.rows)
+        place = sum(
+            row.test is not None and ((row.skill_least or 0) > 0 or row.order <= order)
+            for row in self.rows
+        )
         return (*self.rows[:place], self.constant, *self.rows[place:])
 
     @property

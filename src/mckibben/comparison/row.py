@@ -143,13 +143,13 @@ class Row:
     @property
     def chosen_by(self) -> float:
         """The error that the model is chosen by: the validated one, else that of the fit."""
-        return self.order[2]
+        return self.order[3]
 
     @property
-    def order(self) -> tuple[bool, bool, float, str]:
+    def order(self) -> tuple[bool, bool, bool, float, str]:
         """What rows are sorted by."""
         fitted = None if self.train is None else self.train.rmse
-        return order(self.model, self.validation_rmse, fitted)
+        return order(self.model, self.validation_rmse, fitted, self.skill_least)
 
     @cached_property
     def inverse(self) -> Block | None:

@@ -22,7 +22,7 @@ from mckibben.comparison.offered import objections
 from mckibben.comparison.pieces import PIECES, squares_of
 from mckibben.comparison.row import Row
 from mckibben.comparison.splits import Fold, Mask, Split
-from mckibben.errors import MckibbenError
+from mckibben.errors import MckibbenError, unforeseen
 from mckibben.estimators.optimisers.tracker import Progress, whole_searches
 from mckibben.metrics import Scores, mean_scores, score
 from mckibben.recording import Recording
@@ -146,7 +146,7 @@ def try_part(data: Data, part: Part, tell: Callable[..., None]) -> Tried:
     except MckibbenError as error:
         return Tried(Row(part.name, reason=str(error)))
     except Exception as error:  # one model must not take the comparison down, whatever it does
-        return Tried(Row(part.name, reason=f"{type(error).__name__}: {error}"))
+        return Tried(Row(part.name, reason=unforeseen(error)))
 
 
 def _refused(model: str, data: Data) -> str | None:
@@ -340,17 +340,23 @@ def _try(data: Data, part: Part, tell: Callable[..., None]) -> Tried:
         folds = []
     # what is fitted to all there is is validated as it is delivered
     delivered = [_is_whole(fold, split) for fold in folds]
+    apart = [fold for fold, later in zip(folds, delivered, strict=True) if not later]
+    fits = len(apart) + part.whole
+
+    def told(place: int) -> Progress | None:
+        """Return what is told the share of all fits that is done, by the share of one."""
+        return (lambda share, cost: tell((place + share) / fits, cost)) if part.whole else None
+
     try:
-        for fold, later in zip(folds, delivered, strict=True):
-            if not later:
-                validate(fitted(fold.train, fold.train_rows, None).model_, fold)
+        for place, fold in enumerate(apart):
+            validate(fitted(fold.train, fold.train_rows, told(place)).model_, fold)
     except MckibbenError as error:  # a part of the data may be too little where all of it is enough
         invalid = str(error)
     if not part.whole:
         return Tried(None, (), tuple(squares), count, invalid, tuple(held))
     started = time.perf_counter()
     learned = split.train if item.only is None else (split.train[item.only],)
-    estimator = fitted(learned, None, tell)
+    estimator = fitted(learned, None, told(len(apart)))
     seconds = time.perf_counter() - started
     block = estimator.model_
     for fold, now in zip(folds, delivered, strict=True):

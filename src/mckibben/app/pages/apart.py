@@ -10,6 +10,7 @@ from nicegui import ui
 from mckibben.app import adding
 from mckibben.app.desk import LONGEST, Desk, guarded, labelled, named
 from mckibben.app.kept import Step
+from mckibben.app.together import kinds, sample_times
 from mckibben.signals.zeroing import apart as zeros_apart
 
 SHOWN = 6
@@ -18,20 +19,15 @@ SHOWN = 6
 
 def build(desk: Desk) -> None:
     """Show what differs, where something does."""
-    _channels(desk)
-    _sample_times(desk)
+    hindering(desk)
     _zeros(desk)
 
 
-def sample_times(desk: Desk) -> tuple[float, float] | None:
-    """Return the shortest and the longest sample time in use [s]; None where they may be as they are."""
-    if len(desk.inputs) > 1 or len(desk.outputs) > 1:
-        return None  # models of several muscles take several
-    used = desk.workspace.used().values()
-    times = [run.sample_time for run in used if run.sample_time is not None]
-    if not times or max(times) - min(times) <= 1e-3 * min(times):
-        return None
-    return min(times), max(times)
+def hindering(desk: Desk) -> None:
+    """Show what differs so that nothing may be fitted, and buttons that mend it; one thing at a time."""
+    _channels(desk)
+    if desk.workspace.channels():
+        _sample_times(desk)
 
 
 def common(times: tuple[float, float]) -> float:
@@ -45,10 +41,8 @@ def common(times: tuple[float, float]) -> float:
 
 def _channels(desk: Desk) -> None:
     """Offer to set recordings aside where channels differ."""
-    kinds: dict[tuple[str, ...], list[str]] = {}
-    for name, recording in desk.workspace.used().items():
-        kinds.setdefault(tuple(sorted(recording.channels)), []).append(name)
-    if len(kinds) < 2:
+    found = kinds(desk.workspace.used())
+    if len(found) < 2:
         return
     common = desk.workspace.channels()
     with named(ui.card().classes("w-full border border-warning gap-1"), "different"):
@@ -68,7 +62,7 @@ def _channels(desk: Desk) -> None:
                 )
                 button = ui.button("Join them", on_click=guarded(partial(_join, desk, pairs)))
                 named(button.props("outline dense"), "join")
-        for channels, names in sorted(kinds.items(), key=lambda kind: -len(kind[1])):
+        for channels, names in found.items():
             own = [channel for channel in channels if channel not in common]
             listed = ", ".join(names[:SHOWN]) + (" …" if len(names) > SHOWN else "")
             with ui.row().classes("items-center w-full"):

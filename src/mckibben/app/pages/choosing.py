@@ -6,15 +6,20 @@ import asyncio
 import re
 from typing import Any
 
-from nicegui import ui
+from nicegui import binding, ui
 
 from mckibben.app.desk import Desk, guarded, hinted, labelled, named
 from mckibben.app.fields import said
 from mckibben.app.offering import Offer, Offered, offered
+from mckibben.app.pages import apart
 from mckibben.app.pages.settings import ask
 from mckibben.comparison.needs import Need
 
-INVERSES = {"exact": "exact inverse", "solved": "inverse by solving", "none": "no inverse"}
+INVERSES = {
+    "exact": "exact inverse",
+    "solved": "inverse by solving",
+    "none": "no inverse",
+}
 
 
 class Choice:
@@ -25,7 +30,11 @@ class Choice:
     desk : Desk
     """
 
+    possible = binding.BindableProperty()
+    """Whether there is anything to fit."""
+
     def __init__(self, desk: Desk) -> None:
+        self.possible = False
         self.desk = desk
         self.settings: dict[str, dict[str, str]] = {}
         self.ticked: list[str] = []
@@ -48,10 +57,13 @@ class Choice:
         kept = [model for model in self.ticked if model in names]
         self.shown, self.ticked = found, kept or list(found.start)
         self.said.set_text(said(found.recognised))
+        self.possible = bool(found.groups)
         self.actions.set_visibility(True)
         self.place.clear()
         self.boxes, self.heads = {}, []
         with self.place:
+            if not found.groups:
+                apart.hindering(self.desk)
             for need, offers in found.groups:
                 self._group(need, offers)
             self._others(found.against)
@@ -125,7 +137,8 @@ class Choice:
 
 
 def _about(offer: Offer) -> str:
-    words = [INVERSES[offer.inverse], f"about {_time(offer.seconds)}"]
+    words = [f"{INVERSES[offer.inverse]}{', where that is stable' * offer.inverse_may_lack}"]
+    words.append(_time(offer.seconds))
     if offer.needs_time:
         words.append("needs time")
     if offer.caution:
@@ -134,6 +147,7 @@ def _about(offer: Offer) -> str:
 
 
 def _time(seconds: float) -> str:
-    if seconds < 90:
-        return f"{max(1, round(seconds))} s"
-    return f"{round(seconds / 60)} min"
+    """Return about how long a fit takes: how busy the machine is, nobody knows."""
+    if seconds < 15:
+        return "seconds"
+    return "about a minute" if seconds < 90 else "minutes" if seconds < 1800 else "an hour or more"

@@ -9,13 +9,15 @@ from typing import Any
 from nicegui import ui
 
 from mckibben.app import plots
-from mckibben.app.desk import Desk, caution, guarded, named, on_event
+from mckibben.app.desk import Desk, caution, guarded, named, not_recommended, on_event
 from mckibben.app.pages import next_steps
 from mckibben.blocks.core.block import Block
 from mckibben.blocks.core.writing import quantities
+from mckibben.comparison import limits
 from mckibben.comparison.columns import Column, columns_of
 from mckibben.comparison.free_run import run_free
 from mckibben.comparison.needs import full_name
+from mckibben.comparison.results import CHOICES
 from mckibben.errors import DataError, MckibbenError, ModelError
 from mckibben.numerals import numeral, typeset
 from mckibben.report import subjects, wording
@@ -30,6 +32,28 @@ BY_VALUE = """(a, b, one, other) => {
 }"""
 """How a column is sorted: by what its rows hold, not as it is shown."""
 
+ABOUT = (
+    "Every model is run from its inputs alone, never put right by what was measured. Models are sorted "
+    "by {heading}, their error by {by}; the first is to be chosen, and nothing is chosen by the test. "
+    "{careful}Gap kept: 100 % where the model keeps rising and falling branches as far apart as the "
+    "data do, 0 where it forgot. Inverse: exact by a formula, solved in every step, or none, and then "
+    "there is nothing to compensate with. Select one or two models to look closer."
+)
+
+CAREFUL = (
+    "A model with an asterisk is good only near the motions it was fitted to: it stands behind the "
+    "others that do better than the constant, whatever its error. "
+)
+
+NARROW = {"classes": "!px-2", "headerClasses": "!px-2 !whitespace-normal"}
+"""Of columns of figures, so that all are seen on a wide screen."""
+
+STAYING = dict.fromkeys(
+    ("classes", "headerClasses"),
+    "sticky left-0 z-10 min-w-32 bg-[var(--paper)] dark:bg-[var(--q-dark)] !whitespace-normal",
+)
+"""Of names, which stay while the rest is scrolled on a narrow one."""
+
 OTHER_DATA = (
     "Models marked “other data” were fitted or tested on recordings that have been added, changed, or "
     "given another role since: their errors do not compare with the others'. Fit them again."
@@ -38,7 +62,6 @@ OTHER_DATA = (
 
 def build(desk: Desk) -> None:
     """Build it."""
-    ui.label("Leaderboard: free-running, in the order of the choice").classes("text-lg")
     ticked: list[str] = []  # what a user has chosen stays so when the table is shown anew
 
     @ui.refreshable
@@ -47,18 +70,17 @@ def build(desk: Desk) -> None:
         if not results:
             ui.label("Fit models to see them compared here.").classes("opacity-70")
             return
+        ui.label("Leaderboard").classes("text-lg")
         if not all(result["current"] for result in results):
             named(
                 ui.label(OTHER_DATA).classes("text-sm text-amber-900 dark:text-amber-300"),
                 "other-data",
             )
         table = _table(results, desk.outputs)
-        ui.label(
-            "The first is to be chosen: least error in cross-validation on the training side; nothing "
-            "is chosen by the test. "
-            "Gap kept: 100 % where the model keeps rising and falling branches as far apart as the data "
-            "do, 0 where it forgot. Select one or two models to look closer."
-        ).classes("text-xs opacity-70")
+        heading, by = CHOICES[results[0]["chosen_by"]]
+        careful = CAREFUL if any(limits.caution(result["model"]) for result in results) else ""
+        about = ABOUT.format(heading=heading, by=by, careful=careful)
+        ui.label(about).classes("text-xs opacity-70")
         for said in _judged(results):
             ui.label(said).classes("text-sm")
         place = named(ui.column().classes("w-full"), "closer")
@@ -118,6 +140,7 @@ def _table(results: Sequence[dict[str, Any]], outputs: Sequence[str]) -> ui.tabl
         columns=[
             {"name": key, "label": label, "field": key, "sortable": True}
             | {"align": "left" if key == "title" else "right", ":sort": BY_VALUE % f"{key}_by"}
+            | (STAYING if key == "title" else NARROW)
             for key, label in listed
         ],
         row_key="name",
@@ -131,7 +154,7 @@ def _row(result: dict[str, Any], columns: Sequence[Column]) -> dict[str, Any]:
     shown |= {f"{column.key}_by": column.sorted_by(result) for column in columns}
     full = full_name(result["model"])
     title = result["name"] if full == result["name"] else f"{result['name']}: {full}"
-    title += _other(result)
+    title += "*" * bool(limits.caution(result["model"])) + _other(result)
     return {"name": result["name"], "title": title, "title_by": title} | shown
 
 
@@ -140,7 +163,7 @@ def _other(result: dict[str, Any]) -> str:
 
 
 def _judged(results: Sequence[dict[str, Any]]) -> list[str]:
-    """Return what every model has to beat, and what speaks against models or their tests."""
+    """Return what every model has to beat, and what speaks against all models, or against tests."""
     said: list[str] = []
     against: dict[str, list[str]] = {}
     for result in results:
@@ -148,13 +171,15 @@ def _judged(results: Sequence[dict[str, Any]]) -> list[str]:
         tested = wording.number((constant.get("test") or {}).get("rmse"))
         validated = wording.number(constant.get("validation_rmse"))
         if constant:
+            heading, _ = CHOICES[result["chosen_by"]]
             said.append(
-                f"constant{_other(result)}, the mean of the training output: CV RMSE {validated}, "
+                f"constant{_other(result)}, the mean of the training output: {heading} {validated}, "
                 f"test RMSE {tested}. Every model has to beat it."
             )
-        for why in (result.get("not_recommended"), *result.get("shared", ())):
-            if why:
-                against.setdefault(why, []).append(f"{result['name']}{_other(result)}")
+        for why in result.get("shared", ()):
+            against.setdefault(why, []).append(f"{result['name']}{_other(result)}")
+    if why_none := not_recommended(results):
+        said.append(why_none)
     said += [f"{', '.join(names)}: {why}" for why, names in against.items()]
     return list(dict.fromkeys(said))
 

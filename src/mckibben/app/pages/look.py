@@ -12,6 +12,7 @@ from mckibben.app import plots
 from mckibben.app.desk import Desk, guarded, named, refused
 from mckibben.app.fields import said
 from mckibben.app.pages.cutting import time_plot
+from mckibben.app.together import obstacle
 from mckibben.errors import MckibbenError
 from mckibben.recording import Recording
 from mckibben.report import coupling_subjects, subjects, wording
@@ -28,7 +29,8 @@ def build(desk: Desk) -> None:
         entries = [entry.name for entry in desk.workspace.entries() if entry.role != "unused"]
         known = desk.workspace.channels()
         if not entries or not {*desk.inputs, *desk.outputs} <= set(known):
-            ui.label("Add recordings with an input and an output first, under Data.")
+            first = "Add recordings with an input and an output first, under Data."
+            ui.label(obstacle(desk) or first)
             return
         chosen = named(
             ui.select(entries, value=entries[0], label="Recording").classes("w-80"),

@@ -8,34 +8,63 @@ import numpy as np
 from nicegui import ui
 
 from mckibben.app import fields, plots, scripts
-from mckibben.app.desk import Desk, named, tell
-from mckibben.app.jobs import ENDED, RUNNING, Job
-from mckibben.app.pages import apart, leaderboard
+from mckibben.app.desk import Desk, hinted, named, tell
+from mckibben.app.jobs import DONE, ENDED, RUNNING, Job
+from mckibben.app.pages import leaderboard
 from mckibben.app.pages.choosing import Choice
+from mckibben.app.together import obstacle
 from mckibben.comparison.offered import settings_of
 from mckibben.errors import ModelError
 
+FIT, FIT_MORE = "Models, by what they are for", "Fit more models, by what they are for"
+
+SHARED = (
+    "A model tested on what it was fitted to looks better than it is; every result then says so."
+)
+
+FITS = 12
+"""The latest fits that are shown."""
+
 
 def build(desk: Desk) -> None:
-    """Build the page."""
-    ui.label("Models, by what they are for").classes("text-lg")
+    """Build the page: what was found, once there is any, comes before what may be fitted."""
+    with ui.column().classes("w-full"):
+        board = ui.column().classes("w-full order-2")
+        with ui.column().classes("w-full order-1 gap-0"):
+            _running(desk)
+        with board:
+            leaderboard.build(desk)
+        head = ui.expansion(FIT, value=True).props("dense header-class=text-lg")
+        with named(head.classes("w-full"), "choose-models"):
+            _choosing(desk)
+
+    def arrange() -> None:
+        """Put the choice of models first until there is something to compare."""
+        any_there = bool(desk.results())
+        head.classes(add="order-3" if any_there else "order-0", remove="order-0 order-3")
+        head.props["label"] = FIT_MORE if any_there else FIT
+        head.update()
+
+    for topic in ("results", "channels"):
+        desk.when(topic, arrange)
+    arrange()
+
+
+def _choosing(desk: Desk) -> None:
     choice = Choice(desk)
     with choice.actions:
-        named(ui.button("Fit", on_click=lambda: _fit(desk, choice)), "fit")
+        fit = named(ui.button("Fit", on_click=lambda: _fit(desk, choice)), "fit")
+        fit.bind_enabled_from(choice, "possible")
         ui.button("The usual ones", on_click=choice.start).props("flat")
         named(ui.button("None", on_click=lambda: choice.only([])).props("flat"), "untick")
-        named(
-            ui.checkbox("Go on where recordings share data").bind_value(desk, "allow_shared"),
-            "allow-shared",
-        )
-    with ui.row().classes("w-full items-start gap-4"):
-        with ui.column().classes("min-w-72 flex-1"):
-            _running(desk)
-        with ui.column().classes("min-w-96 flex-[2]"):
-            leaderboard.build(desk)
+        shared = ui.checkbox("Allow the same data in training and test")
+        hinted(named(shared.bind_value(desk, "allow_shared"), "allow-shared"), SHARED)
 
 
 def _fit(desk: Desk, choice: Choice) -> None:
+    if said := obstacle(desk):
+        tell(said)
+        return
     if all(entry.role != "train" for entry in desk.workspace.entries()):
         tell(
             "There is no recording to train on. Remedy: add one under Data, with the role 'train'."
@@ -43,12 +72,6 @@ def _fit(desk: Desk, choice: Choice) -> None:
         return
     if not choice.ticked:
         tell("No model is chosen. Remedy: tick one at least.")
-        return
-    if (times := apart.sample_times(desk)) is not None:
-        tell(
-            f"Recordings have sample times from {times[0]:.4g} to {times[1]:.4g} s, and models need "
-            f"one. Remedy: press 'Resample all to {apart.common(times):g} s' under Data."
-        )
         return
     for model in choice.ticked:
         written = choice.settings.get(model, {})
@@ -68,17 +91,27 @@ def _fit(desk: Desk, choice: Choice) -> None:
 
 
 def _running(desk: Desk) -> None:
-    ui.label("Fits").classes("text-lg")
+    # as the user has left it; until then open while any runs, or has failed
+    folded: dict[str, bool | None] = {"by": None}
 
     @ui.refreshable
     def shown() -> None:
         fits = [job for job in desk.jobs.jobs.values() if job.kind == "fit"]
         if not fits:
-            ui.label("None yet.").classes("opacity-70")
-        said: set[str] = set()
-        for job in reversed(fits[-12:]):
-            _job(desk, job, said)
-        _best_so_far(desk, fits)
+            return
+        ended = [job for job in fits if job.state in ENDED]
+        done = sum(job.state == DONE for job in ended)
+        title = f"Fits: {done} done, {len(ended) - done} not, {len(fits) - len(ended)} to go"
+        open_ = done < len(fits) if folded["by"] is None else folded["by"]
+        head = ui.expansion(title, value=open_, on_value_change=lambda e: folded.update(by=e.value))
+        with named(head.classes("w-full").props("dense"), "fits"):
+            if ended:
+                clear = ui.button("Clear what has ended", on_click=lambda: _forget(desk, *ended))
+                named(clear.props("flat dense"), "clear-fits")
+            said: set[str] = set()
+            for job in reversed(fits[-FITS:]):
+                _job(desk, job, said)
+            _best_so_far(desk, fits)
 
     desk.when("jobs", shown.refresh)
     desk.when("theme", shown.refresh)
@@ -89,7 +122,7 @@ def _job(desk: Desk, job: Job, said: set[str]) -> None:
     """Show how a fit does; a reason that was said of another one above is not said again."""
     told = desk.jobs.progress(job.name)
     with named(ui.row().classes("items-center w-full gap-2 no-wrap"), f"job-{job.title}"):
-        ui.label(job.title).classes("w-28")
+        ui.label(job.title).classes("w-28 sm:w-56 break-words min-w-0 text-sm")
         if job.state in ENDED:
             again = job.said in said and job.said != job.state
             ui.label(f"{job.state}, as above" if again else fields.said(job.said)).classes(
@@ -105,8 +138,11 @@ def _job(desk: Desk, job: Job, said: set[str]) -> None:
             )
             return
         share = told[-1][1] if told and job.state == RUNNING else 0.0
-        ui.linear_progress(value=round(share, 2), show_value=False).classes("flex-1")
-        ui.label(job.state).classes("text-xs")
+        bar = ui.linear_progress(value=round(share, 2), show_value=False).classes("flex-1")
+        if job.state == RUNNING and not share:
+            bar.props("indeterminate")
+        done = f" {100 * share:.0f} %, validation included" if share else ""
+        ui.label(f"{job.state}{done}").classes("text-xs")
         named(
             ui.button("Cancel", on_click=lambda: _cancel(desk, job)).props("flat dense"),
             f"cancel-{job.title}",
@@ -118,8 +154,9 @@ def _cancel(desk: Desk, job: Job) -> None:
     desk.changed("jobs")
 
 
-def _forget(desk: Desk, job: Job) -> None:
-    desk.jobs.forget(job.name)
+def _forget(desk: Desk, *jobs: Job) -> None:
+    for job in jobs:
+        desk.jobs.forget(job.name)
     desk.changed("jobs")
 
 

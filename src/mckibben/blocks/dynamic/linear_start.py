@@ -99,10 +99,32 @@ def told_by(free: Array, left: Array, counts: Mask) -> Array:
     """
     if not free.shape[1] or not np.isfinite(left[counts]).all():
         return np.zeros(free.shape[1])
+    states, seen = known_starts(free, counts)
+    return np.asarray(states @ (seen.T @ left[counts]))
+
+
+def known_starts(free: Array, counts: Mask, least: float = KNOWN) -> tuple[Array, Array]:
+    """Return the starts that known outputs tell of, each with what it adds where they are known.
+
+    Parameters
+    ----------
+    free : array, shape (n, k)
+        What a unit of every state adds to the output.
+    counts : array of bool, shape (n,)
+        Where outputs are known.
+    least : float
+        Norm there of a start's response whose norm is 1, from which it is told of.
+
+    Returns
+    -------
+    states : array, shape (k, r)
+    seen : array, shape (number of samples known, r)
+        Of length 1, and at right angles to one another.
+    """
     size = np.maximum(np.linalg.norm(free, axis=0), 1e-300)
     responses, spread, turned = np.linalg.svd(free / size, full_matrices=False)
     moved = spread > 1e-12 * spread[0]
-    u, known, v = np.linalg.svd(responses[np.ix_(counts, moved)], full_matrices=False)
-    told = known > KNOWN
-    found = v[told].T @ ((u.T @ left[counts])[told] / known[told])
-    return np.asarray(turned[moved].T @ (found / spread[moved]) / size)
+    seen, known, v = np.linalg.svd(responses[np.ix_(counts, moved)], full_matrices=False)
+    told = known > least
+    states = turned[moved].T @ (v[told] / spread[moved]).T / known[told] / size[:, None]
+    return np.asarray(states), np.asarray(seen[:, told])

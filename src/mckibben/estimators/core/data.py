@@ -305,15 +305,8 @@ class TrainingData:
 
     def alone(self, place: int) -> list[Run]:
         """Return the runs in which one input moves and all others rest."""
-        span = self.highest - self.lowest
-        found = []
-        for run in self.runs:
-            travel = np.ptp(run.driven, axis=0)
-            above = run.driven.max(axis=0) - self.lowest
-            others = np.delete(above <= RESTS * span, place)
-            if travel[place] > MOVES * span[place] and others.all():
-                found.append(run)
-        return found
+        ends = self.lowest, self.highest
+        return [run for run in self.runs if moves_alone(run.driven, place, *ends)]
 
     def between(self, start: float, stop: float) -> TrainingData:
         """Return the same runs of which only what is between two shares of their time counts."""
@@ -339,3 +332,19 @@ class TrainingData:
             counts[chosen] = True
             runs.append(replace(run, counts=counts))
         return replace(self, runs=tuple(runs))
+
+
+def moves_alone(driven: Array, place: int, lowest: Array, highest: Array) -> bool:
+    """Tell whether one input moves and all others rest.
+
+    Parameters
+    ----------
+    driven : array, shape (n, m)
+        Of a run.
+    place : int
+    lowest, highest : arrays, shape (m,)
+        Of all runs.
+    """
+    span, above = highest - lowest, driven.max(axis=0) - lowest
+    others = np.delete(above <= RESTS * span, place)
+    return bool(np.ptp(driven[:, place]) > MOVES * span[place] and others.all())

@@ -13,7 +13,7 @@ import numpy as np
 from mckibben.blocks.core.block import Block
 from mckibben.errors import DataError
 from mckibben.estimators.core.checking import training_data
-from mckibben.estimators.core.data import Mask, TrainingData
+from mckibben.estimators.core.data import Mask, TrainingData, moves_alone
 from mckibben.estimators.core.estimator import ErrorsUnknown, Estimator, resting
 from mckibben.estimators.optimisers.tracker import Tracker
 from mckibben.recording import Recording
@@ -56,6 +56,9 @@ class CoupledEstimator(ErrorsUnknown, Estimator):
     """Whether it runs through what does not count, so that memory there is right; else stretches of
     what counts each begin with a memory of their own."""
 
+    each_alone: ClassVar[bool] = False
+    """Whether every muscle must move alone in some run."""
+
     fewest_inputs: ClassVar[int] = 1
     most_inputs: ClassVar[float] = np.inf
     """How many muscles there may be."""
@@ -86,7 +89,9 @@ class CoupledEstimator(ErrorsUnknown, Estimator):
             return "it is of several muscles, or of one under a measured load that changes"
         if not cls.fits(len(inputs), len(outputs)):
             return "it needs an output to every input"
-        return resting(recordings, inputs)
+        return resting(recordings, inputs) or (
+            _never_alone(recordings, inputs) if cls.each_alone else None
+        )
 
     @classmethod
     def fits(cls, n_inputs: int, n_outputs: int) -> bool:
@@ -170,6 +175,20 @@ class CoupledEstimator(ErrorsUnknown, Estimator):
     @abstractmethod
     def identify(self, data: TrainingData, tracker: Tracker) -> Block:
         """Return the block found."""
+
+
+def _never_alone(recordings: Sequence[Recording], inputs: Sequence[str]) -> str | None:
+    """Return which muscle moves alone in no run, or None."""
+    driven = [recording.matrix(inputs) for recording in recordings]
+    lowest = np.min([run.min(axis=0) for run in driven], axis=0)
+    highest = np.max([run.max(axis=0) for run in driven], axis=0)
+    for place, name in enumerate(inputs):
+        if not any(moves_alone(run, place, lowest, highest) for run in driven):
+            return (
+                f"{name} moves alone in no run, so hysteresis cannot be told from coupling: add a run "
+                "in which the other inputs rest"
+            )
+    return None
 
 
 def driving(recording: Recording) -> tuple[str, ...]:

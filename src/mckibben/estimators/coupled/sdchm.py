@@ -178,6 +178,7 @@ class SDCHMEstimator(NetworkEstimator):
     """
 
     effort: ClassVar[float] = 20.0
+    each_alone: ClassVar[bool] = True
 
     n_sets: Annotated[int, Interval(ge=0, le=6)] = 3
     constants: bool = True

@@ -17,6 +17,7 @@ from itertools import combinations_with_replacement, islice
 import numpy as np
 
 from mckibben.arrays import Array
+from mckibben.blocks.dynamic.linear_start import known_starts
 from mckibben.estimators.core.data import Run
 from mckibben.estimators.linear.polynomials import Orders, Polynomials, Start, errors
 from mckibben.estimators.linear.stability import (
@@ -52,6 +53,9 @@ REPLANTED = 4
 
 SAME = 1e-6
 """Relative difference of errors that is none."""
+
+FELT = 1e-13
+"""Share of a start's response that is left where samples count, for it to be solved for."""
 
 LEAST_GAIN = 2e-9
 """Share of the squared error that a step gains, or the descent has arrived."""
@@ -94,16 +98,15 @@ def evaluate(
     for run in runs:
         # how the start's own response moves with theta counts too: slopes are taken at the start found
         e, starts = errors(theta, orders, run, start, only_starts=True)
-        state: Array | None = None
-        if starts.shape[1]:
-            state = np.asarray(-np.linalg.lstsq(starts[run.counts], e[run.counts], rcond=1e-13)[0])
-        e, jacobian = errors(theta, orders, run, start, state)
-        e, jacobian = e[run.counts], jacobian[run.counts]
-        own, starts = jacobian[:, : orders.size], jacobian[:, orders.size :]
-        if starts.shape[1]:
-            q = np.linalg.qr(starts)[0]
-            e = e - q @ (q.T @ e)
-            own = own - q @ (q.T @ own)
+        if not starts.shape[1]:
+            e, jacobian = errors(theta, orders, run, start)
+            e, own = e[run.counts], jacobian[run.counts]
+        else:
+            states, seen = known_starts(starts, run.counts, FELT)
+            e, jacobian = errors(theta, orders, run, start, -states @ (seen.T @ e[run.counts]))
+            e, own = e[run.counts], jacobian[run.counts, : orders.size]
+            e = e - seen @ (seen.T @ e)
+            own = own - seen @ (seen.T @ own)
         found.append(e)
         slopes.append(own)
     e = np.concatenate(found)

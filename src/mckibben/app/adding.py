@@ -138,8 +138,6 @@ def replaced(desk: Desk, names: Sequence[str], reading: Reading) -> list[Recordi
             read[upload] = read_upload(path, reading)
     made = {name: (read[workspace.entry(name).upload], call) for name, call in calls.items()}
     workspace.read_again(made, reading)
-    for call in dict.fromkeys(calls.values()):
-        workspace.log(f"read {', '.join(names)} again", call)
     return made[names[0]][0]
 
 

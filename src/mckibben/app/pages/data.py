@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Callable
 from importlib.util import find_spec
 from typing import Any
 
@@ -218,7 +219,10 @@ def _row(desk: Desk, name: str, dialogs: Any) -> None:
     try:
         recording = desk.workspace.recording(name)
     except MckibbenError as error:
-        refused(error, name)
+        with named(ui.row().classes("items-center w-full gap-2"), f"recording-{name}"):
+            with ui.column().classes("flex-1 min-w-40"):
+                refused(error, name)
+            _button("delete", "Remove", name, lambda: _remove(desk, name))
         return
     duration = "" if recording.duration is None else f", {recording.duration:.4g} s"
     with named(ui.row().classes("items-center w-full gap-2"), f"recording-{name}"):
@@ -246,8 +250,12 @@ def _row(desk: Desk, name: str, dialogs: Any) -> None:
             ("show_chart", "Show", lambda: _show(desk, name)),
             ("delete", "Remove", lambda: _remove(desk, name)),
         ):
-            button = ui.button(icon=icon, on_click=action).props("flat dense")
-            labelled(hinted(button, word.rstrip(":")), "aria-label", f"{word} {name}")
+            _button(icon, word, name, action)
+
+
+def _button(icon: str, word: str, name: str, action: Callable[[], Any]) -> None:
+    button = ui.button(icon=icon, on_click=action).props("flat dense")
+    labelled(hinted(button, word.rstrip(":")), "aria-label", f"{word} {name}")
 
 
 def _aside_said(recording: Recording, name: str) -> None:

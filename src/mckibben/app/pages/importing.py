@@ -15,6 +15,7 @@ from mckibben.app.desk import Desk, guarded, kept, named, tell
 from mckibben.app.fields import said
 from mckibben.app.pages.asking import ask, tell_of
 from mckibben.app.reading import AS_FOUND
+from mckibben.app.recordings import unescaped
 from mckibben.errors import DataError, MckibbenError
 from mckibben.recording import Recording
 
@@ -51,7 +52,7 @@ class Intake:
         """Keep a file and read it; after the last, say what became of them."""
         self.coming += 1
         self.seen += 1
-        shown = event.file.name
+        shown = unescaped(event.file.name)
         try:
             await self._take(event, shown)
         except MckibbenError as error:

@@ -151,8 +151,6 @@ def replaced(desk: Desk, names: Sequence[str], reading: Reading) -> list[Recordi
     calls = {name: scripts.read_call(str(path), options(reading)) for name, path in paths.items()}
     made = {name: (read[paths[name]], call) for name, call in calls.items()}
     workspace.read_again(made, reading, {name: path.name for name, path in paths.items()})
-    for call in dict.fromkeys(calls.values()):
-        workspace.log(f"read {', '.join(names)} again", call)
     return made[names[0]][0]
 
 

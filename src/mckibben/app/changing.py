@@ -1,49 +1,41 @@
-"""Changes of recordings that can be undone: roles, names, steps, other readings, removal.
-
-A change writes new files and descriptions, and keeps the old ones.
-"""
+"""Changes of recordings: roles, names, steps, other readings, removal; each can be undone."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from mckibben.app import kept
-from mckibben.app.folder import short
-from mckibben.app.recordings import Entry, Recordings, Role
+from mckibben.app.recordings import EXAMPLE, Entry, Role
+from mckibben.app.undoing import Undoing
 from mckibben.errors import DataError
 
 if TYPE_CHECKING:
     from mckibben.recording import Recording
 
-MOST_CHANGES = 50
-"""Changes that can be undone."""
 
-HISTORY = "recordings"
-"""Name of the history."""
-
-_Contents = Mapping[str, dict[str, Any] | None]
-
-
-class Changing(Recordings):
-    """Recordings that can be changed, and every change undone.
+class Changing(Undoing):
+    """Recordings that can be changed.
 
     Parameters, and errors, are those of `mckibben.app.folder.Folder`.
     """
 
-    @contextmanager
-    def adding(self, what: str) -> Iterator[list[str]]:
-        """Give a list for the names of recordings that are added, as one change that can be undone."""
-        added: list[str] = []
-        try:
-            yield added
-        finally:
-            if added:
-                with self._changing:
-                    after = {name: self.read_json("recordings", name) for name in added}
-                    self._remember(what, dict.fromkeys(added), after)
+    def add_example(self) -> list[str]:
+        """Add the bundled recordings that are not there yet, and return their names."""
+        from mckibben import example
+        from mckibben.files import read
+
+        with self._changing, self.adding("open the example") as added:
+            there = {entry.call for entry in self.entries() if entry.origin == EXAMPLE}
+            for word, role in (("TRAIN", "train"), ("TEST", "test")):
+                call = f"mckibben.read(mckibben.example.{word})[0]"
+                if call not in there:
+                    (recording,) = read(getattr(example, word))
+                    entry = self.add(recording, origin=EXAMPLE, call=call, role=role)  # type: ignore[arg-type]
+                    added.append(entry.name)
+        return added
 
     def set_role(self, names: str | Sequence[str], role: Role) -> None:
         """Say what one recording or several are used for."""
@@ -93,7 +85,8 @@ class Changing(Recordings):
             chosen = self.new_name("recordings", name) if new else name
             path = self._written(chosen, each) if steps else entry.base or entry.path
             new[chosen] = replace(entry, name=chosen, path=path, steps=tuple(steps))
-        self._change(what, new, dict.fromkeys(new, entry))
+        call = edits.call("recording", ways[0])
+        self._change(what, new, dict.fromkeys(new, entry), call)
         return list(new)
 
     def take_back(
@@ -133,7 +126,7 @@ class Changing(Recordings):
             new[name] = replace(
                 entry, path=path, base=entry.base or entry.path, steps=(*entry.steps, step)
             )
-        self._change(what, new, begun)
+        self._change(what, new, begun, f"[{edits.call('one', [step])} for one in recordings]")
 
     def read_again(
         self,
@@ -143,7 +136,8 @@ class Changing(Recordings):
     ) -> list[str]:
         """Replace what was read by what was read otherwise; steps are done anew.
 
-        Parts that were cut out span the time that they did, unless the rate was read otherwise. Of
+        Parts that were cut out span the time that they did, unless the rate was read otherwise. Steps
+        follow their channels to other names; those whose channels are gone are left out, and noted. Of
         several recordings, one for each stretch, those that were not there before are added; stretches
         that are not cut out any more go.
 
@@ -169,8 +163,9 @@ class Changing(Recordings):
                 places = list(range(len(read)))
             elif entry.reading.gaps == "split" and reading.gaps != "split":
                 new.update(dict.fromkeys(self._stretches(entry)))
+            names = self._names_now(entry, reading)
             for place in places:
-                steps = self._again(entry, read[place])
+                steps, lost = self._again(entry, read[place], names)
                 each = edits.applied(read[place], steps)
                 again = name in new and new[name] is not None
                 chosen = self.new_name("recordings", name) if again else name
@@ -180,8 +175,9 @@ class Changing(Recordings):
                 way = replace(entry, name=chosen, path=path, base=base, call=f"{call}[{place}]")
                 upload = (uploads or {}).get(name, entry.upload)
                 way = replace(way, part=place, reading=reading, steps=steps, upload=upload)
-                new[chosen], begun[chosen] = replace(way, notes=read[place].notes), entry
-        self._change(f"read {', '.join(found)} otherwise", new, begun)
+                new[chosen], begun[chosen] = replace(way, notes=(*read[place].notes, *lost)), entry
+        call = "\n".join(dict.fromkeys(call for _, call in found.values()))
+        self._change(f"read {', '.join(found)} otherwise", new, begun, call)
         return [name for name, each in new.items() if each]
 
     def _stretches(self, entry: Entry) -> list[str]:
@@ -192,22 +188,44 @@ class Changing(Recordings):
             if (each.upload, each.reading) == (entry.upload, entry.reading)
         ]
 
-    def _again(self, entry: Entry, read: Recording) -> tuple[kept.Step, ...]:
-        """Return the steps of a recording for what was read otherwise."""
+    def _names_now(self, entry: Entry, reading: kept.Reading) -> dict[str, str]:
+        """Return what channels are called in another reading of their columns; empty where none."""
+        from mckibben.app.reading import columns
+
+        same = entry.reading.columns == reading.columns
+        if same or not any(step.channels or step.over for step in entry.steps):
+            return {}
+        path = self.path("uploads", entry.upload)
+        pairs = zip(columns(path, entry.reading), columns(path, reading), strict=False)
+        return {old.channel: new.channel for old, new in pairs if old.channel}
+
+    def _again(
+        self, entry: Entry, read: Recording, names: Mapping[str, str]
+    ) -> tuple[tuple[kept.Step, ...], tuple[str, ...]]:
+        """Return the steps of a recording for what was read otherwise, and what to say of them."""
         from mckibben.app import edits
 
-        try:
+        now = [edits.renamed(step, names, read) for step in entry.steps]
+        steps = tuple(step for step in now if step)
+        lost = tuple(
+            f"left out, as its channel is not there any more: {edits.words(step)}"
+            for step, new in zip(entry.steps, now, strict=True)
+            if new is None
+        )
+        # where what was read before is damaged, or its parts are not in what is read now
+        with suppress(DataError):
             before = self._read(entry.base or entry.path)
             if before.sample_time == read.sample_time and len(before) != len(read):
-                return edits.spanning(read, entry.steps, edits.spans(before, entry.steps))
-        except (
-            DataError
-        ):  # what was read before is damaged, or its parts are not in what is read now
-            pass
-        return entry.steps
+                spans = zip(edits.spans(before, entry.steps), now, strict=True)
+                return edits.spanning(read, steps, [span for span, new in spans if new]), lost
+        return steps, lost
 
     def _change(
-        self, what: str, new: Mapping[str, Entry | None], begun: Mapping[str, Entry] | None = None
+        self,
+        what: str,
+        new: Mapping[str, Entry | None],
+        begun: Mapping[str, Entry] | None = None,
+        call: str = "",
     ) -> None:
         """Put what is new, unless that of which it was made is not there any more.
 
@@ -219,6 +237,8 @@ class Changing(Recordings):
             By name; None where there is none.
         begun : mapping, optional
             By name, that of which it was made; only roles may have changed since, and are kept.
+        call : str, optional
+            The Python that does it.
         """
         self.demand()
         with self._changing:
@@ -226,24 +246,18 @@ class Changing(Recordings):
                 roles = {
                     name: self._unchanged(one, what).role for name, one in (begun or {}).items()
                 }
+                put = {n: replace(e, role=roles.get(n, e.role)) if e else e for n, e in new.items()}
+                after = {name: each.content() if each else None for name, each in put.items()}
+                before = {name: self.read_json("recordings", name) for name in new}
+                self._remember(what, before, after)
             except DataError:
                 self._drop(
                     path.name for e in new.values() if e for path in (e.path, e.base) if path
                 )
+                for name in new:
+                    self.give_back("recordings", name)
                 raise
-            new = {n: replace(e, role=roles.get(n, e.role)) if e else e for n, e in new.items()}
-            after = {name: None if each is None else each.content() for name, each in new.items()}
-            before = {name: self.read_json("recordings", name) for name in new}
-            self._put(after)
-            self._remember(what, before, after)
-        self.log(what)
-
-    def _remember(self, what: str, before: _Contents, after: _Contents) -> None:
-        history = self._history()
-        change = kept.Change(what=short(what), before=dict(before), after=dict(after))
-        done = [*history.done, change]
-        gone = [*history.undone, *done[:-MOST_CHANGES]]
-        self._keep(kept.History(done=done[-MOST_CHANGES:]), gone)
+        self._noted(what, call)
 
     def _unchanged(self, entry: Entry, what: str) -> Entry:
         """Return what a recording is now, of which nothing but the role may have changed."""
@@ -254,67 +268,3 @@ class Changing(Recordings):
                 remedy="do it to what is there now",
             )
         return now
-
-    def undo(self) -> str | None:
-        """Take the last change back, and return what it was; None if there is none."""
-        return self._step_back(undo=True)
-
-    def redo(self) -> str | None:
-        """Do again what was undone last, and return what it was; None if there is nothing."""
-        return self._step_back(undo=False)
-
-    def _step_back(self, *, undo: bool) -> str | None:
-        self.demand()
-        with self._changing:
-            history = self._history()
-            here, there = (history.done, history.undone) if undo else (history.undone, history.done)
-            if not here:
-                return None
-            change = here.pop()
-            there.append(change)
-            self._put(change.before if undo else change.after)
-            self._keep(history, [])
-        self.log(f"{'undid' if undo else 'did again'}: {change.what}")
-        return change.what
-
-    def history(self) -> tuple[str | None, str | None]:
-        """Return what would be undone, and what would be done again."""
-        history = self._history()
-        done, undone = history.done, history.undone
-        return done[-1].what if done else None, undone[-1].what if undone else None
-
-    def _history(self) -> kept.History:
-        found = kept.checked(kept.History, self.read_json("history", HISTORY))
-        return kept.History() if found is None else found
-
-    def _keep(self, history: kept.History, gone: Iterable[kept.Change]) -> None:
-        """Write the history; samples that only forgotten changes have are removed."""
-        self.write_json("history", HISTORY, history.model_dump(mode="json"))
-        files = {name for change in gone for name in _files(change)}
-        files -= {name for change in (*history.done, *history.undone) for name in _files(change)}
-        self._drop(files)
-
-    def _drop(self, files: Iterable[str]) -> None:
-        """Remove files of samples that no recording has."""
-        for name in set(files) - {
-            path.name for e in self.entries() for path in (e.path, e.base) if path
-        }:
-            with suppress(OSError, DataError):
-                path = self.path("recordings", name)
-                path.unlink()
-                path.with_name(f"{name}-metadata.json").unlink()
-
-    def _put(self, contents: _Contents) -> None:
-        for name, content in contents.items():
-            if content is None:
-                self.new_path("recordings", f"{name}.json").unlink(missing_ok=True)
-            else:
-                self.write_json("recordings", name, content)
-
-
-def _files(change: kept.Change) -> set[str]:
-    found = (
-        kept.checked(kept.Described, each)
-        for each in (*change.before.values(), *change.after.values())
-    )
-    return {name for each in found if each for name in (each.file, each.base) if name}

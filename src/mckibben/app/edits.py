@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -70,8 +70,6 @@ def applied(recording: Recording, steps: Sequence[Step]) -> Recording:
         values = _values(step)
         if step.do != "detrend" and any(values[name] is None for name in edit.takes[:1]):
             raise DataError(f"{step.do} needs {edit.takes[0]}", remedy="give it")
-        if step.channels is not None:  # those that are there: they may be named otherwise by now
-            values["channels"] = [name for name in step.channels if name in recording]
         recording = edit.do(recording, *(values[name] for name in edit.takes))
     return recording
 
@@ -103,6 +101,26 @@ def spanning(
         found.append(step)
         recording = applied(recording, [step])
     return tuple(found)
+
+
+def renamed(step: Step, names: Mapping[str, str], recording: Recording) -> Step | None:
+    """Return a step of channels that a recording may call otherwise; None where it has none of them.
+
+    Parameters
+    ----------
+    step : Step
+    names : mapping of str to str
+        What channels are called now; those that are not in it are called the same.
+    recording : Recording
+    """
+    channels, over = step.channels, step.over
+    if channels is not None:
+        channels = [now for name in channels if (now := names.get(name, name)) in recording]
+    if over is not None:
+        over = names.get(over, over)
+    if channels == [] or (over is not None and over not in recording):
+        return None
+    return step.model_copy(update={"channels": channels, "over": over})
 
 
 def _ends(recording: Recording) -> tuple[float, float]:

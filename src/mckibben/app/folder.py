@@ -12,6 +12,7 @@ import re
 import stat
 import sys
 import time
+import unicodedata
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from itertools import count
@@ -21,7 +22,7 @@ from typing import Any
 from mckibben.app import kept
 from mckibben.app.claim import Lock
 from mckibben.errors import DataError
-from mckibben.system.atomic import write_text, written
+from mckibben.system.atomic import PART, write_text, written
 from mckibben.system.ordinary import DESCRIPTION, opened, read_bytes
 
 FOLDERS = (
@@ -35,7 +36,14 @@ END_OF_LOG = 2**18
 PATIENCE = 5.0
 """For the jobs of a workbench that was killed to end [s]."""
 
-NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,79}")
+NAME = re.compile(r"[^\W_][\w.-]{0,79}")
+"""Letters and digits of any script; a person's own are no mistake."""
+
+DEVICES = re.compile(r"con|prn|aux|nul|(com|lpt)[0-9¹²³]", re.IGNORECASE)
+"""Names that no file may have on Windows, whatever its ending."""
+
+TAKEN = ".json"
+"""Ending of empty files that stand for a name, and can be nothing else: none is JSON."""
 
 
 class Folder:
@@ -129,16 +137,19 @@ class Folder:
         return held
 
     def _tidy(self) -> None:
-        """Take rights from others, and give names back that nothing came to bear."""
+        """Take rights from others, and give names back that nothing came to bear.
+
+        The folder may have been a person's before: what has no name of ours stays as it is, and so does
+        all that is in folders further down.
+        """
         folders = [self.folder / name for name in FOLDERS]
-        inside = [path for folder in folders for path in folder.rglob("*")]
+        inside = [path for folder in folders for path in folder.iterdir() if not path.is_dir()]
         for path in (self.folder, self.folder / "log.jsonl", *folders, *inside):
             with suppress(OSError):  # of a disk without rights, or of another user
                 found = path.lstat()
-                left = path.suffix == ".part" or not found.st_size
                 if stat.S_ISLNK(found.st_mode):
                     continue
-                if stat.S_ISREG(found.st_mode) and path.parent in folders and left:
+                if stat.S_ISREG(found.st_mode) and path.parent in folders and _left(path, found):
                     path.unlink()
                 elif found.st_mode & 0o077:
                     path.chmod(stat.S_IMODE(found.st_mode) & ~0o077)
@@ -195,6 +206,7 @@ class Folder:
         """Return a free name like the one wished for, whatever that holds, and take it.
 
         An empty file stands for a name that is taken until something is written; see `give_back`.
+        Samples that no recording has, but undoing may bring back, take no name of a recording.
 
         Raises
         ------
@@ -203,8 +215,11 @@ class Folder:
         """
         self.demand()
         folder = self.folder / kind
-        plain = re.sub(r"[^A-Za-z0-9_-]+", "-", wish).strip("-_")[:40] or kind.rstrip("s")
-        taken = {path.name.partition(".")[0] for path in folder.iterdir()}
+        plain = _plain(kind, wish)
+        if kind == "recordings":
+            taken = set(self.names(kind))
+        else:
+            taken = {path.name.partition(".")[0] for path in folder.iterdir()}
         for number in count(1):
             name = plain if number == 1 else f"{plain}-{number}"
             if name in taken:
@@ -276,6 +291,20 @@ class Folder:
         if size > END_OF_LOG:
             content = content.partition(b"\n")[2]
         return [line.model_dump() for line in kept.lines(content)]
+
+
+def _plain(kind: str, wish: str) -> str:
+    """Return the name most like the one wished for, of those that every disk takes."""
+    composed = unicodedata.normalize("NFC", wish)
+    plain = re.sub(r"[^\w-]+", "-", composed).strip("-_")[:40] or kind.rstrip("s")
+    return f"{kind.rstrip('s')}-{plain}" if DEVICES.fullmatch(plain) else plain
+
+
+def _left(path: Path, found: os.stat_result) -> bool:
+    """Tell whether a file is a temporary one, or but stands for a name: both of a process that ended."""
+    if path.name.startswith(PART):
+        return path.suffix == ".part"
+    return not found.st_size and path.suffix == TAKEN and NAME.fullmatch(path.name) is not None
 
 
 def _written(path: Path) -> bool:

@@ -115,6 +115,7 @@ class Jobs:
             if job.state not in ENDED and not self.workspace.read_only:
                 job.state = INTERRUPTED
                 job.message = "the workbench was closed before it was done"
+                self._note(job)
             found[name] = job
         return found
 

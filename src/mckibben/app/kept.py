@@ -27,6 +27,7 @@ def _finite(value: Any) -> float | None:
 
 Text = Annotated[str, Field(max_length=LONGEST)]
 Number = Annotated[float | None, BeforeValidator(_finite)]
+Error = Annotated[Number, Field(ge=0)]
 Count = Annotated[int, Field(ge=0, le=2**53)]
 
 
@@ -106,10 +107,10 @@ class History(Kept):
 class Figures(Kept):
     """How a model did on some recordings."""
 
-    rmse: Number = None
+    rmse: Error = None
     r2: Number = None
-    max_error: Number = None
-    rmse_interval: list[Number] | None = Field(default=None, min_length=2, max_length=2)
+    max_error: Error = None
+    rmse_interval: list[Error] | None = Field(default=None, min_length=2, max_length=2)
 
 
 class Memory(Kept):
@@ -122,7 +123,7 @@ class Memory(Kept):
 class Constant(Kept):
     """How far off the mean of the training output is, which every model has to beat."""
 
-    validation_rmse: Number = None
+    validation_rmse: Error = None
     test: Figures | None = None
 
 
@@ -136,7 +137,7 @@ class Fitted(Kept):
     unit: Text = ""
     chosen_by: Literal["cross-validation", "validation", "given", "fit"] = "cross-validation"
     settings: dict[str, Any] = {}
-    validation_rmse: Number = None
+    validation_rmse: Error = None
     test: Figures | None = None
     train: Figures | None = None
     memory: Memory | None = None

@@ -33,6 +33,9 @@ LONG = 200_000
 MOST_CELLS = 40_000_000
 """Samples times channels of the recordings that are held in memory, the one in use aside."""
 
+MOST_DIGESTS = 10_000
+"""Recordings of which it is remembered what differs whenever their samples do."""
+
 EXAMPLE = "the example"
 """Origin of the bundled recordings."""
 
@@ -94,11 +97,6 @@ class Entry:
             "steps": [step.model_dump(mode="json", exclude_defaults=True) for step in self.steps],
         }
 
-    def samples(self) -> list[Any]:
-        """Return what tells its samples, and what they are used for, whatever it is called."""
-        content = self.content()
-        return [content[key] for key in ("role", "base", "upload", "part", "reading", "steps")]
-
 
 class Recordings(Folder):
     """Recordings as plain files in a folder, as they were read.
@@ -109,6 +107,7 @@ class Recordings(Folder):
     def __init__(self, folder: str | Path) -> None:
         super().__init__(folder)
         self._recordings: Cache[Recording] = Cache(MOST_CELLS)
+        self._digests: Cache[str] = Cache(MOST_DIGESTS)
         self._changing = threading.RLock()
 
     # -- files as they came --------------------------------------------------------------------
@@ -131,7 +130,7 @@ class Recordings(Folder):
         """
         from mckibben.files.formats import READERS
 
-        given = Path(name.replace("\\", "/")).name
+        given = Path(unescaped(name).replace("\\", "/")).name
         ending = "".join(re.findall(r"\.[A-Za-z0-9]{1,8}$", given)).lower()
         if ending not in READERS:
             remedy = "unpack it and drop the files in it" if ending in ARCHIVES else "export as CSV"
@@ -179,24 +178,9 @@ class Recordings(Folder):
         except BaseException:
             self.give_back("recordings", chosen)
             raise
-        self.log(f"added recording {chosen}", call)
+        with suppress(DataError):  # what is done is done, where the log has no room
+            self.log(f"added recording {chosen}", call)
         return self.entry(chosen)
-
-    def add_example(self) -> list[str]:
-        """Add the bundled recordings that are not there yet, and return their names."""
-        from mckibben import example
-        from mckibben.files import read
-
-        with self._changing:
-            there = {entry.call for entry in self.entries() if entry.origin == EXAMPLE}
-            added = []
-            for word, role in (("TRAIN", "train"), ("TEST", "test")):
-                call = f"mckibben.read(mckibben.example.{word})[0]"
-                if call not in there:
-                    (recording,) = read(getattr(example, word))
-                    entry = self.add(recording, origin=EXAMPLE, call=call, role=role)  # type: ignore[arg-type]
-                    added.append(entry.name)
-        return added
 
     def _written(self, name: str, recording: Recording) -> Path:
         """Write samples to a file of their own: what was there before stays, for undoing."""
@@ -219,7 +203,11 @@ class Recordings(Folder):
         DataError
             If there is none of that name, or what is kept of it is damaged.
         """
-        content = kept.checked(kept.Described, self.read_json("recordings", name))
+        return self._described(name, self.read_json("recordings", name))
+
+    def _described(self, name: str, described: dict[str, Any] | None) -> Entry:
+        """Return what a description says of a recording; errors are those of `entry`."""
+        content = kept.checked(kept.Described, described)
         if content is None:
             raise DataError(
                 "there is no such recording, or its description is damaged",
@@ -242,15 +230,11 @@ class Recordings(Folder):
         )
 
     def entries(self) -> list[Entry]:
-        """Return all recordings that are described; their files may still be damaged."""
+        """Return all recordings that are described; their samples may be damaged, or missing."""
         found = []
         for name in self.names("recordings"):
-            try:
-                entry = self.entry(name)
-            except DataError:
-                continue
-            if entry.path.is_file():
-                found.append(entry)
+            with suppress(DataError):
+                found.append(self.entry(name))
         return found
 
     def recording(self, name: str) -> Recording:
@@ -282,10 +266,31 @@ class Recordings(Folder):
         return [self._read(entry.path) for entry in entries if entry.role == role]
 
     def data(self, entries: Iterable[Entry] | None = None) -> str:
-        """Return what differs whenever what is trained or tested on does, of all or of some entries."""
+        """Return what differs whenever what is trained or tested on does, of all or of some entries.
+
+        It is of the samples as they are on disk, whatever they are called and wherever they came from.
+        """
         entries = self.entries() if entries is None else entries
-        told = sorted(json.dumps(each.samples()) for each in entries if each.role != "unused")
+        told = sorted(
+            f"{each.role} {self._digest(each)}" for each in entries if each.role != "unused"
+        )
         return hashlib.sha256("\n".join(told).encode()).hexdigest()[:16]
+
+    def _digest(self, entry: Entry) -> str:
+        """Return what differs whenever samples do; they are looked at once for each time on the disk."""
+
+        def make() -> tuple[str, int]:
+            one = self._read(entry.path)
+            grid = [one.sample_time, one.start_time, *sorted(one.units.items())]
+            digest = hashlib.sha256(json.dumps(grid).encode())
+            for name in sorted(one.channels):
+                digest.update(one[name].data)
+            return digest.hexdigest(), 1
+
+        try:
+            return self._digests.get(entry.path, make)
+        except MckibbenError:
+            return entry.path.name
 
     def readable(self) -> list[Recording]:
         """Return the recordings in use that are not damaged."""
@@ -310,6 +315,13 @@ class Recordings(Folder):
     def stamp(self) -> int:
         """Return what differs whenever recordings were added or changed, by whomever."""
         return (self.folder / "recordings").stat().st_mtime_ns
+
+
+def unescaped(name: str) -> str:
+    """Return the name of an uploaded file; browsers escape these signs of it, and nothing else."""
+    for sign in '"\r\n':
+        name = name.replace(f"%{ord(sign):02X}", sign)
+    return name
 
 
 def demand_text(*names: str) -> None:

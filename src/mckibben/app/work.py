@@ -22,7 +22,7 @@ def fit(workspace: Workspace, given: dict[str, Any], tell: Tell) -> str:
     train, test = workspace.with_role("train", entries), workspace.with_role("test", entries)
     if not train:
         raise DataError("there is no recording to train on", remedy="give one the role 'train'")
-    model = str(given["model"])
+    model, data = str(given["model"]), workspace.data(entries)
     board = compare(
         train,
         test,
@@ -55,7 +55,7 @@ def fit(workspace: Workspace, given: dict[str, Any], tell: Tell) -> str:
         "not_recommended": board.not_recommended,
         "shared": list(board.shared),
         "settings": given.get("settings", {}),
-        "data": workspace.data(entries),
+        "data": data,
         "call": given.get("call", ""),
     }
     workspace.write_json("results", name, result)

@@ -144,6 +144,7 @@ class Workspace(Changing):
         for entry in self.entries():
             with suppress(MckibbenError):
                 self.recording(entry.name)
+        self.data()
         for name in self.names("models"):
             self.invertible(name)
 

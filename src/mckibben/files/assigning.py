@@ -137,14 +137,18 @@ def _require(named: Mapping[str, Column], table: Table, request: Request, path: 
                 channel=channel,
                 remedy=f"name its column with --column {channel}=COLUMN{_proposed(named)}",
             )
-    for channel in request.units:
-        if channel not in named:
-            raise DataError(
-                f"a unit is given for it and it is not there; there are {', '.join(named)}",
-                file=path,
-                channel=channel,
-                remedy="give --unit for one of them",
-            )
+    for word, option, asked in (
+        ("unit", "--unit", request.units),
+        ("calibration", "a calibration", request.calibration),
+    ):
+        for channel in asked:
+            if channel not in named:
+                raise DataError(
+                    f"a {word} is given for it and it is not there; there are {', '.join(named)}",
+                    file=path,
+                    channel=channel,
+                    remedy=f"give {option} for one of them",
+                )
 
 
 def _proposed(named: Mapping[str, Column]) -> str:

@@ -106,14 +106,19 @@ class Unit:
 
 
 def find_listed(text: str) -> Unit | None:
-    """Return the unit of a spelling in `SPELLINGS`, or None; longer ones in any case."""
+    """Return the unit of a spelling in `SPELLINGS`, or None; longer ones in any case.
+
+    Not where that would make a thousandth of a million: MN are no mN.
+    """
     text = text.strip()
     if len(text) > LONGEST:
         return None
     text = _plain(text)
     exact, folded = _lookup()
     found = exact.get(text)
-    return folded.get(text.casefold()) if found is None and len(text) > 1 else found
+    if found is not None or len(text) == 1 or (text.startswith("M") and text[1:] in exact):
+        return found
+    return folded.get(text.casefold())
 
 
 def find(text: str) -> Unit | None:

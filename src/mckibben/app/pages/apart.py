@@ -133,8 +133,7 @@ async def _zero(desk: Desk) -> None:
     said, step = f"{channels[0]} zeroed", Step(do="zero", channels=channels, over=given)
     names = list(desk.workspace.used())
     await asyncio.to_thread(desk.workspace.edit_each, names, said, step)
-    desk.did(said, f"[mckibben.signals.zeroed(one, {channels!r}, {given!r}) for one in recordings]")
-    desk.changed("recordings", "channels")
+    desk.changed("recordings", "channels", "log")
 
 
 async def _resample(desk: Desk, wanted: float) -> None:
@@ -142,5 +141,4 @@ async def _resample(desk: Desk, wanted: float) -> None:
     names = [name for name, run in used.items() if run.sample_time not in (None, wanted)]
     said, step = f"all resampled to {wanted:g} s", Step(do="resample", sample_time=wanted)
     await asyncio.to_thread(desk.workspace.edit_each, names, said, step)
-    desk.did(said, f"[mckibben.signals.resample(one, {wanted!r}) for one in recordings]")
-    desk.changed("recordings", "channels")
+    desk.changed("recordings", "channels", "log")

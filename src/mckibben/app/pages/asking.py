@@ -132,9 +132,12 @@ async def ask(
                 same = name is not None and chosen == reading and not so_too.value
                 read = {} if same else await read_so(chosen)
                 if name is not None and title_field and title_field.value not in ("", name):
-                    desk.preview = await asyncio.to_thread(
-                        desk.workspace.rename, name, title_field.value
-                    )
+                    wish = title_field.value
+                    desk.preview = await asyncio.to_thread(desk.workspace.rename, name, wish)
+                    if desk.preview != wish:
+                        ui.notify(
+                            f"It is named {desk.preview}: {wish:.80} is taken, or is no name."
+                        )
             except MckibbenError as wrong:
                 problem.set_text(said(wrong))
                 problem.set_visibility(True)

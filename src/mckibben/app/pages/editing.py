@@ -112,23 +112,22 @@ async def do(desk: Desk, name: str, *ways: Step | Sequence[Step]) -> None:
     said = " and ".join(edits.words(steps[-1]) for steps in given)
     what = f"{name}: {said}"
     await asyncio.to_thread(desk.workspace.edit, name, what, *given)
-    _done(desk, name, what, given[0])
+    _done(desk, name)
 
 
 def _remover(
     desk: Desk, name: str, what: str, seen: Sequence[Step], place: int
 ) -> Callable[[], Any]:
     async def back() -> None:
-        left = await asyncio.to_thread(desk.workspace.take_back, name, what, seen, place)
-        _done(desk, name, what, left)
+        await asyncio.to_thread(desk.workspace.take_back, name, what, seen, place)
+        _done(desk, name)
 
     return guarded(back)
 
 
-def _done(desk: Desk, name: str, what: str, steps: Sequence[Step]) -> None:
+def _done(desk: Desk, name: str) -> None:
     desk.preview = name
-    desk.did(what, edits.call("recording", steps))
-    desk.changed("recordings", "channels")
+    desk.changed("recordings", "channels", "log")
 
 
 def _button(text: str, name: str) -> Any:

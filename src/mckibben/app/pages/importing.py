@@ -16,6 +16,7 @@ from mckibben.app.desk import Desk, guarded, kept, named, tell, told
 from mckibben.app.fields import said
 from mckibben.app.pages.asking import ask, tell_of
 from mckibben.app.reading import AS_FOUND
+from mckibben.app.recordings import unescaped
 from mckibben.errors import DataError, MckibbenError, TooLargeError
 from mckibben.recording import Recording
 
@@ -60,7 +61,7 @@ class Intake:
         self.coming += 1
         self.seen += 1
         self.sending = True  # until the browser says that it has sent all
-        shown = event.file.name
+        shown = unescaped(event.file.name)
         try:
             with doing(f"Reading {shown:.40}"):
                 await self._take(event, shown)

@@ -75,7 +75,9 @@ class Rows:
         try:
             recording = desk.workspace.recording(name)
         except MckibbenError as error:
-            refused(error, name)
+            with ui.column().classes("flex-1 min-w-40"):
+                refused(error, name)
+            self._button("delete", "Remove", name, _remove)
             return lambda role: None
         duration = "" if recording.duration is None else f", {recording.duration:.4g} s"
         with ui.column().classes("gap-0 flex-1 min-w-40"):
@@ -97,13 +99,13 @@ class Rows:
             ask = guarded(lambda: ask_again(desk, self.dialogs, name))
             button = ui.button(READING, icon="tune", on_click=ask).props("flat dense no-caps")
             labelled(button, "aria-label", f"{READING}: {name}")
-            for icon, word, action in (
-                ("show_chart", "Show", lambda: _show(desk, name)),
-                ("delete", "Remove", lambda: _remove(desk, name)),
-            ):
-                button = ui.button(icon=icon, on_click=action).props("flat dense")
-                labelled(hinted(button, word), "aria-label", f"{word} {name}")
+            self._button("show_chart", "Show", name, _show)
+            self._button("delete", "Remove", name, _remove)
         return toggle.set_value
+
+    def _button(self, icon: str, word: str, name: str, action: Callable[[Desk, str], None]) -> None:
+        button = ui.button(icon=icon, on_click=lambda: action(self.desk, name)).props("flat dense")
+        labelled(hinted(button, word), "aria-label", f"{word} {name}")
 
 
 def state_of(entry: Entry) -> tuple[Entry, int]:

@@ -508,3 +508,18 @@ def test_dask_backend_gives_the_same_table(train: Recording, test_set: Recording
     ):
         spread = compare(train, test_set, models=["pi", "mpi"], n_folds=0, jobs=2)
     assert without_times(serial) == without_times(spread)
+
+
+def test_all_fits_of_a_model_tell_how_far_they_are(train: Recording, test_set: Recording) -> None:
+    told: list[float] = []
+    compare(
+        train,
+        test_set,
+        models=["gpi"],
+        n_folds=2,
+        jobs=1,
+        watch=lambda model, share, cost: told.append(share),
+    )
+    assert told == sorted(told)
+    assert told[0] < 0.4
+    assert told[-1] > 0.7

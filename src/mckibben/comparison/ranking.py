@@ -122,9 +122,8 @@ def compare(
     found : callable, optional
         Told the leaderboard of the models finished, whenever one is.
     watch : callable, optional
-        Told, while a model is fitted, its name, the share of its searches that is done, those of the
-        cross-validation before that of all the training set, and the least cost so far of the present
-        one; where parts of a model are shared among processes, of one of them; not on joblib's backends.
+        Told, while a model is fitted, its name, the share done of the fits of this process, those of
+        the cross-validation first, and the least cost so far of this one; not on joblib's backends.
 
     Returns
     -------

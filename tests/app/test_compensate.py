@@ -219,12 +219,18 @@ def test_where_no_model_is_recommended_the_pages_say_so(tmp_path: Path) -> None:
     workspace.write_json("results", "a", row | {"skill_least": -0.1})
 
     async def look(user: User) -> None:
-        for tab, choice in (("compensate", "invert"), ("take", "take-model")):
-            user.find(marker=f"tab-{tab}").click()
-            await until(user, choice)
-            await until(user, "not-recommended")
-            said = user.find(kind=ui.label, marker="not-recommended").elements
-            assert {one.text for one in said} == {f"{why}."}
+        user.find(marker="tab-take").click()
+        await until(user, "take-model")
+        await until(user, "not-recommended")
+        said = user.find(kind=ui.label, marker="not-recommended").elements
+        assert {one.text for one in said} == {f"{why}."}
+        user.find(marker="tab-compensate").click()
+        await until(user, "invert")
+        assert only(user, "invert").value == "b"
+        await turn(user, "a")
+        reason = why.removeprefix("No model is recommended: ")
+        doubts = {one.text for one in user.find(kind=ui.label, marker="not-recommended").elements}
+        assert f"a is not recommended: {reason}." in doubts
 
     visit(workspace, look)
     better = {"skill_least": 0.5, "validation_rmse": 2.0, "not_recommended": ""}
@@ -234,6 +240,16 @@ def test_where_no_model_is_recommended_the_pages_say_so(tmp_path: Path) -> None:
         user.find(marker="tab-compensate").click()
         await until(user, "invert")
         await user.should_not_see(marker="not-recommended")
+
+    alone = workspace_with(tmp_path / "alone", a=PI.example())
+    alone.write_json("results", "a", row | {"skill_least": -0.1})
+
+    async def look_alone(user: User) -> None:
+        user.find(marker="tab-compensate").click()
+        await until(user, "not-recommended")
+        assert "has an inverse" in only(user, "not-recommended").text
+
+    visit(alone, look_alone)
 
     visit(workspace, look_again)
 

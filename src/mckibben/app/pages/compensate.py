@@ -8,11 +8,12 @@ from typing import Any
 import numpy as np
 from nicegui import ui
 
-from mckibben.app import forms, plots, scripts
-from mckibben.app.desk import Desk, caution, guarded, named, on_event
+from mckibben.app import fields, forms, plots, scripts
+from mckibben.app.desk import Desk, caution, guarded, named, not_recommended, on_event
 from mckibben.app.following import compensated, held_for, kept_motion
-from mckibben.app.pages import closing, forces, leaderboard, logs
+from mckibben.app.pages import closing, forces, logs
 from mckibben.app.pages.drawing_reference import Sketch
+from mckibben.blocks.core.fields import Channel
 from mckibben.comparison.recognising import FORCE
 from mckibben.errors import MckibbenError
 from mckibben.recording import Recording
@@ -21,6 +22,11 @@ NONE_YET = (
     "Fit a model that can be inverted first, under Models: pi, gpi, mpi, cpi, preisach; of several "
     "muscles, balance."
 )
+
+NONE_PREDICTS = "No model that predicts these data has an inverse: fit others under Models. "
+
+NONE = "No model is recommended: "
+"""How the reasons of a board begin."""
 
 FORCED = (
     "What is modelled is a force: it is estimated while the muscle is held, below, and no motion is "
@@ -33,7 +39,10 @@ def build(desk: Desk) -> None:
     editors: list[Editor] = []
 
     def found() -> list[str]:
-        return [name for name in desk.workspace.ranked() if desk.workspace.invertible(name)]
+        """Return what can be inverted: what predicts nothing comes last."""
+        refused = _refused(desk)
+        names = [name for name in desk.workspace.ranked() if desk.workspace.invertible(name)]
+        return sorted(names, key=lambda name: name in refused)
 
     @ui.refreshable
     def shown() -> None:
@@ -41,7 +50,6 @@ def build(desk: Desk) -> None:
         if not names:
             ui.label(FORCED if FORCE in desk.outputs else NONE_YET)
             return
-        leaderboard.unrecommended(desk)
         editors[:] = [Editor(desk, names)]
 
     def more() -> None:
@@ -55,6 +63,12 @@ def build(desk: Desk) -> None:
     shown()
     logs.build(desk)
     forces.build(desk)
+
+
+def _refused(desk: Desk) -> dict[str, str]:
+    """Return the models that are not recommended, each judged by itself, and why."""
+    why = {row["name"]: not_recommended([row]).removeprefix(NONE) for row in desk.results()}
+    return {name: reason for name, reason in why.items() if reason}
 
 
 def _reach(desk: Desk, model: str) -> dict[str, tuple[float, float]]:
@@ -112,6 +126,10 @@ class Editor:
         self.form.on_value_change(self._fields)
         self.form.on_value_change(self._changed)
         self._fields()
+        self.doubt = named(caution(""), "not-recommended")
+        self._say()
+        for topic in ("results", "channels"):
+            desk.when(topic, self._say)
         with ui.row().classes("w-full items-start gap-4"):
             self.left = ui.column().classes("min-w-0 w-full lg:w-[34rem] gap-2")
             with ui.column().classes("min-w-0 flex-1 basis-80 gap-2"):
@@ -119,6 +137,19 @@ class Editor:
         self.model.on_value_change(on_event(lambda _: self._turned()))
         self._sketch()
         ui.timer(0.05, guarded(self._forms), once=True)
+
+    def _say(self) -> None:
+        """Say what speaks against the model chosen, or why it is not the first of the leaderboard."""
+        refused, names = _refused(self.desk), list(self.model.options)
+        first = next((row["name"] for row in self.desk.results()), self.name)
+        text = ""
+        if self.name in refused:
+            text = NONE_PREDICTS * all(name in refused for name in names)
+            text += f"{self.name} is not recommended: {refused[self.name]}."
+        elif first not in names and self.name == names[0]:
+            text = f"{first}, first of the leaderboard, has no inverse; {self.name} is the next with one."
+        self.doubt.set_text(fields.said(text))
+        self.doubt.set_visibility(bool(text))
 
     def _titles(self, names: list[str]) -> dict[str, str]:
         best = next((row["name"] for row in self.desk.results()), None)
@@ -171,6 +202,7 @@ class Editor:
 
     async def _turned(self) -> None:
         self._asked = None
+        self._say()
         before = self.sketch
         self._sketch()
         self.sketch.resume(before)
@@ -230,11 +262,10 @@ class Editor:
         with self.runs:
             closing.runs(desk, name, lambda: file if self._asked is asked else "")
 
-    def _pressures(
-        self, model: str, reference: Recording, given: Recording, notes: list[str]
-    ) -> None:
+    def _figures(self, model: str, reference: Recording, given: Recording) -> None:
         dark, sketch = self.desk.dark, self.sketch
-        ui.label("Shaded: what can be reached whatever happened before").classes(
+        together = "" if len(sketch.channels) == 1 else "; each by itself, all at once less"
+        ui.label(f"Shaded: what can be reached whatever happened before{together}").classes(
             "text-xs opacity-70"
         )
         for place, (name, channel) in enumerate(sketch.channels.items()):
@@ -248,8 +279,7 @@ class Editor:
             )
             mark = "reference-plot" if place == 0 else f"reference-plot-{place + 1}"
             named(ui.plotly(figure).classes("w-full"), mark)
-        block = forms.inverse_of(self.desk.workspace.model(model))
-        pressures = [channel for channel in block.outputs if channel.name in given]
+        pressures = self._commands(model, given)
         figure = plots.lines(
             [
                 (channel.name, given.time, given[channel.name], f"series-{place % 6 + 1}")
@@ -261,6 +291,19 @@ class Editor:
             height=260,
         )
         named(ui.plotly(figure).classes("w-full"), "pressure-plot")
+
+    def _commands(self, model: str, given: Recording) -> list[Channel]:
+        block = forms.inverse_of(self.desk.workspace.model(model))
+        return [channel for channel in block.outputs if channel.name in given]
+
+    def _pressures(
+        self, model: str, reference: Recording, given: Recording, notes: list[str]
+    ) -> None:
+        figures = ui.refreshable(lambda: self._figures(model, reference, given))
+        with ui.column().classes("w-full gap-2"):
+            self.desk.when("theme", figures.refresh)
+            figures()
+        pressures = self._commands(model, given)
         for note in notes:
             caution(note)
         header = ",".join(["time_s", *(f"{c.name}_{c.unit}" for c in pressures)])

@@ -70,6 +70,45 @@ def test_a_file_is_read_otherwise_and_steps_are_done_anew(tmp_path: Path) -> Non
     assert workspace.recording("rig").sample_time is None
 
 
+def test_steps_follow_their_channels_to_other_names(tmp_path: Path) -> None:
+    import mckibben
+
+    workspace = Workspace(tmp_path)
+    taken(workspace)
+    raw = workspace.recording("rig")
+    both = ["pressure", "displacement"]
+    steps = [Step(do="zero", channels=["displacement"], over="pressure")]
+    steps += [Step(do="detrend", channels=["pressure"]), Step(do="detrend", channels=both)]
+    workspace.edit("rig", "steps", steps)
+    before = workspace.recording("rig")
+    path = workspace.path("uploads", workspace.entry("rig").upload)
+    swapped = Reading(
+        columns={"pressure": "displacement_mm", "push": "p_kPa"}, units={"pressure": "bar"}
+    )
+    renamed = Reading(columns={"push": "p_kPa"})
+    for reading, now in ((renamed, "displacement"), (swapped, "pressure")):
+        workspace.read_again({"rig": (read_upload(path, reading), "")}, reading)
+        entry, after = workspace.entry("rig"), workspace.recording("rig")
+        assert [step.channels for step in entry.steps] == [[now], ["push"], ["push", now]]
+        assert entry.steps[0].over == "push"
+        np.testing.assert_array_equal(after["push"], before["pressure"])
+        np.testing.assert_array_equal(after[now], before["displacement"])
+        (line,) = scripts._reads(workspace, "train")
+        assert eval(line, {"mckibben": mckibben})["push"].tolist() == after["push"].tolist()
+        assert workspace.undo()
+    without = Reading(channels=["displacement", "level"])
+    workspace.read_again({"rig": (read_upload(path, without), "")}, without)
+    entry = workspace.entry("rig")
+    assert [step.channels for step in entry.steps] == [["displacement"]]
+    assert [note for note in entry.notes if "left out" in note] == [
+        "left out, as its channel is not there any more: zero where pressure is lowest (displacement)",
+        "left out, as its channel is not there any more: drift removed (pressure)",
+    ]
+    assert not np.allclose(workspace.recording("rig")["displacement"], raw["displacement"])
+    with pytest.raises(DataError, match="pressure"):
+        edits.applied(workspace.recording("rig"), steps[1:2])
+
+
 def test_everything_is_undone_and_done_again(tmp_path: Path) -> None:
     workspace = Workspace(tmp_path)
     whole = taken(workspace)
@@ -92,7 +131,7 @@ def test_everything_is_undone_and_done_again(tmp_path: Path) -> None:
 
 
 def test_forgotten_changes_leave_no_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("mckibben.app.changing.MOST_CHANGES", 2)
+    monkeypatch.setattr("mckibben.app.undoing.MOST_CHANGES", 2)
     workspace = Workspace(tmp_path)
     taken(workspace)
     for stop in range(20, 30):
@@ -278,6 +317,8 @@ def test_calibration_goes_before_all_else(tmp_path: Path) -> None:
     assert recording.meta["calibration"]["pressure"]["gain"] == 2
     with pytest.raises(DataError, match="the gain not 0"):
         read(path, calibration={"pressure": (0.0, 1.0)})
+    with pytest.raises(DataError, match=r"'foo'.*a calibration is given for it"):
+        read(path, calibration={"foo": (2.0, 1.0)})
 
 
 def test_a_file_that_changes_while_it_is_read_is_refused(

@@ -188,6 +188,8 @@ def check_after_kill(folder: Path) -> int:
     assert len(workspace.with_role("train")) == 1
     reopened = Jobs(workspace)
     assert {job.state for job in reopened.jobs.values()} <= {"done", "interrupted"}
+    written = [workspace.read_json("jobs", name) or {} for name in workspace.names("jobs")]
+    assert {content.get("state") for content in written} <= {"done", "interrupted"}
     return finished
 
 

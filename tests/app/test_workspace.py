@@ -3,12 +3,19 @@
 from __future__ import annotations
 
 import json
+import os
+import stat
+import unicodedata
+from collections.abc import Callable
+from itertools import count
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
-from mckibben import DataError, Recording
+from mckibben import DataError, Recording, write
+from mckibben.app import undoing
 from mckibben.app.kept import Step
 from mckibben.app.workspace import Workspace
 from mckibben.registry import load
@@ -26,7 +33,6 @@ HOSTILE = [
     "a\nb",
     "<script>alert(1)</script>",
     "x" * 500,
-    "ü漢字",
     "con.json/..",
 ]
 
@@ -171,3 +177,288 @@ def test_notes_of_reading_stay_with_a_recording(tmp_path: Path) -> None:
     assert workspace.add(given, origin="", call="", name="run").notes == ("the step was assumed",)
     workspace.set_role("run", "test")
     assert Workspace(tmp_path).entry("run").notes == ("the step was assumed",)
+
+
+@pytest.mark.parametrize(
+    ("wish", "name"),
+    [
+        ("ünïcode", "ünïcode"),
+        (unicodedata.normalize("NFD", "ü漢字 1"), "ü漢字-1"),
+        ("con", "recording-con"),
+        ("Lpt1", "recording-Lpt1"),
+        ("console", "console"),
+    ],
+)
+def test_names_keep_letters_of_any_script(wish: str, name: str, tmp_path: Path) -> None:
+    workspace = Workspace(tmp_path)
+    assert workspace.add(recording(), origin="", call="", name=wish).name == name
+    assert [entry.name for entry in workspace.entries()] == [name]
+    assert len(workspace.recording(name)) == 50
+
+
+def test_signs_that_browsers_escape_are_read_as_what_they_were(tmp_path: Path) -> None:
+    workspace = Workspace(tmp_path)
+    assert workspace.keep_upload("a%22quote's%0A.csv", b"1").name == "a-quote-s.csv"
+    assert workspace.keep_upload("50%25.csv", b"1").name == "50-25.csv"
+
+
+def test_files_of_a_person_stay_as_they_are(tmp_path: Path) -> None:
+    (tmp_path / "models" / "sub").mkdir(parents=True)
+    (tmp_path / "results").mkdir()
+    own = [
+        tmp_path / place
+        for place in (
+            "models/__init__.py",
+            "models/weights.bin.part",
+            "models/sub/a.json",
+            "results/.gitkeep",
+        )
+    ]
+    for path in own:
+        path.write_text("")
+    deep = [tmp_path / "models" / "sub", own[2]]
+    for path in deep:
+        path.chmod(0o755)
+    ours = [tmp_path / "models" / ".mckibben-0123.part", tmp_path / "models" / "taken.json"]
+    ours[0].write_text("half")
+    ours[1].write_text("")
+    assert Workspace(tmp_path).claim()
+    assert all(path.exists() for path in own)
+    assert not any(path.exists() for path in ours)
+    if os.name == "posix":
+        assert {stat.S_IMODE(path.stat().st_mode) for path in deep} == {0o755}
+
+
+# -- changes as a whole ----------------------------------------------------------------------
+
+CHANGES: list[Callable[[Workspace], Any]] = [
+    lambda workspace: workspace.rename("a", "b"),
+    lambda workspace: workspace.remove("a"),
+    lambda workspace: workspace.set_role(["a", "keep"], "test"),
+    lambda workspace: workspace.edit(
+        "a", "split", *([Step(do="slice", start=k, stop=k + 25)] for k in (0, 25))
+    ),
+    lambda workspace: workspace.undo(),
+]
+
+
+def filled(folder: Path) -> Workspace:
+    workspace = Workspace(folder)
+    for name in ("a", "c", "keep"):
+        workspace.add(recording(), origin="", call="", name=name)
+    workspace.rename("c", "d")
+    return workspace
+
+
+def standing(folder: Path) -> list[Any]:
+    workspace = Workspace(folder)
+    return [entry.content() | {"name": entry.name} for entry in workspace.entries()]
+
+
+class Killed(BaseException):
+    """The end of a process."""
+
+
+def kill(patch: pytest.MonkeyPatch, after: int) -> None:
+    """End the process after it has renamed and removed so many files."""
+    left = [after]
+
+    def counted(of: Callable[..., Any]) -> Callable[..., Any]:
+        def act(*given: Any, **more: Any) -> Any:
+            left[0] -= 1
+            if left[0] < 0:
+                raise Killed
+            return of(*given, **more)
+
+        return act
+
+    for way in ("replace", "unlink"):
+        patch.setattr(Path, way, counted(getattr(Path, way)))
+
+
+@pytest.mark.parametrize("change", CHANGES)
+def test_a_process_killed_at_any_moment_of_a_change_loses_nothing(
+    change: Callable[[Workspace], Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    before = standing(filled(tmp_path / "whole").folder)
+    change(Workspace(tmp_path / "whole"))
+    after = standing(tmp_path / "whole")
+    for moment in count():
+        folder = tmp_path / str(moment)
+        workspace = filled(folder)
+        with monkeypatch.context() as patch:
+            kill(patch, moment)
+            try:
+                change(workspace)
+            except Killed:
+                pass
+            else:
+                break
+        names = {each["name"] for each in standing(folder)}
+        kept = {each["name"] for each in before} & {each["name"] for each in after}
+        assert kept <= names
+        assert names & {"a", "b"} or workspace.history()[0] == "remove a"
+        again = Workspace(folder)
+        assert again.claim()
+        assert standing(folder) in (before, after)
+        while again.undo():
+            pass
+        assert {e.name: len(again.recording(e.name)) for e in again.entries()} == dict.fromkeys(
+            ("a", "c", "keep"), 50
+        )
+    assert moment > 3
+
+
+@pytest.mark.parametrize("change", CHANGES)
+def test_on_a_full_disk_a_change_is_not_begun(
+    change: Callable[[Workspace], Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    workspace = filled(tmp_path)
+    before, history = standing(tmp_path), workspace.history()
+    files = sorted((tmp_path / "recordings").iterdir())
+    writing, room = Path.write_text, undoing._text(workspace._history())
+
+    def full(path: Path, text: str, *given: Any, **more: Any) -> int:
+        if text.startswith(room[:8]):  # the history is what has no room
+            raise OSError(28, "No space left on device")
+        return writing(path, text, *given, **more)
+
+    monkeypatch.setattr(Path, "write_text", full)
+    with pytest.raises(DataError, match="No space left"):
+        change(workspace)
+    monkeypatch.undo()
+    assert standing(tmp_path) == before
+    assert workspace.history() == history
+    assert sorted((tmp_path / "recordings").iterdir()) == files
+
+
+def test_what_is_done_is_done_where_the_log_has_no_room(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    workspace = filled(tmp_path)
+
+    def full(*_: Any) -> None:
+        raise DataError("No space left", remedy="make room")
+
+    monkeypatch.setattr(workspace, "log", full)
+    workspace.remove("a")
+    assert workspace.undo() == "remove a"
+
+
+def test_the_oldest_changes_are_forgotten_where_the_history_is_too_long(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    workspace = filled(tmp_path)
+    monkeypatch.setattr(undoing, "DESCRIPTION", 3000)
+    for number in range(20):
+        workspace.set_role("a", "train" if number % 2 else "test")
+    assert (tmp_path / "history" / "recordings.json").stat().st_size <= 3000
+    undone = 0
+    while workspace.undo():
+        undone += 1
+    assert 2 < undone < 20
+    monkeypatch.setattr(undoing, "DESCRIPTION", 300)
+    before = standing(tmp_path)
+    with pytest.raises(DataError, match="too many recordings for one change"):
+        workspace.set_role(["a", "keep"], "unused")
+    assert standing(tmp_path) == before
+
+
+def test_a_damaged_history_is_kept_aside(tmp_path: Path) -> None:
+    workspace = filled(tmp_path)
+    (tmp_path / "history" / "recordings.json").write_text('{"done": [3]}')
+    assert workspace.claim()
+    assert (tmp_path / "history" / "damaged.json").read_text() == '{"done": [3]}'
+    assert "cannot be undone" in workspace.logged()[-1]["did"]
+    workspace.remove("a")
+    assert workspace.undo() == "remove a"
+
+
+def test_a_change_that_cannot_be_undone_is_passed_over(tmp_path: Path) -> None:
+    workspace = filled(tmp_path)
+    workspace.set_role("a", "test")
+    history = workspace.read_json("history", "recordings")
+    assert history is not None
+    history["done"].append({"what": "x", "before": {"../../x": {"role": "test"}}, "after": {}})
+    workspace.write_json("history", "recordings", history)
+    with pytest.raises(DataError, match=r"cannot be undone.*passed over"):
+        workspace.undo()
+    assert workspace.undo() == "a as test"
+    assert not (tmp_path.parent / "x.json").exists()
+
+
+def test_undoing_overwrites_no_recording_that_came_meanwhile(tmp_path: Path) -> None:
+    workspace = filled(tmp_path)
+    new = workspace.add(recording(30), origin="a rig", call="", name="c")
+    assert new.name == "c"
+    with pytest.raises(DataError, match=r"cannot be undone.*passed over"):
+        workspace.undo()
+    assert (len(workspace.recording("c")), len(workspace.recording("d"))) == (30, 50)
+
+
+def test_the_example_is_undone_and_comes_back_under_its_name(tmp_path: Path) -> None:
+    workspace = Workspace(tmp_path)
+    names = workspace.add_example()
+    assert workspace.undo() == "open the example"
+    assert workspace.entries() == []
+    assert workspace.redo()
+    workspace.remove(*names)
+    assert workspace.add_example() == names
+    while workspace.undo():
+        pass
+    assert workspace.entries() == []
+
+
+# -- what is on the disk ---------------------------------------------------------------------
+
+
+def test_results_know_when_samples_change_on_the_disk(tmp_path: Path) -> None:
+    workspace = filled(tmp_path)
+    before = workspace.data()
+    path = workspace.entry("a").path
+    os.utime(path, (0, 0))  # as a copy of the folder
+    assert workspace.data() == Workspace(tmp_path).data() == before
+    other = recording()
+    write(other.with_channels({}, pressure=other["pressure"] + 0.01), path)
+    assert workspace.data() != before
+
+
+def test_a_recording_without_samples_is_listed(tmp_path: Path) -> None:
+    workspace = filled(tmp_path)
+    before = workspace.data()
+    workspace.entry("a").path.unlink()
+    assert "a" in [entry.name for entry in workspace.entries()]
+    assert workspace.data() != before
+    assert list(workspace.used()) == ["d", "keep"]
+    with pytest.raises(DataError, match=r"a\.csv.*Remedy: add it again"):
+        workspace.with_role("train")
+    workspace.remove("a")
+    assert len(workspace.with_role("train")) == 2
+
+
+def test_errors_below_zero_are_of_damaged_results(tmp_path: Path) -> None:
+    workspace = Workspace(tmp_path)
+    for name, content in (
+        ("a", {"validation_rmse": -5.0}),
+        ("b", {"test": {"rmse": -5.0}}),
+        ("c", {"train": {"max_error": -1.0}}),
+        ("d", {"validation_rmse": 5.0}),
+    ):
+        workspace.write_json("results", name, {"status": "ok"} | content)
+    assert [row["name"] for row in workspace.results()] == ["d"]
+
+
+def test_each_step_is_logged_once_with_its_call(tmp_path: Path) -> None:
+    workspace = filled(tmp_path)
+    said = len(workspace.logged())
+    workspace.edit("a", "a: cut", [Step(do="slice", start=0, stop=20)])
+    workspace.edit_each(
+        ["d"], "all zeroed", Step(do="zero", channels=["displacement"], over="pressure")
+    )
+    assert [(line["did"], line["call"]) for line in workspace.logged()[said:]] == [
+        ("a: cut", "recording.slice(0, 20)"),
+        (
+            "all zeroed",
+            "[mckibben.signals.zeroed(one, ['displacement'], 'pressure') for one in recordings]",
+        ),
+    ]

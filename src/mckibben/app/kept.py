@@ -27,7 +27,7 @@ def _finite(value: Any) -> float | None:
 
 Text = Annotated[str, Field(max_length=LONGEST)]
 Number = Annotated[float | None, BeforeValidator(_finite)]
-Error = Annotated[Number, Field(ge=0)]
+Error = Annotated[Annotated[float, Field(ge=0)] | None, BeforeValidator(_finite)]
 Count = Annotated[int, Field(ge=0, le=2**53)]
 
 

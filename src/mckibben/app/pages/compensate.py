@@ -147,7 +147,9 @@ class Editor:
             text = NONE_PREDICTS * all(name in refused for name in names)
             text += f"{self.name} is not recommended: {refused[self.name]}."
         elif first not in names and self.name == names[0]:
-            text = f"{first}, first of the leaderboard, has no inverse; {self.name} is the next with one."
+            text = (
+                f"{first}, first of the leaderboard, has no inverse; {self.name} is the next one."
+            )
         self.doubt.set_text(fields.said(text))
         self.doubt.set_visibility(bool(text))
 

@@ -423,3 +423,12 @@ def test_what_is_out_of_reach_is_counted_and_told_apart(cli: Cli, tmp_path: Path
     assert f"{beyond.samples} samples of the reference" in cli("track", *given).out
     told = json.loads(cli("track", *given, "--json").out)["out_of_reach"]["displacement"]
     assert told["samples"] == beyond.samples
+
+
+def test_an_input_of_any_name_drives_a_twin_that_has_no_other() -> None:
+    model = replace(MODEL, input=Channel("force", "N"))
+    twin = Twin(model, limits={"force": (0.0, 3.0)})
+    assert twin.driving == {"force"}
+    wished = LOW + (HIGH - LOW) * np.linspace(0.1, 0.3, 50)
+    followed = track(model.inverse(), twin, Recording({"displacement": wished}, STEP))
+    assert np.ptp(followed.recording["command_force"]) > 0

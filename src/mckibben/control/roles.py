@@ -90,11 +90,11 @@ def roles(plant: Plant, reference: Recording) -> tuple[list[str], list[str]]:
 def actuated(plant: Plant, held: Collection[str]) -> list[str]:
     """Return the inputs of a plant that move its muscles, and are not held.
 
-    They are called pressures or voltages, or, in a twin of what has other names, are all that nothing
-    holds.
+    They are called pressures or voltages; a twin says itself what drives it.
     """
     free = [name for name in plant.inputs if name not in held]
-    driven = [name for name in free if name.startswith(COMMANDS)]
     if isinstance(plant, Twin):
-        driven = driven or [name for name in free if name not in plant.held]
+        driven = [name for name in free if name in plant.driving]
+    else:
+        driven = [name for name in free if name.startswith(COMMANDS)]
     return [name for name in driven if name.rpartition("_")[2].isdigit()] or driven

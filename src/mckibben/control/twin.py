@@ -276,8 +276,10 @@ class Twin:
             self._stream = self.forward.stream(self.sample_time)
 
     @property
-    def _driving(self) -> set[str]:
-        return {channel.name for channel in self.forward.inputs if drives(channel)}
+    def driving(self) -> set[str]:
+        """Inputs that a controller drives: commands, or, where none is called so, all that is not held."""
+        named = {plain(channel.name) for channel in self.forward.inputs if drives(channel)}
+        return named or set(self.inputs).difference(self.held)
 
     def _at_rest(self) -> Array:
         self._rest = np.array([self._resting(name) for name in self.inputs])
@@ -286,7 +288,7 @@ class Twin:
     def _resting(self, name: str) -> float:
         if name in self.held:
             return self.held[name]
-        if name not in self._driving:
+        if name not in self.driving:
             raise DataError(
                 "the plant's model needs it, and nothing says what it is",
                 channel=name,
@@ -297,7 +299,7 @@ class Twin:
     def _limited(self, row: Array) -> Array:
         """Clip commands to what the hardware lets through."""
         for place, name in enumerate(self.inputs):
-            if name in self._driving and name in self._limits and name not in self.held:
+            if name in self.driving and name in self._limits and name not in self.held:
                 row[place] = min(max(row[place], self._limits[name].low), self._limits[name].high)
         return row
 

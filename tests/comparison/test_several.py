@@ -199,10 +199,13 @@ def test_the_choice_is_the_same_whatever_the_test() -> None:
 
 
 def test_models_without_a_place_are_left_out_and_said() -> None:
-    several = plan_of(
-        [run(5.0), run(4.0)], run(3.0, 4), models="all", settings=None, n_folds=0, seed=0
-    )
-    assert {"sdchm", "balance", "tsfnn"} <= set(several.items)
+    runs = [run(5.0), run(4.0)]
+    several = plan_of(runs, run(3.0, 4), models="all", settings=None, n_folds=0, seed=0)
+    assert {"balance", "tsfnn"} <= set(several.items)
+    assert "pressure_1 moves alone in no run" in several.left_out["sdchm"]
+    alone = [run(5.0).with_channels(**{name: np.zeros(TIME.size)}) for name in INPUTS]
+    told = plan_of([*runs, *alone], run(3.0, 4), models="all", settings=None, n_folds=0, seed=0)
+    assert {"sdchm", "balance", "tsfnn"} <= set(told.items)
     assert "gpi" in several.left_out
     assert "mpi-narmax" in several.left_out
     one = run(5.0).select(["pressure_1", "displacement_1"])

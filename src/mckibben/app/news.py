@@ -17,6 +17,9 @@ from nicegui.element import Element
 
 Refresh = Callable[[], Any]
 
+SHORTLY = 0.02
+"""How often it is looked whether all is shown [s]."""
+
 AGAIN = (0.3, 1.0, 3.0)
 """After which times what failed is tried again [s]."""
 
@@ -94,6 +97,11 @@ class News:
             for one in self._listeners.get(topic, []):
                 self._pending[one.shows] = one
         self._go()
+
+    async def settled(self) -> None:
+        """Wait until what has changed is shown, for what comes on top of it."""
+        while self._at_work:
+            await asyncio.sleep(SHORTLY)
 
     def opened(self, tab: str) -> None:
         """Show what has changed on a tab while it was not open."""

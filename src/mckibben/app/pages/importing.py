@@ -107,6 +107,7 @@ class Intake:
                 desk.settle_channels()
                 desk.changed("recordings", "log")
                 self.seen = 0
+                await desk.news.settled()
                 tell_of(read)
             self.seen = 0
             self.show_left()

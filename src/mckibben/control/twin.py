@@ -277,7 +277,7 @@ class Twin:
 
     @property
     def driving(self) -> set[str]:
-        """Inputs that a controller drives: commands, or, where none is called so, all that is not held."""
+        """Inputs that a controller drives: commands, or, where there are none, all that nothing holds."""
         named = {plain(channel.name) for channel in self.forward.inputs if drives(channel)}
         return named or set(self.inputs).difference(self.held)
 

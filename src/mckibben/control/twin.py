@@ -277,7 +277,7 @@ class Twin:
 
     @property
     def driving(self) -> set[str]:
-        """Inputs that a controller drives: commands, or, where there are none, all that nothing holds."""
+        """Inputs that a controller drives: commands, or, without any, all that nothing holds."""
         named = {plain(channel.name) for channel in self.forward.inputs if drives(channel)}
         return named or set(self.inputs).difference(self.held)
 

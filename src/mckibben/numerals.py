@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 
 
 def numeral(value: float | None, digits: int = 3) -> str:
@@ -22,6 +23,15 @@ def numeral(value: float | None, digits: int = 3) -> str:
     size = math.floor(math.log10(abs(value)))
     form = f".{max(0, digits - 1 - size)}f" if -4 <= size <= 6 else f".{digits}g"
     return f"{value:{form}}"
+
+
+def typeset_within(sentence: str) -> str:
+    """Return a sentence with its numbers as they are printed; hyphens in words stay.
+
+    >>> typeset_within("A closed-loop from -20 to 1.5e-12, and -.5")
+    'A closed-loop from −20 to 1.5e−12, and −.5'
+    """
+    return re.sub(r"(?<![\w.])-(?=\.?\d)|(?<=\de)-(?=\d)", "−", sentence)
 
 
 def typeset(text: str) -> str:

@@ -76,6 +76,10 @@ def test_what_another_input_does_is_not_taken_for_the_own() -> None:
     assert apart.creep is None or abs(apart.creep) < 0.1
     assert apart.loop_width == pytest.approx(clean.loop_width, rel=0.02)
     assert apart.sentences[-1].startswith("Told where pressure_2 rest")
+    assert (mixed.n_recordings, mixed.n_stretches) == (1, None)
+    assert apart.n_recordings == 1
+    assert apart.n_stretches is not None
+    assert apart.n_stretches > 1
 
 
 def test_inputs_that_never_move_alone_are_refused() -> None:

@@ -10,7 +10,13 @@ import numpy as np
 from mckibben.arrays import Array
 from mckibben.characterization.beside import alone, levelled, of_one_zero
 from mckibben.characterization.evidence import evidence
-from mckibben.characterization.loops import Loop, largest_of, loops_of, pooled_curves
+from mckibben.characterization.loops import (
+    Loop,
+    largest_of,
+    loops_of,
+    pooled_curves,
+    unexplained,
+)
 from mckibben.characterization.mean_curve import mean_curve
 from mckibben.characterization.memory import dead_zones, minor_loop_errors
 from mckibben.characterization.results import Characterization
@@ -30,6 +36,9 @@ SHAPE = (
     *("closure_error", "wiping_out_error"),
 )
 """What nothing is known of where the output does not depend on the input."""
+
+OWN_WAY = 0.5
+"""Share of its variance by which an output goes its own way, as in resonance: no flat end is told."""
 
 COVERED = 0.8
 """Share of the input range that one cycle must cover to speak for all."""
@@ -82,6 +91,7 @@ def characterize(
     (2, 1.0)
     """
     runs = [recordings] if isinstance(recordings, Recording) else list(recordings)
+    n_recordings = len(runs)
     assumed = []
     if beside and runs:
         runs, said = alone(runs, input, beside)
@@ -94,7 +104,10 @@ def characterize(
     units = tuple(_unit(runs, channel) for channel in (input, output))
     loops = loops_of(tracks, scale)
     largest = largest_of(loops)
-    curve = mean_curve(*_branch_curves(tracks, largest, scale), scale)
+    curves = _branch_curves(tracks, largest, scale)
+    curve = mean_curve(*curves, scale)
+    if (left := unexplained(tracks, *curves)) is not None and left > OWN_WAY:
+        curve = replace(curve, onset=None, saturation=None)
     upper, lower = dead_zones(tracks, scale)
     closure, wiping_out = minor_loop_errors(tracks, scale)
     crept, creep_time = creep(tracks, scale)
@@ -108,7 +121,7 @@ def characterize(
         output=output,
         input_unit=units[0],
         output_unit=units[1],
-        n_recordings=len(runs),
+        n_recordings=n_recordings,
         n_samples=sum(len(run) for run in runs),
         n_cycles=sum(len(whole_cycles(track.u, track.major_turns)) for track in tracks),
         n_reversals=sum(track.turns.size - 2 for track in tracks),
@@ -149,6 +162,7 @@ def characterize(
         p_loop=seen.loop,
         widest_gap=None if seen.widest is None else seen.widest * scale.y_span,
         drift_excluded=sum(track.major_turns.size - 1 for track in tracks) > 2,
+        n_stretches=len(runs) if beside else None,
         falls=scale.sign < 0 and (curve.gain is None or curve.gain < 0),
         assumed=tuple(assumed),
     )

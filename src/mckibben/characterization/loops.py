@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mckibben.arrays import Array
-from mckibben.characterization.tracks import STILL, Scale, Track
+from mckibben.characterization.tracks import SAMPLED, STILL, Scale, Track
 from mckibben.metrics import loop_area
 from mckibben.signals.reversals import whole_cycles
 
@@ -44,7 +44,7 @@ class Cycle:
     Parameters
     ----------
     recording : int
-        Number of its recording, from 0.
+        Number of its recording, or of its stretch of one, from 0.
     low, high : float
         The input levels that both branches cover.
     rate : float or None
@@ -166,7 +166,10 @@ def curve(u: Array, y: Array, levels: Array, half: float) -> Array:
     wide = spread > (0.1 * half) ** 2
     slope = np.where(wide, mean_vw - mean_v * mean_w, 0.0) / np.where(wide, spread, 1.0)
     fitted = middle + mean_w + slope * (levels - centre - mean_v)
-    near = (count >= 3) & wide
+    # no line is drawn on beyond its samples: what is near may be one cluster, far to one side
+    last = x.size - 1
+    amid = (x[np.minimum(first, last)] <= levels) & (levels <= x[np.clip(stop - 1, 0, last)])
+    near = (count >= 3) & wide & amid
     found = np.where(near, fitted, np.interp(levels, x, z))
     found[(levels < x[0]) | (levels > x[-1])] = np.nan
     return np.asarray(found)
@@ -191,6 +194,29 @@ def pooled_curves(tracks: Sequence[Track], scale: Scale) -> tuple[Array, Array, 
         empty = np.full(levels.size, np.nan)
         curves.append(curve(u, y, levels, WINDOW * scale.u_span) if u.size else empty)
     return levels, curves[0], curves[1]
+
+
+def unexplained(
+    tracks: Sequence[Track], levels: Array, rising: Array, falling: Array
+) -> float | None:
+    """Return the share of the output's variance that its branches leave; None without both of them.
+
+    Small where the output follows the input, however wide its loop; large where it swings by itself.
+    """
+    known = np.isfinite(rising) & np.isfinite(falling)
+    if not known.any():
+        return None
+    every = -(-sum(track.u.size for track in tracks) // SAMPLED)
+    apart, outputs = [], []
+    for track in tracks:
+        u, y = track.u[::every], track.y[::every]
+        ways = np.sign(np.diff(track.u[track.major_turns]))
+        branch = np.searchsorted(track.major_turns, every * np.arange(u.size), side="right") - 1
+        up = ways[np.minimum(branch, ways.size - 1)] > 0
+        curves = (np.interp(u, levels[known], branch_y[known]) for branch_y in (rising, falling))
+        apart.append(y - np.where(up, *curves))
+        outputs.append(y)
+    return float(np.mean(np.concatenate(apart) ** 2) / np.var(np.concatenate(outputs)))
 
 
 def _loop(number: int, track: Track, piece: slice, tolerance: float) -> Loop | None:

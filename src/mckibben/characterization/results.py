@@ -78,6 +78,8 @@ class Characterization(DrawsItself):
     drift_excluded : bool
         Whether the input went up or down more than once, so that drift over a single cycle is not
         taken for a loop.
+    n_stretches : int or None
+        Where other inputs rest, of all recordings; None where nothing else moves.
     falls : bool
         Whether the output falls as the input rises.
     assumed : tuple of str
@@ -125,6 +127,7 @@ class Characterization(DrawsItself):
     p_loop: float | None = None
     widest_gap: float | None = None
     drift_excluded: bool = True
+    n_stretches: int | None = None
     falls: bool = False
     assumed: tuple[str, ...] = ()
 

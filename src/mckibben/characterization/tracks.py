@@ -21,8 +21,11 @@ QUIET = 1e-3
 STILL = 0.005
 """Share of its range that the input may move while samples are averaged."""
 
+ROUNDING = 1e-12
+"""Noise below this share of the range is rounding, and none."""
+
 SAMPLED = 20_000
-"""Windows that are looked at to see how far the input moves."""
+"""Samples, or windows of them, that are looked at where all would take long."""
 
 MAJOR = 0.1
 """Swings of the input below this share of its range do not part cycles."""
@@ -149,7 +152,8 @@ def prepare(
 def _noise(signals: Sequence[Array], span: float) -> float:
     levels = [noise_level(signal, span) for signal in signals]
     known = [level for level in levels if np.isfinite(level)]
-    return float(np.median(known)) if known else float("nan")
+    noise = float(np.median(known)) if known else float("nan")
+    return 0.0 if noise < ROUNDING * span else noise
 
 
 def _track(u: Array, y: Array, sample_time: float | None, scale: Scale) -> Track:

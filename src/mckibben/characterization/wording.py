@@ -42,8 +42,9 @@ def table(found: Characterization) -> list[Row]:
     step = found.sample_time
     return [
         ("recordings", found.n_recordings, "", "files or segments looked at"),
-        ("samples", found.n_samples, "", "of all recordings"),
-        ("duration", found.duration, "s", "of all recordings; none without time"),
+        ("stretches", found.n_stretches, "", "of them, those in which all other inputs rest"),
+        ("samples", found.n_samples, "", "looked at in all"),
+        ("duration", found.duration, "s", "looked at in all; none without time"),
         ("sample time", step, "s", "none where unknown or not the same everywhere"),
         ("cycles", found.n_cycles, "", "whole ones over at least a tenth of the input range"),
         (

@@ -8,7 +8,7 @@ import lzma
 from importlib import resources
 from typing import TYPE_CHECKING, Any
 
-from mckibben.numerals import typeset
+from mckibben.numerals import typeset, typeset_within
 from mckibben.report import interactive, wording
 from mckibben.report.mathematics import mathml
 
@@ -71,6 +71,7 @@ def template(name: str) -> Template:
         "number": wording.number,
         "percent": wording.percent,
         "typeset": typeset,
+        "typeset_within": typeset_within,
         "mathml": mathml,
     }
     environment.policies["json.dumps_kwargs"] = {"allow_nan": False, "separators": (",", ":")}

@@ -143,9 +143,7 @@ def replaced(desk: Desk, names: Sequence[str], reading: Reading) -> list[Recordi
         path = paths[name] = source(workspace, entry)
         if path not in read:
             read[path] = read_upload(path, reading)
-        if (
-            not entry.upload
-        ):  # its samples become a file that it came from, to be read otherwise again
+        if not entry.upload:  # its samples become a file, to be read otherwise again
             paths[name] = _as_upload(workspace, entry)
             read[paths[name]] = read.pop(path)
     calls = {name: scripts.read_call(str(path), options(reading)) for name, path in paths.items()}

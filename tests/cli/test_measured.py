@@ -132,11 +132,9 @@ def test_a_set_that_cannot_be_read_is_said_and_the_rest_goes_on(folder: Path) ->
 def test_a_set_that_quick_models_do_not_fit_is_said_and_the_rest_goes_on(folder: Path) -> None:
     (folder / "held").mkdir()
     for seed, length in enumerate((150.0, 140.0, 150.0)):
-        pressure = recorded(seed)["pressure"]
-        held = {"pressure": pressure, "length": np.full(pressure.size, length)}
-        write(
-            Recording(held | {"force": 40.0 * pressure}, 0.02), folder / "held" / f"run{seed}.csv"
-        )
+        moved = recorded(seed)["pressure"]
+        held = {"angle": moved, "length": np.full(moved.size, length)}
+        write(Recording(held | {"force": 40.0 * moved}, 0.02), folder / "held" / f"run{seed}.csv")
     (folder / "held" / "channels.toml").write_text(
         '[[split.tasks]]\ntest = ["run2"]\ninputs = ["length"]\noutputs = ["force"]\n'
     )

@@ -9,6 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 pytest.importorskip("nicegui")
@@ -16,7 +17,7 @@ pytest.importorskip("nicegui")
 from nicegui import ui
 from nicegui.testing import User
 
-from mckibben import PI
+from mckibben import PI, Recording
 from mckibben.app.following import compensated, kept_motion
 from mckibben.app.motions import reference_recording
 from mckibben.app.pages import compensate
@@ -293,3 +294,18 @@ def test_the_compensator_shown_is_taken_away(tmp_path: Path) -> None:
         assert only(user, "take-model").value == "b"
 
     visit(workspace_with(tmp_path, a=PI.example(), b=WEAKER), look)
+
+
+def test_steps_and_motions_begin_as_the_training_recordings_were(tmp_path: Path) -> None:
+    workspace = workspace_with(tmp_path, a=PI.example())
+    wave = 5.0 - 5.0 * np.cos(2 * np.pi * np.arange(1200) / 400)
+    run = Recording({"pressure": 0.3 * wave, "displacement": wave}, 0.1)
+    workspace.add(run, origin="", call="", role="train")
+
+    async def look(user: User) -> None:
+        user.find(marker="tab-compensate").click()
+        await until(user, "wave")
+        assert field(user, "Time between steps [s]").value == 0.1
+        assert field(user, "Duration [s]").value == 80.0
+
+    visit(workspace, look)

@@ -6,7 +6,7 @@ import warnings
 from collections.abc import Callable, Collection
 from contextlib import suppress
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -21,6 +21,60 @@ Tell = Callable[[float, float], None]
 
 CURVE = 2000
 """Most points of a curve that is kept to be drawn."""
+
+MUCH = 3.0
+"""Times that steps are finer, or motions faster, than what a model knows of, and it is said."""
+
+
+class Pace(NamedTuple):
+    """Time between samples of training recordings, and their usual and shortest cycles [s]."""
+
+    step: float
+    usual: float
+    shortest: float
+
+
+def pace(workspace: Workspace, model: str) -> Pace:
+    """Return how fast a model was trained; without recordings, what is usual, and any cycle."""
+    runs: list[Recording] = []
+    with suppress(MckibbenError):
+        runs = [run for run in workspace.with_role("train") if run.sample_time]
+    outputs = workspace.model(model).outputs
+    found = [_cycles(run, c.name) for run in runs for c in outputs if c.name in run]
+    if not found:
+        return Pace(forms.STEP, 10.0, 0.0)
+    step, all_of = float(np.median([run.sample_time or 0.0 for run in runs])), np.concatenate(found)
+    return Pace(float(f"{step:.3g}"), float(np.median(all_of)), float(all_of.min()))
+
+
+def _cycles(run: Recording, name: str) -> Array:
+    """Return how long cycles take [s], told by the outer thirds of what is covered; all, if none."""
+    values, step = run[name], run.sample_time or 0.0
+    share = (values - values.min()) / (np.ptp(values) or 1.0)
+    way = np.where(share > 2 / 3, 1, np.where(share < 1 / 3, -1, 0))
+    seen = np.flatnonzero(way)
+    turns = seen[1:][np.diff(way[seen]) != 0]
+    return 2 * step * np.diff(turns) if len(turns) > 1 else np.array([step * len(run)])
+
+
+def too_fast(workspace: Workspace, model: str, reference: Recording) -> list[str]:
+    """Say where a reference is much faster than what a model that depends on rates was trained on."""
+    known, block, step = pace(workspace, model), workspace.model(model), reference.sample_time
+    if not block.rate_dependent or not known.shortest or not step:
+        return []
+    found, unknown = [], "how the model behaves so fast is not known."
+    if not block.sample_time and MUCH * step < known.step:
+        found.append(
+            f"Steps are {step:g} s, and those of the training recordings {known.step:g} s: {unknown}"
+        )
+    own = [_cycles(reference, c.name) for c in block.outputs if c.name in reference]
+    quick = min((float(np.median(one)) for one in own), default=np.inf)
+    if MUCH * quick < known.shortest:
+        found.append(
+            f"The motion has cycles of {quick:.3g} s, and the training recordings none below "
+            f"{known.shortest:.3g} s: {unknown}"
+        )
+    return found
 
 
 def loop(workspace: Workspace, given: dict[str, Any], tell: Tell) -> str:
@@ -91,7 +145,7 @@ def compensated(
 
     Of one that learns they are those that it begins with: what it learns from is measured.
     """
-    notes = []
+    notes = too_fast(workspace, model, reference)
     if form == "adaptive":
         forms.made(workspace, model, form, settings)
         notes.append("It begins with these pressures, and learns from what is measured.")

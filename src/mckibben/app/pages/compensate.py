@@ -10,7 +10,7 @@ from nicegui import ui
 
 from mckibben.app import fields, forms, plots, scripts
 from mckibben.app.desk import Desk, caution, guarded, named, not_recommended, on_event
-from mckibben.app.following import compensated, held_for, kept_motion
+from mckibben.app.following import compensated, held_for, kept_motion, pace
 from mckibben.app.pages import closing, forces, logs
 from mckibben.app.pages.drawing_reference import Sketch
 from mckibben.blocks.core.fields import Channel
@@ -121,7 +121,7 @@ class Editor:
                 for own in forms.SETTINGS.values()
                 for key, label in own.items()
             }
-            self.step = ui.number("Time between steps [s]", value=forms.STEP, min=1e-4, max=10.0)
+            self.step = ui.number("Time between steps [s]", min=1e-6, max=10.0)
             self.step.classes("w-44").on_value_change(self._changed)
         self.form.on_value_change(self._fields)
         self.form.on_value_change(self._changed)
@@ -185,8 +185,9 @@ class Editor:
     def _sketch(self) -> None:
         desk, name = self.desk, self.name
         block = desk.workspace.model(name)
-        if block.sample_time:
-            self.step.set_value(block.sample_time)
+        known = pace(desk.workspace, name)
+        if block.sample_time or not self.step.value:
+            self.step.set_value(block.sample_time or known.step)
         inverse = forms.inverse_of(block)
         outputs = [c for c in inverse.inputs if c.name not in inverse.scheduling]
         units = {channel.name: channel.unit for channel in inverse.inputs}
@@ -198,7 +199,7 @@ class Editor:
         held = held_for(desk.workspace, name)
         self.left.clear()
         with self.left:
-            self.sketch = Sketch(desk, outputs, reach, held, units, self._changed)
+            self.sketch = Sketch(desk, outputs, reach, held, units, known.usual, self._changed)
         with self.sketch.actions:
             named(ui.button("Show pressures", on_click=guarded(self._show)), "show-pressures")
 

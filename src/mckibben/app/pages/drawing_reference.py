@@ -32,6 +32,10 @@ UNDONE = 100
 """Changes that can be taken back."""
 
 
+CYCLES = 2
+"""Of a ready-made motion, unless others are wished for."""
+
+
 class Sketch:
     """A reference for every coordinate of a model.
 
@@ -46,6 +50,8 @@ class Sketch:
         What a compensator needs beside, as it is held.
     units : mapping of str to str
         Of all these.
+    cycle : float
+        How long one usually takes [s].
     changed : callable
         Told of every change.
     """
@@ -57,9 +63,10 @@ class Sketch:
         reach: dict[str, tuple[float, float]],
         held: dict[str, float],
         units: dict[str, str],
+        cycle: float,
         changed: Callable[[], None],
     ) -> None:
-        self.changed = changed
+        self.changed, self.usual = changed, float(f"{CYCLES * cycle:.2g}")
         self.desk, self.channels, self.reach = desk, {c.name: c for c in channels}, reach
         self.units = {channel.name: channel.unit for channel in channels} | units
         self.points: dict[str, Points] = {name: [] for name in self.channels}
@@ -94,7 +101,7 @@ class Sketch:
         )
         labelled(self.frame, "aria-label", "Reference over time; its points are in the table below")
         with ui.row().classes("items-end gap-2"):
-            self.duration = ui.number("Duration [s]", value=20.0, min=0.1).classes("w-24")
+            self.duration = ui.number("Duration [s]", value=self.usual, min=0.1).classes("w-24")
             self.duration.on_value_change(self.draw)
             self.snap = named(ui.switch("Snap", value=True), "snap")
             self.snap.on_value_change(self.draw)
@@ -104,7 +111,9 @@ class Sketch:
         with ui.row().classes("items-end gap-2"):
             self.low = ui.number("From", format="%.5g").classes("w-20")
             self.high = ui.number("To", format="%.5g").classes("w-20")
-            self.cycles = ui.number("Cycles", value=2, min=1, max=50, precision=0).classes("w-16")
+            self.cycles = ui.number("Cycles", value=CYCLES, min=1, max=50, precision=0).classes(
+                "w-16"
+            )
             self.seed = ui.number("Seed", value=0, min=0, precision=0).classes("w-16")
         with ui.row().classes("gap-2"):
             for kind, label in motions.MOTIONS.items():
@@ -146,7 +155,7 @@ class Sketch:
     @property
     def seconds(self) -> float:
         """Length of the time axis [s]."""
-        return max(float(self.duration.value or 20.0), 0.1)
+        return max(float(self.duration.value or self.usual), 0.1)
 
     @property
     def axes(self) -> Axes:
@@ -291,7 +300,7 @@ class Sketch:
         units = {name: self.units[name] for name in channels if name in self.units}
         self._keep()
         self.file = Recording(channels, given.sample_time, units).with_meta(name=given.name)
-        self.duration.set_value(float(f"{self.file.duration or 20.0:.5g}"))
+        self.duration.set_value(float(f"{self.file.duration or self.usual:.5g}"))
         self.draw()
 
     # -- what it shows and gives -----------------------------------------------------------------

@@ -11,6 +11,7 @@ from nicegui import ui
 
 from mckibben.app import forms
 from mckibben.app.desk import Desk, guarded, named, on_event
+from mckibben.app.following import pace
 from mckibben.blocks.core.block import Block
 from mckibben.system.atomic import replacing
 from mckibben.system.ordinary import read_bytes
@@ -152,7 +153,7 @@ def build(desk: Desk, model: Any) -> None:
         async def offer() -> None:
             name = str(model.value)
             found = await asyncio.to_thread(forms.possible, desk.workspace, name)
-            fixed = await asyncio.to_thread(_own_step, desk, name) if found else None
+            own_step = await asyncio.to_thread(_own_step, desk, name) if found else forms.STEP
             offered = {key: forms.FORMS[key] for key in found}
             if offered and name == str(model.value):
                 value = form.value if form.value in offered else next(iter(offered))
@@ -160,10 +161,10 @@ def build(desk: Desk, model: Any) -> None:
                 if shown == name and use in offered:
                     value = use
                     step.set_value(own)
-                elif fixed:
-                    step.set_value(fixed)
                     for key, number in settings.items():
                         fields[key].set_value(number)
+                else:
+                    step.set_value(own_step)
                 form.set_options(offered, value=value)
                 fitted()
 
@@ -174,9 +175,9 @@ def build(desk: Desk, model: Any) -> None:
         ui.timer(0.05, guarded(offer), once=True)
 
 
-def _own_step(desk: Desk, name: str) -> float | None:
-    """Return the time between steps that a model was made for, if there is one [s]."""
-    return desk.workspace.model(name).sample_time
+def _own_step(desk: Desk, name: str) -> float:
+    """Return the time between steps that a model was made for, or else of what it was trained on [s]."""
+    return desk.workspace.model(name).sample_time or pace(desk.workspace, name).step
 
 
 async def _zipped(desk: Desk, folder: Path, call: str) -> None:

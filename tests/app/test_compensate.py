@@ -309,3 +309,21 @@ def test_steps_and_motions_begin_as_the_training_recordings_were(tmp_path: Path)
         assert field(user, "Duration [s]").value == 80.0
 
     visit(workspace, look)
+
+
+@pytest.mark.parametrize("gain", [3.0, -3.0])
+def test_ready_made_motions_begin_at_rest(tmp_path: Path, gain: float) -> None:
+    workspace = workspace_with(tmp_path, a=PI.example())
+    rising = np.linspace(0.0, 3.0, 50)
+    run = Recording({"pressure": rising, "displacement": 17.0 + 2.0 * gain * (rising - 1.5)}, 0.1)
+    workspace.add(run, origin="", call="", role="train")
+
+    async def look(user: User) -> None:
+        user.find(marker="tab-compensate").click()
+        await until(user, "wave")
+        first, other = (float(field(user, label).value) for label in ("From", "To"))
+        assert (other - first) * gain > 0
+        user.find(marker="wave").click()
+        assert only(user, "points").value.startswith(f"0 {first:g}\n")
+
+    visit(workspace, look)

@@ -66,7 +66,9 @@ def test_ready_made_motions_stay_between_their_ends(kind: str) -> None:
     assert values.min() >= 2.0
     assert values.max() <= 5.0
     with pytest.raises(DataError, match="Remedy"):
-        motions.motion(kind, 10.0, 5.0, 2.0)
+        motions.motion(kind, 10.0, 5.0, 5.0)
+    falling = np.array(motions.motion(kind, 10.0, 5.0, 2.0, cycles=3, seed=4))
+    assert np.allclose(falling[:, 1], 7.0 - values)
 
 
 def test_points_snap_and_lie_where_they_are_drawn() -> None:

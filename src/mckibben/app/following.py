@@ -365,3 +365,19 @@ def held_for(workspace: Workspace, model: str) -> dict[str, float]:
         runs = [run[name] for run in workspace.readable() if name in run]
         found[name] = float(np.median(np.concatenate(runs))) if runs else 0.0
     return found
+
+
+def at_rest(workspace: Workspace, model: str) -> dict[str, float]:
+    """Return a model's outputs as recorded where what drives it, all together, is least."""
+    block = workspace.model(model)
+    driving = [c.name for c in block.inputs if c.name not in block.scheduling]
+    names = [*driving, *(c.name for c in block.outputs)]
+    runs = [run for run in workspace.readable() if all(name in run for name in names)]
+    if not runs:
+        return {}
+    given = np.concatenate([run.matrix(driving).sum(axis=1) for run in runs])
+    least = given <= given.min() + 0.02 * np.ptp(given)
+    return {
+        c.name: float(np.median(np.concatenate([run[c.name] for run in runs])[least]))
+        for c in block.outputs
+    }

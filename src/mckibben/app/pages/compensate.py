@@ -10,7 +10,7 @@ from nicegui import ui
 
 from mckibben.app import fields, forms, plots, scripts
 from mckibben.app.desk import Desk, caution, guarded, named, not_recommended, on_event
-from mckibben.app.following import compensated, held_for, kept_motion, pace
+from mckibben.app.following import at_rest, compensated, held_for, kept_motion, pace
 from mckibben.app.pages import closing, forces, logs
 from mckibben.app.pages.drawing_reference import Sketch
 from mckibben.blocks.core.fields import Channel
@@ -196,10 +196,12 @@ class Editor:
         except MckibbenError:
             reach = {}
         reach = {c.name: reach.get(c.name, (0.0, 1.0)) for c in outputs}
-        held = held_for(desk.workspace, name)
+        held, rest = held_for(desk.workspace, name), at_rest(desk.workspace, name)
         self.left.clear()
         with self.left:
-            self.sketch = Sketch(desk, outputs, reach, held, units, known.usual, self._changed)
+            self.sketch = Sketch(
+                desk, outputs, reach, rest, held, units, known.usual, self._changed
+            )
         with self.sketch.actions:
             named(ui.button("Show pressures", on_click=guarded(self._show)), "show-pressures")
 

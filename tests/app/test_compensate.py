@@ -17,15 +17,17 @@ pytest.importorskip("nicegui")
 from nicegui import ui
 from nicegui.testing import User
 
-from mckibben import PI, Recording
+from mckibben import PI, Banded, Recording
 from mckibben.app.following import compensated, kept_motion
+from mckibben.app.jobs import note
 from mckibben.app.motions import reference_recording
-from mckibben.app.pages import compensate
+from mckibben.app.pages import closing, compensate
 from mckibben.app.workspace import Workspace
 from mckibben.blocks.core.block import Block
 from mckibben.blocks.core.fields import Channel
 from mckibben.control import Twin, before
 from mckibben.registry import load
+from mckibben.rigs import rig_names
 from tests.app.test_pages import visit
 
 WEAKER = replace(PI.example(), weights=tuple(0.9 * weight for weight in PI.example().weights))
@@ -325,5 +327,75 @@ def test_ready_made_motions_begin_at_rest(tmp_path: Path, gain: float) -> None:
         assert (other - first) * gain > 0
         user.find(marker="wave").click()
         assert only(user, "points").value.startswith(f"0 {first:g}\n")
+
+    visit(workspace, look)
+
+
+def test_models_are_plants_at_once_and_a_rig_is_chosen_before_one_that_predicts_worse(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    workspace = workspace_with(tmp_path, a=PI.example(), b=WEAKER)
+    for name, rmse in {"a": 1.0, "b": 2.0}.items():
+        row = {"status": "ok", "model": "pi", "validation_rmse": rmse, "unit": "mm"}
+        workspace.write_json("results", name, row)
+    go, rig = threading.Event(), rig_names()[0]
+
+    def found(*_: Any) -> list[str]:
+        assert go.wait(30.0)
+        return [rig]
+
+    monkeypatch.setattr(closing, "fitting_rigs", found)
+
+    async def look(user: User) -> None:
+        await drawn(user)
+        await until(user, "run-loop")
+        assert list(only(user, "loop-plant").options) == ["model b", "model a"]
+        assert "its validation RMSE is 2.00 mm, not 1.00 mm" in only(user, "weaker-plant").text
+        go.set()
+        await later(lambda: only(user, "loop-plant").value == f"rig {rig}")
+        await user.should_not_see(marker="weaker-plant", retries=200)
+
+    try:
+        visit(workspace, look)
+    finally:
+        go.set()
+
+
+def test_why_a_loop_failed_stays_until_it_is_run_again(tmp_path: Path) -> None:
+    workspace = workspace_with(tmp_path, a=PI.example(), b=WEAKER)
+    given = {"model": "a", "plant": "b", "controller": "pid", "name": "a-pid"}
+    note(workspace, "loop-1", "loop", given, "failed", "there is no loop. Remedy: draw a motion")
+
+    async def look(user: User) -> None:
+        await drawn(user)
+        await until(user, "failed-loop")
+        assert only(user, "failed-loop").text == "a-pid: there is no loop. Remedy: draw a motion"
+
+    visit(workspace, look)
+    note(workspace, "loop-2", "loop", given, "done", "")
+
+    async def look_again(user: User) -> None:
+        await drawn(user)
+        await until(user, "run-loop")
+        await user.should_not_see(marker="failed-loop")
+
+    visit(workspace, look_again)
+
+
+def test_runs_that_gain_nothing_and_plants_that_scatter_are_said(tmp_path: Path) -> None:
+    workspace = workspace_with(tmp_path, a=PI.example(), b=WEAKER)
+    replace(Banded.example(), forward=WEAKER).save(workspace.path("banded", "b.json"))
+    for name, rmse, plant in (("a-good", 0.5, "b"), ("a-bad", 1.5, "c")):
+        run = {"model": "a", "plant": plant, "rmse": {"displacement": rmse}}
+        workspace.write_json("runs", name, run | {"uncompensated": {"displacement": 1.0}})
+
+    async def look(user: User) -> None:
+        await drawn(user)
+        await until(user, "runs")
+        said = {one.text for one in user.find(kind=ui.label, marker="runs-remark").elements}
+        assert said == {
+            "a-bad: no better than without compensation.",
+            "a-good: the plant scatters as its model's band says, and no compensator foresees that.",
+        }
 
     visit(workspace, look)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -10,7 +10,8 @@ from nicegui import ui
 
 from mckibben.app import plots
 from mckibben.app.desk import Desk, named
-from mckibben.app.jobs import FAILED, RUNNING
+from mckibben.app.fields import said
+from mckibben.app.jobs import FAILED, RUNNING, Job
 from mckibben.app.kept import Line2D
 
 MOST = 3
@@ -28,9 +29,7 @@ def showing(
 
     @ui.refreshable
     def waiting() -> None:
-        for job in [job for job in desk.jobs.jobs.values() if job.kind == kind][-MOST:]:
-            if job.state == FAILED:
-                ui.label(f"{job.title}: {job.message}").classes("text-sm text-negative")
+        failures([job for job in desk.jobs.jobs.values() if job.kind == kind][-MOST:])
         for job in desk.jobs.active():
             if job.kind == kind:
                 told = desk.jobs.progress(job.name)
@@ -55,6 +54,14 @@ def showing(
     desk.when("theme", shown.refresh)
     waiting()
     shown()
+
+
+def failures(jobs: Iterable[Job]) -> None:
+    """Say why jobs failed, until they are run again."""
+    for job in {job.title: job for job in jobs}.values():
+        if job.state == FAILED:
+            text = ui.label(said(f"{job.title}: {job.message}")).classes("text-sm text-negative")
+            named(text, f"failed-{job.kind}")
 
 
 def drawn(desk: Desk, curves: Sequence[Line2D], above: str, below: str, name: str) -> None:

@@ -399,3 +399,38 @@ def test_runs_that_gain_nothing_and_plants_that_scatter_are_said(tmp_path: Path)
         }
 
     visit(workspace, look)
+
+
+def test_what_is_commanded_is_called_what_it_is(tmp_path: Path) -> None:
+    valve = replace(PI.example(), input=Channel("valve_voltage", "V"))
+
+    async def look(user: User) -> None:
+        await drawn(user)
+        assert only(user, "show-pressures").text == "Show voltages"
+        assert only(user, "take-pressures").text == "Voltages as CSV"
+        await until(user, "run-loop")
+        assert only(user, "controllers").options["feedforward"] == "Compensator alone (feedforward)"
+
+    visit(workspace_with(tmp_path, a=valve, b=valve), look)
+
+
+def test_a_force_is_estimated_first_of_what_nothing_was_trained_on(tmp_path: Path) -> None:
+    estimator = load("blocks", "balance").example().inverse()
+    workspace = workspace_with(tmp_path, a=estimator)
+    channels = {c.name: np.linspace(1.0, 2.0, 50) for c in (*estimator.inputs, *estimator.outputs)}
+    run = Recording(channels, 0.1)
+    workspace.add(run, origin="", call="", role="train", name="first")
+    workspace.add(run, origin="", call="", role="test", name="second")
+
+    async def look(user: User) -> None:
+        user.find(marker="tab-compensate").click()
+        await until(user, "forces")
+        only(user, "forces").open()
+        await until(user, "force-recording")
+        await later(lambda: only(user, "force-recording").value == "second")
+        assert only(user, "force-recording").options == {
+            "second": "second",
+            "first": "first (trained on)",
+        }
+
+    visit(workspace, look)

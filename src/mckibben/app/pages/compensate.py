@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from mckibben.app.desk import Desk, caution, guarded, named, not_recommended, on
 from mckibben.app.following import at_rest, compensated, held_for, kept_motion, pace
 from mckibben.app.pages import closing, forces, logs
 from mckibben.app.pages.drawing_reference import Sketch
+from mckibben.blocks.core.commanding import COMMANDS
 from mckibben.blocks.core.fields import Channel
 from mckibben.comparison.recognising import FORCE
 from mckibben.errors import MckibbenError
@@ -85,6 +87,11 @@ def _reach(desk: Desk, model: str) -> dict[str, tuple[float, float]]:
             (float(least), float(most)) if least < most else (least - 0.5, least + 0.5)
         )
     return found
+
+
+def _quantity(commands: Sequence[Channel]) -> str:
+    """Return what is commanded: pressure, voltage, force."""
+    return next((one for one in (*COMMANDS, FORCE) if one in commands[0].name), "command")
 
 
 class Editor:
@@ -203,7 +210,8 @@ class Editor:
                 desk, outputs, reach, rest, held, units, known.usual, self._changed
             )
         with self.sketch.actions:
-            named(ui.button("Show pressures", on_click=guarded(self._show)), "show-pressures")
+            text = f"Show {_quantity(inverse.outputs)}s"
+            named(ui.button(text, on_click=guarded(self._show)), "show-pressures")
 
     async def _turned(self) -> None:
         self._asked = None
@@ -236,7 +244,7 @@ class Editor:
         self._asked = None
         self.shown.clear()
         with self.shown:
-            text = "The motion or its compensator has changed: press Show pressures again."
+            text = "The motion or its compensator has changed: press Show again."
             named(ui.label(text), "wish-changed")
         self.desk.news.changed("runs")
 
@@ -291,7 +299,7 @@ class Editor:
                 for place, channel in enumerate(pressures)
             ],
             x="time [s]",
-            y=f"{pressures[0].name.partition('_')[0]} [{pressures[0].unit}]",
+            y=f"{_quantity(pressures)} [{pressures[0].unit}]",
             dark=dark,
             height=260,
         )
@@ -315,8 +323,9 @@ class Editor:
         columns = zip(given.time, *(given[c.name] for c in pressures), strict=True)
         rows = [",".join(f"{number:.9g}" for number in row) for row in columns]
         content = "\n".join([header, *rows])
+        asked = f"{_quantity(pressures)}s"
         button = ui.button(
-            "Pressures as CSV",
-            on_click=lambda: ui.download(content.encode(), f"{model}-pressures.csv"),
+            f"{asked.capitalize()} as CSV",
+            on_click=lambda: ui.download(content.encode(), f"{model}-{asked}.csv"),
         )
         named(button.props("outline"), "take-pressures")

@@ -303,7 +303,7 @@ def _table(runs: dict[str, Followed], motions: dict[str, str]) -> None:
         "rmse": "RMSE",
         "without": "RMSE without compensation",
         "largest": "Largest error",
-        "clipped": "Clipped steps",
+        "clipped": "Steps the plant clipped",
         "step": "Step [µs]",
     }
     rows: list[dict[str, Any]] = [

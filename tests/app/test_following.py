@@ -135,5 +135,5 @@ def test_steps_and_cycles_are_those_of_the_training_recordings(workspace: Worksp
         return " ".join(too_fast(workspace, model, wished))
 
     assert told(0.1, 80.0) == told(0.01, 8.0, "pi") == ""
-    assert "Steps are 0.01 s, and those of the training recordings 0.1 s" in told(0.01, 80.0)
-    assert "The motion has cycles of 4 s, and the training recordings none below" in told(0.1, 8.0)
+    assert "steps take 0.01 s, and those of the training recordings 0.1 s" in told(0.01, 80.0)
+    assert "cycles take 4 s, and those of the training recordings" in told(0.1, 8.0)

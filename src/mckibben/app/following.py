@@ -36,45 +36,40 @@ class Pace(NamedTuple):
 
 def pace(workspace: Workspace, model: str) -> Pace:
     """Return how fast a model was trained; without recordings, what is usual, and any cycle."""
-    runs: list[Recording] = []
+    runs, outputs = list[Recording](), workspace.model(model).outputs
     with suppress(MckibbenError):
         runs = [run for run in workspace.with_role("train") if run.sample_time]
-    outputs = workspace.model(model).outputs
     found = [_cycles(run, c.name) for run in runs for c in outputs if c.name in run]
     if not found:
         return Pace(forms.STEP, 10.0, 0.0)
-    step, all_of = float(np.median([run.sample_time or 0.0 for run in runs])), np.concatenate(found)
-    return Pace(float(f"{step:.3g}"), float(np.median(all_of)), float(all_of.min()))
+    step = float(f"{np.median([run.sample_time or 0.0 for run in runs]):.3g}")
+    return Pace(step, float(np.median(np.concatenate(found))), min(map(np.min, found)))
 
 
 def _cycles(run: Recording, name: str) -> Array:
     """Return how long cycles take [s], told by the outer thirds of what is covered; all, if none."""
     values, step = run[name], run.sample_time or 0.0
     share = (values - values.min()) / (np.ptp(values) or 1.0)
-    way = np.where(share > 2 / 3, 1, np.where(share < 1 / 3, -1, 0))
+    way = 1 * (share > 2 / 3) - (share < 1 / 3)
     seen = np.flatnonzero(way)
     turns = seen[1:][np.diff(way[seen]) != 0]
     return 2 * step * np.diff(turns) if len(turns) > 1 else np.array([step * len(run)])
 
 
 def too_fast(workspace: Workspace, model: str, reference: Recording) -> list[str]:
-    """Say where a reference is much faster than what a model that depends on rates was trained on."""
+    """Say what of a reference is faster than a model that depends on rates was trained on."""
     known, block, step = pace(workspace, model), workspace.model(model), reference.sample_time
-    if not block.rate_dependent or not known.shortest or not step:
+    if not block.rate_dependent or not step:
         return []
-    found, unknown = [], "how the model behaves so fast is not known."
-    if not block.sample_time and MUCH * step < known.step:
-        found.append(
-            f"Steps are {step:g} s, and those of the training recordings {known.step:g} s: {unknown}"
-        )
-    own = [_cycles(reference, c.name) for c in block.outputs if c.name in reference]
-    quick = min((float(np.median(one)) for one in own), default=np.inf)
-    if MUCH * quick < known.shortest:
-        found.append(
-            f"The motion has cycles of {quick:.3g} s, and the training recordings none below "
-            f"{known.shortest:.3g} s: {unknown}"
-        )
-    return found
+    own = [np.median(_cycles(reference, c.name)) for c in block.outputs if c.name in reference]
+    cycle, trained = min(own, default=np.inf), known.step if known.shortest else 0.0
+    pairs = {"steps": (step, trained), "cycles": (cycle, known.shortest)}
+    return [
+        f"The {what} take {now:.3g} s, and those of the training recordings {least:.3g} s or more: "
+        "how the model behaves so fast is not known."
+        for what, (now, least) in pairs.items()
+        if MUCH * now < least
+    ]
 
 
 def loop(workspace: Workspace, given: dict[str, Any], tell: Tell) -> str:

@@ -137,18 +137,15 @@ class Workspace(Changing):
     def weaker(self, inverted: str) -> dict[str, str]:
         """Return the models that predict worse than one that is inverted, and by how much, in words."""
         rows = {row["name"]: row for row in self.results() if row["validation_rmse"]}
-        ours, found = rows.pop(inverted, None), {}
-        for name, row in rows.items():
-            alike = ours and (row["unit"], row["data"]) == (ours["unit"], ours["data"])
-            if ours and alike and row["validation_rmse"] > WEAKER * ours["validation_rmse"]:
-                theirs, own = (
-                    f"{numeral(each['validation_rmse'], 3)} {each['unit']}" for each in (row, ours)
-                )
-                found[name] = (
-                    f"{name} predicts worse than {inverted}: its validation RMSE is {theirs}, not {own}."
-                    " What a compensator does on it says little of your muscle."
-                )
-        return found
+        ours = rows.get(inverted)
+        return {
+            name: f"{name} predicts worse than {inverted}: its validation RMSE is {_rmse(row)}, not "
+            f"{_rmse(ours)}. What a compensator does on it says little of your muscle."
+            for name, row in rows.items()
+            if ours
+            and (row["unit"], row["data"]) == (ours["unit"], ours["data"])
+            and row["validation_rmse"] > WEAKER * ours["validation_rmse"]
+        }
 
     def same(self, inverted: str, plant: str) -> bool:
         """Tell whether a plant is the very model that a compensator undoes."""
@@ -203,6 +200,10 @@ class Workspace(Changing):
         order = sorted(paths, key=lambda name: paths[name].stat().st_mtime_ns)
         found = {name: kept.checked(of, self.read_json(kind, name)) for name in order}
         return {name: one for name, one in found.items() if one is not None}
+
+
+def _rmse(result: dict[str, Any]) -> str:
+    return f"{numeral(result['validation_rmse'], 3)} {result['unit']}"
 
 
 def _as_in_a_leaderboard(result: dict[str, Any]) -> tuple[Any, ...]:

@@ -13,9 +13,8 @@ from mckibben import registry
 from mckibben.app import fields, forms, plots, scripts
 from mckibben.app.desk import Desk, caution, guarded, named, on_event, tell
 from mckibben.app.following import fitting_rigs
-from mckibben.app.jobs import ENDED, RUNNING
 from mckibben.app.kept import Followed
-from mckibben.app.pages.kept_curves import failures
+from mckibben.app.pages.kept_curves import going
 from mckibben.arrays import Array
 from mckibben.errors import MckibbenError
 from mckibben.files import read
@@ -225,17 +224,8 @@ def runs(desk: Desk, model: str, drawn: Callable[[], str]) -> None:
 
     @ui.refreshable
     def waiting() -> None:
-        jobs = [job for job in desk.jobs.jobs.values() if job.kind == "loop"]
-        jobs = [job for job in jobs if job.given.get("model") == model]
-        failures(jobs)
-        for job in jobs:
-            if job.state not in ENDED:
-                told = desk.jobs.progress(job.name)
-                with ui.row().classes("items-center w-full gap-2 no-wrap"):
-                    ui.label(job.title).classes("w-48 text-xs")
-                    share = told[-1][1] if told and job.state == RUNNING else 0.0
-                    ui.linear_progress(round(share, 2), show_value=False).classes("flex-1")
-                    ui.label(job.state).classes("text-xs")
+        loops = [job for job in desk.jobs.jobs.values() if job.kind == "loop"]
+        going(desk, [job for job in loops if job.given.get("model") == model])
 
     @ui.refreshable
     def shown() -> None:

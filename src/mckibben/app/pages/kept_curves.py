@@ -11,7 +11,7 @@ from nicegui import ui
 from mckibben.app import plots
 from mckibben.app.desk import Desk, named
 from mckibben.app.fields import said
-from mckibben.app.jobs import FAILED, RUNNING, Job
+from mckibben.app.jobs import ENDED, FAILED, RUNNING, Job
 from mckibben.app.kept import Line2D
 
 MOST = 3
@@ -29,14 +29,7 @@ def showing(
 
     @ui.refreshable
     def waiting() -> None:
-        failures([job for job in desk.jobs.jobs.values() if job.kind == kind][-MOST:])
-        for job in desk.jobs.active():
-            if job.kind == kind:
-                told = desk.jobs.progress(job.name)
-                with ui.row().classes("items-center gap-2"):
-                    ui.spinner()
-                    share = told[-1][1] if told and job.state == RUNNING else 0.0
-                    ui.label(f"{job.title}: {job.state}, {100 * share:.0f} %").classes("text-sm")
+        going(desk, [job for job in desk.jobs.jobs.values() if job.kind == kind])
 
     @ui.refreshable
     def shown() -> None:
@@ -56,12 +49,18 @@ def showing(
     shown()
 
 
-def failures(jobs: Iterable[Job]) -> None:
-    """Say why jobs failed, until they are run again."""
+def going(desk: Desk, jobs: Iterable[Job]) -> None:
+    """Show how far jobs are, and why those failed that were not run again."""
     for job in {job.title: job for job in jobs}.values():
         if job.state == FAILED:
             text = ui.label(said(f"{job.title}: {job.message}")).classes("text-sm text-negative")
             named(text, f"failed-{job.kind}")
+        elif job.state not in ENDED:
+            told = desk.jobs.progress(job.name)
+            with ui.row().classes("items-center gap-2"):
+                ui.spinner()
+                share = told[-1][1] if told and job.state == RUNNING else 0.0
+                ui.label(f"{job.title}: {job.state}, {100 * share:.0f} %").classes("text-sm")
 
 
 def drawn(desk: Desk, curves: Sequence[Line2D], above: str, below: str, name: str) -> None:

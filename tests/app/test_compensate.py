@@ -397,7 +397,7 @@ def test_runs_that_gain_nothing_and_plants_that_scatter_are_said(tmp_path: Path)
         said = {one.text for one in user.find(kind=ui.label, marker="runs-remark").elements}
         assert said == {
             "a-bad: no better than without compensation.",
-            "a-good: the plant scatters as its model's band says, and no compensator foresees that.",
+            "a-good: the plant scatters as its band says, which no compensator foresees.",
         }
 
     visit(workspace, look)

@@ -27,7 +27,7 @@ MUCH = 3.0
 
 
 class Pace(NamedTuple):
-    """Time between samples of training recordings, and their usual and shortest cycles [s]."""
+    """Time between steps of a model, or else of what trained it, and cycles of that [s]."""
 
     step: float
     usual: float
@@ -36,14 +36,16 @@ class Pace(NamedTuple):
 
 def pace(workspace: Workspace, model: str) -> Pace:
     """Return how fast a model was trained; without recordings, what is usual, and any cycle."""
-    runs, outputs = list[Recording](), workspace.model(model).outputs
+    runs, block = list[Recording](), workspace.model(model)
     with suppress(MckibbenError):
         runs = [run for run in workspace.with_role("train") if run.sample_time]
-    found = [_cycles(run, c.name) for run in runs for c in outputs if c.name in run]
+    found = [_cycles(run, c.name) for run in runs for c in block.outputs if c.name in run]
     if not found:
-        return Pace(forms.STEP, 10.0, 0.0)
+        return Pace(block.sample_time or forms.STEP, 10.0, 0.0)
     step = float(f"{np.median([run.sample_time or 0.0 for run in runs]):.3g}")
-    return Pace(step, float(np.median(np.concatenate(found))), min(map(np.min, found)))
+    return Pace(
+        block.sample_time or step, float(np.median(np.concatenate(found))), min(map(np.min, found))
+    )
 
 
 def _cycles(run: Recording, name: str) -> Array:

@@ -140,7 +140,7 @@ class Workspace(Changing):
         ours = rows.get(inverted)
         return {
             name: f"{name} predicts worse than {inverted}: its validation RMSE is {_rmse(row)}, not "
-            f"{_rmse(ours)}. What a compensator does on it says little of your muscle."
+            f"{_rmse(ours)}. Loops on it say little of your muscle."
             for name, row in rows.items()
             if ours
             and (row["unit"], row["data"]) == (ours["unit"], ours["data"])

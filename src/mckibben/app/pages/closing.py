@@ -103,8 +103,8 @@ def _lacking(desk: Desk, model: str, offered: dict[str, str]) -> None:
         named(ui.label(said), "no-plant")
     elif not any(text.endswith(("of your muscle", "of its size")) for text in offered.values()):
         caution(
-            "Only the model that is inverted is there, on which its inverse is right by construction. "
-            "Fit a model of another kind under Models to try it on."
+            "On the model that is inverted, its inverse is right by construction. Fit a model of "
+            "another kind under Models to try it on."
         )
 
 
@@ -265,7 +265,7 @@ def _remarks(desk: Desk, runs: dict[str, Followed]) -> dict[str, list[str]]:
             scattering.append(name)
     return {
         "no better than without compensation.": no_better,
-        "the plant scatters as its model's band says, and no compensator foresees that.": scattering,
+        "the plant scatters as its band says, which no compensator foresees.": scattering,
     }
 
 

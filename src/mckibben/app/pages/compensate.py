@@ -194,7 +194,7 @@ class Editor:
         block = desk.workspace.model(name)
         known = pace(desk.workspace, name)
         if block.sample_time or not self.step.value:
-            self.step.set_value(block.sample_time or known.step)
+            self.step.set_value(known.step)
         inverse = forms.inverse_of(block)
         outputs = [c for c in inverse.inputs if c.name not in inverse.scheduling]
         units = {channel.name: channel.unit for channel in inverse.inputs}

@@ -153,7 +153,7 @@ def build(desk: Desk, model: Any) -> None:
         async def offer() -> None:
             name = str(model.value)
             found = await asyncio.to_thread(forms.possible, desk.workspace, name)
-            own_step = await asyncio.to_thread(_own_step, desk, name) if found else forms.STEP
+            known = await asyncio.to_thread(pace, desk.workspace, name) if found else None
             offered = {key: forms.FORMS[key] for key in found}
             if offered and name == str(model.value):
                 value = form.value if form.value in offered else next(iter(offered))
@@ -163,8 +163,8 @@ def build(desk: Desk, model: Any) -> None:
                     step.set_value(own)
                     for key, number in settings.items():
                         fields[key].set_value(number)
-                else:
-                    step.set_value(own_step)
+                elif known:
+                    step.set_value(known.step)
                 form.set_options(offered, value=value)
                 fitted()
 
@@ -173,11 +173,6 @@ def build(desk: Desk, model: Any) -> None:
         desk.when("compensator", offer)
         fitted()
         ui.timer(0.05, guarded(offer), once=True)
-
-
-def _own_step(desk: Desk, name: str) -> float:
-    """Return the time between steps that a model was made for, or else of what it was trained on [s]."""
-    return desk.workspace.model(name).sample_time or pace(desk.workspace, name).step
 
 
 async def _zipped(desk: Desk, folder: Path, call: str) -> None:

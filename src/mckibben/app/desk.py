@@ -268,3 +268,35 @@ async def kept(desk: Desk, file: FileUpload) -> Path:
     with desk.workspace.receiving(file.name, file.size()) as (new, path):
         await file.save(new)
     return path
+
+
+class Drawn:
+    """A part of a page that is drawn anew when its state has changed: no click, nor typing, is lost.
+
+    Parameters
+    ----------
+    desk : Desk
+    state : callable
+        Returns what all that is drawn depends on, to be compared.
+    draw : callable
+        Draws it.
+    topics : str
+        After which it is looked whether the state has changed.
+    """
+
+    def __init__(
+        self, desk: Desk, state: Callable[[], Any], draw: Callable[[], None], *topics: str
+    ) -> None:
+        self._state, self._draw = state, ui.refreshable(draw)
+        self._shown: Any = state()
+        self._draw()
+        for topic in topics:
+            desk.when(topic, self.update)
+
+    def update(self) -> None:
+        """Draw it anew, unless it would be the same."""
+        now = self._state()
+        if now != self._shown:
+            self._shown = object()  # where it fails, it is tried again
+            self._draw.refresh()
+            self._shown = now

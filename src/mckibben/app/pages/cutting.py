@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from nicegui import ui
 
-from mckibben.app.desk import Desk, guarded, hinted, labelled, named, refused
-from mckibben.app.drawn import Drawn
+from mckibben.app.desk import Desk, Drawn, guarded, hinted, labelled, named, refused
 from mckibben.app.kept import Step
 from mckibben.app.pages import editing
 from mckibben.app.pages.rows import state_of

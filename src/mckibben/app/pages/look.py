@@ -14,6 +14,7 @@ from mckibben.app.fields import said
 from mckibben.app.pages.cutting import time_plot
 from mckibben.app.together import obstacle
 from mckibben.errors import MckibbenError
+from mckibben.numerals import typeset_within
 from mckibben.recording import Recording
 from mckibben.report import coupling_subjects, subjects, wording
 
@@ -45,7 +46,7 @@ def build(desk: Desk) -> None:
             with ui.column().classes("min-w-72 flex-[2]"):
                 for given, wanted in desk.looked_at:
                     _words(desk, given, wanted)
-                    _untold(desk, given, wanted)
+                _untold(desk)
 
     desk.when("recordings", shown.refresh)
     desk.when("channels", shown.refresh)
@@ -202,7 +203,8 @@ def _by_rate(desk: Desk, recording: Recording, given: str, wanted: str) -> plots
 def _words(desk: Desk, given: str, wanted: str) -> None:
     from mckibben.characterization import characterize
 
-    ui.label(_headed(desk, "What the muscle does", wanted)).classes("text-lg")
+    what = f": {wanted}" if len(desk.outputs) > 1 else ""
+    ui.label(f"What the muscle does{what}").classes("text-lg")
     place = named(ui.column().classes("w-full"), "characterization")
 
     async def find() -> None:
@@ -245,17 +247,19 @@ def _words(desk: Desk, given: str, wanted: str) -> None:
     ui.timer(0.05, guarded(find), once=True)
 
 
-def _untold(desk: Desk, given: str, wanted: str) -> None:
+def _untold(desk: Desk) -> None:
     from mckibben.excitation import untold
 
-    ui.label(_headed(desk, "What these recordings cannot tell", wanted)).classes("text-lg")
+    ui.label("What these recordings cannot tell").classes("text-lg")
     place = named(ui.column().classes("w-full"), "untold")
+    # an output is still moved by inputs other than its own; where inputs are held, by what moves
+    given = desk.inputs if len(desk.inputs) > 1 else (desk.looked_at[0][0],)
 
     async def find() -> None:
         train, test = desk.workspace.with_role("train"), desk.workspace.with_role("test")
         try:
             gaps = await asyncio.to_thread(
-                untold, train or test, given, wanted, tests=test if train else ()
+                untold, train or test, given, desk.outputs, tests=test if train else ()
             )
         except MckibbenError as error:
             with place:
@@ -265,16 +269,11 @@ def _untold(desk: Desk, given: str, wanted: str) -> None:
             if not gaps:
                 ui.label("Nothing that a model would need.")
             for gap in gaps:
-                ui.label(gap.sentence)
-                ui.label(said(gap.remedy)).classes("text-caption pl-4")
+                ui.label(typeset_within(gap.sentence))
+                ui.label(typeset_within(said(gap.remedy))).classes("text-caption pl-4")
             desk.did(
                 "asked what the recordings cannot tell",
-                f"mckibben.untold(train, {given!r}, {wanted!r}, tests=test)",
+                f"mckibben.untold(train, {given!r}, {desk.outputs!r}, tests=test)",
             )
 
     ui.timer(0.05, guarded(find), once=True)
-
-
-def _headed(desk: Desk, heading: str, wanted: str) -> str:
-    """Return a heading, with the output where there are several."""
-    return f"{heading}: {wanted}" if len(desk.outputs) > 1 else heading

@@ -1,0 +1,47 @@
+"""Look: what moves what is found from the data, and told in plain words."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+pytest.importorskip("nicegui")
+
+from nicegui import ui
+from nicegui.testing import User
+
+from mckibben import Recording
+from mckibben.app.workspace import Workspace
+from mckibben.signals import triangle
+from tests.app.test_pages import visit
+
+
+def texts(user: User, marker: str) -> list[str]:
+    """Return what all labels within an element say."""
+    (place,) = user.find(marker=marker).elements
+    return [str(one.text) for one in place.descendants() if isinstance(one, ui.label)]
+
+
+def arm(folder: Path) -> Workspace:
+    """Return a workspace with an arm whose first output is moved by its third input alone."""
+    time = np.arange(1200) * 0.1
+    every = {f"pressure_{k + 1}": np.zeros(time.size) for k in range(3)}
+    for k, pressure in enumerate(every.values()):  # one after another, the others held
+        pressure[400 * k : 400 * k + 400] = triangle(time[:400], 10.0, 4.0)
+    one, two, three = every.values()
+    every |= {"displacement_1": 9 * three + 0.2 * one, "displacement_2": 5 * one - two}
+    every["count"] = np.arange(time.size) % 50.0
+    workspace = Workspace(folder)
+    workspace.add(Recording(every, 0.1), origin="a test", call="", name="arm")
+    return workspace
+
+
+def test_an_output_moved_by_another_input_does_not_creep(tmp_path: Path) -> None:
+    async def look(user: User) -> None:
+        user.find(marker="tab-look").click()
+        await user.should_see("What a load does cannot be told", retries=100)
+        assert not [said for said in texts(user, "untold") if "still moves" in said]
+
+    visit(arm(tmp_path), look)

@@ -14,6 +14,7 @@ from nicegui.testing import User
 
 from mckibben import Recording
 from mckibben.app.workspace import Workspace
+from mckibben.arrays import Array
 from mckibben.signals import triangle
 from tests.app.test_pages import visit
 
@@ -32,7 +33,6 @@ def arm(folder: Path) -> Workspace:
         pressure[400 * k : 400 * k + 400] = triangle(time[:400], 10.0, 4.0)
     one, two, three = every.values()
     every |= {"displacement_1": 9 * three + 0.2 * one, "displacement_2": 5 * one - two}
-    every["count"] = np.arange(time.size) % 50.0
     workspace = Workspace(folder)
     workspace.add(Recording(every, 0.1), origin="a test", call="", name="arm")
     return workspace
@@ -45,3 +45,40 @@ def test_an_output_moved_by_another_input_does_not_creep(tmp_path: Path) -> None
         assert not [said for said in texts(user, "untold") if "still moves" in said]
 
     visit(arm(tmp_path), look)
+
+
+def test_words_and_picture_are_of_the_input_that_moves_an_output_most(tmp_path: Path) -> None:
+    workspace = arm(tmp_path)
+    workspace.add(workspace.recording("arm"), origin="a test", call="", name="again")
+
+    async def look(user: User) -> None:
+        user.find(marker="tab-look").click()
+        await user.should_see("displacement_1 over pressure_3", retries=100)
+        await user.should_see("Over all 2 recordings:", retries=100)
+        rows = [row["what"] for table in user.find(kind=ui.table).elements for row in table.rows]
+        assert "highest pressure_3" in rows
+        assert "highest pressure_2" not in rows
+
+    visit(workspace, look)
+
+
+def test_small_swings_are_no_cycles_and_a_counter_colours_nothing_unasked(tmp_path: Path) -> None:
+    time = np.arange(1200) * 0.1
+    pressure: Array = triangle(time, 30.0, 4.0) + triangle(time, 3.0, 0.3)
+    every: dict[str, Array] = {
+        "pressure": pressure,
+        "displacement": 3 * pressure,
+        "count": np.arange(1200.0) % 50,
+    }
+    workspace = Workspace(tmp_path)
+    workspace.add(Recording(every, 0.1), origin="a test", call="", name="run")
+
+    async def look(user: User) -> None:
+        user.find(marker="tab-look").click()
+        await user.should_see("Cycle, of 4; 0 for all", retries=100)
+        (colour,) = user.find(marker="loop-colour").elements
+        assert isinstance(colour, ui.toggle)
+        assert "by count" in colour.options
+        assert colour.value == "time"
+
+    visit(workspace, look)

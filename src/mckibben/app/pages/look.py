@@ -21,6 +21,9 @@ from mckibben.report import coupling_subjects, subjects, wording
 SMALL_HEIGHT = 150
 """Of a small picture [px]."""
 
+EXPLAINED = '<q-td :props="props" :title="props.row.note">{{ props.value }}</q-td>'
+"""A quantity, with what it is where a pointer rests on it."""
+
 
 def build(desk: Desk) -> None:
     """Build the page."""
@@ -39,14 +42,15 @@ def build(desk: Desk) -> None:
         )
         with ui.row().classes("w-full items-start gap-4"):
             with ui.column().classes("min-w-80 flex-[3]"):
+                pairs = desk.looked_at
                 if len(desk.inputs) > 1 or len(desk.outputs) > 1:
-                    _matrix(desk, chosen)
+                    _matrix(desk, chosen, pairs[0])
                 else:
-                    _plots(desk, chosen, *desk.looked_at[0])
+                    _plots(desk, chosen, *pairs[0])
             with ui.column().classes("min-w-72 flex-[2]"):
-                for given, wanted in desk.looked_at:
+                for given, wanted in pairs:
                     _words(desk, given, wanted)
-                _untold(desk)
+                _untold(desk, pairs[0][0])
 
     desk.when("recordings", shown.refresh)
     desk.when("channels", shown.refresh)
@@ -54,10 +58,10 @@ def build(desk: Desk) -> None:
     shown()
 
 
-def _matrix(desk: Desk, chosen: ui.select) -> None:
+def _matrix(desk: Desk, chosen: ui.select, begun: tuple[str, str]) -> None:
     """Show every output over every input, small, with how far each moves each; a click enlarges."""
     at = named(ui.column().classes("w-full"), "coupling")
-    pair = list(desk.pairs[0])
+    pair = list(begun)
 
     @ui.refreshable
     def enlarged() -> None:
@@ -72,7 +76,8 @@ def _matrix(desk: Desk, chosen: ui.select) -> None:
     def pictured() -> None:
         try:
             recording = desk.workspace.recording(str(chosen.value))
-            found = coupling_subjects.coupling([recording], desk.inputs, desk.outputs)
+            used = list(desk.workspace.used().values())
+            found = coupling_subjects.coupling(used, desk.inputs, desk.outputs)
         except (MckibbenError, KeyError) as error:
             refused(error)
             return
@@ -92,7 +97,7 @@ def _matrix(desk: Desk, chosen: ui.select) -> None:
             "In colour: the input that "
             + ("belongs to the output." if found.paired else "moves the output most.")
             + " Numbers: what the input over its whole range does to the output, by one straight line "
-            "through all inputs. Click on a picture's name to enlarge it."
+            "through all inputs of all recordings. Click on a picture's name to enlarge it."
         ).classes("text-xs opacity-70")
 
     chosen.on_value_change(pictured.refresh)
@@ -121,6 +126,7 @@ def _small(
 
 
 def _plots(desk: Desk, chosen: ui.select, given: str, wanted: str) -> None:
+    from mckibben.characterization.tracks import MAJOR
     from mckibben.signals import cycles
 
     @ui.refreshable
@@ -130,7 +136,7 @@ def _plots(desk: Desk, chosen: ui.select, given: str, wanted: str) -> None:
         except MckibbenError as error:
             refused(error)
             return
-        found = cycles(recording[given])
+        found = cycles(recording[given], MAJOR * float(np.ptp(recording[given])))
         used = (*desk.inputs, *desk.outputs, given)
         others = coupling_subjects.third_channels(recording, used)
         with ui.row().classes("items-center w-full"):
@@ -139,7 +145,7 @@ def _plots(desk: Desk, chosen: ui.select, given: str, wanted: str) -> None:
                     {"time": "Colour by time"}
                     | ({"rate": "Colour by rate"} if recording.sample_time is not None else {})
                     | {f"by {name}": f"Colour by {name}" for name in others},
-                    value=f"by {others[0]}" if others else "time",
+                    value="time",
                 ).props("no-caps"),
                 "loop-colour",
             )
@@ -218,7 +224,9 @@ def _words(desk: Desk, given: str, wanted: str) -> None:
             return
         with place:
             for sentence in found.sentences:
-                ui.label(sentence)
+                ui.label(typeset_within(sentence))
+            if len(recordings) > 1:
+                ui.label(f"Over all {len(recordings)} recordings:").classes("text-sm opacity-70")
             rows = [
                 {
                     "what": name,
@@ -237,9 +245,8 @@ def _words(desk: Desk, given: str, wanted: str) -> None:
                     ("unit", "Unit", "left"),
                 )
             ]
-            ui.table(rows=rows, columns=columns, row_key="what").classes("w-full").props(
-                "dense flat"
-            )
+            table = ui.table(rows=rows, columns=columns, row_key="what").classes("w-full")
+            table.props("dense flat").add_slot("body-cell-what", EXPLAINED)
             told = f", beside={beside!r}" if beside else ""
             call = f"mckibben.characterize(recordings, {given!r}, {wanted!r}{told})"
             desk.did("characterized the recordings", call)
@@ -247,19 +254,18 @@ def _words(desk: Desk, given: str, wanted: str) -> None:
     ui.timer(0.05, guarded(find), once=True)
 
 
-def _untold(desk: Desk) -> None:
+def _untold(desk: Desk, given: str) -> None:
     from mckibben.excitation import untold
 
     ui.label("What these recordings cannot tell").classes("text-lg")
     place = named(ui.column().classes("w-full"), "untold")
-    # an output is still moved by inputs other than its own; where inputs are held, by what moves
-    given = desk.inputs if len(desk.inputs) > 1 else (desk.looked_at[0][0],)
+    inputs = desk.inputs if len(desk.inputs) > 1 else (given,)  # each moves every output
 
     async def find() -> None:
         train, test = desk.workspace.with_role("train"), desk.workspace.with_role("test")
         try:
             gaps = await asyncio.to_thread(
-                untold, train or test, given, desk.outputs, tests=test if train else ()
+                untold, train or test, inputs, desk.outputs, tests=test if train else ()
             )
         except MckibbenError as error:
             with place:
@@ -273,7 +279,7 @@ def _untold(desk: Desk) -> None:
                 ui.label(typeset_within(said(gap.remedy))).classes("text-caption pl-4")
             desk.did(
                 "asked what the recordings cannot tell",
-                f"mckibben.untold(train, {given!r}, {desk.outputs!r}, tests=test)",
+                f"mckibben.untold(train, {inputs!r}, {desk.outputs!r}, tests=test)",
             )
 
     ui.timer(0.05, guarded(find), once=True)

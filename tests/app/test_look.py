@@ -64,11 +64,11 @@ def test_words_and_picture_are_of_the_input_that_moves_an_output_most(tmp_path: 
 
 def test_small_swings_are_no_cycles_and_a_counter_colours_nothing_unasked(tmp_path: Path) -> None:
     time = np.arange(1200) * 0.1
-    pressure: Array = triangle(time, 30.0, 4.0) + triangle(time, 3.0, 0.3)
+    pressure: Array = triangle(time, 30.0, 4.0) + triangle(time, 3.0, 0.6)
     every: dict[str, Array] = {
         "pressure": pressure,
         "displacement": 3 * pressure,
-        "count": np.arange(1200.0) % 50,
+        "count": np.mod(time, 5),
     }
     workspace = Workspace(tmp_path)
     workspace.add(Recording(every, 0.1), origin="a test", call="", name="run")

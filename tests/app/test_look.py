@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,7 @@ from nicegui import ui
 from nicegui.testing import User
 
 from mckibben import Recording
+from mckibben.app import plots
 from mckibben.app.workspace import Workspace
 from mckibben.arrays import Array
 from mckibben.signals import triangle
@@ -60,6 +62,26 @@ def test_words_and_picture_are_of_the_input_that_moves_an_output_most(tmp_path: 
         assert "highest pressure_2" not in rows
 
     visit(workspace, look)
+
+
+def test_another_theme_draws_pictures_anew_and_nothing_else(tmp_path: Path) -> None:
+    async def look(user: User) -> None:
+        user.find(marker="tab-look").click()
+        await user.should_see("What a load does cannot be told", retries=100)
+        (plot,) = user.find(marker="loop-plot").elements
+        assert isinstance(plot, ui.plotly)
+        tables = user.find(kind=ui.table).elements
+        before = plot.figure["layout"]["font"]["color"]
+        user.find(marker="theme").click()
+        for _ in range(100):
+            await asyncio.sleep(0.05)
+            if plot.figure["layout"]["font"]["color"] != before:
+                break
+        assert plot.figure["layout"]["font"]["color"] == plots.colours(True)["ink"]
+        assert user.find(marker="loop-plot").elements == {plot}
+        assert user.find(kind=ui.table).elements == tables
+
+    visit(arm(tmp_path), look)
 
 
 def test_small_swings_are_no_cycles_and_a_counter_colours_nothing_unasked(tmp_path: Path) -> None:

@@ -8,9 +8,10 @@ from typing import Any
 
 import pytest
 
+from mckibben.app.plots import colours
 from mckibben.app.theme import DARK, LIGHT, WRITTEN, contrast
 from mckibben.app.work import fit
-from tests.app.browsing import BROWSER, OPTIONS, TABS, idle, opened, seen, visited, workbench
+from tests.app.browsing import BROWSER, OPTIONS, SLOW, TABS, idle, opened, seen, visited, workbench
 from tests.app.test_jobs import filled
 from tests.app.test_jobs import fit as asked
 from tests.tools import needs
@@ -135,6 +136,27 @@ def test_all_text_of_all_pages_can_be_read(browser: Any, address: str, theme: st
             if found:
                 faint[tab] = found
     assert faint == {}
+
+
+PICTURED = """() => [...document.querySelectorAll(".js-plotly-plot")]
+  .filter((plot) => plot.checkVisibility() && plot._fullLayout)
+  .map((plot) => [plot._fullLayout.font.color, plot._fullLayout.yaxis.gridcolor])"""
+
+
+@needs("chromium")
+def test_all_pictures_follow_the_theme(browser: Any, address: str) -> None:
+    wanted = [[colours(dark)[name] for name in ("ink", "grid")] for dark in (False, True)]
+    drawn = f"wanted => ({PICTURED})().every((one) => `${{one}}` === `${{wanted}}`)"
+    with visited(browser, address, color_scheme="light") as page:
+        for tab in TABS:
+            opened(page, tab)
+            if tab in ("data", "look", "models"):
+                page.wait_for_function(f"({PICTURED})().length > 0", timeout=SLOW)
+        for tab in TABS:
+            opened(page, tab)
+            for theme in (True, False):
+                seen(page, "theme").click()
+                page.wait_for_function(drawn, arg=wanted[theme], timeout=SLOW)
 
 
 NAMELESS = """() => {

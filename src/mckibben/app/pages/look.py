@@ -12,6 +12,7 @@ from mckibben.app import plots
 from mckibben.app.desk import Desk, guarded, named, refused
 from mckibben.app.fields import said
 from mckibben.app.pages.cutting import time_plot
+from mckibben.app.pictures import picture
 from mckibben.app.together import obstacle
 from mckibben.errors import MckibbenError
 from mckibben.numerals import typeset_within
@@ -54,7 +55,6 @@ def build(desk: Desk) -> None:
 
     desk.when("recordings", shown.refresh)
     desk.when("channels", shown.refresh)
-    desk.when("theme", shown.refresh)
     shown()
 
 
@@ -82,17 +82,15 @@ def _matrix(desk: Desk, chosen: ui.select, begun: tuple[str, str]) -> None:
             refused(error)
             return
         ui.label("What moves what: every output over every input").classes("text-lg")
-        small = plots.figures(
-            coupling_subjects.matrix(recording, found), dark=desk.dark, height=SMALL_HEIGHT
-        )
+        small = plots.figures(coupling_subjects.matrix(recording, found), height=SMALL_HEIGHT)
         most = coupling_subjects.MOST
         shown = [(o, i) for o in found.outputs[:most] for i in found.inputs[:most]]
         columns = min(len(found.inputs), most)
         grid = ui.element("div").classes("w-full overflow-x-auto grid gap-1")
-        grid.style(f"grid-template-columns: repeat({columns}, minmax(9rem, 1fr))")
+        grid.style(f"grid-template-columns: repeat({columns}, minmax(7rem, 1fr))")
         with grid:
             for figure, (wanted, given) in zip(small, shown, strict=True):
-                _small(figure, found, given, wanted, enlarge)
+                _small(desk, figure, found, given, wanted, enlarge)
         ui.label(
             "In colour: the input that "
             + ("belongs to the output." if found.paired else "moves the output most.")
@@ -107,6 +105,7 @@ def _matrix(desk: Desk, chosen: ui.select, begun: tuple[str, str]) -> None:
 
 
 def _small(
+    desk: Desk,
     figure: plots.Json,
     found: coupling_subjects.Coupling,
     given: str,
@@ -122,7 +121,7 @@ def _small(
     with ui.column().classes("gap-0 min-w-0"):
         button = ui.button(f"{given} → {wanted}{told}", on_click=lambda: enlarge(given, wanted))
         named(button.props("flat dense no-caps").classes("text-xs"), f"pair-{given}-{wanted}")
-        ui.plotly(figure).classes("w-full")
+        picture(desk, figure)
 
 
 def _plots(desk: Desk, chosen: ui.select, given: str, wanted: str) -> None:
@@ -163,7 +162,7 @@ def _plots(desk: Desk, chosen: ui.select, given: str, wanted: str) -> None:
             if 1 <= number <= len(found):
                 part = recording.slice(found[number - 1].start, found[number - 1].stop)
             if colour.value == "rate":
-                figure = _by_rate(desk, part, given, wanted)
+                figure = _by_rate(part, given, wanted)
             else:
                 by = str(colour.value).removeprefix("by ")
                 drawing = (
@@ -171,8 +170,8 @@ def _plots(desk: Desk, chosen: ui.select, given: str, wanted: str) -> None:
                     if by == "time"
                     else coupling_subjects.loop_by(part, given, wanted, by)
                 )
-                figure = plots.figures(drawing, dark=desk.dark, height=440)[0]
-            named(ui.plotly(figure).classes("w-full"), "loop-plot")
+                figure = plots.figures(drawing, height=440)[0]
+            picture(desk, figure, "loop-plot")
 
         colour.on_value_change(loop.refresh)
         cycle.on_value_change(loop.refresh)
@@ -183,7 +182,7 @@ def _plots(desk: Desk, chosen: ui.select, given: str, wanted: str) -> None:
     drawn()
 
 
-def _by_rate(desk: Desk, recording: Recording, given: str, wanted: str) -> plots.Json:
+def _by_rate(recording: Recording, given: str, wanted: str) -> plots.Json:
     """Return the loop with its points coloured by how fast the input moves."""
     from mckibben.report.drawing import along
 
@@ -194,7 +193,6 @@ def _by_rate(desk: Desk, recording: Recording, given: str, wanted: str) -> plots
         [],
         x=f"{given} [{recording.units[given]}]",
         y=f"{wanted} [{recording.units[wanted]}]",
-        dark=desk.dark,
         height=440,
     )
     bar = {"title": {"text": f"{recording.units[given]}/s"}}

@@ -203,6 +203,53 @@ def test_screen_readers_are_told_what_everything_is(browser: Any, address: str) 
         )
 
 
+BROKEN = """() => {
+  const broken = [];
+  for (const cell of document.querySelectorAll(".q-table :is(td, th)")) {
+    if (!cell.checkVisibility()) continue;
+    const walker = document.createTreeWalker(cell, NodeFilter.SHOW_TEXT);
+    while (walker.nextNode())
+      for (const word of walker.currentNode.textContent.matchAll(/[^\\s–-]+/g)) {
+        const range = document.createRange();
+        range.setStart(walker.currentNode, word.index);
+        range.setEnd(walker.currentNode, word.index + word[0].length);
+        if (range.getClientRects().length > 1) broken.push(word[0]);
+      }
+  }
+  return broken;
+}"""
+
+
+@needs("chromium")
+def test_on_a_phone_words_of_tables_are_whole_and_tables_scroll(browser: Any, address: str) -> None:
+    with visited(browser, address, viewport={"width": 400, "height": 800}) as page:
+        opened(page, "look")
+        seen(page, "characterization").locator("table").wait_for(timeout=SLOW)
+        assert page.evaluate(BROKEN) == []
+        opened(page, "models")
+        page.locator("table td").first.wait_for(timeout=SLOW)
+        assert page.evaluate(BROKEN) == []
+        box = page.locator(".q-table__middle").first
+        assert box.evaluate("one => one.scrollWidth > one.clientWidth && one.clientWidth < 400")
+
+
+@needs("chromium")
+def test_buttons_and_names_of_a_picture_lie_beside_its_curves(browser: Any, address: str) -> None:
+    boxes = "one => [...one.querySelectorAll('%s')].map((e) => e.getBoundingClientRect())"
+    for width in (400, 1400):
+        with visited(browser, address, viewport={"width": width, "height": 900}) as page:
+            opened(page, "look")
+            plot = seen(page, "loop-plot")
+            plot.locator(".legend").wait_for(timeout=SLOW)
+            page.wait_for_function("document.querySelector('.modebar-btn').tabIndex === -1")
+            buttons = plot.evaluate(boxes % ".modebar-btn")
+            (curves,) = plot.evaluate(boxes % ".cartesianlayer .gridlayer")
+            (names,) = plot.evaluate(boxes % ".legend .bg")
+            assert min(min(one["width"], one["height"]) for one in buttons) >= 24
+            assert max(one["bottom"] for one in buttons) <= curves["top"]
+            assert names["top"] >= curves["bottom"]
+
+
 @needs("chromium")
 def test_the_phone_reaches_every_step(browser: Any, address: str) -> None:
     wide = {}

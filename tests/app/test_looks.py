@@ -11,7 +11,7 @@ import pytest
 from mckibben.app.plots import colours
 from mckibben.app.theme import DARK, LIGHT, WRITTEN, contrast
 from mckibben.app.work import fit
-from tests.app.browsing import BROWSER, OPTIONS, SLOW, TABS, idle, opened, seen, visited, workbench
+from tests.app.browsing import SLOW, TABS, idle, opened, seen, visited, workbench
 from tests.app.test_jobs import filled
 from tests.app.test_jobs import fit as asked
 from tests.tools import needs
@@ -46,14 +46,6 @@ def address(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
         fit(workspace, asked(model, model), lambda share, cost: None)
     with workbench(folder) as found:
         yield found
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    with playwright.sync_playwright() as play:
-        browser = play.chromium.launch(executable_path=BROWSER, args=OPTIONS)
-        yield browser
-        browser.close()
 
 
 FAINT = """() => {

@@ -39,7 +39,7 @@ def colours(dark: bool) -> dict[str, str]:
 
 
 def figures(drawing: Drawing, *, dark: bool | None = None, height: int = 420) -> list[Json]:
-    """Return a drawing as figures for `mckibben.app.pictures.picture`, or of one theme."""
+    """Return a drawing as figures for `mckibben.app.drawn.picture`, or of one theme."""
     return [_figure(plot, dark, height) for plot in interactive.plots(drawing)]
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from nicegui import ui
 
 from mckibben.app.desk import Desk, guarded, hinted, labelled, named, refused
-from mckibben.app.drawn import Drawn
+from mckibben.app.drawn import Drawn, picture
 from mckibben.app.kept import Step
 from mckibben.app.pages import editing
 from mckibben.app.pages.rows import state_of
@@ -237,7 +237,6 @@ def time_plot(
 ) -> Any:
     """Plot channels over time; panning and zooming thin the samples anew, on the server."""
     from mckibben.app import plots
-    from mckibben.app.pictures import picture
     from mckibben.report import subjects
 
     drawing = subjects.time_course([recording], channels, plots.POINTS)

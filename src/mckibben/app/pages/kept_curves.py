@@ -10,9 +10,9 @@ from nicegui import ui
 
 from mckibben.app import plots
 from mckibben.app.desk import Desk
+from mckibben.app.drawn import picture
 from mckibben.app.jobs import FAILED, RUNNING
 from mckibben.app.kept import Line2D
-from mckibben.app.pictures import picture
 
 MOST = 3
 """Results shown, the newest."""

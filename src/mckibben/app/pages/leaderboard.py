@@ -10,8 +10,8 @@ from nicegui import ui
 
 from mckibben.app import plots
 from mckibben.app.desk import Desk, caution, guarded, named, not_recommended, on_event
+from mckibben.app.drawn import picture
 from mckibben.app.pages import next_steps
-from mckibben.app.pictures import picture
 from mckibben.blocks.core.block import Block
 from mckibben.blocks.core.writing import quantities
 from mckibben.comparison import limits

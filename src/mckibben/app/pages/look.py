@@ -10,9 +10,9 @@ from nicegui import ui
 
 from mckibben.app import plots
 from mckibben.app.desk import Desk, guarded, named, refused
+from mckibben.app.drawn import picture
 from mckibben.app.fields import said
 from mckibben.app.pages.cutting import time_plot
-from mckibben.app.pictures import picture
 from mckibben.app.together import obstacle
 from mckibben.errors import MckibbenError
 from mckibben.numerals import typeset_within

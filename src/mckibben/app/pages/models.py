@@ -9,10 +9,10 @@ from nicegui import ui
 
 from mckibben.app import fields, plots, scripts
 from mckibben.app.desk import Desk, hinted, named, tell
+from mckibben.app.drawn import picture
 from mckibben.app.jobs import DONE, ENDED, RUNNING, Job
 from mckibben.app.pages import leaderboard
 from mckibben.app.pages.choosing import Choice
-from mckibben.app.pictures import picture
 from mckibben.app.together import obstacle
 from mckibben.comparison.offered import settings_of
 from mckibben.errors import ModelError

@@ -11,10 +11,10 @@ import pytest
 
 from mckibben import Recording
 from mckibben.app.workspace import Workspace
-from tests.app.browsing import BROWSER, OPTIONS, SLOW, opened, seen, visited, workbench
+from tests.app.browsing import SLOW, opened, seen, visited, workbench
 from tests.tools import needs
 
-playwright = pytest.importorskip("playwright.sync_api")
+pytest.importorskip("playwright.sync_api")
 
 pytestmark = needs("chromium")
 
@@ -35,14 +35,6 @@ def workspace(tmp_path: Path) -> Workspace:
     for seed, name in enumerate(RUNS):
         workspace.add(recording(seed), origin="a test", call="", name=name)
     return workspace
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    with playwright.sync_playwright() as play:
-        browser = play.chromium.launch(executable_path=BROWSER, args=OPTIONS)
-        yield browser
-        browser.close()
 
 
 @pytest.fixture

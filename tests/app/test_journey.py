@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.app.browsing import BROWSER, OPTIONS, SLOW, seen, visited, workbench
+from tests.app.browsing import SLOW, seen, visited, workbench
 from tests.tools import needs, where
 
-playwright = pytest.importorskip("playwright.sync_api")
+pytest.importorskip("playwright.sync_api")
 
 pytestmark = needs("chromium")
 
@@ -29,14 +29,6 @@ def address(tmp_path: Path) -> Iterator[str]:
         os.name == "posix"
     ):  # all that it wrote is for nobody else, whatever the rights of this process
         assert not [path for path in (tmp_path / "ws").rglob("*") if path.stat().st_mode & 0o077]
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    with playwright.sync_playwright() as play:
-        browser = play.chromium.launch(executable_path=BROWSER, args=OPTIONS)
-        yield browser
-        browser.close()
 
 
 @pytest.fixture

@@ -13,12 +13,12 @@ from typing import Any
 import pytest
 
 from mckibben.app.work import fit
-from tests.app.browsing import BROWSER, OPTIONS, SLOW, opened, seen, visited, workbench
+from tests.app.browsing import SLOW, opened, seen, visited, workbench
 from tests.app.test_jobs import filled, swung
 from tests.app.test_jobs import fit as asked
 from tests.tools import needs
 
-playwright = pytest.importorskip("playwright.sync_api")
+pytest.importorskip("playwright.sync_api")
 
 pytestmark = needs("chromium")
 
@@ -226,14 +226,6 @@ def empty(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
     """A workbench with nothing in it: what is brought to it is not in others' way."""
     with workbench(tmp_path_factory.mktemp("empty") / "ws") as found:
         yield found
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    with playwright.sync_playwright() as play:
-        browser = play.chromium.launch(executable_path=BROWSER, args=OPTIONS)
-        yield browser
-        browser.close()
 
 
 @pytest.mark.parametrize("thing", THINGS, ids=lambda thing: str(thing.__name__))

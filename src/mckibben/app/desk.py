@@ -79,10 +79,14 @@ class Desk:
 
     @property
     def looked_at(self) -> tuple[tuple[str, str], ...]:
-        """Every output with what moves it: where its input is held, as in isometric runs, another."""
+        """Every output with what moves it: of several inputs the most; where one is held, another."""
         from mckibben.comparison.recognising import moved_by
+        from mckibben.report.coupling_subjects import coupling
 
         used = list(self.workspace.used().values())
+        if len(self.inputs) > 1:
+            own = coupling(used, self.inputs, self.outputs).own
+            return tuple((own(wanted), wanted) for wanted in self.outputs)
         others = [name for name in self.workspace.channels() if name not in self.outputs]
         return tuple((moved_by(used, given, others), wanted) for given, wanted in self.pairs)
 
@@ -268,35 +272,3 @@ async def kept(desk: Desk, file: FileUpload) -> Path:
     with desk.workspace.receiving(file.name, file.size()) as (new, path):
         await file.save(new)
     return path
-
-
-class Drawn:
-    """A part of a page that is drawn anew when its state has changed: no click, nor typing, is lost.
-
-    Parameters
-    ----------
-    desk : Desk
-    state : callable
-        Returns what all that is drawn depends on, to be compared.
-    draw : callable
-        Draws it.
-    topics : str
-        After which it is looked whether the state has changed.
-    """
-
-    def __init__(
-        self, desk: Desk, state: Callable[[], Any], draw: Callable[[], None], *topics: str
-    ) -> None:
-        self._state, self._draw = state, ui.refreshable(draw)
-        self._shown: Any = state()
-        self._draw()
-        for topic in topics:
-            desk.when(topic, self.update)
-
-    def update(self) -> None:
-        """Draw it anew, unless it would be the same."""
-        now = self._state()
-        if now != self._shown:
-            self._shown = object()  # where it fails, it is tried again
-            self._draw.refresh()
-            self._shown = now

@@ -342,9 +342,6 @@ def _pictures(desk: Desk, runs: dict[str, Followed]) -> None:
             own.append((name, run.time, run[channel], f"series-{place + 1}"))
     for place, (channel, own) in enumerate(curves.items()):
         figure = plots.lines(own, x="time [s]", y=f"{channel} [{units[channel]}]", dark=desk.dark)
-        # many names take two lines, and must not lie over the curves
-        figure["layout"]["margin"] |= {"t": 72}
-        figure["layout"]["legend"] |= {"y": 1.02, "yanchor": "bottom"}
         named(
             ui.plotly(figure).classes("w-full"),
             "loop-runs" if not place else f"loop-runs-{place + 1}",

@@ -8,7 +8,8 @@ from typing import Any
 
 from nicegui import ui
 
-from mckibben.app.desk import Desk, Drawn, guarded, named, tell
+from mckibben.app.desk import Desk, guarded, named, tell
+from mckibben.app.drawn import Drawn
 from mckibben.app.guard import LARGEST_UPLOAD, TOO_LARGE
 from mckibben.app.pages import apart, editing, rigs
 from mckibben.app.pages.cutting import preview

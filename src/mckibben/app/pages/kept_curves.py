@@ -10,6 +10,7 @@ from nicegui import ui
 
 from mckibben.app import plots
 from mckibben.app.desk import Desk, named
+from mckibben.app.drawn import picture
 from mckibben.app.fields import said
 from mckibben.app.jobs import ENDED, FAILED, RUNNING, Job
 from mckibben.app.kept import Line2D
@@ -44,7 +45,6 @@ def showing(
             shown.refresh()
 
     desk.when("jobs", moved)
-    desk.when("theme", shown.refresh)
     waiting()
     shown()
 
@@ -70,9 +70,8 @@ def drawn(desk: Desk, curves: Sequence[Line2D], above: str, below: str, name: st
     ):
         if own:
             found = [(c.name, _array(c.x), _array(c.y), _colour(c.colour)) for c in own]
-            figure = plots.lines(found, x="time [s]", y=label, dark=desk.dark, height=260)
-            mark = name if not place else f"{name}-error"
-            named(ui.plotly(figure).classes("w-full"), mark)
+            figure = plots.lines(found, x="time [s]", y=label, height=260)
+            picture(desk, figure, f"{name}-error" if place else name)
 
 
 def _array(values: Sequence[float | None]) -> Any:

@@ -9,6 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 pytest.importorskip("nicegui")
@@ -16,15 +17,17 @@ pytest.importorskip("nicegui")
 from nicegui import ui
 from nicegui.testing import User
 
-from mckibben import PI
+from mckibben import PI, Banded, Recording
 from mckibben.app.following import compensated, kept_motion
+from mckibben.app.jobs import note
 from mckibben.app.motions import reference_recording
-from mckibben.app.pages import compensate
+from mckibben.app.pages import closing, compensate
 from mckibben.app.workspace import Workspace
 from mckibben.blocks.core.block import Block
 from mckibben.blocks.core.fields import Channel
 from mckibben.control import Twin, before
 from mckibben.registry import load
+from mckibben.rigs import rig_names
 from tests.app.test_pages import visit
 
 WEAKER = replace(PI.example(), weights=tuple(0.9 * weight for weight in PI.example().weights))
@@ -293,3 +296,143 @@ def test_the_compensator_shown_is_taken_away(tmp_path: Path) -> None:
         assert only(user, "take-model").value == "b"
 
     visit(workspace_with(tmp_path, a=PI.example(), b=WEAKER), look)
+
+
+def test_steps_and_motions_begin_as_the_training_recordings_were(tmp_path: Path) -> None:
+    workspace = workspace_with(tmp_path, a=PI.example())
+    wave = 5.0 - 5.0 * np.cos(2 * np.pi * np.arange(1200) / 400)
+    run = Recording({"pressure": 0.3 * wave, "displacement": wave}, 0.1)
+    workspace.add(run, origin="", call="", role="train")
+
+    async def look(user: User) -> None:
+        user.find(marker="tab-compensate").click()
+        await until(user, "wave")
+        assert field(user, "Time between steps [s]").value == 0.1
+        assert field(user, "Duration [s]").value == 80.0
+
+    visit(workspace, look)
+
+
+@pytest.mark.parametrize("gain", [3.0, -3.0])
+def test_ready_made_motions_begin_at_rest(tmp_path: Path, gain: float) -> None:
+    workspace = workspace_with(tmp_path, a=PI.example())
+    rising = np.linspace(0.0, 3.0, 50)
+    run = Recording({"pressure": rising, "displacement": 17.0 + 2.0 * gain * (rising - 1.5)}, 0.1)
+    workspace.add(run, origin="", call="", role="train")
+
+    async def look(user: User) -> None:
+        user.find(marker="tab-compensate").click()
+        await until(user, "wave")
+        first, other = (float(field(user, label).value) for label in ("From", "To"))
+        assert (other - first) * gain > 0
+        user.find(marker="wave").click()
+        assert only(user, "points").value.startswith(f"0 {first:g}\n")
+
+    visit(workspace, look)
+
+
+def test_models_are_plants_at_once_and_a_rig_is_chosen_before_one_that_predicts_worse(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    workspace = workspace_with(tmp_path, a=PI.example(), b=WEAKER)
+    for name, rmse in {"a": 1.0, "b": 2.0}.items():
+        row = {"status": "ok", "model": "pi", "validation_rmse": rmse, "unit": "mm"}
+        workspace.write_json("results", name, row)
+    go, rig = threading.Event(), rig_names()[0]
+
+    def found(*_: Any) -> list[str]:
+        assert go.wait(30.0)
+        return [rig]
+
+    monkeypatch.setattr(closing, "fitting_rigs", found)
+
+    async def look(user: User) -> None:
+        await drawn(user)
+        await until(user, "run-loop")
+        assert list(only(user, "loop-plant").options) == ["model b", "model a"]
+        assert "its validation RMSE is 2.00 mm, not 1.00 mm" in only(user, "weaker-plant").text
+        go.set()
+        await later(lambda: only(user, "loop-plant").value == f"rig {rig}")
+        await user.should_not_see(marker="weaker-plant", retries=200)
+
+    try:
+        visit(workspace, look)
+    finally:
+        go.set()
+
+
+def test_why_a_loop_failed_stays_until_it_is_run_again(tmp_path: Path) -> None:
+    workspace = workspace_with(tmp_path, a=PI.example(), b=WEAKER)
+    given = {"model": "a", "plant": "b", "controller": "pid", "name": "a-pid"}
+    note(workspace, "loop-1", "loop", given, "failed", "there is no loop. Remedy: draw a motion")
+
+    async def look(user: User) -> None:
+        await drawn(user)
+        await until(user, "failed-loop")
+        assert only(user, "failed-loop").text == "a-pid: there is no loop. Remedy: draw a motion"
+
+    visit(workspace, look)
+    note(workspace, "loop-2", "loop", given, "done", "")
+
+    async def look_again(user: User) -> None:
+        await drawn(user)
+        await until(user, "run-loop")
+        await user.should_not_see(marker="failed-loop")
+
+    visit(workspace, look_again)
+
+
+def test_runs_that_gain_nothing_and_plants_that_scatter_are_said(tmp_path: Path) -> None:
+    workspace = workspace_with(tmp_path, a=PI.example(), b=WEAKER)
+    replace(Banded.example(), forward=WEAKER).save(workspace.path("banded", "b.json"))
+    for name, rmse, plant in (("a-good", 0.5, "b"), ("a-bad", 1.5, "c")):
+        run = {"model": "a", "plant": plant, "rmse": {"displacement": rmse}}
+        workspace.write_json("runs", name, run | {"uncompensated": {"displacement": 1.0}})
+
+    async def look(user: User) -> None:
+        await drawn(user)
+        await until(user, "runs")
+        # what the compensator clips itself is said in a note, and not counted here
+        assert "Steps the plant clipped" in {one["label"] for one in only(user, "runs").columns}
+        said = {one.text for one in user.find(kind=ui.label, marker="runs-remark").elements}
+        assert said == {
+            "a-bad: no better than without compensation.",
+            "a-good: the plant scatters as its band says, which no compensator foresees.",
+        }
+
+    visit(workspace, look)
+
+
+def test_what_is_commanded_is_called_what_it_is(tmp_path: Path) -> None:
+    valve = replace(PI.example(), input=Channel("valve_voltage", "V"))
+
+    async def look(user: User) -> None:
+        await drawn(user)
+        assert only(user, "show-pressures").text == "Show voltages"
+        assert only(user, "take-pressures").text == "Voltages as CSV"
+        await until(user, "run-loop")
+        assert only(user, "controllers").options["feedforward"] == "Compensator alone (feedforward)"
+
+    visit(workspace_with(tmp_path, a=valve, b=valve), look)
+
+
+def test_a_force_is_estimated_first_of_what_nothing_was_trained_on(tmp_path: Path) -> None:
+    estimator = load("blocks", "balance").example().inverse()
+    workspace = workspace_with(tmp_path, a=estimator)
+    channels = {c.name: np.linspace(1.0, 2.0, 50) for c in (*estimator.inputs, *estimator.outputs)}
+    run = Recording(channels, 0.1)
+    workspace.add(run, origin="", call="", role="train", name="first")
+    workspace.add(run, origin="", call="", role="test", name="second")
+
+    async def look(user: User) -> None:
+        user.find(marker="tab-compensate").click()
+        await until(user, "forces")
+        only(user, "forces").open()
+        await until(user, "force-recording")
+        await later(lambda: only(user, "force-recording").value == "second")
+        assert only(user, "force-recording").options == {
+            "second": "second",
+            "first": "first (trained on)",
+        }
+
+    visit(workspace, look)

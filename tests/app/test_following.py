@@ -9,7 +9,7 @@ import pytest
 
 from mckibben import PI, Recording, write
 from mckibben.app import forms, motions
-from mckibben.app.following import compensated, estimate, look_back, loop
+from mckibben.app.following import compensated, estimate, look_back, loop, pace, too_fast
 from mckibben.app.pages.axes import Axes
 from mckibben.app.workspace import Workspace
 from mckibben.errors import DataError, ModelError
@@ -66,7 +66,9 @@ def test_ready_made_motions_stay_between_their_ends(kind: str) -> None:
     assert values.min() >= 2.0
     assert values.max() <= 5.0
     with pytest.raises(DataError, match="Remedy"):
-        motions.motion(kind, 10.0, 5.0, 2.0)
+        motions.motion(kind, 10.0, 5.0, 5.0)
+    falling = np.array(motions.motion(kind, 10.0, 5.0, 2.0, cycles=3, seed=4))
+    assert np.allclose(falling[:, 1], 7.0 - values)
 
 
 def test_points_snap_and_lie_where_they_are_drawn() -> None:
@@ -113,3 +115,25 @@ def test_a_force_is_estimated_beside_the_measured_one(workspace: Workspace) -> N
     assert found.output == "force"
     assert found.rmse is not None
     assert [curve.name for curve in found.curves] == ["measured", "estimated", "error"]
+
+
+def test_steps_and_cycles_are_those_of_the_training_recordings(workspace: Workspace) -> None:
+    assert pace(workspace, "pi") == (forms.STEP, 10.0, 0.0)
+    load("blocks", "process-model").example().save(workspace.path("models", "lag.json"))
+    t = np.arange(1200) * 0.1
+    wave = 5.0 - 5.0 * np.cos(2 * np.pi * t / 40.0)
+    run = Recording({"pressure": 0.3 * wave, "displacement": wave}, 0.1)
+    workspace.add(run, origin="", call="", role="train")
+    step, usual, shortest = pace(workspace, "lag")
+    assert step == 0.1
+    assert usual == pytest.approx(shortest, rel=0.05) == pytest.approx(40.0, rel=0.05)
+
+    def told(step: float, seconds: float, model: str = "lag") -> str:
+        low, high = (2.0, 8.0)
+        drawn = {"displacement": motions.motion("sine", seconds, low, high)}
+        wished = motions.reference_recording(drawn, step)
+        return " ".join(too_fast(workspace, model, wished))
+
+    assert told(0.1, 80.0) == told(0.01, 8.0, "pi") == ""
+    assert "steps take 0.01 s, and those of the training recordings 0.1 s" in told(0.01, 80.0)
+    assert "cycles take 4 s, and those of the training recordings" in told(0.1, 8.0)

@@ -8,9 +8,10 @@ from typing import Any
 
 import pytest
 
+from mckibben.app.plots import colours
 from mckibben.app.theme import DARK, LIGHT, WRITTEN, contrast
 from mckibben.app.work import fit
-from tests.app.browsing import TABS, idle, opened, seen, visited, workbench
+from tests.app.browsing import SLOW, TABS, idle, opened, seen, visited, workbench
 from tests.app.test_jobs import filled
 from tests.app.test_jobs import fit as asked
 from tests.tools import needs
@@ -129,6 +130,27 @@ def test_all_text_of_all_pages_can_be_read(browser: Any, address: str, theme: st
     assert faint == {}
 
 
+PICTURED = """() => [...document.querySelectorAll(".js-plotly-plot")]
+  .filter((plot) => plot.checkVisibility() && plot._fullLayout)
+  .map((plot) => [plot._fullLayout.font.color, plot._fullLayout.yaxis.gridcolor])"""
+
+
+@needs("chromium")
+def test_all_pictures_follow_the_theme(browser: Any, address: str) -> None:
+    wanted = [[colours(dark)[name] for name in ("ink", "grid")] for dark in (False, True)]
+    drawn = f"wanted => ({PICTURED})().every((one) => `${{one}}` === `${{wanted}}`)"
+    with visited(browser, address, color_scheme="light") as page:
+        for tab in TABS:
+            opened(page, tab)
+            if tab in ("data", "look", "models"):
+                page.wait_for_function(f"({PICTURED})().length > 0", timeout=SLOW)
+        for tab in TABS:
+            opened(page, tab)
+            for theme in (True, False):
+                seen(page, "theme").click()
+                page.wait_for_function(drawn, arg=wanted[theme], timeout=SLOW)
+
+
 NAMELESS = """() => {
   const own = (element) => {
     const by = element.getAttribute("aria-labelledby");
@@ -171,6 +193,53 @@ def test_screen_readers_are_told_what_everything_is(browser: Any, address: str) 
         assert nameless == {}, "\n".join(
             f"{tab}: {one}" for tab, all_ in nameless.items() for one in all_
         )
+
+
+BROKEN = """() => {
+  const broken = [];
+  for (const cell of document.querySelectorAll(".q-table :is(td, th)")) {
+    if (!cell.checkVisibility()) continue;
+    const walker = document.createTreeWalker(cell, NodeFilter.SHOW_TEXT);
+    while (walker.nextNode())
+      for (const word of walker.currentNode.textContent.matchAll(/[^\\s–-]+/g)) {
+        const range = document.createRange();
+        range.setStart(walker.currentNode, word.index);
+        range.setEnd(walker.currentNode, word.index + word[0].length);
+        if (range.getClientRects().length > 1) broken.push(word[0]);
+      }
+  }
+  return broken;
+}"""
+
+
+@needs("chromium")
+def test_on_a_phone_words_of_tables_are_whole_and_tables_scroll(browser: Any, address: str) -> None:
+    with visited(browser, address, viewport={"width": 400, "height": 800}) as page:
+        opened(page, "look")
+        seen(page, "characterization").locator("table").wait_for(timeout=SLOW)
+        assert page.evaluate(BROKEN) == []
+        opened(page, "models")
+        page.locator("table td").first.wait_for(timeout=SLOW)
+        assert page.evaluate(BROKEN) == []
+        box = page.locator(".q-table__middle").first
+        assert box.evaluate("one => one.scrollWidth > one.clientWidth && one.clientWidth < 400")
+
+
+@needs("chromium")
+def test_buttons_and_names_of_a_picture_lie_beside_its_curves(browser: Any, address: str) -> None:
+    boxes = "one => [...one.querySelectorAll('%s')].map((e) => e.getBoundingClientRect())"
+    for width in (400, 1400):
+        with visited(browser, address, viewport={"width": width, "height": 900}) as page:
+            opened(page, "look")
+            plot = seen(page, "loop-plot")
+            plot.locator(".legend").wait_for(timeout=SLOW)
+            page.wait_for_function("document.querySelector('.modebar-btn').tabIndex === -1")
+            buttons = plot.evaluate(boxes % ".modebar-btn")
+            (curves,) = plot.evaluate(boxes % ".cartesianlayer .gridlayer")
+            (names,) = plot.evaluate(boxes % ".legend .bg")
+            assert min(min(one["width"], one["height"]) for one in buttons) >= 24
+            assert max(one["bottom"] for one in buttons) <= curves["top"]
+            assert names["top"] >= curves["bottom"]
 
 
 @needs("chromium")

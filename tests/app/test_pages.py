@@ -214,8 +214,9 @@ def test_what_was_cancelled_is_said_once(tmp_path: Path) -> None:
 
 def test_figures_hold_plain_numbers_and_colours(tmp_path: Path) -> None:
     recording = filled(tmp_path).recording("run")
+    (plain,) = plots.figures(subjects.loop([recording], "pressure", "displacement"))
     for dark in (False, True):
-        (figure,) = plots.figures(subjects.loop([recording], "pressure", "displacement"), dark=dark)
+        figure = plots.coloured(plain, dark)
         trace = figure["data"][0]
         assert isinstance(trace["x"], list)
         assert trace["line"]["color"].startswith("#")

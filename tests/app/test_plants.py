@@ -55,6 +55,22 @@ def test_models_that_know_time_are_the_first_plants(tmp_path: Path) -> None:
     assert workspace.plants("mine") == ["later", "bigger", "unlimited", "mine"]
 
 
+def test_models_that_predict_worse_are_the_last_plants_and_it_is_said(tmp_path: Path) -> None:
+    workspace = workspace_of(tmp_path)
+    replace(MODEL, weights=tuple(2 * w for w in MODEL.weights)).save(tmp_path / "models/close.json")
+    load("blocks", "process-model").example().save(workspace.path("models", "later.json"))
+    rising = np.linspace(0.5, 4.0, 50)
+    run = Recording({"pressure": rising, "displacement": 5.0 * rising}, 0.1)
+    workspace.add(run, origin="", call="", role="train")
+    for name, rmse in {"mine": 0.5, "close": 0.55, "later": 3.125, "bigger": 0.4}.items():
+        row = {"status": "ok", "model": "pi", "validation_rmse": rmse, "unit": "mm"}
+        workspace.write_json("results", name, row)
+    assert workspace.plants("mine") == ["bigger", "close", "unlimited", "later", "mine"]
+    weaker = workspace.weaker("mine")
+    assert set(weaker) == {"later"}
+    assert "its validation RMSE is 3.12 mm, not 0.500 mm" in weaker["later"]
+
+
 @pytest.mark.parametrize(
     ("plant", "words"), [("bigger", "another muscle"), ("mine", "right by construction")]
 )

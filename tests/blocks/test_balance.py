@@ -420,3 +420,6 @@ def test_what_is_clipped_is_told_of_all_muscles() -> None:
     far = 40.0 * np.ones((20, len(block.inputs)))
     with pytest.warns(ModelWarning, match=r"20 samples need .* or .* beyond 0 to 1 bar"):
         block.simulate(far, sample_time=0.1)
+    block = replace(block, pressure_range=(-6.876e-05, 1.0))
+    with pytest.warns(ModelWarning, match=r"beyond 0 to 1 bar .* clipped there by the compensator"):
+        block.simulate(far, sample_time=0.1)

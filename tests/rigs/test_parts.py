@@ -25,9 +25,8 @@ from mckibben.rigs.physics.air import (
 from mckibben.rigs.physics.bladder import bladder_force
 from mckibben.rigs.physics.braid import NEUTRAL_ANGLE, braid_area, braid_constants, braid_volume
 from mckibben.rigs.physics.compiled import ATMOSPHERE, NEWTON_PER_BAR_MM2
-from mckibben.rigs.physics.creep import relax
 from mckibben.rigs.physics.friction import slip
-from mckibben.rigs.physics.muscle import MUSCLE_STATE, chamber, longest, prepare, tension
+from mckibben.rigs.physics.muscle import MUSCLE_STATE, chamber, longest, prepare, relax, tension
 from mckibben.rigs.setups.moving_end import MovingEnd
 from tests.rigs.energy import bladder_energy
 

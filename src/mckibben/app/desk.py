@@ -79,10 +79,14 @@ class Desk:
 
     @property
     def looked_at(self) -> tuple[tuple[str, str], ...]:
-        """Every output with what moves it: where its input is held, as in isometric runs, another."""
+        """Every output with what moves it: of several inputs the most; where one is held, another."""
         from mckibben.comparison.recognising import moved_by
+        from mckibben.report.coupling_subjects import coupling
 
         used = list(self.workspace.used().values())
+        if len(self.inputs) > 1:
+            own = coupling(used, self.inputs, self.outputs).own
+            return tuple((own(wanted), wanted) for wanted in self.outputs)
         others = [name for name in self.workspace.channels() if name not in self.outputs]
         return tuple((moved_by(used, given, others), wanted) for given, wanted in self.pairs)
 

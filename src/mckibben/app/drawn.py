@@ -7,7 +7,7 @@ from typing import Any
 
 from nicegui import ui
 
-from mckibben.app.desk import Desk
+from mckibben.app.desk import Desk, named
 
 
 class Drawn:
@@ -40,3 +40,18 @@ class Drawn:
             self._shown = object()  # where it fails, it is tried again
             self._draw.refresh()
             self._shown = now
+
+
+def picture(desk: Desk, figure: dict[str, Any], name: str = "") -> ui.plotly:
+    """Show a figure whose colours are names: in those of the theme, now and when that changes."""
+    from mckibben.app.plots import coloured
+
+    shown = ui.plotly({}).classes("w-full")
+
+    def colour() -> None:
+        shown.update_figure(coloured(figure, desk.dark))
+
+    colour()
+    with shown:  # it listens for as long as it is there
+        desk.when("theme", colour)
+    return named(shown, name) if name else shown

@@ -6,7 +6,7 @@ import warnings
 from collections.abc import Callable, Collection
 from contextlib import suppress
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -21,6 +21,57 @@ Tell = Callable[[float, float], None]
 
 CURVE = 2000
 """Most points of a curve that is kept to be drawn."""
+
+MUCH = 3.0
+"""Times that steps are finer, or motions faster, than what a model knows of, and it is said."""
+
+
+class Pace(NamedTuple):
+    """Time between steps of a model, or else of what trained it, and cycles of that [s]."""
+
+    step: float
+    usual: float
+    shortest: float
+
+
+def pace(workspace: Workspace, model: str) -> Pace:
+    """Return how fast a model was trained; without recordings, what is usual, and any cycle."""
+    runs, block = list[Recording](), workspace.model(model)
+    with suppress(MckibbenError):
+        runs = [run for run in workspace.with_role("train") if run.sample_time]
+    found = [_cycles(run, c.name) for run in runs for c in block.outputs if c.name in run]
+    if not found:
+        return Pace(block.sample_time or forms.STEP, 10.0, 0.0)
+    step = float(f"{np.median([run.sample_time or 0.0 for run in runs]):.3g}")
+    return Pace(
+        block.sample_time or step, float(np.median(np.concatenate(found))), min(map(np.min, found))
+    )
+
+
+def _cycles(run: Recording, name: str) -> Array:
+    """Return how long cycles take [s], told by the outer thirds of what is covered; all, if none."""
+    values, step = run[name], run.sample_time or 0.0
+    share = (values - values.min()) / (np.ptp(values) or 1.0)
+    way = 1 * (share > 2 / 3) - (share < 1 / 3)
+    seen = np.flatnonzero(way)
+    turns = seen[1:][np.diff(way[seen]) != 0]
+    return 2 * step * np.diff(turns) if len(turns) > 1 else np.array([step * len(run)])
+
+
+def too_fast(workspace: Workspace, model: str, reference: Recording) -> list[str]:
+    """Say what of a reference is faster than a model that depends on rates was trained on."""
+    known, block, step = pace(workspace, model), workspace.model(model), reference.sample_time
+    if not block.rate_dependent or not step:
+        return []
+    own = [np.median(_cycles(reference, c.name)) for c in block.outputs if c.name in reference]
+    cycle, trained = min(own, default=np.inf), known.step if known.shortest else 0.0
+    pairs = {"steps": (step, trained), "cycles": (cycle, known.shortest)}
+    return [
+        f"The {what} take {now:.3g} s, and those of the training recordings {least:.3g} s or more: "
+        "how the model behaves so fast is not known."
+        for what, (now, least) in pairs.items()
+        if MUCH * now < least
+    ]
 
 
 def loop(workspace: Workspace, given: dict[str, Any], tell: Tell) -> str:
@@ -91,7 +142,7 @@ def compensated(
 
     Of one that learns they are those that it begins with: what it learns from is measured.
     """
-    notes = []
+    notes = too_fast(workspace, model, reference)
     if form == "adaptive":
         forms.made(workspace, model, form, settings)
         notes.append("It begins with these pressures, and learns from what is measured.")
@@ -311,3 +362,19 @@ def held_for(workspace: Workspace, model: str) -> dict[str, float]:
         runs = [run[name] for run in workspace.readable() if name in run]
         found[name] = float(np.median(np.concatenate(runs))) if runs else 0.0
     return found
+
+
+def at_rest(workspace: Workspace, model: str) -> dict[str, float]:
+    """Return a model's outputs as recorded where what drives it, all together, is least."""
+    block = workspace.model(model)
+    driving = [c.name for c in block.inputs if c.name not in block.scheduling]
+    names = [*driving, *(c.name for c in block.outputs)]
+    runs = [run for run in workspace.readable() if all(name in run for name in names)]
+    if not runs:
+        return {}
+    given = np.concatenate([run.matrix(driving).sum(axis=1) for run in runs])
+    least = given <= given.min() + 0.02 * np.ptp(given)
+    return {
+        c.name: float(np.median(np.concatenate([run[c.name] for run in runs])[least]))
+        for c in block.outputs
+    }

@@ -27,17 +27,18 @@ MOST_SAMPLES = 1_000_000
 
 
 def motion(
-    kind: str, seconds: float, low: float, high: float, cycles: int = 2, seed: int = 0
+    kind: str, seconds: float, first: float, other: float, cycles: int = 2, seed: int = 0
 ) -> Points:
     """Return a ready-made motion between two ends.
 
     Parameters
     ----------
     kind : str
-        One of `MOTIONS`. Steps rise and fall by quarters; of random ones there are as many as four
+        One of `MOTIONS`. Steps go there and back by quarters; of random ones there are as many as four
         times the cycles, and they lead in straight lines from one to the next.
     seconds : float
-    low, high : float
+    first, other : float
+        Where it begins, and where it turns.
     cycles : int
     seed : int
         Of the random ones.
@@ -47,10 +48,10 @@ def motion(
     DataError
         If there is no room for it.
     """
-    if not (seconds > 0 and low < high and 1 <= cycles <= MOST_POINTS // A_CYCLE):
+    if not (seconds > 0 and first != other and 1 <= cycles <= MOST_POINTS // A_CYCLE):
         raise DataError(
-            f"there is no motion of {seconds:g} s between {low:g} and {high:g} in {cycles} cycles",
-            remedy=f"give a time, the lower end first, and 1 to {MOST_POINTS // A_CYCLE} cycles",
+            f"there is no motion of {seconds:g} s between {first:g} and {other:g} in {cycles} cycles",
+            remedy=f"give a time, two ends, and 1 to {MOST_POINTS // A_CYCLE} cycles",
         )
     if kind == "sine":
         shares: Array = np.linspace(0.0, 1.0, A_CYCLE * cycles + 1)
@@ -68,7 +69,7 @@ def motion(
         ends = np.arange(len(stairs) + 1) / len(stairs)
         shares = np.sort(np.concatenate([ends[:-1], ends[1:] - 1e-3 / len(stairs)]))
         levels = np.repeat(stairs, 2)
-    values = low + (high - low) * levels
+    values = first + (other - first) * levels
     return [(float(t), float(y)) for t, y in zip(seconds * shares, values, strict=True)]
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from functools import cache
 from importlib import resources
 from typing import Any
@@ -37,19 +38,24 @@ def colours(dark: bool) -> dict[str, str]:
     return found
 
 
-def figures(drawing: Drawing, *, dark: bool = False, height: int = 420) -> list[Json]:
-    """Return a drawing as figures for `nicegui.ui.plotly`."""
-    palette = colours(dark)
-    return [_figure(plot, palette, height) for plot in interactive.plots(drawing)]
+def figures(drawing: Drawing, *, height: int = 420) -> list[Json]:
+    """Return a drawing as figures for `mckibben.app.drawn.picture`."""
+    return [_figure(plot, height) for plot in interactive.plots(drawing)]
 
 
-def _figure(plot: Json, palette: dict[str, str], height: int) -> Json:
-    plot = _resolved(plot, palette)
+def coloured(figure: Json, dark: bool) -> Json:
+    """Return a figure with the colours of a theme for their names."""
+    found: Json = _resolved(figure, colours(dark))
+    return found
+
+
+def _figure(plot: Json, height: int) -> Json:
     layout = plot["layout"]
     axis = {
-        "gridcolor": palette["grid"],
-        "linecolor": palette["rule"],
-        "zerolinecolor": palette["rule"],
+        "automargin": True,
+        "gridcolor": "--grid",
+        "linecolor": "--rule",
+        "zerolinecolor": "--rule",
     }
     for key in [key for key in layout if key.startswith(("xaxis", "yaxis"))]:
         layout[key] = axis | layout[key]
@@ -58,14 +64,17 @@ def _figure(plot: Json, palette: dict[str, str], height: int) -> Json:
         "margin": {"l": 64, "r": 16, "t": 40, "b": 48},
         "paper_bgcolor": "rgba(0,0,0,0)",
         "plot_bgcolor": "rgba(0,0,0,0)",
-        "font": {"color": palette["ink"], "family": "system-ui, sans-serif", "size": 13},
-        "legend": {"orientation": "h", "y": 1.08},
+        "font": {"color": "--ink", "family": "system-ui, sans-serif", "size": 13},
+        "legend": {"orientation": "h", "yref": "container", "y": 0, "yanchor": "bottom"},
+        "modebar": {"bgcolor": "rgba(0,0,0,0)", "color": "--muted", "activecolor": "--accent"},
         "uirevision": "kept",
     }
-    return {"data": plot["data"], "layout": layout, "config": CONFIG}
+    figure = {"data": plot["data"], "layout": layout, "config": CONFIG}
+    plain: Json = _resolved(figure, {})
+    return plain
 
 
-def _resolved(value: Any, palette: dict[str, str]) -> Any:
+def _resolved(value: Any, palette: Mapping[str, str]) -> Any:
     """Return plain numbers for packed ones, and colours for their names."""
     if isinstance(value, dict):
         if set(value) == {"base", "f4"}:
@@ -110,16 +119,14 @@ def lines(
     *,
     x: str,
     y: str,
-    dark: bool = False,
     height: int = 320,
     bands: tuple[tuple[float, float], ...] = (),
 ) -> Json:
     """Return named curves in one plane, with bands that shade a range of y."""
-    palette = colours(dark)
     data = []
     for name, at, values, colour in curves:
         t, v = over_time(np.asarray(at, float), np.asarray(values, float), POINTS)
-        line = {"color": palette[colour], "width": 1.6}
+        line = {"color": f"--{colour}", "width": 1.6}
         data.append(
             {
                 "type": "scatter",
@@ -140,7 +147,7 @@ def lines(
             "y1": high,
             "line": {"width": 0},
         }
-        | {"fillcolor": palette["accent"], "opacity": 0.12, "layer": "below"}
+        | {"fillcolor": "--accent", "opacity": 0.12, "layer": "below"}
         for low, high in bands
     ]
     plot = {
@@ -152,4 +159,4 @@ def lines(
             "showlegend": len(curves) > 1,
         },
     }
-    return _figure(plot, palette, height)
+    return _figure(plot, height)

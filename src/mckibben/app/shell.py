@@ -100,6 +100,7 @@ def _header(desk: Desk, dark: ui.dark_mode) -> tuple[ui.tabs, dict[str, ui.tab]]
         said = named(ui.label("").classes("text-xs"), "busy").props("role=status")
         switch = ui.button(icon="contrast", color=None, on_click=lambda: _switch(desk, dark))
         labelled(hinted(switch.props("flat dense"), word := "Light or dark"), "aria-label", word)
+    named(switch, "theme")
     client = context.client
 
     def show() -> None:

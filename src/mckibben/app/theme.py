@@ -106,6 +106,7 @@ body { background: var(--paper); color: var(--ink) }
 .nicegui-content { padding: .5rem 1rem }
 .q-dialog__inner > .q-card { max-width: min(56rem, 94vw); max-height: 92vh; overflow: auto }
 .q-table__container, .q-uploader { max-width: 100% }
+.modebar-btn { min-width: 24px; min-height: 24px }
 .nicegui-content label, .nicegui-content .q-item__label { overflow-wrap: anywhere }
 #asked { position: fixed; left: 0; top: 0; width: 100%; height: 4px; z-index: 9999;
   background: var(--q-warning); opacity: 0; pointer-events: none; transform-origin: left }
@@ -122,7 +123,7 @@ body { background: var(--paper); color: var(--ink) }
   .nicegui-content > *, .nicegui-column, .nicegui-row { max-width: 100% }
   .nicegui-content [class*="min-w-"] { min-width: min(100%, 12rem) }
   .nicegui-content .q-btn { min-height: 40px }
-  .q-table td.text-left { white-space: normal; max-width: 34vw; overflow-wrap: anywhere }
+  .q-table td.text-left { white-space: normal; overflow-wrap: normal; min-width: 7rem }
   .q-table th, .q-table td { padding: 4px 6px }
   .q-dialog__inner { padding: 8px }
 }
@@ -143,6 +144,7 @@ const name = (element, text) => {
 let naming = 0;
 const nameAll = () => {
   naming = 0;
+  document.querySelectorAll(".modebar-btn").forEach((one) => { one.tabIndex = -1 });
   document.querySelectorAll(".q-uploader a.q-btn").forEach((add) => name(add, "Choose files"));
   document.querySelectorAll(".q-table thead .q-checkbox").forEach((all) => name(all, "All rows"));
   document.querySelectorAll(".q-table tbody .q-checkbox").forEach((one) =>

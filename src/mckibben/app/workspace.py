@@ -14,6 +14,7 @@ from mckibben.app.forms import inverse_of
 from mckibben.app.recordings import demand_text
 from mckibben.comparison.recommending import order
 from mckibben.errors import MckibbenError
+from mckibben.numerals import numeral
 
 if TYPE_CHECKING:  # loaded when they are first used, so that the page is there at once
     from mckibben.blocks.core.block import Block
@@ -21,6 +22,9 @@ if TYPE_CHECKING:  # loaded when they are first used, so that the page is there 
 
 MOST_MODELS = 500
 """Models held in memory."""
+
+WEAKER = 1.2
+"""Times the validation RMSE of the model inverted, above which a plant predicts worse."""
 
 
 class Workspace(Changing):
@@ -113,9 +117,10 @@ class Workspace(Changing):
     def plants(self, inverted: str) -> list[str]:
         """Return the models that a model's compensator can be tried on, in the order of the choice.
 
-        Others first, for on its own model a compensator proves nothing; of these, models that know time,
-        for on those that do not, feedback is better than it will be.
+        Others first, for on its own model a compensator proves nothing; of these, those that predict as
+        well; then models that know time, for on those that do not, feedback is better than it will be.
         """
+        weak = self.weaker(inverted)
         undone = self.model(inverted)
         inputs, outputs = ({c.name for c in ends} for ends in (undone.inputs, undone.outputs))
         found = []
@@ -126,8 +131,21 @@ class Workspace(Changing):
                     for each in inputs.difference(undone.scheduling):
                         twin.limits(each)
                     itself, timed = twin.forward == undone, twin.forward.rate_dependent
-                    found.append((itself, not timed, place, name))
+                    found.append((itself, name in weak, not timed, place, name))
         return [name for *_, name in sorted(found)]
+
+    def weaker(self, inverted: str) -> dict[str, str]:
+        """Return the models that predict worse than one that is inverted, and by how much, in words."""
+        rows = {row["name"]: row for row in self.results() if row["validation_rmse"]}
+        ours = rows.get(inverted)
+        return {
+            name: f"{name} predicts worse than {inverted}: its validation RMSE is {_rmse(row)}, not "
+            f"{_rmse(ours)}. Loops on it say little of your muscle."
+            for name, row in rows.items()
+            if ours
+            and (row["unit"], row["data"]) == (ours["unit"], ours["data"])
+            and row["validation_rmse"] > WEAKER * ours["validation_rmse"]
+        }
 
     def same(self, inverted: str, plant: str) -> bool:
         """Tell whether a plant is the very model that a compensator undoes."""
@@ -182,6 +200,10 @@ class Workspace(Changing):
         order = sorted(paths, key=lambda name: paths[name].stat().st_mtime_ns)
         found = {name: kept.checked(of, self.read_json(kind, name)) for name in order}
         return {name: one for name, one in found.items() if one is not None}
+
+
+def _rmse(result: dict[str, Any]) -> str:
+    return f"{numeral(result['validation_rmse'], 3)} {result['unit']}"
 
 
 def _as_in_a_leaderboard(result: dict[str, Any]) -> tuple[Any, ...]:

@@ -101,7 +101,7 @@ def table(found: Characterization) -> list[Row]:
             "where the loop is widest",
             found.width_centroid,
             "",
-            "centroid of its width: −1 at low, 0 at mid, 1 at high input",
+            "on average over its width: −1 at low, 0 at mid, 1 at high input",
         ),
         ("loop area", found.loop_area, area, "enclosed by the largest cycle"),
         (

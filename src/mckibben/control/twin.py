@@ -163,7 +163,7 @@ class Twin:
         if name not in self._limits:
             raise ModelError(
                 f"{self.forward.title!r} does not say how far its {name} may go. Remedy: say it "
-                f"(--limits {name}=LOW:HIGH, or limits={{{name!r}: (low, high)}}), or calibrate it."
+                f"(--limits {name}=LOW:HIGH, or limits of a twin), or calibrate it."
             )
         return self._limits[name]
 
@@ -292,7 +292,7 @@ class Twin:
             raise DataError(
                 "the plant's model needs it, and nothing says what it is",
                 channel=name,
-                remedy=f"add the column to the reference, or say it (held={{{name!r}: ...}})",
+                remedy="add the column to the reference, or say at what it is held",
             )
         return self.limits(name).low
 

@@ -63,7 +63,8 @@ def read(file: BufferedReader, path: Path) -> list[Table]:
 
 def write(recording: Recording, path: Path) -> None:
     """Write a recording as text, and its description beside it."""
-    time = {} if recording.sample_time is None else {"time": recording.time}
+    # 1.38, not 1.3800000000000001: the description has the exact step
+    time = {} if recording.sample_time is None else {"time": recording.time.round(12)}
     columns = {**time, **recording.channels}
     separator = "\t" if path.suffix.casefold() == ".tsv" else ","
     text = io.StringIO()

@@ -93,28 +93,6 @@ RECORDING_KINDS = ("time", "loop")
 MODEL_KINDS = ("fit", "loops", "residuals", "weights")
 
 
-def save_figure(study: Study, name: str, path: str | Path) -> None:
-    """Write one figure of a study.
-
-    Parameters
-    ----------
-    study : Study
-        What was found.
-    name : str
-        One of `FIGURES`.
-    path : path
-        File to write, ``.png``, ``.svg`` or ``.pdf``.
-
-    Raises
-    ------
-    ModelError
-        On an unknown name, or where the study has nothing to draw.
-    DataError
-        On another suffix, or a folder that does not exist.
-    """
-    printed.save(FIGURES[_known(name, tuple(FIGURES))](study), path)
-
-
 def plot_recording(
     recordings: Sequence[Recording],
     input: str,  # noqa: A002

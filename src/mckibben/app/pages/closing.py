@@ -12,9 +12,10 @@ from nicegui import ui
 from mckibben import registry
 from mckibben.app import fields, forms, plots, scripts
 from mckibben.app.desk import Desk, caution, guarded, named, on_event, tell
+from mckibben.app.drawn import picture
 from mckibben.app.following import fitting_rigs
-from mckibben.app.jobs import RUNNING
 from mckibben.app.kept import Followed
+from mckibben.app.pages.kept_curves import going
 from mckibben.arrays import Array
 from mckibben.errors import MckibbenError
 from mckibben.files import read
@@ -48,33 +49,64 @@ def build(desk: Desk, model: str, form: str, settings: dict[str, Any], reference
     """
     ui.label("Closed loop").classes("text-lg")
     place = ui.column().classes("w-full gap-1")
-    with place, ui.row().classes("items-center"):
+    with ui.row().classes("items-center") as looking:
         ui.spinner()
-        ui.label("Looking for plants that fit")
+        ui.label("Looking for virtual rigs that fit")
 
     async def ready() -> None:
-        offered = await asyncio.to_thread(_plants, desk, model)
+        offered = await asyncio.to_thread(_plants, desk, model, [])
         first = next(iter(offered), "")
         reasons = await asyncio.to_thread(_refused, desk, model, form, settings, first)
+        if place.is_deleted:
+            return
+        with place:
+            more = _offer(desk, model, form, settings, reference, offered, reasons)
+        rigs = await asyncio.to_thread(
+            desk.workspace.cached_rigs, model, lambda: fitting_rigs(desk.workspace, model)
+        )
+        offered = await asyncio.to_thread(_plants, desk, model, rigs)
         if not place.is_deleted:
-            place.clear()
+            looking.delete()
+            more(offered)
             with place:
-                _offer(desk, model, form, settings, reference, offered, reasons)
+                _lacking(desk, model, offered)
 
     ui.timer(0.05, guarded(ready), once=True)
 
 
-def _plants(desk: Desk, model: str) -> dict[str, str]:
-    """Return what the compensator can be tried on: other models of the muscle, rigs, then its own."""
-    others, own = {}, {}
+def _plants(desk: Desk, model: str, known: list[str]) -> dict[str, str]:
+    """Return what the compensator can be tried on: other models of the muscle, rigs, then its own.
+
+    Models that predict worse come after the rigs known.
+    """
+    others: dict[str, str] = {}
+    weaker: dict[str, str] = {}
+    own: dict[str, str] = {}
+    weak = desk.workspace.weaker(model)
     for name in desk.workspace.plants(model):
         if desk.workspace.same(model, name):
             own[f"{OWN}{name}"] = f"{name}: the model that is inverted; proves nothing"
         else:
-            others[f"{OWN}{name}"] = f"{name}: another model of your muscle"
-    known = desk.workspace.cached_rigs(model, lambda: fitting_rigs(desk.workspace, model))
+            kind = weaker if name in weak else others
+            kind[f"{OWN}{name}"] = f"{name}: another model of your muscle"
     rigs = {f"{RIG}{name}": f"{name}: a virtual rig of its size" for name in known}
-    return others | rigs | own
+    return others | rigs | weaker | own
+
+
+def _lacking(desk: Desk, model: str, offered: dict[str, str]) -> None:
+    """Say what to do where no plant tells anything."""
+    if not offered:
+        said = "No plant fits: fit a second model of another kind under Models, and try it on that."
+        try:
+            desk.workspace.twin(model)
+        except MckibbenError as error:
+            said = fields.said(error)
+        named(ui.label(said), "no-plant")
+    elif not any(text.endswith(("of your muscle", "of its size")) for text in offered.values()):
+        caution(
+            "On the model that is inverted, its inverse is right by construction. Fit a model of "
+            "another kind under Models to try it on."
+        )
 
 
 def _offer(
@@ -85,25 +117,13 @@ def _offer(
     reference: str,
     offered: dict[str, str],
     reasons: dict[str, str],
-) -> None:
-    if not offered:
-        said = "No plant fits: fit a second model of another kind under Models, and try it on that."
-        try:
-            desk.workspace.twin(model)
-        except MckibbenError as error:
-            said = fields.said(error)
-        named(ui.label(said), "no-plant")
-        return
-    if not any(text.endswith(("of your muscle", "of its size")) for text in offered.values()):
-        ui.label(
-            "Only the model that is inverted is there, on which its inverse is right by construction. "
-            "Fit a model of another kind under Models to try it on."
-        ).classes("text-sm border-l-4 border-warning pl-2")
+) -> Callable[[dict[str, str]], None]:
+    """Offer plants and controllers; return what offers others, and leaves a plant that was chosen."""
     laws = {name: registry.load("controllers", name) for name in registry.names("controllers")}
     titles = {name: (getdoc(law) or name).rstrip(".") for name, law in laws.items()}
-    with ui.row().classes("items-end w-full gap-3"):
+    with ui.row().classes("items-end w-full gap-3") as row:
         plant = named(
-            ui.select(offered, value=next(iter(offered)), label="Plant").classes("min-w-72"),
+            ui.select(offered, value=next(iter(offered), None), label="Plant").classes("min-w-72"),
             "loop-plant",
         )
         kinds = named(
@@ -139,11 +159,17 @@ def _offer(
             desk.changed("jobs")
 
         named(ui.button("Run", on_click=guarded(start)), "run-loop")
+    row.set_visibility(bool(offered))
+    doubt = named(caution(""), "weaker-plant")
     against = ui.column().classes("gap-1")
 
     def suit(reasons: dict[str, str]) -> None:
-        fits = {law: title for law, title in titles.items() if not reasons[law]}
+        # as their runs are called
+        fits = {law: f"{title} ({law})" for law, title in titles.items() if not reasons.get(law)}
         kinds.set_options(fits, value=[law for law in kinds.value or USUAL if law in fits])
+        why = desk.workspace.weaker(model).get(str(plant.value).removeprefix(OWN), "")
+        doubt.set_text(why)
+        doubt.set_visibility(bool(why))
         against.clear()
         with against:
             for reason in dict.fromkeys(filter(None, reasons.values())):
@@ -154,13 +180,19 @@ def _offer(
                 )
 
     async def turned() -> None:
-        chosen = str(plant.value)
+        chosen = str(plant.value or "")
         reasons = await asyncio.to_thread(_refused, desk, model, form, settings, chosen)
-        if chosen == plant.value and not against.is_deleted:
+        if chosen == (plant.value or "") and not against.is_deleted:
             suit(reasons)
+
+    def more(wider: dict[str, str]) -> None:
+        untouched = plant.value == next(iter(offered), None)
+        plant.set_options(wider, value=next(iter(wider), None) if untouched else plant.value)
+        row.set_visibility(bool(wider))
 
     plant.on_value_change(on_event(lambda _: turned()))
     suit(reasons)
+    return more
 
 
 def _refused(
@@ -193,14 +225,8 @@ def runs(desk: Desk, model: str, drawn: Callable[[], str]) -> None:
 
     @ui.refreshable
     def waiting() -> None:
-        for job in desk.jobs.active():
-            if job.kind == "loop" and job.given.get("model") == model:
-                told = desk.jobs.progress(job.name)
-                with ui.row().classes("items-center w-full gap-2 no-wrap"):
-                    ui.label(job.title).classes("w-48 text-xs")
-                    share = told[-1][1] if told and job.state == RUNNING else 0.0
-                    ui.linear_progress(round(share, 2), show_value=False).classes("flex-1")
-                    ui.label(job.state).classes("text-xs")
+        loops = [job for job in desk.jobs.jobs.values() if job.kind == "loop"]
+        going(desk, [job for job in loops if job.given.get("model") == model])
 
     @ui.refreshable
     def shown() -> None:
@@ -213,6 +239,9 @@ def runs(desk: Desk, model: str, drawn: Callable[[], str]) -> None:
         if len(motions) > 1 or drawn() not in ("", pictured):
             text = f"Errors compare only within a motion. In the picture: {motions[pictured]}."
             named(ui.label(text).classes("text-sm"), "motions")
+        for text, names in _remarks(desk, found).items():
+            if names:
+                named(caution(f"{', '.join(names)}: {text}"), "runs-remark")
         for note in dict.fromkeys(note for run in found.values() for note in run.notes):
             named(caution(note), "loop-note")
         alike = {name: run for name, run in found.items() if run.reference == pictured}
@@ -220,9 +249,24 @@ def runs(desk: Desk, model: str, drawn: Callable[[], str]) -> None:
 
     desk.when("jobs", waiting.refresh)
     desk.when("runs", shown.refresh)
-    desk.when("theme", shown.refresh)
     waiting()
     shown()
+
+
+def _remarks(desk: Desk, runs: dict[str, Followed]) -> dict[str, list[str]]:
+    """Return what the figures of runs do not say, and of which."""
+    no_better, scattering = [], []
+    for name, run in runs.items():
+        plain = run.uncompensated
+        pairs = [(run.rmse[key], plain.get(key)) for key in run.rmse]
+        if any(own is not None and other is not None and own >= other for own, other in pairs):
+            no_better.append(name)
+        if run.plant and desk.workspace.path("banded", f"{run.plant}.json").exists():
+            scattering.append(name)
+    return {
+        "no better than without compensation.": no_better,
+        "the plant scatters as its band says, which no compensator foresees.": scattering,
+    }
 
 
 def _motion(run: Followed, drawn: str) -> str:
@@ -249,7 +293,7 @@ def _table(runs: dict[str, Followed], motions: dict[str, str]) -> None:
         "rmse": "RMSE",
         "without": "RMSE without compensation",
         "largest": "Largest error",
-        "clipped": "Clipped steps",
+        "clipped": "Steps the plant clipped",
         "step": "Step [µs]",
     }
     rows: list[dict[str, Any]] = [
@@ -297,11 +341,5 @@ def _pictures(desk: Desk, runs: dict[str, Followed]) -> None:
                 own.append(("no compensation", run.time, run[plain], "input"))
             own.append((name, run.time, run[channel], f"series-{place + 1}"))
     for place, (channel, own) in enumerate(curves.items()):
-        figure = plots.lines(own, x="time [s]", y=f"{channel} [{units[channel]}]", dark=desk.dark)
-        # many names take two lines, and must not lie over the curves
-        figure["layout"]["margin"] |= {"t": 72}
-        figure["layout"]["legend"] |= {"y": 1.02, "yanchor": "bottom"}
-        named(
-            ui.plotly(figure).classes("w-full"),
-            "loop-runs" if not place else f"loop-runs-{place + 1}",
-        )
+        figure = plots.lines(own, x="time [s]", y=f"{channel} [{units[channel]}]")
+        picture(desk, figure, "loop-runs" if not place else f"loop-runs-{place + 1}")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -10,9 +11,11 @@ from nicegui import ui
 
 from mckibben.app import fields, forms, plots, scripts
 from mckibben.app.desk import Desk, caution, guarded, named, not_recommended, on_event
-from mckibben.app.following import compensated, held_for, kept_motion
+from mckibben.app.drawn import picture
+from mckibben.app.following import at_rest, compensated, held_for, kept_motion, pace
 from mckibben.app.pages import closing, forces, logs
 from mckibben.app.pages.drawing_reference import Sketch
+from mckibben.blocks.core.commanding import COMMANDS
 from mckibben.blocks.core.fields import Channel
 from mckibben.comparison.recognising import FORCE
 from mckibben.errors import MckibbenError
@@ -87,6 +90,11 @@ def _reach(desk: Desk, model: str) -> dict[str, tuple[float, float]]:
     return found
 
 
+def _quantity(commands: Sequence[Channel]) -> str:
+    """Return what is commanded: pressure, voltage, force."""
+    return next((one for one in (*COMMANDS, FORCE) if one in commands[0].name), "command")
+
+
 class Editor:
     """A model, what it is used as, a reference, and what comes of it.
 
@@ -121,7 +129,7 @@ class Editor:
                 for own in forms.SETTINGS.values()
                 for key, label in own.items()
             }
-            self.step = ui.number("Time between steps [s]", value=forms.STEP, min=1e-4, max=10.0)
+            self.step = ui.number("Time between steps [s]", min=1e-6, max=10.0)
             self.step.classes("w-44").on_value_change(self._changed)
         self.form.on_value_change(self._fields)
         self.form.on_value_change(self._changed)
@@ -185,8 +193,9 @@ class Editor:
     def _sketch(self) -> None:
         desk, name = self.desk, self.name
         block = desk.workspace.model(name)
-        if block.sample_time:
-            self.step.set_value(block.sample_time)
+        known = pace(desk.workspace, name)
+        if block.sample_time or not self.step.value:
+            self.step.set_value(known.step)
         inverse = forms.inverse_of(block)
         outputs = [c for c in inverse.inputs if c.name not in inverse.scheduling]
         units = {channel.name: channel.unit for channel in inverse.inputs}
@@ -195,12 +204,15 @@ class Editor:
         except MckibbenError:
             reach = {}
         reach = {c.name: reach.get(c.name, (0.0, 1.0)) for c in outputs}
-        held = held_for(desk.workspace, name)
+        held, rest = held_for(desk.workspace, name), at_rest(desk.workspace, name)
         self.left.clear()
         with self.left:
-            self.sketch = Sketch(desk, outputs, reach, held, units, self._changed)
+            self.sketch = Sketch(
+                desk, outputs, reach, rest, held, units, known.usual, self._changed
+            )
         with self.sketch.actions:
-            named(ui.button("Show pressures", on_click=guarded(self._show)), "show-pressures")
+            text = f"Show {_quantity(inverse.outputs)}s"
+            named(ui.button(text, on_click=guarded(self._show)), "show-pressures")
 
     async def _turned(self) -> None:
         self._asked = None
@@ -233,7 +245,7 @@ class Editor:
         self._asked = None
         self.shown.clear()
         with self.shown:
-            text = "The motion or its compensator has changed: press Show pressures again."
+            text = "The motion or its compensator has changed: press Show again."
             named(ui.label(text), "wish-changed")
         self.desk.news.changed("runs")
 
@@ -265,7 +277,7 @@ class Editor:
             closing.runs(desk, name, lambda: file if self._asked is asked else "")
 
     def _figures(self, model: str, reference: Recording, given: Recording) -> None:
-        dark, sketch = self.desk.dark, self.sketch
+        desk, sketch = self.desk, self.sketch
         together = "" if len(sketch.channels) == 1 else "; each by itself, all at once less"
         ui.label(f"Shaded: what can be reached whatever happened before{together}").classes(
             "text-xs opacity-70"
@@ -275,12 +287,11 @@ class Editor:
                 [("reference", reference.time, reference[name], "series-1")],
                 x="time [s]",
                 y=f"{name} [{channel.unit}]",
-                dark=dark,
                 height=240,
                 bands=(sketch.reach[name],),
             )
             mark = "reference-plot" if place == 0 else f"reference-plot-{place + 1}"
-            named(ui.plotly(figure).classes("w-full"), mark)
+            picture(desk, figure, mark)
         pressures = self._commands(model, given)
         figure = plots.lines(
             [
@@ -288,11 +299,10 @@ class Editor:
                 for place, channel in enumerate(pressures)
             ],
             x="time [s]",
-            y=f"{pressures[0].name.partition('_')[0]} [{pressures[0].unit}]",
-            dark=dark,
+            y=f"{_quantity(pressures)} [{pressures[0].unit}]",
             height=260,
         )
-        named(ui.plotly(figure).classes("w-full"), "pressure-plot")
+        picture(desk, figure, "pressure-plot")
 
     def _commands(self, model: str, given: Recording) -> list[Channel]:
         block = forms.inverse_of(self.desk.workspace.model(model))
@@ -301,10 +311,7 @@ class Editor:
     def _pressures(
         self, model: str, reference: Recording, given: Recording, notes: list[str]
     ) -> None:
-        figures = ui.refreshable(lambda: self._figures(model, reference, given))
-        with ui.column().classes("w-full gap-2"):
-            self.desk.when("theme", figures.refresh)
-            figures()
+        self._figures(model, reference, given)
         pressures = self._commands(model, given)
         for note in notes:
             caution(note)
@@ -312,8 +319,9 @@ class Editor:
         columns = zip(given.time, *(given[c.name] for c in pressures), strict=True)
         rows = [",".join(f"{number:.9g}" for number in row) for row in columns]
         content = "\n".join([header, *rows])
+        asked = f"{_quantity(pressures)}s"
         button = ui.button(
-            "Pressures as CSV",
-            on_click=lambda: ui.download(content.encode(), f"{model}-pressures.csv"),
+            f"{asked.capitalize()} as CSV",
+            on_click=lambda: ui.download(content.encode(), f"{model}-{asked}.csv"),
         )
         named(button.props("outline"), "take-pressures")

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from nicegui import ui
 
 from mckibben.app.desk import Desk, guarded, hinted, labelled, named, refused
-from mckibben.app.drawn import Drawn
+from mckibben.app.drawn import Drawn, picture
 from mckibben.app.kept import Step
 from mckibben.app.pages import editing
 from mckibben.app.pages.rows import state_of
@@ -98,10 +98,10 @@ def preview(desk: Desk) -> None:
     def state() -> Any:
         entries = {entry.name: entry for entry in desk.workspace.entries()}
         name = desk.preview if desk.preview in entries else next(iter(entries), None)
-        return name, state_of(entries[name]) if name else None, desk.dark
+        return name, state_of(entries[name]) if name else None
 
     def shown() -> None:
-        name, _, _ = state()
+        name, _ = state()
         if name is None:
             return
         try:
@@ -113,7 +113,7 @@ def preview(desk: Desk) -> None:
         _channels(desk, name, recording)
         editing.steps(desk, name, recording)
 
-    Drawn(desk, state, shown, "recordings", "preview", "theme")
+    Drawn(desk, state, shown, "recordings", "preview")
 
 
 def first_shown(desk: Desk, recording: Recording) -> list[str]:
@@ -202,6 +202,8 @@ def _plot(desk: Desk, name: str, recording: Recording, channels: list[str], part
         plot.run_plot_method("relayout", {"shapes": _shapes(part)})
 
     part.shown = drawn
+    with plot:
+        desk.when("theme", drawn)  # a picture that is drawn anew has no part shaded
     for field in fields:
         field.on("change", typed)
         field.on("keydown.enter", guarded(lambda: cut("keep")))
@@ -238,10 +240,10 @@ def time_plot(
     from mckibben.report import subjects
 
     drawing = subjects.time_course([recording], channels, plots.POINTS)
-    (figure,) = plots.figures(drawing, dark=desk.dark, height=170 * len(channels) + 60)
+    (figure,) = plots.figures(drawing, height=170 * len(channels) + 60)
     figure["layout"]["dragmode"] = "zoom" if part is None else "select"
     figure["layout"]["selectdirection"] = "h"
-    plot = named(ui.plotly(figure).classes("w-full"), name)
+    plot = picture(desk, figure, name)
     whole = (float(recording.time[0]), float(recording.time[-1]))
 
     def moved(event: Any) -> None:

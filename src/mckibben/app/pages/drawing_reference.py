@@ -32,6 +32,10 @@ UNDONE = 100
 """Changes that can be taken back."""
 
 
+CYCLES = 2
+"""Of a ready-made motion, unless others are wished for."""
+
+
 class Sketch:
     """A reference for every coordinate of a model.
 
@@ -42,10 +46,14 @@ class Sketch:
         What is to be wished for.
     reach : mapping of str to (float, float)
         What can be reached of each.
+    rest : mapping of str to float
+        Where each is at rest.
     held : mapping of str to float
         What a compensator needs beside, as it is held.
     units : mapping of str to str
         Of all these.
+    cycle : float
+        How long one usually takes [s].
     changed : callable
         Told of every change.
     """
@@ -55,11 +63,14 @@ class Sketch:
         desk: Desk,
         channels: Sequence[Channel],
         reach: dict[str, tuple[float, float]],
+        rest: dict[str, float],
         held: dict[str, float],
         units: dict[str, str],
+        cycle: float,
         changed: Callable[[], None],
     ) -> None:
-        self.changed = changed
+        self.changed, self.usual = changed, float(f"{CYCLES * cycle:.2g}")
+        self.rest = {name: rest.get(name, ends[0]) for name, ends in reach.items()}
         self.desk, self.channels, self.reach = desk, {c.name: c for c in channels}, reach
         self.units = {channel.name: channel.unit for channel in channels} | units
         self.points: dict[str, Points] = {name: [] for name in self.channels}
@@ -94,7 +105,7 @@ class Sketch:
         )
         labelled(self.frame, "aria-label", "Reference over time; its points are in the table below")
         with ui.row().classes("items-end gap-2"):
-            self.duration = ui.number("Duration [s]", value=20.0, min=0.1).classes("w-24")
+            self.duration = ui.number("Duration [s]", value=self.usual, min=0.1).classes("w-24")
             self.duration.on_value_change(self.draw)
             self.snap = named(ui.switch("Snap", value=True), "snap")
             self.snap.on_value_change(self.draw)
@@ -102,9 +113,11 @@ class Sketch:
             named(ui.button("Clear", on_click=self.clear).props("outline dense"), "clear-points")
         ui.label("Ready-made motions").classes("text-sm mt-2")
         with ui.row().classes("items-end gap-2"):
-            self.low = ui.number("From", format="%.5g").classes("w-20")
-            self.high = ui.number("To", format="%.5g").classes("w-20")
-            self.cycles = ui.number("Cycles", value=2, min=1, max=50, precision=0).classes("w-16")
+            self.first = ui.number("From", format="%.5g").classes("w-20")
+            self.other = ui.number("To", format="%.5g").classes("w-20")
+            self.cycles = ui.number("Cycles", value=CYCLES, min=1, max=50, precision=0).classes(
+                "w-16"
+            )
             self.seed = ui.number("Seed", value=0, min=0, precision=0).classes("w-16")
         with ui.row().classes("gap-2"):
             for kind, label in motions.MOTIONS.items():
@@ -138,15 +151,15 @@ class Sketch:
         ).classes("w-full max-w-2xl").props("flat bordered")
 
     def _span(self) -> None:
-        """Fill in the ends of ready-made motions: well within what can be reached."""
-        low, high = self.reach[self.now]
-        self.low.set_value(float(f"{low + 0.1 * (high - low):.3g}"))
-        self.high.set_value(float(f"{low + 0.9 * (high - low):.3g}"))
+        """Fill in ends of ready-made motions, the one at rest first: well within what can be reached."""
+        first, other = sorted(self.reach[self.now], key=lambda y: abs(y - self.rest[self.now]))
+        self.first.set_value(float(f"{first + 0.1 * (other - first):.3g}"))
+        self.other.set_value(float(f"{first + 0.9 * (other - first):.3g}"))
 
     @property
     def seconds(self) -> float:
         """Length of the time axis [s]."""
-        return max(float(self.duration.value or 20.0), 0.1)
+        return max(float(self.duration.value or self.usual), 0.1)
 
     @property
     def axes(self) -> Axes:
@@ -203,9 +216,9 @@ class Sketch:
     def ready(self, kind: str) -> None:
         """Put a ready-made motion there."""
         with told():
-            if self.low.value is None or self.high.value is None:
+            if self.first.value is None or self.other.value is None:
                 raise DataError("a motion needs its ends", remedy="fill in From and To")
-            given = (float(self.low.value), float(self.high.value), int(self.cycles.value or 1))
+            given = (float(self.first.value), float(self.other.value), int(self.cycles.value or 1))
             self._set(motions.motion(kind, self.seconds, *given, seed=int(self.seed.value or 0)))
 
     def _mouse(self, event: MouseEventArguments) -> None:
@@ -291,7 +304,7 @@ class Sketch:
         units = {name: self.units[name] for name in channels if name in self.units}
         self._keep()
         self.file = Recording(channels, given.sample_time, units).with_meta(name=given.name)
-        self.duration.set_value(float(f"{self.file.duration or 20.0:.5g}"))
+        self.duration.set_value(float(f"{self.file.duration or self.usual:.5g}"))
         self.draw()
 
     # -- what it shows and gives -----------------------------------------------------------------

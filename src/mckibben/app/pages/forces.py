@@ -80,9 +80,11 @@ def build(desk: Desk) -> None:
 
     def runs() -> None:
         wanted = known.get(str(model.value), [])
-        fit = [one for one in desk.workspace.readable() if all(name in one for name in wanted)]
-        named_first = sorted(fit, key=lambda one: "force" not in one)
-        names = [one.name for one in named_first] if wanted else []
+        used = desk.workspace.used() if wanted else {}
+        trained = {one.name for one in desk.workspace.entries() if one.role == "train"}
+        fit = [name for name, one in used.items() if all(key in one for key in wanted)]
+        fit.sort(key=lambda name: ("force" not in used[name], name in trained))
+        names = {name: f"{name} (trained on)" if name in trained else name for name in fit}
         run.set_options(names, value=run.value if run.value in names else next(iter(names), None))
 
     async def look() -> None:

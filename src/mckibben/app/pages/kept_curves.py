@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -10,7 +10,9 @@ from nicegui import ui
 
 from mckibben.app import plots
 from mckibben.app.desk import Desk, named
-from mckibben.app.jobs import FAILED, RUNNING
+from mckibben.app.drawn import picture
+from mckibben.app.fields import said
+from mckibben.app.jobs import ENDED, FAILED, RUNNING, Job
 from mckibben.app.kept import Line2D
 
 MOST = 3
@@ -28,16 +30,7 @@ def showing(
 
     @ui.refreshable
     def waiting() -> None:
-        for job in [job for job in desk.jobs.jobs.values() if job.kind == kind][-MOST:]:
-            if job.state == FAILED:
-                ui.label(f"{job.title}: {job.message}").classes("text-sm text-negative")
-        for job in desk.jobs.active():
-            if job.kind == kind:
-                told = desk.jobs.progress(job.name)
-                with ui.row().classes("items-center gap-2"):
-                    ui.spinner()
-                    share = told[-1][1] if told and job.state == RUNNING else 0.0
-                    ui.label(f"{job.title}: {job.state}, {100 * share:.0f} %").classes("text-sm")
+        going(desk, [job for job in desk.jobs.jobs.values() if job.kind == kind])
 
     @ui.refreshable
     def shown() -> None:
@@ -52,9 +45,22 @@ def showing(
             shown.refresh()
 
     desk.when("jobs", moved)
-    desk.when("theme", shown.refresh)
     waiting()
     shown()
+
+
+def going(desk: Desk, jobs: Iterable[Job]) -> None:
+    """Show how far jobs are, and why those failed that were not run again."""
+    for job in {job.title: job for job in jobs}.values():
+        if job.state == FAILED:
+            text = ui.label(said(f"{job.title}: {job.message}")).classes("text-sm text-negative")
+            named(text, f"failed-{job.kind}")
+        elif job.state not in ENDED:
+            told = desk.jobs.progress(job.name)
+            with ui.row().classes("items-center gap-2"):
+                ui.spinner()
+                share = told[-1][1] if told and job.state == RUNNING else 0.0
+                ui.label(f"{job.title}: {job.state}, {100 * share:.0f} %").classes("text-sm")
 
 
 def drawn(desk: Desk, curves: Sequence[Line2D], above: str, below: str, name: str) -> None:
@@ -64,9 +70,8 @@ def drawn(desk: Desk, curves: Sequence[Line2D], above: str, below: str, name: st
     ):
         if own:
             found = [(c.name, _array(c.x), _array(c.y), _colour(c.colour)) for c in own]
-            figure = plots.lines(found, x="time [s]", y=label, dark=desk.dark, height=260)
-            mark = name if not place else f"{name}-error"
-            named(ui.plotly(figure).classes("w-full"), mark)
+            figure = plots.lines(found, x="time [s]", y=label, height=260)
+            picture(desk, figure, f"{name}-error" if place else name)
 
 
 def _array(values: Sequence[float | None]) -> Any:

@@ -10,6 +10,7 @@ from nicegui import ui
 
 from mckibben.app import plots
 from mckibben.app.desk import Desk, caution, guarded, named, not_recommended, on_event
+from mckibben.app.drawn import picture
 from mckibben.app.pages import next_steps
 from mckibben.blocks.core.block import Block
 from mckibben.blocks.core.writing import quantities
@@ -114,7 +115,6 @@ def build(desk: Desk) -> None:
 
     desk.when("recordings", changed)
     desk.when("results", shown.refresh)
-    desk.when("theme", shown.refresh)
     shown()
 
 
@@ -219,10 +219,10 @@ async def _closer(desk: Desk, names: list[str]) -> Callable[[], None]:
             ]
         for number, drawing in enumerate(drawings):
             with ui.row().classes("w-full"):
-                for figure in plots.figures(drawing, dark=desk.dark, height=360):
+                for figure in plots.figures(drawing, height=360):
                     figure["layout"]["showlegend"] = True
-                    plot = ui.plotly(figure).classes("flex-1 min-w-72")
-                    named(plot, f"closer-{number}")
+                    plot = picture(desk, figure, f"closer-{number}")
+                    plot.classes("flex-1 min-w-72", remove="w-full")
         with ui.row().classes("w-full items-start"):
             for name, block in blocks.items():
                 with ui.expansion(f"Parameters of {name}").classes("flex-1 min-w-72"):

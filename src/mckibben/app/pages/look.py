@@ -10,15 +10,20 @@ from nicegui import ui
 
 from mckibben.app import plots
 from mckibben.app.desk import Desk, guarded, named, refused
+from mckibben.app.drawn import picture
 from mckibben.app.fields import said
 from mckibben.app.pages.cutting import time_plot
 from mckibben.app.together import obstacle
 from mckibben.errors import MckibbenError
+from mckibben.numerals import typeset_within
 from mckibben.recording import Recording
 from mckibben.report import coupling_subjects, subjects, wording
 
 SMALL_HEIGHT = 150
 """Of a small picture [px]."""
+
+EXPLAINED = '<q-td :props="props" :title="props.row.note">{{ props.value }}</q-td>'
+"""A quantity, with what it is where a pointer rests on it."""
 
 
 def build(desk: Desk) -> None:
@@ -38,25 +43,25 @@ def build(desk: Desk) -> None:
         )
         with ui.row().classes("w-full items-start gap-4"):
             with ui.column().classes("min-w-80 flex-[3]"):
+                pairs = desk.looked_at
                 if len(desk.inputs) > 1 or len(desk.outputs) > 1:
-                    _matrix(desk, chosen)
+                    _matrix(desk, chosen, pairs[0])
                 else:
-                    _plots(desk, chosen, *desk.looked_at[0])
+                    _plots(desk, chosen, *pairs[0])
             with ui.column().classes("min-w-72 flex-[2]"):
-                for given, wanted in desk.looked_at:
+                for given, wanted in pairs:
                     _words(desk, given, wanted)
-                    _untold(desk, given, wanted)
+                _untold(desk, pairs[0][0])
 
     desk.when("recordings", shown.refresh)
     desk.when("channels", shown.refresh)
-    desk.when("theme", shown.refresh)
     shown()
 
 
-def _matrix(desk: Desk, chosen: ui.select) -> None:
+def _matrix(desk: Desk, chosen: ui.select, begun: tuple[str, str]) -> None:
     """Show every output over every input, small, with how far each moves each; a click enlarges."""
     at = named(ui.column().classes("w-full"), "coupling")
-    pair = list(desk.pairs[0])
+    pair = list(begun)
 
     @ui.refreshable
     def enlarged() -> None:
@@ -71,27 +76,26 @@ def _matrix(desk: Desk, chosen: ui.select) -> None:
     def pictured() -> None:
         try:
             recording = desk.workspace.recording(str(chosen.value))
-            found = coupling_subjects.coupling([recording], desk.inputs, desk.outputs)
+            used = list(desk.workspace.used().values())
+            found = coupling_subjects.coupling(used, desk.inputs, desk.outputs)
         except (MckibbenError, KeyError) as error:
             refused(error)
             return
         ui.label("What moves what: every output over every input").classes("text-lg")
-        small = plots.figures(
-            coupling_subjects.matrix(recording, found), dark=desk.dark, height=SMALL_HEIGHT
-        )
+        small = plots.figures(coupling_subjects.matrix(recording, found), height=SMALL_HEIGHT)
         most = coupling_subjects.MOST
         shown = [(o, i) for o in found.outputs[:most] for i in found.inputs[:most]]
         columns = min(len(found.inputs), most)
         grid = ui.element("div").classes("w-full overflow-x-auto grid gap-1")
-        grid.style(f"grid-template-columns: repeat({columns}, minmax(9rem, 1fr))")
+        grid.style(f"grid-template-columns: repeat({columns}, minmax(7rem, 1fr))")
         with grid:
             for figure, (wanted, given) in zip(small, shown, strict=True):
-                _small(figure, found, given, wanted, enlarge)
+                _small(desk, figure, found, given, wanted, enlarge)
         ui.label(
             "In colour: the input that "
             + ("belongs to the output." if found.paired else "moves the output most.")
             + " Numbers: what the input over its whole range does to the output, by one straight line "
-            "through all inputs. Click on a picture's name to enlarge it."
+            "through all inputs of all recordings. Click on a picture's name to enlarge it."
         ).classes("text-xs opacity-70")
 
     chosen.on_value_change(pictured.refresh)
@@ -101,6 +105,7 @@ def _matrix(desk: Desk, chosen: ui.select) -> None:
 
 
 def _small(
+    desk: Desk,
     figure: plots.Json,
     found: coupling_subjects.Coupling,
     given: str,
@@ -116,10 +121,11 @@ def _small(
     with ui.column().classes("gap-0 min-w-0"):
         button = ui.button(f"{given} → {wanted}{told}", on_click=lambda: enlarge(given, wanted))
         named(button.props("flat dense no-caps").classes("text-xs"), f"pair-{given}-{wanted}")
-        ui.plotly(figure).classes("w-full")
+        picture(desk, figure)
 
 
 def _plots(desk: Desk, chosen: ui.select, given: str, wanted: str) -> None:
+    from mckibben.characterization.tracks import MAJOR
     from mckibben.signals import cycles
 
     @ui.refreshable
@@ -129,7 +135,7 @@ def _plots(desk: Desk, chosen: ui.select, given: str, wanted: str) -> None:
         except MckibbenError as error:
             refused(error)
             return
-        found = cycles(recording[given])
+        found = cycles(recording[given], MAJOR * float(np.ptp(recording[given])))
         used = (*desk.inputs, *desk.outputs, given)
         others = coupling_subjects.third_channels(recording, used)
         with ui.row().classes("items-center w-full"):
@@ -138,7 +144,7 @@ def _plots(desk: Desk, chosen: ui.select, given: str, wanted: str) -> None:
                     {"time": "Colour by time"}
                     | ({"rate": "Colour by rate"} if recording.sample_time is not None else {})
                     | {f"by {name}": f"Colour by {name}" for name in others},
-                    value=f"by {others[0]}" if others else "time",
+                    value="time",
                 ).props("no-caps"),
                 "loop-colour",
             )
@@ -156,7 +162,7 @@ def _plots(desk: Desk, chosen: ui.select, given: str, wanted: str) -> None:
             if 1 <= number <= len(found):
                 part = recording.slice(found[number - 1].start, found[number - 1].stop)
             if colour.value == "rate":
-                figure = _by_rate(desk, part, given, wanted)
+                figure = _by_rate(part, given, wanted)
             else:
                 by = str(colour.value).removeprefix("by ")
                 drawing = (
@@ -164,8 +170,8 @@ def _plots(desk: Desk, chosen: ui.select, given: str, wanted: str) -> None:
                     if by == "time"
                     else coupling_subjects.loop_by(part, given, wanted, by)
                 )
-                figure = plots.figures(drawing, dark=desk.dark, height=440)[0]
-            named(ui.plotly(figure).classes("w-full"), "loop-plot")
+                figure = plots.figures(drawing, height=440)[0]
+            picture(desk, figure, "loop-plot")
 
         colour.on_value_change(loop.refresh)
         cycle.on_value_change(loop.refresh)
@@ -176,7 +182,7 @@ def _plots(desk: Desk, chosen: ui.select, given: str, wanted: str) -> None:
     drawn()
 
 
-def _by_rate(desk: Desk, recording: Recording, given: str, wanted: str) -> plots.Json:
+def _by_rate(recording: Recording, given: str, wanted: str) -> plots.Json:
     """Return the loop with its points coloured by how fast the input moves."""
     from mckibben.report.drawing import along
 
@@ -187,7 +193,6 @@ def _by_rate(desk: Desk, recording: Recording, given: str, wanted: str) -> plots
         [],
         x=f"{given} [{recording.units[given]}]",
         y=f"{wanted} [{recording.units[wanted]}]",
-        dark=desk.dark,
         height=440,
     )
     bar = {"title": {"text": f"{recording.units[given]}/s"}}
@@ -202,7 +207,8 @@ def _by_rate(desk: Desk, recording: Recording, given: str, wanted: str) -> plots
 def _words(desk: Desk, given: str, wanted: str) -> None:
     from mckibben.characterization import characterize
 
-    ui.label(_headed(desk, "What the muscle does", wanted)).classes("text-lg")
+    what = f": {wanted}" if len(desk.outputs) > 1 else ""
+    ui.label(f"What the muscle does{what}").classes("text-lg")
     place = named(ui.column().classes("w-full"), "characterization")
 
     async def find() -> None:
@@ -216,7 +222,9 @@ def _words(desk: Desk, given: str, wanted: str) -> None:
             return
         with place:
             for sentence in found.sentences:
-                ui.label(sentence)
+                ui.label(typeset_within(sentence))
+            if len(recordings) > 1:
+                ui.label(f"Over all {len(recordings)} recordings:").classes("text-sm opacity-70")
             rows = [
                 {
                     "what": name,
@@ -235,9 +243,8 @@ def _words(desk: Desk, given: str, wanted: str) -> None:
                     ("unit", "Unit", "left"),
                 )
             ]
-            ui.table(rows=rows, columns=columns, row_key="what").classes("w-full").props(
-                "dense flat"
-            )
+            table = ui.table(rows=rows, columns=columns, row_key="what").classes("w-full")
+            table.props("dense flat").add_slot("body-cell-what", EXPLAINED)
             told = f", beside={beside!r}" if beside else ""
             call = f"mckibben.characterize(recordings, {given!r}, {wanted!r}{told})"
             desk.did("characterized the recordings", call)
@@ -245,17 +252,18 @@ def _words(desk: Desk, given: str, wanted: str) -> None:
     ui.timer(0.05, guarded(find), once=True)
 
 
-def _untold(desk: Desk, given: str, wanted: str) -> None:
+def _untold(desk: Desk, given: str) -> None:
     from mckibben.excitation import untold
 
-    ui.label(_headed(desk, "What these recordings cannot tell", wanted)).classes("text-lg")
+    ui.label("What these recordings cannot tell").classes("text-lg")
     place = named(ui.column().classes("w-full"), "untold")
+    inputs = desk.inputs if len(desk.inputs) > 1 else (given,)  # each moves every output
 
     async def find() -> None:
         train, test = desk.workspace.with_role("train"), desk.workspace.with_role("test")
         try:
             gaps = await asyncio.to_thread(
-                untold, train or test, given, wanted, tests=test if train else ()
+                untold, train or test, inputs, desk.outputs, tests=test if train else ()
             )
         except MckibbenError as error:
             with place:
@@ -265,16 +273,11 @@ def _untold(desk: Desk, given: str, wanted: str) -> None:
             if not gaps:
                 ui.label("Nothing that a model would need.")
             for gap in gaps:
-                ui.label(gap.sentence)
-                ui.label(said(gap.remedy)).classes("text-caption pl-4")
+                ui.label(typeset_within(gap.sentence))
+                ui.label(typeset_within(said(gap.remedy))).classes("text-caption pl-4")
             desk.did(
                 "asked what the recordings cannot tell",
-                f"mckibben.untold(train, {given!r}, {wanted!r}, tests=test)",
+                f"mckibben.untold(train, {inputs!r}, {desk.outputs!r}, tests=test)",
             )
 
     ui.timer(0.05, guarded(find), once=True)
-
-
-def _headed(desk: Desk, heading: str, wanted: str) -> str:
-    """Return a heading, with the output where there are several."""
-    return f"{heading}: {wanted}" if len(desk.outputs) > 1 else heading

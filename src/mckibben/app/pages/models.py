@@ -9,6 +9,7 @@ from nicegui import ui
 
 from mckibben.app import fields, plots, scripts
 from mckibben.app.desk import Desk, hinted, named, tell
+from mckibben.app.drawn import picture
 from mckibben.app.jobs import DONE, ENDED, RUNNING, Job
 from mckibben.app.pages import leaderboard
 from mckibben.app.pages.choosing import Choice
@@ -114,7 +115,6 @@ def _running(desk: Desk) -> None:
             _best_so_far(desk, fits)
 
     desk.when("jobs", shown.refresh)
-    desk.when("theme", shown.refresh)
     shown()
 
 
@@ -178,6 +178,7 @@ def _best_so_far(desk: Desk, fits: list[Job]) -> None:
             curves.append((job.title, seconds, costs, f"series-{place % 6 + 1}"))
     if curves:
         ui.label("Best so far, in each fold of the cross-validation anew").classes("text-sm")
-        figure = plots.lines(curves, x="time [s]", y="cost of the search", dark=desk.dark)
+        figure = plots.lines(curves, x="time [s]", y="cost of the search")
         figure["layout"]["yaxis"]["type"] = "log"
-        named(ui.plotly(figure).classes("w-full"), "best-so-far")
+        figure["layout"]["xaxis"]["rangemode"] = "tozero"
+        picture(desk, figure, "best-so-far")

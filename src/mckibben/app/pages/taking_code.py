@@ -11,6 +11,7 @@ from nicegui import ui
 
 from mckibben.app import forms
 from mckibben.app.desk import Desk, guarded, named, on_event
+from mckibben.app.following import pace
 from mckibben.blocks.core.block import Block
 from mckibben.system.atomic import replacing
 from mckibben.system.ordinary import read_bytes
@@ -152,7 +153,7 @@ def build(desk: Desk, model: Any) -> None:
         async def offer() -> None:
             name = str(model.value)
             found = await asyncio.to_thread(forms.possible, desk.workspace, name)
-            fixed = await asyncio.to_thread(_own_step, desk, name) if found else None
+            known = await asyncio.to_thread(pace, desk.workspace, name) if found else None
             offered = {key: forms.FORMS[key] for key in found}
             if offered and name == str(model.value):
                 value = form.value if form.value in offered else next(iter(offered))
@@ -160,10 +161,10 @@ def build(desk: Desk, model: Any) -> None:
                 if shown == name and use in offered:
                     value = use
                     step.set_value(own)
-                elif fixed:
-                    step.set_value(fixed)
                     for key, number in settings.items():
                         fields[key].set_value(number)
+                elif known:
+                    step.set_value(known.step)
                 form.set_options(offered, value=value)
                 fitted()
 
@@ -172,11 +173,6 @@ def build(desk: Desk, model: Any) -> None:
         desk.when("compensator", offer)
         fitted()
         ui.timer(0.05, guarded(offer), once=True)
-
-
-def _own_step(desk: Desk, name: str) -> float | None:
-    """Return the time between steps that a model was made for, if there is one [s]."""
-    return desk.workspace.model(name).sample_time
 
 
 async def _zipped(desk: Desk, folder: Path, call: str) -> None:

@@ -103,10 +103,12 @@ def tell_clipped(
     if not n_samples > 0:
         return
     low, high = reach or (-math.inf, math.inf)
+    # what a sensor is off at rest is no end
+    low = 0.0 if abs(low) < 1e-3 * (high - low) else low
     names = " or ".join(channel.name for channel in given)
     warnings.warn(
         f"{int(n_samples)} samples need {names} beyond {low:.4g} to {high:.4g} {given[0].unit} "
-        f"(less what a dead zone takes){pushing} and were clipped there",
+        f"(less what a dead zone takes){pushing} and were clipped there by the compensator",
         ModelWarning,
         stacklevel=5,
     )

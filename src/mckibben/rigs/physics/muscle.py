@@ -16,7 +16,6 @@ import numpy as np
 from mckibben.rigs.physics.bladder import bladder_force
 from mckibben.rigs.physics.braid import acting_pressure, braid_area, braid_volume, unfolded
 from mckibben.rigs.physics.compiled import NEWTON_PER_BAR_MM2, compiled
-from mckibben.rigs.physics.creep import relax
 from mckibben.rigs.physics.friction import slip
 
 MOST_ELEMENTS = 8
@@ -94,6 +93,16 @@ MUSCLE_STATE = np.dtype(
     align=True,
 )
 """What one muscle remembers."""
+
+
+@compiled
+def relax(force: float, kept: float, drawn: float, moved: float) -> float:
+    """Return the force after a step of a creep branch, spring and dashpot in series [N].
+
+    It is exact at constant speed: ``kept`` is exp(-step/time), ``drawn`` is stiffness time
+    (1 - kept) / step [N/mm].
+    """
+    return force * kept + drawn * moved
 
 
 @compiled

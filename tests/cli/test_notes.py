@@ -59,3 +59,11 @@ def test_several_zeros_are_told_and_taken_out(
     assert rests in cli(*given, "--allow-shared").out
     assert rests not in cli(*given, "--allow-shared", "--zero", "displacement").out
     assert "no such channel" in cli(*given, "--zero", "length").err
+
+
+def test_a_reason_for_which_several_models_fail_is_said_once(
+    cli: Cli, files: tuple[Path, Path]
+) -> None:
+    done = cli("compare", *files, "--models", "pi,multistate,multistate-11", "--jobs", 1)
+    assert "multistate, multistate-11: failed, it maps length to force" in done.out
+    assert done.out.count("it maps length to force") == 1

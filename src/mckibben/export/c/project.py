@@ -184,7 +184,7 @@ def described(
         "n_coefficients": first,
         "adjustable": False,
         "n_states": sum(call["n_states"] for call in calls),
-        "explicit": any(call["state_rows"] for call in calls),
+        "starts": _starts(wiring.calls),
         "primitives": primitives,
         "headers": sorted({f"{call.part.source.stem}.h" for call in wiring.calls}),
         "sources": [f"{name}.c", *(path.name for path in primitives if path.suffix == ".c")],
@@ -272,6 +272,17 @@ def _call(call: Call, index: int, single: bool) -> dict[str, Any]:
         "rows": rows(part.coefficients, single=single) or ["0"],
         "state_rows": [] if part.state is None else rows(part.state, single=single),
     }
+
+
+def _starts(calls: list[Call]) -> str:
+    """Return how the memory of parts starts, in words."""
+    words = {"MCK_VIRGIN": "at rest, whatever its inputs"}
+    parts = [call.part for call in calls if call.part.block.n_states]
+    found = [
+        words.get(part.rule, "from its inputs") if part.state is None else "as the model gives it"
+        for part in parts
+    ]
+    return " or ".join(dict.fromkeys(found)) or "from its inputs"
 
 
 def _told(channels: tuple[Channel, ...]) -> list[dict[str, str]]:

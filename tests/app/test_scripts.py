@@ -88,7 +88,7 @@ def test_the_script_makes_the_compensator_that_was_chosen(
     fitted(workspace, "coarse", settings={"n_operators": 1})
     fitted(workspace, "fine", settings={"n_operators": 12})
     PI.example().save(workspace.path("models", "brought.json"))
-    chosen = (
+    chosen: tuple[tuple[str, str, dict[str, Any]], ...] = (
         ("coarse", "adaptive", {"time": 30.0}),
         ("fine", "predictive", {"rate_limit": 5.0, "horizon": None}),
         ("brought", "inverse", {}),

@@ -126,10 +126,9 @@ def _predictive(inverse: Block, given: Mapping[str, float]) -> Block:
 
 
 def _options(form: str, settings: Mapping[str, Any]) -> dict[str, float]:
-    """Return the settings of a use, those left open at their defaults, if they have any."""
-    given = {key: settings.get(key) for key in SETTINGS.get(form, ())}
-    given = {key: DEFAULTS[key] if value is None else value for key, value in given.items()}
-    return {key: float(value) for key, value in given.items() if value is not None}
+    """Return the settings of a use; what is None is at its default."""
+    given = DEFAULTS | {key: value for key, value in settings.items() if value is not None}
+    return {key: v for key in SETTINGS.get(form, ()) if (v := given[key]) is not None}
 
 
 def possible(workspace: Workspace, name: str) -> list[str]:
@@ -175,16 +174,14 @@ def in_python(block: Block, form: str, settings: Mapping[str, Any]) -> list[str]
     from mckibben.blocks.force.feedforward import ForceFeedforward
 
     given = "".join(f", {key}={value:g}" for key, value in _options(form, settings).items())
-    if form == "adaptive":
-        where, name, call = "adaptive.adaptive_series", "adaptive", f"adaptive(model{given})"
-    elif form == "predictive":
-        call = f"Predictive(model.inverse(){given})"
-        where, name = "predictive.predictive", "Predictive"
-    elif ForceFeedforward.of(block) is not None:
-        where, name, call = "force.feedforward", "ForceFeedforward", "ForceFeedforward.of(model)"
-    else:
+    if form == "inverse" and ForceFeedforward.of(block) is None:
         return ["inverse = model.inverse()"]
-    return [f"from mckibben.blocks.{where} import {name}", "", f"inverse = {call}"]
+    where, name, asked = {
+        "adaptive": ("adaptive.adaptive_series", "adaptive", "(model"),
+        "predictive": ("predictive.predictive", "Predictive", "(model.inverse()"),
+        "inverse": ("force.feedforward", "ForceFeedforward", ".of(model"),
+    }[form]
+    return [f"from mckibben.blocks.{where} import {name}", "", f"inverse = {name}{asked}{given})"]
 
 
 def in_a_shell(command: str) -> str:

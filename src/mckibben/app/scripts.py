@@ -109,7 +109,7 @@ def script(
     compensator : (str, str, mapping, float), optional
         Model, use, settings and step of what was chosen; default the inverse of the best model.
     """
-    name, form, used, _ = compensator or ("", "", {}, 0.0)
+    name, form, used, _ = compensator or ("", "inverse", {}, 0.0)
     lines = ['"""What was done in the workbench, as a script."""', "", "import mckibben", ""]
     for role in ("train", "test"):
         lines += [f"{role} = [", *(f"    {read}," for read in _reads(workspace, role)), "]"]
@@ -135,24 +135,21 @@ def script(
     ]
     if name in workspace.models():
         saved = f"{chosen[0]['model']}.json" if chosen else workspace.path("models", f"{name}.json")
-        lines += [
-            f"model = mckibben.load({str(saved)!r})",
-            *forms.in_python(workspace.model(name), form, used),
-            'inverse.save("inverse.json")',
-            "",
-        ]
-    else:
-        lines += [
-            "if board.best is None:",
-            "    raise SystemExit(board.not_recommended)",
-            "try:",
-            "    inverse = board.best.block.inverse()",
-            "except mckibben.ModelError as error:",
-            "    print(error)",
-            "else:",
-            '    inverse.save("inverse.json")',
-            "",
-        ]
+        lines += [f"model = mckibben.load({str(saved)!r})"]
+        lines += forms.in_python(workspace.model(name), form, used)
+        lines += ['inverse.save("inverse.json")', ""]
+        return "\n".join(lines)
+    lines += [
+        "if board.best is None:",
+        "    raise SystemExit(board.not_recommended)",
+        "try:",
+        "    inverse = board.best.block.inverse()",
+        "except mckibben.ModelError as error:",
+        "    print(error)",
+        "else:",
+        '    inverse.save("inverse.json")',
+        "",
+    ]
     return "\n".join(lines)
 
 

@@ -276,13 +276,10 @@ def _call(call: Call, index: int, single: bool) -> dict[str, Any]:
 
 def _starts(calls: list[Call]) -> str:
     """Return how the memory of parts starts, in words."""
-    words = {"MCK_VIRGIN": "at rest, whatever its inputs"}
+    words = {"": "as the model gives it", "MCK_VIRGIN": "at rest, whatever its inputs"}
     parts = [call.part for call in calls if call.part.block.n_states]
-    found = [
-        words.get(part.rule, "from its inputs") if part.state is None else "as the model gives it"
-        for part in parts
-    ]
-    return " or ".join(dict.fromkeys(found)) or "from its inputs"
+    rules = ["" if part.state is not None else part.rule for part in parts] or ["any"]
+    return " or ".join(dict.fromkeys(words.get(rule, "from its inputs") for rule in rules))
 
 
 def _told(channels: tuple[Channel, ...]) -> list[dict[str, str]]:

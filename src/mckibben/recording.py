@@ -187,6 +187,11 @@ class Recording(DrawsItself):
         return None if file is None else str(file)
 
     @property
+    def origin(self) -> str:
+        """What its samples are called: what a virtual rig gave was not measured."""
+        return "virtual" if "(virtual)" in str(self.meta.get("rig", "")) else "measured"
+
+    @property
     def name(self) -> str:
         """A short name to show: ``meta["name"]``, or the stem of the source file."""
         given = self.meta.get("name")

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from mckibben import PI, DataError, Recording, read
 from mckibben.characterization import characterize
+from mckibben.characterization.beside import effects, without
 from mckibben.signals import multisine, noise_level
 from tests.characterization.test_measured import DATA
 
@@ -130,3 +131,35 @@ def test_a_measured_arm_creeps_little() -> None:
     assert found.creep is not None
     assert abs(found.creep) < 5.0
     assert found.has_loop
+
+
+def loaded(force: np.ndarray) -> Recording:
+    """Return three cycles of the muscle, which gives way to a load whose sensor hisses."""
+    rng = np.random.default_rng(4)
+    y = MUSCLE.simulate(SLOW) - 0.02 * force + 0.01 * rng.standard_normal(TIME.size)
+    hiss = force + 0.5 * rng.standard_normal(TIME.size)
+    return Recording({"pressure": SLOW, "displacement": y, "force": hiss}, STEP)
+
+
+def test_a_load_that_is_held_in_each_recording_moves_the_output_and_not_the_loop() -> None:
+    clean = characterize(loaded(np.zeros(TIME.size)), beside=["force"])
+    assert (clean.n_stretches, clean.effects) == (None, ())  # it rests throughout
+    held = [loaded(np.full(TIME.size, load)) for load in (0.0, 150.0, 300.0)]
+    found = characterize(held, beside=["force"])
+    assert found.loop_width == pytest.approx(clean.loop_width, rel=0.03)
+    (effect,) = found.effects
+    assert (effect.channel, effect.unit) == ("force", "N")
+    assert effect.change == pytest.approx(-0.02 * (effect.high - effect.low), rel=0.02)
+    assert found.output_range[0] < -5.9  # as recorded, at the largest load
+    assert found.sentences[2].startswith("At equal pressure, displacement falls by 6.1 mm")
+    assert [row[1] for row in found.table() if row[0] == "effect of force"] == [effect.change]
+    assert found.to_dict()["effects"][0]["channel"] == "force"
+
+
+def test_what_a_load_does_can_be_taken_away() -> None:
+    swung = loaded(150 + 150 * np.sin(TIME))
+    moved = effects([swung], "pressure", "displacement", ["force"])
+    assert [effect.change for effect in moved] == pytest.approx([-6.0], rel=0.05)
+    left = characterize(without([swung], "displacement", moved))
+    clean = characterize(loaded(np.zeros(TIME.size)))
+    assert left.loop_width == pytest.approx(clean.loop_width, rel=0.1)

@@ -60,7 +60,7 @@ def test_force_moves_every_load_model_while_the_voltage_is_held(found: dict[str,
     held = rows(found, "Figure 3")
     for name, row in held.items():
         shares = [
-            row[f"swing at {volt} V"] / held["measured"][f"swing at {volt} V"] for volt in VOLTS
+            row[f"swing at {volt} V"] / held["muscle"][f"swing at {volt} V"] for volt in VOLTS
         ]
         if name in UNLOADED:
             assert max(shares) == 0.0

@@ -26,6 +26,7 @@ def test_what_the_rerun_claims_holds() -> None:
     found = reproduce("multistate-friction", quick=True, progress=lambda s, _: shares.append(s))
     assert shares == sorted(shares)
     assert shares[-1] <= 1.0
+    assert not any("measured" in figure.curves for figure in found.figures)  # a rig's are virtual
     assert all(
         np.isfinite(curve).all()
         for figure in found.figures

@@ -11,7 +11,7 @@ import pytest
 
 from mckibben import registry
 from mckibben.papers.reproduction import Figure, Points, Reproduction, Source, Table
-from mckibben.report.reproduction import beside, reproduction_page
+from mckibben.report.reproduction import beside, drawing, reproduction_page
 
 SOURCE = Source("A Muscle", "Does it?", authors="Gaylord", published="Patents, 1958", doi="10.1/x")
 
@@ -29,7 +29,7 @@ def page(quick: bool) -> str:
     """Return the report of a re-run of one table and two figures."""
     raw = Figure("Pressure", "time [s]", "pressure [bar]", {"": (RAMP, RAMP)})
     loops = Figure(
-        "Loops", "pressure [bar]", "y [mm]", {"measured": (RAMP, RAMP), "play": (RAMP, RAMP)}
+        "Loops", "pressure [bar]", "y [mm]", {"virtual": (RAMP, RAMP), "play": (RAMP, RAMP)}
     )
     return reproduction_page(
         Reproduction("muscle", SOURCE, ("It does.",), (TABLE,), (raw, loops), ("Levels.",), quick)
@@ -43,6 +43,16 @@ def test_every_number_of_the_drawn_columns_is_a_point_in_its_row() -> None:
     assert (printed.style, printed.x.tolist(), printed.y.tolist()) == ("rings", [2.0], [0.0])
     assert (here.style, here.x.tolist(), here.y.tolist()) == ("dots", [1.5, 0.5], [0.0, 1.0])
     assert [mark.x for mark in panel.marks] == [3.0]
+
+
+@pytest.mark.parametrize("origin", ["virtual", "measured"])
+def test_what_the_muscle_did_is_ink_and_models_are_coloured(origin: str) -> None:
+    curves = {origin: (RAMP, RAMP), "play": (RAMP, RAMP)}
+    (panel,) = drawing(Figure("Loops", "pressure [bar]", "y [mm]", curves)).panels
+    assert [(each.name, each.colour) for each in panel.curves] == [
+        (origin, "measured"),
+        ("play", "series-1"),
+    ]
 
 
 @pytest.mark.parametrize("quick", [True, False])

@@ -89,3 +89,29 @@ def test_no_loop_tells_a_regulator_pressures_as_volts(
     row = SimpleNamespace(model="gpi", inverse=model.inverse())
     board: Any = SimpleNamespace(rows=[row], outputs=("displacement",))
     assert bool(closed_loops(board, "gpi", "rail", [train], 0)) is closed
+
+
+@pytest.mark.parametrize(
+    ("loads", "said"),
+    [((0.0, 100.0), "Told where force rests"), ((None,), "never moves while force rests")],
+)
+def test_a_load_that_is_told_is_no_loop_of_the_muscles(
+    train: Recording, loads: tuple[float | None, ...], said: str
+) -> None:
+    swung = 50 + 50 * np.sin(TIME)
+
+    def under(load: float | None) -> Recording:
+        force = swung if load is None else np.full(TIME.size, load)
+        lifted = train["displacement"] - 0.1 * force
+        return train.with_channels(
+            {"displacement": "mm", "force": "N"}, displacement=lifted, force=force
+        )
+
+    runs = [under(load) for load in loads]
+    plain = study(train, models=["pi"], jobs=1).characterization
+    found = study(runs, load="force", models=["pi"], jobs=1).characterization
+    assert plain is not None
+    assert found is not None
+    assert found.loop_width == pytest.approx(plain.loop_width, rel=0.1)
+    assert found.effects[0].change == pytest.approx(-10.0, rel=0.1)
+    assert said in found.sentences[-1]

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mckibben.characterization.evidence import KNOTS, hats
-from mckibben.characterization.time_effects import holds
+from mckibben.characterization.results import Effect
+from mckibben.characterization.time_effects import held_within, holds
 from mckibben.characterization.tracks import FEWEST, prepare
 from mckibben.errors import DataError
 from mckibben.recording import Recording
@@ -30,27 +31,68 @@ def alone(
     """
     resting = [np.ones(len(one), dtype=bool) for one in recordings]
     for name in beside:
-        if max(float(one[name].max()) for one in recordings) > min(
-            float(one[name].min()) for one in recordings
-        ):
-            for rests, held in zip(resting, _held(recordings, name), strict=True):
-                rests &= held
+        for rests, held in zip(resting, _held(recordings, name), strict=True):
+            rests &= held
     found = [
         one.slice(start, stop)
         for one, rests in zip(recordings, resting, strict=True)
         for start, stop in _stretches(rests)
         if stop - start >= FEWEST
     ]
-    others = " and ".join(beside)
+    others, verb = " and ".join(beside), "rests" if len(beside) == 1 else "rest"
     if not found or max(float(np.ptp(one[given])) for one in found) == 0:
         raise DataError(
-            f"it never moves while {others} rest, so that what it does alone cannot be told",
+            f"it never moves while {others} {verb}, so that what it does alone cannot be told",
             file=recordings[0].source,
             channel=given,
             remedy="record one in which it moves alone; models of several inputs need no such recording",
         )
     share = sum(map(len, found)) / sum(map(len, recordings))
-    return found, f"Told where {others} rest, {100 * share:.0f} % of the samples."
+    return found, f"Told where {others} {verb}, {100 * share:.0f} % of the samples."
+
+
+def moves(recordings: Sequence[Recording], name: str) -> bool:
+    """Tell whether a channel moves, in or between recordings, by more than white noise does."""
+    seen = [one[name] for one in recordings]
+    steps = np.concatenate([np.diff(one) for one in seen])
+    return float(np.mean(steps**2)) < float(np.concatenate(seen).var())  # of noise it is twice that
+
+
+def effects(
+    recordings: Sequence[Recording], given: str, wanted: str, beside: Sequence[str]
+) -> tuple[Effect, ...]:
+    """Return how far other inputs move an output at equal input, each by one straight line.
+
+    There are none where some move together.
+    """
+    seen = [one.matrix((given, wanted, *beside)) for one in recordings]
+    every = np.concatenate([one[:: -(-len(one) // MOST)] for one in seen])
+    lows, highs = every[:, 2:].min(axis=0).tolist(), every[:, 2:].max(axis=0).tolist()
+    columns = np.column_stack([hats(every[:, 0], KNOTS), every[:, 2:]])
+    slopes, _, rank, _ = np.linalg.lstsq(columns, every[:, 1], rcond=None)
+    if rank < columns.shape[1]:
+        return ()
+    found = []
+    others = slopes[columns.shape[1] - len(beside) :].tolist()
+    for name, slope, low, high in zip(beside, others, lows, highs, strict=True):
+        found.append(Effect(name, low, high, recordings[0].units[name], slope * (high - low)))
+    return tuple(found)
+
+
+def without(
+    recordings: Sequence[Recording], wanted: str, moved: Sequence[Effect]
+) -> list[Recording]:
+    """Return recordings whose output is what it would be with other inputs amid their ranges."""
+    found = []
+    for one in recordings:
+        output = one[wanted]
+        for effect in moved:
+            middle = (effect.low + effect.high) / 2
+            output = output - effect.change * (one[effect.channel] - middle) / (
+                effect.high - effect.low
+            )
+        found.append(one.with_channels({wanted: one.units[wanted]}, **{wanted: output}))
+    return found
 
 
 def levelled(recordings: Sequence[Recording], given: str, wanted: str) -> list[Recording]:
@@ -94,7 +136,7 @@ def _held(recordings: Sequence[Recording], name: str) -> list[NDArray[np.bool_]]
     found = []
     for track in tracks:
         held = np.zeros(track.u.size, dtype=bool)
-        if np.ptp(track.u) == 0:
+        if np.ptp(track.u) <= held_within(track, scale):
             held[:] = True
         for start, stop in holds(track, scale):
             held[start:stop] = True

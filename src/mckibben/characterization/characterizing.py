@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.characterization.beside import alone, levelled, of_one_zero
+from mckibben.characterization.beside import alone, effects, levelled, moves, of_one_zero
 from mckibben.characterization.evidence import evidence
 from mckibben.characterization.loops import (
     Loop,
@@ -66,7 +66,8 @@ def characterize(
     input, output : str
         Channels.
     beside : sequence of str
-        Other inputs that move the output: only stretches in which they rest are looked at.
+        Other inputs that move the output, such as a load: only stretches in which they rest are
+        looked at.
 
     Returns
     -------
@@ -93,9 +94,16 @@ def characterize(
     runs = [recordings] if isinstance(recordings, Recording) else list(recordings)
     n_recordings = len(runs)
     assumed = []
-    if beside and runs:
+    beside = [name for name in beside if runs and moves(runs, name)]
+    moved = effects(runs, input, output, beside) if beside else ()
+    ends: tuple[float, float] | None = None
+    if beside:
         runs, said = alone(runs, input, beside)
         assumed.append(said)
+        ends = (
+            min(float(one[output].min()) for one in runs),
+            max(float(one[output].max()) for one in runs),
+        )
         runs = levelled(runs, input, output)
     else:
         runs, said = of_one_zero(runs, input, output)
@@ -128,7 +136,7 @@ def characterize(
         duration=None if None in durations else float(sum(d for d in durations if d is not None)),
         sample_time=steps.pop() if len(steps) == 1 else None,
         input_range=(scale.u_low, scale.u_high),
-        output_range=(scale.y_low, scale.y_high),
+        output_range=ends or (scale.y_low, scale.y_high),
         input_noise=None if np.isnan(scale.u_noise) else scale.u_noise,
         output_noise=None if np.isnan(scale.y_noise) else scale.y_noise,
         cycles=tuple(loop.cycle for loop in loops),
@@ -164,6 +172,7 @@ def characterize(
         drift_excluded=sum(track.major_turns.size - 1 for track in tracks) > 2,
         n_stretches=len(runs) if beside else None,
         falls=scale.sign < 0 and (curve.gain is None or curve.gain < 0),
+        effects=moved,
         assumed=tuple(assumed),
     )
     if found.depends:

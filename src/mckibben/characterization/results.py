@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, fields
+from dataclasses import asdict, dataclass, fields
 from typing import Any, ClassVar
 
 from mckibben.characterization.evidence import LEVEL
@@ -14,6 +14,29 @@ Range = tuple[float, float]
 
 NO_GAP = 0.01
 """Branches that are on average at most so far apart, over the output range, are no loop."""
+
+
+@dataclass(frozen=True)
+class Effect:
+    """How far another input, such as a load, moves the output at equal input.
+
+    Parameters
+    ----------
+    channel : str
+        The other input.
+    low, high : float
+        Between which it goes.
+    unit : str
+        Its unit.
+    change : float
+        Of the output from low to high [output unit].
+    """
+
+    channel: str
+    low: float
+    high: float
+    unit: str
+    change: float
 
 
 @dataclass(frozen=True)
@@ -82,6 +105,8 @@ class Characterization(DrawsItself):
         Where other inputs rest, of all recordings; None where nothing else moves.
     falls : bool
         Whether the output falls as the input rises.
+    effects : tuple of Effect
+        What other inputs do.
     assumed : tuple of str
         Sentences on what is looked at: where other inputs rest, counted from which zero.
     """
@@ -129,6 +154,7 @@ class Characterization(DrawsItself):
     drift_excluded: bool = True
     n_stretches: int | None = None
     falls: bool = False
+    effects: tuple[Effect, ...] = ()
     assumed: tuple[str, ...] = ()
 
     @property
@@ -180,6 +206,7 @@ class Characterization(DrawsItself):
             }
             for cycle in self.cycles
         ]
+        found["effects"] = [asdict(effect) for effect in self.effects]
         found["sentences"] = self.sentences
         return found
 

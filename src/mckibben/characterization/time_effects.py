@@ -132,7 +132,7 @@ def holds(track: Track, scale: Scale) -> list[tuple[int, int]]:
     length = max(10, int(np.ceil(HELD_TRAVEL * scale.u_span / speed)))
     if length > u.size:
         return []
-    band = max(HELD * scale.u_span, swing_threshold(track.u_noise, 0.0, u.size))
+    band = held_within(track, scale)
     swing = maximum_filter1d(u, length, mode="nearest") - minimum_filter1d(
         u, length, mode="nearest"
     )
@@ -146,6 +146,11 @@ def holds(track: Track, scale: Scale) -> list[tuple[int, int]]:
     firsts = quiet[np.concatenate([[0], breaks + 1])]
     lasts = quiet[np.concatenate([breaks, [quiet.size - 1]])]
     return [(int(a), int(b) + length) for a, b in zip(firsts, lasts, strict=True)]
+
+
+def held_within(track: Track, scale: Scale) -> float:
+    """Return how far an input moves that counts as held."""
+    return max(HELD * scale.u_span, swing_threshold(track.u_noise, 0.0, track.u.size))
 
 
 def _speed(track: Track) -> float:

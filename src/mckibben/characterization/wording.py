@@ -30,7 +30,14 @@ def sentences(found: Characterization) -> list[str]:
     """Return what the muscle does, in plain words, most important first."""
     if not found.depends:
         return [_independent(found), *found.assumed]
-    said = [_headline(found), _motion(found), _memory(found), _rate(found), _trust(found)]
+    said = [
+        _headline(found),
+        _motion(found),
+        *_effects(found),
+        _memory(found),
+        _rate(found),
+        _trust(found),
+    ]
     return [*(sentence for sentence in said if sentence), *found.assumed]
 
 
@@ -124,6 +131,16 @@ def table(found: Characterization) -> list[Row]:
         ),
         ("dead zone after lower reversals", found.dead_zone_lower, u, "the same from below"),
         ("gain", found.gain, gain, "slope of the mean of both branches at mid input"),
+        *(
+            (
+                f"effect of {one.channel}",
+                one.change,
+                y,
+                f"change of the output as it goes {_range((one.low, one.high), one.unit)} at equal "
+                "input, by one straight line",
+            )
+            for one in found.effects
+        ),
         ("onset", found.onset, u, "below it the slope is under a fifth of its maximum"),
         ("saturation", found.saturation, u, "above it the slope is under a fifth of its maximum"),
         ("creep", found.creep, y, "in a hold of the input; positive: it goes on as it was going"),
@@ -261,6 +278,19 @@ def _motion(found: Characterization) -> str:
         dead = high if low == high else f"{low} to {high}"
         text += f"; after a reversal the input changes by {dead} before the output moves back"
     return _sentence(text)
+
+
+def _effects(found: Characterization) -> list[str]:
+    """Return what every other input does."""
+    said = []
+    for one in found.effects:
+        share = 100 * abs(one.change) / found.output_span
+        moved = f"{'rises' if one.change > 0 else 'falls'} by {_apart(found, one.change)}"
+        said.append(
+            f"At equal {found.input}, {found.output} {'hardly moves' if share < NOTABLE else moved} "
+            f"as {one.channel} goes {_range((one.low, one.high), one.unit)}."
+        )
+    return said
 
 
 def _memory(found: Characterization) -> str:

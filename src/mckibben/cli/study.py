@@ -164,7 +164,7 @@ def _conclude(study: Study, folder: Path) -> None:
         )
     for name, tracked in study.loops.items():
         errors = ", ".join(numeral(error, 2) for error in tracked.rmse.values())
-        say(f"Following a measured motion on {study.plant}: {name}, RMSE {errors} mm.")
+        say(f"Following a recorded motion on {study.plant}: {name}, RMSE {errors} mm.")
     best = study.leaderboard.best
     written = [
         str(folder / "report.html"),

@@ -35,7 +35,7 @@ def frequency_response(found: FrequencyResponse) -> Drawing:
     for label, values, interval, measured in rows:
         first = not panels
         curves = [
-            Curve(found.measured_frequency, measured, "measured" * first, "measured", "specks"),
+            Curve(found.measured_frequency, measured, "recorded" * first, "measured", "specks"),
             Curve(f, values, "model" * first, "series-1"),
         ]
         if interval is not None:
@@ -44,7 +44,7 @@ def frequency_response(found: FrequencyResponse) -> Drawing:
             curves.append(Curve(f, high, "", "series-1", "fine"))
         axes: Literal["xy", "x"] = "xy" if first else "x"
         panels.append(Panel("frequency [Hz]", label, tuple(curves), logarithmic=axes))
-    note = "" if found.measured_frequency.size else "No frequency was measured with high coherence."
+    note = "" if found.measured_frequency.size else "No frequency was recorded with high coherence."
     return Drawing(tuple(panels), stacked=True, note=note)
 
 
@@ -68,7 +68,7 @@ def describing_function(found: DescribingFunction) -> Drawing:
             curves.append(Curve(found.amplitude, row, name * first, colour))
         if measured.size:
             x = found.measured_amplitude
-            curves.append(Curve(x, measured, "measured cycles" * first, "measured", "specks"))
+            curves.append(Curve(x, measured, "recorded cycles" * first, "measured", "specks"))
             curves.append(Curve(x, modelled, "model, same cycles" * first, "series-2", "rings"))
         x_label = axis_label(f"amplitude of {found.input.name}", found.input.unit)
         panels.append(Panel(x_label, label, tuple(curves)))

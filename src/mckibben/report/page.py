@@ -84,7 +84,7 @@ def page(study: Study, typed: Typed | None = None) -> str:
         figures,
         study=study,
         board=study.leaderboard,
-        source=subjects.source(pictured[0].recording),
+        source=pictured[0].recording.origin,
         shown=unique(every),
         listed_drawn=unique(pictured),
         drawn=pictured,

@@ -60,13 +60,13 @@ def beside(table: Table) -> Drawing:
 
 
 def drawing(figure: Figure) -> Drawing:
-    """Return a paper's figure as a drawing: what was measured in ink, models in colours on top."""
+    """Return a paper's figure as a drawing: what a muscle did in ink, models in colours on top."""
     curves = []
     shown = list(figure.curves.items())[: N_COLOURS + 1]
     models = 0
     for place, (name, (x, y)) in enumerate(shown):
-        measured = place == 0 and name in ("", "measured", "extracted")
-        models += not measured
-        colour = "measured" if measured else f"series-{(models - 1) % N_COLOURS + 1}"
+        recorded = place == 0 and name in ("", "virtual", "measured", "sensor", "extracted")
+        models += not recorded
+        colour = "measured" if recorded else f"series-{(models - 1) % N_COLOURS + 1}"
         curves.append(Curve(x, y, name, colour))
     return Drawing((Panel(figure.x_label, figure.y_label, tuple(curves)),))

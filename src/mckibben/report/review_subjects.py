@@ -32,7 +32,7 @@ def causes(one: Followed, points: int = POINTS) -> Drawing:
         Curve(*over_time(one.time, cause.signal, points), cause.kind, series_colour(place))
         for place, cause in enumerate(parts)
     ]
-    above = (Curve(*wanted, "reference", style="broad"), Curve(*got, "measured", "series-1"))
+    above = (Curve(*wanted, "reference", style="broad"), Curve(*got, "recorded", "series-1"))
     below = (Curve(*error, "error", style="broad"), *curves)
     return Drawing(
         (

@@ -84,7 +84,7 @@ def fit_over_time(
     time = recording.time
     under = _measured_style(recording, under=True)
     curves = [
-        Curve(*over_time(time, recording[output_name], points), source(recording), style=under)
+        Curve(*over_time(time, recording[output_name], points), recording.origin, style=under)
     ]
     for model, colour, modelled in _worst_to_best(outputs):
         curves.append(Curve(*over_time(time, modelled, points), model, colour, model=model))
@@ -106,7 +106,7 @@ def fit_loops(
     measured = recording[output_name]
     under = _path_style(u, _measured_style(recording, under=True))
     over = _path_style(u, "line")
-    curves = [Curve(*along(u, measured, points)[1:], source(recording), style=under)]
+    curves = [Curve(*along(u, measured, points)[1:], recording.origin, style=under)]
     for model, colour, modelled in _worst_to_best(outputs):
         curves.append(Curve(*along(u, modelled, points)[1:], model, colour, over, model))
     x_label, y_label = _plane(recording, input_name, output_name)
@@ -130,7 +130,7 @@ def residuals(
         against_input.append(Curve(*path, model, colour, _path_style(u, "fine"), model))
         against_time.append(Curve(*course, "", colour, "fine", model))
     x_label = axis_label(input_name, recording.units[input_name])
-    y_label = axis_label(f"{source(recording)} − model", recording.units[output_name])
+    y_label = axis_label(f"{recording.origin} − model", recording.units[output_name])
     marks = _test_mark(recording.time, test_from)
     return Drawing(
         (
@@ -168,11 +168,6 @@ def directions(u: Array, y: Array) -> tuple[Arrow, ...]:
         b = max(b, a + 1)
         arrows.append(Arrow((float(u[a]), float(y[a])), (float(u[b]), float(y[b]))))
     return tuple(arrows)
-
-
-def source(recording: Recording) -> str:
-    """Return what a legend calls a recording: what a virtual rig gave was not measured."""
-    return "virtual" if "(virtual)" in str(recording.meta.get("rig", "")) else "measured"
 
 
 def _by_age(

@@ -11,7 +11,8 @@ from typing import Any, ClassVar
 from mckibben.arrays import Array
 from mckibben.blocks.core.block import Block
 from mckibben.characterization import Characterization, characterize
-from mckibben.comparison.channels import Names
+from mckibben.characterization.beside import effects, moves, without
+from mckibben.comparison.channels import Channels, Names
 from mckibben.comparison.planning import Settings, plan_of
 from mckibben.comparison.ranking import ranked
 from mckibben.comparison.recognising import moved_by
@@ -203,7 +204,7 @@ def study(
         train=plan.data.split.train,
         test=plan.data.split.test,
         characterization=(
-            characterize([*recordings, *tests], looped[0], channels.outputs[0]) if one else None
+            _characterized([*recordings, *tests], looped[0], channels) if one else None
         ),
         leaderboard=plan.board(),
         predictions={},
@@ -249,6 +250,27 @@ def study(
     if clear:
         kept.clear()
     return so_far
+
+
+def _characterized(
+    recordings: Sequence[Recording], given: str, channels: Channels
+) -> Characterization:
+    """Return what a muscle does where its load rests; where that never does, without what it does."""
+    wanted, told = channels.outputs[0], (*channels.inputs, *(channels.scheduling or ()))
+    beside = [name for name in told if name != given and moves(recordings, name)]
+    try:
+        return characterize(recordings, given, wanted, beside=beside)
+    except DataError:
+        if not beside:
+            raise
+    moved = effects(recordings, given, wanted, beside)
+    found = characterize(without(recordings, wanted, moved), given, wanted)
+    others = " and ".join(beside)
+    said = (
+        f"As {given} never moves while {others} rests, the loop is what is left when {others}'s effect "
+        "by one straight line is taken away: what bends of it, or remembers, is in the loop."
+    )
+    return replace(found, effects=moved, assumed=(*found.assumed, said))
 
 
 def _driven(log: Recording) -> Recording:

@@ -125,7 +125,7 @@ def activation_pressure(
         figures=_figures(sines, waves, theirs, ours),
         notes=(
             "The paper does not print what its errors are relative to. Here: to the range of the "
-            "measured pressure, run by run.",
+            "recorded pressure, run by run.",
             "Pressures of the sines are the printed y_1 and y_2; loads are forces that do not swing.",
             "Slow cycles at every force are ours: they show where pressure is low and where it is high.",
             "How inflection and tangent were moved to the boundaries of low and high pressure is not "
@@ -286,7 +286,7 @@ def _figures(
                     "contraction",
                     "pressure [bar]",
                     {
-                        "measured": (e, thinned(recording["pressure"], 2000)),
+                        recording.origin: (e, thinned(recording["pressure"], 2000)),
                         THEIRS: (e, thinned(modelled(theirs, recording, frequency), 2000)),
                         OURS: (e, thinned(modelled(ours, recording, frequency), 2000)),
                     },

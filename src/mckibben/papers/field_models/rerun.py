@@ -272,7 +272,7 @@ def _leaderboard(board: Leaderboard) -> Table:
         ("model", *(column.label for column in columns), "failed because"),
         tuple(rows),
         "Free-running, plain; cross-validated within the calibration run (not in the quick run). Gap "
-        "kept: the model's gaps between branches over the measured ones (100 % is perfect); kept in a "
+        "kept: the model's gaps between branches over the recorded ones (100 % is perfect); kept in a "
         "hold: what survives of the model's own gap.",
     )
 
@@ -298,19 +298,19 @@ def _figures(
                 f"{title}: loops",
                 "pressure [bar]",
                 "displacement [mm]",
-                {"measured": (thinned(run["pressure"]), measured[1])},
+                {run.origin: (thinned(run["pressure"]), measured[1])},
             ),
             Figure(
                 f"{title}: the paper's methods, matched by range (its Figure {place})",
                 "time [s]",
                 "displacement [mm]",
-                {"measured": measured} | _outputs(run, paper),
+                {run.origin: measured} | _outputs(run, paper),
             ),
             Figure(
                 f"{title}: ours",
                 "time [s]",
                 "displacement [mm]",
-                {"measured": measured} | _outputs(run, ours),
+                {run.origin: measured} | _outputs(run, ours),
             ),
         ]
     return tuple(figures)

@@ -34,7 +34,7 @@ PLAIN = "MPI-NARMAX, ours"
 ONE_RECORD = "balance, one record"
 OURS = "balance"
 MEMORY = "coupled-memory"
-PRESSURE = "balance, on measured pressure"
+PRESSURE = "balance, on recorded pressure"
 
 
 @dataclass(frozen=True)

@@ -118,10 +118,10 @@ def _loops(
     inverse = model.inverse()
     laws = {
         "inverse without force": blind.inverse(),
-        "inverse with measured force": inverse,
+        "inverse told the force": inverse,
         "inverse with estimated force": EstimatedLoad(BlockController(inverse), estimate),
         "PID": pid,
-        "inverse with measured force + PID": control_law("feedforward-pid", inverse, lambda: pid),
+        "inverse told the force + PID": control_law("feedforward-pid", inverse, lambda: pid),
     }
     return {
         name: track(law, rig, reference, approach=10.0, settle=5.0, seed=seed)
@@ -231,7 +231,7 @@ def _summary(found: Found) -> tuple[str, ...]:
         "RMSE).".format(*gains),
         f"Random voltage and force, MAE / RMSE: {both(RANDOM)}.",
         f"Voltage held while the force is cycled, MAE / RMSE: {both(*HELD_RUNS)}. Swing over the "
-        f"measured one: {'; '.join(swings)}; every MPI 0.",
+        f"muscle's: {'; '.join(swings)}; every MPI 0.",
         "Only good near the patterns of their training: models that are told the force, and are yet no "
         "better in MAE than the best MPI, which is not told it. On random voltage and force: "
         f"{no_better(RANDOM)}. With the voltage held: {no_better(*HELD_RUNS)}.",

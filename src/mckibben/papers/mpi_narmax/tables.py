@@ -71,7 +71,7 @@ def unrepeated(found: Found) -> Table:
 def held(found: Found) -> Table:
     """Return how far the displacement swings while the voltage is held and the force is cycled."""
     rows: list[tuple[Cell, ...]] = [
-        ("measured", None, None, *(found.swing(run) for run in HELD_RUNS))
+        ("muscle", None, None, *(found.swing(run) for run in HELD_RUNS))
     ]
     for name in found.models:
         swings = (found.swing(run, name) for run in HELD_RUNS)
@@ -160,7 +160,7 @@ def figures(found: Found) -> tuple[Figure, ...]:
             return thinned(found.counted(run, values))
 
         x = part(found.recordings[run][against])
-        drawn = {"measured": (x, part(found.recordings[run]["displacement"]))}
+        drawn = {found.recordings[run].origin: (x, part(found.recordings[run]["displacement"]))}
         return drawn | {name: (x, part(found.displacements[name][run])) for name in models}
 
     figures = [
@@ -177,13 +177,13 @@ def figures(found: Found) -> tuple[Figure, ...]:
         for run in (PULLS, TEST, *HELD_RUNS)
     ]
     time = thinned(found.recordings[TEST].time)
-    measured, estimated = found.forces[TEST]
+    sensed, estimated = found.forces[TEST]
     figures.append(
         Figure(
-            "Status 4: force measured and estimated",
+            "Status 4: force, and its estimate",
             "time [s]",
             "force [N]",
-            {"measured": (time, thinned(measured)), "estimated": (time, thinned(estimated))},
+            {"sensor": (time, thinned(sensed)), "estimated": (time, thinned(estimated))},
         )
     )
     if found.loops:

@@ -249,7 +249,7 @@ def figures(
             "length [mm]",
             "force [N]",
             {
-                "measured": curve(minor["length"], minor["force"]),
+                minor.origin: curve(minor["length"], minor["force"]),
                 STATIC: curve(minor["length"], static),
                 **{
                     name: curve(

@@ -251,7 +251,7 @@ class Predictions:
         for extensor in ("constant", "moving"):
             run = self.joint("test", extensor)[0]
             shown = {name: self.found(name, run) for name in (LINEAR, OURS, BALANCE)}
-            curves = {"measured": (thinned(run.time), thinned(run[OUTPUTS[0]]))}
+            curves = {run.origin: (thinned(run.time), thinned(run[OUTPUTS[0]]))}
             for name, found in shown.items():
                 curves[name] = (thinned(run.time), thinned(found[OUTPUTS[0]]))
             title = f"All pressures random, extensor {extensor}: displacement 1"
@@ -260,7 +260,7 @@ class Predictions:
             driven = f"pressure_{pattern[0]}"
             found_by = {name: self.found(name, run) for name in (PUBLISHED, RAW, OURS)}
             for output in OUTPUTS:
-                curves = {"measured": (thinned(run[driven]), thinned(run[output]))}
+                curves = {run.origin: (thinned(run[driven]), thinned(run[output]))}
                 for name, found in found_by.items():
                     curves[name] = (thinned(run[driven]), thinned(found[output]))
                 said = f"Driven: {', '.join(pattern)}; {output.replace('_', ' ')} (its Figure 10)"

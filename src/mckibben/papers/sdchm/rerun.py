@@ -41,7 +41,7 @@ NOTES = (
     "SDCHM, ours, and the damped raw network stop their searches by the validation patterns; the paper "
     "does not say what it uses them for.",
     "A compensator of ours is the inverse of the model that predicts: one fit, one damping.",
-    "Compensators are identified on measured pressures, so pressures are regulated by an inner loop in "
+    "Compensators are identified on recorded pressures, so pressures are regulated by an inner loop in "
     "all trials, PID's too.",
     "e_w of every muscle is relative to the range of the reference that moves.",
 )

@@ -73,9 +73,8 @@ def print_leaderboard(board: Leaderboard) -> None:
     for row in board.rows:
         if row.reason is None and row.invalid:
             say(f"{row.model}: not chosen, its {heading.split()[0]} failed: {row.invalid}")
-    for row in board.rows:
-        if row.reason is not None:
-            say(f"{row.model}: failed, {row.reason}")
+    for reason, models in board.failures.items():
+        say(f"{', '.join(models)}: failed, {reason}")
     for note in (*board.notes, *board.of_models):
         say(f"Note: {note}")
     if board.left_out:

@@ -164,6 +164,15 @@ class Leaderboard(DrawsItself):
         return (*self.rows[:place], self.constant, *self.rows[place:])
 
     @property
+    def failures(self) -> dict[str, list[str]]:
+        """Every reason for which models failed, once, with those models."""
+        found: dict[str, list[str]] = {}
+        for row in self.rows:
+            if row.reason is not None or row.test is None or row.train is None:
+                found.setdefault(row.reason or "no scores", []).append(row.model)
+        return found
+
+    @property
     def lowest(self) -> Row | None:
         """The row with the least test error, which is nothing to choose by, or None."""
         tested = [row for row in self.rows if row.test is not None]

@@ -91,7 +91,7 @@ def page(study: Study, typed: Typed | None = None) -> str:
         left_out=left_out,
         models=_models(study.leaderboard),
         explained=_explained(study.leaderboard),
-        failures=failures(study.leaderboard),
+        failures=study.leaderboard.failures,
         coupling=coupled,
         bars=_bars(study.leaderboard),
         columns=columns_of_board(study.leaderboard),
@@ -190,15 +190,6 @@ def _coupled(study: Study, pictured: tuple[Shown, ...]) -> coupling_subjects.Cou
     if not pictured or len(inputs) == len(outputs) == 1:
         return None
     return coupling_subjects.coupling([one.recording for one in unique(pictured)], inputs, outputs)
-
-
-def failures(board: Leaderboard) -> dict[str, list[str]]:
-    """Return every reason for which models failed, once, with those models."""
-    found: dict[str, list[str]] = {}
-    for row in board.ranking:
-        if row.reason is not None or row.test is None or row.train is None:
-            found.setdefault(row.reason or "no scores", []).append(row.model)
-    return found
 
 
 def _explained(board: Leaderboard) -> dict[str, str]:

@@ -8,6 +8,7 @@ job. Nothing is uploaded; what is left to do is printed. See docs/releasing.md.
 
 from __future__ import annotations
 
+import os
 import re
 import subprocess
 import sys
@@ -40,9 +41,12 @@ class ReleaseError(Exception):
 def main(words: list[str]) -> None:
     """Make the release, or say what stands against it."""
     try:
+        if len(words) > 1:
+            raise ReleaseError(f"one version, not {' '.join(words)}")
         if words:
-            set_version(ROOT, *words)
+            set_version(ROOT, words[0])
         version = agreed_version(ROOT)
+        refuse_uncommitted()
         for old in DIST.glob("mckibben-*"):
             old.unlink()
         wheel, source = build(DIST)
@@ -61,7 +65,9 @@ def set_version(root: Path, version: str) -> None:
         raise ReleaseError(f"{version!r} is no version such as 1.2.0 or 1.2.0rc1")
     changes = (root / "CHANGELOG.md").read_text(encoding="utf-8")
     if f"\n## {version} " in changes:
-        raise ReleaseError(f"CHANGELOG.md has {version} already")
+        raise ReleaseError(
+            f"CHANGELOG.md has {version} already: python -m tests.release goes on with it"
+        )
     if not re.search(r"^## Unreleased\n\n(?!##)\S", changes, re.M):
         raise ReleaseError("CHANGELOG.md has nothing under '## Unreleased'")
     today = time.strftime("%Y-%m-%d")
@@ -87,6 +93,14 @@ def agreed_version(root: Path) -> str:
         told = ", ".join(f"{name} says {version}" for name, version in found.items())
         raise ReleaseError(f"the versions differ: {told}. Give one: python -m tests.release 1.2.0")
     return found["pyproject.toml"]
+
+
+def refuse_uncommitted() -> None:
+    """Refuse to release what no commit holds, but for the files that name the version."""
+    named = {"pyproject.toml", "CITATION.cff", "CHANGELOG.md"}
+    told = run("git", "status", "--porcelain", within=ROOT).splitlines()
+    if left := [line[3:] for line in told if line[3:] not in named]:
+        raise ReleaseError(f"these are in no commit: {', '.join(left[:5])}")
 
 
 def build(folder: Path) -> tuple[Path, Path]:
@@ -166,7 +180,10 @@ def megabytes(packages: Path) -> float:
 
 def run(*command: str, within: Path | None = None) -> str:
     """Run a command, and return what it prints; show what it said where it fails."""
-    done = subprocess.run(command, cwd=within, capture_output=True, text=True, check=False)
+    alone = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
+    done = subprocess.run(
+        command, cwd=within, env=alone, capture_output=True, text=True, check=False
+    )
     if done.returncode:
         sys.stderr.write(done.stdout + done.stderr)
     done.check_returncode()

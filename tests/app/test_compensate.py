@@ -392,8 +392,10 @@ def test_runs_that_gain_nothing_and_plants_that_scatter_are_said(tmp_path: Path)
     async def look(user: User) -> None:
         await drawn(user)
         await until(user, "runs")
-        # what the compensator clips itself is said in a note, and not counted here
-        assert "Steps the plant clipped" in {one["label"] for one in only(user, "runs").columns}
+        # what the compensator clips itself, where it does not say what it reaches, is said in a note
+        assert "Steps at a limit or out of reach" in {
+            one["label"] for one in only(user, "runs").columns
+        }
         said = {one.text for one in user.find(kind=ui.label, marker="runs-remark").elements}
         assert said == {
             "a-bad: no better than without compensation.",

@@ -11,7 +11,7 @@ import pytest
 
 from mckibben import Recording
 from mckibben.app.workspace import Workspace
-from tests.app.browsing import SLOW, opened, seen, visited, workbench
+from tests.app.browsing import SLOW, idle, opened, seen, visited, workbench
 from tests.tools import needs
 
 pytest.importorskip("playwright.sync_api")
@@ -91,6 +91,7 @@ def test_what_came_from_no_file_is_read_otherwise_and_a_load_is_told(
     page: Any, workspace: Workspace
 ) -> None:
     def ask(name: str) -> None:
+        idle(page)
         page.get_by_role("button", name=f"How it was read: {name}").click()
         seen(page, "add-constant")
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import json
 import os
 import zipfile
 from collections.abc import Iterator
@@ -70,6 +71,7 @@ def test_from_the_example_to_a_c_folder(page: Any, tmp_path: Path) -> None:
     )
     seen(page, "show-pressures").click()
     seen(page, "pressure-plot")
+    assert downloaded(page, "take-pressures").startswith(b"time_s,pressure_bar\n0,")
     seen(page, "run-loop").click()
     page.get_by_test_id("runs").get_by_text("feedforward-pid").first.wait_for(timeout=SLOW)
 
@@ -255,14 +257,8 @@ def swung(muscles: int, phase: float, *, load: bool = False) -> bytes:
     return "\n".join([",".join(columns), *rows]).encode()
 
 
-@pytest.mark.parametrize(
-    ("muscles", "load", "model"),
-    [(3, False, "coupled-memory"), (1, True, "pi")],
-    ids=["arm", "load"],
-)
-def test_an_arm_and_a_load_from_files_to_a_leaderboard(
-    page: Any, muscles: int, load: bool, model: str
-) -> None:
+def modelled(page: Any, *models: str, muscles: int, load: bool = False) -> None:
+    """Go from two files, one for the test, to models on the leaderboard, which are ticked at first."""
     for name, phase in (("first", 0.4), ("second", 1.1)):
         seen(page, "upload")
         upload(page, f"{name}.csv", swung(muscles, phase, load=load))
@@ -271,10 +267,45 @@ def test_an_arm_and_a_load_from_files_to_a_leaderboard(
     seen(page, "tab-look").click()
     seen(page, "loop-plot")
     seen(page, "tab-models").click()
+    for model in models:
+        assert seen(page, f"model-{model}").get_attribute("aria-checked") == "true"
+    seen(page, "untick").click()
+    for model in models:
+        seen(page, f"model-{model}").click()
     seen(page, "fit").click()
-    seen(page, "leaderboard").get_by_text(model).first.wait_for(timeout=3 * SLOW)
+    for model in models:
+        seen(page, "leaderboard").get_by_text(model).first.wait_for(timeout=SLOW)
+    seen(page, "tab-compensate").click()
+
+
+def shown(page: Any, field: str, text: str) -> None:
+    """Wait until a field shows a text."""
+    place = page.locator(".q-field", has=page.get_by_test_id(field))
+    place.get_by_text(text).wait_for(timeout=SLOW)
+
+
+def test_an_arm_from_files_to_its_compensator(page: Any) -> None:
+    modelled(page, "balance", "coupled-memory", muscles=3)
+    seen(page, "wave").click()
+    seen(page, "show-pressures").click()
+    first = downloaded(page, "take-pressures").splitlines()[0]
+    assert first == b"time_s,pressure_1_bar,pressure_2_bar,pressure_3_bar"
+    seen(page, "run-loop").click()
+    seen(page, "runs").get_by_text("balance-feedforward").first.wait_for(timeout=SLOW)
+    seen(page, "loop-runs-3")
     seen(page, "tab-take").click()
-    seen(page, "take-json")
+    shown(page, "take-form", "its compensator")
+    taken = json.loads(downloaded(page, "take-json"))
+    assert taken["kind"] == "balance"  # whose inverse the model is
+
+
+def test_a_load_from_files_to_its_estimate(page: Any) -> None:
+    modelled(page, "pi", "balance", muscles=1, load=True)
+    seen(page, "forces").get_by_text("Estimate a force").click()
+    seen(page, "estimate-force").click()
+    seen(page, "force-plot")
+    assert "% of the measured range" in seen(page, "force-balance-second").inner_text()
+    assert b'"load-estimate"' in downloaded(page, "take-force")
 
 
 def test_results_appear_every_time_without_a_reload(page: Any) -> None:

@@ -60,6 +60,10 @@ def test_words_and_picture_are_of_the_input_that_moves_an_output_most(tmp_path: 
         await user.should_see("as pressure_1 ", retries=100)
         await user.should_see("Over all 2 recordings:", retries=100)
         await user.should_not_see("as pressure_2 ")
+        figures = [one.figure for one in user.find(ui.plotly).elements]
+        small = [figure["layout"] for figure in figures if figure["config"].get("staticPlot")]
+        assert len(small) == 6  # too small for the names of axes, which stand above
+        assert {layout[axis]["title"] for layout in small for axis in ("xaxis", "yaxis")} == {""}
 
     visit(workspace, look)
 
@@ -80,6 +84,27 @@ def test_another_theme_draws_pictures_anew_and_nothing_else(tmp_path: Path) -> N
         assert plot.figure["layout"]["font"]["color"] == plots.colours(True)["ink"]
         assert user.find(marker="loop-plot").elements == {plot}
         assert user.find(kind=ui.table).elements == tables
+
+    visit(arm(tmp_path), look)
+
+
+def test_a_picture_in_which_nothing_is_selected_is_not_shaded_anew(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It may not be there yet in the browser, which then complains."""
+    asked: list[str] = []
+    monkeypatch.setattr(ui.plotly, "run_plot_method", lambda self, name, *_: asked.append(name))
+
+    async def look(user: User) -> None:
+        await user.should_see(marker="preview-plot", retries=100)
+        (plot,) = user.find(marker="preview-plot").elements
+        assert isinstance(plot, ui.plotly)
+        user.find(marker="theme").click()
+        for _ in range(100):
+            await asyncio.sleep(0.05)
+            if plot.figure["layout"]["font"]["color"] == plots.colours(True)["ink"]:
+                break
+        assert asked == []
 
     visit(arm(tmp_path), look)
 

@@ -6,6 +6,7 @@ import asyncio
 import os
 from collections.abc import Awaitable, Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -21,7 +22,7 @@ from mckibben.app.desk import Desk
 from mckibben.app.jobs import Jobs
 from mckibben.app.motions import parsed, reference_recording
 from mckibben.app.offering import offered
-from mckibben.app.pages import data
+from mckibben.app.pages import data, leaderboard
 from mckibben.app.shell import build, load_the_rest
 from mckibben.app.work import fit
 from mckibben.app.workspace import Workspace
@@ -270,3 +271,24 @@ def test_of_one_channel_no_model_is_offered(tmp_path: Path) -> None:
     assert found.groups == []
     assert found.recognised.startswith("pressure would be input and output")
     desk.jobs.close()
+
+
+def test_a_model_that_fails_on_the_test_alone_is_named() -> None:
+    def result(name: str, validated: float, tested: float) -> dict[str, Any]:
+        constant = {"test": {"rmse": 38.0}, "validation_rmse": 38.0}
+        return {
+            "name": name,
+            "current": True,
+            "chosen_by": "cross-validation",
+            "shared": [],
+            "test": {"rmse": tested},
+            "validation_rmse": validated,
+            "constant": constant,
+            "skill_least": 0.9,
+            "not_recommended": None,
+        }
+
+    rows = [result("good", 1.0, 2.0), result("unlike", 1.2, 36.0), result("poor", 35.0, 36.0)]
+    (said,) = [text for text in leaderboard.judged(rows) if "hardly better" in text]
+    assert said.startswith("unlike: ")
+    assert not any("hardly" in text for text in leaderboard.judged(rows[:1]))

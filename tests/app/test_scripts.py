@@ -15,7 +15,7 @@ import pytest
 pytest.importorskip("nicegui")
 
 import mckibben
-from mckibben import Recording
+from mckibben import PI, Recording
 from mckibben.app import forms, scripts
 from mckibben.app.kept import Step
 from mckibben.app.work import fit
@@ -34,10 +34,10 @@ def fitted(workspace: Workspace, name: str, model: str = "pi", **given: Any) -> 
     fit(workspace, {"model": model, "name": name} | CHANNELS | given, lambda share, cost: None)
 
 
-def run(workspace: Workspace, folder: Path) -> str:
+def run(workspace: Workspace, folder: Path, chosen: Any = None) -> str:
     """Run the script in a process of its own, and return what it prints."""
     path = folder / "script.py"
-    path.write_text(scripts.script(workspace, workspace.results(), CHANNELS))
+    path.write_text(scripts.script(workspace, workspace.results(), CHANNELS, chosen))
     done = subprocess.run(
         [sys.executable, path.name], cwd=folder, capture_output=True, text=True, check=False
     )
@@ -80,6 +80,24 @@ def test_the_script_fits_each_model_once_as_its_best_fit_was(
     assert asked(workspace)["settings"] == {"pi": best["settings"]}
     run(workspace, tmp_path)
     assert mckibben.load(tmp_path / "pi.json") == workspace.model(best["name"])
+
+
+def test_the_script_makes_the_compensator_that_was_chosen(
+    workspace: Workspace, tmp_path: Path
+) -> None:
+    fitted(workspace, "coarse", settings={"n_operators": 1})
+    fitted(workspace, "fine", settings={"n_operators": 12})
+    PI.example().save(workspace.path("models", "brought.json"))
+    chosen: tuple[tuple[str, str, dict[str, Any]], ...] = (
+        ("coarse", "adaptive", {"time": 30.0}),
+        ("fine", "predictive", {"rate_limit": 5.0, "horizon": None}),
+        ("brought", "inverse", {}),
+    )
+    for name, form, settings in chosen:
+        run(workspace, tmp_path, (name, form, settings, 0.02))
+        assert mckibben.load(tmp_path / "inverse.json") == forms.made(
+            workspace, name, form, settings
+        )
 
 
 def test_the_script_goes_on_where_recordings_share_data(tmp_path: Path) -> None:

@@ -226,6 +226,20 @@ def test_the_work_of_a_search_does_not_grow_with_the_time() -> None:
     assert search.affordable(20) == CANDIDATES
 
 
+def test_what_came_before_a_recording_is_no_noise_of_its_model() -> None:
+    recorded = run_of(PI.example(), slow_sine(40.0), 0)
+    fading = 1.5 * np.exp(-recorded.time)
+    moved = recorded.with_channels(
+        {"displacement": "mm"}, displacement=recorded["displacement"] + fading
+    )
+    found = []
+    for one in (recorded, moved):
+        belief = from_recordings([one], PI.example(), None, 0)
+        prospect = prospect_of(belief, belief.limits, 60.0, None, 0)
+        found.append((prospect.motion.noise.density[0], prospect.by_motion(prospect.known)))
+    assert found[1] == pytest.approx(found[0], rel=0.3)
+
+
 def test_models_without_anything_to_tell_are_refused() -> None:
     silent = PI.example()
     silent = silent.unpack(np.zeros_like(silent.pack()))

@@ -334,6 +334,23 @@ def test_a_series_that_would_start_otherwise_is_refused(tmp_path: Path) -> None:
     compiled(Series((lagging("first_sample"), load("blocks", "pi").example())), tmp_path / "c")
 
 
+@pytest.mark.parametrize(
+    ("initial", "said"),
+    [
+        ("first_sample", "from its inputs."),
+        ("virgin", "at rest, whatever its inputs."),
+        ((0.1, 0.2, 0.3, 0.4), "as the model gives it."),
+    ],
+)
+def test_what_is_written_says_how_memory_starts(initial: Any, said: str, tmp_path: Path) -> None:
+    export_c(
+        replace(load("blocks", "pi").example(), initial=initial), tmp_path / "c", name="muscle"
+    )
+    for file in ("README.md", "src/muscle.h"):
+        words = " ".join((tmp_path / "c" / file).read_text().replace(" * ", " ").split())
+        assert f"The first step starts the memory {said}" in words
+
+
 def lagging(initial: str) -> Block:
     return replace(load("blocks", "process-model").example(), initial=initial)
 

@@ -80,7 +80,7 @@ def made(workspace: Workspace, name: str, form: str, settings: Mapping[str, Any]
     form : str
         One of `FORMS`.
     settings : mapping
-        Those of `SETTINGS`; what is None is left at its default.
+        Those of `SETTINGS`; what is None is at its default.
 
     Raises
     ------
@@ -90,7 +90,7 @@ def made(workspace: Workspace, name: str, form: str, settings: Mapping[str, Any]
     if form == "band":
         return workspace.model(name, "banded")
     block = workspace.model(name)
-    given = {key: settings[key] for key in SETTINGS.get(form, ()) if settings.get(key) is not None}
+    given = _options(form, settings)
     match form:
         case "model":
             return block
@@ -101,7 +101,7 @@ def made(workspace: Workspace, name: str, form: str, settings: Mapping[str, Any]
         case "adaptive":
             from mckibben.blocks.adaptive.adaptive_series import adaptive
 
-            time = float(given.get("time", 60.0))
+            time = given["time"]
             if not 0 < time <= 1e6:
                 raise ModelError(f"it cannot learn in {time:g} s. Remedy: give 1 to 1000 s.")
             return adaptive(block, time)
@@ -115,7 +115,7 @@ def made(workspace: Workspace, name: str, form: str, settings: Mapping[str, Any]
 def _predictive(inverse: Block, given: Mapping[str, float]) -> Block:
     from mckibben.blocks.predictive.predictive import MOST, Predictive
 
-    horizon, rate = int(given.get("horizon", 20)), given.get("rate_limit")
+    horizon, rate = int(given["horizon"]), given.get("rate_limit")
     if not 1 <= horizon <= 200:
         raise ModelError(f"it cannot look {horizon} samples ahead. Remedy: give 1 to 200.")
     if rate is not None and not 0 < rate <= MOST:
@@ -123,6 +123,12 @@ def _predictive(inverse: Block, given: Mapping[str, float]) -> Block:
             f"pressure cannot change by {rate:g} bar/s. Remedy: give what the valve can."
         )
     return Predictive(inverse, horizon=horizon, rate_limit=rate)
+
+
+def _options(form: str, settings: Mapping[str, Any]) -> dict[str, float]:
+    """Return the settings of a use; what is None is at its default."""
+    given = DEFAULTS | {key: value for key, value in settings.items() if value is not None}
+    return {key: v for key in SETTINGS.get(form, ()) if (v := given[key]) is not None}
 
 
 def possible(workspace: Workspace, name: str) -> list[str]:
@@ -144,9 +150,7 @@ def written(workspace: Workspace, name: str, form: str, settings: Mapping[str, A
     """Return the call that gives a model as what it is used as; what makes its file stands before."""
     from mckibben.blocks.force.feedforward import ForceFeedforward
 
-    options = {
-        key: settings[key] for key in SETTINGS.get(form, ()) if settings.get(key) is not None
-    }
+    options = _options(form, settings)
     flags = "".join(f" --{key.replace('_', '-')} {value:g}" for key, value in options.items())
     asked = {
         "inverse": "",
@@ -163,6 +167,21 @@ def written(workspace: Workspace, name: str, form: str, settings: Mapping[str, A
     made = f"{name}-{form}.json"
     invert = in_a_shell(f"mckibben invert models/{name}.json{asked[form]}{flags} -o {made}")
     return f"{invert}\nmckibben.load({made!r})"
+
+
+def in_python(block: Block, form: str, settings: Mapping[str, Any]) -> list[str]:
+    """Return the lines that make of ``model`` its compensator, ``inverse``."""
+    from mckibben.blocks.force.feedforward import ForceFeedforward
+
+    given = "".join(f", {key}={value:g}" for key, value in _options(form, settings).items())
+    if form == "inverse" and ForceFeedforward.of(block) is None:
+        return ["inverse = model.inverse()"]
+    where, name, asked = {
+        "adaptive": ("adaptive.adaptive_series", "adaptive", "(model"),
+        "predictive": ("predictive.predictive", "Predictive", "(model.inverse()"),
+        "inverse": ("force.feedforward", "ForceFeedforward", ".of(model"),
+    }[form]
+    return [f"from mckibben.blocks.{where} import {name}", "", f"inverse = {name}{asked}{given})"]
 
 
 def in_a_shell(command: str) -> str:

@@ -93,7 +93,8 @@ def offered(desk: Desk) -> Offered:
             objections(names, _fitted(train, "test" in roles.values(), channels), channels)
             | against
         )
-    samples = max(sum(map(len, train)), LEAST)
+    ways = len(desk.inputs) * len(desk.outputs)
+    samples = max(sum(map(len, train)), LEAST) * ways
     groups = [
         (need, [_offer(model, samples) for model in need.models if model not in against])
         for need in needs()

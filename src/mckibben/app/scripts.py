@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from mckibben.app import edits
+from mckibben.app import edits, forms
 from mckibben.app.reading import options
 from mckibben.app.recordings import Entry
 from mckibben.app.workspace import Workspace
@@ -92,7 +92,10 @@ def _asked(models: Sequence[str], settings: Mapping[str, Any], allow_shared: boo
 
 
 def script(
-    workspace: Workspace, results: Sequence[Mapping[str, Any]], channels: Mapping[str, Any]
+    workspace: Workspace,
+    results: Sequence[Mapping[str, Any]],
+    channels: Mapping[str, Any],
+    compensator: tuple[str, str, Mapping[str, Any], float] | None = None,
 ) -> str:
     """Return a Python script that does again what was done: read, fit, choose, invert, save.
 
@@ -100,16 +103,20 @@ def script(
     ----------
     workspace : Workspace
     results : sequence of mapping
-        What came of fits, best first. Of those of one model, the best is fitted again.
+        What came of fits, best first. Of those of one model, the chosen or the best is fitted again.
     channels : mapping
         Input and output.
+    compensator : (str, str, mapping, float), optional
+        Model, use, settings and step of what was chosen; default the inverse of the best model.
     """
+    name, form, used, _ = compensator or ("", "inverse", {}, 0.0)
     lines = ['"""What was done in the workbench, as a script."""', "", "import mckibben", ""]
     for role in ("train", "test"):
         lines += [f"{role} = [", *(f"    {read}," for read in _reads(workspace, role)), "]"]
     fitted, said = _of_one_split(results)
+    chosen = [row for row in fitted if row["name"] == name]
     best: dict[str, Mapping[str, Any]] = {}
-    for row in fitted:
+    for row in (*chosen, *fitted):
         best.setdefault(row["model"], row)
     settings = {model: row["settings"] for model, row in best.items() if row["settings"]}
     shared = any(row["shared"] for row in best.values())
@@ -125,6 +132,14 @@ def script(
         "    if row.block is not None:",
         '        row.block.save(f"{row.model}.json")',
         "",
+    ]
+    if name in workspace.models():
+        saved = f"{chosen[0]['model']}.json" if chosen else workspace.path("models", f"{name}.json")
+        lines += [f"model = mckibben.load({str(saved)!r})"]
+        lines += forms.in_python(workspace.model(name), form, used)
+        lines += ['inverse.save("inverse.json")', ""]
+        return "\n".join(lines)
+    lines += [
         "if board.best is None:",
         "    raise SystemExit(board.not_recommended)",
         "try:",

@@ -11,6 +11,7 @@ from mckibben.blocks.core.block import Block
 from mckibben.blocks.core.writing import quantities
 from mckibben.errors import DataError, ModelError
 from mckibben.estimators.coupled.balance_prior import noise_of
+from mckibben.estimators.coupled.balance_starts import EARLY, LARGER
 from mckibben.excitation.believed import Belief, telling
 from mckibben.excitation.candidates import random_plan
 from mckibben.excitation.information import Criterion, Known, Noise, Slopes, crossed
@@ -237,11 +238,12 @@ def _recorded(
         slopes = Slopes(block, places, step, len(inputs))
         base, by, _ = slopes.over(inputs, slopes.start(inputs[0]))
         measured = recording.matrix(channel.name for channel in block.outputs)[::every]
-        gathered.append(by)
-        errors.append(measured - base)
-        steps.append(step)
         features, _ = unmodelled.features(commands, unmodelled.start(commands[0]), step)
-        seen.append(features)
+        begun = _begun(measured - base)
+        gathered.append(by[begun:])
+        errors.append((measured - base)[begun:])
+        steps.append(step)
+        seen.append(features[begun:])
     density, left = np.empty(spans.size), 0.0
     for output, span in enumerate(spans.tolist()):
         own = [error[:, output] for error in errors]
@@ -255,6 +257,13 @@ def _recorded(
         pulls += crossed(by, features, step * spans / density)
     # a model fitted to little leaves little of that, and more of what comes
     return Noise(density, max(float(np.sqrt(left)), LEFT)), precision, pulls
+
+
+def _begun(errors: Array) -> int:
+    """Return from which sample on errors are the model's, not of what came before the recording."""
+    first = len(errors) // EARLY
+    early, late = (np.mean(part**2, axis=0) for part in (errors[: first or None], errors[first:]))
+    return first if (early > LARGER**2 * late).any() else 0
 
 
 def _wide(weight: Array) -> Array:

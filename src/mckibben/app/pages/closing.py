@@ -293,7 +293,7 @@ def _table(runs: dict[str, Followed], motions: dict[str, str]) -> None:
         "rmse": "RMSE",
         "without": "RMSE without compensation",
         "largest": "Largest error",
-        "clipped": "Steps the plant clipped",
+        "clipped": "Steps at a limit or out of reach",
         "step": "Step [µs]",
     }
     rows: list[dict[str, Any]] = [
@@ -316,7 +316,9 @@ def _table(runs: dict[str, Followed], motions: dict[str, str]) -> None:
 
 
 def _listed(values: dict[str, float | None], units: dict[str, str]) -> str:
-    known = [f"{wording.number(value, 3)} {units.get(name, '')}" for name, value in values.items()]
+    known = [
+        f"{wording.number(value, 3)}\xa0{units.get(name, '')}" for name, value in values.items()
+    ]
     return ", ".join(text.strip() for text in known) or "none"
 
 

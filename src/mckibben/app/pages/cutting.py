@@ -202,8 +202,14 @@ def _plot(desk: Desk, name: str, recording: Recording, channels: list[str], part
         plot.run_plot_method("relayout", {"shapes": _shapes(part)})
 
     part.shown = drawn
+
+    def again() -> None:
+        # a picture that is drawn anew has no part shaded; before one is chosen it may not be there yet
+        if part.low is not None:
+            drawn()
+
     with plot:
-        desk.when("theme", drawn)  # a picture that is drawn anew has no part shaded
+        desk.when("theme", again)
     for field in fields:
         field.on("change", typed)
         field.on("keydown.enter", guarded(lambda: cut("keep")))

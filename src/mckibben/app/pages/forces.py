@@ -10,13 +10,10 @@ from mckibben.app import forms, scripts
 from mckibben.app.desk import Desk, caution, guarded, named
 from mckibben.app.kept import Estimated
 from mckibben.app.pages.kept_curves import drawn, showing
+from mckibben.app.pages.taking_code import hand_over
 from mckibben.comparison.recognising import FORCE
 from mckibben.errors import DataError, MckibbenError
 from mckibben.report import wording
-from mckibben.system.ordinary import read_bytes
-
-LARGEST = 64 * 2**20
-"""Bytes of a model."""
 
 
 def _tells(desk: Desk) -> dict[str, list[str]]:
@@ -67,8 +64,7 @@ def build(desk: Desk) -> None:
                 block = forms.made(desk.workspace, name, "force", {})
                 path = desk.workspace.new_path("takeaway", f"{name}-force.json")
                 await asyncio.to_thread(block.save, path)
-                desk.did(f"wrote {path.name}", forms.written(desk.workspace, name, "force", {}))
-                ui.download(read_bytes(path, most=LARGEST), path.name)
+                hand_over(desk, path, forms.written(desk.workspace, name, "force", {}))
 
             named(ui.button("Estimate", on_click=guarded(start)), "estimate-force")
             named(

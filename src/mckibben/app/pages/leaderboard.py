@@ -61,6 +61,15 @@ OTHER_DATA = (
 )
 
 
+HARDLY = 0.5
+"""Share of the constant's error above which a model tells little."""
+
+UNLIKE = (
+    "on the test hardly better than the constant, unlike in validation: the test moves otherwise than "
+    "what was trained on. Train on a recording like it, too, or take another model."
+)
+
+
 def build(desk: Desk) -> None:
     """Build it."""
     ticked: list[str] = []  # what a user has chosen stays so when the table is shown anew
@@ -82,7 +91,7 @@ def build(desk: Desk) -> None:
         careful = CAREFUL if any(limits.caution(result["model"]) for result in results) else ""
         about = ABOUT.format(heading=heading, by=by, careful=careful)
         ui.label(about).classes("text-xs opacity-70")
-        for said in _judged(results):
+        for said in judged(results):
             ui.label(said).classes("text-sm")
         place = named(ui.column().classes("w-full"), "closer")
 
@@ -162,7 +171,7 @@ def _other(result: dict[str, Any]) -> str:
     return "" if result["current"] else " (other data)"
 
 
-def _judged(results: Sequence[dict[str, Any]]) -> list[str]:
+def judged(results: Sequence[dict[str, Any]]) -> list[str]:
     """Return what every model has to beat, and what speaks against all models, or against tests."""
     said: list[str] = []
     against: dict[str, list[str]] = {}
@@ -176,12 +185,27 @@ def _judged(results: Sequence[dict[str, Any]]) -> list[str]:
                 f"constant{_other(result)}, the mean of the training output: {heading} {validated}, "
                 f"test RMSE {tested}. Every model has to beat it."
             )
+        if _unlike(result):
+            against.setdefault(UNLIKE, []).append(f"{result['name']}{_other(result)}")
         for why in result.get("shared", ()):
             against.setdefault(why, []).append(f"{result['name']}{_other(result)}")
     if why_none := not_recommended(results):
         said.append(why_none)
     said += [f"{', '.join(names)}: {why}" for why, names in against.items()]
     return list(dict.fromkeys(said))
+
+
+def _unlike(result: dict[str, Any]) -> bool:
+    """Tell whether a model is hardly better than the constant on the test, unlike in validation."""
+    constant = result.get("constant") or {}
+    test, validated = (
+        (own is not None and least is not None and own > HARDLY * least)
+        for own, least in (
+            ((one.get("test") or {}).get("rmse") for one in (result, constant)),
+            (one.get("validation_rmse") for one in (result, constant)),
+        )
+    )
+    return test and not validated
 
 
 async def _closer(desk: Desk, names: list[str]) -> Callable[[], None]:

@@ -113,11 +113,14 @@ def _small(
     enlarge: Callable[[str, str], None],
 ) -> None:
     figure["config"] = figure["config"] | {"staticPlot": True}
-    figure["layout"] |= {"margin": {"l": 44, "r": 6, "t": 4, "b": 36}}
+    figure["layout"] |= {"margin": {"l": 30, "r": 6, "t": 4, "b": 20}}
     figure["layout"]["font"] = figure["layout"]["font"] | {"size": 10}
+    for axis in ("xaxis", "yaxis"):  # its name stands above
+        few = {"title": "", "nticks": 3, "tickangle": 0}
+        figure["layout"][axis] = figure["layout"][axis] | few
     row, column = found.outputs.index(wanted), found.inputs.index(given)
     effect = found.effects[row, column]
-    told = f": {wording.number(effect)} {found.units[row]}" if np.isfinite(effect) else ""
+    told = f": {wording.number(effect)}\xa0{found.units[row]}" if np.isfinite(effect) else ""
     with ui.column().classes("gap-0 min-w-0"):
         button = ui.button(f"{given} → {wanted}{told}", on_click=lambda: enlarge(given, wanted))
         named(button.props("flat dense no-caps").classes("text-xs"), f"pair-{given}-{wanted}")

@@ -149,7 +149,7 @@ def _report(desk: Desk) -> None:
 
 def _script(desk: Desk) -> None:
     def text() -> str:
-        return scripts.script(desk.workspace, desk.results(), desk.channels)
+        return scripts.script(desk.workspace, desk.results(), desk.channels, desk.compensator)
 
     with ui.card().classes("w-full"):
         ui.label("The same as a script").classes("text-lg")
@@ -158,7 +158,7 @@ def _script(desk: Desk) -> None:
         def shown() -> None:
             named(code(text()).classes("min-w-0"), "script")
 
-        for topic in ("results", "recordings", "channels"):
+        for topic in ("results", "recordings", "channels", "compensator"):
             desk.when(topic, shown.refresh)
         shown()
         named(

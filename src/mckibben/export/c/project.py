@@ -184,7 +184,7 @@ def described(
         "n_coefficients": first,
         "adjustable": False,
         "n_states": sum(call["n_states"] for call in calls),
-        "explicit": any(call["state_rows"] for call in calls),
+        "starts": _starts(wiring.calls),
         "primitives": primitives,
         "headers": sorted({f"{call.part.source.stem}.h" for call in wiring.calls}),
         "sources": [f"{name}.c", *(path.name for path in primitives if path.suffix == ".c")],
@@ -272,6 +272,14 @@ def _call(call: Call, index: int, single: bool) -> dict[str, Any]:
         "rows": rows(part.coefficients, single=single) or ["0"],
         "state_rows": [] if part.state is None else rows(part.state, single=single),
     }
+
+
+def _starts(calls: list[Call]) -> str:
+    """Return how the memory of parts starts, in words."""
+    words = {"": "as the model gives it", "MCK_VIRGIN": "at rest, whatever its inputs"}
+    parts = [call.part for call in calls if call.part.block.n_states]
+    rules = ["" if part.state is not None else part.rule for part in parts] or ["any"]
+    return " or ".join(dict.fromkeys(words.get(rule, "from its inputs") for rule in rules))
 
 
 def _told(channels: tuple[Channel, ...]) -> list[dict[str, str]]:

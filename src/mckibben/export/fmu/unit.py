@@ -10,9 +10,11 @@ from __future__ import annotations
 
 import hashlib
 import json
+import tarfile
 import tempfile
 import zipfile
 from collections.abc import Mapping, Sequence
+from functools import cache
 from pathlib import Path
 from typing import Any, Literal
 
@@ -179,8 +181,8 @@ def fmu_files(
     sources = {Path(path).name: text for path, text in source_files(content).items()}
     sources["unit_model.h"] = _render("unit_model.h.j2", content)
     ours = [HERE / "c" / f"{stem}" for stem in ("unit.h", "unit.c", f"fmi{digit}.c")]
-    ours += sorted((HERE / "headers").glob(f"fmi{digit}*.h"))
     sources |= {path.name: path.read_text(encoding="utf-8") for path in ours}
+    sources |= {name: text for name, text in _headers().items() if name.startswith(f"fmi{digit}")}
     own, types = sources[f"fmi{digit}.c"], sources[f"fmi{digit}FunctionTypes.h"]
     sources[f"fmi{digit}_refused.c"] = refusals(types, own)
     content["unit_sources"] = sorted(source for source in sources if source.endswith(".c"))
@@ -191,6 +193,14 @@ def fmu_files(
     if version == "3.0":
         texts["sources/buildDescription.xml"] = _render("build.xml.j2", content)
     return {path: text.encode() for path, text in texts.items()}
+
+
+@cache
+def _headers() -> dict[str, str]:
+    """Return the headers of FMI 2.0 and 3.0, unchanged, with the notices of their licence (BSD)."""
+    with tarfile.open(HERE / "headers.tar.xz") as packed:
+        parts = {name: packed.extractfile(name) for name in packed.getnames()}
+        return {name: part.read().decode() for name, part in parts.items() if part}
 
 
 def _token(block: Block, sample_time: float | None, version: str) -> str:

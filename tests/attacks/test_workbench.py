@@ -30,7 +30,7 @@ from mckibben.app.claim import keep_to_the_user
 from mckibben.app.folder import FOLDERS
 from mckibben.app.guard import Guard, checked_token
 from mckibben.app.jobs import Job, Jobs
-from mckibben.app.pages.leaderboard import _judged
+from mckibben.app.pages.leaderboard import judged
 from mckibben.app.workspace import Workspace
 from mckibben.files import write
 from mckibben.registry import load
@@ -619,6 +619,6 @@ def test_what_speaks_against_a_model_reaches_the_page(tmp_path: Path) -> None:
     against = {"not_recommended": "Nothing speaks for it.", "shared": ["It was fitted to."]}
     result = {"status": "ok", "model": "pi", "constant": {"test": {"rmse": 3.0}}} | against
     workspace.write_json("results", "pi", result)
-    constant, *said = _judged(workspace.results())
+    constant, *said = judged(workspace.results())
     assert "test RMSE 3" in constant
     assert said == ["Nothing speaks for it.", "pi: It was fitted to."]

@@ -16,6 +16,7 @@ from mckibben.blocks.core.fields import Channel
 from mckibben.blocks.feedback.feedforward_feedback import FeedforwardFeedback
 from mckibben.blocks.feedback.pid import PIDFeedback
 from mckibben.control import DisturbanceObserver, control_law, track, tune_pid
+from mckibben.control.pressure_loop import PressureLoop
 from tests.cli.conftest import Cli
 from tests.cli.conftest import cli as cli  # a fixture
 
@@ -174,3 +175,36 @@ def test_a_controller_that_is_no_block_says_so(cli: Cli, tmp_path: Path) -> None
     result = cli("track", tmp_path / "inverse.json", *given, *kept)
     assert result.code == 2
     assert re.search(r"'observer' is no block.*Remedy:", " ".join(result.err.split()))
+
+
+@pytest.mark.parametrize("step", [0.005, 0.02, 0.05])
+@pytest.mark.parametrize("name", ["mas20-hanging", "mckibben-530", "soft-arm"])
+def test_no_regulator_of_a_rig_is_made_to_swing(name: str, step: float) -> None:
+    rig = load_rig(name).changed({"sample_time": step})
+    driven = [channel for channel in rig.inputs if channel.startswith("pressure")]
+    at = [rig.outputs.index(channel) for channel in driven]
+    low, high = (np.array([getattr(rig.limits(c), end) for c in driven]) for end in ("low", "high"))
+    loop = PressureLoop(low, high, step)
+    wanted, measured = low + 0.4 * (high - low), rig.reset(0)
+    others = {channel: 0.0 for channel in rig.inputs if channel not in driven}
+    seen = []
+    for _ in range(round(12.0 / step)):
+        command = loop.step(wanted, measured[at]).tolist()
+        measured = rig.step(dict(zip(driven, command, strict=True)) | others)
+        seen.append(measured[at])
+    late = np.array(seen[len(seen) // 2 :])
+    assert late.std(axis=0).max() < 0.01
+    assert np.abs(late.mean(axis=0) - wanted).max() < 0.01
+
+
+def test_fast_motion_is_not_taken_for_swinging() -> None:
+    """A lag of a first order that is asked for much is behind, to and fro, at its full gain."""
+    loop = PressureLoop(np.array([0.0]), np.array([5.0]), 0.01)
+    pressure, plain, total = np.zeros(1), 0.0, 0.0
+    for time in 0.01 * np.arange(1000):
+        wanted = 2.5 + 2.0 * float(np.sin(2 * np.pi * time))
+        pressure += (loop.step(np.array([wanted]), pressure) - pressure) * 0.01 / 0.5
+        asked = wanted + 3.0 * (wanted - plain) + total
+        total += 2.0 * 0.01 * (wanted - plain) * (0.0 < asked < 5.0)
+        plain += (min(max(asked, 0.0), 5.0) - plain) * 0.01 / 0.5
+        assert pressure[0] == pytest.approx(plain, abs=1e-12)

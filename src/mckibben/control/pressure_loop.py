@@ -1,7 +1,7 @@
 """The inner loop that regulators with a pressure sensor have: what is asked for is what is there.
 
 Compensators are identified on measured pressures; between command and pressure lie valves that fill and
-vent at rates of their own.
+vent at rates of their own. How large a gain they bear nobody says: it is halved where it swings.
 """
 
 from __future__ import annotations
@@ -12,6 +12,9 @@ import numpy as np
 
 from mckibben.arrays import Array
 
+SLIGHT = 0.05
+"""Of the range: pressure that is off by more, to and fro, swings, where less was asked for meanwhile."""
+
 
 @dataclass
 class PressureLoop:
@@ -20,7 +23,7 @@ class PressureLoop:
     Parameters
     ----------
     gain : float
-        Proportional.
+        Proportional, to begin with; that of a muscle is halved whenever its pressure swings.
     integral : float
         [1/s].
     low, high : array
@@ -35,11 +38,27 @@ class PressureLoop:
 
     def __post_init__(self) -> None:
         self._sum = np.zeros_like(self.low)
+        self._gains = np.full_like(self.low, self.gain)
+        self._side = np.zeros_like(
+            self.low
+        )  # on which pressure was off last, and what is asked since
+        self._least, self._most = np.full_like(self.low, np.inf), np.full_like(self.low, -np.inf)
 
     def step(self, wanted: Array, measured: Array) -> Array:
         """Return the command."""
         error = wanted - measured
-        command = wanted + self.gain * error + self._sum
+        self._calm(wanted, error)
+        command = wanted + self._gains * error + self._sum
         inside = (command > self.low) & (command < self.high)
         self._sum += self.integral * self.sample_time * error * inside
         return np.clip(command, self.low, self.high)
+
+    def _calm(self, wanted: Array, error: Array) -> None:
+        """Halve the gains with which pressures swing though nothing like it is asked for."""
+        slight = SLIGHT * (self.high - self.low)
+        self._least, self._most = np.minimum(self._least, wanted), np.maximum(self._most, wanted)
+        side = np.sign(error) * (np.abs(error) > slight)
+        over = side * self._side < 0
+        self._gains[over & (self._most - self._least < slight)] /= 2
+        self._side = np.where(side == 0, self._side, side)
+        self._least, self._most = (np.where(over, wanted, x) for x in (self._least, self._most))

@@ -56,10 +56,10 @@ def test_words_and_picture_are_of_the_input_that_moves_an_output_most(tmp_path: 
     async def look(user: User) -> None:
         user.find(marker="tab-look").click()
         await user.should_see("displacement_1 over pressure_3", retries=100)
-        await user.should_see("as pressure_3 ", retries=100)
-        await user.should_see("as pressure_1 ", retries=100)
+        await user.should_see("At equal pressure_3,", retries=100)
+        await user.should_see("At equal pressure_1,", retries=100)
         await user.should_see("Over all 2 recordings:", retries=100)
-        await user.should_not_see("as pressure_2 ")
+        await user.should_not_see("At equal pressure_2,")
         figures = [one.figure for one in user.find(ui.plotly).elements]
         small = [figure["layout"] for figure in figures if figure["config"].get("staticPlot")]
         assert len(small) == 6  # too small for the names of axes, which stand above

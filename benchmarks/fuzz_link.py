@@ -18,11 +18,10 @@ import sys
 import tempfile
 from pathlib import Path
 
-from tests.examples import examples
-
 from fuzz_c import SAMPLE_TIME, fuzzed
 from fuzzing import guarded
 from mckibben.blocks.core.block import Block
+from mckibben.blocks.laws.examples import examples
 from mckibben.errors import DataError, ModelError
 from mckibben.export.c.project import described, source_files
 from mckibben.export.c.serving import Serving, limits, served, served_files

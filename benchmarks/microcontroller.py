@@ -11,13 +11,13 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
-from tests.examples import examples
 
 from mckibben import Block, Channel, Series
 from mckibben.blocks.compose import PerChannel
 from mckibben.blocks.coupled.balance import Balance
 from mckibben.blocks.coupled.coupling import Coupling
 from mckibben.blocks.coupled.fuzzy_network import FuzzyNetwork
+from mckibben.blocks.laws.examples import examples
 from mckibben.blocks.play_type.gpi import GPI
 from mckibben.export.c.emulation import Emulated, emulate
 

@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 
 from mckibben import Block, DataError, ModelWarning
 from mckibben.blocks.core.running import Stream
+from mckibben.blocks.laws.examples import examples
 from mckibben.blocks.laws.trial import input_limits, wander
 from mckibben.export.c.building import LOOP
 from mckibben.export.c.project import described, source_files
 from mckibben.registry import load
-from tests.examples import examples
 from tests.tools import needs
 
 Array = NDArray[np.float64]

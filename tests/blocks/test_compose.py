@@ -29,10 +29,10 @@ from mckibben import (
 )
 from mckibben.blocks.core.block import Run
 from mckibben.blocks.core.fields import DISPLACEMENT, Initial
+from mckibben.blocks.laws.examples import examples
 from mckibben.blocks.laws.inverse_laws import inverts
 from mckibben.blocks.laws.trial import Trial
 from tests.blocks.strategies import paths, pi_models
-from tests.examples import examples
 
 Array = NDArray[np.float64]
 

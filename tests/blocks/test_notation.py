@@ -11,9 +11,9 @@ from mckibben.blocks.core.block import Block
 from mckibben.blocks.core.inverse import Inverse
 from mckibben.blocks.core.notation import MANY, Written, meanings
 from mckibben.blocks.core.writing import quantities, written
+from mckibben.blocks.laws.examples import examples
 from mckibben.registry import load, names
 from mckibben.report.mathematics import mathml
-from tests.examples import examples
 
 EXAMPLES = examples()
 

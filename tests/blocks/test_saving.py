@@ -14,8 +14,8 @@ from hypothesis import strategies as st
 
 from mckibben import GPI, PI, DataError, ModelError, Series, load
 from mckibben.blocks.core import saving
+from mckibben.blocks.laws.examples import examples
 from tests.blocks.strategies import gpi_models, pi_models, rate_dependent_models
-from tests.examples import examples
 
 EXAMPLES = examples()
 GOOD: dict[str, Any] = GPI.example().to_dict()

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from mckibben import Block, check_block
+from mckibben.blocks.laws.examples import examples
 from mckibben.registry import load, names
-from tests.examples import examples
 
 EXAMPLES = examples()
 

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from mckibben.blocks.laws.examples import examples
 from mckibben.blocks.laws.trial import Trial
 from mckibben.registry import load, names
 from mckibben.system.compiling import Deferred
-from tests.examples import examples
 from tests.twins import ENVELOPES, STEP_ERROR, STEPPED, TWINS
 
 SAMPLE_TIME = 0.01

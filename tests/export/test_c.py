@@ -20,13 +20,13 @@ from mckibben.blocks.coupled.coupling import Coupling
 from mckibben.blocks.coupled.fuzzy_network import FuzzyNetwork
 from mckibben.blocks.coupled.recurrent_fuzzy_network import RecurrentFuzzyNetwork
 from mckibben.blocks.feedback.feedforward_feedback import FeedforwardFeedback
+from mckibben.blocks.laws.examples import examples
 from mckibben.blocks.laws.trial import input_limits, wander
 from mckibben.blocks.play_type.gpi import GPI
 from mckibben.export import export_c
 from mckibben.export.c.building import CompiledModel, self_test
 from mckibben.registry import load, names
 from mckibben.stream import Step
-from tests.examples import examples
 from tests.tools import needs
 
 Array = NDArray[np.float64]

@@ -11,9 +11,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from mckibben.blocks.laws.examples import examples
 from mckibben.export import export_c
 from mckibben.export.c.parts import PRIMITIVES
-from tests.examples import examples
 from tests.export.test_c import MODELS, SAMPLE_TIME, difference, path_for, simulated
 from tests.tools import needs
 

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from mckibben import Block, ModelError
+from mckibben.blocks.laws.examples import examples
 from mckibben.export.c import emulation
 from mckibben.export.c.emulation import emulate
-from tests.examples import examples
 from tests.export.test_c import MODELS, SAMPLE_TIME, SINGLE
 from tests.tools import needs
 

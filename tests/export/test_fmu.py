@@ -16,9 +16,9 @@ import pytest
 from numpy.typing import NDArray
 
 from mckibben import Block, DataError, ModelError
+from mckibben.blocks.laws.examples import examples
 from mckibben.export import export_fmu
 from mckibben.export.fmu.toolchains import own_platform
-from tests.examples import examples
 from tests.export.test_c import MODELS, SAMPLE_TIME, difference, path_for, simulated
 from tests.tools import needs
 

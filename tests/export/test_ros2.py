@@ -11,9 +11,9 @@ import pytest
 
 from mckibben import GPI, ModelError, muscles
 from mckibben.blocks.core.block import Block
+from mckibben.blocks.laws.examples import examples
 from mckibben.export import export_ros2
 from mckibben.export.ros2.package import ros2_files
-from tests.examples import examples
 from tests.tools import needs
 
 STUBS = Path(__file__).parent / "ros2_stubs"

@@ -16,6 +16,7 @@ import pytest
 
 from mckibben.blocks.adaptive.adaptive import Adaptive
 from mckibben.blocks.adaptive.adaptive_series import AdaptiveSeries
+from mckibben.blocks.laws.examples import examples
 from mckibben.blocks.play_type.gpi import GPI
 from mckibben.errors import DataError, ModelError
 from mckibben.export import Serving, export_c, state_of
@@ -24,7 +25,6 @@ from mckibben.files import read
 from mckibben.link import Descriptor, Link, LinkError, open_port
 from mckibben.link.trying import emulated, hosted
 from tests.attacks.commands import call
-from tests.examples import examples
 from tests.export.test_c import path_for
 from tests.export.test_emulation import emulated as with_emulator
 from tests.tools import needs

@@ -5,6 +5,7 @@ import pytest
 
 from mckibben.blocks.compose import Parallel, Series
 from mckibben.blocks.core.block import Block
+from mckibben.blocks.laws.examples import examples
 from mckibben.blocks.memoryless.piecewise_linear import PiecewiseLinear
 from mckibben.blocks.play_type.gpi import GPI
 from mckibben.blocks.play_type.pi import PI
@@ -12,7 +13,6 @@ from mckibben.blocks.play_type.play import Play
 from mckibben.blocks.play_type.rate_dependent_pi import RateDependentPI
 from mckibben.errors import ModelError
 from mckibben.report import interactive, model_subjects
-from tests.examples import examples
 from tests.report.studies_by_hand import models, study
 
 LINE = Play.example()

@@ -14,12 +14,12 @@ from mckibben.arrays import Array
 from mckibben.blocks.compose import Series
 from mckibben.blocks.core.block import Block
 from mckibben.blocks.dynamic.transfer_function import TransferFunction
+from mckibben.blocks.laws.examples import examples
 from mckibben.blocks.memoryless.negative import Negative
 from mckibben.errors import DataError
 from mckibben.report import printed
 from mckibben.report.description_subjects import figures, frequency_response
 from mckibben.validation.describing import describe
-from tests.examples import examples
 
 STEP = 0.05
 EXAMPLES = examples()

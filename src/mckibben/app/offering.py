@@ -93,10 +93,9 @@ def offered(desk: Desk) -> Offered:
             objections(names, _fitted(train, "test" in roles.values(), channels), channels)
             | against
         )
-    ways = len(desk.inputs) * len(desk.outputs)
-    samples = max(sum(map(len, train)), LEAST) * ways
+    work = max(sum(map(len, train)), LEAST) * len(desk.inputs) * len(desk.outputs)
     groups = [
-        (need, [_offer(model, samples) for model in need.models if model not in against])
+        (need, [_offer(model, work) for model in need.models if model not in against])
         for need in needs()
     ]
     groups = [(need, offers) for need, offers in groups if offers]
@@ -122,7 +121,7 @@ def _fitted(train: list[Recording], tested: bool, channels: Channels) -> list[Re
     return train
 
 
-def _offer(model: str, samples: int) -> Offer:
+def _offer(model: str, work: int) -> Offer:
     estimator, said = registry.load("estimators", model), limits().get(model, {})
     return Offer(
         model,
@@ -132,7 +131,7 @@ def _offer(model: str, samples: int) -> Offer:
         inverse_kind(model),
         inverse_may_lack(model),
         estimator.needs_time,
-        estimator.effort * samples / 10_000 * FOLDS,
+        estimator.effort * work / 10_000 * FOLDS,
     )
 
 

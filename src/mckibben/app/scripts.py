@@ -137,20 +137,19 @@ def script(
         saved = f"{chosen[0]['model']}.json" if chosen else workspace.path("models", f"{name}.json")
         lines += [f"model = mckibben.load({str(saved)!r})"]
         lines += forms.in_python(workspace.model(name), form, used)
-        lines += ['inverse.save("inverse.json")', ""]
-        return "\n".join(lines)
-    lines += [
-        "if board.best is None:",
-        "    raise SystemExit(board.not_recommended)",
-        "try:",
-        "    inverse = board.best.block.inverse()",
-        "except mckibben.ModelError as error:",
-        "    print(error)",
-        "else:",
-        '    inverse.save("inverse.json")',
-        "",
-    ]
-    return "\n".join(lines)
+        lines += ['inverse.save("inverse.json")']
+    else:
+        lines += [
+            "if board.best is None:",
+            "    raise SystemExit(board.not_recommended)",
+            "try:",
+            "    inverse = board.best.block.inverse()",
+            "except mckibben.ModelError as error:",
+            "    print(error)",
+            "else:",
+            '    inverse.save("inverse.json")',
+        ]
+    return "\n".join([*lines, ""])
 
 
 def _of_one_split(

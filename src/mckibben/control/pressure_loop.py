@@ -39,9 +39,8 @@ class PressureLoop:
     def __post_init__(self) -> None:
         self._sum = np.zeros_like(self.low)
         self._gains = np.full_like(self.low, self.gain)
-        self._side = np.zeros_like(
-            self.low
-        )  # on which pressure was off last, and what is asked since
+        # on which side pressure was off last, and between what is asked for since
+        self._side = np.zeros_like(self.low)
         self._least, self._most = np.full_like(self.low, np.inf), np.full_like(self.low, -np.inf)
 
     def step(self, wanted: Array, measured: Array) -> Array:

@@ -11,7 +11,7 @@ from mckibben.blocks.core.block import Block
 from mckibben.blocks.core.writing import quantities
 from mckibben.errors import DataError, ModelError
 from mckibben.estimators.coupled.balance_prior import noise_of
-from mckibben.estimators.coupled.balance_starts import EARLY, LARGER
+from mckibben.estimators.coupled.balance_starts import LARGER, opening
 from mckibben.excitation.believed import Belief, telling
 from mckibben.excitation.candidates import random_plan
 from mckibben.excitation.information import Criterion, Known, Noise, Slopes, crossed
@@ -239,9 +239,10 @@ def _recorded(
         base, by, _ = slopes.over(inputs, slopes.start(inputs[0]))
         measured = recording.matrix(channel.name for channel in block.outputs)[::every]
         features, _ = unmodelled.features(commands, unmodelled.start(commands[0]), step)
-        begun = _begun(measured - base)
+        error = measured - base
+        begun = _begun(error)
         gathered.append(by[begun:])
-        errors.append((measured - base)[begun:])
+        errors.append(error[begun:])
         steps.append(step)
         seen.append(features[begun:])
     density, left = np.empty(spans.size), 0.0
@@ -261,8 +262,7 @@ def _recorded(
 
 def _begun(errors: Array) -> int:
     """Return from which sample on errors are the model's, not of what came before the recording."""
-    first = len(errors) // EARLY
-    early, late = (np.mean(part**2, axis=0) for part in (errors[: first or None], errors[first:]))
+    first, early, late = opening(errors)
     return first if (early > LARGER**2 * late).any() else 0
 
 

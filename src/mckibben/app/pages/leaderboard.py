@@ -198,14 +198,11 @@ def judged(results: Sequence[dict[str, Any]]) -> list[str]:
 def _unlike(result: dict[str, Any]) -> bool:
     """Tell whether a model is hardly better than the constant on the test, unlike in validation."""
     constant = result.get("constant") or {}
-    test, validated = (
-        (own is not None and least is not None and own > HARDLY * least)
-        for own, least in (
-            ((one.get("test") or {}).get("rmse") for one in (result, constant)),
-            (one.get("validation_rmse") for one in (result, constant)),
-        )
-    )
-    return test and not validated
+    tested, least = ((one.get("test") or {}).get("rmse") for one in (result, constant))
+    validated, limit = (one.get("validation_rmse") for one in (result, constant))
+    fails = tested is not None and least is not None and tested > HARDLY * least
+    failed = validated is not None and limit is not None and validated > HARDLY * limit
+    return fails and not failed
 
 
 async def _closer(desk: Desk, names: list[str]) -> Callable[[], None]:

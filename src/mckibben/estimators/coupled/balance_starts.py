@@ -37,12 +37,19 @@ def with_starts(search: Search, values: Array, data: TrainingData) -> Search | N
     early, late = [], []
     for place in range(len(search.runs)):
         errors = search.missed(values, place, sloped=False, whole=True)[0]
-        first = len(errors) // EARLY
-        early.append(np.mean(errors[:first] ** 2))
-        late.append(np.mean(errors[first:] ** 2))
+        _, before, after = opening(errors)
+        early.append(np.mean(before))
+        late.append(np.mean(after))
     if not np.mean(early) > LARGER**2 * np.mean(late):
         return None
     return search.having(settled=False, n_starts=1 + max(run.place for run in data.runs))
+
+
+def opening(errors: Array) -> tuple[int, Array, Array]:
+    """Return how many samples a run's first part has, and the mean squares of errors there and after."""
+    first = len(errors) // EARLY
+    early, late = (np.mean(part**2, axis=0) for part in (errors[: first or None], errors[first:]))
+    return first, early, late
 
 
 def simulate_started(

@@ -3,10 +3,17 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from mckibben.report.mathematics import mathml
+
+GREEK = "sum|alpha|beta|gamma|zeta|theta|kappa|lambda|mu|sigma|tau|omega"
+SYMBOL = re.compile(
+    rf"(?<!\w)((?:[A-Za-z]|{GREEK})(?:[_^](?:\{{[^{{}}]*\}}|-?[A-Za-z0-9]{{1,2}}(?![A-Za-z0-9])))+"
+    r"(?:\[\w\](?:_\w)?)?)"
+)
+"""A letter with indices or powers, and what it is taken of: w_{t-1}, x^2, F_{r_i}[u]_t."""
 
 DOCS = Path(__file__).parents[1]
 MADE = DOCS / "_generated"
@@ -20,15 +27,31 @@ def write(path: Path, text: str) -> None:
 
 
 def plain(text: str) -> str:
-    """Return text as Markdown that shows it as it is, paragraphs kept; what is between ` stays code."""
+    """Return text as Markdown that shows it as it is, paragraphs kept; what is between ` stays code.
+
+    Symbols with an index or a power, as docstrings write them, are set as mathematics.
+    """
+
+    def shown(paragraph: str) -> Iterator[str]:
+        for place, piece in enumerate(re.split(r"(`+[^`]*`+)", paragraph)):
+            for where, part in enumerate([piece] if place % 2 else SYMBOL.split(piece)):
+                if where % 2:
+                    yield symbol(part)
+                else:
+                    yield part if place % 2 else re.sub(r"([\\*_\[\]<>$|#])", r"\\\1", part)
+
     paragraphs = [" ".join(part.split()) for part in re.split(r"\n\s*\n", text)]
-    return "\n\n".join(
-        "".join(
-            piece if place % 2 else re.sub(r"([\\*_\[\]<>$|#])", r"\\\1", piece)
-            for place, piece in enumerate(re.split(r"(`+[^`]*`+)", paragraph))
-        )
-        for paragraph in paragraphs
-    )
+    return "\n\n".join("".join(shown(paragraph)) for paragraph in paragraphs)
+
+
+def symbol(written: str) -> str:
+    """Return a symbol of a docstring as mathematics, as HTML.
+
+    >>> "<msub>" in symbol("gamma_R"), symbol("w_{t-1}") == inline("w_{t-1}")
+    (True, True)
+    """
+    indexed = re.sub(r"([_^])(-?\w+)", r"\1{\2}", written)
+    return inline(re.sub(rf"\b({GREEK})(?=[_^])", r"\\\1", indexed))
 
 
 def equation(latex: str) -> list[str]:

@@ -15,7 +15,7 @@ from mckibben.app.jobs import Jobs, note
 from mckibben.app.kept import Step
 from mckibben.app.offering import offered
 from mckibben.app.pages import apart
-from mckibben.app.together import obstacle, sample_times
+from mckibben.app.together import differing, obstacle, sample_times
 from mckibben.app.workspace import Workspace
 from tests.app.test_jobs import filled, swung
 from tests.app.test_pages import visit
@@ -113,6 +113,32 @@ def test_what_keeps_models_from_being_fitted_is_said(tmp_path: Path) -> None:
     workspace.add(Recording(channels, 0.06, units=units), origin="", call="", name="two")
     assert "sample times from 0.05 to 0.06 s" in obstacle(desk)
     assert not offered(desk).groups
+    desk.jobs.close()
+
+
+def test_counts_keep_nobody_from_fitting_and_lacking_times_do(tmp_path: Path) -> None:
+    workspace = Workspace(tmp_path)
+    desk = Desk(workspace, Jobs(workspace))
+    runs: dict[str, tuple[dict[str, str], float | None]] = {
+        "level": ({"level": ""}, 0.1),
+        "cycle": ({"cycle": ""}, 0.1),
+        "pull": ({"force": "N"}, 0.1),
+        "late": ({}, None),
+    }
+    for name, (more, step) in runs.items():
+        run = swung(10.0)
+        channels = dict(run.channels) | dict.fromkeys(more, run["pressure"])
+        recording = Recording(channels, step, units=dict(run.units) | more)
+        workspace.add(recording, origin="", call="", name=name)
+    desk.settle_channels()
+    workspace.set_role(["pull", "late"], "unused")
+    assert not differing(desk)
+    assert obstacle(desk) == ""
+    workspace.set_role("pull", "train")
+    assert len(differing(desk)) == 3
+    workspace.set_role("pull", "unused")
+    workspace.set_role("late", "train")
+    assert "others have none (late)" in obstacle(desk)
     desk.jobs.close()
 
 

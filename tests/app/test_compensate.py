@@ -18,10 +18,12 @@ from nicegui import ui
 from nicegui.testing import User
 
 from mckibben import PI, Banded, Recording
+from mckibben.app.desk import Desk
 from mckibben.app.following import compensated, kept_motion
-from mckibben.app.jobs import note
+from mckibben.app.jobs import Jobs, note
 from mckibben.app.motions import reference_recording
 from mckibben.app.pages import closing, compensate
+from mckibben.app.work import fit
 from mckibben.app.workspace import Workspace
 from mckibben.blocks.core.block import Block
 from mckibben.blocks.core.fields import Channel
@@ -29,6 +31,7 @@ from mckibben.control import Twin, before
 from mckibben.registry import load
 from mckibben.rigs import rig_names
 from tests.app.test_pages import visit
+from tests.comparison.test_several import QUICKLY, hung
 
 WEAKER = replace(PI.example(), weights=tuple(0.9 * weight for weight in PI.example().weights))
 
@@ -282,6 +285,34 @@ def test_an_arm_without_a_run_to_compare_with_still_hears_what_else_is_to_be_kno
     assert without.startswith("there is no run without compensation: pressure_1, pressure_2")
 
 
+def test_under_dead_loads_a_person_gives_the_load_and_gets_pressures(tmp_path: Path) -> None:
+    workspace = Workspace(tmp_path)
+    for pull in (10.0, 20.0):
+        workspace.add(hung(pull), origin="", call="", name=f"hung{pull:g}")
+    desk = Desk(workspace, Jobs(workspace))
+    desk.settle_channels()
+    asked = {"model": "balance", "name": "balance", "settings": QUICKLY["balance"]}
+    fit(workspace, asked | desk.channels, lambda share, cost: None)
+    (row,) = desk.results()
+    assert (row["name"], row["input"], row["load"]) == ("balance", "pressure", "force")
+    taken: list[str] = []
+
+    async def look(user: User) -> None:
+        await drawn(user)
+        for pulled in (12.0, 18.0):
+            field(user, "force [N]").set_value(pulled)
+            await user.should_not_see(marker="take-pressures")
+            user.find(marker="show-pressures").click()
+            await until(user, "take-pressures")
+            user.find(marker="take-pressures").click()
+            taken.append((await user.download.next(timeout=20.0)).text)
+
+    visit(workspace, look)
+    assert [csv.splitlines()[0] for csv in taken] == ["time_s,pressure_bar"] * 2
+    light, heavy = (np.loadtxt(csv.splitlines()[1:], delimiter=",")[:, 1] for csv in taken)
+    assert heavy.mean() > light.mean() + 0.1
+
+
 def test_the_compensator_shown_is_taken_away(tmp_path: Path) -> None:
     async def look(user: User) -> None:
         user.find(marker="tab-take").click()
@@ -416,6 +447,27 @@ def test_what_is_commanded_is_called_what_it_is(tmp_path: Path) -> None:
         assert only(user, "controllers").options["feedforward"] == "Compensator alone (feedforward)"
 
     visit(workspace_with(tmp_path, a=valve, b=valve), look)
+
+
+def test_a_model_that_forgets_the_gap_is_doubted_before_it_estimates(tmp_path: Path) -> None:
+    estimator = load("blocks", "balance").example().inverse()
+    workspace = workspace_with(tmp_path, a=estimator, b=estimator)
+    channels = {c.name: np.linspace(1.0, 2.0, 50) for c in (*estimator.inputs, *estimator.outputs)}
+    workspace.add(Recording(channels, 0.1), origin="", call="", role="train", name="run")
+    for name, ratio in (("a", -0.013), ("b", 0.9)):
+        result = {"status": "ok", "model": "balance", "memory": {"gap_ratio": ratio}}
+        workspace.write_json("results", name, result)
+
+    async def look(user: User) -> None:
+        user.find(marker="tab-compensate").click()
+        await until(user, "forces")
+        only(user, "forces").open()
+        await until(user, "force-doubt")
+        assert "a keeps only −1.3 % of the gap" in only(user, "force-doubt").text
+        only(user, "force-model").set_value("b")
+        await user.should_not_see(marker="force-doubt")
+
+    visit(workspace, look)
 
 
 def test_a_force_is_estimated_first_of_what_nothing_was_trained_on(tmp_path: Path) -> None:

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mckibben import Recording
+from mckibben import Recording, write
+from mckibben.app.kept import Step
 from mckibben.app.workspace import Workspace
 from tests.app.browsing import SLOW, idle, opened, seen, visited, workbench
 from tests.tools import needs
@@ -76,14 +77,25 @@ def test_clicks_count_and_typed_values_stay_while_others_change(
     seen(page, "steps").get_by_text("resampled to 0.01 s").wait_for(timeout=SLOW)
 
 
+def test_a_row_stays_while_what_it_tells_changes(page: Any, workspace: Workspace) -> None:
+    """What is clicked on the way must not be taken away: a click on what is gone is lost."""
+    role = seen(page, "role-run-3").element_handle()
+    workspace.edit_each(RUNS, "halved", Step(do="resample", sample_time=0.04))
+    seen(page, "recording-run-3").get_by_text("150 samples").wait_for(timeout=SLOW)
+    role.query_selector("button:nth-of-type(2)").click()
+    until(page, lambda: workspace.entry("run-3").role == "test")
+
+
 def test_what_is_driven_and_moves_is_drawn_and_the_rest_is_named(page: Any) -> None:
     plot = seen(page, "preview-plot")
     for name in ("pressure", "displacement"):
         plot.get_by_text(name).first.wait_for(timeout=SLOW)
-    assert seen(page, "not-drawn").inner_text() == "Not drawn: voltage, force"
+    assert (
+        seen(page, "not-drawn").inner_text() == "Not drawn: flow, force"
+    )  # flow is without a unit
     seen(page, "draw-channels").click()
     page.get_by_role("option", name="force").click()
-    page.get_by_text("Not drawn: voltage", exact=True).wait_for(timeout=SLOW)
+    page.get_by_text("Not drawn: flow", exact=True).wait_for(timeout=SLOW)
     plot.get_by_text("force").first.wait_for(timeout=SLOW)
 
 
@@ -160,3 +172,18 @@ def test_the_open_page_stays_when_it_is_loaded_again(page: Any) -> None:
     page.get_by_text("Fit a model first").first.wait_for(timeout=SLOW)
     opened(page, "data")
     seen(page, "recording-run-0")
+
+
+def test_a_file_is_dropped_again_after_it_was_removed(
+    page: Any, workspace: Workspace, tmp_path: Path
+) -> None:
+    path = tmp_path / "again.csv"
+    write(recording(1), path)
+    chooser = page.locator("input[type=file]").first
+    for _ in range(2):
+        chooser.set_input_files(path)
+        seen(page, "recording-again")
+        idle(page)
+        page.get_by_role("button", name="Remove again").click()
+        page.get_by_test_id("recording-again").wait_for(state="detached", timeout=SLOW)
+    assert not page.get_by_text("MiB").count()

@@ -57,6 +57,10 @@ def test_no_option_of_the_command_line_reaches_a_page() -> None:
     ("text", "words"),
     [
         (
+            "models need it so, too: --zero displacement (mckibben.signals.zeroed).",
+            "models need it so, too: “Zero displacement there”, under Data.",
+        ),
+        (
             "these are assumed: voltage in V; say --unit CHANNEL=UNIT where that is wrong",
             "these are assumed: voltage in V; give units by “How it was read” where that is wrong",
         ),

@@ -114,7 +114,11 @@ def test_a_force_is_estimated_beside_the_measured_one(workspace: Workspace) -> N
     found = workspace.estimates()["try"]
     assert found.output == "force"
     assert found.rmse is not None
-    assert [curve.name for curve in found.curves] == ["measured", "estimated", "error"]
+    measured, estimated, error = found.curves
+    assert (measured.name, estimated.name) == ("measured", "estimated")
+    assert error.name == "measured − estimated"
+    y = [np.array(curve.y, dtype=float) for curve in (measured, estimated, error)]
+    np.testing.assert_allclose(y[2], y[0] - y[1], atol=1e-4)
 
 
 def test_steps_and_cycles_are_those_of_the_training_recordings(workspace: Workspace) -> None:

@@ -15,6 +15,7 @@ from mckibben.app import reading as app_reading
 from mckibben.app.desk import Desk
 from mckibben.app.jobs import Jobs
 from mckibben.app.kept import Reading, Step
+from mckibben.app.pages.data import told_of
 from mckibben.app.reading import columns, options, read_upload, untold
 from mckibben.app.recordings import EXAMPLE
 from mckibben.app.workspace import Workspace
@@ -476,6 +477,22 @@ def test_a_unit_that_was_assumed_is_not_where_it_is_said_later(tmp_path: Path) -
     assert workspace.entry("rig").notes == (assumed, "mended")
     adding.replaced(desk, ["rig"], Reading(columns={"force": "voltage"}, units={"force": "N"}))
     assert workspace.entry("rig").notes == ("mended",)
+
+
+def test_units_that_were_converted_are_told_once(tmp_path: Path) -> None:
+    workspace = Workspace(tmp_path / "ws")
+    desk = Desk(workspace, Jobs(workspace))
+    rows = "\n".join(f"{0.1 * k:.1f},{k % 9},{k % 7}" for k in range(40))
+    for name in ("first", "second"):
+        path = workspace.keep_upload(
+            f"{name}.csv", f"time_s,pressure_kPa,angle_deg\n{rows}".encode()
+        )
+        (read_so,) = read_upload(path)
+        workspace.add(read_so, origin="", call="", name=name)
+    desk.settle_channels()
+    converted = "; converted: pressure from kPa to bar, angle from deg to rad"
+    assert adding.understood(workspace.recording("first")).endswith(converted)
+    assert told_of(desk).endswith(converted)
 
 
 def test_what_is_plain_is_no_warning(tmp_path: Path) -> None:

@@ -68,6 +68,40 @@ def test_words_and_picture_are_of_the_input_that_moves_an_output_most(tmp_path: 
     visit(workspace, look)
 
 
+def test_a_loop_is_drawn_over_an_input_that_moves_in_its_recording(tmp_path: Path) -> None:
+    workspace = arm(tmp_path)
+    first = workspace.recording("arm").slice(0, 400)  # in which the first muscle moves alone
+    workspace.add(first, origin="a test", call="", name="first")
+
+    async def look(user: User) -> None:
+        user.find(marker="tab-look").click()
+        await user.should_see("displacement_1 over pressure_3", retries=100)
+        (chosen,) = user.find(marker="look-recording").elements
+        assert isinstance(chosen, ui.select)
+        chosen.set_value("first")
+        await user.should_see("displacement_1 over pressure_1", retries=100)
+        user.find(marker="pair-pressure_1-displacement_2").click()
+        await user.should_see("displacement_2 over pressure_1", retries=100)
+        chosen.set_value("arm")
+        await user.should_see("Cycle, of 4", retries=100)
+        await user.should_see("displacement_2 over pressure_1")
+
+    visit(workspace, look)
+
+
+def test_names_of_axes_that_stand_above_each_other_are_short(tmp_path: Path) -> None:
+    async def look(user: User) -> None:
+        await user.should_see(marker="preview-plot", retries=100)
+        (plot,) = user.find(marker="preview-plot").elements
+        assert isinstance(plot, ui.plotly)
+        layout = plot.figure["layout"]
+        titles = [axis["title"]["text"] for key, axis in layout.items() if key.startswith("yaxis")]
+        assert titles[0] == "pressure_1<br>[bar]"
+        assert len(titles) == 5
+
+    visit(arm(tmp_path), look)
+
+
 def test_another_theme_draws_pictures_anew_and_nothing_else(tmp_path: Path) -> None:
     async def look(user: User) -> None:
         user.find(marker="tab-look").click()

@@ -115,6 +115,7 @@ def test_recordings_of_two_muscles_get_models_that_couple_them(tmp_path: Path) -
         await user.should_see(marker="leaderboard")
         await user.should_see("2 inputs (pressure_1, pressure_2); 2 outputs")
         for model in models:
+            await user.should_see(marker=f"model-{model}", retries=100)
             (box,) = user.find(marker=f"model-{model}").elements
             assert isinstance(box, ui.checkbox)
             assert box.value
@@ -155,6 +156,18 @@ def test_models_of_other_channels_are_not_compared(tmp_path: Path) -> None:
     assert [result["name"] for result in desk.results()] == ["mine"]
     desk.outputs = ("force",)
     assert [result["name"] for result in desk.results()] == ["other"]
+
+
+def test_models_that_are_of_other_channels_are_told_of(tmp_path: Path) -> None:
+    workspace = filled(tmp_path)
+    result = {"status": "ok", "model": "pi", "input": "pressure", "output": "force"}
+    workspace.write_json("results", "other", result)
+
+    async def look(user: User) -> None:
+        user.find(marker="tab-models").click()
+        await user.should_see("chosen under Data: pressure to force.", retries=100)
+
+    visit(workspace, look)
 
 
 def test_a_damaged_recording_is_told_and_harms_nothing_else(tmp_path: Path) -> None:
@@ -273,6 +286,15 @@ def test_of_one_channel_no_model_is_offered(tmp_path: Path) -> None:
     desk.jobs.close()
 
 
+def test_ticks_between_decades_are_whole_numbers() -> None:
+    seconds, costs = np.array([[0.0, 1.0, 2.0], [0.5, 0.3, 0.2]], dtype=np.float64)
+    figure = plots.lines(
+        [("cost", seconds, costs, "series-1")], x="time [s]", y="cost", logarithmic=True
+    )
+    axis = figure["layout"]["yaxis"]
+    assert (axis["type"], axis["tickformat"]) == ("log", "~g")
+
+
 def test_a_model_that_fails_on_the_test_alone_is_named() -> None:
     def result(name: str, validated: float, tested: float) -> dict[str, Any]:
         constant = {"test": {"rmse": 38.0}, "validation_rmse": 38.0}
@@ -281,6 +303,7 @@ def test_a_model_that_fails_on_the_test_alone_is_named() -> None:
             "current": True,
             "chosen_by": "cross-validation",
             "shared": [],
+            "split": "last 80 samples of run to test, all before to fit",
             "test": {"rmse": tested},
             "validation_rmse": validated,
             "constant": constant,
@@ -292,3 +315,4 @@ def test_a_model_that_fails_on_the_test_alone_is_named() -> None:
     (said,) = [text for text in leaderboard.judged(rows) if "hardly better" in text]
     assert said.startswith("unlike: ")
     assert not any("hardly" in text for text in leaderboard.judged(rows[:1]))
+    assert leaderboard.judged(rows)[0] == "Last 80 samples of run to test, all before to fit."

@@ -161,6 +161,7 @@ def test_numbers_with_odd_blanks_are_numbers(tmp_path: Path) -> None:
         ("pressure (bar)", 1e300, "--unit pressure="),
         ("pressure (kPa)", 1e300, "--unit pressure="),
         ("pressure (MPa)", 300.0, "--unit pressure="),
+        ("pressure (bar)", 4.9e5, "--unit pressure=Pa"),
         ("displacement (mm)", 1e9, "--unit displacement="),
         ("displacement (km)", 1e3, "--unit displacement="),
         ("force (GN)", 1.0, "--unit force="),
@@ -174,6 +175,13 @@ def test_declared_units_that_cannot_be_stop(
     with pytest.raises(DataError, match="which cannot be") as caught:
         read(path)
     assert remedy in caught.value.remedy
+
+
+def test_a_travel_in_metres_under_millimetres_is_doubted(tmp_path: Path) -> None:
+    travel = [f"{0.02 * k / N:.6f}" for k in range(N)]
+    with pytest.warns(DataWarning, match=r"travels 0.0195 mm in all; where it is in m, use --unit"):
+        read(table(tmp_path, "displacement_mm", travel))
+    read(table(tmp_path, "displacement_m", travel))
 
 
 @pytest.mark.parametrize(("channel", "unit"), [("pressure", "mPa"), ("displacement", "Gm")])
@@ -214,7 +222,7 @@ def test_counts_since_1970_are_recognised_and_said(
         recording = read(timed(tmp_path, "timestamp", times))
     assert recording.sample_time == pytest.approx(0.01, rel=1e-3)
     assert read(timed(tmp_path, f"time_{unit}", times)).sample_time == pytest.approx(0.01, rel=1e-3)
-    with pytest.raises(DataError, match=r"which cannot be.*--unit time=ms"):
+    with pytest.raises(DataError, match=f"which cannot be.*--unit time={unit}"):
         read(timed(tmp_path, "time_s", times))
 
 

@@ -222,3 +222,11 @@ def test_saving_replaces_and_keeps_to_the_umask(tmp_path: Path) -> None:
 def test_from_dict_wants_a_mapping() -> None:
     with pytest.raises(ModelError, match="not a saved model"):
         saving.from_dict([("kind", "pi")])  # type: ignore[arg-type]
+
+
+def test_a_file_that_a_windows_editor_has_saved_again_is_read(tmp_path: Path) -> None:
+    path = tmp_path / "model.json"
+    block = GPI.example()
+    block.save(path)
+    path.write_bytes(b"\xef\xbb\xbf" + path.read_bytes())
+    assert load(path) == block

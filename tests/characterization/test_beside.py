@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from mckibben import PI, DataError, Recording, read
 from mckibben.characterization import characterize
 from mckibben.characterization.beside import effects, without
-from mckibben.signals import multisine, noise_level
+from mckibben.signals import multisine, noise_level, zeroed
 from tests.characterization.test_measured import DATA
 
 STEP = 0.01
@@ -43,6 +43,10 @@ def test_zeros_that_differ_are_told() -> None:
     assert "rest at different displacement, from" in found.sentences[-1]
     low, high = found.output_range
     assert high - low == pytest.approx(np.ptp(run(0.0, 1)["displacement"]), rel=0.02)
+    one = zeroed(run(0.0, 1), ["displacement"], "pressure")
+    assert (low, high) == pytest.approx(  # no positions that never were
+        (one["displacement"].min(), one["displacement"].max()), abs=0.1
+    )
 
 
 def test_curves_that_differ_from_length_to_length_hide_no_loop() -> None:
@@ -83,10 +87,19 @@ def test_what_another_input_does_is_not_taken_for_the_own() -> None:
     assert apart.n_stretches > 1
 
 
-def test_inputs_that_never_move_alone_are_refused() -> None:
-    together = two(np.concatenate([SLOW[::-1] * (1 + TIME / 30), np.zeros(1000)]))
-    with pytest.raises(DataError, match="never moves while pressure_2 rest"):
-        characterize(together.slice(0, 3000), "pressure_1", "displacement", beside=["pressure_2"])
+def test_inputs_that_never_move_alone_are_told_without_what_others_do() -> None:
+    other = 2 + 2 * np.sin(2 * np.pi * np.arange(4000) * STEP / 13)
+    clean = characterize(two(np.zeros(4000)), "pressure_1", "displacement")
+    found = characterize(two(other), "pressure_1", "displacement", beside=["pressure_2"])
+    assert found.loop_width == pytest.approx(clean.loop_width, rel=0.2)
+    assert [effect.change for effect in found.effects] == pytest.approx([28.0], rel=0.05)
+    assert found.sentences[-1].startswith("As pressure_1 never moves while pressure_2 rests")
+
+
+def test_inputs_that_move_as_one_are_refused() -> None:
+    one = two(0.5 * np.concatenate([SLOW, np.zeros(1000)])).slice(0, 3000)
+    with pytest.raises(DataError, match="never moves while pressure_2 rests"):
+        characterize(one, "pressure_1", "displacement", beside=["pressure_2"])
 
 
 def test_fast_motion_is_no_noise() -> None:
@@ -154,6 +167,70 @@ def test_a_load_that_is_held_in_each_recording_moves_the_output_and_not_the_loop
     assert found.sentences[2].startswith("At equal pressure, displacement falls by 6.1 mm")
     assert [row[1] for row in found.table() if row[0] == "effect of force"] == [effect.change]
     assert found.to_dict()["effects"][0]["channel"] == "force"
+
+
+def isometric(length: float, gain: float, gap: float, seed: int) -> Recording:
+    """Return three cycles of force at a length, whose branches are apart by some of its range."""
+    lag = gap * np.sin(2 * np.pi * TIME / 10.0)
+    noise = 0.5 * np.random.default_rng(seed).standard_normal(TIME.size)
+    force = gain * (SLOW - lag) - 5 * length + noise
+    still = np.full(TIME.size, length)
+    return Recording({"pressure": SLOW, "displacement": still, "force": force}, STEP)
+
+
+LENGTHS = ((0.0, 200.0, 0.1), (10.0, 140.0, -0.05), (20.0, 70.0, -0.2))
+"""Held, with the gain there; loops that go round either way hide each other."""
+
+
+@pytest.mark.parametrize("asked", [(), ("displacement",)])
+def test_every_held_length_has_its_loop_and_its_gain(asked: tuple[str, ...]) -> None:
+    runs = [isometric(*each, seed) for seed in range(2) for each in LENGTHS]
+    found = characterize(runs, output="force", beside=asked)
+    assert found.has_loop
+    assert [level.held for level in found.levels] == [
+        (("displacement", length, "mm"),) for length, _, _ in LENGTHS
+    ]
+    for level, (length, gain, gap) in zip(found.levels, LENGTHS, strict=True):
+        alone = characterize(
+            [isometric(length, gain, gap, seed) for seed in range(2)], output="force"
+        )
+        assert level.found.gain == pytest.approx(gain, rel=0.05)
+        assert level.found.loop_width == alone.loop_width
+        assert level.found.to_dict() == alone.to_dict() | {
+            "cycles": level.found.to_dict()["cycles"]
+        }
+    assert (found.gain, found.loop_width) == (
+        found.levels[0].found.gain,
+        found.levels[0].found.loop_width,
+    )
+    assert (found.n_recordings, found.n_samples) == (6, 6 * TIME.size)
+    assert [cycle.recording for cycle in found.cycles] == sorted(3 * list(range(6)))
+    (effect,) = found.effects
+    assert effect.channel == "displacement"
+    assert effect.change == pytest.approx(-5 * 20 - 130 * 2.5, rel=0.1)
+    assert found.sentences[3].startswith("Where displacement rests at 0 mm, force has a loop of")
+    assert "; at 20 mm, a loop of" in found.sentences[3]
+    assert found.sentences[-1].startswith("Told where displacement rests at 0 mm")
+    rows = {name: value for name, value, _, _ in found.table()}
+    assert rows["gain at 10 mm"] == found.levels[1].found.gain
+    assert [level["held"]["displacement"] for level in found.to_dict()["levels"]] == [0, 10, 20]
+
+
+def test_a_length_at_which_nothing_moves_hides_no_other() -> None:
+    slack = isometric(30.0, 0.0, 0.0, 0)
+    slack = slack.with_channels({"force": "N"}, force=np.zeros(TIME.size))
+    found = characterize([isometric(*LENGTHS[0], 0), slack], output="force")
+    assert found.has_loop
+    assert [level.at for level in found.levels] == ["0 mm"]
+
+
+def test_zeros_that_differ_under_one_load_are_no_effect_of_the_load() -> None:
+    held = [loaded(np.full(TIME.size, load)) for load in (0.0, 300.0, 300.0)]
+    zero = held[2].with_channels({"displacement": "mm"}, displacement=held[2]["displacement"] + 50)
+    found = characterize([*held[:2], zero], beside=["force"])
+    assert abs(found.effects[0].change) < 0.5  # what hangs at rest is zeroed, too
+    assert found.output_range[1] == pytest.approx(held[0]["displacement"].max(), abs=4.0)
+    assert "rest at different displacement" in found.sentences[-2]
 
 
 def test_what_a_load_does_can_be_taken_away() -> None:

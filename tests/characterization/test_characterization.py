@@ -21,6 +21,7 @@ Array = NDArray[np.float64]
 
 STEP = 0.01
 TIME = np.arange(10_001) * STEP
+HIDDEN = "largest gap that noise hides"
 RAMP: Array = np.arange(50, dtype=float)
 
 
@@ -261,6 +262,12 @@ def test_noise_moves_nothing_much(seed: int) -> None:
     assert found.loop_area_share == pytest.approx(clean.loop_area_share, abs=1.5)
 
 
+def test_what_a_regulator_hunts_over_is_no_minor_loop() -> None:
+    wave = triangle(TIME, 100.0, 4.0) + 0.06 * np.sin(np.pi * TIME)
+    assert characterize(run(wave, play(wave, 0.3))).n_reversals > 10
+    assert characterize(run(wave, play(wave, 0.3))).closure_error is None
+
+
 def test_minor_loops_do_not_part_a_cycle() -> None:
     levels = [0.0, 2.0, 1.8, 4.0, 2.5, 2.8, 0.0, 2.0, 1.8, 4.0, 2.5, 2.8, 0.0]
     ways = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(levels)))])
@@ -301,6 +308,8 @@ def vented(seed: int, cycles: int = 1, gap: float = 0.0, noise: float = 5e-4) ->
 def test_loops_of_muscles_blown_up_and_vented_are_told(cycles: int, seed: int) -> None:
     found = characterize(vented(seed, cycles, gap=0.05))
     assert found.has_loop
+    assert found.widest_gap is not None
+    assert HIDDEN not in [name for name, value, *_ in found.table() if value is not None]
     assert found.mid_width == pytest.approx(60.0, rel=0.25)
     assert found.branch_gap is not None
     assert any("drift would part" in sentence for sentence in found.sentences) == (cycles == 1)
@@ -322,6 +331,7 @@ def test_where_noise_would_hide_a_loop_none_is_denied(seed: int) -> None:
     assert found.has_loop is None
     assert found.widest_gap is not None
     assert found.widest_gap > 0.04
+    assert HIDDEN in [name for name, value, *_ in found.table() if value is not None]
     assert "cannot be told" in found.sentences[0]
     assert "record several cycles" in found.sentences[0]
     assert "along a curve without memory" not in " ".join(found.sentences)

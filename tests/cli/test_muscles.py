@@ -256,3 +256,13 @@ def test_one_muscle_is_told_which_input_was_taken_and_what_lies_beyond(
     write(Recording({**given, "force": 2.0 * given["force"]}, 0.05), tmp_path / "heavy.csv")
     result = cli("simulate", model, tmp_path / "heavy.csv", "-o", tmp_path / "out.csv", "--force")
     assert "in heavy, force goes from" in result.out.replace("\n", " ")
+
+
+def test_a_comparison_that_leaves_no_model_ends_with_an_error(cli: Cli, arm: Path) -> None:
+    runs = sorted(arm.glob("*drive-123.csv"))
+    result = cli("compare", *runs[:2], "--test", runs[2], "--models", "pi,gpi", "--jobs", 1)
+    assert result.code == 1
+    assert "Traceback" not in result.err
+    models = ("pi", "coupled-memory")
+    result = cli("compare", *runs[:2], "--test", runs[2], "--models", ",".join(models), "--jobs", 1)
+    assert result.code == 0

@@ -34,6 +34,11 @@ def test_figures_have_units_and_digits_and_rounding_errors_are_nothing() -> None
     }
 
 
+def test_a_share_of_the_variance_below_nothing_has_no_size() -> None:
+    row = ROW | {"test": {"rmse": 0.25, "r2": -24.99}}
+    assert shown(row)["R² [%]"] == "below 0"
+
+
 def test_without_a_unit_there_are_no_brackets() -> None:
     assert "CV RMSE" in shown(ROW, "")
 

@@ -4,8 +4,17 @@ from __future__ import annotations
 
 import pytest
 
-from mckibben import ModelError
-from mckibben.comparison.offered import settings_of, settings_of_all
+from mckibben import ModelError, registry
+from mckibben.comparison.needs import full_name
+from mckibben.comparison.offered import settings_of, settings_of_all, summary
+
+
+def test_a_model_is_told_by_what_it_can_and_not_by_how_it_is_fitted() -> None:
+    for model in registry.names("estimators"):
+        said = summary(model)
+        assert said.startswith(f"{full_name(model)}. ")
+        assert "variable projection" not in said
+    assert "Asymmetric, saturating loops between two envelopes" in summary("gpi")
 
 
 def test_settings_are_read_as_json_or_words() -> None:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mckibben import GPI, DataError, Recording, compare
-from mckibben.comparison.channels import Channels, channels_of
+from mckibben import GPI, DataError, Recording, compare, registry
+from mckibben.comparison.channels import Channels, channels_of, dead_loads_told
 from mckibben.comparison.planning import plan_of
 from mckibben.comparison.splits import ENOUGH, held_out, validation_folds
 from mckibben.signals import triangle
@@ -68,6 +68,69 @@ def test_a_load_that_only_some_models_find_is_said(models: list[str], told: str)
 def test_no_model_is_told_what_it_is_to_give(load: str) -> None:
     with pytest.raises(DataError, match="named twice"):
         compare([run(3.0)], run(4.0), load=load, models=["coupled-memory"], jobs=1)
+
+
+def hung(load: float, seed: int = 0) -> Recording:
+    """Return a muscle under a dead load that stretches it."""
+    moved = GPI.example().simulate(wave := triangle(TIME + seed, 7.0, 4.0)) - 0.2 * load
+    moved += 0.01 * np.random.default_rng(seed).standard_normal(TIME.size)
+    channels = {"pressure": wave, "displacement": moved, "force": np.full(TIME.size, load)}
+    return Recording(channels, 0.05, meta={"name": f"under {load:g} N"})
+
+
+def test_a_force_beside_other_inputs_is_given_and_never_commanded() -> None:
+    runs = [hung(10.0), hung(20.0, 1)]
+    told = Channels(("pressure",), ("displacement",), ("force",))
+    assert channels_of(runs, ["pressure", "force"], None, None) == told
+    assert channels_of(runs, "force", None, None) == Channels(("force",), ("displacement",))
+    both = ["pressure", "force"]
+    plan = plan_of(runs, [], inputs=both, models=["balance"], settings=None, seed=0)
+    assert plan.board().inputs == ("pressure",)
+    assert any("force is a load" in note and "never commanded" in note for note in plan.notes)
+    with pytest.raises(DataError, match="no such channel to tell the load"):
+        channels_of([*runs, hung(5.0).select(["pressure", "displacement"])], both, None, None)
+
+
+def test_only_what_is_held_at_a_level_of_each_recording_is_a_dead_load() -> None:
+    one = Channels(("pressure",), ("displacement",))
+    shaken = 0.3 * np.random.default_rng(0).random(TIME.size)
+    noisy = [run.with_channels(force=run["force"] + shaken) for run in (hung(10.0), hung(20.0, 1))]
+    assert dead_loads_told([hung(10.0), hung(20.0)], one).scheduling == ("force",)
+    assert dead_loads_told(noisy, one).scheduling == ("force",)
+    assert dead_loads_told([hung(10.0), hung(10.0)], one) == one
+    varied = hung(10.0).with_channels(force=TIME.astype(float))
+    assert dead_loads_told([varied, hung(20.0)], one) == one
+
+
+QUICKLY = {"balance": {"n_stops": 2, "n_lags": 0, "steps": 2, "elasticity": 3, "contact": False}}
+
+
+def test_under_two_dead_loads_a_model_is_ranked_whether_it_is_told_them_or_not() -> None:
+    runs = [hung(10.0), hung(20.0, 1)]  # of which a part left out leaves one load
+    (found,) = compare(runs, models=["balance"], settings=QUICKLY, jobs=1).rows
+    assert found.reason is None
+    assert found.band is None
+    told = compare(
+        runs, inputs=["pressure", "force"], models=["balance"], settings=QUICKLY, jobs=1
+    ).best
+    assert told is not None
+    assert told.model == "balance"
+    assert told.band is not None
+    assert told.block is not None
+    assert [channel.name for channel in told.block.inverse().outputs] == ["pressure"]
+    assert found.validation_rmse is not None
+    assert told.validation_rmse is not None
+    assert told.validation_rmse < 0.5 * found.validation_rmse
+
+
+@pytest.mark.parametrize("name", ["force", "weight"])
+def test_a_model_named_with_a_force_as_input_is_given_it(name: str) -> None:
+    runs = [
+        run.select(["pressure", "displacement"]).with_channels({name: "N"}, **{name: run["force"]})
+        for run in (hung(10.0), hung(20.0, 1))
+    ]
+    estimator = registry.load("estimators", "coupled-memory")(input=("pressure", name))
+    assert estimator.fit(runs).model_.scheduling == (name,)
 
 
 def test_a_model_of_one_muscle_named_for_several_says_so() -> None:

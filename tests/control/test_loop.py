@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -13,10 +14,12 @@ import pytest
 
 from mckibben import PI, DataError, ModelError, Recording, load, load_rig, write
 from mckibben.blocks.core.fields import Channel
+from mckibben.blocks.coupled.balance import Balance
 from mckibben.blocks.feedback.feedforward_feedback import FeedforwardFeedback
 from mckibben.blocks.feedback.pid import PIDFeedback
-from mckibben.control import DisturbanceObserver, control_law, track, tune_pid
+from mckibben.control import DisturbanceObserver, Twin, control_law, track, tune_pid
 from mckibben.control.pressure_loop import PressureLoop
+from mckibben.errors import ModelWarning
 from tests.cli.conftest import Cli
 from tests.cli.conftest import cli as cli  # a fixture
 
@@ -208,3 +211,22 @@ def test_fast_motion_is_not_taken_for_swinging() -> None:
         total += 2.0 * 0.01 * (wanted - plain) * (0.0 < asked < 5.0)
         plain += (min(max(asked, 0.0), 5.0) - plain) * 0.01 / 0.5
         assert pressure[0] == pytest.approx(plain, abs=1e-12)
+
+
+def test_what_the_compensator_of_several_muscles_clips_is_counted() -> None:
+    """Each displacement may be within reach, and both together not."""
+    inverse = replace(Balance.example(), pressure_range=(0.0, 2.0))
+    n = 400
+    waves = {"displacement_1": 12 * np.sin(np.arange(n) / 40) ** 2, "displacement_2": np.zeros(n)}
+    names = [channel.name for channel in inverse.outputs]
+    held = {"pressure_extensor": np.zeros(n), "force": np.zeros(n)}
+    wanted = Recording(waves | held, 0.02)
+    state = inverse.final_state(wanted)
+    with pytest.warns(ModelWarning, match="samples need"):
+        inverse.report(state)
+    plant = Twin(Balance.example().inverse(), limits=dict.fromkeys(names, (0.0, 2.0)))
+    found = track(inverse, plant, wanted, approach=0.0, pressure_loop=False)
+    assert 0 < inverse.n_clipped(state) < n
+    # what is asked for at the last step is due after the end
+    assert inverse.n_clipped(state) - 1 <= found.clipped <= inverse.n_clipped(state)
+    assert found.clipping_cost > 0

@@ -74,6 +74,13 @@ def test_every_model_has_a_page_with_its_equations(site: Path) -> None:
             assert f">{part}<" in text, (model, part)
 
 
+def test_symbols_in_words_are_set_as_mathematics(site: Path) -> None:
+    for model in ("mpi", "gpi", "kp"):
+        text = (site / "_generated" / "models" / f"{model}.html").read_text(encoding="utf-8")
+        words = re.sub(r"<[^>]+>", "", text.partition('id="in-words"')[2])
+        assert not re.findall(r"\bsum_|\b[uwy]_[ijt]\b", words), model
+
+
 def test_pages_say_what_has_an_inverse_and_what_data_are_of(site: Path) -> None:
     def said(model: str) -> str:
         text = (site / "_generated" / "models" / f"{model}.html").read_text(encoding="utf-8")

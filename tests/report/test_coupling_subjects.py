@@ -23,6 +23,34 @@ def test_effects_are_those_of_inputs_over_their_ranges() -> None:
     assert len(coupling_subjects.matrix(arm(), found).panels) == 4
 
 
+def held(channel: str) -> Recording:
+    """Return the arm with an input that rests."""
+    values = {name: arm()[name] for name in arm().channels}
+    return Recording(values | {channel: np.zeros(400)}, 0.01, arm().units)
+
+
+def test_an_output_is_drawn_over_an_input_that_moves_where_it_is_drawn() -> None:
+    runs = [held("u1"), held("u2")]
+    found = coupling_subjects.coupling(runs, ("u1", "u2"), ("y1", "y2"))
+    assert found.pairs(runs) == (("u1", "y1"), ("u2", "y2"))
+    assert found.pairs(runs[:1]) == (("u2", "y1"), ("u2", "y2"))
+    assert found.pairs(runs[1:]) == (("u1", "y1"), ("u1", "y2"))
+    colours = [panel.curves[0].colour for panel in coupling_subjects.matrix(runs[1], found).panels]
+    assert colours == ["series-1", "input", "series-1", "input"]
+    most = coupling_subjects.coupling([arm()], ("u1", "u2"), ("y2",))
+    assert most.pairs([arm()]) == (("u2", "y2"),)
+    assert most.pairs([held("u2")]) == (("u1", "y2"),)
+
+
+def test_where_the_input_is_held_what_else_drives_is_drawn_over() -> None:
+    wave = np.sin(np.arange(100) / 5)
+    values = {"displacement": np.zeros(100), "pressure": wave, "force": 3 * wave}
+    found = coupling_subjects.coupling([Recording(values, 0.1)], ("displacement",), ("force",))
+    assert found.pairs([Recording(values, 0.1)]) == (("pressure", "force"),)
+    rest = Recording(values | {"pressure": np.zeros(100)}, 0.1)
+    assert found.pairs([rest]) == (("displacement", "force"),)
+
+
 def test_inputs_that_move_together_have_no_effects_of_their_own() -> None:
     found = coupling_subjects.coupling([arm(shared=True)], ("u1", "u2"), ("y1", "y2"))
     assert np.isnan(found.effects).all()

@@ -2,11 +2,16 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from mckibben.blocks.core.fields import Channel
+from mckibben.blocks.coupled.coupling import Coupling
 from mckibben.blocks.play_type.gpi import GPI
 from mckibben.errors import DataError, ModelError
+from mckibben.recording import Recording
 from mckibben.report import printed
+from mckibben.report.drawing import Drawing
 from mckibben.report.figures import (
     FIGURES,
     MODEL_KINDS,
@@ -49,6 +54,25 @@ def test_many_recordings_are_named_where_they_are_not_drawn(tmp_path: Path) -> N
     many = [measured(60, seed=k, name=f"run {k}") for k in range(8)]
     plot_model(GPI.example(), many, "fit", tmp_path / "figure.pdf")
     printed.save(FIGURES["loops"](study(tuple(many[:4]), tuple(many[4:]))), tmp_path / "loops.pdf")
+
+
+def test_a_model_is_drawn_over_an_input_that_moves(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    drawn: list[Drawing] = []
+    monkeypatch.setattr(printed, "save", lambda drawing, path: drawn.append(drawing))
+    wave = np.sin(np.arange(100) / 5)
+    pressures = [(wave, 0 * wave), (0 * wave, wave), (wave, wave**2)]
+    names = ("pressure_1", "pressure_2", "displacement")
+    runs = [
+        Recording(dict(zip(names, (one, two, one + 2 * two), strict=True)), 0.1)
+        for one, two in pressures
+    ]
+    driven = (Channel("pressure_1", "bar"), Channel("pressure_2", "bar"))
+    block = Coupling(((1.0,), (2.0,)), driven, (Channel("displacement", "mm"),))
+    plot_model(block, runs, "loops", tmp_path / "figure.pdf")
+    found = [panel.x_label.partition(" ")[0] for panel in drawn[0].panels]
+    assert found == ["pressure_1", "pressure_2", "pressure_2"]
 
 
 def test_unknown_kinds_list_the_known_ones(tmp_path: Path) -> None:

@@ -12,6 +12,7 @@ import pytest
 
 from mckibben.blocks.play_type.gpi import GPI
 from mckibben.blocks.play_type.pi import PI
+from mckibben.recording import Recording
 from mckibben.report import write_report
 from mckibben.report.page import page
 from mckibben.studying.study import Study
@@ -154,6 +155,19 @@ def test_hostile_names_stay_words(name: str) -> None:
     title = parsed.figures["loop"][0][0]["layout"]["xaxis"]["title"]["text"]
     assert title.startswith("pressure")
     assert "<" not in title
+
+
+def test_the_coupling_picture_names_its_recording() -> None:
+    def run(still: bool, name: str) -> Recording:
+        one = measured(300, name=name)
+        other = one["pressure"][::-1] * (not still)
+        values = {channel: one[channel] for channel in one.channels} | {"pressure_2": other}
+        return Recording(values, 0.01, meta=one.meta)
+
+    base = study((run(False, "all of them"),), (run(True, "one alone"),))
+    inputs = ("pressure", "pressure_2")
+    found = Parsed(page(replace(base, leaderboard=replace(base.leaderboard, inputs=inputs))))
+    assert "(columns), of all of them." in found.words
 
 
 def test_one_recording_without_time_is_enough() -> None:

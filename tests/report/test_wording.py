@@ -43,7 +43,7 @@ def test_the_verdict_names_the_model_its_error_with_unit_and_range_and_the_inver
     assert "Chosen by cross-validation on the training side: gpi" in words
     assert "neither fitted to nor chosen by, gpi is off by" in words
     assert f"{number(best.test.rmse)} mm" in words
-    assert "% of the recorded range" in words
+    assert f"{percent(best.test.nrmse)} of the range of the test" in words
     assert "It can be inverted" in words
 
 
@@ -83,7 +83,7 @@ def test_next_steps_answer_what_is_wrong() -> None:
     assert best.test is not None
     bad = replace(
         best,
-        test=replace(best.test, rmse=5.0),
+        test=replace(best.test, rmse=5.0, nrmse=0.5),
         memory=Memory(gap_ratio=0.2, n_pairs=10, hold_ratio=1.0),
     )
     worse = replace(found, leaderboard=replace(found.leaderboard, rows=(bad, *others)))

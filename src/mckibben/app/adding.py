@@ -120,6 +120,8 @@ def understood(recording: Recording) -> str:
     """Return what was understood of a file: channels, time, and columns that were left out."""
     said = ", ".join(f"{c} in {recording.units[c] or 'no unit'}" for c in recording.channels)
     said += "; no time column" if recording.sample_time is None else ""
+    if converted := recording.meta.get("converted_units"):
+        said += f"; converted: {', '.join(map(str, converted))}"
     ignored = recording.meta.get("ignored_columns") or ()
     if ignored:
         said += f"; left out: {', '.join(map(str, ignored))}"

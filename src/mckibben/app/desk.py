@@ -22,6 +22,9 @@ from mckibben.errors import MckibbenError
 if TYPE_CHECKING:
     from nicegui.elements.upload_files import FileUpload
 
+    from mckibben.comparison.channels import Channels
+    from mckibben.recording import Recording
+
 SHARED = ("recordings", "results", "runs", "log")
 """Topics of the workspace; the others are of one page."""
 
@@ -65,38 +68,46 @@ class Desk:
         return self.outputs[0]
 
     @property
+    def sides(self) -> Channels:
+        """What is modelled, of what, and what is given beside: loads are never commanded."""
+        from mckibben.comparison.channels import Channels, dead_loads_told, loads_told
+
+        used = self.workspace.used()
+        roles = {entry.name: entry.role for entry in self.workspace.entries()}
+        train = [run for name, run in used.items() if roles.get(name) == "train"]
+        recordings = train or list(used.values())
+        found = loads_told(recordings, Channels(self.inputs, self.outputs))
+        return dead_loads_told(recordings, found)
+
+    @property
     def channels(self) -> dict[str, str | list[str]]:
-        """Input and output, or all of them, as the library's functions take them."""
-        named = {"input": self.inputs, "output": self.outputs}
-        return {key: names[0] if len(names) == 1 else list(names) for key, names in named.items()}
+        """Input and output, or all of them, and the load, as the library's functions take them."""
+        sides = self.sides
+        named = {"input": sides.inputs, "output": sides.outputs}
+        found = {key: names[0] if len(names) == 1 else list(names) for key, names in named.items()}
+        return found | ({"load": sides.scheduling[0]} if sides.scheduling else {})
 
-    @property
-    def pairs(self) -> tuple[tuple[str, str], ...]:
-        """Every output with the input that is its own."""
-        from mckibben.comparison.channels import Channels
-
-        return Channels(self.inputs, self.outputs).pairs()
-
-    @property
-    def looked_at(self) -> tuple[tuple[str, str], ...]:
-        """Every output with what moves it: of several inputs the most; where one is held, another."""
-        from mckibben.comparison.recognising import moved_by
+    def looked_at(self, recordings: Sequence[Recording] = ()) -> tuple[tuple[str, str], ...]:
+        """Return what every output of recordings, or of all there are, is drawn over, and the output."""
         from mckibben.report.coupling_subjects import coupling
 
         used = list(self.workspace.used().values())
-        if len(self.inputs) > 1:
-            own = coupling(used, self.inputs, self.outputs).own
-            return tuple((own(wanted), wanted) for wanted in self.outputs)
-        others = [name for name in self.workspace.channels() if name not in self.outputs]
-        return tuple((moved_by(used, given, others), wanted) for given, wanted in self.pairs)
+        sides = self.sides
+        return coupling(used, sides.inputs, sides.outputs).pairs(recordings or used)
 
     def results(self) -> list[dict[str, Any]]:
         """Return what is known of the models of these channels: other errors do not compare."""
-        named = ", ".join(self.inputs), ", ".join(self.outputs)
+        sides = self.sides
+        named = [", ".join(side) for side in (sides.inputs, sides.outputs)]
+        load = (sides.scheduling or ("",))[0]
         return [
             result
             for result in self.workspace.results()
-            if result["input"] in ("", named[0]) and result["output"] in ("", named[1])
+            if all(
+                result[key] in ("", own)
+                for key, own in zip(("input", "output"), named, strict=True)
+            )
+            and result["load"] == load
         ]
 
     @property

@@ -31,6 +31,7 @@ _WAYS = (
     (r"--(sample-time|resample) SECONDS", "the field of the sample time"),
     (r"--limits? (\w+)=\S+:[^\s.,]+", r"limits of \1"),
     (r"--load (\w+)", r"\1 among the inputs"),
+    (r"--zero (\w+) \(mckibben\.signals\.zeroed\)", r"“Zero \1 there”, under Data"),
     (r"--zero (\w+)", r"the button that zeroes \1"),
     (r"--set ", "the setting "),
     (r"see mckibben info --models", "see the settings of the models"),

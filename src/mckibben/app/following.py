@@ -282,9 +282,9 @@ def estimate(workspace: Workspace, given: dict[str, Any], tell: Tell) -> str:
         figures: dict[str, float] = {}
         if channel.name in recording:
             measured = recording[channel.name]
-            error = found[channel.name] - measured
+            error = measured - found[channel.name]
             curves.insert(0, curve("measured", time, measured, "measured"))
-            curves.append(curve("error", time, error, "series-2", below=True))
+            curves.append(curve("measured − estimated", time, error, "series-2", below=True))
             figures = {
                 "rmse": float(np.sqrt(np.mean(error**2))),
                 "largest": float(np.abs(error).max()),

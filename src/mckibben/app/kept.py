@@ -134,7 +134,9 @@ class Fitted(Kept):
     model: Text = ""
     input: Text = ""
     output: Text = ""
+    load: Text = ""
     unit: Text = ""
+    split: Text = ""
     chosen_by: Literal["cross-validation", "validation", "given", "fit"] = "cross-validation"
     settings: dict[str, Any] = {}
     validation_rmse: Error = None

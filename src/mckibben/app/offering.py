@@ -13,9 +13,10 @@ from mckibben.comparison.inverses import Kind
 from mckibben.comparison.limits import limits
 from mckibben.comparison.needs import Need, full_name, inverse_kind, inverse_may_lack, needs
 from mckibben.comparison.offered import defaults, objections
-from mckibben.comparison.recognising import DRIVING, FORCE
+from mckibben.comparison.recognising import DRIVING, FORCE, any_moves
 from mckibben.comparison.splits import held_out
 from mckibben.errors import DataError
+from mckibben.estimators.coupled.base import schedules
 from mckibben.recording import Recording
 
 FOLDS = 6
@@ -84,7 +85,7 @@ def offered(desk: Desk) -> Offered:
         return Offered(hindered, [], [], {})
     used = desk.workspace.used()
     names, recordings = registry.names("estimators"), list(used.values())
-    channels = Channels(desk.inputs, desk.outputs)
+    channels = desk.sides
     against = objections(names, recordings, channels) if recordings else {}
     roles = {entry.name: entry.role for entry in desk.workspace.entries()}
     train = [run for name, run in used.items() if roles.get(name) == "train"]
@@ -93,7 +94,7 @@ def offered(desk: Desk) -> Offered:
             objections(names, _fitted(train, "test" in roles.values(), channels), channels)
             | against
         )
-    work = max(sum(map(len, train)), LEAST) * len(desk.inputs) * len(desk.outputs)
+    work = max(sum(map(len, train)), LEAST) * len(channels.inputs) * len(channels.outputs)
     groups = [
         (need, [_offer(model, work) for model in need.models if model not in against])
         for need in needs()
@@ -136,21 +137,31 @@ def _offer(model: str, work: int) -> Offer:
 
 
 def _recognised(desk: Desk, n_models: int) -> str:
+    models = "model has" if n_models == 1 else "models have"
+    return f"{sides(desk)}: {n_models} {models} a place on these data."
+
+
+def sides(desk: Desk) -> str:
+    """Return in words what is modelled, of what, and what becomes of the other channels."""
     used = desk.workspace.readable()
-    said = [_counted("input", desk.inputs), _counted("output", desk.outputs)]
-    told = Channels(desk.inputs, desk.outputs).scheduled(used)
-    others = set(desk.workspace.channels()).difference(desk.inputs, desk.outputs)
+    channels = desk.sides
+    said = [_counted("input", channels.inputs), _counted("output", channels.outputs)]
+    told = channels.scheduled(used)
+    named = (*channels.inputs, *channels.outputs)
+    others = set(desk.workspace.channels()).difference(named)
     if told:
-        said.append(f"given beside: {', '.join(told)}")
+        loads = channels.scheduling is not None
+        said.append(f"given beside: {', '.join(told)}{', a load, never commanded' * loads}")
     elif desk.outputs == (FORCE,) and (driving := others.intersection(DRIVING)):
         said.append(f"given beside: {', '.join(sorted(driving))}")  # which balance-force takes
+    elif loads_known := [name for name in schedules(used, named) if any_moves(used, (name,))]:
+        said.append(f"given to models that take a load: {', '.join(loads_known)}")
     elif others:
         said.append(f"not used: {', '.join(sorted(others))}")
     timeless = sum(run.sample_time is None for run in used)
     if timeless:
         said.append(f"{timeless} of {len(used)} without time")
-    models = "model has" if n_models == 1 else "models have"
-    return f"{'; '.join(said)}: {n_models} {models} a place on these data."
+    return "; ".join(said)
 
 
 def _counted(word: str, names: tuple[str, ...]) -> str:

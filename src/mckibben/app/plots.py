@@ -120,9 +120,10 @@ def lines(
     x: str,
     y: str,
     height: int = 320,
+    logarithmic: bool = False,
     bands: tuple[tuple[float, float], ...] = (),
 ) -> Json:
-    """Return named curves in one plane, with bands that shade a range of y."""
+    """Return named curves in one plane, y perhaps logarithmic, with bands that shade a range of y."""
     data = []
     for name, at, values, colour in curves:
         t, v = over_time(np.asarray(at, float), np.asarray(values, float), POINTS)
@@ -154,7 +155,9 @@ def lines(
         "data": data,
         "layout": {
             "xaxis": {"title": {"text": text(x)}},
-            "yaxis": {"title": {"text": text(y)}},
+            # without a format, ticks between decades are a 2 or a 5, whatever the decade
+            "yaxis": {"title": {"text": text(y)}}
+            | ({"type": "log", "tickformat": "~g"} if logarithmic else {}),
             "shapes": shapes,
             "showlegend": len(curves) > 1,
         },

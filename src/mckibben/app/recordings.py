@@ -25,6 +25,9 @@ if TYPE_CHECKING:  # loaded when they are first used, so that the page is there 
 
 Role = Literal["train", "test", "unused"]
 
+DESCRIBING = "-metadata.json"
+"""How the names of files end that this package puts beside recordings."""
+
 ARCHIVES = (".zip", ".gz", ".tgz", ".tar", ".7z", ".rar", ".bz2", ".xz")
 
 LONG = 200_000
@@ -132,6 +135,11 @@ class Recordings(Folder):
 
         given = Path(unescaped(name).replace("\\", "/")).name
         ending = "".join(re.findall(r"\.[A-Za-z0-9]{1,8}$", given)).lower()
+        if given.endswith(DESCRIBING):
+            raise DataError(
+                f"{name!r:.80} describes a recording and holds none",
+                remedy="drop the file beside it alone: its units are asked by “How it was read”",
+            )
         if ending not in READERS:
             remedy = "unpack it and drop the files in it" if ending in ARCHIVES else "export as CSV"
             raise DataError(

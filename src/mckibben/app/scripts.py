@@ -83,7 +83,8 @@ def _assigned(name: str, call: str) -> list[str]:
 
 
 def _given(channels: Mapping[str, Any]) -> str:
-    return ", ".join(f"{name}s={value!r}" for name, value in channels.items())
+    names = {"input": "inputs", "output": "outputs"}
+    return ", ".join(f"{names.get(key, key)}={value!r}" for key, value in channels.items())
 
 
 def _asked(models: Sequence[str], settings: Mapping[str, Any], allow_shared: bool) -> str:

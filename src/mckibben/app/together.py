@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from mckibben.app.desk import Desk
+from mckibben.app.fields import READING
 from mckibben.comparison.recognising import recognised
 from mckibben.recording import Recording
 
@@ -18,6 +19,20 @@ def kinds(used: Mapping[str, Recording]) -> Kinds:
     for name, recording in used.items():
         found.setdefault(tuple(sorted(recording.channels)), []).append(name)
     return dict(sorted(found.items(), key=lambda kind: -len(kind[1])))
+
+
+def differing(desk: Desk) -> Kinds:
+    """Return the kinds of the recordings in use where that matters, else none.
+
+    Where only counts differ, of levels or cycles, which are without a unit, all are fitted together.
+    """
+    used, common = desk.workspace.used(), desk.workspace.channels()
+    found = kinds(used)
+    units = {each: unit for run in used.values() for each, unit in run.units.items()}
+    known = set(desk.inputs + desk.outputs) <= set(common)
+    if len(found) < 2 or (known and not any(units[each] for each in units.keys() - set(common))):
+        return {}
+    return found
 
 
 def sample_times(desk: Desk) -> tuple[float, float] | None:
@@ -49,6 +64,13 @@ def obstacle(desk: Desk) -> str:
         return (
             f"Outputs are in {' and in '.join(sorted(units))}, so that their errors have no mean: "
             "choose outputs of one unit under Data."
+        )
+    timeless = [name for name, run in used.items() if run.sample_time is None]
+    if 0 < len(timeless) < len(used):
+        listed = ", ".join(timeless[:4]) + (", …" if len(timeless) > 4 else "")
+        return (
+            f"Some recordings have time and others have none ({listed}): give these a rate by "
+            f"“{READING}” under Data, or set them, or the others, unused."
         )
     if times := sample_times(desk):
         return (

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 from mckibben.app.following import Tell, estimate, look_back, loop
@@ -15,7 +16,8 @@ TRAINED_ON = "On training recordings, which it was fitted to:"
 
 def fit(workspace: Workspace, given: dict[str, Any], tell: Tell) -> str:
     """Fit, validate and test a model as `mckibben.compare` does, and keep it with its figures."""
-    from mckibben.comparison.ranking import compare
+    from mckibben.comparison.planning import plan_of
+    from mckibben.comparison.ranking import ranked
     from mckibben.comparison.results import CHOICES
 
     entries = workspace.entries()
@@ -23,18 +25,22 @@ def fit(workspace: Workspace, given: dict[str, Any], tell: Tell) -> str:
     if not train:
         raise DataError("there is no recording to train on", remedy="give one the role 'train'")
     model, data = str(given["model"]), workspace.data(entries)
-    board = compare(
+    plan = plan_of(
         train,
         test,
         inputs=given["input"],
         outputs=given["output"],
+        load=given.get("load"),
         models=[model],
         settings={model: given.get("settings", {})},
         seed=int(given.get("seed", 0)),
-        jobs=1,
         allow_shared=bool(given.get("allow_shared", False)),
-        watch=lambda _, share, cost: tell(share, cost),
     )
+    plan = replace(plan, items={model: plan.items[model]})  # without those of each load alone
+    (ranking,) = ranked(
+        plan, jobs=1, kept=plan.kept(None), watch=lambda _, share, cost: tell(share, cost)
+    )
+    board = ranking.board
     (row,) = board.rows
     if row.reason is not None or row.block is None:
         raise ModelError(row.reason or "it gave no model. Remedy: try other settings.")
@@ -48,6 +54,7 @@ def fit(workspace: Workspace, given: dict[str, Any], tell: Tell) -> str:
     result = row.to_dict() | {
         "input": board.input,
         "output": board.output,
+        "load": given.get("load") or "",
         "unit": board.unit,
         "split": board.split,
         "chosen_by": board.chosen_by,
@@ -76,6 +83,7 @@ def report(workspace: Workspace, given: dict[str, Any], tell: Tell) -> str:
         workspace.with_role("test"),
         inputs=given["input"],
         outputs=given["output"],
+        load=given.get("load"),
         models=given["models"],
         settings=given.get("settings") or None,
         seed=int(given.get("seed", 0)),

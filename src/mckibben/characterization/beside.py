@@ -11,44 +11,26 @@ from mckibben.characterization.evidence import KNOTS, hats
 from mckibben.characterization.results import Effect
 from mckibben.characterization.time_effects import held_within, holds
 from mckibben.characterization.tracks import FEWEST, prepare
-from mckibben.errors import DataError
 from mckibben.recording import Recording
-from mckibben.signals.zeroing import apart
+from mckibben.signals.zeroing import apart, zeroed
 
 MOST = 2000
 """Samples of a recording that are looked at for its level."""
 
 
-def alone(
-    recordings: Sequence[Recording], given: str, beside: Sequence[str]
-) -> tuple[list[Recording], str]:
-    """Return the stretches of recordings in which all other inputs rest, and a sentence on them.
-
-    Raises
-    ------
-    DataError
-        If an input is missing, or none moves alone.
-    """
-    resting = [np.ones(len(one), dtype=bool) for one in recordings]
+def alone(recordings: Sequence[Recording], given: str, beside: Sequence[str]) -> list[Recording]:
+    """Return the stretches in which all other inputs rest; none if the input moves in none of them."""
+    still = [np.ones(len(one), dtype=bool) for one in recordings]
     for name in beside:
-        for rests, held in zip(resting, _held(recordings, name), strict=True):
-            rests &= held
+        for rests, at in zip(still, held(recordings, name), strict=True):
+            rests &= at
     found = [
         one.slice(start, stop)
-        for one, rests in zip(recordings, resting, strict=True)
+        for one, rests in zip(recordings, still, strict=True)
         for start, stop in _stretches(rests)
         if stop - start >= FEWEST
     ]
-    others, verb = " and ".join(beside), "rests" if len(beside) == 1 else "rest"
-    if not found or max(float(np.ptp(one[given])) for one in found) == 0:
-        raise DataError(
-            f"it never moves while {others} {verb}, so that what it does alone cannot be told",
-            file=recordings[0].source,
-            channel=given,
-            remedy="record one in which it moves alone; models of several inputs need no such recording",
-        )
-    share = sum(map(len, found)) / sum(map(len, recordings))
-    return found, f"Told where {others} {verb}, {100 * share:.0f} % of the samples."
+    return found if any(np.ptp(one[given]) > 0 for one in found) else []
 
 
 def moves(recordings: Sequence[Recording], name: str) -> bool:
@@ -115,23 +97,27 @@ def levelled(recordings: Sequence[Recording], given: str, wanted: str) -> list[R
 
 
 def of_one_zero(
-    recordings: Sequence[Recording], given: str, wanted: str
+    recordings: Sequence[Recording], given: str, wanted: str, alike: Sequence[Sequence[int]]
 ) -> tuple[list[Recording], str]:
-    """Return recordings of one zero, and a sentence on zeros that differ; empty where they do not."""
-    if not all(given in one and wanted in one for one in recordings):
+    """Return recordings of one zero, and a sentence on zeros that differ; empty where they do not.
+
+    They differ where some that should be alike rest apart.
+    """
+    known = all(given in one and wanted in one for one in recordings)
+    parts = [[recordings[k] for k in places] for places in alike if known]
+    found = [ends for part in parts if (ends := apart(part, wanted, given)) is not None]
+    if not found:
         return list(recordings), ""
-    found = apart(recordings, wanted, given)
-    if found is None:
-        return list(recordings), ""
-    unit = recordings[0].units[wanted]
-    return levelled(recordings, given, wanted), (
-        f"The recordings rest at different {wanted}, from {found[0]:.3g} to {found[1]:.3g} {unit} where "
-        f"{given} is lowest: each is counted from a zero of its own here, and models need it so, too "
-        "(mckibben.signals.zeroed, --zero)."
+    low, high = min(ends[0] for ends in found), max(ends[1] for ends in found)
+    return [zeroed(one, [wanted], given) for one in recordings], (
+        f"The recordings rest at different {wanted}, from {low:.3g} to {high:.3g} "
+        f"{recordings[0].units[wanted]} where {given} is lowest: each is counted from a zero of its own "
+        f"here, and models need it so, too: --zero {wanted} (mckibben.signals.zeroed)."
     )
 
 
-def _held(recordings: Sequence[Recording], name: str) -> list[NDArray[np.bool_]]:
+def held(recordings: Sequence[Recording], name: str) -> list[NDArray[np.bool_]]:
+    """Return where an input rests in every recording."""
     scale, tracks = prepare(recordings, name, name)
     found = []
     for track in tracks:

@@ -8,9 +8,18 @@ from dataclasses import replace
 import numpy as np
 
 from mckibben.arrays import Array
-from mckibben.characterization.beside import alone, effects, levelled, moves, of_one_zero
+from mckibben.characterization.beside import (
+    alone,
+    effects,
+    levelled,
+    moves,
+    of_one_zero,
+    without,
+)
 from mckibben.characterization.evidence import evidence
+from mckibben.characterization.levels import conditions, levels_of
 from mckibben.characterization.loops import (
+    Cycle,
     Loop,
     largest_of,
     loops_of,
@@ -19,9 +28,10 @@ from mckibben.characterization.loops import (
 )
 from mckibben.characterization.mean_curve import mean_curve
 from mckibben.characterization.memory import dead_zones, minor_loop_errors
-from mckibben.characterization.results import Characterization
+from mckibben.characterization.results import Characterization, Level
 from mckibben.characterization.time_effects import creep, drift, rate_dependence
 from mckibben.characterization.tracks import Scale, Track, prepare
+from mckibben.characterization.wording import resting
 from mckibben.errors import DataError
 from mckibben.recording import Recording
 from mckibben.signals.reversals import whole_cycles
@@ -59,6 +69,10 @@ def characterize(
     the output does not depend on the input by more than noise would give, tested at a level of 1 %.
     Recordings that rest at different outputs are counted from a zero of their own, which is said.
 
+    Where every recording holds other inputs, such as a length or a load, every level has a loop of its
+    own: told is that at which the output moves most, beside all of them. Where others move, told are the
+    stretches in which they rest; where none tells, what is left without their effect.
+
     Parameters
     ----------
     recordings : Recording or sequence of Recording
@@ -66,8 +80,8 @@ def characterize(
     input, output : str
         Channels.
     beside : sequence of str
-        Other inputs that move the output, such as a load: only stretches in which they rest are
-        looked at.
+        Other inputs that move the output, such as a load. Channels that every recording holds, not all
+        of them alike, are among them unasked.
 
     Returns
     -------
@@ -77,7 +91,7 @@ def characterize(
     ------
     DataError
         On no recordings, a missing or constant channel, units that differ between recordings, fewer
-        than ten samples, or an input that never moves while those beside rest.
+        than ten samples, or an input that moves only together with those beside.
 
     Examples
     --------
@@ -92,24 +106,94 @@ def characterize(
     (2, 1.0)
     """
     runs = [recordings] if isinstance(recordings, Recording) else list(recordings)
-    n_recordings = len(runs)
-    assumed = []
-    beside = [name for name in beside if runs and moves(runs, name)]
-    moved = effects(runs, input, output, beside) if beside else ()
-    ends: tuple[float, float] | None = None
-    if beside:
-        runs, said = alone(runs, input, beside)
-        assumed.append(said)
-        ends = (
-            min(float(one[output].min()) for one in runs),
-            max(float(one[output].max()) for one in runs),
+    told = dict.fromkeys((*beside, *conditions(runs, (input, output))))
+    others = [name for name in told if moves(runs, name)]
+    levels = levels_of(runs, input, output, others)
+    runs, zeros = of_one_zero(runs, input, output, levels)
+    if not others:
+        return _measured(runs, zeros, input, output)
+    moved = effects(runs, input, output, others)
+    if levels:
+        found = _by_level(runs, levels, others, zeros, input, output)
+    elif rested := alone(runs, input, others):
+        share = sum(map(len, rested)) / sum(map(len, runs))
+        said = f"Told where {resting(others)}, {100 * share:.0f} % of the samples."
+        found = replace(
+            _measured(levelled(rested, input, output), said, input, output),
+            output_range=_ends(rested, output),
+            branch_gap=None,  # stretches that only rise have an offset, too
+            n_stretches=len(rested),
         )
-        runs = levelled(runs, input, output)
+    elif moved:
+        said = (
+            f"As {input} never moves while {resting(others)}, the loop is what is left when the effect "
+            f"of {' and '.join(others)} by straight lines is taken away: what bends of it, or "
+            "remembers, is in the loop."
+        )
+        left, zeros = of_one_zero(without(runs, output, moved), input, output, [range(len(runs))])
+        found = _measured(left, " ".join(filter(None, (zeros, said))), input, output)
     else:
-        runs, said = of_one_zero(runs, input, output)
-        assumed += [said] * bool(said)
-    scale, tracks = prepare(runs, input, output)
-    units = tuple(_unit(runs, channel) for channel in (input, output))
+        raise DataError(
+            f"it never moves while {resting(others)}, so that what it does alone cannot be told",
+            file=runs[0].source,
+            channel=input,
+            remedy="record one in which it moves alone; models of several inputs need no such recording",
+        )
+    return replace(found, n_recordings=len(runs), effects=moved)
+
+
+def _by_level(
+    runs: Sequence[Recording],
+    levels: Sequence[Sequence[int]],
+    others: Sequence[str],
+    zeros: str,
+    given: str,
+    wanted: str,
+) -> Characterization:
+    """Return what is found where the output moves most, beside all levels that recordings hold."""
+    found = []
+    for places in levels:
+        here = [runs[k] for k in places]
+        one = _measured(here, "", given, wanted)
+        cycles = tuple(replace(each, recording=places[each.recording]) for each in one.cycles)
+        at = (float(np.mean([run[name].mean() for run in here])) for name in others)
+        units = (here[0].units[name] for name in others)
+        held = tuple(zip(others, at, units, strict=True))
+        found.append(Level(held, replace(one, cycles=cycles)))
+    each = [level.found for level in found]
+    most = max(found, key=lambda level: (level.found.depends, level.found.output_span))
+    durations = [one.duration for one in each]
+    steps = {one.sample_time for one in each}
+    where = f"Told where {resting(others)} at {most.at}, the level at which {wanted} moves most."
+    return replace(
+        most.found,
+        n_samples=sum(one.n_samples for one in each),
+        n_cycles=sum(one.n_cycles for one in each),
+        n_reversals=sum(one.n_reversals for one in each),
+        duration=None if None in durations else float(sum(d for d in durations if d is not None)),
+        sample_time=steps.pop() if len(steps) == 1 else None,
+        input_range=_ends(runs, given),
+        output_range=_ends(runs, wanted),
+        cycles=tuple(sorted((cycle for one in each for cycle in one.cycles), key=_place)),
+        levels=tuple(found),
+        assumed=(*([zeros] if zeros else []), where),
+    )
+
+
+def _place(cycle: Cycle) -> int:
+    return cycle.recording
+
+
+def _ends(runs: Sequence[Recording], channel: str) -> tuple[float, float]:
+    """Return the lowest and the highest value in recordings."""
+    seen = [run[channel] for run in runs]
+    return float(min(x.min() for x in seen)), float(max(x.max() for x in seen))
+
+
+def _measured(runs: Sequence[Recording], said: str, given: str, wanted: str) -> Characterization:
+    """Return what is found in recordings in which nothing else moves, and a sentence on them."""
+    scale, tracks = prepare(runs, given, wanted)
+    units = tuple(_unit(runs, channel) for channel in (given, wanted))
     loops = loops_of(tracks, scale)
     largest = largest_of(loops)
     curves = _branch_curves(tracks, largest, scale)
@@ -125,18 +209,18 @@ def characterize(
     steps = {run.sample_time for run in runs}
     area = None if largest is None else largest.area
     found = Characterization(
-        input=input,
-        output=output,
+        input=given,
+        output=wanted,
         input_unit=units[0],
         output_unit=units[1],
-        n_recordings=n_recordings,
+        n_recordings=len(runs),
         n_samples=sum(len(run) for run in runs),
         n_cycles=sum(len(whole_cycles(track.u, track.major_turns)) for track in tracks),
         n_reversals=sum(track.turns.size - 2 for track in tracks),
         duration=None if None in durations else float(sum(d for d in durations if d is not None)),
         sample_time=steps.pop() if len(steps) == 1 else None,
         input_range=(scale.u_low, scale.u_high),
-        output_range=ends or (scale.y_low, scale.y_high),
+        output_range=(scale.y_low, scale.y_high),
         input_noise=None if np.isnan(scale.u_noise) else scale.u_noise,
         output_noise=None if np.isnan(scale.y_noise) else scale.y_noise,
         cycles=tuple(loop.cycle for loop in loops),
@@ -158,7 +242,7 @@ def characterize(
         gain=curve.gain,
         onset=curve.onset,
         saturation=curve.saturation,
-        branch_gap=None if beside else curve.gap,  # stretches that only rise have an offset, too
+        branch_gap=curve.gap,
         creep=crept,
         creep_time=creep_time,
         drift=drift(loops),
@@ -170,10 +254,8 @@ def characterize(
         p_loop=seen.loop,
         widest_gap=None if seen.widest is None else seen.widest * scale.y_span,
         drift_excluded=sum(track.major_turns.size - 1 for track in tracks) > 2,
-        n_stretches=len(runs) if beside else None,
         falls=scale.sign < 0 and (curve.gain is None or curve.gain < 0),
-        effects=moved,
-        assumed=tuple(assumed),
+        assumed=(said,) if said else (),
     )
     if found.depends:
         return found

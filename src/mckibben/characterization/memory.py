@@ -16,6 +16,9 @@ MOVED = 0.02
 BEYOND = 0.02
 """Share of the input range within which two turning points are the same."""
 
+HUNTED = 0.05
+"""Share of the input range over which a regulator hunts: what turns back by less is no minor loop."""
+
 DENSE = 8
 """Samples that a branch must have for the output on it to be read between samples."""
 
@@ -100,15 +103,22 @@ def minor_loop_errors(tracks: Sequence[Track], scale: Scale) -> tuple[float | No
 
     Closure: after a minor loop, the output where the input is back at the level of departure, against
     the output at departure. Wiping-out: further on, the output against that on branches from the same
-    turning points without the minor loop. Medians of absolute differences; None where the recordings
-    have no such loops with at least eight samples a branch. Both are zero for every model of
+    turning points without the minor loop. Medians of absolute differences over loops of at least 5 % of
+    the input range, as a regulator hunts over less; None where the recordings have no such loops with at
+    least eight samples a branch. Both are zero for every model of
     Preisach type, of which Prandtl-Ishlinskii models are some.
     """
     closure, wiping = [], []
     for track in tracks:
         heights, turns = track.heights, track.turns
         tolerance = 0.5 * BEYOND * scale.u_span
-        for count, found in enumerate(excursions(heights, tolerance)):
+        away = HUNTED * scale.u_span
+        loops = (
+            each
+            for each in excursions(heights, tolerance)
+            if abs(heights[each.back] - heights[each.departure]) >= away
+        )
+        for count, found in enumerate(loops):
             returned = _output_at(track, found.back, float(heights[found.departure]))
             if returned is None:
                 continue

@@ -40,6 +40,31 @@ class Effect:
 
 
 @dataclass(frozen=True)
+class Level:
+    """What a muscle does where other inputs are held.
+
+    Parameters
+    ----------
+    held : tuple of (str, float, str)
+        Their channels, at which level each, and its unit.
+    found : Characterization
+        Of the recordings that hold them there.
+    """
+
+    held: tuple[tuple[str, float, str], ...]
+    found: Characterization
+
+    @property
+    def at(self) -> str:
+        """The level in words, by name where several are held."""
+        several = len(self.held) > 1
+        return " and ".join(
+            f"{f'{name} ' if several else ''}{at:.3g} {unit}".rstrip()
+            for name, at, unit in self.held
+        )
+
+
+@dataclass(frozen=True)
 class Characterization(DrawsItself):
     """What a muscle does, from recordings alone; None for what they cannot tell.
 
@@ -107,6 +132,9 @@ class Characterization(DrawsItself):
         Whether the output falls as the input rises.
     effects : tuple of Effect
         What other inputs do.
+    levels : tuple of Level
+        Those at which recordings hold other inputs. What is told of the loop is then that of the one at
+        which the output moves most; numbers and ranges of what was looked at are those of all.
     assumed : tuple of str
         Sentences on what is looked at: where other inputs rest, counted from which zero.
     """
@@ -155,6 +183,7 @@ class Characterization(DrawsItself):
     n_stretches: int | None = None
     falls: bool = False
     effects: tuple[Effect, ...] = ()
+    levels: tuple[Level, ...] = ()
     assumed: tuple[str, ...] = ()
 
     @property
@@ -188,7 +217,7 @@ class Characterization(DrawsItself):
 
     def table(self) -> list[tuple[str, float | int | str | None, str, str]]:
         """Return rows of quantity, value, unit and explanation."""
-        from mckibben.characterization.wording import table
+        from mckibben.characterization.table import table
 
         return table(self)
 
@@ -207,6 +236,10 @@ class Characterization(DrawsItself):
             for cycle in self.cycles
         ]
         found["effects"] = [asdict(effect) for effect in self.effects]
+        found["levels"] = [
+            {"held": {name: at for name, at, _ in one.held}} | one.found.to_dict()
+            for one in self.levels
+        ]
         found["sentences"] = self.sentences
         return found
 

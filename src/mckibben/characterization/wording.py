@@ -1,9 +1,12 @@
-"""Characterization in words: sentences, and a table that explains itself."""
+"""Characterization in words."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
+
+import numpy as np
 
 from mckibben.characterization.evidence import LEVEL
 
@@ -23,7 +26,8 @@ such [%]."""
 REMEMBERED = 2.0
 """Errors of minor loops below this are those of a muscle that remembers its turning points [%]."""
 
-Row = tuple[str, float | int | str | None, str, str]
+SPOKEN = 5
+"""Levels of what is held that are spoken of; the table has all."""
 
 
 def sentences(found: Characterization) -> list[str]:
@@ -34,133 +38,12 @@ def sentences(found: Characterization) -> list[str]:
         _headline(found),
         _motion(found),
         *_effects(found),
+        _levels(found),
         _memory(found),
         _rate(found),
         _trust(found),
     ]
     return [*(sentence for sentence in said if sentence), *found.assumed]
-
-
-def table(found: Characterization) -> list[Row]:
-    """Return rows of quantity, value, unit and explanation."""
-    u, y = found.input_unit, found.output_unit
-    gain = f"{y}/{u}" if u else y
-    area = " ".join(part for part in (u, y) if part)
-    step = found.sample_time
-    return [
-        ("recordings", found.n_recordings, "", "files or segments looked at"),
-        ("stretches", found.n_stretches, "", "of them, those in which all other inputs rest"),
-        ("samples", found.n_samples, "", "looked at in all"),
-        ("duration", found.duration, "s", "looked at in all; none without time"),
-        ("sample time", step, "s", "none where unknown or not the same everywhere"),
-        ("cycles", found.n_cycles, "", "whole ones over at least a tenth of the input range"),
-        (
-            "reversals",
-            found.n_reversals,
-            "",
-            "where the input turns back by 1 % of its range or more, minor loops too",
-        ),
-        (f"lowest {found.input}", found.input_range[0], u, "input range"),
-        (f"highest {found.input}", found.input_range[1], u, "input range"),
-        (f"lowest {found.output}", found.output_range[0], y, "output range"),
-        (f"highest {found.output}", found.output_range[1], y, "output range"),
-        (f"noise of {found.input}", found.input_noise, u, "standard deviation of a sample"),
-        (f"noise of {found.output}", found.output_noise, y, "standard deviation of a sample"),
-        (
-            "chance that noise looks so dependent",
-            _chance(found.p_dependence),
-            "",
-            "p-value: how likely noise alone makes the output depend on the input as much",
-        ),
-        (
-            "chance that noise looks so much like a loop",
-            _chance(found.p_loop),
-            "",
-            "p-value: the same of the input's direction, beside a curve without memory",
-        ),
-        (
-            "largest gap that noise hides",
-            found.widest_gap,
-            y,
-            "branches may be as far apart on average for all that this test tells",
-        ),
-        (
-            "loop width e_w",
-            found.loop_width,
-            "%",
-            "of the largest cycle: distance of its branches at mid input over its output range",
-        ),
-        ("width at mid input", found.mid_width, y, "the same distance in units of the output"),
-        (
-            "mean branch gap",
-            found.branch_gap,
-            y,
-            "same input reached from above and from below: mean difference of the output",
-        ),
-        (
-            "asymmetry",
-            found.asymmetry,
-            "%",
-            "distance of the loop from its image turned by half a turn; 0 for a classical "
-            "Prandtl-Ishlinskii model",
-        ),
-        (
-            "where the loop is widest",
-            found.width_centroid,
-            "",
-            "on average over its width: −1 at low, 0 at mid, 1 at high input",
-        ),
-        ("loop area", found.loop_area, area, "enclosed by the largest cycle"),
-        (
-            "loop area share",
-            found.loop_area_share,
-            "%",
-            "of the rectangle round the loop: 0 no hysteresis, 100 a relay",
-        ),
-        (
-            "loss per effective area",
-            found.loss_per_area,
-            "J/m²",
-            "the loop area as work lost in a cycle; times the effective area it is an energy",
-        ),
-        (
-            "dead zone after upper reversals",
-            found.dead_zone_upper,
-            u,
-            "input change before the output moves back; 2 r for a play operator of radius r",
-        ),
-        ("dead zone after lower reversals", found.dead_zone_lower, u, "the same from below"),
-        ("gain", found.gain, gain, "slope of the mean of both branches at mid input"),
-        *(
-            (
-                f"effect of {one.channel}",
-                one.change,
-                y,
-                f"change of the output as it goes {_range((one.low, one.high), one.unit)} at equal "
-                "input, by one straight line",
-            )
-            for one in found.effects
-        ),
-        ("onset", found.onset, u, "below it the slope is under a fifth of its maximum"),
-        ("saturation", found.saturation, u, "above it the slope is under a fifth of its maximum"),
-        ("creep", found.creep, y, "in a hold of the input; positive: it goes on as it was going"),
-        ("creep time", found.creep_time, "s", "the time over which it crept so far"),
-        ("drift", found.drift, y, "change of the output from one cycle to the next alike"),
-        ("rate dependence", found.rate_dependence, "%", "growth of e_w at twice the speed"),
-        ("rate verdict", found.rate_verdict, "", "from cycles alike at different speed"),
-        (
-            "closure error",
-            found.closure_error,
-            "%",
-            "return-point memory: output after a minor loop against output before it",
-        ),
-        (
-            "wiping-out error",
-            found.wiping_out_error,
-            "%",
-            "output beyond a minor loop against that without one",
-        ),
-    ]
 
 
 def _independent(found: Characterization) -> str:
@@ -169,11 +52,6 @@ def _independent(found: Characterization) -> str:
         f"noise would give ({_level(found.p_dependence)}), so there is no loop, gain or saturation to "
         "tell: check the channels and the sensor."
     )
-
-
-def _chance(p: float | None) -> float | str | None:
-    """Return a p-value, without figures that no test has."""
-    return "< 0.001" if p is not None and p < 0.001 else p
 
 
 def _level(p: float | None) -> str:
@@ -258,11 +136,9 @@ def _crept(found: Characterization, creep: float, time: float) -> str:
 
 def _motion(found: Characterization) -> str:
     ends = found.output_range[::-1] if found.falls else found.output_range
-    text = (
-        f"{found.output} {'falls' if found.falls else 'goes'} {_range(ends, found.output_unit)} as "
-    )
+    text = f"{found.output} {'falls' if found.falls else 'goes'} {spanning(ends, found.output_unit)} as "
     text += f"{found.input} {'rises' if found.falls else 'goes'} "
-    text += _range(found.input_range, found.input_unit)
+    text += spanning(found.input_range, found.input_unit)
     if found.gain is not None:
         unit = f"{found.output_unit}/{found.input_unit}" if found.input_unit else found.output_unit
         text += f", {_value(found.gain, unit)} at mid input"
@@ -288,9 +164,35 @@ def _effects(found: Characterization) -> list[str]:
         moved = f"{'rises' if one.change > 0 else 'falls'} by {_apart(found, one.change)}"
         said.append(
             f"At equal {found.input}, {found.output} {'hardly moves' if share < NOTABLE else moved} "
-            f"as {one.channel} goes {_range((one.low, one.high), one.unit)}."
+            f"as {one.channel} goes {spanning((one.low, one.high), one.unit)}."
         )
     return said
+
+
+def _levels(found: Characterization) -> str:
+    """Return the loops at all levels of what is held, or at some of them from end to end."""
+    n = len(found.levels)
+    if n < 2:
+        return ""
+    told = [found.levels[k] for k in sorted({round(k) for k in np.linspace(0, n - 1, SPOKEN)})]
+    held = resting([name for name, *_ in told[0].held])
+    first = f"Where {held} at {told[0].at}, {found.output} has {_loop(told[0].found)}"
+    others = [f"at {level.at}, {_loop(level.found)}" for level in told[1:]]
+    left = f" ({n} levels in all)" if n > len(told) else ""
+    return f"{'; '.join([first, *others])}{left}."
+
+
+def _loop(found: Characterization) -> str:
+    if not found.depends:
+        return f"no dependence on {found.input}"
+    if not found.has_loop:
+        loop = "no loop" if found.has_loop is False else "no loop that can be told"
+    else:
+        loop = "a loop" if found.loop_width is None else f"a loop of {_percent(found.loop_width)}"
+    if found.gain is None:
+        return loop
+    unit = f"{found.output_unit}/{found.input_unit}" if found.input_unit else found.output_unit
+    return f"{loop} and a gain of {_value(found.gain, unit)}"
 
 
 def _memory(found: Characterization) -> str:
@@ -339,7 +241,7 @@ def _trust(found: Characterization) -> str:
         one = max(found.cycles, key=lambda cycle: cycle.amplitude)
         said.append(
             f"No cycle of the input is whole: width, area and shape of the loop are those "
-            f"{_range((one.low, one.high), found.input_unit)}, where both branches are."
+            f"{spanning((one.low, one.high), found.input_unit)}, where both branches are."
         )
     if found.has_loop and not found.drift_excluded:
         said.append(
@@ -349,7 +251,12 @@ def _trust(found: Characterization) -> str:
     return " ".join(said)
 
 
-def _range(limits: tuple[float, float], unit: str) -> str:
+def resting(beside: Sequence[str]) -> str:
+    """Return that other inputs rest, in words."""
+    return f"{' and '.join(beside)} {'rests' if len(beside) == 1 else 'rest'}"
+
+
+def spanning(limits: tuple[float, float], unit: str) -> str:
     """Return limits to about a percent of their distance, so that noise at 0 is not spelled out."""
     digits = 2 - math.floor(math.log10(abs(limits[1] - limits[0])))
     low, high = (f"{round(limit, digits) + 0.0:.6g}" for limit in limits)

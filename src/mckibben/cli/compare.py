@@ -12,7 +12,7 @@ from mckibben.cli.grouping import spread
 from mckibben.cli.leaderboards import print_leaderboard, told
 from mckibben.cli.options import Files, Reading
 from mckibben.cli.output import make_folder, print_json, say
-from mckibben.cli.stopping import forget_kept, stop_short, stoppable
+from mckibben.cli.stopping import demand_a_model, forget_kept, stop_short, stoppable
 
 
 @spread
@@ -56,3 +56,4 @@ def compare(
                 say(f"Written: {folder / 'leaderboard.json'}, {folder / 'leaderboard.csv'}")
         stop_short(board)
         forget_kept(folder)
+        demand_a_model(board)

@@ -13,6 +13,8 @@ from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING
 
+import typer
+
 from mckibben.cli.output import InterruptionError, say
 from mckibben.system.workers import leave
 
@@ -21,6 +23,9 @@ if TYPE_CHECKING:
 
 INTERRUPTED = 130
 """Exit code."""
+
+NO_MODEL = 1
+"""Exit code where none of the models asked for could be fitted."""
 
 PATIENCE = 1.3
 """How long the work may take to stop before the program ends without it [s]."""
@@ -126,3 +131,16 @@ def stop_short(board: Leaderboard) -> None:
             f"Stopped after {done} of {done + len(board.pending)} models; the same command goes on "
             "from there, where -o names a folder."
         )
+
+
+def demand_a_model(board: Leaderboard) -> None:
+    """Leave with another exit code where every model failed, as the board has said of each.
+
+    Raises
+    ------
+    typer.Exit
+        If so.
+    """
+    failed = sum(map(len, board.failures.values()))
+    if board.rows and failed == len(board.rows):
+        raise typer.Exit(NO_MODEL)

@@ -84,7 +84,7 @@ class TestedBand:
 def tested_band(
     block: Block, held: Sequence[Held], outputs: Sequence[Array], data: Data
 ) -> tuple[Banded, TestedBand] | None:
-    """Return a model with its band, and how that does on the test; None where too little was held out.
+    """Return a model with its band, and how that does on the test; None where that cannot be told.
 
     Parameters
     ----------
@@ -96,6 +96,8 @@ def tested_band(
     names = data.channels.outputs
     if not held or tuple(channel.name for channel in block.outputs) != tuple(names):
         return None
+    if any(run.inputs.shape[1] != len(block.inputs) for run in held):
+        return None  # without a load that it is told, the others missed what it does not
     try:
         found, constant = find_band(block, held), find_band(block, held, shapes=SHAPES[:1])
     except DataError:

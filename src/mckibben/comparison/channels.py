@@ -4,15 +4,20 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+
+import numpy as np
 
 from mckibben.comparison.recognising import FORCE, any_moves
 from mckibben.errors import DataError
-from mckibben.estimators.coupled.base import driving, moved, schedules
+from mckibben.estimators.coupled.base import driving, loads_among, moved, schedules
 from mckibben.recording import Recording
 
 Names = str | Sequence[str] | None
 """One channel, several, or None for what the recordings' names say."""
+
+STEADY = 0.05
+"""What schedules is a level of its run where it varies in it by no more than this share of its range."""
 
 
 @dataclass(frozen=True)
@@ -61,7 +66,7 @@ def channels_of(
     outputs: Names,
     load: str | None,
 ) -> Channels:
-    """Return the channels that a comparison is about.
+    """Return the channels that a comparison is about; a force beside other inputs is a load, too.
 
     Raises
     ------
@@ -70,24 +75,55 @@ def channels_of(
     """
     given = _named(recordings, inputs, _by_name(recordings, driving, "pressure", load is None))
     wanted = _named(recordings, outputs, _by_name(recordings, moved, "displacement", True))
-    named = (*given, *wanted, *((load,) if load else ()))
+    found = loads_told(recordings, Channels(given, wanted, (load,) if load else None))
+    told = found.scheduling or ()
+    named = (*found.inputs, *found.outputs, *told)
     if twice := [name for name in named if named.count(name) > 1]:
         raise DataError(
             "the channel is named twice among inputs, outputs and load",
             channel=twice[0],
             remedy="a model is not told what it is to give: name each channel once",
         )
-    if load is None:
-        return Channels(given, wanted)
-    for recording in recordings:
-        if load not in recording:
-            raise DataError(
-                "there is no such channel to tell the load",
-                file=recording.source,
-                channel=load,
-                remedy="name it with --column, or leave --load out",
-            )
-    return Channels(given, wanted, (load,))
+    for name in told:
+        for recording in recordings:
+            if name not in recording:
+                raise DataError(
+                    "there is no such channel to tell the load",
+                    file=recording.source,
+                    channel=name,
+                    remedy="name it with --column, or leave --load out",
+                )
+    return found
+
+
+def loads_told(recordings: Sequence[Recording], channels: Channels) -> Channels:
+    """Return channels whose forces beside other inputs schedule: nobody commands what hangs there."""
+    loads = loads_among(recordings, channels.inputs)
+    if channels.scheduling is not None or not loads:
+        return channels
+    driven = tuple(name for name in channels.inputs if name not in loads)
+    return replace(channels, inputs=driven, scheduling=loads)
+
+
+def dead_loads_told(recordings: Sequence[Recording], channels: Channels) -> Channels:
+    """Return channels of one muscle with what is held at a level of its own in every recording.
+
+    Such a load moves the output from recording to recording, and no input tells a model why.
+    """
+    if not (channels.single and recordings):
+        return channels
+    held = [
+        name
+        for name in schedules(recordings, (*channels.inputs, *channels.outputs))
+        if all(name in one for one in recordings) and held_at_levels(recordings, name)
+    ]
+    return replace(channels, scheduling=tuple(held)) if held else channels
+
+
+def held_at_levels(recordings: Sequence[Recording], name: str) -> bool:
+    """Tell whether a channel differs from recording to recording, and hardly within one."""
+    span = float(np.ptp(np.concatenate([one[name] for one in recordings])))
+    return span > 0 and all(float(np.ptp(one[name])) <= STEADY * span for one in recordings)
 
 
 def where_held(recordings: Sequence[Recording], found: Channels) -> Channels:

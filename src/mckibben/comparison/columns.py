@@ -60,6 +60,8 @@ class Column:
         value = self.value(row)
         if isinstance(value, str):
             return value
+        if self.key == "r2" and value is not None and value < 0:
+            return "below 0"  # how far is a matter of how little the test varies
         if isinstance(value, list):
             return " to ".join(numeral(self._rounded(end, row), self.digits) for end in value)
         return numeral(self._rounded(value, row), self.digits)

@@ -8,6 +8,8 @@ from typing import Any
 
 from mckibben import registry
 from mckibben.comparison.channels import Channels
+from mckibben.comparison.limits import limits
+from mckibben.comparison.needs import full_name
 from mckibben.errors import ModelError
 from mckibben.estimators.core.estimator import Estimator
 from mckibben.estimators.core.settings import check_settings, setting_value
@@ -15,7 +17,13 @@ from mckibben.recording import Recording
 
 
 def summary(model: str) -> str:
-    """Return what a model is, in one sentence."""
+    """Return a model's full name and what it can represent; of others' models, what they say.
+
+    >>> summary("arx")
+    'ARX model, linear. Linear dynamics, in closed form.'
+    """
+    if known := limits().get(model):
+        return f"{full_name(model)}. {known['can']}"
     said: str = registry.load("estimators", model).__doc__.strip().splitlines()[0]
     return said
 

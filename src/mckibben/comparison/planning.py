@@ -153,6 +153,11 @@ def plan_of(
     every = [*recordings, *tests, *checks]
     channels = channels_of(every, inputs, outputs, load)
     held: tuple[str, ...] = ()
+    if load is None and channels.scheduling:
+        load = channels.scheduling[0]
+        held = (
+            f"{load} is a load: models are told it beside the inputs, and it is never commanded",
+        )
     if inputs is None and outputs is None and load is None:
         named, channels = channels, where_held(every, channels)
         if channels != named:

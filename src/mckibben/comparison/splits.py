@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mckibben.arrays import Array
-from mckibben.comparison.channels import Channels
+from mckibben.comparison.channels import Channels, held_at_levels
 from mckibben.errors import DataError
 from mckibben.recording import Recording
 from mckibben.signals import reversals, split_cycles
@@ -29,9 +29,6 @@ EVERY = 3
 
 ENOUGH = 12
 """Fewest runs of which a third can be spared: of a few, each shows what no other does."""
-
-STEADY = 0.05
-"""What schedules is a level of its run where it varies in it by no more than this share of its range."""
 
 PIECES = 4
 """Of a part that has pieces from all over a recording."""
@@ -107,10 +104,8 @@ def held_out(recordings: Sequence[Recording], channels: Channels) -> Split:
     if not channels.single:
         for name in channels.scheduled(recordings):
             means = [round(float(recording[name].mean()), 1) for recording in recordings]
-            span = np.ptp(np.concatenate([recording[name] for recording in recordings]))
-            steady = all(np.ptp(recording[name]) <= STEADY * span for recording in recordings)
             unseen = set(sorted(set(means))[1:-1][::EVERY])
-            if steady and unseen:
+            if unseen and held_at_levels(recordings, name):
                 listed = ", ".join(f"{level:g}" for level in sorted(unseen))
                 unit = recordings[0].units[name]
                 return _parted(

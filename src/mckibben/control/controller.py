@@ -52,6 +52,11 @@ class Controller(ABC):
         """How many samples further ahead it wants the reference, to plan with."""
         return 0
 
+    @property
+    def n_clipped(self) -> int:
+        """How many samples its compensator has clipped by itself since the start."""
+        return 0
+
     def foresees(self, reference: Array, scheduled: Array) -> None:
         """Learn reference and schedule as they will be then, before `step`, where they are known.
 
@@ -95,6 +100,11 @@ class BlockController(Controller):
     def samples_ahead(self) -> int:
         """Those of the horizon of a compensator that looks ahead."""
         return self.block.samples_ahead
+
+    @property
+    def n_clipped(self) -> int:
+        """Those of the compensator."""
+        return self._stream.block.n_clipped(self._stream.state)
 
     def reset(self, sample_time: float) -> None:
         whole = self.block

@@ -43,6 +43,11 @@ class EstimatedLoad(Controller):
         """The controller's."""
         return self.controller.preview
 
+    @property
+    def n_clipped(self) -> int:
+        """Those of the controller's compensator."""
+        return self.controller.n_clipped
+
     def foresees(self, reference: Array, scheduled: Array) -> None:
         """Pass on the reference; the load to come is taken to be that of now."""
         del scheduled

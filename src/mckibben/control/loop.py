@@ -175,6 +175,7 @@ def track(
     controller.reset(step)
     seen, commands = np.empty((n, len(measured))), np.empty((n, len(driven)))
     clipped, times = np.zeros(n, dtype=bool), np.empty(n)
+    own = np.zeros(n + 1, dtype=int)
     drawn = np.zeros_like(seen)
     last: Array | None = None
     with telling(progress, "tracking") as tell:
@@ -202,6 +203,7 @@ def track(
             if slew is not None and last is not None:
                 allowed = np.clip(allowed, last - slew * step, last + slew * step)
             clipped[t] = bool((np.abs(allowed - wanted) > 1e-9).any())
+            own[t + 1] = controller.n_clipped
             last = allowed
             controller.applied(allowed)
             command = loop.step(allowed, measured[at_p]) if inner else allowed
@@ -216,7 +218,7 @@ def track(
     errors = seen[:, at_y] - due
     reached = ends(controller.undone, followed)
     out = {name: outside(due[:, followed.index(name)], *reached[name]) for name in reached}
-    clipped |= np.any([*out.values(), np.zeros(n, dtype=bool)], axis=0)
+    clipped |= np.any([*out.values(), np.diff(own, prepend=0)[:-1] > 0], axis=0)
     part, at_limit = errors[scored], clipped[scored]
     parts = dict(zip(followed, part.T, strict=True))
     far = {name: beyond(parts[name], out[name][scored], *reached[name]) for name in reached}

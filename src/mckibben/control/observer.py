@@ -50,6 +50,11 @@ class DisturbanceObserver(Controller):
         """The model."""
         return self._model
 
+    @property
+    def n_clipped(self) -> int:
+        """Those of the compensator."""
+        return self.compensator.n_clipped(self._ahead.state)
+
     def reset(self, sample_time: float) -> None:
         self._coming: tuple[Array, Array] | None = None
         self._ahead = self.compensator.stream(sample_time)

@@ -64,9 +64,10 @@ def _ends(seen: Seen, name: str, inner: int) -> Gap:
         if inner == 0
         else f"{inner} of them {'is' if inner == 1 else 'are'} inside its range"
     )
+    told = "cannot be told" if inner == 0 else "are too few to tell"
     return Gap(
         "minor loops",
-        f"Minor loops cannot be told: {name} has {counted(n, 'turning point')}, and {where}.",
+        f"Minor loops {told}: {name} has {counted(n, 'turning point')}, and {where}.",
         _decaying(seen, name),
         MINOR,
         0.75 if inner == 0 else 0.55,

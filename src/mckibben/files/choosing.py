@@ -55,6 +55,7 @@ class _Findings:
     """What comes up while columns are looked at."""
 
     ignored: list[str]
+    converted: list[str] = field(default_factory=list)
     assumed: list[str] = field(default_factory=list)
     references: dict[str, str] = field(default_factory=dict)
 
@@ -89,6 +90,8 @@ def choose(table: Table, request: Request, path: Path) -> Choice:
             keeps = target is None or (table.own and unit_of(channel) is None)
             units[channel] = unit.name if keeps or target is None else target
             channels[channel] = convert(values, unit.name, units[channel])
+            if units[channel] != unit.name:
+                found.converted.append(f"{channel} from {unit.name} to {units[channel]}")
             if not table.own or channel in request.units:
                 plausible.check(
                     channel, channels[channel], unit_of(channel), unit.name, table, path
@@ -104,6 +107,7 @@ def choose(table: Table, request: Request, path: Path) -> Choice:
         )
     notes = {
         "ignored_columns": found.ignored,
+        "converted_units": found.converted,
         "pressure_reference": found.references,
         "calibration": calibration,
     }
@@ -184,6 +188,8 @@ def _unit(
         )
     if unit.reference is not None:
         found.references[channel] = unit.reference
+    if unit.name == "mm" and given is None:
+        plausible.doubt(channel, values, path)
     return unit
 
 

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import numpy as np
 
 from mckibben.arrays import Array
 from mckibben.errors import DataError
+from mckibben.files.notices import warn
 from mckibben.files.table import Table
+from mckibben.files.units import SPELLINGS, convert
 
 LARGEST: dict[str, float] = {
     "bar": 2e3,
@@ -23,10 +26,15 @@ LARGEST: dict[str, float] = {
 }
 """Package unit -> what no measurement reaches, wide of anything built; times since year 0 are fine."""
 
+LEAST_TRAVEL = 0.1
+"""A travel that is doubted below [mm]: muscles move by more, unless they are read in metres."""
+
 SMALLEST_BAR, NO_BAR = 1e-7, 1e-12
 """A pressure between these is none: below a hundredth of a pascal, and above the rounding of zero."""
 
-_EXAMPLES = {"bar": "MPa", "mm": "um", "N": "mN", "s": "ms", "rad": "deg", "V": "mV", "": "%"}
+USUAL = {"bar": 5.0, "mm": 30.0, "N": 300.0, "s": 1.7e9, "rad": 1.0, "V": 5.0, "mm/s": 100.0}
+"""Package unit -> what measurements often reach, by which the unit that was meant is guessed; times so
+large count from 1970."""
 
 
 def check(
@@ -68,6 +76,25 @@ def check(
         file=path,
         channel=channel,
         row=table.row(at),
-        remedy=f"say its unit, as in --unit {channel}={_EXAMPLES.get(target, 'UNIT')}, or correct "
-        "that cell",
+        remedy=f"say its unit, as in --unit {channel}={_meant(values[at], read_in, target)}, or "
+        "correct that cell",
     )
+
+
+def doubt(channel: str, values: Array, path: Path) -> None:
+    """Say of a travel [mm] that hardly is one that its unit may be another."""
+    known = values[np.isfinite(values)]
+    travel = float(np.ptp(known)) if known.size else 0.0
+    if 0 < travel < LEAST_TRAVEL:
+        warn(
+            path,
+            f"{channel} travels {travel:.3g} mm in all; where it is in m, use --unit {channel}=m",
+        )
+
+
+def _meant(value: float, read_in: str, target: str) -> str:
+    """Return the unit in which what was read is nearest to what is usual."""
+    read = convert(np.array([abs(value)]), target, read_in)
+    sizes = {unit: float(convert(read, unit, target)[0]) for unit in SPELLINGS[target]}
+    usual = math.log(USUAL.get(target, 1.0))
+    return min(sizes, key=lambda unit: abs(math.log(max(sizes[unit], 1e-300)) - usual))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from mckibben.report.wording import number, output_range, percent
+from mckibben.report.wording import number, of_test_range, percent
 from mckibben.validation.results import Validation
 
 if TYPE_CHECKING:
@@ -39,10 +39,10 @@ def how_far(study: Study) -> list[str]:
     largest = f"At worst it was off by {number(best.test.max_error)} {board.unit} on the test."
     band = best.band
     if band is None:
-        share = percent(best.test.rmse / output_range(study))
+        share = of_test_range(best.test)
         return [
-            f"On the test it is off by {number(best.test.rmse)} {board.unit} RMSE, {share} of the "
-            "range. For a band around it: mckibben calibrate, on runs that it was not fitted to.",
+            f"On the test it is off by {number(best.test.rmse)} {board.unit} RMSE{share}. For a band "
+            "around it: mckibben calibrate, on runs that it was not fitted to.",
             largest,
         ]
     said = []

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from mckibben.arrays import Array
+from mckibben.comparison.channels import Channels
+from mckibben.comparison.recognising import any_moves, moved_by
 from mckibben.recording import Recording
 from mckibben.report.drawing import (
     N_AGES,
@@ -51,12 +53,31 @@ class Coupling:
     units: tuple[str, ...]
     explained: tuple[float, ...]
 
-    def own(self, output: str) -> str:
-        """Return the input that is an output's own: of as many its pair, else what moves it most."""
+    def own(self, output: str, recordings: Sequence[Recording] = ()) -> str:
+        """Return the input that is an output's own: of as many its pair, else what moves it most.
+
+        Where recordings are given, it is one that moves in them, if any does.
+        """
         place = self.outputs.index(output)
-        if len(self.inputs) == len(self.outputs) or not np.isfinite(self.effects[place]).all():
-            return self.inputs[place % len(self.inputs)]
-        return self.inputs[int(np.argmax(np.abs(self.effects[place])))]
+        moving = [k for k, name in enumerate(self.inputs) if any_moves(recordings, (name,))]
+        moving = moving or list(range(len(self.inputs)))
+        pair = self.inputs.index(Channels(self.inputs, self.outputs).pairs()[place][0])
+        effects = np.abs(self.effects[place, moving])
+        if pair in moving and (self.paired or not np.isfinite(effects).all()):
+            return self.inputs[pair]
+        return self.inputs[moving[int(np.argmax(np.nan_to_num(effects)))]]
+
+    def pairs(self, recordings: Sequence[Recording]) -> tuple[tuple[str, str], ...]:
+        """Return what every output of recordings is drawn over, and the output.
+
+        That is the input that is its own; where all are held, what else drives and moves.
+        """
+        shared = [n for n in recordings[0].channels if all(n in each for each in recordings)]
+        others = [name for name in shared if name not in self.outputs]
+        return tuple(
+            (moved_by(recordings, self.own(output, recordings), others), output)
+            for output in self.outputs
+        )
 
     @property
     def paired(self) -> bool:
@@ -110,7 +131,7 @@ def matrix(recording: Recording, found: Coupling, points: int = SMALL) -> Drawin
     for output in found.outputs[:MOST]:
         for name in found.inputs[:MOST]:
             x, y = along(recording[name], recording[output], points)[1:]
-            colour = "series-1" if found.own(output) == name else "input"
+            colour = "series-1" if found.own(output, [recording]) == name else "input"
             panels.append(
                 Panel(
                     axis_label(name, recording.units[name]),

@@ -11,8 +11,10 @@ from typing import TYPE_CHECKING
 from mckibben.arrays import Array
 from mckibben.blocks.core.block import Block
 from mckibben.errors import ModelError
+from mckibben.estimators.coupled.base import driving
 from mckibben.recording import Recording
 from mckibben.report import model_subjects, printed, subjects
+from mckibben.report.coupling_subjects import coupling
 from mckibben.report.drawing import N_COLOURS, Drawing, Panel, left_out
 from mckibben.report.shown import Shown, shown, unique
 
@@ -130,7 +132,8 @@ def plot_recording(
 def plot_model(block: Block, recordings: Sequence[Recording], kind: str, path: str | Path) -> None:
     """Write a figure of a model, running free, against recordings.
 
-    The first input and the first output of the model are drawn.
+    The first output of the model is drawn, over the first input, or of several muscles over that which
+    moves it most.
 
     Parameters
     ----------
@@ -157,9 +160,10 @@ def plot_model(block: Block, recordings: Sequence[Recording], kind: str, path: s
     if _known(kind, MODEL_KINDS) == "weights":
         printed.save(model_subjects.weights({name: block}), path)
         return
-    given, wanted = block.inputs[0].name, block.outputs[0].name
+    wanted = block.outputs[0].name
+    coupled = coupling(recordings, _driving(block, recordings[0]), (wanted,))
     runs = [
-        Shown(r, given, wanted, {name: run_free(block, r, wanted)}, "")
+        Shown(r, *coupled.pairs([r])[0], {name: run_free(block, r, wanted)}, "")
         for r in recordings[:N_COLOURS]
     ]
 
@@ -167,8 +171,8 @@ def plot_model(block: Block, recordings: Sequence[Recording], kind: str, path: s
         if kind == "fit":
             return subjects.fit_over_time(one.recording, wanted, one.outputs)
         if kind == "loops":
-            return subjects.fit_loops(one.recording, given, wanted, one.outputs)
-        return subjects.residuals(one.recording, given, wanted, one.outputs)
+            return subjects.fit_loops(one.recording, one.input, wanted, one.outputs)
+        return subjects.residuals(one.recording, one.input, wanted, one.outputs)
 
     printed.save(_one_each(runs, drawing, [r.name for r in recordings[N_COLOURS:]]), path)
 
@@ -202,6 +206,13 @@ def _chosen(one: Shown) -> dict[str, Array]:
             "no model of this study worked. Remedy: read the reasons in its leaderboard."
         )
     return dict(list(one.outputs.items())[:1])
+
+
+def _driving(block: Block, recording: Recording) -> tuple[str, ...]:
+    """Return a model's inputs, without what else it is told, as a load: no loop is drawn over that."""
+    told = tuple(channel.name for channel in block.inputs)
+    muscles = tuple(name for name in driving(recording) if name in told)
+    return muscles if told[0] in muscles else told[:1]
 
 
 def _known(name: str, names: tuple[str, ...]) -> str:

@@ -73,12 +73,11 @@ def page(study: Study, typed: Typed | None = None) -> str:
     every = shown(study)
     pictured = drawn(every)
     figures, left_out = _figures(study, pictured)
-    coupled = _coupled(study, pictured)
-    if coupled is not None:
-        runs = [one.recording for one in unique(every)]
-        drawing = coupling_subjects.matrix(coupling_subjects.fullest(runs, coupled.inputs), coupled)
-        figures["coupling"] = [interactive.plots(drawing)]
     measured = [one.recording for one in unique(every)]
+    coupled = _coupled(study, pictured)
+    fullest = coupling_subjects.fullest(measured, study.leaderboard.inputs)
+    if coupled is not None:
+        figures["coupling"] = [interactive.plots(coupling_subjects.matrix(fullest, coupled))]
     return templating.page(
         "report.html.j2",
         figures,
@@ -93,6 +92,7 @@ def page(study: Study, typed: Typed | None = None) -> str:
         explained=_explained(study.leaderboard),
         failures=study.leaderboard.failures,
         coupling=coupled,
+        coupling_of=fullest.name,
         bars=_bars(study.leaderboard),
         columns=columns_of_board(study.leaderboard),
         choices=CHOICES,
@@ -193,23 +193,12 @@ def _coupled(study: Study, pictured: tuple[Shown, ...]) -> coupling_subjects.Cou
 
 
 def _explained(board: Leaderboard) -> dict[str, str]:
-    """Return the full name of every model of a leaderboard and what it is; nothing of unknown ones."""
+    """Return the full name of every model of a leaderboard and what it can; nothing of unknown ones."""
     from mckibben import registry
-    from mckibben.comparison.needs import full_name
     from mckibben.comparison.offered import summary
 
     known = registry.names("estimators")
-    return {
-        row.model: _once(full_name(row.model), summary(row.model))
-        for row in board.ranking
-        if row.model in known
-    }
-
-
-def _once(name: str, told: str) -> str:
-    """Return a full name and a summary, less the name where the summary begins with it."""
-    stem, plain = (text.split(" (")[0].replace("–", "-") for text in (name, told))
-    return told if plain.startswith(stem) else f"{name}. {told}"
+    return {row.model: summary(row.model) for row in board.ranking if row.model in known}
 
 
 def checked(study: Study) -> tuple[OutputCheck, ...]:

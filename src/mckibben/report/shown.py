@@ -10,6 +10,7 @@ import numpy as np
 
 from mckibben.arrays import Array
 from mckibben.recording import Recording
+from mckibben.report.coupling_subjects import coupling
 
 if TYPE_CHECKING:
     from mckibben.studying.study import Study
@@ -57,15 +58,9 @@ def shown(study: Study) -> tuple[Shown, ...]:
     Where the last part of a recording is held out, the study holds its first part once more to fit;
     that is not repeated here.
     """
-    from mckibben.comparison.channels import Channels
-    from mckibben.comparison.recognising import moved_by
-
-    board, runs = study.leaderboard, [*study.train, *study.test]
-    every = list(runs[0].channels)
-    pairs = [
-        (moved_by(runs, given, every), wanted)
-        for given, wanted in Channels(board.inputs, board.outputs).pairs()
-    ]
+    board = study.leaderboard
+    coupled = coupling([*study.train, *study.test], board.inputs, board.outputs)
+    several = len(board.outputs) > 1
     ranked = [row.model for row in study.leaderboard.rows if row.model in study.predictions]
     n_train = len(study.train)
     parts = [_part_of(study, recording) for recording in study.test]
@@ -73,14 +68,14 @@ def shown(study: Study) -> tuple[Shown, ...]:
     for index, (recording, part) in enumerate(zip(study.test, parts, strict=True)):
         role = "test" if part is None else "first part to fit, rest to test"
         start = None if part is None else len(study.train[part])
-        for place, pair in enumerate(pairs):
+        for place, pair in enumerate(coupled.pairs([recording])):
             outputs = {m: study.predictions[m][n_train + index][:, place] for m in ranked}
-            found.append(Shown(recording, *pair, outputs, role, start, len(pairs) > 1))
+            found.append(Shown(recording, *pair, outputs, role, start, several))
     for index, recording in enumerate(study.train):
         if index not in parts:
-            for place, pair in enumerate(pairs):
+            for place, pair in enumerate(coupled.pairs([recording])):
                 outputs = {model: study.predictions[model][index][:, place] for model in ranked}
-                found.append(Shown(recording, *pair, outputs, "fit", None, len(pairs) > 1))
+                found.append(Shown(recording, *pair, outputs, "fit", None, several))
     return tuple(found)
 
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from mckibben.metrics import Scores
 from mckibben.numerals import numeral, typeset
 
 if TYPE_CHECKING:
@@ -50,12 +51,13 @@ def percent(value: float | None, digits: int = 2) -> str:
     return f"{number(100 * shown, digits)} %"
 
 
-def output_range(study: Study) -> float:
-    """Return the range of the measured output over all recordings; of several, the mean range."""
-    names = study.leaderboard.outputs
-    outputs = [recording.matrix(names) for recording in (*study.train, *study.test)]
-    highest = np.max([y.max(axis=0) for y in outputs], axis=0)
-    return float((highest - np.min([y.min(axis=0) for y in outputs], axis=0)).mean())
+def of_test_range(test: Scores) -> str:
+    """Return an error as a share of the range of what it was tested on, as words that follow it.
+
+    >>> of_test_range(Scores(0.02, 0.01, 0.9, 0.1, 0.034, 3.0))
+    ', 3.4 % of the range of the test'
+    """
+    return "" if np.isnan(test.nrmse) else f", {percent(test.nrmse)} of the range of the test"
 
 
 def verdict(study: Study) -> list[str]:
@@ -76,11 +78,10 @@ def verdict(study: Study) -> list[str]:
         low, high = best.rmse_interval
         between = f" (95 % interval {number(low)} to {number(high)} {board.unit})"
     so_far = " so far" if board.pending else ""
-    share = percent(best.test.rmse / output_range(study))
     sentences = [
         f"Models that worked{so_far}: {n_ok}. {board.chosen}",
         f"Free-running on the test data{_untouched(board)}, {best.model} is "
-        f"off by {number(best.test.rmse)} {board.unit} RMSE{between}, {share} of the recorded range; "
+        f"off by {number(best.test.rmse)} {board.unit} RMSE{between}{of_test_range(best.test)}; "
         f"at worst by {number(best.test.max_error)} {board.unit}.",
     ]
     if board.level:
@@ -155,7 +156,7 @@ def next_steps(study: Study) -> list[str]:
             f"{study.input} (command at the end). On the muscle itself expect the error of the "
             f"model, not of the inverse."
         )
-    if best.test.rmse / output_range(study) > MISLEADING:
+    if best.test.nrmse > MISLEADING:
         steps.append(
             "The chosen model still misses something: the residuals below show whether it depends on "
             "the input (a wrong shape) or on time (creep, rate)."

@@ -11,8 +11,7 @@ from typing import Any, ClassVar
 from mckibben.arrays import Array
 from mckibben.blocks.core.block import Block
 from mckibben.characterization import Characterization, characterize
-from mckibben.characterization.beside import effects, moves, without
-from mckibben.comparison.channels import Channels, Names
+from mckibben.comparison.channels import Names
 from mckibben.comparison.planning import Settings, plan_of
 from mckibben.comparison.ranking import ranked
 from mckibben.comparison.recognising import moved_by
@@ -197,19 +196,26 @@ def study(
             remedy="leave --rig out, or use mckibben track",
         )
     one = len(channels.inputs) == len(channels.outputs) == 1
-    looped = channels.inputs
+    looped, told = channels.inputs, (*channels.inputs, *(channels.scheduling or ()))
     if one:
         looped = (moved_by([*recordings, *tests], looped[0], list(recordings[0].channels)),)
     so_far = Study(
         train=plan.data.split.train,
         test=plan.data.split.test,
         characterization=(
-            _characterized([*recordings, *tests], looped[0], channels) if one else None
+            characterize(
+                [*recordings, *tests],
+                looped[0],
+                channels.outputs[0],
+                beside=[name for name in told if name != looped[0]],
+            )
+            if one
+            else None
         ),
         leaderboard=plan.board(),
         predictions={},
         inverse=None,
-        load=load,
+        load=next(iter(channels.scheduling or ()), None),
         notes=(*notes, *plan.notes),
         untold=untold(recordings, looped, channels.outputs, tests=tests),
         review=reviewed,
@@ -250,27 +256,6 @@ def study(
     if clear:
         kept.clear()
     return so_far
-
-
-def _characterized(
-    recordings: Sequence[Recording], given: str, channels: Channels
-) -> Characterization:
-    """Return what a muscle does where its load rests; where that never does, without what it does."""
-    wanted, told = channels.outputs[0], (*channels.inputs, *(channels.scheduling or ()))
-    beside = [name for name in told if name != given and moves(recordings, name)]
-    try:
-        return characterize(recordings, given, wanted, beside=beside)
-    except DataError:
-        if not beside:
-            raise
-    moved = effects(recordings, given, wanted, beside)
-    found = characterize(without(recordings, wanted, moved), given, wanted)
-    others = " and ".join(beside)
-    said = (
-        f"As {given} never moves while {others} rests, the loop is what is left when {others}'s effect "
-        "by one straight line is taken away: what bends of it, or remembers, is in the loop."
-    )
-    return replace(found, effects=moved, assumed=(*found.assumed, said))
 
 
 def _driven(log: Recording) -> Recording:

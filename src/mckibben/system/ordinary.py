@@ -97,7 +97,7 @@ def read_text(path: str | Path, *, most: int) -> str:
         Also if it is not UTF-8.
     """
     try:
-        return read_bytes(path, most=most).decode("utf-8")
+        return read_bytes(path, most=most).decode("utf-8-sig")  # which Windows' editors write
     except UnicodeDecodeError:
         raise DataError("it is not text in UTF-8", file=path, remedy="give a text file") from None
 

@@ -10,7 +10,7 @@ from nicegui import ui
 from mckibben.app import adding
 from mckibben.app.desk import LONGEST, Desk, guarded, labelled, named
 from mckibben.app.kept import Step
-from mckibben.app.together import kinds, sample_times
+from mckibben.app.together import differing, sample_times
 from mckibben.signals.zeroing import apart as zeros_apart
 
 SHOWN = 6
@@ -41,10 +41,9 @@ def common(times: tuple[float, float]) -> float:
 
 def _channels(desk: Desk) -> None:
     """Offer to set recordings aside where channels differ."""
-    found = kinds(desk.workspace.used())
-    if len(found) < 2:
+    found, common = differing(desk), desk.workspace.channels()
+    if not found:
         return
-    common = desk.workspace.channels()
     with named(ui.card().classes("w-full border border-warning gap-1"), "different"):
         ui.label("These recordings have different channels").classes("font-medium")
         ui.label(

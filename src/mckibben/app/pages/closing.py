@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable
+from contextlib import suppress
 from inspect import getdoc
 from typing import Any
 
@@ -82,6 +83,7 @@ def _plants(desk: Desk, model: str, known: list[str]) -> dict[str, str]:
     others: dict[str, str] = {}
     weaker: dict[str, str] = {}
     own: dict[str, str] = {}
+    step = desk.compensator[3] if desk.compensator else forms.STEP
     weak = desk.workspace.weaker(model)
     for name in desk.workspace.plants(model):
         if desk.workspace.same(model, name):
@@ -89,8 +91,19 @@ def _plants(desk: Desk, model: str, known: list[str]) -> dict[str, str]:
         else:
             kind = weaker if name in weak else others
             kind[f"{OWN}{name}"] = f"{name}: another model of your muscle"
-    rigs = {f"{RIG}{name}": f"{name}: a virtual rig of its size" for name in known}
+    rigs = {
+        f"{RIG}{name}": f"{name}: a virtual rig of its size" for name in known if _runs(name, step)
+    }
     return others | rigs | weaker | own
+
+
+def _runs(rig: str, step: float) -> bool:
+    """Tell whether a rig takes steps of a length [s]."""
+    from mckibben.rigs import load_rig
+
+    with suppress(MckibbenError):
+        return bool(load_rig(rig).changed({"sample_time": step}))
+    return False
 
 
 def _lacking(desk: Desk, model: str, offered: dict[str, str]) -> None:

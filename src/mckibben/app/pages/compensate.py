@@ -13,7 +13,7 @@ from mckibben.app import fields, forms, plots, scripts
 from mckibben.app.desk import Desk, caution, guarded, named, not_recommended, on_event
 from mckibben.app.drawn import picture
 from mckibben.app.following import at_rest, compensated, held_for, kept_motion, pace
-from mckibben.app.pages import closing, forces, logs
+from mckibben.app.pages import closing, forces, leaderboard, logs
 from mckibben.app.pages.drawing_reference import Sketch
 from mckibben.blocks.core.commanding import COMMANDS
 from mckibben.blocks.core.fields import Channel
@@ -53,6 +53,7 @@ def build(desk: Desk) -> None:
         if not names:
             ui.label(FORCED if FORCE in desk.outputs else NONE_YET)
             return
+        leaderboard.doubts(desk, all_refused=False)
         editors[:] = [Editor(desk, names)]
 
     def more() -> None:
@@ -142,6 +143,7 @@ class Editor:
             self.left = ui.column().classes("min-w-0 w-full lg:w-[34rem] gap-2")
             with ui.column().classes("min-w-0 flex-1 basis-80 gap-2"):
                 self.shown, self.runs = (ui.column().classes("w-full gap-2") for _ in range(2))
+        self._blank()
         self.model.on_value_change(on_event(lambda _: self._turned()))
         self._sketch()
         ui.timer(0.05, guarded(self._forms), once=True)
@@ -220,9 +222,14 @@ class Editor:
         before = self.sketch
         self._sketch()
         self.sketch.resume(before)
-        self.shown.clear()
+        self._blank()
         self.runs.clear()
         await self._forms()
+
+    def _blank(self) -> None:
+        self.shown.clear()
+        with self.shown:
+            ui.label("What the motion needs, and a closed loop, come here.").classes("opacity-70")
 
     async def _forms(self) -> None:
         """Offer what the model can be used as."""

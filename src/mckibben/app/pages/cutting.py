@@ -117,9 +117,13 @@ def preview(desk: Desk) -> None:
 
 
 def first_shown(desk: Desk, recording: Recording) -> list[str]:
-    """Return the channels that are drawn unasked: what is chosen, else what there is, a few."""
+    """Return the channels that are drawn unasked: what is chosen, else what is measured, a few.
+
+    A column without a unit beside those chosen is mostly a count: of levels, branches or cycles.
+    """
     chosen = [name for name in (*desk.inputs, *desk.outputs) if name in recording]
     others = [name for name in recording.channels if name not in chosen]
+    others = [name for name in others if recording.units[name] or not chosen]
     return [*chosen, *others][: max(FEW, min(len(chosen), MOST))]
 
 
@@ -247,6 +251,10 @@ def time_plot(
 
     drawing = subjects.time_course([recording], channels, plots.POINTS)
     (figure,) = plots.figures(drawing, height=170 * len(channels) + 60)
+    for axis in (axis for key, axis in figure["layout"].items() if key.startswith("yaxis")):
+        axis["title"]["text"] = axis["title"]["text"].replace(
+            " [", "<br>["
+        )  # else it meets the next
     figure["layout"]["dragmode"] = "zoom" if part is None else "select"
     figure["layout"]["selectdirection"] = "h"
     plot = picture(desk, figure, name)

@@ -8,9 +8,9 @@ from typing import Any
 
 from nicegui import ui
 
-from mckibben.app.desk import Desk, guarded, named, tell
+from mckibben.app.desk import Desk, guarded, named
 from mckibben.app.drawn import Drawn
-from mckibben.app.guard import LARGEST_UPLOAD, TOO_LARGE
+from mckibben.app.dropping import drop_zone
 from mckibben.app.pages import apart, editing, rigs
 from mckibben.app.pages.cutting import preview
 from mckibben.app.pages.importing import Intake
@@ -32,6 +32,7 @@ WATCH = 1.0
 
 def build(desk: Desk) -> None:
     """Build the page."""
+    seen = _seen(desk)
     dialogs = ui.element("div")  # outside of what is drawn anew, which would take them along
     with ui.column().classes("w-full"):
         with ui.row().classes("w-full gap-4 items-start"):
@@ -41,27 +42,34 @@ def build(desk: Desk) -> None:
                 with ui.row().classes("items-center"):
                     ui.label("Recordings").classes("text-lg")
                     editing.undoing(desk)
-                _list(desk, dialogs)
+                _list(desk, dialogs, intake)
         preview(desk)
-    _watch(desk, intake)
+    _watch(desk, intake, seen)
 
 
-def _watch(desk: Desk, intake: Intake) -> None:
+def _seen(desk: Desk) -> dict[str, int]:
+    """Return what tells of changes, noted before anything is shown: what changes meanwhile is seen."""
+    seen: dict[str, int] = {}
+
+    def noted() -> None:
+        seen["stamp"] = desk.workspace.stamp()
+
+    noted()
+    desk.when("recordings", noted)
+    return seen
+
+
+def _watch(desk: Desk, intake: Intake, seen: dict[str, int]) -> None:
     """Draw anew what other windows, or workbenches over the same folder, have changed.
 
     Not while files are coming in here: what is drawn twice takes the click that came between.
     """
-    seen = {"stamp": desk.workspace.stamp()}
-
-    def noted() -> None:
-        seen["stamp"] = desk.workspace.stamp()
 
     async def look() -> None:
         if not intake.seen and desk.workspace.stamp() != seen["stamp"]:
             await asyncio.to_thread(desk.workspace.warm)
             desk.changed("recordings", "channels")
 
-    desk.when("recordings", noted)
     ui.timer(WATCH, look)
 
 
@@ -74,13 +82,7 @@ def _sources(desk: Desk, dialogs: Any) -> Intake:
     ui.label("Add recordings").classes("text-lg")
     intake = Intake(desk, dialogs)
     upload = named(
-        ui.upload(
-            label=f"Drop files here: {', '.join(taken())}",
-            multiple=True,
-            auto_upload=True,
-            max_file_size=LARGEST_UPLOAD,
-            on_rejected=lambda: tell(TOO_LARGE),
-        ).classes("w-full"),
+        drop_zone(f"Drop files here: {', '.join(taken())}", multiple=True).classes("w-full"),
         "upload",
     )
     intake.watch(upload)
@@ -108,10 +110,10 @@ async def _example(desk: Desk) -> None:
         ui.notify("The example is open already.")
 
 
-def _list(desk: Desk, dialogs: Any) -> None:
+def _list(desk: Desk, dialogs: Any, intake: Intake) -> None:
     desk.when("recordings", desk.settle_channels)
     Drawn(desk, lambda: _compared(desk), lambda: apart.build(desk), "recordings", "channels")
-    Rows(desk, dialogs)
+    Rows(desk, dialogs, lambda: intake.seen)
     _sides(desk)
 
 
@@ -136,10 +138,12 @@ def _sides(desk: Desk) -> None:
             )
             for side in ("inputs", "outputs")
         }
+    told = named(ui.label("").classes("text-sm opacity-70 break-words"), "sides")
 
     def update() -> None:
         known = desk.workspace.channels()
         row.set_visibility(bool(desk.workspace.entries()))
+        told.set_text(told_of(desk))
         for side, field in fields.items():
             chosen = list(getattr(desk, side))
             shown = [name for name in chosen if name in known]
@@ -149,6 +153,17 @@ def _sides(desk: Desk) -> None:
     update()
     desk.when("recordings", update)
     desk.when("channels", update)
+
+
+def told_of(desk: Desk) -> str:
+    """Return what is modelled of what, and which channels were converted when they were read."""
+    from mckibben.app.offering import sides
+
+    if not desk.workspace.entries():
+        return ""
+    read = [run.meta.get("converted_units") or () for run in desk.workspace.readable()]
+    converted = list(dict.fromkeys(str(each) for one in read for each in one))
+    return f"{sides(desk)}{'; converted: ' if converted else ''}{', '.join(converted)}"
 
 
 def _chosen(desk: Desk, side: str, channels: list[str]) -> None:

@@ -10,8 +10,8 @@ from nicegui import ui
 from nicegui.events import MouseEventArguments, UploadEventArguments
 
 from mckibben.app import motions, plots
-from mckibben.app.desk import Desk, kept, labelled, named, on_event, tell, told
-from mckibben.app.guard import LARGEST_UPLOAD, TOO_LARGE
+from mckibben.app.desk import Desk, kept, labelled, named, on_event, told
+from mckibben.app.dropping import drop_zone
 from mckibben.app.motions import Points
 from mckibben.app.pages.axes import HEIGHT, WIDTH, Axes
 from mckibben.app.reading import read_upload
@@ -123,7 +123,6 @@ class Sketch:
             for kind, label in motions.MOTIONS.items():
                 button = ui.button(label, on_click=lambda kind=kind: self.ready(kind))
                 named(button.props("outline dense"), "wave" if kind == "sine" else f"wave-{kind}")
-        self.actions = ui.row().classes("w-full mt-2")
         if held:
             ui.label("Held while it moves").classes("text-sm mt-2")
         with ui.row().classes("gap-2"):
@@ -136,19 +135,16 @@ class Sketch:
                 ).classes("w-40")
                 for name, value in held.items()
             }
+        self.actions = ui.row().classes("w-full mt-2")
         with ui.expansion("Points, as a table", value=False).classes("w-full") as table:
             self.table = ui.column().classes("w-full gap-0 max-h-80 overflow-y-auto flex-nowrap")
         named(table, "points-table")
         with ui.expansion("Points, as text: time and value, one pair a line").classes("w-full"):
             self.text = named(ui.textarea("time value").classes("w-full"), "points")
             self.text.on_value_change(self._typed)
-        ui.upload(
-            label="or drop a file with the motion over time",
-            auto_upload=True,
-            max_file_size=LARGEST_UPLOAD,
-            on_rejected=lambda: tell(TOO_LARGE),
-            on_upload=on_event(self._loaded),
-        ).classes("w-full max-w-2xl").props("flat bordered")
+        asked = "or drop a file with the motion over time"
+        upload = drop_zone(asked, on_upload=on_event(self._loaded))
+        upload.classes("w-full max-w-2xl").props("flat bordered")
 
     def _span(self) -> None:
         """Fill in ends of ready-made motions, the one at rest first: well within what can be reached."""

@@ -70,6 +70,8 @@ def build(desk: Desk) -> None:
             named(
                 ui.button("Take the estimator (JSON)", on_click=guarded(take)), "take-force"
             ).props("outline")
+        doubt = named(caution(""), "force-doubt")
+        doubt.set_visibility(False)
         ui.label("As C or FMU: under Take away.").classes("text-xs opacity-70")
         showing(desk, "force", lambda: desk.workspace.estimates(), lambda *one: _shown(desk, *one))
     named(section, "forces")
@@ -82,6 +84,8 @@ def build(desk: Desk) -> None:
         fit.sort(key=lambda name: ("force" not in used[name], name in trained))
         names = {name: f"{name} (trained on)" if name in trained else name for name in fit}
         run.set_options(names, value=run.value if run.value in names else next(iter(names), None))
+        doubt.set_text(_forgets(desk, str(model.value)))
+        doubt.set_visibility(bool(doubt.text))
 
     async def look() -> None:
         found = await asyncio.to_thread(_tells, desk)
@@ -105,13 +109,26 @@ def build(desk: Desk) -> None:
     again()
 
 
+def _forgets(desk: Desk, model: str) -> str:
+    """Return that a model lost the gap between branches; empty where it keeps it, or is not known."""
+    memory = next((row["memory"] for row in desk.results() if row["name"] == model), None) or {}
+    ratio = memory.get("gap_ratio")
+    if ratio is None or ratio >= wording.FORGETFUL:
+        return ""
+    return (
+        f"{model} keeps only {wording.percent(ratio)} of the gap between rising and falling branches: "
+        "where its inputs turn back or are held, do not rely on what it estimates."
+    )
+
+
 def _shown(desk: Desk, name: str, one: Estimated) -> None:
     """Show an estimate beside what was measured."""
     ui.label(f"{one.output} of {one.recording} by {one.model}").classes("text-base mt-2")
-    if one.rmse is not None and one.span:
+    if one.rmse is not None:
+        share = f", {100 * one.rmse / one.span:.1f} % of the measured range" if one.span else ""
         said = (
-            f"RMSE {wording.number(one.rmse, 3)} {one.unit}, {100 * one.rmse / one.span:.1f} % of the "
-            f"measured range; largest {wording.number(one.largest, 3)} {one.unit}."
+            f"RMSE {wording.number(one.rmse, 3)} {one.unit}{share}; "
+            f"largest {wording.number(one.largest, 3)} {one.unit}."
         )
     else:
         said = "The recording has no measured force to compare with."

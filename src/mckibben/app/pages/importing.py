@@ -61,6 +61,7 @@ class Intake:
         self.coming += 1
         self.seen += 1
         self.sending = True  # until the browser says that it has sent all
+        self.desk.changed("coming")
         shown = unescaped(event.file.name)
         try:
             with doing(f"Reading {shown:.40}"):
@@ -110,6 +111,7 @@ class Intake:
                 await desk.news.settled()
                 tell_of(read)
             self.seen = 0
+            desk.changed("coming")
             self.show_left()
             if len(problems) == len(self.left) == 1 and not read:
                 await self._ask(problems[0])

@@ -37,7 +37,8 @@ ABOUT = (
     "Every model is run from its inputs alone, never put right by what was measured. Models are sorted "
     "by {heading}, their error by {by}; the first is to be chosen, and nothing is chosen by the test. "
     "{careful}Gap kept: 100 % where the model keeps rising and falling branches as far apart as the "
-    "data do, 0 where it forgot. Inverse: exact by a formula, solved in every step, or none, and then "
+    "data do, 0 where it forgot. R² counts from the test's own mean, which may lie closer where the "
+    "test hardly varies. Inverse: exact by a formula, solved in every step, or none, and then "
     "there is nothing to compensate with. Select one or two models to look closer."
 )
 
@@ -78,14 +79,17 @@ def build(desk: Desk) -> None:
     def shown() -> None:
         results = desk.results()
         if not results:
-            ui.label("Fit models to see them compared here.").classes("opacity-70")
+            others = {(one["input"], one["output"]) for one in desk.workspace.results()}
+            text = "Fit models to see them compared here."
+            if others:
+                listed = "; ".join(f"{given} to {wanted}" for given, wanted in sorted(others))
+                text += (
+                    f" Those fitted are of other inputs or outputs, chosen under Data: {listed}."
+                )
+            ui.label(text).classes("opacity-70")
             return
         ui.label("Leaderboard").classes("text-lg")
-        if not all(result["current"] for result in results):
-            named(
-                ui.label(OTHER_DATA).classes("text-sm text-amber-900 dark:text-amber-300"),
-                "other-data",
-            )
+        _of_other_data(results)
         table = _table(results, desk.outputs)
         heading, by = CHOICES[results[0]["chosen_by"]]
         careful = CAREFUL if any(limits.caution(result["model"]) for result in results) else ""
@@ -127,18 +131,31 @@ def build(desk: Desk) -> None:
     shown()
 
 
-def unrecommended(desk: Desk) -> None:
-    """Say where a model is chosen that none is recommended, and why, in the words of the leaderboard."""
+def doubts(desk: Desk, *, all_refused: bool = True) -> None:
+    """Say where a model is chosen what speaks against all, in the words of the leaderboard.
+
+    Parameters
+    ----------
+    desk : Desk
+    all_refused : bool
+        Whether to say that none is recommended, and why; else only that data have changed since.
+    """
 
     @ui.refreshable
     def shown() -> None:
-        if why := desk.not_recommended:
-            text = caution(f"{why}.")
-            named(text, "not-recommended")
+        _of_other_data(desk.results())
+        if all_refused and (why := desk.not_recommended):
+            named(caution(f"{why}."), "not-recommended")
 
-    for topic in ("results", "channels"):
+    for topic in ("results", "channels", "recordings"):
         desk.when(topic, shown.refresh)
     shown()
+
+
+def _of_other_data(results: Sequence[dict[str, Any]]) -> None:
+    if not all(result["current"] for result in results):
+        text = ui.label(OTHER_DATA).classes("text-sm text-amber-900 dark:text-amber-300")
+        named(text, "other-data")
 
 
 def _table(results: Sequence[dict[str, Any]], outputs: Sequence[str]) -> ui.table:
@@ -172,8 +189,8 @@ def _other(result: dict[str, Any]) -> str:
 
 
 def judged(results: Sequence[dict[str, Any]]) -> list[str]:
-    """Return what every model has to beat, and what speaks against all models, or against tests."""
-    said: list[str] = []
+    """Return what models are tested on and have to beat, and what speaks against them, or tests."""
+    said = [_sentence(result["split"]) for result in results if result.get("split")]
     against: dict[str, list[str]] = {}
     for result in results:
         constant = result.get("constant") or {}
@@ -193,6 +210,10 @@ def judged(results: Sequence[dict[str, Any]]) -> list[str]:
         said.append(why_none)
     said += [f"{', '.join(names)}: {why}" for why, names in against.items()]
     return list(dict.fromkeys(said))
+
+
+def _sentence(text: str) -> str:
+    return f"{text[0].upper()}{text[1:]}."
 
 
 def _unlike(result: dict[str, Any]) -> bool:
@@ -223,7 +244,7 @@ async def _closer(desk: Desk, names: list[str]) -> Callable[[], None]:
 
     try:
         outputs = await asyncio.to_thread(modelled)
-        pairs = await asyncio.to_thread(lambda: desk.looked_at)
+        pairs = await asyncio.to_thread(desk.looked_at, [recording])
     except MckibbenError as error:
         raise ModelError(f"{', '.join(names)} on {recording.name}: {error}") from None
 

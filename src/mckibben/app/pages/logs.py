@@ -9,8 +9,8 @@ from nicegui import ui
 from nicegui.events import UploadEventArguments
 
 from mckibben.app import forms
-from mckibben.app.desk import Desk, guarded, kept, labelled, named, on_event, tell
-from mckibben.app.guard import LARGEST_UPLOAD, TOO_LARGE
+from mckibben.app.desk import Desk, guarded, kept, labelled, named, on_event
+from mckibben.app.dropping import drop_zone
 from mckibben.app.kept import Reviewed
 from mckibben.app.pages.kept_curves import drawn, showing
 from mckibben.app.reading import read_upload
@@ -57,13 +57,8 @@ def build(desk: Desk) -> None:
                 )
             _look_back(desk, str(model.value), str(form.value), path.name, refit=False)
 
-        upload = ui.upload(
-            label="Drop the log here",
-            auto_upload=True,
-            max_file_size=LARGEST_UPLOAD,
-            on_rejected=lambda: tell(TOO_LARGE),
-            on_upload=on_event(loaded),
-        ).classes("w-full max-w-2xl")
+        upload = drop_zone("Drop the log here", on_upload=on_event(loaded))
+        upload.classes("w-full max-w-2xl")
         named(upload.props("flat bordered"), "log-upload")
         showing(desk, "review", lambda: desk.workspace.reviews(), lambda *one: _shown(desk, *one))
     named(section, "logs")

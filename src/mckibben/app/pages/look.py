@@ -14,6 +14,7 @@ from mckibben.app.drawn import picture
 from mckibben.app.fields import said
 from mckibben.app.pages.cutting import time_plot
 from mckibben.app.together import obstacle
+from mckibben.comparison.recognising import any_moves
 from mckibben.errors import MckibbenError
 from mckibben.numerals import typeset_within
 from mckibben.recording import Recording
@@ -43,11 +44,8 @@ def build(desk: Desk) -> None:
         )
         with ui.row().classes("w-full items-start gap-4"):
             with ui.column().classes("min-w-80 flex-[3]"):
-                pairs = desk.looked_at
-                if len(desk.inputs) > 1 or len(desk.outputs) > 1:
-                    _matrix(desk, chosen, pairs[0])
-                else:
-                    _plots(desk, chosen, *pairs[0])
+                _pictures(desk, chosen)
+            pairs = desk.looked_at()
             with ui.column().classes("min-w-72 flex-[2]"):
                 for given, wanted in pairs:
                     _words(desk, given, wanted)
@@ -58,26 +56,46 @@ def build(desk: Desk) -> None:
     shown()
 
 
-def _matrix(desk: Desk, chosen: ui.select, begun: tuple[str, str]) -> None:
-    """Show every output over every input, small, with how far each moves each; a click enlarges."""
-    at = named(ui.column().classes("w-full"), "coupling")
-    pair = list(begun)
+def _pictures(desk: Desk, chosen: ui.select) -> None:
+    """Show the loop of the recording chosen; of several channels one, below what moves what."""
+    several = len(desk.sides.inputs) > 1 or len(desk.outputs) > 1
+    clicked: list[str] = []
 
     @ui.refreshable
     def enlarged() -> None:
-        ui.label(f"{pair[1]} over {pair[0]}").classes("text-lg")
-        _plots(desk, chosen, *pair)
+        try:
+            recording = desk.workspace.recording(str(chosen.value))
+            pairs = desk.looked_at([recording])
+        except (MckibbenError, KeyError) as error:
+            refused(error)
+            return
+        given, wanted = clicked or pairs[0]
+        if clicked and not any_moves([recording], (given,)):  # over what is held, there is no loop
+            given = pairs[desk.outputs.index(wanted)][0]
+        if several:
+            ui.label(f"{wanted} over {given}").classes("text-lg")
+        _plots(desk, recording, given, wanted)
 
     def enlarge(given: str, wanted: str) -> None:
-        pair[:] = given, wanted
+        clicked[:] = given, wanted
         enlarged.refresh()
+
+    if several:
+        _matrix(desk, chosen, enlarge)
+    chosen.on_value_change(enlarged.refresh)
+    enlarged()
+
+
+def _matrix(desk: Desk, chosen: ui.select, enlarge: Callable[[str, str], None]) -> None:
+    """Show every output over every input, small, with how far each moves each; a click enlarges."""
+    at = named(ui.column().classes("w-full"), "coupling")
 
     @ui.refreshable
     def pictured() -> None:
         try:
             recording = desk.workspace.recording(str(chosen.value))
             used = list(desk.workspace.used().values())
-            found = coupling_subjects.coupling(used, desk.inputs, desk.outputs)
+            found = coupling_subjects.coupling(used, desk.sides.inputs, desk.outputs)
         except (MckibbenError, KeyError) as error:
             refused(error)
             return
@@ -93,7 +111,11 @@ def _matrix(desk: Desk, chosen: ui.select, begun: tuple[str, str]) -> None:
                 _small(desk, figure, found, given, wanted, enlarge)
         ui.label(
             "In colour: the input that "
-            + ("belongs to the output." if found.paired else "moves the output most.")
+            + (
+                "belongs to the output."
+                if found.paired
+                else "moves the output most, of those that move here."
+            )
             + " Numbers: what the input over its whole range does to the output, by one straight line "
             "through all inputs of all recordings. Click on a picture's name to enlarge it."
         ).classes("text-xs opacity-70")
@@ -101,7 +123,6 @@ def _matrix(desk: Desk, chosen: ui.select, begun: tuple[str, str]) -> None:
     chosen.on_value_change(pictured.refresh)
     with at:
         pictured()
-        enlarged()
 
 
 def _small(
@@ -127,62 +148,52 @@ def _small(
         picture(desk, figure)
 
 
-def _plots(desk: Desk, chosen: ui.select, given: str, wanted: str) -> None:
+def _plots(desk: Desk, recording: Recording, given: str, wanted: str) -> None:
     from mckibben.characterization.tracks import MAJOR
     from mckibben.signals import cycles
 
+    found = cycles(recording[given], MAJOR * float(np.ptp(recording[given])))
+    used = (*desk.inputs, *desk.outputs, given)
+    others = coupling_subjects.third_channels(recording, used)
+    with ui.row().classes("items-center w-full"):
+        colour = named(
+            ui.toggle(
+                {"time": "Colour by time"}
+                | ({"rate": "Colour by rate"} if recording.sample_time is not None else {})
+                | {f"by {name}": f"Colour by {name}" for name in others},
+                value="time",
+            ).props("no-caps"),
+            "loop-colour",
+        )
+        cycle = named(
+            ui.number(
+                f"Cycle, of {len(found)}; 0 for all", value=0, min=0, max=len(found), step=1
+            ).classes("w-52"),
+            "cycle",
+        )
+
     @ui.refreshable
-    def drawn() -> None:
-        try:
-            recording = desk.workspace.recording(str(chosen.value))
-        except MckibbenError as error:
-            refused(error)
-            return
-        found = cycles(recording[given], MAJOR * float(np.ptp(recording[given])))
-        used = (*desk.inputs, *desk.outputs, given)
-        others = coupling_subjects.third_channels(recording, used)
-        with ui.row().classes("items-center w-full"):
-            colour = named(
-                ui.toggle(
-                    {"time": "Colour by time"}
-                    | ({"rate": "Colour by rate"} if recording.sample_time is not None else {})
-                    | {f"by {name}": f"Colour by {name}" for name in others},
-                    value="time",
-                ).props("no-caps"),
-                "loop-colour",
+    def loop() -> None:
+        number = int(cycle.value or 0)
+        part = recording
+        if 1 <= number <= len(found):
+            part = recording.slice(found[number - 1].start, found[number - 1].stop)
+        if colour.value == "rate":
+            figure = _by_rate(part, given, wanted)
+        else:
+            by = str(colour.value).removeprefix("by ")
+            drawing = (
+                subjects.loop([part], given, wanted)
+                if by == "time"
+                else coupling_subjects.loop_by(part, given, wanted, by)
             )
-            cycle = named(
-                ui.number(
-                    f"Cycle, of {len(found)}; 0 for all", value=0, min=0, max=len(found), step=1
-                ).classes("w-52"),
-                "cycle",
-            )
+            figure = plots.figures(drawing, height=440)[0]
+        picture(desk, figure, "loop-plot")
 
-        @ui.refreshable
-        def loop() -> None:
-            number = int(cycle.value or 0)
-            part = recording
-            if 1 <= number <= len(found):
-                part = recording.slice(found[number - 1].start, found[number - 1].stop)
-            if colour.value == "rate":
-                figure = _by_rate(part, given, wanted)
-            else:
-                by = str(colour.value).removeprefix("by ")
-                drawing = (
-                    subjects.loop([part], given, wanted)
-                    if by == "time"
-                    else coupling_subjects.loop_by(part, given, wanted, by)
-                )
-                figure = plots.figures(drawing, height=440)[0]
-            picture(desk, figure, "loop-plot")
-
-        colour.on_value_change(loop.refresh)
-        cycle.on_value_change(loop.refresh)
-        loop()
-        time_plot(desk, recording, [given, wanted], "time-plot")
-
-    chosen.on_value_change(drawn.refresh)
-    drawn()
+    colour.on_value_change(loop.refresh)
+    cycle.on_value_change(loop.refresh)
+    loop()
+    time_plot(desk, recording, [given, wanted], "time-plot")
 
 
 def _by_rate(recording: Recording, given: str, wanted: str) -> plots.Json:
@@ -213,19 +224,25 @@ def _words(desk: Desk, given: str, wanted: str) -> None:
     what = f": {wanted}" if len(desk.outputs) > 1 else ""
     ui.label(f"What the muscle does{what}").classes("text-lg")
     place = named(ui.column().classes("w-full"), "characterization")
+    with place:
+        ui.spinner()
 
     async def find() -> None:
         recordings = desk.workspace.with_role("train") + desk.workspace.with_role("test")
-        beside = [name for name in desk.inputs if name != given and given in desk.inputs]
+        sides = desk.sides
+        others = (*sides.inputs, *(sides.scheduling or ()))
+        beside = [name for name in others if name != given]
         try:
             found = await asyncio.to_thread(characterize, recordings, given, wanted, beside=beside)
         except MckibbenError as error:
+            place.clear()
             with place:
                 refused(error)
             return
+        place.clear()
         with place:
             for sentence in found.sentences:
-                ui.label(typeset_within(sentence))
+                ui.label(typeset_within(said(sentence)))
             if len(recordings) > 1:
                 ui.label(f"Over all {len(recordings)} recordings:").classes("text-sm opacity-70")
             rows = [
@@ -260,7 +277,9 @@ def _untold(desk: Desk, given: str) -> None:
 
     ui.label("What these recordings cannot tell").classes("text-lg")
     place = named(ui.column().classes("w-full"), "untold")
-    inputs = desk.inputs if len(desk.inputs) > 1 else (given,)  # each moves every output
+    inputs = (
+        desk.sides.inputs if len(desk.sides.inputs) > 1 else (given,)
+    )  # each moves every output
 
     async def find() -> None:
         train, test = desk.workspace.with_role("train"), desk.workspace.with_role("test")

@@ -177,8 +177,10 @@ def _best_so_far(desk: Desk, fits: list[Job]) -> None:
             seconds, costs = np.insert(seconds, begun, np.nan), np.insert(costs, begun, np.nan)
             curves.append((job.title, seconds, costs, f"series-{place % 6 + 1}"))
     if curves:
-        ui.label("Best so far, in each fold of the cross-validation anew").classes("text-sm")
-        figure = plots.lines(curves, x="time [s]", y="cost of the search")
-        figure["layout"]["yaxis"]["type"] = "log"
+        ui.label(
+            "Best so far, in each fold of the cross-validation anew: what each search makes smaller, "
+            "on a scale of its own"
+        ).classes("text-sm")
+        figure = plots.lines(curves, x="time [s]", y="cost of the search", logarithmic=True)
         figure["layout"]["xaxis"]["rangemode"] = "tozero"
         picture(desk, figure, "best-so-far")

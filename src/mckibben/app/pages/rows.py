@@ -22,10 +22,11 @@ SHOWN = 6
 
 @dataclass
 class _Row:
-    """What a row was made for, what holds it, and what gives its role another value."""
+    """What a row was made for, what holds it and its words, and what gives its role another value."""
 
     state: tuple[Entry, int]
     place: ui.row
+    words: ui.column
     role: Callable[[str], Any]
 
 
@@ -37,10 +38,12 @@ class Rows:
     desk : Desk
     dialogs : element
         Where dialogs go.
+    coming : callable
+        Returns how many files are just coming in.
     """
 
-    def __init__(self, desk: Desk, dialogs: Any) -> None:
-        self.desk, self.dialogs = desk, dialogs
+    def __init__(self, desk: Desk, dialogs: Any, coming: Callable[[], int]) -> None:
+        self.desk, self.dialogs, self.coming = desk, dialogs, coming
         self._rows: dict[str, _Row] = {}
         with named(ui.card().classes("w-full"), "empty") as self._empty:
             ui.label("Nothing here yet.").classes("text-base")
@@ -50,58 +53,66 @@ class Rows:
             )
         self._place = ui.column().classes("w-full gap-3")
         self.update()
-        desk.when("recordings", self.update)
+        for topic in ("recordings", "coming"):
+            desk.when(topic, self.update)
 
     def update(self) -> None:
         """Show what is there now."""
         entries = {entry.name: entry for entry in self.desk.workspace.entries()}
         states = {name: state_of(entry) for name, entry in entries.items()}
-        self._empty.set_visibility(not entries)
-        for name in [name for name, row in self._rows.items() if row.state != states.get(name)]:
+        self._empty.set_visibility(not entries and not self.coming())
+        for name in self._rows.keys() - entries.keys():
             self._rows.pop(name).place.delete()
         for at, (name, entry) in enumerate(entries.items()):
-            if name in self._rows:
-                self._rows[name].role(entry.role)
-                continue
-            with self._place, ui.row().classes("items-center w-full gap-2") as place:
-                role = self._filled(entry)
-            named(place, f"recording-{name}")
-            self._rows[name] = _Row(states[name], place, role)
-            if at < len(self._rows) - 1:
-                place.move(target_index=at)
+            row = self._rows.get(name)
+            if row is None:
+                self._rows[name] = row = self._made(entry, states[name])
+                if at < len(self._rows) - 1:
+                    row.place.move(target_index=at)
+            elif (
+                row.state != states[name]
+            ):  # what is clicked stays: a click that comes now must count
+                row.state = states[name]
+                row.words.clear()
+                self._tell(row.words, name, entry)
+            row.role(entry.role)
 
-    def _filled(self, entry: Entry) -> Callable[[str], Any]:
+    def _made(self, entry: Entry, state: tuple[Entry, int]) -> _Row:
         desk, name = self.desk, entry.name
-        try:
-            recording = desk.workspace.recording(name)
-        except MckibbenError as error:
-            with ui.column().classes("flex-1 min-w-40"):
+        with self._place, ui.row().classes("items-center w-full gap-2") as place:
+            words = ui.column().classes("gap-0 flex-1 min-w-40")
+            toggle = ui.toggle(["train", "test", "unused"], value=entry.role)
+            toggle.props(f'dense role=group aria-label="Role of {name}"')
+            toggle.on_value_change(lambda event: _set_role(desk, name, event.value))
+            named(toggle, f"role-{name}")
+            with ui.row().classes("gap-0 items-center"):
+                ask = guarded(lambda: ask_again(desk, self.dialogs, name))
+                button = ui.button(READING, icon="tune", on_click=ask).props("flat dense no-caps")
+                labelled(button, "aria-label", f"{READING}: {name}")
+                self._button("show_chart", "Show", name, _show)
+                self._button("delete", "Remove", name, _remove)
+        self._tell(words, name, entry)
+        return _Row(state, named(place, f"recording-{name}"), words, toggle.set_value)
+
+    def _tell(self, words: ui.column, name: str, entry: Entry) -> None:
+        with words:
+            try:
+                recording = self.desk.workspace.recording(name)
+            except MckibbenError as error:
                 refused(error, name)
-            self._button("delete", "Remove", name, _remove)
-            return lambda role: None
-        duration = "" if recording.duration is None else f", {recording.duration:.4g} s"
-        with ui.column().classes("gap-0 flex-1 min-w-40"):
+                return
+            duration = "" if recording.duration is None else f", {recording.duration:.4g} s"
             ui.label(name).classes("font-medium break-all")
             listed = ", ".join(f"{c} [{recording.units[c] or '-'}]" for c in recording.channels)
-            words = f"{len(recording)} samples{duration}; {listed}"
-            ui.label(words).classes("text-xs opacity-70 break-words")
+            ui.label(f"{len(recording)} samples{duration}; {listed}").classes(
+                "text-xs opacity-70 break-words"
+            )
             _aside_said(recording, name)
             for note in [note for note in entry.notes if not is_plain(note)][:SHOWN]:
                 named(
                     ui.label(said(note)).classes("text-xs text-amber-900 dark:text-amber-300"),
                     f"note-{name}",
                 )
-        toggle = ui.toggle(["train", "test", "unused"], value=entry.role)
-        toggle.props(f'dense role=group aria-label="Role of {name}"')
-        toggle.on_value_change(lambda event: _set_role(desk, name, event.value))
-        named(toggle, f"role-{name}")
-        with ui.row().classes("gap-0 items-center"):
-            ask = guarded(lambda: ask_again(desk, self.dialogs, name))
-            button = ui.button(READING, icon="tune", on_click=ask).props("flat dense no-caps")
-            labelled(button, "aria-label", f"{READING}: {name}")
-            self._button("show_chart", "Show", name, _show)
-            self._button("delete", "Remove", name, _remove)
-        return toggle.set_value
 
     def _button(self, icon: str, word: str, name: str, action: Callable[[Desk, str], None]) -> None:
         button = ui.button(icon=icon, on_click=lambda: action(self.desk, name)).props("flat dense")

@@ -35,7 +35,7 @@ def build(desk: Desk) -> None:
         if not names:
             ui.label("Fit a model first, under Models.")
             return
-        leaderboard.unrecommended(desk)
+        leaderboard.doubts(desk)
         model = named(
             ui.select(names, value=names[0], label="Model").classes("w-full max-w-xs"),
             "take-model",
@@ -69,9 +69,8 @@ def _figures(desk: Desk, model: Any) -> None:
         ui.label("Figures for print").classes("text-lg")
         kind = ui.select(FIGURES, value="loops", label="Figure").classes("w-full")
         form = ui.toggle(["png", "svg", "pdf"], value="pdf").props("dense")
-        pairs = {f"{u} → {y}": (u, y) for u, y in desk.pairs}
-        pair = ui.select(list(pairs), value=next(iter(pairs)), label="Channels").classes("w-full")
-        pair.set_visibility(len(pairs) > 1)
+        output = ui.select(list(desk.outputs), value=desk.output, label="Output").classes("w-full")
+        output.set_visibility(len(desk.outputs) > 1)
 
         async def draw() -> None:
             from mckibben.report.figures import plot_model, plot_recording
@@ -86,7 +85,8 @@ def _figures(desk: Desk, model: Any) -> None:
 
             def save() -> None:
                 if kind.value in ("time", "loop"):
-                    plot_recording(recordings, *pairs[str(pair.value)], str(kind.value), path)
+                    pair = desk.looked_at(recordings)[desk.outputs.index(str(output.value))]
+                    plot_recording(recordings, *pair, str(kind.value), path)
                 else:
                     block = desk.workspace.model(str(model.value))
                     plot_model(block, recordings, str(kind.value), path)

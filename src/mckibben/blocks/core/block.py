@@ -287,6 +287,11 @@ class Block(DrawsItself, Exportable, Parametrised, HandsOver):
         """Warn of what happened during a run that its user should know, read off the final state."""
         del state
 
+    def n_clipped(self, state: Array) -> int:
+        """Return how many samples were clipped, or not solved, in a run that ended in a state."""
+        del state
+        return 0
+
     def _inputs_from(self, recording: Recording) -> Array:
         for channel in self.inputs:
             if channel.name in recording and recording.units[channel.name] != channel.unit:

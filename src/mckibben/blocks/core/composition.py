@@ -97,6 +97,11 @@ class Composition(Block):
         for part, share in zip(self.parts, self._states(state), strict=True):
             part.report(share)
 
+    def n_clipped(self, state: Array) -> int:
+        """Return those of all parts."""
+        shares = zip(self.parts, self._states(state), strict=True)
+        return sum(part.n_clipped(share) for part, share in shares)
+
     def _shared_initial(self, initial: Initial | None) -> Sequence[Initial | None]:
         """Return every part's own share of an explicit initial state, or the rule for all."""
         if initial is None or isinstance(initial, str):

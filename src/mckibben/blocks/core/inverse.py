@@ -100,8 +100,11 @@ class Invertible(Primitive):
         numbers = self.inverse_numbers(self.c_numbers(sample_time))
         return Cost.of(numbers, self.n_inverse_states)
 
+    inverse_counts: ClassVar[bool] = False
+    """Whether the last of the inverse's state counts the samples that `inverse_complaint` is about."""
+
     def inverse_complaint(self, state: Array) -> str:
-        """Return what is to be said of a run of the inverse that ended in a state; most often none."""
+        """Return what is to be said of a run of the inverse in which samples were counted."""
         del state
         return ""
 
@@ -218,9 +221,12 @@ class Inverse(Block):
 
     def report(self, state: Array) -> None:
         """Warn of what the forward block complains of, as references clipped."""
-        complaint = self.forward.inverse_complaint(state)
-        if complaint:
-            warnings.warn(complaint, ModelWarning, stacklevel=4)
+        if self.n_clipped(state):
+            warnings.warn(self.forward.inverse_complaint(state), ModelWarning, stacklevel=4)
+
+    def n_clipped(self, state: Array) -> int:
+        """Return how many samples the forward block complains of."""
+        return int(state[-1]) if self.forward.inverse_counts and state[-1] > 0 else 0
 
     def equations(self) -> tuple[str, ...]:
         """Return that it solves the equations of the block undone, which follow."""

@@ -154,10 +154,10 @@ class Ranged(SingleChannel, Invertible):
         low, high = self.limits
         return np.array([low]), np.array([high])
 
+    inverse_counts: ClassVar[bool] = True
+
     def inverse_complaint(self, state: Array) -> str:
         """Tell of references that were clipped."""
-        if not state[-1] > 0:
-            return ""
         low, high = self.reachable()
         wanted, given = self.output, self.input
         return (

@@ -302,10 +302,14 @@ class Balance(ManyChannels, LearntBalance):
         pushing = " or muscles to push harder than they can," if self.pushes else ""
         tell_clipped(state[-1], self.given, self.pressure_range, pushing)
 
+    def n_clipped(self, state: Array) -> int:
+        """Return how many samples needed pressures out of range."""
+        return int(state[-1]) if state[-1] > 0 else 0
+
+    inverse_counts: ClassVar[bool] = True
+
     def inverse_complaint(self, state: Array) -> str:
         """Tell of pressures for which no equilibrium was found."""
-        if not state[-1] > 0:
-            return ""
         return (
             f"{self.kind!r} found no equilibrium in {int(state[-1])} samples: the model was not made "
             "for such pressures"

@@ -334,6 +334,10 @@ class ForceBalance(ManyChannels, Invertible):
         """Warn of references that would need pressures out of range."""
         tell_clipped(state[-1], self.given, self.pressure_range)
 
+    def n_clipped(self, state: Array) -> int:
+        """Return how many samples needed pressures out of range."""
+        return int(state[-1]) if state[-1] > 0 else 0
+
     def cost(self, sample_time: float | None) -> Cost:
         """Return about four operations a number, for those of stops come again."""
         operations = 4 * self.c_numbers(sample_time).size
@@ -361,10 +365,10 @@ class ForceBalance(ManyChannels, Invertible):
         state[-1] = 0.0
         return state
 
+    inverse_counts: ClassVar[bool] = True
+
     def inverse_complaint(self, state: Array) -> str:
         """Tell of pressures for which no equilibrium was found."""
-        if not state[-1] > 0:
-            return ""
         return (
             f"no equilibrium was found in {int(state[-1])} samples: the model was not made for such "
             "pressures"

@@ -256,10 +256,10 @@ class FuzzyNetwork(Stateless, ManyChannels, Invertible):
                 found, least = state, error
         return np.append(found[:-1], 0.0)
 
+    inverse_counts: ClassVar[bool] = True
+
     def inverse_complaint(self, state: Array) -> str:
         """Tell of references that the network cannot give."""
-        if not state[-1] > 0:
-            return ""
         return (
             f"{int(state[-1])} samples of the reference are out of reach of the network and were "
             "clipped to the nearest that is"

@@ -303,10 +303,10 @@ class Air(Ranged):
         left = APPROACHED * (highest - lowest) if lags and np.isfinite(ends).all() else 0.0
         return np.array([lowest + left]), np.array([highest - left])
 
+    inverse_counts: ClassVar[bool] = True
+
     def inverse_complaint(self, state: Array) -> str:
         """Tell of references that were clipped."""
-        if not state[-1] > 0:
-            return ""
         low, high = self.reachable()
         return (
             f"{int(state[-1])} sample(s) of the reference {self.output.name!r} were clipped: they are "

@@ -42,7 +42,6 @@ from mckibben.estimators.coupled.balance_coordinates import (
     together,
 )
 from mckibben.estimators.coupled.balance_loads import (
-    LOADS,
     held_told,
     loads_told,
     varying,
@@ -56,7 +55,7 @@ from mckibben.estimators.coupled.balance_stages import Stages, acted, acting
 from mckibben.estimators.coupled.balance_starts import simulate_started
 from mckibben.estimators.coupled.balance_structure import APART, Structure
 from mckibben.estimators.coupled.balance_words import held_back, missed, sentences
-from mckibben.estimators.coupled.base import CoupledEstimator, schedules
+from mckibben.estimators.coupled.base import LOADS, CoupledEstimator, schedules
 from mckibben.estimators.optimisers.tracker import Tracker
 from mckibben.recording import Recording
 

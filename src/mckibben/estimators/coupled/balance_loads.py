@@ -24,11 +24,9 @@ from mckibben.estimators.core.data import TrainingData
 from mckibben.estimators.coupled.balance_checks import held
 from mckibben.estimators.coupled.balance_search import Search
 from mckibben.estimators.coupled.balance_structure import LEAST_PULL
+from mckibben.estimators.coupled.base import LOADS
 from mckibben.estimators.optimisers.tracker import Tracker
 from mckibben.recording import Recording
-
-LOADS = ("N",)
-"""Units of what loads a muscle, instead of scheduling its springs."""
 
 LOADS_HELP = 0.1
 """By how much loads of their own have to help, for them to be believed."""

@@ -21,6 +21,9 @@ from mckibben.recording import Recording
 SCHEDULES = ("pressure_extensor", "force")
 """Channels that schedule a model by default, where there are any."""
 
+LOADS = ("N",)
+"""Units of what loads a muscle, instead of scheduling its springs."""
+
 FEWEST_SAMPLES = 50
 """Fewer samples than this in a row identify nothing of several muscles."""
 
@@ -129,9 +132,12 @@ class CoupledEstimator(ErrorsUnknown, Estimator):
                     file=first.source,
                     remedy=f"name the columns {what}_1, {what}_2 and so on, or use --column",
                 )
+        loads = loads_among(listed, inputs)
+        inputs = tuple(name for name in inputs if name not in loads)
         scheduling = self.scheduling
         if scheduling is None:
             scheduling = schedules(listed, (*inputs, *outputs))
+        scheduling = tuple(dict.fromkeys((*scheduling, *loads)))
         for recording in listed:
             for name in (*inputs, *outputs, *scheduling):
                 if name not in recording:
@@ -143,7 +149,7 @@ class CoupledEstimator(ErrorsUnknown, Estimator):
                     )
             if len(recording) < FEWEST_SAMPLES:
                 raise DataError(
-                    f"{len(recording)} samples are too few for several muscles",
+                    f"{len(recording)} samples are too few for this model",
                     file=recording.source,
                     remedy=f"give recordings of at least {FEWEST_SAMPLES} samples",
                 )
@@ -217,6 +223,16 @@ def schedules(recordings: Sequence[Recording], others: Sequence[str] = ()) -> tu
         for name in SCHEDULES
         if name not in others and any(name in recording for recording in recordings)
     )
+
+
+def loads_among(recordings: Sequence[Recording], inputs: Sequence[str]) -> tuple[str, ...]:
+    """Return the forces beside other inputs: loads, which are given, and nobody commands."""
+    found = tuple(
+        name
+        for name in inputs
+        if any(name in one and one.units[name] in LOADS for one in recordings)
+    )
+    return found if len(found) < len(inputs) else ()
 
 
 def one(recording: Recording, *names: str) -> tuple[str, ...]:

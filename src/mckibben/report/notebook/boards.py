@@ -33,7 +33,7 @@ class LeaderboardFace(Face):
         ranked = [row for row in board.ranking if row.reason is None]
         failed = [row.model for row in board.rows if row.reason is not None]
         chosen = next((k for k, row in enumerate(ranked) if row is board.best), None)
-        notes = [board.chosen] if board.chosen else []
+        notes = [f"Split: {board.split}.", *([board.chosen] if board.chosen else [])]
         notes += [f"Failed: {', '.join(failed)}."] if failed else []
         notes += [f"Pending: {', '.join(board.pending)}."] if board.pending else []
         if any(row.caution for row in board.rows if row.reason is None):

@@ -1,8 +1,8 @@
-"""A browser for all tests of a module."""
+"""A browser for all tests of a module, and what its page said where one fails."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from typing import Any
 
 import pytest
@@ -17,3 +17,14 @@ def browser() -> Iterator[Any]:
         browser = play.chromium.launch(executable_path=BROWSER, args=OPTIONS)
         yield browser
         browser.close()
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(
+    item: pytest.Item,
+) -> Generator[None, pytest.TestReport, pytest.TestReport]:
+    report = yield
+    page: Any = getattr(item, "funcargs", {}).get("page")
+    if report.when == "call" and report.failed and hasattr(page, "inner_text"):
+        report.sections.append(("what the page said", page.inner_text("body")))
+    return report

@@ -135,6 +135,34 @@ def test_recordings_of_two_muscles_get_models_that_couple_them(tmp_path: Path) -
     visit(workspace, look)
 
 
+def test_what_was_unticked_stays_so_when_the_data_change(tmp_path: Path) -> None:
+    workspace = filled(tmp_path)
+
+    async def look(user: User) -> None:
+        def boxes() -> set[Any]:
+            return user.find(marker="model-pi").elements
+
+        user.find(marker="tab-models").click()
+        await user.should_see(marker="model-pi", retries=100)
+        before = boxes()
+        user.find(marker="untick").click()
+        turns = 2.0 + np.sin(np.arange(200_000) / 50)
+        longer = Recording({"pressure": turns, "displacement": 2 * turns}, 0.1)
+        workspace.add(longer, origin="", call="")  # with which fits take longer, as is told of each
+        Desk(workspace, Jobs(workspace)).changed("recordings")
+        for _ in range(100):
+            if user.find(marker="model-pi").elements.isdisjoint(before):
+                break
+            await asyncio.sleep(0.05)
+        assert boxes().isdisjoint(before)
+        for model in ("pi", "gpi", "mpi"):
+            (box,) = user.find(marker=f"model-{model}").elements
+            assert isinstance(box, ui.checkbox)
+            assert not box.value
+
+    visit(workspace, look)
+
+
 def test_a_channel_is_on_one_side(tmp_path: Path) -> None:
     workspace = filled(tmp_path)
     desk = Desk(workspace, Jobs(workspace))

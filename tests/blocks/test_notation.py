@@ -97,5 +97,6 @@ def test_units_follow_the_channels() -> None:
 
 def test_the_springs_of_a_balance_grow_with_what_schedules() -> None:
     by_name = {one.name: one.unit for one in quantities(EXAMPLES["balance"])}
-    springs = [by_name[f"springs 1 {place}"] for place in range(1, 7)]
+    own = ["constant force of muscle 1", "spring of muscle 1", "spring of muscle 1 to muscle 2"]
+    springs = [by_name[name] for name in (*own, *(f"{name} by pressure_extensor" for name in own))]
     assert springs == ["N", "N/mm", "N/mm", "N/bar", "N/mm bar", "N/mm bar"]

@@ -39,6 +39,7 @@ class Choice:
         self.settings: dict[str, dict[str, str]] = {}
         self.ticked: list[str] = []
         self.shown: Offered | None = None
+        self._looks = 0
         self.boxes: dict[str, ui.checkbox] = {}
         self.heads: list[tuple[Any, str, list[Offer]]] = []
         self.said = named(ui.label("Looking at the data …"), "recognised").classes("text-sm w-full")
@@ -50,12 +51,14 @@ class Choice:
         ui.timer(0.02, guarded(self._offer), once=True)
 
     async def _offer(self) -> None:
+        self._looks = look = self._looks + 1
         found = await asyncio.to_thread(offered, self.desk)
-        if found == self.shown:
+        if look != self._looks or found == self.shown:  # a later look knows better
             return
         names = [offer.model for _, offers in found.groups for offer in offers]
         kept = [model for model in self.ticked if model in names]
-        self.shown, self.ticked = found, kept or list(found.start)
+        unticked = not self.ticked and self.shown is not None and bool(self.shown.groups)
+        self.shown, self.ticked = found, kept if kept or unticked else list(found.start)
         self.said.set_text(said(found.recognised))
         self.possible = bool(found.groups)
         self.actions.set_visibility(True)

@@ -45,6 +45,10 @@ class Parametrised(metaclass=Checked):
         del index
         return self.notation.unit(field)
 
+    def name_of(self, field: str, index: tuple[int, ...]) -> str:
+        """Return what a number of a field is called, for people: the field's name, and its places."""
+        return " ".join([field.replace("_", " "), *(str(place + 1) for place in index)])
+
     @property
     def n_parameters(self) -> int:
         """Length of the parameter vector, `pack`."""
@@ -52,11 +56,11 @@ class Parametrised(metaclass=Checked):
 
     @property
     def parameter_names(self) -> tuple[str, ...]:
-        """What each number of `pack` is, for people: its field's name, numbered in a vector."""
+        """What each number of `pack` is called, for people; see `name_of`."""
         names = [
             text
-            for name in self.parameters
-            for text in _names(getattr(self, name), name.replace("_", " "))
+            for field in self.parameters
+            for text in _names(self, field, getattr(self, field), ())
         ]
         return tuple(names or (f"{self.kind} {place + 1}" for place in range(self.n_parameters)))
 
@@ -125,10 +129,10 @@ def _is_flat(values: tuple[Any, ...]) -> bool:
     return not values or type(values[0]) is float
 
 
-def _names(value: Any, said: str) -> list[str]:
+def _names(part: Parametrised, field: str, value: Any, index: tuple[int, ...]) -> list[str]:
     if isinstance(value, Parametrised):
         return list(value.parameter_names)
     if isinstance(value, tuple):
-        numbered = enumerate(value, start=1)
-        return [name for place, item in numbered for name in _names(item, f"{said} {place}")]
-    return [] if value is None else [said]
+        items = enumerate(value)
+        return [n for k, item in items for n in _names(part, field, item, (*index, k))]
+    return [] if value is None else [part.name_of(field, index)]

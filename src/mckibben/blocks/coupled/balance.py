@@ -43,7 +43,7 @@ from mckibben.blocks.core.many_channels import ManyChannels
 from mckibben.blocks.core.notation import Notation
 from mckibben.blocks.core.refusals import explicit_state, needs_sample_time
 from mckibben.blocks.coupled.balance_equations import balance_of_forces
-from mckibben.blocks.coupled.balance_fields import check_fields, tell_clipped
+from mckibben.blocks.coupled.balance_fields import check_fields, number_name, tell_clipped
 from mckibben.blocks.coupled.balance_law import NEARLY, NEVER, begin, keep, press, pressed, settle
 from mckibben.blocks.coupled.balance_learning import LearntBalance
 from mckibben.blocks.coupled.balance_terms import AT_REST, FROM_REST, IN_TIME
@@ -340,6 +340,10 @@ class Balance(ManyChannels, LearntBalance):
         units = {"N": force, "mm": moved, "bar": driving}
         declared = super().unit_of(field, index) or ""
         return re.sub(r"\b(N|mm|bar)\b", lambda unit: units[unit[0]], declared)
+
+    def name_of(self, field: str, index: tuple[int, ...]) -> str:
+        """Return what a number is called: by its muscle, what it acts on, and what schedules it."""
+        return number_name(self, field, index)
 
     @classmethod
     def example(cls) -> Self:

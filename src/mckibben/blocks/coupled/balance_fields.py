@@ -1,4 +1,4 @@
-"""What fields of a balance of forces have to be: of one size, and as physics asks."""
+"""What fields of a balance of forces are called, and have to be: of one size, and as physics asks."""
 
 from __future__ import annotations
 
@@ -91,6 +91,47 @@ def check_fields(balance: Balance) -> None:
         )
     if any(not low < high for low, high in balance.hull):
         raise ModelError(f"hull of {balance.kind!r} is {balance.hull}. Remedy: lower ends first.")
+
+
+ONE_EACH = {
+    "damping": "damping",
+    "lines": "resistance of the line",
+    "walls": "stretch of the wall",
+    "bladders": "spring of the bladder",
+    "pushes": "force of slackening",
+    "mass": "mass",
+}
+"""Fields that have one number for every muscle, in words."""
+
+
+def number_name(balance: Balance, field: str, index: tuple[int, ...]) -> str:
+    """Return what a number of a field is called, for people."""
+    if field == "grip":
+        return field
+    n = len(balance.driven)
+    of = f" of muscle {index[0] + 1}" if n > 1 else ""
+    if field in ONE_EACH:
+        return f"{ONE_EACH[field]}{of}"
+    place = index[1]
+    if field == "springs":
+        power, to = divmod(place, 1 + n)
+        own = "constant force" if to == 0 else "spring"
+        other = f" to muscle {to}" if to not in (0, index[0] + 1) else ""
+        if power == 0:
+            return f"{own}{of}{other}"
+        by, degree = divmod(power - 1, balance.degree)
+        raised = f"^{degree + 1}" if degree else ""
+        return f"{own}{of}{other} by {balance.scheduled[by].name}{raised}"
+    if field == "loads":
+        return f"share{of} of {balance.scheduled[place - len(balance.loads[0])].name}"
+    if field == "friction":
+        return f"stop {place + 1}{of}"
+    if field == "relaxation":
+        return f"relaxation {place + 1}{of}"
+    if field == "areas" and place == 0:
+        return f"area{of} at rest"
+    raised = f"^{place + 2 * (field == 'elasticity')}"
+    return f"{'area' if field == 'areas' else field}{of} by displacement{raised.replace('^1', '')}"
 
 
 def tell_clipped(

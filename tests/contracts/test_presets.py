@@ -51,6 +51,8 @@ def test_a_preset_answers_what_is_asked_of_its_class() -> None:
     assert p2.__doc__.startswith("Two lags.")
     assert (p2.effort, multistate.effort) == (type(p2()).effort, 3.0)
     assert multistate.objection([], ["pressure"], ["displacement"]) == "it maps length to force"
+    said = multistate.objection([], ["displacement"], ["force"])
+    assert said == "it maps length to force, and a length is the rest length less the displacement"
     with pytest.raises(AttributeError):
         _ = p2.nothing_of_that_name
 

@@ -121,7 +121,8 @@ def _zeros(desk: Desk) -> None:
         ui.label(f"These recordings rest at different {wanted}").classes("font-medium")
         ui.label(
             f"From {found[0]:.3g} to {found[1]:.3g} {unit} where {given} is lowest: a sensor was zeroed "
-            f"anew, or another load hung there. Models that are not told take it for what {given} does."
+            f"anew, or another load hung there. Models that are not told take it for what {given} does. "
+            "Of a load that you know, tell them: “How it was read”, “Add a constant”, a force in N."
         ).classes("text-sm")
         button = ui.button(f"Zero {wanted} there", on_click=guarded(partial(_zero, desk)))
         named(button.props("outline dense no-caps"), "zero-all")

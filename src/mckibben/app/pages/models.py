@@ -23,6 +23,9 @@ SHARED = (
     "A model tested on what it was fitted to looks better than it is; every result then says so."
 )
 
+JUDGED = "fitted; now tested, and its inverse and band tried"
+"""Of a fit whose search has ended: the first of its kind compiles what these need."""
+
 FITS = 12
 """The latest fits that are shown."""
 
@@ -142,7 +145,7 @@ def _job(desk: Desk, job: Job, said: set[str]) -> None:
         if job.state == RUNNING and not share:
             bar.props("indeterminate")
         done = f" {100 * share:.0f} %, validation included" if share else ""
-        ui.label(f"{job.state}{done}").classes("text-xs")
+        ui.label(JUDGED if share >= 1.0 else f"{job.state}{done}").classes("text-xs")
         named(
             ui.button("Cancel", on_click=lambda: _cancel(desk, job)).props("flat dense"),
             f"cancel-{job.title}",

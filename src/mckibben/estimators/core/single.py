@@ -17,6 +17,12 @@ from mckibben.estimators.core.estimator import Estimator, resting
 from mckibben.estimators.optimisers.tracker import Tracker
 from mckibben.recording import Recording
 
+MADE_OF_DISPLACEMENT = {
+    "length": ", and a length is the rest length less the displacement",
+    "contraction": ", and a contraction is the displacement over the rest length",
+}
+"""What of a recording's displacement is asked for."""
+
 
 @dataclass(kw_only=True, repr=False, eq=False)
 class SingleEstimator(Estimator):
@@ -65,7 +71,9 @@ class SingleEstimator(Estimator):
         (given,), (wanted,) = inputs, outputs
         kinds = (given.partition("_")[0], wanted.partition("_")[0])
         if cls.made_for is not None and kinds != cls.made_for:
-            return f"it maps {cls.made_for[0]} to {cls.made_for[1]}"
+            nearly = kinds == ("displacement", cls.made_for[1])
+            made = MADE_OF_DISPLACEMENT.get(cls.made_for[0], "") if nearly else ""
+            return f"it maps {cls.made_for[0]} to {cls.made_for[1]}{made}"
         needed = cls(input=given, output=wanted).scheduling
         absent = [name for name in needed if any(name not in r for r in recordings)]
         if absent:

@@ -22,8 +22,6 @@ pytest.importorskip("sphinx")
 pytest.importorskip("furo")
 pytest.importorskip("myst_parser")
 
-pytestmark = pytest.mark.xdist_group("site")  # which is built once
-
 ROOT = Path(__file__).parents[2]
 LONGEST = 120_000
 """Letters of text on a page: about sixty screens."""

@@ -24,8 +24,6 @@ from mckibben.papers.reproduction import Reproduction, reproduce
 from mckibben.registry import load
 from tests.cli.conftest import files  # noqa: F401  # a fixture
 
-pytestmark = pytest.mark.xdist_group("field-models")  # one quick run serves all its tests
-
 ROLES, RUNS = ("train", "test"), ("decaying-triangle", "irregular-triangle")
 PAPERS = tuple(PRINTED)
 

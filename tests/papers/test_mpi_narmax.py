@@ -17,8 +17,6 @@ from mckibben.papers.mpi_narmax.models import (
 from mckibben.papers.mpi_narmax.tables import PRINTED_MAE
 from mckibben.papers.reproduction import reproduce
 
-pytestmark = pytest.mark.xdist_group("mpi-narmax")  # one quick run serves all its tests
-
 Rows = dict[str, dict[str, Any]]
 
 VOLTS = (2, 4, 6, 8, 10)

@@ -29,8 +29,6 @@ from mckibben.papers.sdchm.prediction import Predictions
 from mckibben.papers.sdchm.recordings import EXTENSOR, OUTPUTS, Recordings, plan
 from mckibben.signals.protocol import protocol
 
-pytestmark = pytest.mark.xdist_group("sdchm")  # one quick run serves all its tests
-
 
 @dataclass(frozen=True)
 class Off:

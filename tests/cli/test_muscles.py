@@ -108,6 +108,7 @@ def test_a_study_says_whether_a_network_is_to_be_trusted_off_its_patterns(
     test = tmp_path / f"{run.name}.csv"
     write(joint, test)
     asked = ["study", arm, "--test", test, "--models", "tsfnn,balance", "--jobs", 1]
+    asked += ["--resample", 0.25]
     for setting in ("tsfnn.search_samples=400", *(f"balance.{one}" for one in SHORT)):
         asked += ["--set", setting]
     damped = cli(*asked, "-o", tmp_path / "damped")

@@ -22,6 +22,9 @@ Tell = Callable[[float, float], None]
 CURVE = 2000
 """Most points of a curve that is kept to be drawn."""
 
+SLOWLY = 400
+"""Samples of a slow way up and down, of two usual cycles at least."""
+
 MUCH = 3.0
 """Times that steps are finer, or motions faster, than what a model knows of, and it is said."""
 
@@ -362,6 +365,31 @@ def held_for(workspace: Workspace, model: str) -> dict[str, float]:
         runs = [run[name] for run in workspace.readable() if name in run]
         found[name] = float(np.median(np.concatenate(runs))) if runs else 0.0
     return found
+
+
+def reached_under(
+    workspace: Workspace, model: str, held: dict[str, float]
+) -> dict[str, tuple[float, float]]:
+    """Return what a model of one muscle gives under a load, over all inputs recorded; else nothing."""
+    block = workspace.model(model)
+    driven = [channel for channel in block.inputs if channel.name not in block.scheduling]
+    if not held or len(driven) > 1 or len(block.outputs) > 1:
+        return {}
+    (given,), (wanted,) = driven, block.outputs
+    runs = [run[given.name] for run in workspace.readable() if given.name in run]
+    if not runs:
+        return {}
+    low, high = min(float(u.min()) for u in runs), max(float(u.max()) for u in runs)
+    known = pace(workspace, model)
+    there = low + (high - low) * (1.0 - np.abs(np.linspace(-1.0, 1.0, SLOWLY)))
+    channels = {given.name: there} | {name: np.full(SLOWLY, x) for name, x in held.items()}
+    step = block.sample_time or max(known.step, 2.0 * known.usual / SLOWLY)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ModelWarning)
+        found = block.simulate(Recording(channels, step))[wanted.name]
+    (least,), (most,) = block.reachable()
+    ends = max(float(found.min()), float(least)), min(float(found.max()), float(most))
+    return {wanted.name: ends} if ends[0] < ends[1] else {}
 
 
 def at_rest(workspace: Workspace, model: str) -> dict[str, float]:

@@ -12,7 +12,7 @@ from nicegui import ui
 from mckibben.app import fields, forms, plots, scripts
 from mckibben.app.desk import Desk, caution, guarded, named, not_recommended, on_event
 from mckibben.app.drawn import picture
-from mckibben.app.following import at_rest, compensated, held_for, kept_motion, pace
+from mckibben.app.following import at_rest, compensated, held_for, kept_motion, pace, reached_under
 from mckibben.app.pages import closing, forces, leaderboard, logs
 from mckibben.app.pages.drawing_reference import Sketch
 from mckibben.blocks.core.commanding import COMMANDS
@@ -110,6 +110,7 @@ class Editor:
         self.desk = desk
         self.sketch: Sketch
         self._asked: tuple[Any, ...] | None = None  # what is shown, or being worked out
+        self._told: dict[str, float] | None = None  # under which it is shown what can be reached
         with ui.row().classes("w-full items-end gap-3"):
             self.model = named(
                 ui.select(self._titles(names), value=names[0], label="Model to invert").classes(
@@ -207,11 +208,14 @@ class Editor:
             reach = {}
         reach = {c.name: reach.get(c.name, (0.0, 1.0)) for c in outputs}
         held, rest = held_for(desk.workspace, name), at_rest(desk.workspace, name)
+        self._told = None
         self.left.clear()
         with self.left:
             self.sketch = Sketch(
                 desk, outputs, reach, rest, held, units, known.usual, self._changed
             )
+        with self.left:
+            ui.timer(0.02, guarded(self._under), once=True)
         with self.sketch.actions:
             text = f"Show {_quantity(inverse.outputs)}s"
             named(ui.button(text, on_click=guarded(self._show)), "show-pressures")
@@ -225,6 +229,13 @@ class Editor:
         self._blank()
         self.runs.clear()
         await self._forms()
+
+    async def _under(self) -> None:
+        """Show what can be reached under the load that is held: another one than under any."""
+        sketch, self._told = self.sketch, self.sketch.told
+        found = await asyncio.to_thread(reached_under, self.desk.workspace, self.name, sketch.told)
+        if found and sketch is self.sketch and sketch.told == self._told:
+            sketch.reaches(found)
 
     def _blank(self) -> None:
         self.shown.clear()
@@ -247,6 +258,9 @@ class Editor:
 
     def _changed(self) -> None:
         """Take pressures away that are of another wish than what is drawn, and what would run it."""
+        if self._told is not None and self.sketch.told != self._told:
+            with self.left:
+                ui.timer(0.02, guarded(self._under), once=True)
         if self._asked is None or self._asked == self.wish:
             return
         self._asked = None

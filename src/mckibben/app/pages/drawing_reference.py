@@ -146,6 +146,18 @@ class Sketch:
         upload = drop_zone(asked, on_upload=on_event(self._loaded))
         upload.classes("w-full max-w-2xl").props("flat bordered")
 
+    @property
+    def told(self) -> dict[str, float]:
+        """What a compensator is told beside the reference, as it is held."""
+        return {name: float(field.value or 0.0) for name, field in self.held.items()}
+
+    def reaches(self, reach: dict[str, tuple[float, float]]) -> None:
+        """Show what can be reached now; ready-made motions go there until one is drawn."""
+        self.reach = self.reach | reach
+        if self.file is None and not any(self.points.values()):
+            self._span()
+        self.draw()
+
     def _span(self) -> None:
         """Fill in ends of ready-made motions, the one at rest first: well within what can be reached."""
         first, other = sorted(self.reach[self.now], key=lambda y: abs(y - self.rest[self.now]))
@@ -313,7 +325,7 @@ class Sketch:
         DataError
             If it is none yet.
         """
-        held = {name: float(field.value or 0.0) for name, field in self.held.items()}
+        held = self.told
         if self.file is not None:
             rest = {n: np.full(len(self.file), v) for n, v in held.items() if n not in self.file}
             units = {name: self.units[name] for name in rest}

@@ -19,7 +19,7 @@ from nicegui.testing import User
 
 from mckibben import PI, Banded, Recording
 from mckibben.app.desk import Desk
-from mckibben.app.following import compensated, kept_motion, reached_under
+from mckibben.app.following import compensated, kept_motion, reached
 from mckibben.app.jobs import Jobs, note
 from mckibben.app.motions import reference_recording
 from mckibben.app.pages import closing, compensate
@@ -296,10 +296,9 @@ def test_under_dead_loads_a_person_gives_the_load_and_gets_pressures(tmp_path: P
     (row,) = desk.results()
     assert (row["name"], row["input"], row["load"]) == ("balance", "pressure", "force")
     taken: list[str] = []
-    ends = [reached_under(workspace, "balance", {"force": pull}) for pull in (10.0, 20.0)]
+    ends = [reached(workspace, "balance", {"force": pull}) for pull in (10.0, 20.0)]
     (_, above), (_, below) = (each["displacement"] for each in ends)
     assert above > below + 0.5
-    assert reached_under(workspace, "balance", {}) == {}
 
     async def look(user: User) -> None:
         await drawn(user)

@@ -34,6 +34,10 @@ _WAYS = (
     (r"--zero (\w+) \(mckibben\.signals\.zeroed\)", r"“Zero \1 there”, under Data"),
     (r"--zero (\w+)", r"the button that zeroes \1"),
     (r"--set ", "the setting "),
+    (
+        r"give a path in a folder that can be written to, on a disk that is not full",
+        "make room on the disk, or see to the rights of the folder",
+    ),
     (r"see mckibben info --models", "see the settings of the models"),
 )
 """Options with their values, and what they are on a page."""

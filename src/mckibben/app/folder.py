@@ -154,6 +154,10 @@ class Folder:
                 elif found.st_mode & 0o077:
                     path.chmod(stat.S_IMODE(found.st_mode) & ~0o077)
 
+        for door in self.folder.glob(".open-*.html"):  # of one that was killed: it holds a token
+            with suppress(OSError):
+                door.unlink()
+
     def _rights(self) -> Iterator[tuple[Path, os.stat_result]]:
         """Look up whose its folders are and who may enter; nothing where the system tells otherwise."""
         if os.name == "posix":

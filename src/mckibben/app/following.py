@@ -367,13 +367,13 @@ def held_for(workspace: Workspace, model: str) -> dict[str, float]:
     return found
 
 
-def reached_under(
+def reached(
     workspace: Workspace, model: str, held: dict[str, float]
 ) -> dict[str, tuple[float, float]]:
-    """Return what a model of one muscle gives under a load, over all inputs recorded; else nothing."""
+    """Return what a model of one muscle gives over all inputs recorded, up and down, under a load."""
     block = workspace.model(model)
     driven = [channel for channel in block.inputs if channel.name not in block.scheduling]
-    if not held or len(driven) > 1 or len(block.outputs) > 1:
+    if len(driven) > 1 or len(block.outputs) > 1:
         return {}
     (given,), (wanted,) = driven, block.outputs
     runs = [run[given.name] for run in workspace.readable() if given.name in run]
@@ -387,8 +387,7 @@ def reached_under(
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ModelWarning)
         found = block.simulate(Recording(channels, step))[wanted.name]
-    (least,), (most,) = block.reachable()
-    ends = max(float(found.min()), float(least)), min(float(found.max()), float(most))
+    ends = float(found.min()), float(found.max())
     return {wanted.name: ends} if ends[0] < ends[1] else {}
 
 

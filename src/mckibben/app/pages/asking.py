@@ -100,18 +100,40 @@ async def ask(
         others = [one.shown for one in unread] if name is None else alike(desk, name)
         which = "that were not read" if name is None else "with the same columns"
         so_too = named(
-            ui.checkbox(f"Read the {len(others)} others {which} so too", value=name is None),
+            ui.checkbox(
+                f"Read the {len(others)} others {which} so too"
+                if len(others) > 1
+                else f"Read the other one {which.replace('were', 'was')} so too",
+                value=name is None,
+            ),
             "alike",
         )
+        constants_too = named(
+            ui.checkbox("with the same constants: the same load hung there", value=False),
+            "alike-constants",
+        )
         so_too.set_visibility(bool(others))
+        constants_too.set_visibility(bool(others))
         asked = {"many": False}
+
+        def way(chosen: Reading, other: str = "") -> Reading:
+            """Return how another file is read so too: a load is its own, unless it is said to be one."""
+            if constants_too.value:
+                return chosen
+            own = desk.workspace.entry(other).reading.constants if other else {}
+            return chosen.model_copy(update={"constants": own})
 
         async def read_so(chosen: Reading) -> dict[str, list[Recording]]:
             """Read the file, and others if wished for; keep those that still are not."""
             too = so_too.value and others
             if name is not None:
-                names = [name, *(others if too else [])]
-                return {shown: await asyncio.to_thread(replaced, desk, names, chosen)}
+                ways = {other: way(chosen, other) for other in (others if too else ())}
+                same = [name, *(other for other, its in ways.items() if its == chosen)]
+                found = await asyncio.to_thread(replaced, desk, same, chosen)
+                for other in sorted(ways.keys() - same):
+                    await asyncio.to_thread(replaced, desk, [other], ways[other])
+                return {shown: found}
+            theirs = way(chosen)
             many, asked["many"] = asked["many"], True
             read = {shown: await asyncio.to_thread(add, desk, path.name, shown, chosen, many=many)}
             for one in list(left) if too else []:
@@ -119,7 +141,7 @@ async def ask(
                 problem.set_visibility(True)
                 try:
                     read[one.shown] = await asyncio.to_thread(
-                        add, desk, one.held, one.shown, chosen
+                        add, desk, one.held, one.shown, theirs
                     )
                     left.remove(one)
                 except MckibbenError as wrong:

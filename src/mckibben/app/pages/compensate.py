@@ -12,7 +12,7 @@ from nicegui import ui
 from mckibben.app import fields, forms, plots, scripts
 from mckibben.app.desk import Desk, caution, guarded, named, not_recommended, on_event
 from mckibben.app.drawn import picture
-from mckibben.app.following import at_rest, compensated, held_for, kept_motion, pace, reached_under
+from mckibben.app.following import at_rest, compensated, held_for, kept_motion, pace, reached
 from mckibben.app.pages import closing, forces, leaderboard, logs
 from mckibben.app.pages.drawing_reference import Sketch
 from mckibben.blocks.core.commanding import COMMANDS
@@ -138,8 +138,7 @@ class Editor:
         self._fields()
         self.doubt = named(caution(""), "not-recommended")
         self._say()
-        for topic in ("results", "channels"):
-            desk.when(topic, self._say)
+        desk.when("channels", self._say)
         with ui.row().classes("w-full items-start gap-4"):
             self.left = ui.column().classes("min-w-0 w-full lg:w-[34rem] gap-2")
             with ui.column().classes("min-w-0 flex-1 basis-80 gap-2"):
@@ -166,16 +165,16 @@ class Editor:
 
     def _titles(self, names: list[str]) -> dict[str, str]:
         best = next((row["name"] for row in self.desk.results()), None)
-        return {
-            name: f"{name} (first of the leaderboard)" if name == best else name for name in names
-        }
+        words = {name: "" if self.desk.current(name) else " (other data)" for name in names}
+        words |= {best: " (first of the leaderboard)"} if best in words else {}
+        return {name: f"{name}{words[name]}" for name in names}
 
     def offer(self, names: list[str]) -> None:
-        """Offer other models, without disturbing what is drawn."""
-        if self.name in names:
-            self.model.set_options(self._titles(names))
-        elif names:
-            self.model.set_options(self._titles(names), value=names[0])
+        """Offer other models, without disturbing what is drawn; one of data that were is not kept."""
+        if names:
+            value = self.desk.model_to_show(self.name, names)
+            self.model.set_options(self._titles(names), value=value)
+        self._say()
 
     @property
     def name(self) -> str:
@@ -233,7 +232,7 @@ class Editor:
     async def _under(self) -> None:
         """Show what can be reached under the load that is held: another one than under any."""
         sketch, self._told = self.sketch, self.sketch.told
-        found = await asyncio.to_thread(reached_under, self.desk.workspace, self.name, sketch.told)
+        found = await asyncio.to_thread(reached, self.desk.workspace, self.name, sketch.told)
         if found and sketch is self.sketch and sketch.told == self._told:
             sketch.reaches(found)
 
@@ -300,7 +299,7 @@ class Editor:
     def _figures(self, model: str, reference: Recording, given: Recording) -> None:
         desk, sketch = self.desk, self.sketch
         together = "" if len(sketch.channels) == 1 else "; each by itself, all at once less"
-        ui.label(f"Shaded: what can be reached whatever happened before{together}").classes(
+        ui.label(f"Shaded: what the model reaches over all that was recorded{together}").classes(
             "text-xs opacity-70"
         )
         for place, (name, channel) in enumerate(sketch.channels.items()):

@@ -95,8 +95,9 @@ def build(desk: Desk) -> None:
         known.update(found)
         none.set_visibility(not found)
         choice.set_visibility(bool(found))
-        value = model.value if model.value in found else next(iter(found), None)
-        model.set_options(list(found), value=value)
+        names = list(found)
+        value = desk.model_to_show(str(model.value), names) if names else None
+        model.set_options(names, value=value)
         runs()
 
     def again() -> None:

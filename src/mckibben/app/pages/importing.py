@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 from nicegui import ui
@@ -140,18 +141,20 @@ class Intake:
         await ask(self.desk, self.place, path, one.shown, one.error, unread=rest, then=then)
 
     def list(self, foreign: Sequence[Problem] = ()) -> None:
-        """Show all files that were not read; those that cannot be recordings in one line."""
+        """Show all files that were not read; those that cannot be recordings by reason."""
         with (
             self.place,
             ui.dialog() as dialog,
             named(ui.card().classes("w-full max-w-3xl"), "not-read"),
         ):
             ui.label(f"{len(foreign) + len(self.left)} file(s) were not read").classes("text-lg")
-            if foreign:
-                names = ", ".join(each.shown for each in foreign[:LISTED])
-                more = f" and {len(foreign) - LISTED} more" if len(foreign) > LISTED else ""
-                ui.label(f"{len(foreign)} cannot be recordings: {names}{more}").classes("break-all")
-                ui.label(said(foreign[0].error)).classes("text-sm opacity-70")
+            for alike in _by_reason(foreign):
+                names = ", ".join(each.shown for each in alike[:LISTED])
+                more = f" and {len(alike) - LISTED} more" if len(alike) > LISTED else ""
+                reason = said(alike[0].error)
+                lot = "kept" if "cannot be written" in reason else "recordings"
+                ui.label(f"{len(alike)} cannot be {lot}: {names}{more}").classes("break-all")
+                ui.label(reason).classes("text-sm opacity-70")
             for each in self.left[:LISTED]:
                 with ui.row().classes("items-center w-full"):
                     ui.label(str(each)).classes("flex-1 text-sm break-words min-w-48")
@@ -165,3 +168,12 @@ class Intake:
                 ui.label(f"and {len(self.left) - LISTED} more")
             named(ui.button("Close", on_click=dialog.close).props("flat"), "not-read-close")
         dialog.open()
+
+
+def _by_reason(problems: Sequence[Problem]) -> list[list[Problem]]:
+    """Return problems, those of the same reason together."""
+    found: dict[str, list[Problem]] = {}
+    for each in problems:
+        words = str(each.error).replace(each.shown, "")
+        found.setdefault(words.replace(Path(each.shown).suffix, ""), []).append(each)
+    return list(found.values())[:LISTED]

@@ -79,13 +79,14 @@ def build(desk: Desk) -> None:
     def shown() -> None:
         results = desk.results()
         if not results:
-            others = {(one["input"], one["output"]) for one in desk.workspace.results()}
+            others = {
+                (one["input"] + (f" under {one['load']}" if one["load"] else ""), one["output"])
+                for one in desk.workspace.results()
+            }
             text = "Fit models to see them compared here."
             if others:
                 listed = "; ".join(f"{given} to {wanted}" for given, wanted in sorted(others))
-                text += (
-                    f" Those fitted are of other inputs or outputs, chosen under Data: {listed}."
-                )
+                text += f" Those fitted are of other inputs, outputs or loads, chosen under Data: {listed}."
             ui.label(text).classes("opacity-70")
             return
         ui.label("Leaderboard").classes("text-lg")

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
+import numpy as np
 from nicegui import ui
 
 from mckibben.app.desk import LONGEST, Desk, guarded, hinted, labelled, named, refused, told
@@ -14,6 +15,7 @@ from mckibben.app.pages.asking import ask_again
 from mckibben.app.recordings import Entry
 from mckibben.errors import MckibbenError
 from mckibben.files.notices import is_plain
+from mckibben.numerals import numeral
 from mckibben.recording import Recording
 
 SHOWN = 6
@@ -103,7 +105,7 @@ class Rows:
                 return
             duration = "" if recording.duration is None else f", {recording.duration:.4g} s"
             ui.label(name).classes("font-medium break-all")
-            listed = ", ".join(f"{c} [{recording.units[c] or '-'}]" for c in recording.channels)
+            listed = ", ".join(_channel(recording, name) for name in recording.channels)
             ui.label(f"{len(recording)} samples{duration}; {listed}").classes(
                 "text-xs opacity-70 break-words"
             )
@@ -117,6 +119,14 @@ class Rows:
     def _button(self, icon: str, word: str, name: str, action: Callable[[Desk, str], None]) -> None:
         button = ui.button(icon=icon, on_click=lambda: action(self.desk, name)).props("flat dense")
         labelled(hinted(button, word), "aria-label", f"{word} {name}")
+
+
+def _channel(recording: Recording, name: str) -> str:
+    """Return a channel with its unit, and its value where that is one: a load, a held length."""
+    values, unit = recording[name], recording.units[name]
+    if len(values) > 1 and np.ptp(values) == 0:
+        return f"{name} {numeral(float(values[0]), 4)} {unit}".rstrip()
+    return f"{name} [{unit or '-'}]"
 
 
 def state_of(entry: Entry) -> tuple[Entry, int]:

@@ -50,7 +50,8 @@ def build(desk: Desk) -> None:
 
     def more() -> None:
         if selects:
-            selects[0].set_options(desk.workspace.ranked())
+            names = desk.workspace.ranked() or [selects[0].value]
+            selects[0].set_options(names, value=desk.model_to_show(selects[0].value, names))
         else:
             shown.refresh()
 

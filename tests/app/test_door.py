@@ -10,6 +10,7 @@ import pytest
 
 from mckibben.app.door import door
 from mckibben.app.server import _without
+from mckibben.app.workspace import Workspace
 from tests.app.browsing import BROWSER, OPTIONS, seen, starting
 from tests.tools import needs
 
@@ -21,6 +22,12 @@ def test_it_is_the_users_alone_and_goes_with_the_workbench(tmp_path: Path) -> No
         assert page is not None
         assert ADDRESS in page.read_text()
     assert not page.exists()
+
+
+def test_the_page_of_a_workbench_that_was_killed_goes(tmp_path: Path) -> None:
+    (tmp_path / ".open-8750.html").write_text("a token")
+    assert Workspace(tmp_path).claim()
+    assert not list(tmp_path.glob(".open-*"))
 
 
 def test_names_of_folders_are_text(tmp_path: Path) -> None:

@@ -117,6 +117,22 @@ def test_a_file_that_needs_help_is_mapped_by_hand(page: Any) -> None:
     assert "pressure [bar]" in seen(page, "recording-rig").inner_text()
 
 
+def test_a_load_told_of_one_file_is_not_that_of_another(page: Any) -> None:
+    lines = swung(1, 0.4).decode().splitlines()
+    torn = "\n".join(lines[:100] + lines[150:]).encode()  # which is asked about
+    seen(page, "upload")
+    files = [{"name": f"{n}.csv", "mimeType": "text/csv", "buffer": torn} for n in ("one", "two")]
+    page.locator("input[type=file]").first.set_input_files(files)
+    seen(page, "not-read").get_by_text("How is it to be read?").first.click()
+    seen(page, "add-constant").click()
+    seen(page, "constant-value-0").fill("20")
+    assert seen(page, "alike").get_attribute("aria-checked") == "true"
+    assert seen(page, "alike-constants").get_attribute("aria-checked") == "false"
+    seen(page, "read-again").click()
+    assert "force 20 N" in seen(page, "recording-one").inner_text()
+    assert "force" not in seen(page, "recording-two").inner_text()
+
+
 HOSTILE = {
     "../../evil.csv": b"pressure_bar,displacement_mm\n1,2\n",
     "empty.csv": b"\n",

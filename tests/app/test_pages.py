@@ -186,6 +186,19 @@ def test_models_of_other_channels_are_not_compared(tmp_path: Path) -> None:
     assert [result["name"] for result in desk.results()] == ["other"]
 
 
+def test_a_model_of_data_that_were_is_not_kept_chosen(tmp_path: Path) -> None:
+    workspace = filled(tmp_path)
+    for name, seen in {"old": "other", "new": workspace.data()}.items():
+        workspace.write_json("results", name, {"status": "ok", "model": "pi", "data": seen})
+    desk = Desk(workspace, Jobs(workspace))
+    assert desk.model_to_show("old", ["new", "old"]) == "new"
+    assert desk.model_to_show("own", ["new", "own"]) == "own"  # of which nothing is known
+    assert desk.model_to_show("gone", ["new", "old"]) == "new"
+    assert desk.model_to_show("old", ["older", "old"]) == "older"
+    workspace.write_json("results", "older", {"status": "ok", "model": "pi", "data": "another"})
+    assert desk.model_to_show("old", ["older", "old"]) == "old"
+
+
 def test_models_that_are_of_other_channels_are_told_of(tmp_path: Path) -> None:
     workspace = filled(tmp_path)
     result = {"status": "ok", "model": "pi", "input": "pressure", "output": "force"}

@@ -200,6 +200,19 @@ def test_no_regulator_of_a_rig_is_made_to_swing(name: str, step: float) -> None:
     assert np.abs(late.mean(axis=0) - wanted).max() < 0.01
 
 
+@pytest.mark.parametrize("step", [0.2, 0.6])
+def test_in_long_steps_pressure_follows_what_is_asked_for(step: float) -> None:
+    """What is seen has settled, and is a step old: a gain on it would swing from end to end."""
+    loop = PressureLoop(np.array([0.0]), np.array([5.0]), step)
+    pressure, off = np.zeros(1), []
+    for place in range(200):  # up and down by more than what is slight in every step
+        wanted = np.array([0.5 + 0.4 * abs(place % 20 - 10)])
+        pressure = loop.step(wanted, pressure) - 0.1  # a regulator whose zero is off
+        off.append(float(pressure[0] - wanted[0]))
+    assert np.abs(off[50:]).max() < 0.6
+    assert abs(np.mean(off[50:])) < 0.05
+
+
 def test_fast_motion_is_not_taken_for_swinging() -> None:
     """A lag of a first order that is asked for much is behind, to and fro, at its full gain."""
     loop = PressureLoop(np.array([0.0]), np.array([5.0]), 0.01)

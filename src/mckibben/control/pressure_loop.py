@@ -16,6 +16,13 @@ SLIGHT = 0.05
 """Of the range: pressure that is off by more, to and fro, swings, where less was asked for meanwhile."""
 
 
+QUICK = 0.1
+"""Longest step that sees a regulator get to its pressure [s]; in longer ones it is there already."""
+
+STEADY = 0.2
+"""Most that the integral takes in of a step's error: with all of it, what is seen a step late swings."""
+
+
 @dataclass
 class PressureLoop:
     """PI feedback of pressure on top of the pressure asked for.
@@ -23,9 +30,10 @@ class PressureLoop:
     Parameters
     ----------
     gain : float
-        Proportional, to begin with; that of a muscle is halved whenever its pressure swings.
+        Proportional, to begin with; that of a muscle is halved whenever its pressure swings. None in
+        steps so long that pressure has settled within them: it would swing for ever.
     integral : float
-        [1/s].
+        [1/s]; less in long steps.
     low, high : array
         Limits of the command [bar].
     """
@@ -38,7 +46,8 @@ class PressureLoop:
 
     def __post_init__(self) -> None:
         self._sum = np.zeros_like(self.low)
-        self._gains = np.full_like(self.low, self.gain)
+        self._gains = np.full_like(self.low, self.gain if self.sample_time <= QUICK else 0.0)
+        self._share = min(self.integral * self.sample_time, STEADY)
         # on which side pressure was off last, and between what is asked for since
         self._side = np.zeros_like(self.low)
         self._least, self._most = np.full_like(self.low, np.inf), np.full_like(self.low, -np.inf)
@@ -49,7 +58,7 @@ class PressureLoop:
         self._calm(wanted, error)
         command = wanted + self._gains * error + self._sum
         inside = (command > self.low) & (command < self.high)
-        self._sum += self.integral * self.sample_time * error * inside
+        self._sum += self._share * error * inside
         return np.clip(command, self.low, self.high)
 
     def _calm(self, wanted: Array, error: Array) -> None:

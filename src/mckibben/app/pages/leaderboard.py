@@ -86,7 +86,8 @@ def build(desk: Desk) -> None:
             text = "Fit models to see them compared here."
             if others:
                 listed = "; ".join(f"{given} to {wanted}" for given, wanted in sorted(others))
-                text += f" Those fitted are of other inputs, outputs or loads, chosen under Data: {listed}."
+                told = "Those fitted are of other inputs, outputs or loads, chosen under Data"
+                text += f" {told}: {listed}."
             ui.label(text).classes("opacity-70")
             return
         ui.label("Leaderboard").classes("text-lg")

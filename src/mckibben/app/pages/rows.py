@@ -15,7 +15,6 @@ from mckibben.app.pages.asking import ask_again
 from mckibben.app.recordings import Entry
 from mckibben.errors import MckibbenError
 from mckibben.files.notices import is_plain
-from mckibben.numerals import numeral
 from mckibben.recording import Recording
 
 SHOWN = 6
@@ -125,7 +124,7 @@ def _channel(recording: Recording, name: str) -> str:
     """Return a channel with its unit, and its value where that is one: a load, a held length."""
     values, unit = recording[name], recording.units[name]
     if len(values) > 1 and np.ptp(values) == 0:
-        return f"{name} {numeral(float(values[0]), 4)} {unit}".rstrip()
+        return f"{name} {values[0]:.4g} {unit}".rstrip()
     return f"{name} [{unit or '-'}]"
 
 

@@ -149,7 +149,7 @@ def tell_clipped(
     names = " or ".join(channel.name for channel in given)
     warnings.warn(
         f"{int(n_samples)} samples need {names} beyond {low:.4g} to {high:.4g} {given[0].unit} "
-        f"(less what a dead zone takes){pushing} and were clipped there by the compensator",
+        f"(behind a dead zone, if there is one){pushing} and were clipped there by the compensator",
         ModelWarning,
         stacklevel=5,
     )

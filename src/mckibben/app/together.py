@@ -70,12 +70,14 @@ def obstacle(desk: Desk) -> str:
         listed = ", ".join(timeless[:4]) + (", …" if len(timeless) > 4 else "")
         return (
             f"Some recordings have time and others have none ({listed}): give these a rate by "
-            f"“{READING}” under Data, or set them, or the others, unused."
+            f"“{READING}” under Data; or, where speed does not matter, say there of the others' time "
+            "that it is “(left out)”; or set one kind unused."
         )
     if times := sample_times(desk):
         return (
             f"Recordings have sample times from {times[0]:.4g} to {times[1]:.4g} s, and models of one "
-            "muscle need one: bring all to one sample time."
+            "muscle need one: bring all to one sample time; or, where speed does not matter, say by "
+            f"“{READING}” under Data of every time that it is “(left out)”."
         )
     return ""
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import asyncio
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -53,30 +54,38 @@ class Rows:
                 "Or open the example, a virtual muscle with a hanging load."
             )
         self._place = ui.column().classes("w-full gap-3")
-        self.update()
+        for _ in self._updating():
+            pass
         for topic in ("recordings", "coming"):
             desk.when(topic, self.update)
 
-    def update(self) -> None:
-        """Show what is there now."""
+    async def update(self) -> None:
+        """Show what is there now; clicks are answered between one row and the next."""
+        for _ in self._updating():
+            await asyncio.sleep(0)
+
+    def _updating(self) -> Iterator[None]:
+        """Show what is there now, and yield after every row that is made."""
         entries = {entry.name: entry for entry in self.desk.workspace.entries()}
         states = {name: state_of(entry) for name, entry in entries.items()}
         self._empty.set_visibility(not entries and not self.coming())
         for name in self._rows.keys() - entries.keys():
             self._rows.pop(name).place.delete()
-        for at, (name, entry) in enumerate(entries.items()):
-            row = self._rows.get(name)
-            if row is None:
-                self._rows[name] = row = self._made(entry, states[name])
-                if at < len(self._rows) - 1:
-                    row.place.move(target_index=at)
-            elif (
+        for name, row in self._rows.items():
+            entry = entries[name]
+            if (
                 row.state != states[name]
             ):  # what is clicked stays: a click that comes now must count
                 row.state = states[name]
                 row.words.clear()
                 self._tell(row.words, name, entry)
             row.role(entry.role)
+        for at, (name, entry) in enumerate(entries.items()):
+            if name not in self._rows:
+                self._rows[name] = row = self._made(entry, states[name])
+                if at < len(self._rows) - 1:
+                    row.place.move(target_index=at)
+                yield
 
     def _made(self, entry: Entry, state: tuple[Entry, int]) -> _Row:
         desk, name = self.desk, entry.name

@@ -48,7 +48,7 @@ class Choice:
         self.place = ui.element("div").classes("w-full grid gap-x-4 lg:grid-cols-2 items-start")
         for topic in ("recordings", "channels"):
             desk.when(topic, guarded(self._offer))
-        ui.timer(0.02, guarded(self._offer), once=True)
+        ui.timer(0.02, guarded(self._offer, "Looking for models"), once=True)
 
     async def _offer(self) -> None:
         self._looks = look = self._looks + 1

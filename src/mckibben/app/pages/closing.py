@@ -72,7 +72,7 @@ def build(desk: Desk, model: str, form: str, settings: dict[str, Any], reference
             with place:
                 _lacking(desk, model, offered)
 
-    ui.timer(0.05, guarded(ready), once=True)
+    ui.timer(0.05, guarded(ready, "Looking for plants"), once=True)
 
 
 def _plants(desk: Desk, model: str, known: list[str]) -> dict[str, str]:

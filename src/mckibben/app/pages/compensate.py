@@ -146,7 +146,7 @@ class Editor:
         self._blank()
         self.model.on_value_change(on_event(lambda _: self._turned()))
         self._sketch()
-        ui.timer(0.05, guarded(self._forms), once=True)
+        ui.timer(0.05, guarded(self._forms, "Looking what it can be used as"), once=True)
 
     def _say(self) -> None:
         """Say what speaks against the model chosen, or why it is not the first of the leaderboard."""
@@ -214,7 +214,7 @@ class Editor:
                 desk, outputs, reach, rest, held, units, known.usual, self._changed
             )
         with self.left:
-            ui.timer(0.02, guarded(self._under), once=True)
+            ui.timer(0.02, guarded(self._under, "Looking what can be reached"), once=True)
         with self.sketch.actions:
             text = f"Show {_quantity(inverse.outputs)}s"
             named(ui.button(text, on_click=guarded(self._show)), "show-pressures")
@@ -259,7 +259,7 @@ class Editor:
         """Take pressures away that are of another wish than what is drawn, and what would run it."""
         if self._told is not None and self.sketch.told != self._told:
             with self.left:
-                ui.timer(0.02, guarded(self._under), once=True)
+                ui.timer(0.02, guarded(self._under, "Looking what can be reached"), once=True)
         if self._asked is None or self._asked == self.wish:
             return
         self._asked = None

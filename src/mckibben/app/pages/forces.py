@@ -102,7 +102,7 @@ def build(desk: Desk) -> None:
 
     def again() -> None:
         with section:
-            ui.timer(0.05, guarded(look), once=True)
+            ui.timer(0.05, guarded(look, "Looking for forces"), once=True)
 
     model.on_value_change(runs)
     for topic in ("results", "recordings"):

@@ -119,7 +119,7 @@ def build(desk: Desk) -> None:
         table.on_select(on_event(choose))
         kept = [row for row in table.rows if row["name"] in ticked]
         table.selected = kept or table.rows[:1]
-        ui.timer(0.05, guarded(closer), once=True)
+        ui.timer(0.05, guarded(closer, "Running the model"), once=True)
 
     data = {"known": desk.workspace.data()}
 

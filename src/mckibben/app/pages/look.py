@@ -269,7 +269,7 @@ def _words(desk: Desk, given: str, wanted: str) -> None:
             call = f"mckibben.characterize(recordings, {given!r}, {wanted!r}{told})"
             desk.did("characterized the recordings", call)
 
-    ui.timer(0.05, guarded(find), once=True)
+    ui.timer(0.05, guarded(find, "Looking what the muscle does"), once=True)
 
 
 def _untold(desk: Desk, given: str) -> None:
@@ -302,4 +302,4 @@ def _untold(desk: Desk, given: str) -> None:
                 f"mckibben.untold(train, {inputs!r}, {desk.outputs!r}, tests=test)",
             )
 
-    ui.timer(0.05, guarded(find), once=True)
+    ui.timer(0.05, guarded(find, "Looking what cannot be told"), once=True)

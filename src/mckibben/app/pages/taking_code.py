@@ -172,7 +172,7 @@ def build(desk: Desk, model: Any) -> None:
         model.on_value_change(on_event(lambda _: offer()))
         desk.when("compensator", offer)
         fitted()
-        ui.timer(0.05, guarded(offer), once=True)
+        ui.timer(0.05, guarded(offer, "Looking what it can be used as"), once=True)
 
 
 async def _zipped(desk: Desk, folder: Path, call: str) -> None:

@@ -116,9 +116,8 @@ def _forgets(desk: Desk, model: str) -> str:
     ratio = memory.get("gap_ratio")
     if ratio is None or ratio >= wording.FORGETFUL:
         return ""
-    kept = f"only {wording.percent(ratio)}" if ratio > 0 else "nothing"
     return (
-        f"{model} keeps {kept} of the gap between rising and falling branches: "
+        f"{model} keeps {wording.kept(ratio)} of the gap between rising and falling branches: "
         "where its inputs turn back or are held, do not rely on what it estimates."
     )
 

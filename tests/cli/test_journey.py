@@ -38,6 +38,18 @@ def test_fit_writes_a_model_with_the_settings_asked_for(model: Path) -> None:
     assert len(block.weights) == 6
 
 
+@pytest.mark.parametrize("kind", ["gpi", "balance"])
+def test_fit_counts_no_recording_twice(
+    cli: Cli, files: tuple[Path, Path], tmp_path: Path, kind: str
+) -> None:
+    out = tmp_path / "twice.json"
+    result = cli("fit", kind, files[0], files[0], "-o", out)
+    assert result.code == 2
+    assert "the same samples would count twice to fit" in result.err
+    assert "Remedy: drop the copy" in result.err
+    assert not out.exists()
+
+
 def test_simulate_writes_the_inputs_the_modelled_and_the_measured_output(
     cli: Cli, model: Path, files: tuple[Path, Path], tmp_path: Path
 ) -> None:

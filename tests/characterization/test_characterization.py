@@ -377,6 +377,8 @@ def test_it_can_be_saved_and_shown() -> None:
         ([], "no recording"),
         (run(np.zeros(50), RAMP), "'pressure'.*constant"),
         (run(RAMP, np.ones(50)), "'displacement'.*constant"),
+        (run(1e-300 * RAMP, RAMP), "'pressure'.*too little to compute with"),
+        (run(RAMP, 1e-300 * RAMP), "'displacement'.*too little to compute with"),
         (run(np.arange(5, dtype=float), np.arange(5, dtype=float)), "'pressure'.*too few"),
         (Recording({"pressure": RAMP}), "no channel 'displacement'"),
         (

@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mckibben import GPI, Recording, load, write
+from mckibben import GPI, Affine, Recording, load, read, write
+from mckibben.blocks.compose import Series
 from mckibben.signals import irregular_triangle
 from tests.cli.conftest import Cli
 
@@ -37,6 +38,18 @@ def test_fit_writes_a_model_with_the_settings_asked_for(model: Path) -> None:
     assert len(block.weights) == 6
 
 
+@pytest.mark.parametrize("kind", ["gpi", "balance"])
+def test_fit_counts_no_recording_twice(
+    cli: Cli, files: tuple[Path, Path], tmp_path: Path, kind: str
+) -> None:
+    out = tmp_path / "twice.json"
+    result = cli("fit", kind, files[0], files[0], "-o", out)
+    assert result.code == 2
+    assert "the same samples would count twice to fit" in result.err
+    assert "Remedy: drop the copy" in result.err
+    assert not out.exists()
+
+
 def test_simulate_writes_the_inputs_the_modelled_and_the_measured_output(
     cli: Cli, model: Path, files: tuple[Path, Path], tmp_path: Path
 ) -> None:
@@ -52,6 +65,21 @@ def test_simulate_writes_the_inputs_the_modelled_and_the_measured_output(
     metrics = json.loads(result.out)["metrics"]["displacement"]
     assert metrics["rmse"] == pytest.approx(rmse, rel=1e-12)
     assert {"mae", "r2", "max_error"} <= set(metrics)
+
+
+def test_simulate_tells_where_it_extrapolates(
+    cli: Cli, model: Path, files: tuple[Path, Path], tmp_path: Path
+) -> None:
+    series, out = tmp_path / "series.json", tmp_path / "out.csv"
+    Series((load(model), Affine.example())).save(series)
+    (known,) = read(files[0])
+    for share, told in ((1.03, 0), (2.0, 1)):  # noise leaves the range too, and is not told
+        beyond = tmp_path / f"{share}.csv"
+        write(known.with_channels({}, pressure=share * known["pressure"]), beyond)
+        for path in (model, series):
+            result = cli("simulate", path, beyond, "-o", out, "--force")
+            assert result.code == 0, result.err
+            assert result.out.count("it extrapolates") == told
 
 
 def test_inverse_then_forward_through_files_is_the_identity(

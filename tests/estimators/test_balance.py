@@ -15,10 +15,10 @@ from mckibben.blocks.core.fields import DISPLACEMENT, FORCE, PRESSURE
 from mckibben.blocks.core.inverse import Inverse
 from mckibben.blocks.core.saving import from_dict
 from mckibben.blocks.coupled.balance import Balance
-from mckibben.blocks.coupled.known import beyond_known
 from mckibben.blocks.coupled.load_estimate import load_of
 from mckibben.blocks.memoryless.affine import Affine
 from mckibben.blocks.memoryless.contact import Contact
+from mckibben.control.beyond import beyond_known
 from mckibben.estimators.coupled.balance import BalanceEstimator
 from mckibben.estimators.coupled.balance_loads import under
 from mckibben.estimators.coupled.balance_search import Search

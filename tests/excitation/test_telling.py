@@ -96,6 +96,13 @@ def whats(recordings: Sequence[Recording], **settings: object) -> list[str]:
     return [gap.what for gap in untold(recordings, **settings)]  # type: ignore[arg-type]
 
 
+@pytest.mark.parametrize("channel", ["pressure", "displacement"])
+def test_what_moves_too_little_to_compute_with_counts_as_held(channel: str) -> None:
+    (recording, *_) = pair(COMPLETE)
+    tiny = recording.with_channels({}, **{channel: 1e-300 * recording[channel]})
+    assert untold([tiny], ["pressure"], ["displacement"])
+
+
 def test_of_recordings_that_tell_it_all_nothing_is_said() -> None:
     assert untold(pair(COMPLETE)) == ()
 

@@ -98,6 +98,12 @@ def test_it_is_drawn_in_both_ways(name: str, things: dict[str, Any]) -> None:
     assert not re.search(r'"--[a-z]', figure.to_json()), "a colour was left as a name"
 
 
+def test_what_is_virtual_is_not_called_measured(things: dict[str, Any]) -> None:
+    legend = things["tracked"].plot().get_legend()
+    assert [text.get_text() for text in legend.get_texts()] == ["reference", "achieved"]
+    assert "measured" not in things["rig"]._repr_html_()
+
+
 @pytest.mark.parametrize("kind", names("blocks"))
 def test_every_block_says_what_it_is(kind: str) -> None:
     block = load("blocks", kind).example()

@@ -2,10 +2,12 @@ from __future__ import annotations
 
 import json
 import re
+from collections.abc import Sequence
 from dataclasses import replace
 from html.parser import HTMLParser
 from importlib.resources import files
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -13,7 +15,8 @@ import pytest
 from mckibben.blocks.play_type.gpi import GPI
 from mckibben.blocks.play_type.pi import PI
 from mckibben.recording import Recording
-from mckibben.report import write_report
+from mckibben.report import coupling_subjects, write_report
+from mckibben.report.coupling_subjects import Coupling
 from mckibben.report.page import page
 from mckibben.studying.study import Study
 from tests.report.studies_by_hand import measured, models, renamed, study
@@ -168,6 +171,27 @@ def test_the_coupling_picture_names_its_recording() -> None:
     inputs = ("pressure", "pressure_2")
     found = Parsed(page(replace(base, leaderboard=replace(base.leaderboard, inputs=inputs))))
     assert "(columns), of all of them." in found.words
+
+
+def test_the_coupling_is_of_all_recordings_and_not_of_those_pictured_alone(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    counted: list[int] = []
+
+    def counting(recordings: Sequence[Recording], *channels: Sequence[str]) -> Coupling:
+        counted.append(len(recordings))
+        return coupling_subjects.coupling(recordings, *channels)
+
+    train = tuple(
+        one.with_channels({"pressure_2": "bar"}, pressure_2=one["pressure"][::-1])
+        for one in (measured(200, seed=k, name=f"run {k}") for k in range(8))
+    )
+    base = study(train[:7], train[7:])
+    inputs = ("pressure", "pressure_2")
+    seen = SimpleNamespace(**vars(coupling_subjects) | {"coupling": counting})
+    monkeypatch.setattr("mckibben.report.page.coupling_subjects", seen)
+    page(replace(base, leaderboard=replace(base.leaderboard, inputs=inputs)))
+    assert counted == [8]
 
 
 def test_one_recording_without_time_is_enough() -> None:

@@ -95,6 +95,23 @@ def test_next_steps_answer_what_is_wrong() -> None:
     assert len(next_steps(replace(found, inverse=None))) == 1
 
 
+def test_an_inverse_is_recommended_only_where_its_own_model_is_known_and_followed() -> None:
+    found = study()
+    assert found.inverse is not None
+    other = replace(found, inverse=replace(found.inverse, model="pi"))
+    assert next_steps(other)[0].startswith("Use the inverse of pi as feedforward")
+    assert "expect the error of pi" in next_steps(other)[0]
+    rows = tuple(
+        replace(row, validation_rmse=None) if row.model == "pi" else row
+        for row in found.leaderboard.rows
+    )
+    unvalidated = replace(other, leaderboard=replace(found.leaderboard, rows=rows))
+    astray = replace(found, inverse=replace(found.inverse, error=0.3))
+    for doubted, why in ((unvalidated, "no cross-validated error"), (astray, "up to 30 %")):
+        assert next_steps(doubted)[0].startswith("Do not rely on the inverse")
+        assert why in next_steps(doubted)[0]
+
+
 def test_a_study_in_which_nothing_worked_says_what_to_do() -> None:
     empty = study(blocks={})
     assert "No model could be identified" in " ".join(verdict(empty))

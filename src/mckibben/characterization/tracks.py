@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mckibben.arrays import Array
+from mckibben.blocks.core.single_channel import NARROWEST
 from mckibben.errors import DataError
 from mckibben.recording import Recording
 from mckibben.signals.reversals import noise_level, reversals, swing_threshold
@@ -109,7 +110,7 @@ def prepare(
     Raises
     ------
     DataError
-        On no recordings, a missing channel, fewer than ten samples, or a channel that is constant.
+        On no recordings, a missing channel, fewer than ten samples, or a channel that hardly moves.
     """
     if not recordings:
         raise DataError("there is no recording to characterize", remedy="give at least one")
@@ -131,6 +132,13 @@ def prepare(
                 file=recordings[0].source,
                 channel=channel,
                 remedy="record while it moves, or name another channel",
+            )
+        if high - low < NARROWEST:
+            raise DataError(
+                f"it moves by {high - low:.3g} in all, which is too little to compute with",
+                file=recordings[0].source,
+                channel=channel,
+                remedy="check its column and unit, or name another channel",
             )
     together = sum(float(np.sum((u - u.mean()) * (y - y.mean()))) for u, y in pairs)
     scale = Scale(

@@ -54,7 +54,7 @@ def simulate(
 
     from mckibben.bands.beyond import beyond_calibrated
     from mckibben.blocks.core.saving import load
-    from mckibben.blocks.coupled.known import beyond_known
+    from mckibben.control.beyond import beyond_known
     from mckibben.files import write
     from mckibben.metrics import score
     from mckibben.outputs import claim_recording

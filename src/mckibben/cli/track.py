@@ -88,7 +88,6 @@ def track(
     """
     from mckibben.blocks.core.block import Block
     from mckibben.blocks.core.saving import load
-    from mckibben.blocks.coupled.known import beyond_known
     from mckibben.blocks.feedback.feedforward_feedback import FeedforwardFeedback
     from mckibben.control import (
         UNCOMPENSATED,
@@ -99,6 +98,7 @@ def track(
         tune_pid,
     )
     from mckibben.control import track as close
+    from mckibben.control.beyond import beyond_known
     from mckibben.control.roles import wished
     from mckibben.control.suiting import doubts_of_feedback
     from mckibben.control.twin import COMMAND

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mckibben.arrays import Array
+from mckibben.blocks.core.single_channel import NARROWEST
 from mckibben.estimators.coupled.base import SCHEDULES
 from mckibben.recording import Recording
 from mckibben.signals.reversals import noise_level, reversals, swing_threshold
@@ -61,8 +62,9 @@ class Scale:
 
     @property
     def moves(self) -> bool:
-        """Whether the channel moves by more than noise, and by more than a hair."""
-        return self.span > max(STILL * max(abs(self.low), abs(self.high)), 10 * self.noise)
+        """Whether the channel moves by more than noise, a hair, and what can be computed with."""
+        least = max(STILL * max(abs(self.low), abs(self.high)), 10 * self.noise, NARROWEST)
+        return self.span > least
 
 
 @dataclass(frozen=True)

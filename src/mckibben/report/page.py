@@ -26,6 +26,7 @@ from mckibben.report.shown import Shown, drawn, shown, unique
 if TYPE_CHECKING:
     from mckibben.comparison.results import Leaderboard
     from mckibben.comparison.row import Row
+    from mckibben.recording import Recording
     from mckibben.studying.study import Study
     from mckibben.validation.results import OutputCheck
 
@@ -74,7 +75,7 @@ def page(study: Study, typed: Typed | None = None) -> str:
     pictured = drawn(every)
     figures, left_out = _figures(study, pictured)
     measured = [one.recording for one in unique(every)]
-    coupled = _coupled(study, pictured)
+    coupled = _coupled(study, measured)
     fullest = coupling_subjects.fullest(measured, study.leaderboard.inputs)
     if coupled is not None:
         figures["coupling"] = [interactive.plots(coupling_subjects.matrix(fullest, coupled))]
@@ -184,12 +185,12 @@ def _lead(one: Shown) -> Drawing:
     return subjects.fit_loops(one.recording, one.input, one.output, best, LEAD_POINTS)
 
 
-def _coupled(study: Study, pictured: tuple[Shown, ...]) -> coupling_subjects.Coupling | None:
-    """Return how inputs move outputs, where there are several."""
+def _coupled(study: Study, recordings: list[Recording]) -> coupling_subjects.Coupling | None:
+    """Return how inputs move outputs of all recordings, where there are several."""
     inputs, outputs = study.leaderboard.inputs, study.leaderboard.outputs
-    if not pictured or len(inputs) == len(outputs) == 1:
+    if not recordings or len(inputs) == len(outputs) == 1:
         return None
-    return coupling_subjects.coupling([one.recording for one in unique(pictured)], inputs, outputs)
+    return coupling_subjects.coupling(recordings, inputs, outputs)
 
 
 def _explained(board: Leaderboard) -> dict[str, str]:

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from mckibben.comparison.results import Leaderboard
     from mckibben.comparison.row import Row
     from mckibben.recording import Recording
+    from mckibben.studying.inverting import InverseCheck
     from mckibben.studying.study import Study
 
 WORSE_ON_TEST = 1.5
@@ -25,6 +26,9 @@ FORGETFUL = 0.7
 MISLEADING = 0.05
 """RMSE over range from which the chosen model is said to miss something."""
 
+
+MISSING = 0.1
+"""Largest error of an inverse over the range, on its own model, from which it is no feedforward."""
 
 ROUNDING = 1e-9
 """Share that is rounding, and shown as none."""
@@ -156,11 +160,7 @@ def next_steps(study: Study) -> list[str]:
         ]
     steps = []
     if study.inverse is not None:
-        steps.append(
-            f"Use the inverse as feedforward: inverse.json turns a wished-for {study.output} into "
-            f"{study.input} (command at the end). On the muscle itself expect the error of the "
-            f"model, not of the inverse."
-        )
+        steps.append(_feedforward(study, study.inverse, best))
     if best.test.nrmse > MISLEADING:
         steps.append(
             "The chosen model still misses something: the residuals below show whether it depends on "
@@ -183,6 +183,25 @@ def next_steps(study: Study) -> list[str]:
             "Test the model on a recording made on another day or with another load (--test)."
         )
     return steps
+
+
+def _feedforward(study: Study, check: InverseCheck, best: Row) -> str:
+    """Return that the inverse can be used as feedforward, or why it had better not be."""
+    (row,) = (row for row in study.leaderboard.rows if row.model == check.model)
+    if row.validation_rmse is None:
+        doubt = "the model has no cross-validated error"
+    elif not check.error <= MISSING:
+        doubt = f"on the model itself it is off by up to {percent(check.error)} of the range"
+    else:
+        doubt = ""
+    if doubt:
+        return f"Do not rely on the inverse, that of {check.model}, as feedforward: {doubt}."
+    of = "" if check.model == best.model else f" of {check.model}"
+    return (
+        f"Use the inverse{of} as feedforward: inverse.json turns a wished-for {study.output} into "
+        f"{study.input} (command at the end). On the muscle itself expect the error of "
+        f"{check.model if of else 'the model'}, not of the inverse."
+    )
 
 
 def versions() -> dict[str, str]:

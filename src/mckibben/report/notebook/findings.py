@@ -92,7 +92,7 @@ class TrackedFace(Face):
             raise DataError(
                 "this was not followed", channel=output, remedy=f"use {', '.join(self.found.rmse)}"
             )
-        return model_subjects.tracking({"measured": self.found}, output)
+        return model_subjects.tracking({"achieved": self.found}, output)
 
 
 class ReviewFace(Face):

@@ -36,7 +36,7 @@ class RigFace(Face):
                 (name, "driven", _unit(name), f"{numeral(ends.low)} to {numeral(ends.high)}")
             )
         rows += [
-            (name, "measured", _unit(name), "") for name in rig.outputs if name not in rig.inputs
+            (name, "output", _unit(name), "") for name in rig.outputs if name not in rig.inputs
         ]
         said = [rig.title] if rig.title else []
         note = f"Virtual: a simulation, a sample every {numeral(rig.sample_time)} s."

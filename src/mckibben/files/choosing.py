@@ -179,8 +179,9 @@ def _unit(
             remedy=f"say which it is, as in --unit {channel}={example}",
         )
     if expected is not None and unit.target != expected:
+        said = f"in {text!r}, which does not convert to" if text else "without a unit: it is in"
         raise DataError(
-            f"it cannot be in {text!r}, which does not convert to {expected or 'a pure number'}",
+            f"it cannot be {said} {expected or 'a pure number'}",
             file=path,
             channel=channel,
             remedy=f"correct the unit with --unit {channel}={expected or '%'}, "

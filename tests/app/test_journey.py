@@ -118,7 +118,10 @@ def test_a_file_that_needs_help_is_mapped_by_hand(page: Any) -> None:
 
 
 def test_a_load_told_of_one_file_is_not_that_of_another(page: Any) -> None:
-    lines = swung(1, 0.4).decode().splitlines()
+    lines = [
+        f"{line},{7 if k else 'counter'}"
+        for k, line in enumerate(swung(1, 0.4).decode().splitlines())
+    ]
     torn = "\n".join(lines[:100] + lines[150:]).encode()  # which is asked about
     seen(page, "upload")
     files = [{"name": f"{n}.csv", "mimeType": "text/csv", "buffer": torn} for n in ("one", "two")]
@@ -126,6 +129,8 @@ def test_a_load_told_of_one_file_is_not_that_of_another(page: Any) -> None:
     seen(page, "not-read").get_by_text("How is it to be read?").first.click()
     seen(page, "add-constant").click()
     seen(page, "constant-value-0").fill("20")
+    seen(page, "channel-3").click()
+    page.get_by_role("option").filter(has_text="(left out)").click()
     assert seen(page, "alike").get_attribute("aria-checked") == "true"
     assert seen(page, "alike-constants").get_attribute("aria-checked") == "false"
     seen(page, "read-again").click()

@@ -121,7 +121,11 @@ async def ask(
             if constants_too.value:
                 return chosen
             own = desk.workspace.entry(other).reading.constants if other else {}
-            return chosen.model_copy(update={"constants": own})
+            channels = chosen.channels and [
+                *(channel for channel in chosen.channels if channel not in chosen.constants),
+                *own,
+            ]
+            return chosen.model_copy(update={"constants": own, "channels": channels})
 
         async def read_so(chosen: Reading) -> dict[str, list[Recording]]:
             """Read the file, and others if wished for; keep those that still are not."""

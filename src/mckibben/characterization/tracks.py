@@ -8,8 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mckibben.arrays import Array
-from mckibben.blocks.core.single_channel import NARROWEST
+from mckibben.arrays import NARROWEST, Array
 from mckibben.errors import DataError
 from mckibben.recording import Recording
 from mckibben.signals.reversals import noise_level, reversals, swing_threshold

@@ -9,8 +9,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from mckibben.arrays import Array
-from mckibben.blocks.core.single_channel import NARROWEST
+from mckibben.arrays import NARROWEST, Array
 from mckibben.estimators.coupled.base import SCHEDULES
 from mckibben.recording import Recording
 from mckibben.signals.reversals import noise_level, reversals, swing_threshold

@@ -6,7 +6,7 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from mckibben.arrays import Array
+from mckibben.arrays import NARROWEST, Array
 from mckibben.blocks.core.block import Block
 from mckibben.blocks.core.fields import Channel, Rule
 from mckibben.blocks.core.inverse import Invertible
@@ -167,8 +167,8 @@ class Ranged(SingleChannel, Invertible):
         )
 
 
-NARROWEST, NARROWEST_SHARE = 1e-30, 1e-9
-"""Least width of an input range: in the unit of the input, and as a share of the sizes of its ends."""
+NARROWEST_SHARE = 1e-9
+"""Least width of an input range as a share of the sizes of its ends."""
 
 
 def check_input_range(kind: str, input_range: tuple[float, float] | None) -> None:

@@ -19,10 +19,11 @@ from nicegui.testing import User
 
 from mckibben import PI, Banded, Recording
 from mckibben.app.desk import Desk
-from mckibben.app.following import compensated, kept_motion, reached
+from mckibben.app.following import compensated, kept_motion
 from mckibben.app.jobs import Jobs, note
 from mckibben.app.motions import reference_recording
 from mckibben.app.pages import closing, compensate
+from mckibben.app.recorded import reached
 from mckibben.app.work import fit
 from mckibben.app.workspace import Workspace
 from mckibben.blocks.core.block import Block

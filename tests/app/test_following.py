@@ -9,8 +9,9 @@ import pytest
 
 from mckibben import PI, Recording, write
 from mckibben.app import forms, motions
-from mckibben.app.following import compensated, estimate, look_back, loop, pace, too_fast
+from mckibben.app.following import compensated, estimate, look_back, loop, too_fast
 from mckibben.app.pages.axes import Axes
+from mckibben.app.recorded import pace
 from mckibben.app.workspace import Workspace
 from mckibben.errors import DataError, ModelError
 from mckibben.registry import load

@@ -103,11 +103,6 @@ def _untouched(board: Leaderboard) -> str:
     return "" if board.shared else ", which it was neither fitted to nor chosen by"
 
 
-def kept(ratio: float) -> str:
-    """Return the share of a gap that a model keeps, in words; one that it turns round is not kept."""
-    return f"only {percent(ratio)}" if ratio > 0 else "nothing"
-
-
 def cautions(board: Leaderboard) -> dict[str, str]:
     """Return the models of a leaderboard that are good only near what they were fitted to, and why."""
     return {row.model: row.caution for row in board.rows if row.reason is None and row.caution}
@@ -175,7 +170,7 @@ def next_steps(study: Study) -> list[str]:
     memory = best.memory
     if memory is not None and memory.gap_ratio is not None and memory.gap_ratio < FORGETFUL:
         steps.append(
-            f"It keeps {kept(memory.gap_ratio)} of the recorded gap between branches: do not rely on "
+            f"It keeps only {percent(memory.gap_ratio)} of the recorded gap between branches: do not rely on "
             "it where the input is held."
         )
     if not steps:

@@ -12,9 +12,10 @@ from nicegui import ui
 from mckibben.app import fields, forms, plots, scripts
 from mckibben.app.desk import Desk, caution, guarded, named, not_recommended, on_event
 from mckibben.app.drawn import picture
-from mckibben.app.following import at_rest, compensated, held_for, kept_motion, pace, reached
+from mckibben.app.following import compensated, kept_motion
 from mckibben.app.pages import closing, forces, leaderboard, logs
 from mckibben.app.pages.drawing_reference import Sketch
+from mckibben.app.recorded import at_rest, held_for, pace, reached
 from mckibben.blocks.core.commanding import COMMANDS
 from mckibben.blocks.core.fields import Channel
 from mckibben.comparison.recognising import FORCE

@@ -117,7 +117,7 @@ def _forgets(desk: Desk, model: str) -> str:
     if ratio is None or ratio >= wording.FORGETFUL:
         return ""
     return (
-        f"{model} keeps {wording.kept(ratio)} of the gap between rising and falling branches: "
+        f"{model} keeps only {wording.percent(ratio)} of the gap between rising and falling branches: "
         "where its inputs turn back or are held, do not rely on what it estimates."
     )
 

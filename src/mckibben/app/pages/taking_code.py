@@ -11,7 +11,7 @@ from nicegui import ui
 
 from mckibben.app import forms
 from mckibben.app.desk import Desk, guarded, named, on_event
-from mckibben.app.following import pace
+from mckibben.app.recorded import pace
 from mckibben.blocks.core.block import Block
 from mckibben.system.atomic import replacing
 from mckibben.system.ordinary import read_bytes

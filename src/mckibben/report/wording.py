@@ -170,8 +170,8 @@ def next_steps(study: Study) -> list[str]:
     memory = best.memory
     if memory is not None and memory.gap_ratio is not None and memory.gap_ratio < FORGETFUL:
         steps.append(
-            f"It keeps only {percent(memory.gap_ratio)} of the recorded gap between branches: do not rely on "
-            "it where the input is held."
+            f"It keeps only {percent(memory.gap_ratio)} of the recorded gap between branches: do "
+            "not rely on it where the input is held."
         )
     if not steps:
         steps.append(

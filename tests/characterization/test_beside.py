@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -13,7 +11,7 @@ from mckibben import PI, DataError, Recording, read
 from mckibben.characterization import characterize
 from mckibben.characterization.beside import effects, without
 from mckibben.signals import multisine, noise_level, zeroed
-from tests.characterization.test_measured import DATA
+from tests.recordings import MEASURED
 
 STEP = 0.01
 TIME = np.arange(3000) * STEP
@@ -125,7 +123,7 @@ def test_an_output_that_falls_is_said_to() -> None:
 
 @pytest.mark.filterwarnings("ignore::mckibben.DataWarning")
 def test_measured_muscles_of_several_zeros() -> None:
-    files = sorted(Path(DATA / "cavatappi_loads").glob("*.csv"))
+    files = sorted((MEASURED / "cavatappi_loads").glob("*.csv"))
     if not files:
         pytest.skip("the measured recordings are not here")
     found = characterize([one for file in files for one in read(file, gaps="interpolate")])
@@ -136,7 +134,7 @@ def test_measured_muscles_of_several_zeros() -> None:
 
 @pytest.mark.filterwarnings("ignore::mckibben.DataWarning")
 def test_a_measured_arm_creeps_little() -> None:
-    files = sorted(Path(DATA / "soft_arm_three_muscles").glob("*.csv"))
+    files = sorted((MEASURED / "soft_arm_three_muscles").glob("*.csv"))
     if not files:
         pytest.skip("the measured recordings are not here")
     arm = [one for file in files for one in read(file)]

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import csv
-import os
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,10 +10,9 @@ from numpy.typing import NDArray
 
 from mckibben import Recording
 from mckibben.characterization import characterize
+from tests.recordings import MEASURED
 
 Array = NDArray[np.float64]
-
-DATA = Path(os.environ.get("MCKIBBEN_DATA", Path(__file__).parents[2] / "shared" / "data"))
 
 
 def run(u: Array, y: Array, step: float | None) -> Recording:
@@ -25,7 +22,7 @@ def run(u: Array, y: Array, step: float | None) -> Recording:
 
 def read(name: str, pressure: str, displacement: str) -> tuple[Array, Array, Array]:
     """Return time (or sample numbers), pressure and displacement of a real recording."""
-    path = DATA / f"{name}.csv"
+    path = MEASURED / f"{name}.csv"
     if not path.exists():
         pytest.skip("the measured recordings are not here")
     with path.open(newline="") as file:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import os
 import re
 from pathlib import Path
 
@@ -15,8 +14,8 @@ from mckibben import PI, Recording, compare, registry
 from mckibben.comparison.drift import Drift, Stretch, adapted_by, drift_of
 from mckibben.comparison.free_run import run_free
 from mckibben.control import DisturbanceObserver
+from tests.recordings import MEASURED
 
-DATA = Path(os.environ.get("MCKIBBEN_DATA", Path(__file__).parents[2] / "shared" / "data"))
 STEP = 4.0
 SEEDS = 100
 
@@ -153,7 +152,7 @@ def test_the_leaderboard_says_drift_and_what_to_do(
 
 
 def test_a_measured_muscle_goes_on_creeping_and_cpi_foresees_it() -> None:
-    path = DATA / "festo_dmsp10_levels" / "festo_dmsp10_levels.csv"
+    path = MEASURED / "festo_dmsp10_levels" / "festo_dmsp10_levels.csv"
     if not path.exists():
         pytest.skip("the measured recordings are not here")
     with path.open(newline="") as file:

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -18,13 +16,11 @@ from mckibben.blocks.differential.duhem_oscillator import DuhemOscillator
 from mckibben.estimators.differential.bouc_wen_oscillator import BoucWenOscillatorEstimator
 from mckibben.estimators.differential.duhem_oscillator import DuhemOscillatorEstimator
 from mckibben.estimators.differential.oscillator_slopes import follow_bouc_wen, follow_duhem
+from tests.recordings import MEASURED
 
 Array = NDArray[np.float64]
 
-MEASURED = (
-    Path(os.environ.get("MCKIBBEN_DATA", Path(__file__).parents[3] / "shared" / "data"))
-    / "bouc_wen_benchmark"
-)
+BENCHMARK = MEASURED / "bouc_wen_benchmark"
 
 SYSTEMS = {
     "light": (BoucWenOscillator(5.0, 0.002, 2.0, 6.0, 0.4, 0.3), 0.01, (0.2, 12.0), 1.5),
@@ -150,7 +146,7 @@ def test_what_cannot_be_learned_from_is_refused() -> None:
         BoucWenOscillatorEstimator(periodic=True).fit(turned)
 
 
-@pytest.mark.skipif(not MEASURED.is_dir(), reason="the benchmark's files are not here")
+@pytest.mark.skipif(not BENCHMARK.is_dir(), reason="the benchmark's files are not here")
 @pytest.mark.parametrize(
     ("estimator", "most"),
     [(BoucWenOscillatorEstimator, 1.1e-4), (DuhemOscillatorEstimator, 7.2e-3)],
@@ -160,7 +156,7 @@ def test_the_benchmark_is_met(estimator: Any, most: float) -> None:
     from scipy.io import loadmat
 
     def samples(name: str) -> Array:
-        content = loadmat(MEASURED / f"{name}_multisine.mat")
+        content = loadmat(BENCHMARK / f"{name}_multisine.mat")
         (found,) = (value.ravel() for key, value in content.items() if not key.startswith("__"))
         return found
 

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import json
-import os
 import time
 from collections.abc import Callable, Iterator, Sequence
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -20,10 +18,10 @@ from mckibben.blocks.dynamic.process_model import ProcessModel
 from mckibben.excitation import untold
 from mckibben.signals import random_wave, triangle
 from mckibben.system.threads import one_blas_thread
+from tests.recordings import MEASURED
 
 Array = NDArray[np.float64]
 
-DATA = Path(os.environ.get("MCKIBBEN_DATA", Path(__file__).parents[2] / "shared" / "data"))
 STEP = 0.05
 NOISE = 0.002
 
@@ -583,9 +581,9 @@ def measured(name: str) -> list[Recording]:
     """Return a set of measured recordings."""
     from mckibben.measured.sets import sets_in
 
-    if not (DATA / name).exists():
+    if not (MEASURED / name).exists():
         pytest.skip("the measured recordings are not here")
-    (found,) = sets_in(DATA / name)
+    (found,) = sets_in(MEASURED / name)
     return found.recordings()
 
 

@@ -14,6 +14,7 @@ import mckibben
 from mckibben import DataError, DataWarning, Recording
 from mckibben.files.channels import NAME
 from mckibben.files.folders import roles
+from tests.recordings import MEASURED
 
 N = 60
 T = np.arange(N) / 50
@@ -211,9 +212,7 @@ def test_a_part_that_is_missing_or_no_signal(tmp_path: Path) -> None:
 
 
 def test_measured_files_of_one_signal(tmp_path: Path) -> None:
-    from tests.files.conftest import SHARED
-
-    source = SHARED / "bouc_wen_benchmark"
+    source = MEASURED / "bouc_wen_benchmark"
     if not source.is_dir():
         pytest.skip(f"{source} is not here")
     for path in source.glob("*.mat"):

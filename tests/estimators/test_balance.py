@@ -190,7 +190,7 @@ def test_standard_errors_cover_what_is_true(found: BalanceEstimator) -> None:
     names = found.fitted.parameter_names
     errors = dict(zip(names, found.diagnostics_.standard_errors, strict=True))
     values = dict(zip(names, found.fitted.pack(), strict=True))
-    area = next(name for name in names if name.startswith("areas"))
+    area = next(name for name in names if name.startswith("area"))
     assert 0 < errors[area] < 3.0
     assert abs(values[area] - 60.0) < 6.0 * errors[area] + 0.5
     assert any("N/bar" in note for note in found.diagnostics_.notes)

@@ -110,14 +110,15 @@ class Desk:
             and result["load"] == load
         ]
 
-    def current(self, name: str) -> bool:
-        """Whether a model was fitted to the recordings as they are now, as far as is known."""
-        return all(row["current"] for row in self.workspace.results() if row["name"] == name)
+    def stale(self) -> set[str]:
+        """Return the models that were fitted to recordings as they are no more."""
+        return {row["name"] for row in self.workspace.results() if not row["current"]}
 
     def model_to_show(self, now: str, names: Sequence[str]) -> str:
         """Return the model chosen now, or the first, where that one is gone or of data that were."""
-        fresh = now in names and (self.current(now) or not self.current(names[0]))
-        return now if fresh else names[0]
+        stale = self.stale()
+        kept = now in names and (now not in stale or names[0] in stale)
+        return now if kept else names[0]
 
     @property
     def not_recommended(self) -> str:

@@ -9,6 +9,7 @@ from nicegui import ui
 
 from mckibben.app import adding
 from mckibben.app.desk import LONGEST, Desk, guarded, labelled, named
+from mckibben.app.fields import READING
 from mckibben.app.kept import Step
 from mckibben.app.together import differing, sample_times
 from mckibben.signals.zeroing import apart as zeros_apart
@@ -122,7 +123,7 @@ def _zeros(desk: Desk) -> None:
         ui.label(
             f"From {found[0]:.3g} to {found[1]:.3g} {unit} where {given} is lowest: a sensor was zeroed "
             f"anew, or another load hung there. Models that are not told take it for what {given} does. "
-            "Of a load that you know, tell them: “How it was read”, “Add a constant”, a force in N."
+            f"Of a load that you know, tell them: “{READING}”, “Add a constant”, a force in N."
         ).classes("text-sm")
         button = ui.button(f"Zero {wanted} there", on_click=guarded(partial(_zero, desk)))
         named(button.props("outline dense no-caps"), "zero-all")

@@ -166,7 +166,8 @@ class Editor:
 
     def _titles(self, names: list[str]) -> dict[str, str]:
         best = next((row["name"] for row in self.desk.results()), None)
-        words = {name: "" if self.desk.current(name) else " (other data)" for name in names}
+        stale = self.desk.stale()
+        words = {name: " (other data)" if name in stale else "" for name in names}
         words |= {best: " (first of the leaderboard)"} if best in words else {}
         return {name: f"{name}{words[name]}" for name in names}
 
@@ -214,8 +215,7 @@ class Editor:
             self.sketch = Sketch(
                 desk, outputs, reach, rest, held, units, known.usual, self._changed
             )
-        with self.left:
-            ui.timer(0.02, guarded(self._under, "Looking what can be reached"), once=True)
+        self._look_under()
         with self.sketch.actions:
             text = f"Show {_quantity(inverse.outputs)}s"
             named(ui.button(text, on_click=guarded(self._show)), "show-pressures")
@@ -229,6 +229,10 @@ class Editor:
         self._blank()
         self.runs.clear()
         await self._forms()
+
+    def _look_under(self) -> None:
+        with self.left:
+            ui.timer(0.02, guarded(self._under, "Looking what can be reached"), once=True)
 
     async def _under(self) -> None:
         """Show what can be reached under the load that is held: another one than under any."""
@@ -259,8 +263,7 @@ class Editor:
     def _changed(self) -> None:
         """Take pressures away that are of another wish than what is drawn, and what would run it."""
         if self._told is not None and self.sketch.told != self._told:
-            with self.left:
-                ui.timer(0.02, guarded(self._under, "Looking what can be reached"), once=True)
+            self._look_under()
         if self._asked is None or self._asked == self.wish:
             return
         self._asked = None

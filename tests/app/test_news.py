@@ -7,6 +7,8 @@ import gc
 import weakref
 from collections.abc import Awaitable, Callable
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, cast
 
 import pytest
 
@@ -15,7 +17,7 @@ pytest.importorskip("nicegui")
 from nicegui import Client, ui
 from nicegui.testing import User, user_simulation
 
-from mckibben.app import news
+from mckibben.app import news, shell
 from mckibben.app.busy import SOON, Answer, under_way
 from mckibben.app.desk import Desk
 from mckibben.app.jobs import Jobs
@@ -237,3 +239,22 @@ def test_a_second_click_does_nothing_twice_and_what_runs_is_said(tmp_path: Path)
         assert done == ["slow", "slow"]
 
     simulated(root, look)
+
+
+@pytest.mark.parametrize("clicked", [True, False])
+def test_a_theme_chosen_by_a_click_stays(clicked: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The browser's own theme is asked for when a page opens; its answer may come after a click."""
+    desk = SimpleNamespace(dark=False, changed=lambda topic: None)
+    dark = SimpleNamespace(value=None)
+    dark.set_value = lambda value: setattr(dark, "value", value)
+
+    async def answered(query: str, *, timeout: float) -> bool:
+        if clicked:
+            shell._switch(cast(Any, desk), cast(Any, dark), False)
+        return not clicked
+
+    monkeypatch.setattr(ui, "run_javascript", answered)
+    asyncio.run(shell._match(cast(Any, desk), cast(Any, dark)))
+    assert (desk.dark, dark.value) == (True, True)
+    shell._switch(cast(Any, desk), cast(Any, dark), True)
+    assert (desk.dark, dark.value) == (False, False)

@@ -98,7 +98,8 @@ def _header(desk: Desk, dark: ui.dark_mode) -> tuple[ui.tabs, dict[str, ui.tab]]
         ui.space()
         spinner = ui.spinner(size="1.2em", color="currentColor")
         said = named(ui.label("").classes("text-xs"), "busy").props("role=status")
-        switch = ui.button(icon="contrast", color=None, on_click=lambda: _switch(desk, dark))
+        switch = ui.button(icon="contrast", color=None)
+        switch.on("click", lambda shown: _switch(desk, dark, bool(shown.args)), js_handler=IS_DARK)
         labelled(hinted(switch.props("flat dense"), word := "Light or dark"), "aria-label", word)
     named(switch, "theme")
     client = context.client
@@ -236,16 +237,21 @@ async def _match(desk: Desk, dark: ui.dark_mode) -> None:
     """Draw figures for the theme that the browser has chosen."""
     query = "window.matchMedia('(prefers-color-scheme: dark)').matches"
     with contextlib.suppress(TimeoutError):  # of a browser that is busy: it stays light
-        desk.dark = bool(await ui.run_javascript(query, timeout=5.0))
-    dark.set_value(desk.dark)
-    if desk.dark:
+        chosen = bool(await ui.run_javascript(query, timeout=5.0))
+        if dark.value is None:  # a click may have come before the answer
+            _show(desk, dark, chosen)
+
+
+def _switch(desk: Desk, dark: ui.dark_mode, shown: bool) -> None:
+    """Change to the other theme than the one that is shown."""
+    _show(desk, dark, not shown)
+
+
+def _show(desk: Desk, dark: ui.dark_mode, chosen: bool) -> None:
+    dark.set_value(chosen)
+    if desk.dark != chosen:
+        desk.dark = chosen
         desk.changed("theme")
-
-
-def _switch(desk: Desk, dark: ui.dark_mode) -> None:
-    desk.dark = not desk.dark
-    dark.set_value(desk.dark)
-    desk.changed("theme")
 
 
 def _log(desk: Desk) -> None:
@@ -295,6 +301,9 @@ FIRST = ("mckibben.files", "pandas")
 
 SELECTED = '(value) => { element.props["model-value"] = value }'
 """Where handlers of events are made, ``element`` is what they are of."""
+
+IS_DARK = "() => emit(document.body.classList.contains('body--dark'))"
+"""Tells which theme is shown, which until :func:`_match` has asked is known to the browser alone."""
 
 LATER = ("mckibben.app.work", "mckibben.characterization", "mckibben.excitation")
 """What pages import when they first need it, in threads of their own."""

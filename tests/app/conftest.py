@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 
 from tests.app.browsing import BROWSER, OPTIONS
+from tests.tools import needs
 
 
 @pytest.fixture(scope="module")
@@ -17,6 +18,13 @@ def browser() -> Iterator[Any]:
         browser = play.chromium.launch(executable_path=BROWSER, args=OPTIONS)
         yield browser
         browser.close()
+
+
+@pytest.hookimpl(tryfirst=True)  # before marks select
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    for item in items:
+        if "browser" in getattr(item, "fixturenames", ()):
+            item.add_marker(needs("chromium"))
 
 
 @pytest.hookimpl(wrapper=True)

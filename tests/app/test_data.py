@@ -13,11 +13,8 @@ from mckibben import Recording, write
 from mckibben.app.kept import Step
 from mckibben.app.workspace import Workspace
 from tests.app.browsing import SLOW, idle, opened, seen, visited, workbench
-from tests.tools import needs
 
 pytest.importorskip("playwright.sync_api")
-
-pytestmark = needs("chromium")
 
 RUNS = [f"run-{k}" for k in range(9)]
 

@@ -14,11 +14,9 @@ import numpy as np
 import pytest
 
 from tests.app.browsing import SLOW, seen, visited, workbench
-from tests.tools import needs, where
+from tests.tools import where
 
 pytest.importorskip("playwright.sync_api")
-
-pytestmark = needs("chromium")
 
 
 @pytest.fixture

@@ -14,7 +14,6 @@ from mckibben.app.work import fit
 from tests.app.browsing import SLOW, TABS, idle, opened, seen, visited, workbench
 from tests.app.test_jobs import filled
 from tests.app.test_jobs import fit as asked
-from tests.tools import needs
 
 playwright = pytest.importorskip("playwright.sync_api")
 
@@ -113,7 +112,6 @@ FAINT = """() => {
 }""".replace("LARGE", str(LEAST_LARGE)).replace("LEAST", str(LEAST))
 
 
-@needs("chromium")
 @pytest.mark.parametrize("theme", ["light", "dark"])
 def test_all_text_of_all_pages_can_be_read(browser: Any, address: str, theme: str) -> None:
     faint = {}
@@ -139,7 +137,6 @@ PICTURED = """() => [...document.querySelectorAll(".js-plotly-plot")]
   .map((plot) => [plot._fullLayout.font.color, plot._fullLayout.yaxis.gridcolor])"""
 
 
-@needs("chromium")
 def test_all_pictures_follow_the_theme(browser: Any, address: str) -> None:
     wanted = [[colours(dark)[name] for name in ("ink", "grid")] for dark in (False, True)]
     drawn = f"wanted => ({PICTURED})().every((one) => `${{one}}` === `${{wanted}}`)"
@@ -177,7 +174,6 @@ NAMELESS = """() => {
 }"""
 
 
-@needs("chromium")
 def test_screen_readers_are_told_what_everything_is(browser: Any, address: str) -> None:
     with visited(browser, address) as page:
         assert page.get_by_role("banner").count() == 1
@@ -216,7 +212,6 @@ BROKEN = """() => {
 }"""
 
 
-@needs("chromium")
 def test_on_a_phone_words_of_tables_are_whole_and_tables_scroll(browser: Any, address: str) -> None:
     with visited(browser, address, viewport={"width": 400, "height": 800}) as page:
         opened(page, "look")
@@ -229,7 +224,6 @@ def test_on_a_phone_words_of_tables_are_whole_and_tables_scroll(browser: Any, ad
         assert box.evaluate("one => one.scrollWidth > one.clientWidth && one.clientWidth < 400")
 
 
-@needs("chromium")
 def test_buttons_and_names_of_a_picture_lie_beside_its_curves(browser: Any, address: str) -> None:
     boxes = "one => [...one.querySelectorAll('%s')].map((e) => e.getBoundingClientRect())"
     for width in (400, 1400):
@@ -246,7 +240,6 @@ def test_buttons_and_names_of_a_picture_lie_beside_its_curves(browser: Any, addr
             assert names["top"] >= curves["bottom"]
 
 
-@needs("chromium")
 def test_the_phone_reaches_every_step(browser: Any, address: str) -> None:
     wide = {}
     size = {"width": 400, "height": 800}
@@ -269,7 +262,6 @@ def test_the_phone_reaches_every_step(browser: Any, address: str) -> None:
         assert box["x"] + box["width"] <= 400
 
 
-@needs("chromium")
 def test_the_keyboard_skips_to_the_content_and_sees_where_it_is(browser: Any, address: str) -> None:
     with visited(browser, address, reduced_motion="reduce") as page:
         idle(page)

@@ -16,11 +16,8 @@ from mckibben.app.work import fit
 from tests.app.browsing import SLOW, opened, seen, visited, workbench
 from tests.app.test_jobs import filled, swung
 from tests.app.test_jobs import fit as asked
-from tests.tools import needs
 
 pytest.importorskip("playwright.sync_api")
-
-pytestmark = needs("chromium")
 
 CSV = "time_s,pressure_bar,displacement_mm\n" + "\n".join(
     f"{0.1 * k:.1f},{1 + k % 40 / 10},{2 * (k % 40)}" for k in range(200)

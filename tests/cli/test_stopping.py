@@ -161,3 +161,24 @@ def test_a_second_signal_ends_at_once(recordings: tuple[Path, Path], tmp_path: P
     assert process.returncode in (130, -signal.SIGINT)
     assert "Traceback" not in said
     assert time.monotonic() - started < PROMPT
+
+
+LOST = """
+import ctypes, os, signal, time
+from mckibben.cli.stopping import stoppable
+
+@ctypes.CFUNCTYPE(None)
+def called_by_compiled_code():
+    os.kill(os.getpid(), signal.SIGINT)
+    time.sleep(0.01)
+
+with stoppable(None):
+    called_by_compiled_code()
+    time.sleep(60)
+"""
+
+
+def test_a_signal_that_compiled_code_loses_ends_the_program_without_a_traceback() -> None:
+    process = subprocess.run([sys.executable, "-c", LOST], capture_output=True, text=True)
+    assert process.returncode == 130
+    assert process.stderr == "\nStopping: nothing is kept without -o DIR.\n"

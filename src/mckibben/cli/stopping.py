@@ -59,7 +59,7 @@ def stoppable(folder: Path | None) -> Iterator[None]:
             raise KeyboardInterrupt
 
     before = signal.signal(signal.SIGINT, stop)
-    with _watched(f"\nStopping: {what}.\n"):
+    with _watched(f"\nStopping: {what}.\n"), _quiet():
         try:
             yield
         except (KeyboardInterrupt, InterruptionError) as error:
@@ -97,6 +97,25 @@ def _watched(message: str) -> Iterator[None]:
     finally:
         signal.set_wakeup_fd(before)
         os.close(told)
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Do not print where an interruption is lost: in what compiled code calls, as a compiler does.
+
+    The program then ends by what :func:`_watched` has heard.
+    """
+    printed = sys.unraisablehook
+
+    def lost(what: sys.UnraisableHookArgs) -> None:
+        if what.exc_type is not KeyboardInterrupt:
+            printed(what)
+
+    sys.unraisablehook = lost
+    try:
+        yield
+    finally:
+        sys.unraisablehook = printed
 
 
 def _kept(folder: Path | None) -> str:

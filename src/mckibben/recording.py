@@ -284,3 +284,23 @@ def reading_notes(recordings: Iterable[Recording]) -> tuple[str, ...]:
     """Return the notes of `notes_by_file` as sentences that begin with the file."""
     found = notes_by_file(recordings)
     return tuple(f"{file}: {note}" for file, notes in found.items() for note in notes)
+
+
+def listed(recordings: Recording | Sequence[Recording]) -> list[Recording]:
+    """Return recordings as a list, be it one.
+
+    Raises
+    ------
+    DataError
+        If something else is given, such as the name of a file.
+    """
+    given: Any = recordings  # whatever the annotation says
+    several = isinstance(given, Iterable) and not isinstance(given, Recording | str)
+    found = list(given) if several else [given]
+    for one in found:
+        if not isinstance(one, Recording):
+            raise DataError(
+                f"a recording is needed here, not {type(one).__name__} {str(one)[:60]!r}",
+                remedy="read the file first: mckibben.read gives the list of its recordings",
+            )
+    return found

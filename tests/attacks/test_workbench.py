@@ -26,7 +26,6 @@ import pytest
 
 from mckibben import DataError, Recording
 from mckibben.app import guard, kept, reading
-from mckibben.app.claim import keep_to_the_user
 from mckibben.app.folder import FOLDERS
 from mckibben.app.guard import Guard, checked_token
 from mckibben.app.jobs import Job, Jobs
@@ -34,6 +33,7 @@ from mckibben.app.pages.leaderboard import judged
 from mckibben.app.workspace import Workspace
 from mckibben.files import write
 from mckibben.registry import load
+from mckibben.system.locks import keep_to_the_user
 
 ROOT = Path(__file__).parents[2]
 TOKEN = "a-token-of-tests"

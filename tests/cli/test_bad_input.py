@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from mckibben.system.locks import alone
 from tests.cli.conftest import Cli
 from tests.files.malformed import CASES, Case
 
@@ -122,3 +123,17 @@ def test_interrupt_while_fitting_keeps_the_best_so_far(
     assert result.code == 0, result.err
     assert json.loads(result.out)["interrupted"] is True
     assert out.exists()
+
+
+@pytest.mark.parametrize(
+    "words",
+    [("compare", "FILE", "--models", "pi"), ("study", "FILE"), ("reproduce", "field-models")],
+)
+def test_two_do_not_write_to_one_folder(
+    cli: Cli, files: tuple[Path, Path], tmp_path: Path, words: tuple[str, ...]
+) -> None:
+    with alone(tmp_path):
+        result = cli(*(files[0] if word == "FILE" else word for word in words), "-o", tmp_path)
+    assert result.code == 2
+    assert "another process is writing its results there" in result.err
+    assert not list(tmp_path.iterdir())

@@ -107,10 +107,8 @@ def test_a_study_says_whether_a_network_is_to_be_trusted_off_its_patterns(
     ((run, joint),) = record("sdchm", runs=["joint-test-p0-1.1"])
     test = tmp_path / f"{run.name}.csv"
     write(joint, test)
-    asked = ["study", arm, "--test", test, "--models", "tsfnn,balance", "--jobs", 1]
-    asked += ["--resample", 0.25]
-    for setting in ("tsfnn.search_samples=400", *(f"balance.{one}" for one in SHORT)):
-        asked += ["--set", setting]
+    asked = ["study", arm, "--test", test, "--models", "tsfnn,coupled-pi", "--jobs", 1]
+    asked += ["--resample", 0.25, "--set", "tsfnn.search_samples=400"]
     damped = cli(*asked, "-o", tmp_path / "damped")
     assert damped.code == 0, damped.err
     begin = "tsfnn: trained on 4 patterns that cover "
@@ -125,7 +123,7 @@ def test_a_study_says_whether_a_network_is_to_be_trusted_off_its_patterns(
     assert said in json.loads((out / "leaderboard.json").read_text())["notes"]
     assert said in (out / "report.html").read_text()
     found = {row["model"]: row.get("off_training") for row in board["rows"]}
-    assert found["balance"] is None
+    assert found["coupled-pi"] is None
     assert found["tsfnn"]["covered"] < 0.3 < found["tsfnn"]["share"]
     assert found["tsfnn"]["trusted"] is False
 

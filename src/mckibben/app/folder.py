@@ -20,9 +20,9 @@ from pathlib import Path
 from typing import Any
 
 from mckibben.app import kept
-from mckibben.app.claim import Lock
 from mckibben.errors import DataError
 from mckibben.system.atomic import PART, write_text, written
+from mckibben.system.locks import Lock
 from mckibben.system.ordinary import DESCRIPTION, opened, read_bytes
 
 FOLDERS = (
@@ -49,7 +49,8 @@ TAKEN = ".json"
 class Folder:
     """A folder of plain files, for nobody else on this machine.
 
-    What a process writes here is for nobody else where it calls `mckibben.app.claim.keep_to_the_user`.
+    What a process writes here is for nobody else where it calls
+    `mckibben.system.locks.keep_to_the_user`.
 
     Parameters
     ----------

@@ -18,10 +18,10 @@ from pathlib import Path
 from typing import Any
 
 from mckibben.app import kept
-from mckibben.app.claim import keep_to_the_user
 from mckibben.app.fields import said
 from mckibben.app.workspace import Workspace
 from mckibben.errors import DataError
+from mckibben.system.locks import keep_to_the_user
 from mckibben.system.ordinary import DESCRIPTION, read_bytes
 from mckibben.system.threads import cores
 from mckibben.system.workers import context, end_with_parent, prepare

@@ -10,11 +10,11 @@ from importlib import import_module
 from pathlib import Path
 from typing import cast
 
-from mckibben.app.claim import keep_to_the_user
 from mckibben.app.door import door, knock
 from mckibben.app.guard import checked_token, new_token
 from mckibben.app.workspace import Workspace
 from mckibben.errors import DataError
+from mckibben.system.locks import keep_to_the_user
 
 UNUSED = ("aiohttp", "requests", "tornado", "websocket")
 """Clients of the web, which the framework of the pages loads where it finds them: half a second."""

@@ -33,7 +33,7 @@ from mckibben.characterization.time_effects import creep, drift, rate_dependence
 from mckibben.characterization.tracks import Scale, Track, prepare
 from mckibben.characterization.wording import resting
 from mckibben.errors import DataError
-from mckibben.recording import Recording
+from mckibben.recording import Recording, listed
 from mckibben.signals.reversals import whole_cycles
 
 JOULE_PER_SQUARE_METRE = 100.0
@@ -105,7 +105,7 @@ def characterize(
     >>> found.n_cycles, round(found.mid_width, 6)
     (2, 1.0)
     """
-    runs = [recordings] if isinstance(recordings, Recording) else list(recordings)
+    runs = listed(recordings)
     told = dict.fromkeys((*beside, *conditions(runs, (input, output))))
     others = [name for name in told if moves(runs, name)]
     levels = levels_of(runs, input, output, others)

@@ -13,6 +13,7 @@ from mckibben.cli.leaderboards import print_leaderboard, told
 from mckibben.cli.options import Files, Reading
 from mckibben.cli.output import make_folder, print_json, say
 from mckibben.cli.stopping import demand_a_model, forget_kept, stop_short, stoppable
+from mckibben.system.locks import alone
 
 
 @spread
@@ -34,7 +35,7 @@ def compare(
     from mckibben.report.results_folder import LEADERBOARD, write_leaderboard
 
     folder = None if out is None else make_folder(out)
-    with stoppable(folder):
+    with alone(folder), stoppable(folder):
         begun = asked.begin(files, reading, folder, lambda models: LEADERBOARD)
         from mckibben.comparison.ranking import compare as rank
         from mckibben.comparison.results import Leaderboard

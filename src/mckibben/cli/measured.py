@@ -10,6 +10,7 @@ import typer
 from mckibben.cli.options import Force, Jobs, Json, Models, Quick, Seed, chosen_models
 from mckibben.cli.output import make_folder, print_json, progress_bar, say
 from mckibben.cli.stopping import forget_kept, stoppable
+from mckibben.system.locks import alone
 
 if TYPE_CHECKING:
     from mckibben.measured.running import Outcome
@@ -68,7 +69,7 @@ def measured(
     target = make_folder(out)
     if jobs != 1:
         workers.prepare()
-    with stoppable(target):
+    with alone(target), stoppable(target):
         results = Results(target, inputs=[one.folder for one in asked], force=force)
         results.claim([PAGE, ROWS])
         found: list[Outcome] = []

@@ -13,6 +13,7 @@ from mckibben.cli.output import make_folder, print_json, print_table, progress_b
 from mckibben.cli.stopping import forget_kept, stoppable
 from mckibben.errors import DataError
 from mckibben.numerals import numeral
+from mckibben.system.locks import alone
 
 if TYPE_CHECKING:
     from mckibben.papers.reproduction import Reproduction
@@ -53,7 +54,7 @@ def reproduce(
     from mckibben.system import threads, workers
 
     folder = None if out is None else make_folder(out)
-    with stoppable(folder):
+    with alone(folder), stoppable(folder):
         registry.load("papers", name)
         results = None
         if folder is not None:

@@ -14,6 +14,7 @@ from mckibben.cli.options import Files, Reading
 from mckibben.cli.output import make_folder, print_json, say
 from mckibben.cli.stopping import forget_kept, stop_short, stoppable
 from mckibben.numerals import numeral
+from mckibben.system.locks import alone
 
 if TYPE_CHECKING:
     from mckibben.studying.study import Study
@@ -54,7 +55,7 @@ def study(
     from mckibben.report.results_folder import study_files
 
     folder = make_folder(out)
-    with stoppable(folder):
+    with alone(folder), stoppable(folder):
         ran = [None if path is None else saved(path) for path in (model, compensator)]
         given = [path for path in (model, compensator) if path is not None]
         begun = asked.begin(files, reading, folder, study_files, beside=given)

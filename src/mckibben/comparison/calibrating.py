@@ -14,9 +14,8 @@ from mckibben.blocks.core.block import Block
 from mckibben.blocks.core.commanding import commands
 from mckibben.comparison.free_run import refuse_runaway, run_free
 from mckibben.comparison.shared_stretches import GRAVE, refuse_copies, shared_stretches
-from mckibben.comparison.splits import listed
 from mckibben.errors import DataError, ModelError, ModelWarning
-from mckibben.recording import Recording
+from mckibben.recording import Recording, listed
 from mckibben.system.progress import Tell, one_by_one, telling
 
 FEWEST = 20

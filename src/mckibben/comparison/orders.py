@@ -26,7 +26,7 @@ from mckibben.errors import ModelError
 from mckibben.estimators.core.estimator import Estimator
 from mckibben.estimators.core.single import SingleEstimator
 from mckibben.estimators.coupled.base import CoupledEstimator
-from mckibben.recording import Recording
+from mckibben.recording import Recording, listed
 from mckibben.system.progress import Tell, telling
 from mckibben.system.workers import checked
 
@@ -113,10 +113,10 @@ def identify(
             f"there are no usual orders of {family!r}. Remedy: give orders, for instance "
             "{'n_operators': (5, 10)}."
         )
-    listed = [recordings] if isinstance(recordings, Recording) else list(recordings)
-    channels = _channels(estimator_class(**settings), listed)
-    parts = tuple(folds(listed, channels.inputs[0], max(n_folds, 2)))
-    data = Data(given_split(listed, ()), parts, channels)
+    runs = listed(recordings)
+    channels = _channels(estimator_class(**settings), runs)
+    parts = tuple(folds(runs, channels.inputs[0], max(n_folds, 2)))
+    data = Data(given_split(runs, ()), parts, channels)
     combinations = [dict(zip(grid, values, strict=True)) for values in product(*grid.values())]
     every = tuple(range(len(parts)))
     work = [
@@ -133,7 +133,7 @@ def identify(
     chosen, lowest, reason = min(tried, key=lambda item: item[1])
     if not np.isfinite(lowest):
         raise ModelError(f"every order of {family!r} failed: {reason}")
-    fitted: Estimator = estimator_class(**settings, **chosen).fit(listed)
+    fitted: Estimator = estimator_class(**settings, **chosen).fit(runs)
     return Choice(fitted, chosen, tuple(tried))
 
 

@@ -19,11 +19,11 @@ from mckibben.comparison.offered import objections
 from mckibben.comparison.results import Leaderboard
 from mckibben.comparison.row import Row
 from mckibben.comparison.shared_stretches import TESTED, told
-from mckibben.comparison.splits import given_split, held_out, listed, validation_folds
+from mckibben.comparison.splits import given_split, held_out, validation_folds
 from mckibben.comparison.trying import Data, Item, Tried
 from mckibben.errors import DataError, ModelError
 from mckibben.estimators.coupled.base import CoupledEstimator, schedules
-from mckibben.recording import Recording, reading_notes
+from mckibben.recording import Recording, listed, reading_notes
 from mckibben.signals import made_manageable
 from mckibben.signals.zeroing import apart
 

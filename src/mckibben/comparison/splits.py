@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -325,27 +324,6 @@ def _interpolates(part: Fold, channel: str) -> bool:
         for runs, rows in ((part.test, part.test_rows), (part.train, part.train_rows))
     )
     return within(tested, fitted)
-
-
-def listed(recordings: Recording | Sequence[Recording]) -> list[Recording]:
-    """Return recordings as a list, be it one.
-
-    Raises
-    ------
-    DataError
-        If something else is given, such as the name of a file.
-    """
-    given: Any = recordings  # whatever the annotation says
-    several = isinstance(given, Iterable) and not isinstance(given, Recording | str)
-    found = list(given) if several else [given]
-    kept = [one for one in found if isinstance(one, Recording)]
-    for one in found:
-        if not isinstance(one, Recording):
-            raise DataError(
-                f"a recording is needed here, not {type(one).__name__} {str(one)[:60]!r}",
-                remedy="read the file first: mckibben.read gives the list of its recordings",
-            )
-    return kept
 
 
 def predecessor(recording: Recording, others: Sequence[Recording]) -> Recording | None:

@@ -14,14 +14,13 @@ from pathlib import Path
 import numpy as np
 
 from mckibben.blocks.core.block import Block
-from mckibben.comparison.splits import listed
 from mckibben.errors import DataError, ModelError
 from mckibben.excitation.believed import from_muscle, from_recordings, from_rig
 from mckibben.excitation.limits import Limits, beyond, limits_of_rig, narrowed, within_hardware
 from mckibben.excitation.plans import Plan
 from mckibben.excitation.prospect import prospect_of
 from mckibben.excitation.search import Progress, Search
-from mckibben.recording import Recording, standard_unit
+from mckibben.recording import Recording, listed, standard_unit
 from mckibben.rigs import Rig, load_rig
 from mckibben.signals.checking import generator
 from mckibben.system.progress import telling

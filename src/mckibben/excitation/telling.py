@@ -10,7 +10,6 @@ import numpy as np
 
 from mckibben.blocks.bands.banded import inside
 from mckibben.comparison.shared_stretches import without_copies
-from mckibben.comparison.splits import listed
 from mckibben.errors import DataError
 from mckibben.excitation.coupling import coupling
 from mckibben.excitation.gap import Gap, listing
@@ -22,7 +21,7 @@ from mckibben.excitation.reversals import reversals
 from mckibben.excitation.sampling import sampling
 from mckibben.excitation.seen import Seen, seen
 from mckibben.excitation.speeds import speeds
-from mckibben.recording import Recording
+from mckibben.recording import Recording, listed
 from mckibben.system.threads import one_blas_thread
 
 if TYPE_CHECKING:

@@ -11,8 +11,7 @@ import numpy as np
 from mckibben.arrays import Array
 from mckibben.blocks.core.block import Block
 from mckibben.comparison.shared_stretches import refuse_copies
-from mckibben.comparison.splits import listed
-from mckibben.recording import Recording
+from mckibben.recording import Recording, listed
 from mckibben.studying import review_words
 from mckibben.studying.causes import Cause, explained, shares
 from mckibben.studying.chain import ROUNDING, Chain, chain

@@ -16,13 +16,12 @@ from mckibben.comparison.planning import Settings, plan_of
 from mckibben.comparison.ranking import ranked
 from mckibben.comparison.recognising import moved_by
 from mckibben.comparison.results import Leaderboard
-from mckibben.comparison.splits import listed
 from mckibben.comparison.standing import Standing
 from mckibben.control import Tracked
 from mckibben.control.twin import COMMAND
 from mckibben.errors import DataError
 from mckibben.excitation import Gap, untold
-from mckibben.recording import Recording
+from mckibben.recording import Recording, listed
 from mckibben.studying.checking import check_on_test
 from mckibben.studying.inverting import InverseCheck, invert_best
 from mckibben.studying.loops import closed_loops, published_rig

@@ -21,7 +21,7 @@ from mckibben.blocks.core.exportable import Exportable
 from mckibben.blocks.core.fields import Channel, Initial
 from mckibben.blocks.core.linear import HandsOver
 from mckibben.blocks.core.parametrised import Parametrised
-from mckibben.blocks.core.running import Stream, run_many
+from mckibben.blocks.core.running import Stream, refuse_time, run_many
 from mckibben.errors import DataError, ModelError
 from mckibben.recording import Recording
 from mckibben.system.compiling import bound
@@ -218,7 +218,12 @@ class Block(DrawsItself, Exportable, Parametrised, HandsOver):
             units = {channel.name: channel.unit for channel in self.outputs}
             kept = data.select([channel.name for channel in self.inputs])
             return kept.with_channels(units, **modelled)
-        array = np.asarray(data, dtype=np.float64)
+        try:
+            array = np.asarray(data, dtype=np.float64)
+        except (TypeError, ValueError) as error:
+            raise DataError(
+                f"these are no inputs ({error})", remedy="give a recording or an array of numbers"
+            ) from None
         outputs = self._run(self._inputs_from_array(array), sample_time, initial)
         return outputs[:, 0] if array.ndim == 1 and outputs.shape[1] == 1 else outputs
 
@@ -273,6 +278,7 @@ class Block(DrawsItself, Exportable, Parametrised, HandsOver):
     def _run(self, inputs: Array, sample_time: float | None, initial: Initial | None) -> Array:
         state = self.initial_state(inputs[0], initial)
         outputs = np.empty((inputs.shape[0], len(self.outputs)))
+        refuse_time(sample_time)
         self.check_time(sample_time)
         self.bind(sample_time, state, inputs, outputs)()
         self.report(state)

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from mckibben.arrays import Array
 from mckibben.blocks.core.fields import Initial
-from mckibben.errors import DataError
+from mckibben.errors import DataError, ModelError
 from mckibben.system.threads import cores
 
 if TYPE_CHECKING:
@@ -52,6 +52,7 @@ class Stream:
         self.block, self.sample_time, self.initial = block, sample_time, initial
         inputs, outputs = np.zeros((1, len(block.inputs))), np.zeros((1, len(block.outputs)))
         self.state = np.zeros(block.n_states)
+        refuse_time(sample_time)
         block.check_time(sample_time)
         self._run = block.bind(sample_time, self.state, inputs, outputs)
         self._input, self._output = inputs[0], outputs[0]
@@ -118,6 +119,20 @@ class Stream:
         )
 
 
+def refuse_time(sample_time: float | None) -> None:
+    """Refuse what cannot be the time between two samples.
+
+    Raises
+    ------
+    ModelError
+        If it is given, and is no finite number of seconds above 0.
+    """
+    if sample_time is not None and not (isfinite(sample_time) and sample_time > 0):
+        raise ModelError(
+            f"the time between samples cannot be {sample_time:g} s. Remedy: give seconds, above 0."
+        )
+
+
 def _scalars(array: Array) -> memoryview[float]:
     return array.data.cast("B").cast("d")
 
@@ -135,6 +150,7 @@ def run_many(
     -------
     array, shape (len(blocks), n, n_outputs)
     """
+    refuse_time(sample_time)
     outputs = np.empty((len(blocks), inputs.shape[0], len(blocks[0].outputs)))
 
     def run(share: Iterable[int]) -> None:

@@ -11,7 +11,7 @@ from mckibben.blocks.compose import Series
 from mckibben.blocks.core.block import Block
 from mckibben.blocks.memoryless.affine import Affine
 from mckibben.errors import DataError
-from mckibben.recording import Recording
+from mckibben.recording import Recording, listed
 
 
 def affine_match(
@@ -42,23 +42,23 @@ def affine_match(
     DataError
         If the model's output does not move.
     """
-    listed = [recordings] if isinstance(recordings, Recording) else list(recordings)
+    every = listed(recordings)
     name = model.outputs[0].name
     inputs = [channel.name for channel in model.inputs]
-    modelled = [model.simulate(recording.select(inputs))[name] for recording in listed]
+    modelled = [model.simulate(recording.select(inputs))[name] for recording in every]
     x = modelled[0] if rule == "range" else np.concatenate(modelled)
     if np.ptp(x) == 0:
         raise DataError(
             "the model's output does not move on it, so there is nothing to match",
-            file=listed[0].source,
+            file=every[0].source,
             remedy="give another recording, or another model",
         )
     if rule == "range":
-        z = listed[0][output]
+        z = every[0][output]
         gain = float(np.ptp(z) / np.ptp(x))
         offset = float(z[0] - gain * x[0])
     else:
-        z = np.concatenate([recording[output] for recording in listed])
+        z = np.concatenate([recording[output] for recording in every])
         gain, offset = (float(value) for value in np.polyfit(x, z, 1))
     channel = model.outputs[0]
     return Series((model, Affine(gain, offset, channel, channel)))

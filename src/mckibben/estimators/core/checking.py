@@ -9,7 +9,7 @@ import numpy as np
 from mckibben.blocks.core.fields import Channel
 from mckibben.errors import DataError
 from mckibben.estimators.core.data import Mask, Run, TrainingData
-from mckibben.recording import Recording
+from mckibben.recording import Recording, listed
 
 FEWEST_SAMPLES = 10
 """Fewer samples than this identify nothing."""
@@ -49,11 +49,11 @@ def training_data(
         On no recordings, absent channels, too few samples, a constant input or output, or sample
         times that differ.
     """
-    listed = [recordings] if isinstance(recordings, Recording) else list(recordings)
+    every = listed(recordings)
     driven, given = (
         (names,) if isinstance(names, str) else tuple(names) for names in (inputs, outputs)
     )
-    if not listed:
+    if not every:
         raise DataError("there are no recordings to fit", remedy="give at least one")
     if same := set(driven) & set(given):
         raise DataError(
@@ -61,15 +61,15 @@ def training_data(
             channel=min(same),
             remedy="choose two channels with --input and --output",
         )
-    masks = [np.ones(len(r), dtype=bool) for r in listed] if rows is None else list(rows)
-    if len(masks) != len(listed) or any(
-        np.shape(mask) != (len(r),) for mask, r in zip(masks, listed, strict=False)
+    masks = [np.ones(len(r), dtype=bool) for r in every] if rows is None else list(rows)
+    if len(masks) != len(every) or any(
+        np.shape(mask) != (len(r),) for mask, r in zip(masks, every, strict=False)
     ):
         raise DataError(
             "rows do not match the recordings", remedy="give one mask a recording, one value a row"
         )
-    first = listed[0]
-    for recording in listed:
+    first = every[0]
+    for recording in every:
         _check(recording, first, (*driven, *given, *scheduling), one_rate)
     runs = tuple(
         Run(
@@ -81,7 +81,7 @@ def training_data(
             r.sample_time,
             recording=place,
         )
-        for place, (r, mask) in enumerate(zip(listed, masks, strict=True))
+        for place, (r, mask) in enumerate(zip(every, masks, strict=True))
     )
 
     def channels(names: Sequence[str]) -> tuple[Channel, ...]:

@@ -20,7 +20,7 @@ from mckibben.estimators.core.parameters import Parametrised
 from mckibben.estimators.core.settings import check_settings
 from mckibben.estimators.core.uncertainty import covariance_of, simulate_all, unknown
 from mckibben.estimators.optimisers.tracker import Progress, Tracker
-from mckibben.recording import Recording
+from mckibben.recording import Recording, listed
 from mckibben.signals.checking import LARGEST_SEED
 from mckibben.system.progress import telling
 from mckibben.system.threads import one_blas_thread
@@ -190,9 +190,9 @@ class Estimator(Parametrised, ABC):
     ) -> Self:
         started = time.perf_counter()
         self.check_settings()
-        data = self.data(recordings, rows)
-        if validation:
-            data = replace(data, early=self.data(validation))
+        data = self.data(listed(recordings), rows)
+        if early := listed(validation):
+            data = replace(data, early=self.data(early))
         tracker = Tracker(progress=progress)
         block, data = self.find(data, tracker)
         tracker.end()
@@ -222,16 +222,16 @@ class Estimator(Parametrised, ABC):
         block = self.fitted
         names = [channel.name for channel in block.inputs]
         given = [channel.name for channel in block.outputs]
-        listed = [recordings] if isinstance(recordings, Recording) else list(recordings)
-        found = [block.simulate(r.select(names)).matrix(given) for r in listed]
+        every = listed(recordings)
+        found = [block.simulate(r.select(names)).matrix(given) for r in every]
         return [outputs[:, 0] for outputs in found] if len(given) == 1 else found
 
     def score(self, recordings: Recording | Sequence[Recording], y: None = None) -> float:
         """Return R² over all recordings of what `predict` gives; of several outputs the mean."""
-        listed = [recordings] if isinstance(recordings, Recording) else list(recordings)
-        predicted = np.concatenate(self.predict(listed))
+        every = listed(recordings)
+        predicted = np.concatenate(self.predict(every))
         given = [channel.name for channel in self.fitted.outputs]
-        measured = np.concatenate([recording.matrix(given) for recording in listed])
+        measured = np.concatenate([recording.matrix(given) for recording in every])
         residual = measured - predicted.reshape(measured.shape)
         unexplained = (residual**2).sum(axis=0) / ((measured - measured.mean(axis=0)) ** 2).sum(
             axis=0

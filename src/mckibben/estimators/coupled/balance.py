@@ -57,7 +57,7 @@ from mckibben.estimators.coupled.balance_structure import APART, Structure
 from mckibben.estimators.coupled.balance_words import held_back, missed, sentences
 from mckibben.estimators.coupled.base import LOADS, CoupledEstimator, schedules
 from mckibben.estimators.optimisers.tracker import Tracker
-from mckibben.recording import Recording
+from mckibben.recording import Recording, listed
 
 LIMITED = ("bar", "V")
 """Units of what the hardware limits."""
@@ -153,11 +153,11 @@ class BalanceEstimator(CoupledEstimator):
         self, recordings: Recording | Sequence[Recording], rows: Sequence[Mask] | None = None
     ) -> TrainingData:
         """Return what is learned from recordings, of which some may lack a load that others have."""
-        listed = [recordings] if isinstance(recordings, Recording) else list(recordings)
+        every = listed(recordings)
         if self.unknown_load is False:
-            return super().data(listed, rows)
-        scheduling = schedules(listed) if self.scheduling is None else self.scheduling
-        filled, lacking = with_loads(listed, scheduling)
+            return super().data(every, rows)
+        scheduling = schedules(every) if self.scheduling is None else self.scheduling
+        filled, lacking = with_loads(every, scheduling)
         data = super().data(filled, rows)
         runs = [replace(run, unmeasured=lacking[run.recording]) for run in data.runs]
         return replace(data, runs=tuple(runs))

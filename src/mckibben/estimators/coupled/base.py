@@ -16,7 +16,7 @@ from mckibben.estimators.core.checking import training_data
 from mckibben.estimators.core.data import Mask, TrainingData, moves_alone
 from mckibben.estimators.core.estimator import ErrorsUnknown, Estimator, resting
 from mckibben.estimators.optimisers.tracker import Tracker
-from mckibben.recording import Recording
+from mckibben.recording import Recording, listed
 
 SCHEDULES = ("pressure_extensor", "force")
 """Channels that schedule a model by default, where there are any."""
@@ -116,15 +116,15 @@ class CoupledEstimator(ErrorsUnknown, Estimator):
         self, recordings: Recording | Sequence[Recording], rows: Sequence[Mask] | None = None
     ) -> TrainingData:
         """Return what is learned from recordings, their channels found by name where not given."""
-        listed = [recordings] if isinstance(recordings, Recording) else list(recordings)
-        if not listed:
+        every = listed(recordings)
+        if not every:
             raise DataError("there are no recordings", remedy="give at least one")
-        first = listed[0]
+        first = every[0]
         inputs, outputs = (
             (given,) if isinstance(given, str) else given for given in (self.input, self.output)
         )
-        inputs = inputs or in_any(listed, driving)
-        outputs = outputs or in_any(listed, moved)
+        inputs = inputs or in_any(every, driving)
+        outputs = outputs or in_any(every, moved)
         for what, names in (("pressure", inputs), ("displacement", outputs)):
             if not names:
                 raise DataError(
@@ -132,13 +132,13 @@ class CoupledEstimator(ErrorsUnknown, Estimator):
                     file=first.source,
                     remedy=f"name the columns {what}_1, {what}_2 and so on, or use --column",
                 )
-        loads = loads_among(listed, inputs)
+        loads = loads_among(every, inputs)
         inputs = tuple(name for name in inputs if name not in loads)
         scheduling = self.scheduling
         if scheduling is None:
-            scheduling = schedules(listed, (*inputs, *outputs))
+            scheduling = schedules(every, (*inputs, *outputs))
         scheduling = tuple(dict.fromkeys((*scheduling, *loads)))
-        for recording in listed:
+        for recording in every:
             for name in (*inputs, *outputs, *scheduling):
                 if name not in recording:
                     raise DataError(
@@ -160,7 +160,7 @@ class CoupledEstimator(ErrorsUnknown, Estimator):
                 remedy="record as many of both, or fit coupled-memory or tsfnn",
             )
         found = training_data(
-            listed, inputs, outputs, rows, scheduling, one_rate=False, spans=self.spans
+            every, inputs, outputs, rows, scheduling, one_rate=False, spans=self.spans
         )
         kept = found.bridged() if self.through else found.stretches(FEWEST_SAMPLES - 1)
         if sum(int(run.counts.sum()) for run in kept.runs) < FEWEST_SAMPLES:

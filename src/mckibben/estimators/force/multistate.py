@@ -27,7 +27,7 @@ from mckibben.estimators.core.separable import SeparableEstimator
 from mckibben.estimators.force.static import ORDERS, Law, force_columns, force_law
 from mckibben.estimators.optimisers.multi_start import Choice
 from mckibben.estimators.optimisers.tracker import Tracker
-from mckibben.recording import Recording
+from mckibben.recording import Recording, listed
 
 Structure = Literal["eleven", "each-way", "eighteen"]
 STRUCTURES = {"eleven": ELEVEN, "each-way": EACH_WAY, "eighteen": EIGHTEEN}
@@ -64,10 +64,10 @@ def extract_hysteresis(
     DataError
         Where a channel that the law needs is absent.
     """
-    listed = [recordings] if isinstance(recordings, Recording) else list(recordings)
+    every = listed(recordings)
     force = law.outputs[0].name
     found = []
-    for recording in listed:
+    for recording in every:
         static = law.simulate(recording)[force]
         left = recording[force] - static
         found.append(recording.with_channels({output: "N"}, **{output: left}))

@@ -1,4 +1,4 @@
-"""Who may write to a workspace: one workbench, as long as it lives, and the jobs that it started.
+"""Who may write to a folder: one process as long as it lives, and the jobs that it started.
 
 The locks are the system's: they go with the process that holds them, however it ends, and whatever the
 clock says.
@@ -9,6 +9,8 @@ from __future__ import annotations
 import os
 import sys
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from mckibben.errors import DataError
@@ -82,3 +84,40 @@ class Lock:
             file=self.path,
             remedy="use a folder on a disk of this machine that can be written to",
         )
+
+
+@contextmanager
+def alone(folder: Path | None) -> Iterator[None]:
+    """Write results to a folder to which no other process writes any meanwhile.
+
+    Where the system cannot lock folders, as Windows and some disks, others are not kept away.
+
+    Parameters
+    ----------
+    folder : Path or None
+        One that is there; None for results that are not written.
+
+    Raises
+    ------
+    DataError
+        If another process is at it.
+    """
+    if folder is None or sys.platform == "win32":
+        yield
+        return
+    import fcntl
+
+    held = os.open(folder, os.O_RDONLY)
+    try:
+        with suppress(OSError):
+            try:
+                fcntl.flock(held, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                raise DataError(
+                    "another process is writing its results there",
+                    file=folder,
+                    remedy="wait until it has ended, or give another folder with -o",
+                ) from None
+        yield
+    finally:
+        os.close(held)

@@ -1,0 +1,48 @@
+"""Results are written to a folder by one process at a time, and a dead one is in nobody's way."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from mckibben.errors import DataError
+from mckibben.system.locks import alone
+
+HOLDS = """
+import sys, time
+from pathlib import Path
+from mckibben.system.locks import alone
+with alone(Path(sys.argv[1])):
+    print("held", flush=True)
+    time.sleep(60)
+"""
+
+pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="folders cannot be locked there")
+
+
+def test_a_folder_is_held_as_long_as_its_process_lives(tmp_path: Path) -> None:
+    holding = subprocess.Popen(
+        [sys.executable, "-c", HOLDS, str(tmp_path)], stdout=subprocess.PIPE, text=True
+    )
+    try:
+        assert holding.stdout is not None
+        assert holding.stdout.readline() == "held\n"
+        with pytest.raises(
+            DataError, match=f"{tmp_path}.*another process.* or give another folder"
+        ):
+            enter(tmp_path)
+    finally:
+        holding.kill()
+        holding.communicate()
+    enter(tmp_path)
+    enter(tmp_path)  # and left again
+    enter(None)
+    assert not list(tmp_path.iterdir())
+
+
+def enter(folder: Path | None) -> None:
+    with alone(folder):
+        pass

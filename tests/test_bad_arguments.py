@@ -1,0 +1,64 @@
+"""From Python: what is no recording, and no time between samples, is refused with a remedy."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+import mckibben
+from mckibben import DataError, ModelError
+from mckibben.blocks.core.running import run_many
+
+GPI = mckibben.GPI.example()
+
+TAKES_RECORDINGS: list[Callable[[Any], object]] = [
+    mckibben.compare,
+    mckibben.study,
+    mckibben.characterize,
+    mckibben.untold,
+    mckibben.plan,
+    mckibben.review,
+    lambda given: mckibben.identify(given, "pi"),
+    lambda given: mckibben.check(GPI, given),
+    lambda given: mckibben.GPIEstimator().fit(given),
+    lambda given: mckibben.GPIEstimator().fit(
+        mckibben.read(mckibben.example.TRAIN), validation=given
+    ),
+]
+
+
+@pytest.mark.parametrize("given", ["run.csv", ["run.csv"], 3, np.zeros(5)], ids=repr)
+@pytest.mark.parametrize("takes", TAKES_RECORDINGS)
+def test_what_is_no_recording_is_refused(takes: Callable[[Any], object], given: object) -> None:
+    with pytest.raises(
+        DataError, match=r"a recording is needed here, not .* Remedy: read the file"
+    ):
+        takes(given)
+
+
+def test_a_model_is_given_numbers() -> None:
+    with pytest.raises(DataError, match="give a recording or an array of numbers"):
+        GPI.simulate("run.csv")
+
+
+@pytest.mark.parametrize("sample_time", [0.0, -0.01, np.nan, np.inf])
+@pytest.mark.parametrize(
+    "runs",
+    [
+        lambda time: GPI.stream(time),
+        lambda time: GPI.inverse().stream(time),
+        lambda time: GPI.simulate([1.0, 2.0], sample_time=time),
+        lambda time: GPI.simulate_many([GPI.pack()], [1.0, 2.0], sample_time=time),
+        lambda time: run_many([GPI], np.ones((2, 1)), sample_time=time),
+    ],
+)
+def test_no_time_between_samples_is_refused(
+    runs: Callable[[float], object], sample_time: float
+) -> None:
+    with pytest.raises(
+        ModelError, match=r"the time between samples cannot be .* give seconds, above 0"
+    ):
+        runs(sample_time)

@@ -1,4 +1,4 @@
-"""A closed loop, tried on another model of the muscle or on a virtual rig of its size."""
+"""A closed loop, tried on another model of the muscle or on a virtual rig of like size."""
 
 from __future__ import annotations
 
@@ -21,6 +21,15 @@ OWN = "model "
 
 RIG = "rig "
 """Before the names of virtual rigs."""
+
+ITSELF = "the model that is inverted; proves nothing"
+"""Of a plant."""
+
+IDLE = "no better than the mean of the output"
+"""Of a plant that predicts nothing."""
+
+LIKE = "a virtual rig, another muscle of like size"
+"""Of a rig that fits."""
 
 USUAL = ("feedforward", "pid", "feedforward-pid")
 """Controllers that are compared where they can be."""
@@ -67,25 +76,24 @@ def build(desk: Desk, model: str, form: str, settings: dict[str, Any], reference
 
 
 def _plants(desk: Desk, model: str, known: list[str]) -> dict[str, str]:
-    """Return what the compensator can be tried on: other models of the muscle, rigs, then its own.
+    """Return what the compensator can be tried on, and what each is, in the order of the choice.
 
-    Models that predict worse come after the rigs known.
+    Models of the user's own muscle come first; after the rigs known, which are other muscles, come
+    those that tell nothing: models that do not predict, and the one that is inverted.
     """
-    others: dict[str, str] = {}
-    weaker: dict[str, str] = {}
-    own: dict[str, str] = {}
+    twins: dict[str, str] = {}
+    last: dict[str, str] = {}
     step = desk.compensator[3] if desk.compensator else forms.STEP
-    weak = desk.workspace.weaker(model)
+    errors, idle = desk.workspace.test_errors(), desk.workspace.idle()
     for name in desk.workspace.plants(model):
         if desk.workspace.same(model, name):
-            own[f"{OWN}{name}"] = f"{name}: the model that is inverted; proves nothing"
+            last[f"{OWN}{name}"] = f"{name}: {ITSELF}"
         else:
-            kind = weaker if name in weak else others
-            kind[f"{OWN}{name}"] = f"{name}: another model of your muscle"
-    rigs = {
-        f"{RIG}{name}": f"{name}: a virtual rig of its size" for name in known if _runs(name, step)
-    }
-    return others | rigs | weaker | own
+            kind, doubt = (last, f"{IDLE}, ") if name in idle else (twins, "")
+            tested = errors.get(name, "not tested")
+            kind[f"{OWN}{name}"] = f"{name}: another model of your muscle, {doubt}{tested}"
+    rigs = {f"{RIG}{name}": f"{name}: {LIKE}" for name in known if _runs(name, step)}
+    return twins | rigs | last
 
 
 def _runs(rig: str, step: float) -> bool:
@@ -106,7 +114,7 @@ def _lacking(desk: Desk, model: str, offered: dict[str, str]) -> None:
         except MckibbenError as error:
             said = fields.said(error)
         named(ui.label(said), "no-plant")
-    elif not any(text.endswith(("of your muscle", "of its size")) for text in offered.values()):
+    elif all(text.endswith(ITSELF) for text in offered.values()):
         caution(
             "On the model that is inverted, its inverse is right by construction. Fit a model of "
             "another kind under Models to try it on."

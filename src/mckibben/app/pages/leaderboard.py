@@ -19,7 +19,8 @@ from mckibben.comparison.columns import Column, columns_of
 from mckibben.comparison.free_run import run_free
 from mckibben.comparison.needs import full_name
 from mckibben.comparison.results import CHOICES
-from mckibben.errors import DataError, MckibbenError, ModelError
+from mckibben.comparison.splits import tested_from
+from mckibben.errors import MckibbenError, ModelError
 from mckibben.numerals import numeral, typeset
 from mckibben.report import subjects, wording
 
@@ -232,12 +233,12 @@ async def _closer(desk: Desk, names: list[str]) -> Callable[[], None]:
     """Return what draws measured against modelled, residuals and parameters, of one model or two."""
     if not names:
         return lambda: None
-    recordings = desk.workspace.with_role("test") or desk.workspace.with_role("train")
-    if not recordings:
-        raise DataError("there is no recording to run it on", remedy="add one under Data")
-    recording = recordings[0]
+    split = await asyncio.to_thread(desk.split)
+    recording, known, part = split.test[0], split.train, tested_from(split.test_rows[0])
+    if old := desk.stale().intersection(names):  # of which something else was held out
+        part = None
+    used = "" if old else ", a test recording" if part is None else f", in part {subjects.HELD_OUT}"
     blocks = {name: desk.workspace.model(name) for name in names}
-    known = desk.workspace.with_role("train")
 
     def modelled() -> dict[str, Any]:
         return {
@@ -252,14 +253,14 @@ async def _closer(desk: Desk, names: list[str]) -> Callable[[], None]:
 
     def draw() -> None:
         next_steps.buttons(desk, names[0])
-        ui.label(f"On {recording.name}").classes("text-base")
+        named(ui.label(f"On {recording.name}{used}").classes("text-base"), "closer-on")
         drawings = []
         for output, pair in enumerate(pairs):
             own = {name: found[:, output] for name, found in outputs.items()}
             drawings += [
-                subjects.fit_over_time(recording, pair[1], own),
+                subjects.fit_over_time(recording, pair[1], own, part),
                 subjects.fit_loops(recording, *pair, own),
-                subjects.residuals(recording, *pair, own),
+                subjects.residuals(recording, *pair, own, part),
             ]
         for number, drawing in enumerate(drawings):
             with ui.row().classes("w-full"):

@@ -58,12 +58,39 @@ def test_what_was_held_out_is_shaded_and_called_so(
         if tested or not current:
             assert marked == []
             used = ", a test recording" if current else ""
-            assert said == f"On {'other' if tested else 'run'}{used}"
+            assert said.startswith(f"On {'other' if tested else 'run'}{used}. RMSE: a ")
         else:
-            assert said == "On run, in part held out to test"
+            assert said.startswith("On run, in part held out to test. RMSE of that part: a ")
             assert marked == [[pytest.approx(ends)]] * 2  # of what is over time
             words = [one["text"] for figure in figures for one in figure["layout"]["annotations"]]
             assert words.count("held out to test") == 2
+
+    visit(workspace, look)
+
+
+def test_models_are_run_on_any_recording_and_their_error_is_said(tmp_path: Path) -> None:
+    workspace = workspace_with(tmp_path, a=PI.example())
+    for name in ("first", "second"):
+        workspace.add(moved(), origin="", call="", role="train", name=name)
+    off = moved().with_channels({}, displacement=moved()["displacement"] + 1000.0)
+    workspace.add(off, origin="", call="", role="test", name="off")
+    row = {"status": "ok", "model": "pi", "validation_rmse": 1.0, "data": workspace.data()}
+    workspace.write_json("results", "a", row)
+
+    async def look(user: User) -> None:
+        user.find(marker="tab-models").click()
+        await until(user, "closer-on")
+        run = only(user, "closer-run")
+        assert list(run.options.values()) == [
+            "off, a test recording",
+            "first, trained on",
+            "second, trained on",
+        ]
+        far = float(only(user, "closer-on").text.split("a ")[-1].split()[0])
+        assert far > 900.0
+        run.set_value("first")
+        await later(lambda: "first, trained on" in only(user, "closer-on").text)
+        assert float(only(user, "closer-on").text.split(": a ")[-1].split()[0]) < 100.0
 
     visit(workspace, look)
 

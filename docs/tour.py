@@ -101,7 +101,7 @@ STEPS = (
     Step(
         "loop",
         "Compensate: the loop",
-        "Try the compensator on another model of the muscle, or a virtual rig of its size, "
+        "Try the compensator on another model of the muscle, or a virtual rig of like size, "
         "beside the uncompensated run.",
         ("run-loop",),
         "runs",

@@ -176,7 +176,6 @@ def test_what_runs_is_what_is_drawn(tmp_path: Path) -> None:
         motions = {row["name"]: row["motion"] for row in only(user, "runs").rows}
         assert motions == {"a-pid": "earlier, another", "a-now": "reference, as drawn"}
         assert "Errors compare only within a motion" in only(user, "motions").text
-        assert "reference, as drawn" in only(user, "motions").text
         user.find(marker="wave-triangle").click()
         await until(user, "wish-changed")
         await user.should_not_see(marker="run-loop")
@@ -366,13 +365,16 @@ def test_ready_made_motions_begin_at_rest(tmp_path: Path, gain: float) -> None:
     visit(workspace, look)
 
 
-def test_models_are_plants_at_once_and_a_rig_is_chosen_before_one_that_predicts_worse(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize(("tested", "useful"), [(2.0, True), (9.0, False), (None, True)])
+def test_ones_own_muscle_is_chosen_before_a_rig_where_its_model_predicts(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, tested: float | None, useful: bool
 ) -> None:
     workspace = workspace_with(tmp_path, a=PI.example(), b=WEAKER)
     for name, rmse in {"a": 1.0, "b": 2.0}.items():
         row = {"status": "ok", "model": "pi", "validation_rmse": rmse, "unit": "mm"}
-        workspace.write_json("results", name, row)
+        constant = {"validation_rmse": 8.0, "test": {"rmse": 8.0}}
+        test = None if tested is None else {"rmse": tested}
+        workspace.write_json("results", name, row | {"constant": constant, "test": test})
     go, rig = threading.Event(), rig_names()[0]
 
     def found(*_: Any) -> list[str]:
@@ -384,11 +386,20 @@ def test_models_are_plants_at_once_and_a_rig_is_chosen_before_one_that_predicts_
     async def look(user: User) -> None:
         await drawn(user)
         await until(user, "run-loop")
-        assert list(only(user, "loop-plant").options) == ["model b", "model a"]
+        plant = only(user, "loop-plant")
+        assert list(plant.options) == ["model b", "model a"]
+        error = "not tested" if tested is None else f"test RMSE {tested:.2f} mm"
+        doubt = "" if useful else "no better than the mean of the output, "
+        assert plant.options["model b"] == f"b: another model of your muscle, {doubt}{error}"
         assert "its validation RMSE is 2.00 mm, not 1.00 mm" in only(user, "weaker-plant").text
         go.set()
-        await later(lambda: only(user, "loop-plant").value == f"rig {rig}")
-        await user.should_not_see(marker="weaker-plant", retries=200)
+        await later(lambda: f"rig {rig}" in plant.options)
+        first = ["model b", f"rig {rig}"]
+        assert list(plant.options) == [*(first if useful else first[::-1]), "model a"]
+        assert plant.value == next(iter(plant.options))
+        assert plant.options[f"rig {rig}"] == f"{rig}: a virtual rig, another muscle of like size"
+        if not useful:
+            await user.should_not_see(marker="weaker-plant", retries=200)
 
     try:
         visit(workspace, look)
@@ -421,7 +432,7 @@ def test_runs_that_gain_nothing_and_plants_that_scatter_are_said(tmp_path: Path)
     workspace = workspace_with(tmp_path, a=PI.example(), b=WEAKER)
     replace(Banded.example(), forward=WEAKER).save(workspace.path("banded", "b.json"))
     for name, rmse, plant in (("a-good", 0.5, "b"), ("a-bad", 1.5, "c")):
-        run = {"model": "a", "plant": plant, "rmse": {"displacement": rmse}}
+        run = {"model": "a", "plant": plant, "controller": "pid", "rmse": {"displacement": rmse}}
         workspace.write_json("runs", name, run | {"uncompensated": {"displacement": 1.0}})
 
     async def look(user: User) -> None:
@@ -433,8 +444,8 @@ def test_runs_that_gain_nothing_and_plants_that_scatter_are_said(tmp_path: Path)
         }
         said = {one.text for one in user.find(kind=ui.label, marker="runs-remark").elements}
         assert said == {
-            "a-bad: no better than without compensation.",
-            "a-good: the plant scatters as its band says, which no compensator foresees.",
+            "pid on c: no better than without compensation.",
+            "pid on b: the plant scatters as its band says, which no compensator foresees.",
         }
 
     visit(workspace, look)

@@ -17,12 +17,13 @@ from mckibben.app.fields import said
 from mckibben.app.jobs import Jobs
 from mckibben.app.news import News, Refresh
 from mckibben.app.workspace import Workspace
-from mckibben.errors import MckibbenError
+from mckibben.errors import DataError, MckibbenError
 
 if TYPE_CHECKING:
     from nicegui.elements.upload_files import FileUpload
 
     from mckibben.comparison.channels import Channels
+    from mckibben.comparison.splits import Split
     from mckibben.recording import Recording
 
 SHARED = ("recordings", "results", "runs", "log")
@@ -94,6 +95,21 @@ class Desk:
         used = list(self.workspace.used().values())
         sides = self.sides
         return coupling(used, sides.inputs, sides.outputs).pairs(recordings or used)
+
+    def split(self) -> Split:
+        """Return what a fit now trains on and is tested on.
+
+        Raises
+        ------
+        DataError
+            If there is too little for both.
+        """
+        from mckibben.comparison.splits import split_of
+
+        train, test = self.workspace.with_role("train"), self.workspace.with_role("test")
+        if not (train or test):
+            raise DataError("there is no recording in use", remedy="add one under Data")
+        return split_of(train, test, self.sides)
 
     def results(self) -> list[dict[str, Any]]:
         """Return what is known of the models of these channels: other errors do not compare."""

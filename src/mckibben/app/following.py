@@ -76,7 +76,9 @@ def loop(workspace: Workspace, given: dict[str, Any], tell: Tell) -> str:
     recording = without.beside(found.recording).with_meta(name=name)
     write(recording, workspace.path("runs", f"{name}.csv"))
     errors = {channel: float(value) for channel, value in found.rmse.items()}
+    beside = [channel for channel in reference.channels if channel not in errors]
     units = {channel: recording.units[channel] for channel in errors}
+    units |= {channel: reference.units[channel] for channel in beside}
     workspace.write_json(
         "runs",
         name,
@@ -91,6 +93,7 @@ def loop(workspace: Workspace, given: dict[str, Any], tell: Tell) -> str:
             "largest": {channel: float(value) for channel, value in found.largest.items()},
             "uncompensated": {} if without.tracked is None else dict(without.tracked.rmse),
             "units": units,
+            "held": {c: None if np.ptp(reference[c]) else float(reference[c][0]) for c in beside},
             "notes": [*without.notes, *doubts_of_feedback(kind, plant)],
             "clipped": int(found.clipped),
             "step_us": 1e6 * float(found.step_time[0]),

@@ -168,6 +168,7 @@ class Followed(Kept):
     largest: dict[str, Number] = {}
     uncompensated: dict[str, Number] = {}
     units: dict[str, Text] = {}
+    held: dict[str, Number] = {}
     notes: list[Text] = []
     clipped: Count | None = None
     step_us: Number = None

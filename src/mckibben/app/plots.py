@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from functools import cache
 from importlib import resources
 from typing import Any
@@ -122,12 +122,13 @@ def lines(
     height: int = 320,
     logarithmic: bool = False,
     bands: tuple[tuple[float, float], ...] = (),
+    dotted: Collection[str] = (),
 ) -> Json:
     """Return named curves in one plane, y perhaps logarithmic, with bands that shade a range of y."""
     data = []
     for name, at, values, colour in curves:
         t, v = over_time(np.asarray(at, float), np.asarray(values, float), POINTS)
-        line = {"color": f"--{colour}", "width": 1.6}
+        line = {"color": f"--{colour}", "width": 1.6, "dash": "dot" if name in dotted else "solid"}
         data.append(
             {
                 "type": "scatter",

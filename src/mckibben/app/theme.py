@@ -108,6 +108,7 @@ body { background: var(--paper); color: var(--ink) }
 .q-table__container, .q-uploader { max-width: 100% }
 .modebar-btn { min-width: 24px; min-height: 24px }
 .nicegui-content label, .nicegui-content .q-item__label { overflow-wrap: anywhere }
+.q-select .q-field__native > .ellipsis { white-space: normal }
 #asked { position: fixed; left: 0; top: 0; width: 100%; height: 4px; z-index: 9999;
   background: var(--q-warning); opacity: 0; pointer-events: none; transform-origin: left }
 #asked.on { opacity: 1; animation: asked 1.2s ease-in-out infinite }

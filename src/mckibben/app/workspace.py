@@ -117,10 +117,11 @@ class Workspace(Changing):
     def plants(self, inverted: str) -> list[str]:
         """Return the models that a model's compensator can be tried on, in the order of the choice.
 
-        Others first, for on its own model a compensator proves nothing; of these, those that predict as
-        well; then models that know time, for on those that do not, feedback is better than it will be.
+        Others first, for on its own model a compensator proves nothing; of these, those that predict at
+        all, then as well; then models that know time, for on those that do not, feedback is better than
+        it will be.
         """
-        weak = self.weaker(inverted)
+        idle, weak = self.idle(), self.weaker(inverted)
         undone = self.model(inverted)
         inputs, outputs = ({c.name for c in ends} for ends in (undone.inputs, undone.outputs))
         found = []
@@ -131,7 +132,8 @@ class Workspace(Changing):
                     for each in inputs.difference(undone.scheduling):
                         twin.limits(each)
                     itself, timed = twin.forward == undone, twin.forward.rate_dependent
-                    found.append((itself, name in weak, not timed, place, name))
+                    doubts = itself, name in idle, name in weak, not timed
+                    found.append((*doubts, place, name))
         return [name for *_, name in sorted(found)]
 
     def weaker(self, inverted: str) -> dict[str, str]:
@@ -146,6 +148,22 @@ class Workspace(Changing):
             and (row["unit"], row["data"]) == (ours["unit"], ours["data"])
             and row["validation_rmse"] > WEAKER * ours["validation_rmse"]
         }
+
+    def idle(self) -> set[str]:
+        """Return the models that predict no better than a mean where nothing was fitted."""
+        found = set()
+        for row in self.results():
+            least = ((row["constant"] or {}).get("test") or {}).get("rmse")
+            tested = (row["test"] or {}).get("rmse")
+            worse = tested is not None and least is not None and not tested < least
+            if worse or (row["skill_least"] is not None and not row["skill_least"] > 0):
+                found.add(row["name"])
+        return found
+
+    def test_errors(self) -> dict[str, str]:
+        """Return the test error of every model that has been tested, in words."""
+        tested = [row for row in self.results() if (row["test"] or {}).get("rmse") is not None]
+        return {row["name"]: f"test RMSE {_rmse(row, test=True)}" for row in tested}
 
     def same(self, inverted: str, plant: str) -> bool:
         """Tell whether a plant is the very model that a compensator undoes."""
@@ -202,8 +220,9 @@ class Workspace(Changing):
         return {name: one for name, one in found.items() if one is not None}
 
 
-def _rmse(result: dict[str, Any]) -> str:
-    return f"{numeral(result['validation_rmse'], 3)} {result['unit']}"
+def _rmse(result: dict[str, Any], test: bool = False) -> str:
+    value = result["test"]["rmse"] if test else result["validation_rmse"]
+    return f"{numeral(value, 3)} {result['unit']}"
 
 
 def _as_in_a_leaderboard(result: dict[str, Any]) -> tuple[Any, ...]:

@@ -19,7 +19,7 @@ from mckibben.comparison.offered import objections
 from mckibben.comparison.results import Leaderboard
 from mckibben.comparison.row import Row
 from mckibben.comparison.shared_stretches import TESTED, told
-from mckibben.comparison.splits import given_split, held_out, validation_folds
+from mckibben.comparison.splits import split_of, validation_folds
 from mckibben.comparison.trying import Data, Item, Tried
 from mckibben.errors import DataError, ModelError
 from mckibben.estimators.coupled.base import CoupledEstimator, schedules
@@ -182,7 +182,7 @@ def plan_of(
             "recordings of several muscles, or under loads, are not thinned",
             remedy="leave --samples out, or resample them to a longer sample time",
         )
-    split = given_split(recordings, tests) if tests else held_out(recordings, channels)
+    split = split_of(recordings, tests, channels)
     parts, chosen_by = validation_folds(split.train, channels, n_folds, checks)
     validated = ""
     if chosen_by == "cross-validation":

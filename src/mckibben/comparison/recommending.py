@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Protocol, TypeVar
 
 from mckibben.comparison.limits import caution
+from mckibben.numerals import numeral
 
 CONSTANT = "constant"
 """Name of the row that predicts the mean of the training output, whatever the input: never chosen."""
@@ -109,4 +110,4 @@ def acceptable(row: Ranked, constant: Ranked | None) -> bool:
 
 
 def _error(row: Ranked, unit: str) -> str:
-    return f"{row.test_error:.3g} {unit}".strip()
+    return f"{numeral(row.test_error, 3)} {unit}".strip()

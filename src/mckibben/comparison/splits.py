@@ -91,6 +91,17 @@ def given_split(train: Sequence[Recording], test: Sequence[Recording]) -> Split:
     return Split(tuple(train), tuple(test), tuple(rows), described)
 
 
+def split_of(train: Sequence[Recording], test: Sequence[Recording], channels: Channels) -> Split:
+    """Return the split that the user gave, or else what is held out of the training recordings."""
+    return given_split(train, test) if test else held_out(train, channels)
+
+
+def tested_from(rows: Mask) -> int | None:
+    """Return the first sample tested on of a recording that was fitted before that; else None."""
+    first = int(rows.argmax())
+    return first if first > 1 else None  # of others, the first sample may only start their memory
+
+
 def held_out(recordings: Sequence[Recording], channels: Channels) -> Split:
     """Return the split of recordings where the user gave nothing to test on.
 

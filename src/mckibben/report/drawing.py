@@ -72,10 +72,11 @@ class Arrow:
 
 @dataclass(frozen=True)
 class Mark:
-    """A vertical line with a word at its top."""
+    """A vertical line with a word at its top; where it has an end, what is between is shaded."""
 
     x: float
     text: str
+    until: float | None = None
 
 
 @dataclass(frozen=True)

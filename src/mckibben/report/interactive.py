@@ -101,10 +101,23 @@ def _plot(panels: tuple[Panel, ...]) -> Json:
                 {"type": "line", "xref": x, "yref": f"{y} domain", "x0": mark.x, "x1": mark.x}
                 | {"y0": 0, "y1": 1, "line": {"color": "--muted", "width": 1, "dash": "dot"}}
             )
+            at, anchor = (mark.x, "left") if mark.until is None else (mark.until, "right")
             layout["annotations"].append(
-                {"xref": x, "yref": f"{y} domain", "x": mark.x, "y": 1, "text": text(mark.text)}
-                | {"xanchor": "left", "yanchor": "bottom", "showarrow": False}
+                {"xref": x, "yref": f"{y} domain", "x": at, "y": 1, "text": text(mark.text)}
+                | {"xanchor": anchor, "yanchor": "bottom", "showarrow": False}
             )
+            if mark.until is not None:
+                layout["shapes"].append(
+                    {
+                        "type": "rect",
+                        "xref": x,
+                        "yref": f"{y} domain",
+                        "x0": mark.x,
+                        "x1": mark.until,
+                    }
+                    | {"y0": 0, "y1": 1, "line": {"width": 0}, "fillcolor": "--accent"}
+                    | {"opacity": 0.12, "layer": "below"}
+                )
         if panel.title:
             layout["title"] = {"text": text(panel.title)}
     return {"data": traces, "layout": layout}

@@ -174,6 +174,8 @@ def draw_panel(axis: Axes, panel: Panel, bottom: bool) -> None:
             arrowprops={"arrowstyle": "-|>", "color": "#222222", "linewidth": 0.8},
         )
     for mark in panel.marks:
+        if mark.until is not None:
+            axis.axvspan(mark.x, mark.until, color="#0072b2", alpha=0.1, linewidth=0, zorder=0)
         axis.axvline(mark.x, color="#777777", linewidth=0.6, linestyle=":")
         axis.annotate(
             verbatim(mark.text),

@@ -29,6 +29,9 @@ from mckibben.report.drawing import (
     time_label,
 )
 
+HELD_OUT = "held out to test"
+"""What stands over the part of a recording that no model was fitted to."""
+
 Outputs = Mapping[str, Array]
 """Model name to its output on one recording, best first."""
 
@@ -231,4 +234,4 @@ def _worst_to_best(outputs: Outputs) -> list[tuple[str, str, Array]]:
 
 
 def _test_mark(time: Array, test_from: int | None) -> tuple[Mark, ...]:
-    return () if test_from is None else (Mark(float(time[test_from]), "test"),)
+    return () if test_from is None else (Mark(float(time[test_from]), HELD_OUT, float(time[-1])),)

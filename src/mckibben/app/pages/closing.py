@@ -1,4 +1,4 @@
-"""A closed loop, tried on another model of the muscle or on a virtual rig of its size."""
+"""A closed loop, tried on another model of the muscle or on a virtual rig of like size."""
 
 from __future__ import annotations
 
@@ -11,16 +11,10 @@ from typing import Any
 from nicegui import ui
 
 from mckibben import registry
-from mckibben.app import fields, forms, plots, scripts
+from mckibben.app import fields, forms, scripts
 from mckibben.app.desk import Desk, caution, guarded, named, on_event, tell
-from mckibben.app.drawn import picture
 from mckibben.app.following import fitting_rigs
-from mckibben.app.kept import Followed
-from mckibben.app.pages.kept_curves import going
-from mckibben.arrays import Array
 from mckibben.errors import MckibbenError
-from mckibben.files import read
-from mckibben.report import wording
 
 OWN = "model "
 """Before the names of models among those of plants."""
@@ -28,11 +22,17 @@ OWN = "model "
 RIG = "rig "
 """Before the names of virtual rigs."""
 
+ITSELF = "the model that is inverted; proves nothing"
+"""Of a plant."""
+
+IDLE = "no better than the mean of the output"
+"""Of a plant that predicts nothing."""
+
+LIKE = "a virtual rig, another muscle of like size"
+"""Of a rig that fits."""
+
 USUAL = ("feedforward", "pid", "feedforward-pid")
 """Controllers that are compared where they can be."""
-
-DRAWN = 4
-"""Most runs in a picture."""
 
 
 def build(desk: Desk, model: str, form: str, settings: dict[str, Any], reference: str) -> None:
@@ -76,25 +76,24 @@ def build(desk: Desk, model: str, form: str, settings: dict[str, Any], reference
 
 
 def _plants(desk: Desk, model: str, known: list[str]) -> dict[str, str]:
-    """Return what the compensator can be tried on: other models of the muscle, rigs, then its own.
+    """Return what the compensator can be tried on, and what each is, in the order of the choice.
 
-    Models that predict worse come after the rigs known.
+    Models of the user's own muscle come first; after the rigs known, which are other muscles, come
+    those that tell nothing: models that do not predict, and the one that is inverted.
     """
-    others: dict[str, str] = {}
-    weaker: dict[str, str] = {}
-    own: dict[str, str] = {}
+    twins: dict[str, str] = {}
+    last: dict[str, str] = {}
     step = desk.compensator[3] if desk.compensator else forms.STEP
-    weak = desk.workspace.weaker(model)
+    errors, idle = desk.workspace.test_errors(), desk.workspace.idle()
     for name in desk.workspace.plants(model):
         if desk.workspace.same(model, name):
-            own[f"{OWN}{name}"] = f"{name}: the model that is inverted; proves nothing"
+            last[f"{OWN}{name}"] = f"{name}: {ITSELF}"
         else:
-            kind = weaker if name in weak else others
-            kind[f"{OWN}{name}"] = f"{name}: another model of your muscle"
-    rigs = {
-        f"{RIG}{name}": f"{name}: a virtual rig of its size" for name in known if _runs(name, step)
-    }
-    return others | rigs | weaker | own
+            kind, doubt = (last, f"{IDLE}, ") if name in idle else (twins, "")
+            tested = errors.get(name, "not tested")
+            kind[f"{OWN}{name}"] = f"{name}: another model of your muscle, {doubt}{tested}"
+    rigs = {f"{RIG}{name}": f"{name}: {LIKE}" for name in known if _runs(name, step)}
+    return twins | rigs | last
 
 
 def _runs(rig: str, step: float) -> bool:
@@ -115,7 +114,7 @@ def _lacking(desk: Desk, model: str, offered: dict[str, str]) -> None:
         except MckibbenError as error:
             said = fields.said(error)
         named(ui.label(said), "no-plant")
-    elif not any(text.endswith(("of your muscle", "of its size")) for text in offered.values()):
+    elif all(text.endswith(ITSELF) for text in offered.values()):
         caution(
             "On the model that is inverted, its inverse is right by construction. Fit a model of "
             "another kind under Models to try it on."
@@ -222,139 +221,3 @@ def _refused(
     name = plant.removeprefix(OWN).removeprefix(RIG)
     there = desk.workspace.twin(name) if own else load_rig(name)
     return {law: refusal(law, compensator, there) for law in registry.names("controllers")}
-
-
-def runs(desk: Desk, model: str, drawn: Callable[[], str]) -> None:
-    """Show what came of loops with a model, as they end.
-
-    Parameters
-    ----------
-    desk : Desk
-    model : str
-        What was inverted.
-    drawn : callable
-        Returns the file of the motion that is drawn now, empty where none is known.
-    """
-
-    @ui.refreshable
-    def waiting() -> None:
-        loops = [job for job in desk.jobs.jobs.values() if job.kind == "loop"]
-        going(desk, [job for job in loops if job.given.get("model") == model])
-
-    @ui.refreshable
-    def shown() -> None:
-        found = desk.workspace.runs(model)
-        if not found:
-            return
-        motions = {run.reference: _motion(run, drawn()) for run in found.values()}
-        pictured = drawn() if drawn() in motions else _latest(desk, found)
-        _table(found, motions)
-        if len(motions) > 1 or drawn() not in ("", pictured):
-            text = f"Errors compare only within a motion. In the picture: {motions[pictured]}."
-            named(ui.label(text).classes("text-sm"), "motions")
-        for text, names in _remarks(desk, found).items():
-            if names:
-                named(caution(f"{', '.join(names)}: {text}"), "runs-remark")
-        for note in dict.fromkeys(note for run in found.values() for note in run.notes):
-            named(caution(note), "loop-note")
-        alike = {name: run for name, run in found.items() if run.reference == pictured}
-        _pictures(desk, dict(list(alike.items())[-DRAWN:]))
-
-    desk.when("jobs", waiting.refresh)
-    desk.when("runs", shown.refresh)
-    waiting()
-    shown()
-
-
-def _remarks(desk: Desk, runs: dict[str, Followed]) -> dict[str, list[str]]:
-    """Return what the figures of runs do not say, and of which."""
-    no_better, scattering = [], []
-    for name, run in runs.items():
-        plain = run.uncompensated
-        pairs = [(run.rmse[key], plain.get(key)) for key in run.rmse]
-        if any(own is not None and other is not None and own >= other for own, other in pairs):
-            no_better.append(name)
-        if run.plant and desk.workspace.path("banded", f"{run.plant}.json").exists():
-            scattering.append(name)
-    return {
-        "no better than without compensation.": no_better,
-        "the plant scatters as its band says, which no compensator foresees.": scattering,
-    }
-
-
-def _motion(run: Followed, drawn: str) -> str:
-    """Return what a motion is called: its file, and whether it is the one that is drawn."""
-    name = run.reference.removesuffix(".csv") or "unknown"
-    if not drawn:
-        return name
-    return f"{name}, as drawn" if run.reference == drawn else f"{name}, another"
-
-
-def _latest(desk: Desk, runs: dict[str, Followed]) -> str:
-    """Return the motion of the latest run."""
-    paths = {name: desk.workspace.path("runs", f"{name}.csv") for name in runs}
-    ended = {name: path.stat().st_mtime_ns for name, path in paths.items() if path.is_file()}
-    return runs[max(ended or runs, key=lambda name: ended.get(name, 0))].reference
-
-
-def _table(runs: dict[str, Followed], motions: dict[str, str]) -> None:
-    """Show runs, those of the same motion together."""
-    labels = {
-        "name": "Run",
-        "motion": "Motion",
-        "plant": "Plant",
-        "rmse": "RMSE",
-        "without": "RMSE without compensation",
-        "largest": "Largest error",
-        "clipped": "Steps at a limit or out of reach",
-        "step": "Step [µs]",
-    }
-    rows: list[dict[str, Any]] = [
-        {"name": name, "motion": motions[run.reference], "plant": run.plant or run.rig}
-        | {"rmse": _listed(run.rmse, run.units), "without": _listed(run.uncompensated, run.units)}
-        | {"largest": _listed(run.largest, run.units), "clipped": run.clipped}
-        | {"step": wording.number(run.step_us, 2)}
-        for name, run in sorted(runs.items(), key=lambda one: one[1].reference)
-    ]
-    columns = [
-        {"name": key, "field": key, "label": label, "align": "left"}
-        for key, label in labels.items()
-    ]
-    named(
-        ui.table(rows=rows, columns=columns, row_key="name")
-        .props("dense flat wrap-cells")
-        .classes("w-full"),
-        "runs",
-    )
-
-
-def _listed(values: dict[str, float | None], units: dict[str, str]) -> str:
-    known = [
-        f"{wording.number(value, 3)}\xa0{units.get(name, '')}" for name, value in values.items()
-    ]
-    return ", ".join(text.strip() for text in known) or "none"
-
-
-def _pictures(desk: Desk, runs: dict[str, Followed]) -> None:
-    """Draw runs of one motion, and what no compensation did, for every coordinate."""
-    curves: dict[str, list[tuple[str, Array, Array, str]]] = {}
-    units: dict[str, str] = {}
-    for place, name in enumerate(runs):
-        try:
-            (run,) = read(desk.workspace.path("runs", f"{name}.csv"), informative=False)
-        except (MckibbenError, ValueError):
-            continue
-        if run.duration is not None and run.start_time < 0:  # the approach is not scored
-            run = run.slice(round(-run.start_time / (run.sample_time or 1.0)), len(run))
-        for channel in runs[name].rmse:
-            wished, plain = f"reference_{channel}", f"uncompensated_{channel}"
-            if channel not in run or wished not in run:
-                continue
-            units[channel] = run.units[channel]
-            own = curves.setdefault(channel, [("reference", run.time, run[wished], "measured")])
-            if plain in run and not any(curve[0] == "no compensation" for curve in own):
-                own.append(("no compensation", run.time, run[plain], "input"))
-            own.append((name, run.time, run[channel], f"series-{place + 1}"))
-    for place, (channel, own) in enumerate(curves.items()):
-        figure = plots.lines(own, x="time [s]", y=f"{channel} [{units[channel]}]")
-        picture(desk, figure, "loop-runs" if not place else f"loop-runs-{place + 1}")

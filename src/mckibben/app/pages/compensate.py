@@ -13,7 +13,7 @@ from mckibben.app import fields, forms, plots, scripts
 from mckibben.app.desk import Desk, caution, guarded, named, not_recommended, on_event
 from mckibben.app.drawn import picture
 from mckibben.app.following import compensated, kept_motion
-from mckibben.app.pages import closing, forces, leaderboard, logs
+from mckibben.app.pages import closing, forces, leaderboard, logs, loops
 from mckibben.app.pages.drawing_reference import Sketch
 from mckibben.app.recorded import at_rest, held_for, pace, reached
 from mckibben.blocks.core.commanding import COMMANDS
@@ -110,6 +110,7 @@ class Editor:
     def __init__(self, desk: Desk, names: list[str]) -> None:
         self.desk = desk
         self.sketch: Sketch
+        self.ticks = loops.Ticks()
         self._asked: tuple[Any, ...] | None = None  # what is shown, or being worked out
         self._told: dict[str, float] | None = None  # under which it is shown what can be reached
         with ui.row().classes("w-full items-end gap-3"):
@@ -298,7 +299,7 @@ class Editor:
             closing.build(desk, name, form, settings, file)
         self.runs.clear()
         with self.runs:
-            closing.runs(desk, name, lambda: file if self._asked is asked else "")
+            loops.build(desk, name, lambda: file if self._asked is asked else "", self.ticks)
 
     def _figures(self, model: str, reference: Recording, given: Recording) -> None:
         desk, sketch = self.desk, self.sketch

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from contextlib import suppress
 
 from nicegui import ui
 
@@ -12,6 +13,7 @@ from mckibben.app.kept import Estimated
 from mckibben.app.pages.kept_curves import drawn, showing
 from mckibben.app.pages.taking_code import hand_over
 from mckibben.comparison.recognising import FORCE
+from mckibben.comparison.splits import tested_from
 from mckibben.errors import DataError, MckibbenError
 from mckibben.report import wording
 
@@ -79,10 +81,10 @@ def build(desk: Desk) -> None:
     def runs() -> None:
         wanted = known.get(str(model.value), [])
         used = desk.workspace.used() if wanted else {}
-        trained = {one.name for one in desk.workspace.entries() if one.role == "train"}
+        trained = _trained(desk) if wanted else {}
         fit = [name for name, one in used.items() if all(key in one for key in wanted)]
         fit.sort(key=lambda name: ("force" not in used[name], name in trained))
-        names = {name: f"{name} (trained on)" if name in trained else name for name in fit}
+        names = {name: f"{name}{trained.get(name, '')}" for name in fit}
         run.set_options(names, value=run.value if run.value in names else next(iter(names), None))
         doubt.set_text(_forgets(desk, str(model.value)))
         doubt.set_visibility(bool(doubt.text))
@@ -108,6 +110,18 @@ def build(desk: Desk) -> None:
     for topic in ("results", "recordings"):
         desk.when(topic, again)
     again()
+
+
+def _trained(desk: Desk) -> dict[str, str]:
+    """Return the recordings that models are fitted to, and whether as a whole."""
+    with suppress(MckibbenError):
+        split = desk.split()
+        parts = zip(split.test, split.test_rows, strict=True)
+        partly = {run.name for run, rows in parts if tested_from(rows) is not None}
+        return {
+            run.name: f" ({'in part ' * (run.name in partly)}trained on)" for run in split.train
+        }
+    return {}
 
 
 def _forgets(desk: Desk, model: str) -> str:

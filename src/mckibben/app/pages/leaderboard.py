@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Awaitable, Callable, Sequence
+from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
 from nicegui import ui
 
 from mckibben.app import plots
@@ -19,8 +21,10 @@ from mckibben.comparison.columns import Column, columns_of
 from mckibben.comparison.free_run import run_free
 from mckibben.comparison.needs import full_name
 from mckibben.comparison.results import CHOICES
-from mckibben.errors import DataError, MckibbenError, ModelError
+from mckibben.comparison.splits import Mask, Split, tested_from
+from mckibben.errors import MckibbenError, ModelError
 from mckibben.numerals import numeral, typeset
+from mckibben.recording import Recording
 from mckibben.report import subjects, wording
 
 PARAMETERS = 12
@@ -73,7 +77,9 @@ UNLIKE = (
 
 def build(desk: Desk) -> None:
     """Build it."""
-    ticked: list[str] = []  # what a user has chosen stays so when the table is shown anew
+    # what a user has chosen stays so when the table is shown anew
+    ticked: list[str] = []
+    picked = {"wanted": "", "shown": ""}
 
     @ui.refreshable
     def shown() -> None:
@@ -99,15 +105,21 @@ def build(desk: Desk) -> None:
         ui.label(about).classes("text-xs opacity-70")
         for said in judged(results):
             ui.label(said).classes("text-sm")
+        run = named(ui.select({}, label="Recording").classes("min-w-52"), "closer-run")
+        run.set_visibility(False)
         place = named(ui.column().classes("w-full"), "closer")
 
         def chosen() -> list[str]:
             return [row["name"] for row in table.selected][:2]
 
         async def closer() -> None:
-            names = chosen()
-            draw = await _closer(desk, names)
-            if names == chosen() and not place.is_deleted:  # else a later click draws
+            names, wanted = chosen(), picked["wanted"]
+            draw, runs = await _closer(desk, names, wanted)
+            # else a later click draws
+            if (names, wanted) == (chosen(), picked["wanted"]) and not place.is_deleted:
+                picked["shown"] = wanted if wanted in runs else next(iter(runs), "")
+                run.set_options(runs, value=picked["shown"] or None)
+                run.set_visibility(len(runs) > 1)
                 place.clear()
                 with place:
                     draw()
@@ -116,7 +128,13 @@ def build(desk: Desk) -> None:
             ticked[:] = chosen()
             return closer()
 
+        async def pick(_: Any) -> None:
+            if run.value != picked["shown"]:
+                picked.update(wanted=run.value, shown=run.value)
+                await closer()
+
         table.on_select(on_event(choose))
+        run.on_value_change(on_event(pick))
         kept = [row for row in table.rows if row["name"] in ticked]
         table.selected = kept or table.rows[:1]
         ui.timer(0.05, guarded(closer, "Running the model"), once=True)
@@ -228,16 +246,20 @@ def _unlike(result: dict[str, Any]) -> bool:
     return fails and not failed
 
 
-async def _closer(desk: Desk, names: list[str]) -> Callable[[], None]:
-    """Return what draws measured against modelled, residuals and parameters, of one model or two."""
+async def _closer(
+    desk: Desk, names: list[str], wanted: str
+) -> tuple[Callable[[], None], dict[str, str]]:
+    """Return what draws one model or two on a recording wanted, or the first, and all recordings.
+
+    It draws measured against modelled, residuals and parameters.
+    """
     if not names:
-        return lambda: None
-    recordings = desk.workspace.with_role("test") or desk.workspace.with_role("train")
-    if not recordings:
-        raise DataError("there is no recording to run it on", remedy="add one under Data")
-    recording = recordings[0]
+        return lambda: None, {}
+    split = await asyncio.to_thread(desk.split)
+    parts = _parts(split, old=bool(desk.stale().intersection(names)))
+    one = parts.get(wanted) or next(iter(parts.values()))
+    recording, known = one.recording, split.train
     blocks = {name: desk.workspace.model(name) for name in names}
-    known = desk.workspace.with_role("train")
 
     def modelled() -> dict[str, Any]:
         return {
@@ -249,17 +271,25 @@ async def _closer(desk: Desk, names: list[str]) -> Callable[[], None]:
         pairs = await asyncio.to_thread(desk.looked_at, [recording])
     except MckibbenError as error:
         raise ModelError(f"{', '.join(names)} on {recording.name}: {error}") from None
+    measured = recording.matrix(desk.outputs)
+    off = {
+        name: float(np.sqrt(np.mean((found - measured)[one.rows] ** 2)))
+        for name, found in outputs.items()
+    }
+    unit = recording.units[desk.outputs[0]]
 
     def draw() -> None:
         next_steps.buttons(desk, names[0])
-        ui.label(f"On {recording.name}").classes("text-base")
+        errors = "; ".join(f"{name} {wording.number(rmse, 3)} {unit}" for name, rmse in off.items())
+        where = " of that part" if one.part is not None else ""
+        named(ui.label(f"On {one.title}. RMSE{where}: {errors}."), "closer-on")
         drawings = []
         for output, pair in enumerate(pairs):
             own = {name: found[:, output] for name, found in outputs.items()}
             drawings += [
-                subjects.fit_over_time(recording, pair[1], own),
+                subjects.fit_over_time(recording, pair[1], own, one.part),
                 subjects.fit_loops(recording, *pair, own),
-                subjects.residuals(recording, *pair, own),
+                subjects.residuals(recording, *pair, own, one.part),
             ]
         for number, drawing in enumerate(drawings):
             with ui.row().classes("w-full"):
@@ -272,7 +302,37 @@ async def _closer(desk: Desk, names: list[str]) -> Callable[[], None]:
                 with ui.expansion(f"Parameters of {name}").classes("flex-1 min-w-72"):
                     named(_parameters(block), f"parameters-{name}")
 
-    return draw
+    return draw, {name: each.title for name, each in parts.items()}
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """A recording that models are run on, what is judged of it, and from where that is tested."""
+
+    recording: Recording
+    title: str
+    rows: Mask
+    part: int | None = None
+
+
+def _parts(split: Split, *, old: bool) -> dict[str, Part]:
+    """Return all recordings, those tested on first, and what a fit does with each.
+
+    Parameters
+    ----------
+    split : Split
+    old : bool
+        Whether models are looked at of other data, of which something else was held out.
+    """
+    found = {}
+    for run, rows in zip(split.test, split.test_rows, strict=True):
+        part = None if old else tested_from(rows)
+        use = ", a test recording" if part is None else f", in part {subjects.HELD_OUT}"
+        found[run.name] = Part(run, f"{run.name}{'' if old else use}", rows, part)
+    for run in split.train:
+        title = f"{run.name}{'' if old else ', trained on'}"
+        found.setdefault(run.name, Part(run, title, np.ones(len(run), dtype=bool)))
+    return found
 
 
 def _parameters(block: Block) -> ui.table:

@@ -171,6 +171,7 @@ def _plots(desk: Desk, recording: Recording, given: str, wanted: str) -> None:
             ).classes("w-52"),
             "cycle",
         )
+        cycle.set_visibility(bool(found))
 
     @ui.refreshable
     def loop() -> None:

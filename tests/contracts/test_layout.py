@@ -11,8 +11,11 @@ from pathlib import Path
 import pytest
 
 import mckibben
+from tests.conftest import LONG
 
 SOURCE = Path(mckibben.__file__).parent
+
+ROOT = Path(__file__).parents[2]
 
 LONGEST = 400
 """Lines of a file."""
@@ -62,6 +65,10 @@ def test_imports_go_round_in_no_circle() -> None:
 def test_files_can_be_read_at_a_sitting(name: str) -> None:
     n = len(TEXTS[name].splitlines())
     assert n <= LONGEST, f"{n} lines"
+
+
+def test_what_takes_long_is_there() -> None:
+    assert [place for place in LONG if not (ROOT / place).exists()] == []
 
 
 def test_public_methods_say_what_they_do_or_their_bases_do() -> None:

@@ -67,17 +67,33 @@ class Changing(Undoing):
             raise
         return chosen
 
-    def edit(self, name: str, what: str, *ways: Sequence[kept.Step]) -> list[str]:
+    def edit(
+        self,
+        name: str,
+        what: str,
+        *ways: Sequence[kept.Step],
+        seen: Sequence[kept.Step] | None = None,
+    ) -> list[str]:
         """Give a recording other steps; of several ways, each gives one, and the first keeps its name.
+
+        Parameters
+        ----------
+        name, what : str
+            Of the recording, and of the change, in words.
+        ways : sequence of Step
+        seen : sequence of Step, optional
+            Those it had when these were chosen.
 
         Raises
         ------
         DataError
-            If a step cannot be done.
+            If a step cannot be done, or another one was done since.
         """
         from mckibben.app import edits
 
         entry = self.entry(name)
+        if seen is not None:
+            entry = self._unchanged(replace(entry, steps=tuple(seen)), what)
         base = self._read(entry.base or entry.path)
         made = [edits.applied(base, steps) for steps in ways]
         new: dict[str, Entry | None] = {}

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping, Sequence
+from pathlib import Path
 
 import numpy as np
 
@@ -174,6 +175,51 @@ def reference_recording(
     channels = {name: np.interp(grid, *own) for name, own in arrays.items()}
     channels |= {name: np.full(len(grid), value) for name, value in (held or {}).items()}
     return Recording(channels, step, {n: u for n, u in (units or {}).items() if n in channels})
+
+
+def of_file(
+    path: Path,
+    found: Sequence[Recording],
+    units: Mapping[str, str],
+    wanted: Collection[str],
+    held: Collection[str],
+) -> Recording:
+    """Return a reference that was read from a file.
+
+    Parameters
+    ----------
+    path : Path
+    found : sequence of Recording
+        What is in it.
+    units : mapping
+        Of channels.
+    wanted, held : collection of str
+        Channels that it must have, and may have.
+
+    Raises
+    ------
+    DataError
+        If there is none in it.
+    """
+    if len(found) != 1:
+        raise DataError("it holds several recordings", file=path, remedy="give a file of one")
+    (given,) = found
+    if given.sample_time is None:
+        remedy = "add a column time_s, or draw the motion"
+        raise DataError("it has no time", file=path, remedy=remedy)
+    names = {name: f"reference_{name}" for name in (*wanted, *held)}
+    names = {name: other if other in given else name for name, other in names.items()}
+    channels = {name: given[own] for name, own in names.items() if own in given}
+    for name in wanted:
+        if name not in channels:
+            raise DataError(
+                "the model wants a reference for it, and the file has no such column",
+                file=path,
+                channel=name,
+                remedy=f"name a column {name}_{units[name]}",
+            )
+    own = {name: units[name] for name in channels if name in units}
+    return Recording(channels, given.sample_time, own).with_meta(name=given.name)
 
 
 def thinned(times: Array, values: Array, most: int = 400) -> Points:

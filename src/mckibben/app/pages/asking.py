@@ -69,7 +69,7 @@ async def ask(
         if name is None:
             path.unlink(missing_ok=True)  # nobody can be asked how it is to be read
         tell(str(Problem(shown, error or damaged)))
-        if then is not None and left:
+        if then is not None:
             await then(left)
         return
     with place, ui.dialog() as dialog, ui.card().classes("w-full max-w-4xl gap-2"):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -129,7 +129,7 @@ def first_shown(desk: Desk, recording: Recording) -> list[str]:
 
 def _channels(desk: Desk, name: str, recording: Recording) -> None:
     """Let the channels to draw be chosen, and draw them."""
-    every = list(recording.channels)
+    every, seen = list(recording.channels), desk.workspace.entry(name).steps
     part = Part((float(recording.time[0]), float(recording.time[-1])))
     asked = [each for each in desk.drawn if each in every]
     field = ui.select(
@@ -147,7 +147,7 @@ def _channels(desk: Desk, name: str, recording: Recording) -> None:
         rest = [each for each in every if each not in field.value]
         left.set_text(f"Not drawn: {', '.join(rest)}" if rest else "")
         if field.value:
-            _plot(desk, name, recording, list(field.value), part)
+            _plot(desk, name, recording, list(field.value), part, seen)
 
     def chosen() -> None:
         desk.drawn = list(field.value)
@@ -157,7 +157,14 @@ def _channels(desk: Desk, name: str, recording: Recording) -> None:
     drawn()
 
 
-def _plot(desk: Desk, name: str, recording: Recording, channels: list[str], part: Part) -> None:
+def _plot(
+    desk: Desk,
+    name: str,
+    recording: Recording,
+    channels: list[str],
+    part: Part,
+    seen: Sequence[Step],
+) -> None:
     words = (
         "Part to cut: arrow keys move it, with shift they make it wider or narrower, Enter keeps it"
     )
@@ -168,7 +175,8 @@ def _plot(desk: Desk, name: str, recording: Recording, channels: list[str], part
 
     async def cut(which: str) -> None:
         low, high = part.samples(recording)
-        await editing.do(desk, name, *_ways(which, low, high, len(recording)))
+        # samples are counted in what is seen, which may be another recording by now
+        await editing.do(desk, name, *_ways(which, low, high, len(recording)), seen=seen)
 
     async def pressed(event: Any) -> None:
         given = event.args or {}

@@ -78,7 +78,7 @@ class Sketch:
         self.now = next(iter(self.channels))
         self._before: list[tuple[dict[str, Points], Recording | None]] = []
         self._taken: tuple[float, float] | None = None
-        self._quiet = False
+        self._quiet, self._changes = False, 0
         self._build(held)
         desk.when("theme", self.draw)
         self._span()
@@ -195,6 +195,7 @@ class Sketch:
         self.draw()
 
     def _keep(self) -> None:
+        self._changes += 1
         self._before.append(({name: list(own) for name, own in self.points.items()}, self.file))
         del self._before[:-UNDONE]
 
@@ -207,6 +208,7 @@ class Sketch:
     def undo(self) -> None:
         """Take the last change back."""
         if self._before:
+            self._changes += 1
             self.points, self.file = self._before.pop()
             self.draw()
 
@@ -287,31 +289,15 @@ class Sketch:
         self._set([*own, (round(last[0] + every, 9), float(f"{last[1]:.5g}"))])
 
     async def _loaded(self, event: UploadEventArguments) -> None:
+        self._changes = change = self._changes + 1
         path = await kept(self.desk, event.file)
         found = await asyncio.to_thread(read_upload, path)
-        if len(found) != 1:
-            raise DataError("it holds several recordings", file=path, remedy="give a file of one")
-        (given,) = found
-        if given.sample_time is None:
-            raise DataError(
-                "it has no time", file=path, remedy="add a column time_s, or draw the motion"
-            )
-        channels = {
-            name: given[f"reference_{name}"] if f"reference_{name}" in given else given[name]
-            for name in (*self.channels, *self.held)
-            if name in given or f"reference_{name}" in given
-        }
-        missing = [name for name in self.channels if name not in channels]
-        if missing:
-            raise DataError(
-                "the model wants a reference for it, and the file has no such column",
-                file=path,
-                channel=missing[0],
-                remedy=f"name a column {missing[0]}_{self.channels[missing[0]].unit}",
-            )
-        units = {name: self.units[name] for name in channels if name in self.units}
+        if change != self._changes or self.duration.is_deleted:
+            what = "another motion was wished for while it was read"
+            raise DataError(what, file=path, remedy="drop it again")
+        given = motions.of_file(path, found, self.units, self.channels, self.held)
         self._keep()
-        self.file = Recording(channels, given.sample_time, units).with_meta(name=given.name)
+        self.file = given
         self.duration.set_value(float(f"{self.file.duration or self.usual:.5g}"))
         self.draw()
 

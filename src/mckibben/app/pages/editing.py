@@ -105,13 +105,15 @@ def steps(desk: Desk, name: str, recording: Recording) -> None:
         )
 
 
-async def do(desk: Desk, name: str, *ways: Step | Sequence[Step]) -> None:
-    """Do a step to a recording; of several ways, each gives a recording."""
-    before = desk.workspace.entry(name).steps
+async def do(
+    desk: Desk, name: str, *ways: Step | Sequence[Step], seen: Sequence[Step] | None = None
+) -> None:
+    """Do a step to a recording, or to what was seen of it; of several ways, each gives a recording."""
+    before = desk.workspace.entry(name).steps if seen is None else seen
     given = [(*before, *([way] if isinstance(way, Step) else way)) for way in ways]
     said = " and ".join(edits.words(steps[-1]) for steps in given)
     what = f"{name}: {said}"
-    await asyncio.to_thread(desk.workspace.edit, name, what, *given)
+    await asyncio.to_thread(desk.workspace.edit, name, what, *given, seen=before)
     _done(desk, name)
 
 

@@ -33,6 +33,7 @@ def _tells(desk: Desk) -> dict[str, list[str]]:
 def build(desk: Desk) -> None:
     """Build the section, which opens where a force is what is modelled."""
     known: dict[str, list[str]] = {}
+    looks: list[None] = []
     with ui.expansion("Estimate a force").classes("w-full text-base") as section:
         none = ui.label(
             "No model here tells a force. Under Models, fit balance-force with the force as output, or "
@@ -90,7 +91,11 @@ def build(desk: Desk) -> None:
         doubt.set_visibility(bool(doubt.text))
 
     async def look() -> None:
+        looks.append(None)
+        now = len(looks)
         found = await asyncio.to_thread(_tells, desk)
+        if now != len(looks) or section.is_deleted:  # a later look knows better
+            return
         if found and not known and FORCE in desk.outputs:
             section.open()
         known.clear()

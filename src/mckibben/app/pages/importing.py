@@ -40,6 +40,7 @@ class Intake:
     place: Any
     coming: int = 0
     seen: int = 0
+    told: int = 0
     sending: bool = False
     read: dict[str, list[Recording]] = field(default_factory=dict)
     problems: list[Problem] = field(default_factory=list)
@@ -100,6 +101,7 @@ class Intake:
         desk = self.desk
         read, self.read = self.read, {}
         problems, self.problems = self.problems, []
+        told, self.told = self.seen - self.told, self.seen  # others may come in meanwhile
         self.reading.set_text("")
         self.left = [one for one in self.left if one.shown not in read]
         self.left += [one for one in problems if one.held]
@@ -108,10 +110,11 @@ class Intake:
                 await asyncio.to_thread(desk.workspace.warm)
                 desk.settle_channels()
                 desk.changed("recordings", "log")
-                self.seen = 0
+                self._done(told)
                 await desk.news.settled()
                 tell_of(read)
-            self.seen = 0
+            else:
+                self._done(told)
             desk.changed("coming")
             self.show_left()
             if len(problems) == len(self.left) == 1 and not read:
@@ -120,6 +123,11 @@ class Intake:
                 tell(str(problems[0]))
             elif problems:
                 self.list([one for one in problems if not one.held])
+
+    def _done(self, files: int) -> None:
+        """Take files off those that are just coming in."""
+        self.seen -= files
+        self.told -= files
 
     def show_left(self) -> None:
         """Show that there are files that were not read, until there are none."""
@@ -132,9 +140,11 @@ class Intake:
         rest = [each for each in self.left if each is not one]
 
         async def then(left: list[Problem]) -> None:
-            fewer, self.left = len(left) < len(self.left), left
+            held = {each.held for each in left}
+            done = {each.held for each in (one, *rest)} - held
+            self.left = [each for each in self.left if each.held not in done]
             self.show_left()
-            if fewer and left:
+            if done and self.left:
                 self.list()
 
         path = self.desk.workspace.path("uploads", one.held)

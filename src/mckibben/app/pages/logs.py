@@ -47,6 +47,7 @@ def build(desk: Desk) -> None:
         async def loaded(event: UploadEventArguments) -> None:
             if not model.value:
                 raise DataError("there is no model to compare with", remedy="fit one under Models")
+            name, use = str(model.value), str(form.value)
             path = await kept(desk, event.file)
             found = await asyncio.to_thread(read_upload, path)
             if not any(name.startswith("reference_") for run in found for name in run.channels):
@@ -55,7 +56,7 @@ def build(desk: Desk) -> None:
                     file=path,
                     remedy="name a column reference_displacement_mm",
                 )
-            _look_back(desk, str(model.value), str(form.value), path.name, refit=False)
+            _look_back(desk, name, use, path.name, refit=False)
 
         upload = drop_zone("Drop the log here", on_upload=on_event(loaded))
         upload.classes("w-full max-w-2xl")

@@ -236,9 +236,13 @@ def _words(desk: Desk, given: str, wanted: str) -> None:
         try:
             found = await asyncio.to_thread(characterize, recordings, given, wanted, beside=beside)
         except MckibbenError as error:
+            if place.is_deleted:  # something else is looked at by now
+                return
             place.clear()
             with place:
                 refused(error)
+            return
+        if place.is_deleted:
             return
         place.clear()
         with place:
@@ -284,13 +288,17 @@ def _untold(desk: Desk, given: str) -> None:
 
     async def find() -> None:
         train, test = desk.workspace.with_role("train"), desk.workspace.with_role("test")
+        outputs = desk.outputs
         try:
             gaps = await asyncio.to_thread(
-                untold, train or test, inputs, desk.outputs, tests=test if train else ()
+                untold, train or test, inputs, outputs, tests=test if train else ()
             )
         except MckibbenError as error:
-            with place:
-                refused(error)
+            if not place.is_deleted:
+                with place:
+                    refused(error)
+            return
+        if place.is_deleted:
             return
         with place:
             if not gaps:
@@ -300,7 +308,7 @@ def _untold(desk: Desk, given: str) -> None:
                 ui.label(typeset_within(said(gap.remedy))).classes("text-caption pl-4")
             desk.did(
                 "asked what the recordings cannot tell",
-                f"mckibben.untold(train, {inputs!r}, {desk.outputs!r}, tests=test)",
+                f"mckibben.untold(train, {inputs!r}, {outputs!r}, tests=test)",
             )
 
     ui.timer(0.05, guarded(find, "Looking what cannot be told"), once=True)

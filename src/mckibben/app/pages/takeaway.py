@@ -79,21 +79,19 @@ def _figures(desk: Desk, model: Any) -> None:
             recordings = desk.workspace.with_role("test") or desk.workspace.with_role("train")
             if not recordings:
                 raise DataError("there is no recording to draw", remedy="add one under Data")
-            stem = (
-                f"{model.value}-{kind.value}" if kind.value not in ("time", "loop") else kind.value
-            )
+            # as it is at the click
+            what, name, place = str(kind.value), str(model.value), desk.outputs.index(output.value)
+            stem = what if what in ("time", "loop") else f"{name}-{what}"
             path = desk.workspace.new_path("takeaway", f"{stem}.{form.value}")
 
             def save() -> None:
-                if kind.value in ("time", "loop"):
-                    pair = desk.looked_at(recordings)[desk.outputs.index(str(output.value))]
-                    plot_recording(recordings, *pair, str(kind.value), path)
+                if what in ("time", "loop"):
+                    plot_recording(recordings, *desk.looked_at(recordings)[place], what, path)
                 else:
-                    block = desk.workspace.model(str(model.value))
-                    plot_model(block, recordings, str(kind.value), path)
+                    plot_model(desk.workspace.model(name), recordings, what, path)
 
             await asyncio.to_thread(save)
-            hand_over(desk, path, f"mckibben plot ... --kind {kind.value} -o {path.name}")
+            hand_over(desk, path, f"mckibben plot ... --kind {what} -o {path.name}")
 
         named(ui.button("Draw it", on_click=guarded(draw)), "take-figure")
 

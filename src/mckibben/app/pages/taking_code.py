@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ from nicegui import ui
 from mckibben.app import forms
 from mckibben.app.desk import Desk, guarded, named, on_event
 from mckibben.app.recorded import pace
+from mckibben.app.workspace import Workspace
 from mckibben.blocks.core.block import Block
 from mckibben.system.atomic import replacing
 from mckibben.system.ordinary import read_bytes
@@ -67,39 +69,32 @@ def build(desk: Desk, model: Any) -> None:
                 {key: fields[key].value for key in forms.SETTINGS.get(kind, ())},
             )
 
-        def stem() -> str:
-            name, kind, _ = chosen()
-            return name if kind == "model" else f"{name}-{kind}"
-
-        def block_and_options() -> tuple[Block, dict[str, Any]]:
-            block = forms.made(desk.workspace, *chosen())
-            return block, {"sample_time": between()} if block.rate_dependent else {}
-
         def between() -> float:
             return float(step.value or forms.STEP)
 
-        def exported(kind: str, target: str, options: Mapping[str, Any], flags: str = "") -> str:
-            told = f" --sample-time {between():g}" if "sample_time" in options else ""
-            return f"mckibben export {kind} {stem()}.json -o {target}{told}{flags}"
+        def taken() -> Taken:
+            """Return what is chosen at a click: it may change while that is written."""
+            return Taken(desk.workspace, *chosen(), between())
 
         async def as_json() -> None:
-            path = desk.workspace.new_path("takeaway", f"{stem()}.json")
-            block, _ = await asyncio.to_thread(block_and_options)
+            one = taken()
+            path = desk.workspace.new_path("takeaway", f"{one.stem}.json")
+            block, _ = await asyncio.to_thread(one.block_and_options)
             await asyncio.to_thread(block.save, path)
-            hand_over(desk, path, forms.written(desk.workspace, *chosen()))
+            hand_over(desk, path, one.written)
 
         async def as_c() -> None:
             from mckibben.export import export_c
             from mckibben.export.naming import name_from
 
-            name = name_from(Path(f"{stem()}.json"))
+            one, only = taken(), bool(single.value)
+            name = name_from(Path(f"{one.stem}.json"))
             folder = desk.workspace.new_path("takeaway", f"{name}-c")
 
             def write() -> str:
-                block, options = block_and_options()
-                only = bool(single.value)
+                block, options = one.block_and_options()
                 export_c(block, folder, name=name, single=only, overwrite=True, **options)
-                return exported("c", folder.name, options, " --float32" if only else "")
+                return one.exported("c", folder.name, options, " --float32" if only else "")
 
             await _zipped(desk, folder, await asyncio.to_thread(write))
 
@@ -107,14 +102,14 @@ def build(desk: Desk, model: Any) -> None:
             from mckibben.export import export_fmu
             from mckibben.export.naming import name_from
 
-            name = name_from(Path(f"{stem()}.json"))
+            one, fmi = taken(), version.value
+            name = name_from(Path(f"{one.stem}.json"))
             path = desk.workspace.new_path("takeaway", f"{name}.fmu")
 
             def write() -> str:
-                block, options = block_and_options()
-                fmi = version.value
+                block, options = one.block_and_options()
                 export_fmu(block, path, name=name, version=fmi, overwrite=True, **options)
-                return exported("fmu", path.name, options, f" --fmi {fmi}")
+                return one.exported("fmu", path.name, options, f" --fmi {fmi}")
 
             hand_over(desk, path, await asyncio.to_thread(write))
 
@@ -122,13 +117,14 @@ def build(desk: Desk, model: Any) -> None:
             from mckibben.export import export_ros2
             from mckibben.export.naming import name_from
 
-            name = name_from(Path(f"{stem()}.json"))
+            one = taken()
+            name = name_from(Path(f"{one.stem}.json"))
             folder = desk.workspace.new_path("takeaway", f"{name}-ros2")
 
             def write() -> str:
-                block, options = block_and_options()
+                block, options = one.block_and_options()
                 export_ros2(block, folder, name=name, overwrite=True, **options)
-                return exported("ros2", folder.name, options)
+                return one.exported("ros2", folder.name, options)
 
             await _zipped(desk, folder, await asyncio.to_thread(write))
 
@@ -151,14 +147,16 @@ def build(desk: Desk, model: Any) -> None:
             rows["ros2"].set_visibility(kind in forms.COMPENSATORS)
 
         async def offer() -> None:
-            name = str(model.value)
+            name, before = str(model.value), (form.value, step.value)
             found = await asyncio.to_thread(forms.possible, desk.workspace, name)
             known = await asyncio.to_thread(pace, desk.workspace, name) if found else None
             offered = {key: forms.FORMS[key] for key in found}
             if offered and name == str(model.value):
                 value = form.value if form.value in offered else next(iter(offered))
                 shown, use, settings, own = desk.compensator or ("", "", {}, forms.STEP)
-                if shown == name and use in offered:
+                if before != (form.value, step.value):  # what was chosen meanwhile stays
+                    pass
+                elif shown == name and use in offered:
                     value = use
                     step.set_value(own)
                     for key, number in settings.items():
@@ -173,6 +171,37 @@ def build(desk: Desk, model: Any) -> None:
         desk.when("compensator", offer)
         fitted()
         ui.timer(0.05, guarded(offer, "Looking what it can be used as"), once=True)
+
+
+@dataclass(frozen=True)
+class Taken:
+    """A model as it is to be taken away: its use, the settings of that, and its steps [s]."""
+
+    workspace: Workspace
+    model: str
+    form: str
+    settings: dict[str, Any]
+    step: float
+
+    @property
+    def stem(self) -> str:
+        """What its files are called."""
+        return self.model if self.form == "model" else f"{self.model}-{self.form}"
+
+    @property
+    def written(self) -> str:
+        """The Python that makes it."""
+        return forms.written(self.workspace, self.model, self.form, self.settings)
+
+    def block_and_options(self) -> tuple[Block, dict[str, Any]]:
+        """Return what runs, and what its export is to be told."""
+        block = forms.made(self.workspace, self.model, self.form, self.settings)
+        return block, {"sample_time": self.step} if block.rate_dependent else {}
+
+    def exported(self, kind: str, target: str, options: Mapping[str, Any], flags: str = "") -> str:
+        """Return the command that exports it."""
+        told = f" --sample-time {self.step:g}" if "sample_time" in options else ""
+        return f"mckibben export {kind} {self.stem}.json -o {target}{told}{flags}"
 
 
 async def _zipped(desk: Desk, folder: Path, call: str) -> None:

@@ -63,7 +63,7 @@ LONG = tuple(
         "validation/test_check.py",
     )
 )
-"""What goes a whole way, in a browser, a protocol, a compiler, other processes or many seeds: ``-m long``.
+"""What goes a whole way, in a browser, a protocol, a compiler, other processes: ``-m long``.
 
 These take three quarters of the time of all tests, and are left out where nothing is said.
 """

@@ -57,9 +57,30 @@ def test_inputs_that_move_together_have_no_effects_of_their_own() -> None:
 
 
 def test_a_loop_is_coloured_by_a_third_channel() -> None:
-    panel = coupling_subjects.loop_by(arm(), "u1", "y2", "u2").panels[0]
+    panel = coupling_subjects.loop_by([arm()], "u1", "y2", "u2").panels[0]
     assert len(panel.curves) == 5
     assert panel.x_label == "u1 [bar]"
+
+
+def test_loops_under_loads_that_are_held_are_one_picture() -> None:
+    wave = np.sin(np.arange(100) / 5)
+    runs = [
+        Recording({"pressure": wave, "displacement": wave - load, "force": np.full(100, load)}, 0.1)
+        for load in (0.0, 10.0, 20.0)
+    ]
+    (panel,) = coupling_subjects.loop_by(runs, "pressure", "displacement", "force").panels
+    assert [curve.name for curve in panel.curves] == ["force 0 N", "force 10 N", "force 20 N"]
+    for curve, load in zip(panel.curves, (0.0, 10.0, 20.0), strict=True):
+        np.testing.assert_allclose(curve.y, curve.x - load)
+
+
+def test_what_moves_what_is_said_most_first() -> None:
+    first, second = coupling_subjects.coupling([arm()], ("u1", "u2"), ("y1", "y2")).sentences
+    assert first.startswith("u1 moves y1 by 5.9")
+    assert second.startswith("u2 moves y2 by ")
+    assert ", u1 by 1.99 mm; 0 % of its variance is bent" in second
+    together = coupling_subjects.coupling([arm(shared=True)], ("u1", "u2"), ("y1",))
+    assert together.sentences == ("What moves y1 cannot be told: inputs move together.",)
 
 
 def test_the_recording_in_which_all_inputs_move_is_drawn() -> None:

@@ -160,6 +160,11 @@ def test_hostile_names_stay_words(name: str) -> None:
     assert "<" not in title
 
 
+def lead(parsed: Parsed) -> str:
+    """Return what the first picture is drawn over."""
+    return str(parsed.figures["lead"][0][0]["layout"]["xaxis"]["title"]["text"])
+
+
 def test_the_coupling_picture_names_its_recording() -> None:
     def run(still: bool, name: str) -> Recording:
         one = measured(300, name=name)
@@ -169,8 +174,14 @@ def test_the_coupling_picture_names_its_recording() -> None:
 
     base = study((run(False, "all of them"),), (run(True, "one alone"),))
     inputs = ("pressure", "pressure_2")
-    found = Parsed(page(replace(base, leaderboard=replace(base.leaderboard, inputs=inputs))))
+    board = replace(base.leaderboard, inputs=inputs)
+    base = replace(base, leaderboard=board, characterization=None)
+    found = Parsed(page(base))
     assert "(columns), of all of them." in found.words
+    assert "pressure moves displacement by" in found.words
+    assert lead(found) == "pressure [bar]"
+    found = Parsed(page(replace(base, test=base.train)))
+    assert lead(found) == "time [s]"  # a path over one of two inputs that move is no loop
 
 
 def test_the_coupling_is_of_all_recordings_and_not_of_those_pictured_alone(

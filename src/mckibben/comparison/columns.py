@@ -124,6 +124,7 @@ def columns_of(
         ),
         *of_each,
         Column("rank", "rank", "", _inside("test", "rank")),
+        Column("inverse", "inverse", "", _inside("inverse")),
         *(() if by_fit else (Column("train", CHOICES["fit"][0], unit, on_train),)),
         Column("worst", "worst", unit, _inside("test", "max_error")),
         Column("r2", "R²", "%", _share("test", "r2"), 4),
@@ -132,7 +133,6 @@ def columns_of(
         Column("parameters", "parameters", "", _inside("n_parameters")),
         Column("seconds", "fit time", "s", _inside("fit_seconds"), 2),
         Column("step", "step", "ns", _inside("step_ns")),
-        Column("inverse", "inverse", "", _inside("inverse")),
     )
     return tuple(column for column in every if any(column.value(row) is not None for row in rows))
 

@@ -10,6 +10,7 @@ import numpy as np
 from mckibben.arrays import Array
 from mckibben.comparison.channels import Channels
 from mckibben.comparison.recognising import any_moves, moved_by
+from mckibben.numerals import numeral
 from mckibben.recording import Recording
 from mckibben.report.drawing import (
     N_AGES,
@@ -80,6 +81,24 @@ class Coupling:
         )
 
     @property
+    def sentences(self) -> tuple[str, ...]:
+        """What moves every output, in words."""
+        return tuple(map(self._moved, self.outputs))
+
+    def _moved(self, output: str) -> str:
+        place = self.outputs.index(output)
+        effects, unit = self.effects[place], f" {self.units[place]}".rstrip()
+        if not np.isfinite(effects).all():
+            return f"What moves {output} cannot be told: inputs move together."
+        first, *others = np.argsort(-np.abs(effects))[:MOST]
+        least = "".join(f", {self.inputs[k]} by {numeral(effects[k])}{unit}" for k in others)
+        return (
+            f"{self.inputs[first]} moves {output} by {numeral(effects[first])}{unit} over its range"
+            f"{least}; {numeral(100 * (1 - self.explained[place]), 2)} % of its variance is bent, or "
+            "remembers."
+        )
+
+    @property
     def paired(self) -> bool:
         """Whether there are as many inputs as outputs."""
         return len(self.inputs) == len(self.outputs)
@@ -144,19 +163,28 @@ def matrix(recording: Recording, found: Coupling, points: int = SMALL) -> Drawin
 
 
 def loop_by(
-    recording: Recording, input_name: str, output_name: str, by: str, points: int = POINTS
+    recordings: Sequence[Recording],
+    input_name: str,
+    output_name: str,
+    by: str,
+    points: int = POINTS,
 ) -> Drawing:
     """Draw output over input, coloured by a third channel, a load or a stiffness, from low to high."""
-    places, x, y = along(recording[input_name], recording[output_name], points)
-    level = recording[by][places.astype(int)]
-    edges = levels(recording[by])
+    paths = [along(r[input_name], r[output_name], points) for r in recordings]
+    x, y = (np.concatenate([path[k] for path in paths]) for k in (1, 2))
+    level = np.concatenate(
+        [r[by][path[0].astype(int)] for r, path in zip(recordings, paths, strict=True)]
+    )
+    edges = levels(np.concatenate([r[by] for r in recordings]))
+    recording = recordings[0]
     unit = f" {recording.units[by]}" if recording.units[by] else ""
     which = np.clip(np.searchsorted(edges, level, side="right") - 1, 0, len(edges) - 2)
     curves = []
     for place in range(len(edges) - 1):
         chosen = which == place
         if chosen.any():
-            name = f"{by} {edges[place]:.3g} to {edges[place + 1]:.3g}{unit}"
+            ends = dict.fromkeys(f"{end:.3g}" for end in (level[chosen].min(), level[chosen].max()))
+            name = f"{by} {' to '.join(ends)}{unit}"
             colour = f"age-{place + 1}"
             curves.append(Curve(x[chosen], y[chosen], name, colour, "specks"))
     x_label = axis_label(input_name, recording.units[input_name])

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from mckibben.comparison.channels import held_at_levels
+from mckibben.comparison.recognising import any_moves
 from mckibben.recording import notes_by_file, reading_notes
 from mckibben.report import (
     check_subjects,
@@ -142,14 +144,16 @@ def _figures(study: Study, pictured: tuple[Shown, ...]) -> tuple[Plots, str]:
                 one.recording, one.input, one.output, one.outputs, one.test_from, points
             )
         )
-    figures["lead"] = [interactive.plots(_lead(pictured[0]))]
+    figures["lead"] = [interactive.plots(_lead(pictured[0], study.leaderboard.inputs))]
     if study.load is not None and all(study.load in one.recording.channels for one in pictured):
         load = study.load
+        runs = [one.recording for one in pictured]
+        held = held_at_levels(runs, load)
         figures["levels"] = each(
             lambda one: coupling_subjects.loop_by(
-                one.recording, one.input, one.output, load, points
+                runs if held else [one.recording], one.input, one.output, load, points
             )
-        )
+        )[: 1 if held else None]
     blocks = {row.model: row.block for row in study.leaderboard.rows if row.block is not None}
     left_out = ""
     if any(any(model_subjects.operator_sums(block)) for block in blocks.values()):
@@ -177,11 +181,17 @@ def _figures(study: Study, pictured: tuple[Shown, ...]) -> tuple[Plots, str]:
     return figures, left_out
 
 
-def _lead(one: Shown) -> Drawing:
-    """Draw the measured loop with the chosen model's, or from early to late where there is none."""
-    if not one.outputs:
-        return subjects.loop([one.recording], one.input, one.output, LEAD_POINTS)
+def _lead(one: Shown, inputs: Sequence[str]) -> Drawing:
+    """Draw the measured loop with the chosen model's, or from early to late where there is none.
+
+    Where several inputs move, a path over one of them is no loop: that is drawn over time.
+    """
+    moving = [name for name in inputs if any_moves([one.recording], (name,))]
     best = dict(list(one.outputs.items())[:1])
+    if len(moving) > 1 and one.recording.sample_time is not None:
+        return subjects.fit_over_time(one.recording, one.output, best, one.test_from, LEAD_POINTS)
+    if not best:
+        return subjects.loop([one.recording], one.input, one.output, LEAD_POINTS)
     return subjects.fit_loops(one.recording, one.input, one.output, best, LEAD_POINTS)
 
 

@@ -186,7 +186,7 @@ def _plots(desk: Desk, recording: Recording, given: str, wanted: str) -> None:
             drawing = (
                 subjects.loop([part], given, wanted)
                 if by == "time"
-                else coupling_subjects.loop_by(part, given, wanted, by)
+                else coupling_subjects.loop_by([part], given, wanted, by)
             )
             figure = plots.figures(drawing, height=440)[0]
         picture(desk, figure, "loop-plot")

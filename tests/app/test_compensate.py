@@ -505,3 +505,26 @@ def test_a_force_is_estimated_first_of_what_nothing_was_trained_on(tmp_path: Pat
         }
 
     visit(workspace, look)
+
+
+def test_the_first_model_fitted_is_chosen_for_logs_too(tmp_path: Path) -> None:
+    workspace = workspace_with(tmp_path)
+    desks: list[Desk] = []
+    build = compensate.build
+
+    async def look(user: User) -> None:
+        user.find(marker="tab-compensate").click()
+        await until(user, "logs")
+        only(user, "logs").open()
+        assert only(user, "log-model").value is None
+        PI.example().save(workspace.path("models", "a.json"))
+        desks[0].changed("results")
+        await later(lambda: only(user, "log-model").value == "a")
+
+    def noted(desk: Desk) -> None:
+        desks.append(desk)
+        build(desk)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(compensate, "build", noted)
+        visit(workspace, look)

@@ -63,13 +63,13 @@ def build(desk: Desk) -> None:
         named(upload.props("flat bordered"), "log-upload")
         showing(desk, "review", lambda: desk.workspace.reviews(), lambda *one: _shown(desk, *one))
     named(section, "logs")
-    desk.when(
-        "results",
-        lambda: model.set_options(
-            [name for name in desk.workspace.ranked() if desk.workspace.invertible(name)],
-            value=model.value,
-        ),
-    )
+
+    def more() -> None:
+        names = [name for name in desk.workspace.ranked() if desk.workspace.invertible(name)]
+        value = desk.model_to_show(str(model.value), names) if names else None
+        model.set_options(names, value=value)
+
+    desk.when("results", more)
 
 
 def _look_back(desk: Desk, model: str, form: str, log: str, *, refit: bool) -> None:

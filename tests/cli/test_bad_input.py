@@ -5,8 +5,11 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from mckibben import PI
+from mckibben.signals import triangle
 from mckibben.system.locks import alone
 from tests.cli.conftest import Cli
 from tests.files.malformed import CASES, Case
@@ -137,3 +140,18 @@ def test_two_do_not_write_to_one_folder(
     assert result.code == 2
     assert "another process is writing its results there" in result.err
     assert not list(tmp_path.iterdir())
+
+
+def test_channels_without_telling_names_are_called_by_their_units(cli: Cli, tmp_path: Path) -> None:
+    file = tmp_path / "wing.csv"
+    command = np.concatenate([triangle(np.arange(120) / 10, 4.0, [3.0, 2.0, 1.0])] * 2)
+    angle = 10 * PI.example().simulate(command)
+    rows = [f"{u:.4f},{y:.4f}" for u, y in zip(command, angle, strict=True)]
+    file.write_text("\n".join(["input_V,output_deg", *rows]))
+    result = cli("compare", file, "--models", "pi", "-o", tmp_path / "out")
+    assert result.code == 0, result.err
+    assert "by their units, input is taken for voltage, output is taken for angle" in result.out
+    assert "by their units" in cli("info", file).out
+    named = ["--column", "pressure=input_V", "--column", "displacement=output_deg"]
+    assert "by their units" not in cli("info", file, *named).out
+    assert "by their units" not in cli("info", file, "--input", "input", "--output", "output").out

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import mckibben
-from mckibben import registry
+from mckibben import Recording, registry
+from mckibben.comparison.channels import Channels
 from mckibben.comparison.inverses import inverse_of
 from mckibben.comparison.needs import full_name, inverse_kind, needs
+from mckibben.comparison.offered import objections
 from mckibben.errors import MckibbenError
 
 FITTED = Path(__file__).parents[2] / "docs" / "models" / "fitted"
@@ -41,3 +44,16 @@ def test_models_are_undone_as_said(model: str) -> None:
     except MckibbenError:
         found = "none"
     assert inverse_kind(model) == found
+
+
+def test_a_load_that_some_recordings_lack_is_an_objection_of_those_that_are_told_it() -> None:
+    wave = np.sin(np.arange(200) / 10)
+    known = Recording(
+        {"pressure": wave, "displacement": wave, "force": wave}, 0.1, meta={"name": "a"}
+    )
+    runs = [known, known.select(["pressure", "displacement"]).with_meta(name="b")]
+    found = objections(
+        registry.names("estimators"), runs, Channels(("pressure",), ("displacement",))
+    )
+    assert {"pi", "balance"}.isdisjoint(found)
+    assert found["coupled-memory"].startswith("it is told force, which b lacks")

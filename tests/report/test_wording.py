@@ -95,6 +95,27 @@ def test_next_steps_answer_what_is_wrong() -> None:
     assert len(next_steps(replace(found, inverse=None))) == 1
 
 
+def test_where_none_is_recommended_those_that_beat_the_mean_on_the_test_are_named() -> None:
+    found = study()
+    best, second, third, *_ = found.leaderboard.rows
+    astray, mean, good, other = (
+        replace(row, model=name, test=None if row.test is None else replace(row.test, rmse=rmse))
+        for row, name, rmse in (
+            (best, best.model, 9.0),
+            (second, "constant", 5.0),
+            (second, second.model, 1.0),
+            (third, third.model, 6.0),
+        )
+    )
+    board = replace(found.leaderboard, rows=(astray, good, other), constant=mean)
+    (step,) = next_steps(replace(found, leaderboard=board))
+    assert step.startswith(
+        f"On the test, {second.model} is off by 1.00 mm, the mean by 5.00 mm. But"
+    )
+    (step,) = next_steps(replace(found, leaderboard=replace(board, rows=(astray, other))))
+    assert step.startswith("Use none of these models.")
+
+
 def test_an_inverse_is_recommended_only_where_its_own_model_is_known_and_followed() -> None:
     found = study()
     assert found.inverse is not None

@@ -41,7 +41,8 @@ def info(
     elif len(files) == 1 and files[0].suffix.lower() == ".json":
         _model(files[0], as_json)
     else:
-        recordings = reading.read(files, None, informative=False)
+        unsaid = not (inputs or outputs or model)
+        recordings = reading.read(files, None, informative=False, by_units=unsaid)
         _recordings(recordings, _untold(recordings, inputs, outputs, model), as_json)
 
 

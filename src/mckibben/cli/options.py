@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import warnings
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -160,9 +160,17 @@ class Reading:
     zero: Zero = None
 
     def read(
-        self, files: Sequence[Path], channels: Sequence[str] | None, *, informative: bool = True
+        self,
+        files: Sequence[Path],
+        channels: Sequence[str] | None,
+        *,
+        informative: bool = True,
+        by_units: bool = False,
     ) -> list[Recording]:
-        """Return the recordings in all files, with the channels asked for; see `mckibben.read`."""
+        """Return the recordings in all files, with the channels asked for; see `mckibben.read`.
+
+        Where asked, channels without telling names, such as u1, are called what their units tell.
+        """
         from mckibben.files import read
 
         recordings: list[Recording] = []
@@ -177,6 +185,8 @@ class Reading:
                 channels=channels,
                 informative=informative,
             )
+        if by_units and not self.column:
+            recordings = [_called_by_units(recording) for recording in recordings]
         if self.resample is not None:
             from mckibben.signals import resample
 
@@ -203,31 +213,48 @@ class Reading:
         or of one that is held: which of theirs are meant, the comparison finds.
         """
         asked = [*(inputs or ["pressure"]), *(outputs or ["displacement"])]
+        unsaid = inputs is None and outputs is None
         if load is not None or len(asked) > 2:
-            return [self.read(some, None, informative=False) for some in files]
+            return [self.read(some, None, informative=False, by_units=unsaid) for some in files]
         (first, *rest), *others = files
         try:
             begun = self.read([first], asked)
-            every = inputs is None and outputs is None and _is_held(begun)
+            every = unsaid and _is_held(begun)
         except DataError:
-            if not self._finds_its_own(first):
+            if not self._finds_its_own(first, unsaid):
                 raise
             every = True
         if every:
-            return [self.read(some, None, informative=False) for some in files]
+            return [self.read(some, None, informative=False, by_units=unsaid) for some in files]
         return [begun + self.read(rest, asked), *(self.read(some, asked) for some in others)]
 
-    def _finds_its_own(self, file: Path) -> bool:
+    def _finds_its_own(self, file: Path, by_units: bool) -> bool:
         """Tell whether a file is of several muscles, or a loop's log of commands alone."""
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             try:
-                (found, *_) = self.read([file], None, informative=False)
+                (found, *_) = self.read([file], None, informative=False, by_units=by_units)
             except DataError as error:
                 if SEVERAL.fullmatch(error.channel or ""):
                     raise
                 return False  # what is wrong with one muscle's file is said by whoever asks
         return any(map(SEVERAL.fullmatch, found.channels))
+
+
+def _called_by_units(recording: Recording) -> Recording:
+    """Return a recording whose channels without telling names are called what their units tell."""
+    from mckibben.files.headers import by_units
+
+    names = by_units(recording.units)
+    if not names:
+        return recording
+    said = ", ".join(f"{old} is taken for {new}" for old, new in names.items())
+    note = f"by their units, {said}; say --column CHANNEL=COLUMN where that is wrong"
+    return replace(
+        recording,
+        channels={names.get(name, name): x for name, x in recording.channels.items()},
+        units={names.get(name, name): unit for name, unit in recording.units.items()},
+    ).with_meta(notes=[*recording.notes, note])
 
 
 def _is_held(recordings: Sequence[Recording]) -> bool:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from mckibben.comparison.recommending import acceptable
 from mckibben.metrics import Scores
 from mckibben.numerals import numeral, typeset
 
@@ -134,6 +135,14 @@ def _invertibility(study: Study, best: Row) -> str:
     )
 
 
+def _better_on_the_test(board: Leaderboard) -> str:
+    """Return which models beat the mean on the test, though none is recommended, in words."""
+    rows = [row for row in board.rows if acceptable(row, board.constant)]
+    told = [f"{row.model} is off by {number(row.test_error)} {board.unit}" for row in rows]
+    mean = board.constant.test_error if board.constant else 0.0
+    return f"{' and '.join(told)}, the mean by {number(mean)} {board.unit}" if told else ""
+
+
 def next_steps(study: Study) -> list[str]:
     """Return what to do next, most useful first."""
     best, pending = study.leaderboard.best, study.leaderboard.pending
@@ -144,6 +153,11 @@ def next_steps(study: Study) -> list[str]:
             f"{_listed(pending)} to come. If the work was stopped, the same command goes on."
         ]
     if study.leaderboard.not_recommended:
+        if others := _better_on_the_test(study.leaderboard):
+            return [
+                f"On the test, {others}. But what a test has chosen, it has not tested: record more "
+                "that moves as the test does, and fit again; or test that model on another run."
+            ]
         return [
             "Use none of these models. Check that input and output are the right channels, that the "
             "sensor of the output was connected, and that several cycles are covered; then record again."

@@ -162,6 +162,8 @@ class Editor:
             text = (
                 f"{first}, first of the leaderboard, has no inverse; {self.name} is the next one."
             )
+            if none := self.desk.not_recommended:
+                text = f"{none}. {text}"
         self.doubt.set_text(fields.said(text))
         self.doubt.set_visibility(bool(text))
 

@@ -163,6 +163,8 @@ def told_of(desk: Desk) -> str:
         return ""
     read = [run.meta.get("converted_units") or () for run in desk.workspace.readable()]
     converted = list(dict.fromkeys(str(each) for one in read for each in one))
+    if set(desk.inputs + desk.outputs).difference(desk.workspace.channels()):
+        return ""  # of recordings of several kinds: what keeps them apart is said above
     return f"{sides(desk)}{'; converted: ' if converted else ''}{', '.join(converted)}"
 
 

@@ -81,6 +81,12 @@ class CoupledEstimator(ErrorsUnknown, Estimator):
         scheduled = scheduling
         if scheduled is None:
             scheduled = schedules(recordings, (*inputs, *outputs))
+        for name in scheduled:
+            lacking = [recording.name for recording in recordings if name not in recording]
+            if lacking and not cls.alone:
+                return (
+                    f"it is told {name}, which {lacking[0]} lacks: give it there, or leave it out"
+                )
         if (
             not cls.alone
             and len(inputs) == len(outputs) == 1

@@ -14,6 +14,8 @@ from mckibben.blocks.core.running import run_many
 
 GPI = mckibben.GPI.example()
 
+MASKED = np.ma.masked_greater([1.0, 999999.0], 10.0)  # type: ignore[no-untyped-call]
+
 TAKES_RECORDINGS: list[Callable[[Any], object]] = [
     mckibben.compare,
     mckibben.study,
@@ -37,6 +39,32 @@ def test_what_is_no_recording_is_refused(takes: Callable[[Any], object], given: 
         DataError, match=r"a recording is needed here, not .* Remedy: read the file"
     ):
         takes(given)
+
+
+@pytest.mark.parametrize(
+    "samples",
+    [
+        MASKED,
+        np.array(["2020-01-01", "2020-01-02"], dtype="datetime64[D]"),
+        np.array([1 + 2j, 3.0]),
+        ["a", "b"],
+        [object(), 1],
+        [10**400, 1],
+        [[1.0], [1.0, 2.0]],
+        {1.0, 2.0},
+    ],
+    ids=range(8),
+)
+def test_what_are_no_samples_is_refused(samples: Any) -> None:
+    with pytest.raises(DataError, match=r"channel 'pressure': .* Remedy: "):
+        mckibben.Recording({"pressure": samples})
+
+
+def test_whatever_is_named_a_refusal_can_be_read() -> None:
+    (run,) = mckibben.read(mckibben.example.TRAIN)
+    with pytest.raises(DataError) as refused:
+        mckibben.compare(run, models=["pi"], load=5)  # type: ignore[arg-type]
+    assert "channel '5'" in str(refused.value)
 
 
 def test_a_model_is_given_numbers() -> None:

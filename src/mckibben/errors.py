@@ -65,8 +65,9 @@ class DataError(MckibbenError):
         return f"{place}{_short(self.problem)}. Remedy: {_short(self.remedy)}."
 
 
-def _short(text: str, most: int = 1000) -> str:
+def _short(given: object, most: int = 1000) -> str:
     """Return a text without its middle where it is too long to be read, as one from a file can be."""
+    text = str(given)  # whatever was given for a name
     half = most // 2
     return text if len(text) <= most else f"{text[:half]} ... {text[-half:]}"
 

@@ -254,7 +254,21 @@ class Recording(DrawsItself):
 
 
 def _frozen(name: str, samples: ArrayLike) -> Array:
-    values = np.array(samples, dtype=np.float64)
+    if isinstance(samples, np.ma.MaskedArray) and (masked := int(np.sum(samples.mask))):
+        raise DataError(
+            f"{masked} sample(s) are masked",
+            channel=name,
+            remedy="cut them out, or fill them in",
+        )
+    try:
+        given = np.asarray(samples)
+        if given.dtype.kind in "cmM":
+            raise TypeError(f"{given.dtype.name}")
+        values = np.array(given, dtype=np.float64)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise DataError(
+            f"these are no samples ({error})", channel=name, remedy="give real numbers"
+        ) from None
     if values.ndim != 1:
         raise DataError(
             f"samples have shape {values.shape}", channel=name, remedy="give one value a sample"

@@ -41,13 +41,15 @@ def test_each_gets_one_step_more_and_one_undo_takes_all_back(tmp_path: Path) -> 
     desk.jobs.close()
 
 
-def test_recordings_of_several_zeros_get_one(tmp_path: Path) -> None:
+@pytest.mark.parametrize("load", [None, 20.0])
+def test_recordings_of_several_zeros_get_one(tmp_path: Path, load: float | None) -> None:
     workspace = Workspace(tmp_path)
     time = np.arange(400) * 0.05
     for name, zero in (("one", 0.0), ("two", 30.0)):
         u = 2 - 2 * np.cos(time)
+        told = {} if load is None else {"force": np.full(400, load + zero)}
         workspace.add(
-            Recording({"pressure": u, "displacement": u + zero}, 0.05),
+            Recording({"pressure": u, "displacement": u + zero} | told, 0.05),
             origin="",
             call="",
             name=name,
@@ -56,6 +58,9 @@ def test_recordings_of_several_zeros_get_one(tmp_path: Path) -> None:
     async def look(user: User) -> None:
         await user.should_see(marker="zeros", retries=100)
         await user.should_see("where pressure is lowest")
+        await user.should_see(
+            "a sensor was zeroed" if load is None else "force that is told may be why"
+        )
         user.find(marker="zero-all").click()
         await user.should_not_see(marker="zeros", retries=100)
 

@@ -106,13 +106,13 @@ def _sample_times(desk: Desk) -> None:
 
 
 def _zeros(desk: Desk) -> None:
-    """Offer one zero where one muscle's recordings rest at several, and no load tells why."""
+    """Offer one zero where one muscle's recordings rest at several, which a load may tell or not."""
     from mckibben.estimators.coupled.base import schedules
 
     used = list(desk.workspace.used().values())
     (given, *more), (wanted, *others) = desk.inputs, desk.outputs
     known = all(given in one and wanted in one for one in used)
-    if more or others or not known or schedules(used):
+    if more or others or not known:
         return
     found = zeros_apart(used, wanted, given)
     if found is None:
@@ -121,9 +121,15 @@ def _zeros(desk: Desk) -> None:
     with named(ui.card().classes("w-full border border-warning gap-1"), "zeros"):
         ui.label(f"These recordings rest at different {wanted}").classes("font-medium")
         ui.label(
-            f"From {found[0]:.3g} to {found[1]:.3g} {unit} where {given} is lowest: a sensor was zeroed "
-            f"anew, or another load hung there. Models that are not told take it for what {given} does. "
-            f"Of a load that you know, tell them: “{READING}”, “Add a constant”, a force in N."
+            f"From {found[0]:.3g} to {found[1]:.3g} {unit} where {given} is lowest: "
+            + (
+                f"the {told[0]} that is told may be why. Where it is not (a sensor zeroed anew, another "
+                "muscle), give them one zero: what a load does at rest goes with it."
+                if (told := schedules(used))
+                else "a sensor was zeroed anew, or another load hung there. Models that are not told "
+                f"take it for what {given} does. Of a load that you know, tell them: “{READING}”, "
+                "“Add a constant”, a force in N."
+            )
         ).classes("text-sm")
         button = ui.button(f"Zero {wanted} there", on_click=guarded(partial(_zero, desk)))
         named(button.props("outline dense no-caps"), "zero-all")

@@ -339,6 +339,8 @@ def run_full(commands: list[list[str]], most: int) -> list[tuple[int, str]]:
         [sys.executable, "-c", code, json.dumps(commands)],
         stdout=subprocess.PIPE,
         check=True,
+        # Python would keep bytecode that is cut off, and all that come later would stumble over it
+        env=os.environ | {"PYTHONDONTWRITEBYTECODE": "1"},
         preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (most, most)),
     )
     lines = [line for line in done.stdout.decode().splitlines() if line.startswith("[")]

@@ -32,6 +32,7 @@ LONG = tuple(
         "app/test_looks.py",
         "app/test_loops.py",
         "app/test_news.py",
+        "app/test_next_steps.py",
         "app/test_pages.py",
         "app/test_scripts.py",
         "app/test_twenty.py",
@@ -40,6 +41,8 @@ LONG = tuple(
         "attacks/test_reports.py",
         "attacks/test_workers.py",
         "bands/test_calibrate.py",
+        "blocks/test_adaptive_balance.py",
+        "blocks/test_predictive.py",
         "cli/test_measured.py",
         "cli/test_muscles.py",
         "cli/test_plan.py",
@@ -50,6 +53,7 @@ LONG = tuple(
         "docs/test_tutorials.py",
         "estimators/test_balance_prior.py",
         "estimators/test_coupled.py",
+        "estimators/test_linear.py",
         "estimators/test_loads.py",
         "export/test_c.py",
         "export/test_c_checkers.py",
@@ -57,10 +61,12 @@ LONG = tuple(
         "link/test_devices.py",
         "papers",
         "stream/test_link.py",
+        "studying/test_log.py",
         "system/test_compiling.py",
         "system/test_progress.py",
         "system/test_workers.py",
         "validation/test_check.py",
+        "validation/test_regression.py",
     )
 )
 """What goes a whole way, in a browser, a protocol, a compiler, other processes: ``-m long``.

@@ -60,6 +60,33 @@ def test_what_are_no_samples_is_refused(samples: Any) -> None:
         mckibben.Recording({"pressure": samples})
 
 
+RECORDING: Any = mckibben.Recording
+COMPARE: Any = mckibben.compare
+
+
+@pytest.mark.parametrize(
+    "made",
+    [
+        lambda run: RECORDING(None),
+        lambda run: RECORDING([1.0, 2.0]),
+        lambda run: RECORDING({"pressure": [1.0, 2.0]}, 0.1, units=3),
+        lambda run: RECORDING({"pressure": [1.0, 2.0]}, "0.1"),
+        lambda run: run.slice(0.5, 3.2),
+        lambda run: COMPARE(run, models=5),
+        lambda run: COMPARE(run, models=["pi"], n_folds=-3),
+        lambda run: COMPARE(run, models=["pi"], n_folds=2.5),
+        lambda run: COMPARE(run, models=["pi"], settings={"gpi": {"n_operators": 4}}),
+    ],
+    ids=range(9),
+)
+def test_arguments_of_other_kinds_are_refused_and_never_passed_over(
+    made: Callable[[Any], object],
+) -> None:
+    (run,) = mckibben.read(mckibben.example.TRAIN)
+    with pytest.raises((DataError, ModelError), match="Remedy: "):
+        made(run)
+
+
 def test_whatever_is_named_a_refusal_can_be_read() -> None:
     (run,) = mckibben.read(mckibben.example.TRAIN)
     with pytest.raises(DataError) as refused:

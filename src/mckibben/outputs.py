@@ -16,7 +16,7 @@ from pathlib import Path
 
 from mckibben.errors import DataError
 from mckibben.system import manifest, ordinary
-from mckibben.system.atomic import write_text, written
+from mckibben.system.atomic import demand_room, write_text, written
 from mckibben.system.seals import is_sealed
 
 MANIFEST = "results.sha256"
@@ -100,7 +100,8 @@ def claim(
     ------
     DataError
         If it is an input, by whatever name or link; or a file with something in it that is not ours,
-        or a link, without ``force``; or nothing that a file can replace.
+        or a link, without ``force``; or nothing that a file can replace, or its folder cannot be
+        written to.
     """
     refuse_inputs(path, inputs)
     with written(path):
@@ -115,6 +116,7 @@ def claim(
             raise DataError(
                 "there is a device or a pipe of that name", file=path, remedy="name a file"
             )
+        demand_room(path)
         if force or not (link or (path.exists() and path.stat().st_size)):
             return
     if link or not ours(path):

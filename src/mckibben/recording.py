@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, ClassVar
+from typing import Any, ClassVar, SupportsFloat, SupportsIndex
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -31,7 +31,13 @@ STANDARD_UNITS: Mapping[str, str] = MappingProxyType(
 """Units of the standard channels; ``pressure_2`` and ``pressure_extensor`` follow ``pressure``."""
 
 
-PROVENANCE = ("file", "sha256")
+ROWS = "rows"
+"""Entry of ``meta`` that keeps the fingerprint of the rows that were read, of every channel."""
+
+AT = ""
+"""Entry of these: where the recording begins among the rows, in the time of the file [s], or rows."""
+
+PROVENANCE = ("file", "sha256", ROWS)
 """Entries of ``meta`` that say where a recording was read from; recordings are equal without them."""
 
 
@@ -78,6 +84,15 @@ class Recording(DrawsItself):
     meta: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
+        for what, named in (
+            ("channels", self.channels),
+            ("units", self.units),
+            ("meta", self.meta),
+        ):
+            if not isinstance(named, Mapping):
+                raise DataError(
+                    f"{what} cannot be {named!r:.60}", remedy='give them by name: {"pressure": ...}'
+                )
         channels = {name: _frozen(name, samples) for name, samples in self.channels.items()}
         if not channels:
             raise DataError(
@@ -92,9 +107,10 @@ class Recording(DrawsItself):
             raise DataError(
                 f"{min(lengths.values())} sample(s) are too few", remedy="give at least two samples"
             )
-        if self.sample_time is not None and not (0 < self.sample_time < np.inf):
+        step: Any = self.sample_time
+        if step is not None and not (isinstance(step, SupportsFloat) and 0 < float(step) < np.inf):
             raise DataError(
-                f"a sample time of {self.sample_time} s is impossible",
+                f"a sample time of {step!r:.60} s is impossible",
                 remedy="give a positive time in seconds, or None where time is unknown",
             )
         if not np.isfinite(self.start_time):
@@ -200,6 +216,11 @@ class Recording(DrawsItself):
         return "recording" if self.source is None else Path(self.source).stem
 
     @property
+    def known(self) -> dict[str, Any]:
+        """What ``meta`` tells a person: all but the fingerprint of the rows."""
+        return {key: what for key, what in self.meta.items() if key != ROWS}
+
+    @property
     def notes(self) -> tuple[str, ...]:
         """What was assumed or mended when it was read, as ``meta["notes"]`` has it."""
         given = self.meta.get("notes")
@@ -213,10 +234,22 @@ class Recording(DrawsItself):
     def with_channels(
         self, units: Mapping[str, str] | None = None, /, **samples: ArrayLike
     ) -> Recording:
-        """Return a recording with channels added or replaced."""
+        """Return a recording with channels added, or replaced by others that were not read."""
         added = {name: np.asarray(values, dtype=float) for name, values in samples.items()}
         kept = {name: unit for name, unit in self.units.items() if name not in added}
-        return replace(self, channels={**self.channels, **added}, units=kept | dict(units or {}))
+        meta, rows = dict(self.meta), self.meta.get(ROWS)
+        if isinstance(rows, Mapping):
+            meta[ROWS] = {name: known for name, known in rows.items() if name not in added}
+        return replace(
+            self,
+            channels={**self.channels, **added},
+            units=kept | dict(units or {}),
+            meta=meta,
+        )
+
+    def processed(self, samples: Mapping[str, Array]) -> Recording:
+        """Return a recording some of whose channels are the same samples, filtered or shifted."""
+        return replace(self, channels={**self.channels, **samples})
 
     def with_meta(self, **meta: Any) -> Recording:
         """Return a recording with entries of ``meta`` added or replaced."""
@@ -232,16 +265,21 @@ class Recording(DrawsItself):
 
     def slice(self, start: int, stop: int) -> Recording:
         """Return samples ``start`` up to, not including, ``stop``, counted from 0."""
-        if not 0 <= start < stop <= self.n_samples:
+        whole = all(isinstance(end, SupportsIndex) for end in (start, stop))
+        if not (whole and 0 <= start < stop <= self.n_samples):
             raise DataError(
                 f"samples {start}:{stop} are not within 0:{self.n_samples}",
                 file=self.source,
                 remedy="cut inside the recording",
             )
+        meta, rows = dict(self.meta), self.meta.get(ROWS)
+        if isinstance(rows, Mapping) and isinstance(at := rows.get(AT), int | float):
+            meta[ROWS] = {**rows, AT: at + float(self.time[start]) - self.start_time}
         return replace(
             self,
             channels={name: samples[start:stop] for name, samples in self.channels.items()},
             start_time=float(self.time[start]),
+            meta=meta,
         )
 
     def continues(self, other: Recording) -> bool:

@@ -16,7 +16,7 @@ from mckibben.app.desk import Desk
 from mckibben.app.jobs import Jobs
 from mckibben.app.kept import Reading, Step
 from mckibben.app.pages.data import told_of
-from mckibben.app.reading import columns, options, read_upload, untold
+from mckibben.app.reading import columns, options, read_upload
 from mckibben.app.recordings import EXAMPLE
 from mckibben.app.workspace import Workspace
 from mckibben.comparison.channels import Channels
@@ -357,25 +357,6 @@ def test_models_that_need_time_say_so_before_fitting() -> None:
     )
     assert "pi" not in found
     assert all("needs time" in found[name] for name in ("oe", "narx"))
-
-
-def test_names_that_tell_nothing_are_taken_for_what_their_units_say(tmp_path: Path) -> None:
-    path = tmp_path / "arm.csv"
-    rows = "\n".join(f"{k * 0.1},{k},{k % 3},{k * 2},{k % 5}" for k in range(20))
-    path.write_text(f"time_s,u1_V,u2_V,y1_cm,q2\n{rows}")
-    reading = untold(path, read_upload(path))
-    (recording,) = read_upload(path, reading)
-    assert list(recording.channels) == ["voltage_1", "voltage_2", "displacement_1", "q2"]
-    assert recording["displacement_1"][1] == 20.0
-    wing = tmp_path / "wing.csv"
-    wing.write_text("input_V,output_deg\n" + "\n".join(f"{k % 5},{k % 3}" for k in range(20)))
-    (recording,) = read_upload(wing, untold(wing, read_upload(wing)))
-    assert list(recording.channels) == ["voltage", "angle"]
-    plain = tmp_path / "plain.csv"
-    plain.write_text(
-        "time_s,pressure_bar,displacement_mm\n" + "\n".join(f"{k},{k},{k}" for k in range(9))
-    )
-    assert untold(plain, read_upload(plain)) == Reading()
 
 
 def held(desk: Desk, constants: dict[str, tuple[float, str]], **other: Any) -> Recording:

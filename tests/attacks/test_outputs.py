@@ -100,6 +100,19 @@ def test_no_command_writes_over_what_it_reads(
         assert held(folder) == before
 
 
+@pytest.mark.skipif(
+    not Path("/proc/self").is_dir(), reason="has no folder that nobody can write to"
+)
+@pytest.mark.parametrize("command", [each for each in COMMANDS if not each.startswith("export")])
+def test_a_folder_that_cannot_be_written_to_is_refused_before_any_work(
+    folder: Path, command: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("mckibben.files.read", None)
+    result = call(*COMMANDS[command][0], f"/proc/mine{ending(command, MODEL)}")
+    assert result.code == 2
+    assert "it cannot be written" in result.err
+
+
 @pytest.mark.parametrize(
     ("words", "out"),
     [

@@ -138,7 +138,7 @@ def test_a_measured_arm_creeps_little() -> None:
     if not files:
         pytest.skip("the measured recordings are not here")
     arm = [one for file in files for one in read(file)]
-    found = characterize(arm, "u1", "y1", beside=["u2", "u3"])
+    found = characterize(arm, "voltage_1", "displacement_1", beside=["voltage_2", "voltage_3"])
     assert found.creep is not None
     assert abs(found.creep) < 5.0
     assert found.has_loop

@@ -8,8 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mckibben import PI
-from mckibben.signals import triangle
+from mckibben import load
 from mckibben.system.locks import alone
 from tests.cli.conftest import Cli
 from tests.files.malformed import CASES, Case
@@ -142,16 +141,34 @@ def test_two_do_not_write_to_one_folder(
     assert not list(tmp_path.iterdir())
 
 
-def test_channels_without_telling_names_are_called_by_their_units(cli: Cli, tmp_path: Path) -> None:
-    file = tmp_path / "wing.csv"
-    command = np.concatenate([triangle(np.arange(120) / 10, 4.0, [3.0, 2.0, 1.0])] * 2)
-    angle = 10 * PI.example().simulate(command)
-    rows = [f"{u:.4f},{y:.4f}" for u, y in zip(command, angle, strict=True)]
-    file.write_text("\n".join(["input_V,output_deg", *rows]))
-    result = cli("compare", file, "--models", "pi", "-o", tmp_path / "out")
+def test_columns_without_telling_names_need_no_options(cli: Cli, tmp_path: Path) -> None:
+    time = np.arange(600) * 0.05
+    volts = 2.0 - 2.0 * np.cos(time)
+    rows = "\n".join(f"{t:.2f},{v:.5f},{8 * v:.5f}" for t, v in zip(time, volts, strict=True))
+    wing, model = tmp_path / "wing.csv", tmp_path / "model.json"
+    wing.write_text(f"time_s,input_V,output_deg\n{rows}\n")
+    assert "'input_V' as voltage, 'output_deg' as angle" in cli("info", wing).out
+    for name in ("pi", "balance"):
+        result = cli("fit", name, wing, "-o", model, "--force")
+        assert result.code == 0, result.err
+        assert [channel.name for channel in load(model).inputs] == ["voltage"]
+    result = cli("compare", wing, "--models", "pi", "-o", tmp_path / "out")
     assert result.code == 0, result.err
-    assert "by their units, input is taken for voltage, output is taken for angle" in result.out
-    assert "by their units" in cli("info", file).out
-    named = ["--column", "pressure=input_V", "--column", "displacement=output_deg"]
-    assert "by their units" not in cli("info", file, *named).out
-    assert "by their units" not in cli("info", file, "--input", "input", "--output", "output").out
+    assert "'input_V' as voltage" in result.out
+    assert cli("characterize", wing).code == 0
+    result = cli(
+        "fit", "pi", wing, "--input", "input", "--output", "output", "-o", model, "--force"
+    )
+    assert [channel.name for channel in load(model).inputs] == ["input"], result.err
+    result = cli("simulate", model, wing, "-o", tmp_path / "run.csv")
+    assert "output: RMSE" in result.out, result.err
+    arm = tmp_path / "arm.csv"
+    arm.write_text(
+        "time_s,u1_V,u2_V,y1_mm\n"
+        + "\n".join(
+            f"{t:.2f},{v:.5f},{4 - v:.5f},{v:.5f}" for t, v in zip(time, volts, strict=True)
+        )
+    )
+    result = cli("fit", "pi", arm, "-o", model, "--force")
+    assert result.code == 2
+    assert "it is of several: voltage_1, voltage_2, displacement_1" in result.err

@@ -250,3 +250,18 @@ def test_the_command_refuses_in_words(
     assert result.code == 2
     assert said in result.err
     assert "Traceback" not in result.err
+
+
+def test_periods_of_a_file_are_its_own_and_settings_of_other_models_wait(
+    cli: Cli, folder: Path, tmp_path: Path
+) -> None:
+    path = folder / "volts" / "channels.toml"
+    given = (
+        "[split]\nperiod = 750\n[[split.tasks]]\n"
+        "settings = {pi = {n_operators = 5}, gpi = {n_operators = 4}}\n"
+    )
+    path.write_text(path.read_text().split("[split]")[0].rstrip() + "\n" + given)
+    words = ["-o", tmp_path / "out", "--only", "volts", "--models", "pi", "--jobs", "1"]
+    result = cli("measured", folder, *words)
+    assert result.code == 0, result.err
+    assert "Chosen by cross-validation on the training side: pi" in result.out

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mckibben import PI, Recording, write
+from mckibben import PI, Recording, load, write
 from mckibben.blocks.coupled.balance import Balance
 from mckibben.rigs import record
 from mckibben.signals import resample
@@ -247,9 +247,11 @@ def test_one_muscle_is_told_which_input_was_taken_and_what_lies_beyond(
     settings = [word for setting in SHORT for word in ("--set", setting)]
     result = cli("fit", "balance", run, *settings, "-o", model)
     assert result.code == 0, result.err
-    assert "--input pressure" in result.out
+    assert "the input is pressure, and voltage was recorded too" in result.out
+    assert load(model).inputs[0].name == "pressure"
+    assert "the input is pressure" in cli("fit", "pi", run, "-o", tmp_path / "pi.json").out
     result = cli("fit", "balance", run, *settings, "--input", "pressure", "-o", model, "--force")
-    assert "--input pressure" not in result.out
+    assert "voltage was recorded" not in result.out
     result = cli("simulate", model, run, "-o", tmp_path / "out.csv")
     assert "extrapolates" not in result.out
     write(Recording({**given, "force": 2.0 * given["force"]}, 0.05), tmp_path / "heavy.csv")

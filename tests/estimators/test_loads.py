@@ -62,6 +62,7 @@ def test_mpi_narmax_runs_free_under_a_load(
 def test_hysteresis_is_identified_on_all_runs_without_load(runs: dict[str, Recording]) -> None:
     free, pulled = [runs[name] for name in FREE], runs["training-pulls-100N"]
     settings = {"memory": "rdpi", "method": "ls", "n_sets": 2, "constants": False}
+    settings["input"] = "voltage"
     estimator_class = registry.load("estimators", "mpi-narmax")
     model = estimator_class(**settings, learns_from="loaded").fit([*free, pulled]).model_
     alone = registry.load("estimators", "rdpi")(input="voltage", rate_time_constant=0.25).fit(free)
@@ -154,3 +155,14 @@ def test_an_estimated_load_serves_as_well_as_a_measured_one(
     assert errors[1] < 1.5 * errors[0]
     with pytest.raises(ModelError, match="filter_time"):
         EstimatedLoad(told, model, filter_time=0.0)
+
+
+@pytest.mark.parametrize("name", ["balance", "coupled-memory"])
+def test_a_short_recording_beside_a_long_one_does_not_stop_a_model(
+    runs: dict[str, Recording], name: str
+) -> None:
+    whole = runs["training-pulls-100N"]
+    estimator = registry.load("estimators", name)()
+    assert estimator.data([whole, whole.slice(0, 20)]).runs
+    with pytest.raises(DataError, match="20 samples are too few for this model"):
+        estimator.data([whole.slice(0, 20), whole.slice(30, 40)])

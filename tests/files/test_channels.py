@@ -88,7 +88,7 @@ def test_files_may_be_otherwise(folder: Folder) -> None:
 
 
 def test_an_offset_moves_what_the_header_states(folder: Folder) -> None:
-    path = folder("[channels.pressure]\noffset = -10.0\n", "time_ms,pressure_kPa,x_mm")
+    path = folder("[channels.pressure]\noffset = -10.0\n", "time_ms,pressure_kPa,position_mm")
     assert one(path / "run_load200g.csv")["pressure"] == pytest.approx((RAW - 10) / 100)
 
 
@@ -104,9 +104,11 @@ def test_what_the_caller_says_goes_before(folder: Folder) -> None:
 
 def test_sample_time_is_for_files_without_times(folder: Folder) -> None:
     said = "[time]\nsample_time = 0.004\n"
-    assert one(folder(said, "A9,p_bar,x_mm") / "run_load200g.csv").sample_time == 0.004
-    assert one(folder(said, "time_ms,p_bar,x_mm") / "run_load200g.csv").sample_time == 0.02
-    assert one(folder(said, "A9,p_bar,x_mm") / "run_load200g.csv", rate=10).sample_time == 0.1
+    assert one(folder(said, "A9,p_bar,position_mm") / "run_load200g.csv").sample_time == 0.004
+    assert one(folder(said, "time_ms,p_bar,position_mm") / "run_load200g.csv").sample_time == 0.02
+    assert (
+        one(folder(said, "A9,p_bar,position_mm") / "run_load200g.csv", rate=10).sample_time == 0.1
+    )
 
 
 def test_a_constant_goes_before_a_column_of_that_name(folder: Folder) -> None:

@@ -137,12 +137,25 @@ def test_parquet_changed_by_another_program_is_read_as_foreign(
         assert mckibben.read(path, units=UNITS)[0].n_samples == 20
 
 
-def test_columns_of_no_telling_name_are_proposed_by_their_units(tmp_path: Path) -> None:
+def test_columns_of_no_telling_name_are_taken_by_their_units(tmp_path: Path) -> None:
     path = tmp_path / "arm.csv"
-    path.write_text("t_s,u1_V,u2_V,y1_cm,q\n" + "\n".join(f"{k},{k},{k},{k},{k}" for k in range(9)))
-    said = "--column voltage_1=u1_V --column voltage_2=u2_V --column displacement_1=y1_cm as"
-    with pytest.raises(DataError, match=said):
-        mckibben.read(path, channels=["pressure"])
+    rows = "\n".join(f"{k * 0.1},{k},{k % 3},{k * 2},{k % 5}" for k in range(20))
+    path.write_text(f"time_s,u1_V,u2_V,y1_cm,q2\n{rows}")
+    with pytest.warns(DataWarning, match="'u1_V' as voltage_1, 'u2_V' as voltage_2, 'y1_cm' as"):
+        (recording,) = mckibben.read(path)
+    assert list(recording.channels) == ["voltage_1", "voltage_2", "displacement_1", "q2"]
+    assert recording["displacement_1"][1] == 20.0
+    assert any("'u1_V' as voltage_1" in note for note in recording.notes)
+
+
+@pytest.mark.parametrize("said", [{"channels": ["input"]}, {"units": {"input": "mV"}}])
+def test_what_is_spoken_of_by_its_own_name_keeps_it(tmp_path: Path, said: Any) -> None:
+    path = tmp_path / "wing.csv"
+    path.write_text("input_V,output_deg\n" + "\n".join(f"{k % 5},{k % 3}" for k in range(20)))
+    with pytest.warns(DataWarning, match="'output_deg' as angle"):
+        assert list(mckibben.read(path, **said)[0].channels) == ["input", "angle"]
+    with pytest.warns(DataWarning, match="'input_V' as voltage, 'output_deg' as angle"):
+        assert list(mckibben.read(path)[0].channels) == ["voltage", "angle"]
 
 
 def test_own_files_follow_columns_units_rate_and_channels(tmp_path: Path) -> None:

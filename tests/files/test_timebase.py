@@ -202,6 +202,14 @@ def test_gaps_split(tmp_path: Path) -> None:
     assert np.array_equal(parts[1]["pressure"], samples[35:])
 
 
+def test_stretches_too_short_for_later_steps_are_left_out_even_of_what_need_not_inform(
+    tmp_path: Path,
+) -> None:
+    with pytest.warns(DataWarning, match=r"1 of 3 .* no later step can use.* begin in row 32$"):
+        parts, _ = read(tmp_path, GAPPED, gaps="split", informative=False)
+    assert [len(part) for part in parts] == [30, 25]
+
+
 def test_gaps_interpolate(tmp_path: Path) -> None:
     with pytest.warns(DataWarning, match=r"2 gap\(s\) in time, .* interpolated over"):
         (recording,), samples = read(tmp_path, GAPPED, gaps="interpolate")

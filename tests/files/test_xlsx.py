@@ -65,7 +65,10 @@ def test_numbers_are_read_to_the_last_bit(tmp_path: Path) -> None:
 
 
 def test_numbers_that_text_would_make_doubtful_are_not(tmp_path: Path) -> None:
-    rows = [["time_s", "pressure_bar", "x_mm"], *([t, 1.234 + k % 3, 2] for k, t in enumerate(T))]
+    rows = [
+        ["time_s", "pressure_bar", "position_mm"],
+        *([t, 1.234 + k % 3, 2] for k, t in enumerate(T)),
+    ]
     assert one(book(tmp_path / "a.xlsx", Data=rows))["pressure"][1] == 2.234
 
 

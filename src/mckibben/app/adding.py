@@ -10,7 +10,7 @@ from mckibben.app import scripts
 from mckibben.app.desk import LONGEST, Desk
 from mckibben.app.fields import GAPS, said
 from mckibben.app.kept import Reading
-from mckibben.app.reading import AS_FOUND, options, read_upload, untold
+from mckibben.app.reading import AS_FOUND, options, read_upload
 from mckibben.app.recordings import Entry
 from mckibben.app.workspace import Workspace
 from mckibben.errors import DataError, MckibbenError
@@ -56,8 +56,6 @@ def add(
             f"that would make {len(found)} recordings, of {longest} samples at most",
             remedy=f"“{GAPS['interpolate']}”, or press again for so many",
         )
-    if reading == AS_FOUND and (better := untold(path, found)) != AS_FOUND:
-        reading, found = better, read_upload(path, better)
     call = scripts.read_call(str(path), options(reading))
     with desk.workspace.adding(f"add {shown}") as added:
         for part, one in enumerate(found):

@@ -13,7 +13,7 @@ from mckibben.app.kept import Reading
 from mckibben.errors import DataError, TooLargeError
 from mckibben.files import formats, read
 from mckibben.files.assigning import assign
-from mckibben.files.headers import by_units, channel_of, parse
+from mckibben.files.headers import channel_of, parse
 from mckibben.files.own import description
 from mckibben.files.request import Request
 from mckibben.files.table import Column, Table
@@ -80,18 +80,6 @@ def read_upload(path: Path, reading: Reading = AS_FOUND) -> list[Recording]:
         If it cannot be read, or holds or takes more than is kept in memory here.
     """
     return _aside(_read, path, reading)
-
-
-def untold(path: Path, found: list[Recording]) -> Reading:
-    """Return how a file is read whose channels have no telling names, such as u1, or output.
-
-    Loops, tuning and reports know motions and what drives them by name, which their units give.
-    """
-    renamed = by_units(found[0].units)
-    headers = {column.channel: column.header for column in columns(path, AS_FOUND)}
-    if not renamed or not renamed.keys() <= headers.keys():
-        return AS_FOUND
-    return Reading(columns={new: headers[name] for name, new in renamed.items()})
 
 
 def columns(path: Path, reading: Reading) -> list[Seen]:

@@ -29,18 +29,18 @@ Beside = Annotated[
 def characterize(
     files: Files,
     reading: Reading,
-    input: Input = "pressure",  # noqa: A002
-    output: Output = "displacement",
+    input: Input = None,  # noqa: A002
+    output: Output = None,
     beside: Beside = None,
     as_json: Json = False,
 ) -> None:
     """Say what the muscle does: loop width, asymmetry, dead zone, creep, rate dependence."""
     others = beside or []
-    recordings = reading.read(files, [input, output, *others])
+    recordings, given, moved = reading.read_one(files, input, output, others)
     from mckibben.characterization import characterize as find
     from mckibben.recording import notes_by_file, reading_notes
 
-    found = find(recordings, input, output, beside=others)
+    found = find(recordings, given, moved, beside=others)
     if as_json:
         print_json(found.to_dict() | {"notes": notes_by_file(recordings)})
         return

@@ -49,9 +49,10 @@ class Version(StrEnum):
 
 def _loaded(model: Path, inverse: bool) -> Block:
     from mckibben.blocks.core.saving import load
+    from mckibben.blocks.force.feedforward import compensator
 
     block = load(model)
-    return block.inverse() if inverse else block
+    return compensator(block) if inverse else block
 
 
 def _emulated(block: Block, sample_time: float | None) -> str:

@@ -92,10 +92,15 @@ def fit(
         raise DataError(f"{model!r} does not stop early", remedy="leave --validation out")
     channels = [estimator.input, estimator.output]
     several = not all(isinstance(name, str) for name in channels)
-    # of several, each may hold the input, as isometric runs hold the length
-    recordings = reading.read(
-        files, None if several else channels, informative=not several and len(files) == 1
-    )
+    if channels == ["pressure", "displacement"]:
+        asked = (given.get("input"), given.get("output"))
+        recordings, estimator.input, estimator.output = reading.read_one(files, *asked)
+    else:  # of several, each may hold the input, as isometric runs hold the length
+        asked_for = [
+            name for some in channels for name in ((some,) if isinstance(some, str) else some or ())
+        ]
+        informative = not several and len(files) == 1
+        recordings = reading.read(files, asked_for or None, informative=informative)
     held_back = reading.read(validation or [], None, informative=False)
     data = estimator.data(recordings)
     names = [[channel.name for channel in some] for some in (data.inputs, data.outputs)]
@@ -161,17 +166,13 @@ def fit(
 
 
 def _unasked(given: list[str] | None, model: Block, recording: Recording) -> list[str]:
-    """Return that the command was taken as input where the pressure was recorded too, if so."""
+    """Return that the pressure was taken as input where the command was recorded too, if so."""
     driven = [channel.name for channel in model.inputs]
-    if (
-        given
-        or "pressure" in driven
-        or not {"voltage", "pressure"} <= {*driven, *recording.channels}
-    ):
+    if given or "pressure" not in driven or "voltage" in driven or "voltage" not in recording:
         return []
     return [
-        "the input is voltage. Remedy: for a model of the muscle alone, whose loads are forces and that "
-        "tells forces, say --input pressure"
+        "the input is pressure, and voltage was recorded too. Remedy: for a model that commands the "
+        "valve, say --input voltage"
     ]
 
 

@@ -41,8 +41,8 @@ def info(
     elif len(files) == 1 and files[0].suffix.lower() == ".json":
         _model(files[0], as_json)
     else:
-        unsaid = not (inputs or outputs or model)
-        recordings = reading.read(files, None, informative=False, by_units=unsaid)
+        named = [*(inputs or ()), *(outputs or ())] or None
+        recordings = reading.read(files, named, informative=False)
         _recordings(recordings, _untold(recordings, inputs, outputs, model), as_json)
 
 
@@ -65,10 +65,11 @@ def _models(as_json: bool) -> None:
 
 def _model(file: Path, as_json: bool) -> None:
     from mckibben.blocks.core.saving import load
+    from mckibben.blocks.force.feedforward import compensator
 
     block = load(file)
     try:
-        block.inverse()
+        compensator(block)
         inverse = "yes"
     except Exception as error:
         inverse = f"no: {error}"
@@ -120,7 +121,7 @@ def _recordings(recordings: list[Recording], gaps: tuple[Gap, ...] | str, as_jso
                 }
                 for name, samples in recording.channels.items()
             },
-            "meta": dict(recording.meta),
+            "meta": recording.known,
         }
         for recording in recordings
     ]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import warnings
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -34,8 +34,16 @@ Test = Annotated[
     list[Path] | None,
     typer.Option("--test", metavar="FILE", help="Recording to test on; repeatable."),
 ]
-Input = Annotated[str, typer.Option("--input", metavar="CHANNEL", help="Input channel.")]
-Output = Annotated[str, typer.Option("--output", metavar="CHANNEL", help="Output channel.")]
+Input = Annotated[
+    str | None,
+    typer.Option("--input", metavar="CHANNEL", help="Input. Default: pressure, or else voltage."),
+]
+Output = Annotated[
+    str | None,
+    typer.Option(
+        "--output", metavar="CHANNEL", help="Output. Default: displacement, or else angle."
+    ),
+]
 Inputs = Annotated[
     list[str] | None,
     typer.Option(
@@ -160,17 +168,9 @@ class Reading:
     zero: Zero = None
 
     def read(
-        self,
-        files: Sequence[Path],
-        channels: Sequence[str] | None,
-        *,
-        informative: bool = True,
-        by_units: bool = False,
+        self, files: Sequence[Path], channels: Sequence[str] | None, *, informative: bool = True
     ) -> list[Recording]:
-        """Return the recordings in all files, with the channels asked for; see `mckibben.read`.
-
-        Where asked, channels without telling names, such as u1, are called what their units tell.
-        """
+        """Return the recordings in all files, with the channels asked for; see `mckibben.read`."""
         from mckibben.files import read
 
         recordings: list[Recording] = []
@@ -185,8 +185,6 @@ class Reading:
                 channels=channels,
                 informative=informative,
             )
-        if by_units and not self.column:
-            recordings = [_called_by_units(recording) for recording in recordings]
         if self.resample is not None:
             from mckibben.signals import resample
 
@@ -199,6 +197,41 @@ class Reading:
                 (over, *_), _ = recognised([one], list(one.channels))
                 recordings[place] = zeroed(one, self.zero, over)
         return recordings
+
+    def read_one(
+        self,
+        files: Sequence[Path],
+        input: str | None,  # noqa: A002
+        output: str | None,
+        beside: Sequence[str] = (),
+    ) -> tuple[list[Recording], str, str]:
+        """Return recordings of one muscle, its input and its output: as named, the usual, or others.
+
+        Raises
+        ------
+        DataError
+            If a channel is missing, or is that of several muscles.
+        """
+        from mckibben.comparison.channels import channels_of
+
+        asked = input or "pressure", output or "displacement"
+        try:
+            return self.read(files, [*asked, *beside]), *asked
+        except DataError:
+            if not self._finds_its_own(files[0]):
+                raise
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            begun = self.read(files[:1], None, informative=False)
+        found = channels_of(begun, input, output, None)
+        if len(found.inputs) > 1 or len(found.outputs) > 1:
+            raise DataError(
+                f"it is of several: {', '.join((*found.inputs, *found.outputs))}",
+                file=files[0],
+                remedy="name one of each with --input and --output; fit balance models all at once",
+            )
+        named = found.inputs[0], found.outputs[0]
+        return self.read(files, [*named, *beside]), *named
 
     def read_all(
         self,
@@ -213,48 +246,32 @@ class Reading:
         or of one that is held: which of theirs are meant, the comparison finds.
         """
         asked = [*(inputs or ["pressure"]), *(outputs or ["displacement"])]
-        unsaid = inputs is None and outputs is None
+        named = [*(inputs or ()), *(outputs or ()), *([] if load is None else [load])] or None
         if load is not None or len(asked) > 2:
-            return [self.read(some, None, informative=False, by_units=unsaid) for some in files]
+            return [self.read(some, named, informative=False) for some in files]
         (first, *rest), *others = files
         try:
             begun = self.read([first], asked)
-            every = unsaid and _is_held(begun)
+            every = inputs is None and outputs is None and _is_held(begun)
         except DataError:
-            if not self._finds_its_own(first, unsaid):
+            if not self._finds_its_own(first):
                 raise
             every = True
         if every:
-            return [self.read(some, None, informative=False, by_units=unsaid) for some in files]
+            return [self.read(some, named, informative=False) for some in files]
         return [begun + self.read(rest, asked), *(self.read(some, asked) for some in others)]
 
-    def _finds_its_own(self, file: Path, by_units: bool) -> bool:
+    def _finds_its_own(self, file: Path) -> bool:
         """Tell whether a file is of several muscles, or a loop's log of commands alone."""
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             try:
-                (found, *_) = self.read([file], None, informative=False, by_units=by_units)
+                (found, *_) = self.read([file], None, informative=False)
             except DataError as error:
                 if SEVERAL.fullmatch(error.channel or ""):
                     raise
                 return False  # what is wrong with one muscle's file is said by whoever asks
         return any(map(SEVERAL.fullmatch, found.channels))
-
-
-def _called_by_units(recording: Recording) -> Recording:
-    """Return a recording whose channels without telling names are called what their units tell."""
-    from mckibben.files.headers import by_units
-
-    names = by_units(recording.units)
-    if not names:
-        return recording
-    said = ", ".join(f"{old} is taken for {new}" for old, new in names.items())
-    note = f"by their units, {said}; say --column CHANNEL=COLUMN where that is wrong"
-    return replace(
-        recording,
-        channels={names.get(name, name): x for name, x in recording.channels.items()},
-        units={names.get(name, name): unit for name, unit in recording.units.items()},
-    ).with_meta(notes=[*recording.notes, note])
 
 
 def _is_held(recordings: Sequence[Recording]) -> bool:

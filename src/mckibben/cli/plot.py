@@ -32,8 +32,8 @@ def plot(
             help="time, loop (default); with --model also fit (default), loops, residuals, weights."
         ),
     ] = None,
-    input: Input = "pressure",  # noqa: A002
-    output: Output = "displacement",
+    input: Input = None,  # noqa: A002
+    output: Output = None,
     force: Force = False,
 ) -> None:
     """Draw recordings, or a saved model against them."""
@@ -42,11 +42,11 @@ def plot(
 
     format_of(out)  # another ending is refused now
     claim_figure(out, inputs=[*files, *([] if model is None else [model])], force=force)
-    recordings = reading.read(files, [input, output])
+    recordings, given, moved = reading.read_one(files, input, output)
     from mckibben.report.figures import plot_model, plot_recording
 
     if model is None:
-        plot_recording(recordings, input, output, kind or "loop", out)
+        plot_recording(recordings, given, moved, kind or "loop", out)
     else:
         from mckibben.blocks.core.saving import load
 

@@ -64,7 +64,11 @@ def simulate(
     if banded is not None and horizon is not None:
         raise ModelError("bands are of free runs. Remedy: leave --horizon or --interval out.")
     wanted = [channel.name for channel in block.inputs]
-    recordings = reading.read([file], wanted, informative=False)
+    whole = list(dict.fromkeys((*wanted, *(channel.name for channel in block.outputs))))
+    try:
+        recordings = reading.read([file], whole, informative=False)
+    except DataError:  # nothing was measured, or what lacks is said of the inputs
+        recordings = reading.read([file], wanted, informative=False)
     if len(recordings) > 1:
         raise DataError(
             f"the file splits into {len(recordings)} recordings at its gaps",

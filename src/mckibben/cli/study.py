@@ -160,7 +160,7 @@ def _conclude(study: Study, folder: Path) -> None:
         say("No model here has an inverse.")
     if check is not None and check.uncompensated_error is not None:
         say(
-            f"Without compensation, {study.input} read off one slow rise, that is "
+            f"Without compensation, {check.given} read off one slow rise, that is "
             f"{numeral(100 * check.uncompensated_error, 2)} %. On the muscle, the model's comes on top."
         )
     for name, tracked in study.loops.items():

@@ -73,8 +73,8 @@ def channels_of(
     DataError
         If a recording lacks the load, or a channel is named twice.
     """
-    given = _named(recordings, inputs, _by_name(recordings, driving, "pressure", load is None))
-    wanted = _named(recordings, outputs, _by_name(recordings, moved, "displacement", True))
+    given = _named(recordings, inputs, _by_name(recordings, driving, "pressure"))
+    wanted = _named(recordings, outputs, _by_name(recordings, moved, "displacement"))
     found = loads_told(recordings, Channels(given, wanted, (load,) if load else None))
     told = found.scheduling or ()
     named = (*found.inputs, *found.outputs, *told)
@@ -137,14 +137,13 @@ def _by_name(
     recordings: Sequence[Recording],
     named: Callable[[Recording], tuple[str, ...]],
     usual: str,
-    prefers: bool,
 ) -> tuple[str, ...]:
-    """Return what recordings call several muscles' channels, or one's: the usual, where preferred."""
+    """Return what recordings call several muscles' channels, or one's: the usual before others."""
     found = tuple(dict.fromkeys(name for recording in recordings for name in named(recording)))
     several = tuple(name for name in found if name.rpartition("_")[2].isdigit())
-    if several or not found:
+    if len(several) > 1 or not found:
         return several or (usual,)
-    return (usual,) if prefers and any(usual in recording for recording in recordings) else found
+    return (usual,) if any(usual in recording for recording in recordings) else several or found
 
 
 def _named(

@@ -7,7 +7,7 @@ simulation without noise that is run twice gives the same samples, and is the sa
 on it tells nothing that training did not. Repeats within one recording are no matter of this module.
 
 Holds, saturated stretches and slow rests do not count, since all recordings of one muscle agree there.
-A copy that was interpolated to another sample time, filtered or scaled is not found.
+What was interpolated, resampled, filtered or given a zero is looked up by the rows that were read.
 """
 
 from __future__ import annotations
@@ -20,10 +20,10 @@ from numpy.typing import NDArray
 
 from mckibben.arrays import Array
 from mckibben.errors import DataError
+from mckibben.files.fingerprint import Hashes, mixed, pairs_of_one_row, shared_rows
 from mckibben.recording import Recording
 
 Indices = NDArray[np.int64]
-Hashes = NDArray[np.uint64]
 
 ENOUGH = 100
 """Movements of the output in a row that make a shared stretch; of short recordings, half of theirs."""
@@ -121,7 +121,14 @@ def shared_stretches(
         if known:
             start, stop, begins, share = max(known, key=lambda item: item[3])
             found.append(Shared(first, second, start, stop, begins, share))
-    return found
+    seen = {(one.first, one.second) for one in found}
+    for first, second in pairs_of_one_row(recordings, outputs):
+        rows = None
+        if (first, second) not in seen:
+            rows = shared_rows(recordings[first], recordings[second], inputs, outputs)
+        if rows is not None:
+            found.append(Shared(first, second, rows.start, rows.stop, rows.begins, rows.share))
+    return sorted(found, key=lambda one: (one.first, one.second))
 
 
 def told(
@@ -281,7 +288,7 @@ def _windows(bins: Sequence[Array]) -> tuple[Indices, Hashes]:
     """
     code = np.zeros(bins[0].size if bins else 0, dtype=np.uint64)
     for one in bins:
-        code = _mixed(code + one.astype(np.int64).astype(np.uint64))
+        code = mixed(code + one.astype(np.int64).astype(np.uint64))
     changes = np.flatnonzero(np.diff(code)) + 1
     n = changes.size - WINDOW + 1
     if n < 1:
@@ -289,16 +296,8 @@ def _windows(bins: Sequence[Array]) -> tuple[Indices, Hashes]:
     values = code[changes]
     hashes = np.zeros(n, dtype=np.uint64)
     for k in range(WINDOW):
-        hashes = _mixed(hashes + values[k : k + n])
+        hashes = mixed(hashes + values[k : k + n])
     return changes[:n].astype(np.int64), hashes
-
-
-def _mixed(code: Hashes) -> Hashes:
-    """Return codes scrambled, each to another one (the finalizer of splitmix64)."""
-    code = code + np.uint64(0x9E3779B97F4A7C15)
-    code = (code ^ (code >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
-    code = (code ^ (code >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
-    return code ^ (code >> np.uint64(31))
 
 
 def _compared(

@@ -17,7 +17,7 @@ from mckibben.signals.reversals import noise_level, reversals, swing_threshold
 STILL = 0.01
 """An input whose range is below this share of its largest value is held; an output likewise."""
 
-HELD = 0.003
+HELD = 0.01
 """Share of its range within which an input counts as held."""
 
 SHORTEST_HOLD = 10

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -10,12 +9,10 @@ from mckibben.errors import DataError
 from mckibben.files.calibration import constants
 from mckibben.files.channels import NAME
 from mckibben.files.headers import LONGEST, by_units, channel_of, parse, snake_case
-from mckibben.files.notices import warn
+from mckibben.files.notices import listed, warn
 from mckibben.files.request import Request
 from mckibben.files.table import Column, Table
 from mckibben.files.units import find
-
-_LISTED = 30
 
 ROLES = ("reference_", "command_")
 """What names of a loop's channels begin with."""
@@ -74,7 +71,16 @@ def assign(table: Table, request: Request, path: Path) -> tuple[dict[str, Column
             named[channel] = column
     order = {id(column): place for place, column in enumerate(table.columns)}
     named = dict(sorted(named.items(), key=lambda item: order.get(id(item[1]), len(order))))
+    found = {} if table.own else _by_units(named, request)
+    said = [f"{named[name].header!r} as {channel}" for name, channel in found.items()]
+    named = {found.get(channel, channel): column for channel, column in named.items()}
     _require(named, table, request, path)
+    if said:
+        warn(
+            path,
+            f"no name tells what these columns are, so they are taken by their units: {listed(said)}; "
+            "say --column CHANNEL=COLUMN where that is wrong",
+        )
     return named, left_out
 
 
@@ -135,7 +141,7 @@ def _require(named: Mapping[str, Column], table: Table, request: Request, path: 
                 f"there is no such channel; the columns are {_listed(table)}",
                 file=path,
                 channel=channel,
-                remedy=f"name its column with --column {channel}=COLUMN{_proposed(named)}",
+                remedy=f"name its column with --column {channel}=COLUMN",
             )
     for word, option, asked in (
         ("unit", "--unit", request.units),
@@ -151,20 +157,19 @@ def _require(named: Mapping[str, Column], table: Table, request: Request, path: 
                 )
 
 
-def _proposed(named: Mapping[str, Column]) -> str:
-    """Return what columns without telling names are by their units, as the options that say so."""
+def _by_units(named: Mapping[str, Column], request: Request) -> dict[str, str]:
+    """Return what columns without telling names, such as u1, are called, as their units tell.
+
+    What the caller or the folder speaks of by its own name keeps it.
+    """
+    spoken = {*request.columns, *request.units, *request.calibration, *(request.channels or ())}
+    spoken |= request.described.channels.keys()
     units = {}
     for channel, column in named.items():
         unit = find(column.unit or parse(column.label).unit or "")
-        units[channel] = (unit.target or "") if unit else ""
-    options = [
-        f"--column {channel}={shlex.quote(named[name].header)}"
-        for name, channel in by_units(units).items()
-    ]
-    return f", or say {' '.join(options)} as their units tell" if options else ""
+        units[channel] = (unit.target or "") if unit and channel not in spoken else ""
+    return by_units(units)
 
 
 def _listed(table: Table) -> str:
-    headers = [column.header for column in table.columns]
-    more = f" and {len(headers) - _LISTED} more" if len(headers) > _LISTED else ""
-    return ", ".join(headers[:_LISTED]) + more
+    return listed([column.header for column in table.columns])

@@ -15,7 +15,7 @@ from mckibben.files.assigning import assign
 from mckibben.files.calibration import calibrated
 from mckibben.files.channels import Described
 from mckibben.files.headers import LONGEST, parse, unit_of
-from mckibben.files.notices import warn
+from mckibben.files.notices import listed, warn
 from mckibben.files.request import Request
 from mckibben.files.table import Column, Table
 from mckibben.files.units import Unit, convert, find
@@ -25,8 +25,6 @@ IMPLAUSIBLE_BAR = 50.0
 
 ASSUMED = "no unit is given, so these are assumed: "
 """What a note on assumed units begins with."""
-
-_LISTED = 30
 
 
 @dataclass(frozen=True)
@@ -103,7 +101,7 @@ def choose(table: Table, request: Request, path: Path) -> Choice:
     if found.assumed:
         warn(
             path,
-            f"{ASSUMED}{_listed(found.assumed)}; say --unit CHANNEL=UNIT where that is wrong",
+            f"{ASSUMED}{listed(found.assumed)}; say --unit CHANNEL=UNIT where that is wrong",
         )
     notes = {
         "ignored_columns": found.ignored,
@@ -113,11 +111,6 @@ def choose(table: Table, request: Request, path: Path) -> Choice:
     }
     meta = {name: note for name, note in notes.items() if note}
     return Choice(channels, units, time, time_unit, meta)
-
-
-def _listed(items: list[str]) -> str:
-    more = f" and {len(items) - _LISTED} more" if len(items) > _LISTED else ""
-    return ", ".join(items[:_LISTED]) + more
 
 
 def _numbers(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
@@ -173,8 +174,8 @@ def by_units(units: Mapping[str, str]) -> dict[str, str]:
         quantity = QUANTITIES.get(unit)
         if untelling and quantity:
             found[name] = quantity + (f"_{untelling[1]}" if untelling[1] else "")
-    names = [found.get(name, name) for name in units]
-    return found if len(set(names)) == len(names) else {}
+    names = Counter(found.get(name, name) for name in units)
+    return {name: new for name, new in found.items() if names[new] == 1}
 
 
 def unit_of(channel: str) -> str | None:

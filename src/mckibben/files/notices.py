@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import inspect
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from pathlib import Path
@@ -16,6 +16,12 @@ _NOTED: ContextVar[list[str] | None] = ContextVar("noted", default=None)
 
 PLAIN = "; other columns of the file show that mark"
 """End of a note on what was understood and is hardly in doubt, so that nothing was assumed."""
+
+
+def listed(items: Sequence[str], most: int = 30) -> str:
+    """Return items side by side: the first of many, and how many more there are."""
+    more = f" and {len(items) - most} more" if len(items) > most else ""
+    return ", ".join(items[:most]) + more
 
 
 def is_plain(note: str) -> bool:

@@ -15,13 +15,14 @@ from mckibben.errors import DataError
 from mckibben.files import sources, timebase
 from mckibben.files.channels import about
 from mckibben.files.choosing import ASSUMED, Choice, choose
+from mckibben.files.fingerprint import fingerprint
 from mckibben.files.holes import Channels, treat
-from mckibben.files.notices import noted, warn
-from mckibben.files.request import Request
+from mckibben.files.notices import listed, noted, warn
+from mckibben.files.request import FEWEST, Request
 from mckibben.files.table import Table
 from mckibben.files.timebase import Span
 from mckibben.files.units import convert
-from mckibben.recording import Recording
+from mckibben.recording import AT, ROWS, Recording
 
 MAY_BE_HELD = frozenset(
     {"displacement", "length", "contraction", "angle", "velocity", "force", "temperature"}
@@ -157,20 +158,33 @@ def _recordings(table: Table, request: Request, path: Path, digest: str) -> list
     if measured is not None:
         timebase.check(measured, table, path)
     order = np.arange(n, dtype=float) if measured is None else measured
+    begin = table.start_time if choice.time is None else _seconds(choice.time[0], choice)
     channels, spans = treat(choice.channels, order, table, request, path)
     if request.informative:
         _refuse_constant(channels, spans, request, path)
     if measured is None:
-        begin = table.start_time if choice.time is None else _seconds(choice.time[0], choice)
         pieces = [
             Piece(_cut(channels, span), step, begin + (step or 1.0) * span[0])
-            for span in _long_enough(spans, request, path)
+            for span in _long_enough(spans, table, request, path)
         ]
     else:
         pieces = _on_grid(channels, measured, spans, choice, table, request, path)
     units = {name: choice.units[name] for name in channels}
+    when = (
+        begin + (step or 1.0) * order if measured is None else convert(order, choice.time_unit, "s")
+    )
+    rows = fingerprint({name: choice.channels[name] for name in channels}, when)
     meta = _meta(choice, table, path, digest)
-    found = [Recording(piece.samples, piece.step, units, piece.start, meta) for piece in pieces]
+    found = [
+        Recording(
+            piece.samples,
+            piece.step,
+            units,
+            piece.start,
+            ({ROWS: rows | {AT: piece.start}} if rows else {}) | meta,
+        )
+        for piece in pieces
+    ]
     if len(found) == 1:
         return found
     return [each.with_meta(name=f"{each.name}[{i}]") for i, each in enumerate(found, start=1)]
@@ -222,7 +236,7 @@ def _on_grid(
     bridged = bool(cuts) and request.gaps == "interpolate"
     stretches = _split(spans, cuts)
     if request.gaps == "split":
-        spans = stretches = _long_enough(stretches, request, path)
+        spans = stretches = _long_enough(stretches, table, request, path)
     step = timebase.common_step(time, stretches)
     seconds = _seconds(step.size, choice)
     if step.jitter is not None:
@@ -236,7 +250,7 @@ def _on_grid(
     if bridged:
         _announce_bridges(time, cuts, step.size, choice, path)
     pieces = []
-    for start, stop in _long_enough(spans, request, path):
+    for start, stop in _long_enough(spans, table, request, path):
         samples, t = _cut(channels, (start, stop)), time[start:stop]
         if bridged or step.jitter is not None:
             samples = {
@@ -273,22 +287,24 @@ def _refuse_constant(channels: Channels, spans: list[Span], request: Request, pa
             )
 
 
-def _long_enough(spans: list[Span], request: Request, path: Path) -> list[Span]:
-    """Return the spans that are not too short to be of use."""
-    kept = [span for span in spans if span[1] - span[0] >= request.fewest]
-    if not kept:
+def _long_enough(spans: list[Span], table: Table, request: Request, path: Path) -> list[Span]:
+    """Return the spans that are not too short to be of use: of a split, to any later step."""
+    fewest = FEWEST if len(spans) > 1 else request.fewest
+    short = [span for span in spans if span[1] - span[0] < fewest]
+    if len(short) == len(spans):
         raise DataError(
-            f"no stretch without gaps has {request.fewest} samples",
+            f"no stretch without gaps has {fewest} samples",
             file=path,
             remedy="say --gaps interpolate, or give a recording with fewer gaps",
         )
-    if len(kept) < len(spans):
+    if short:
+        rows = [f"{table.row(start)}" for start, _ in short]
         warn(
             path,
-            f"{len(spans) - len(kept)} of {len(spans)} stretches between gaps have fewer than "
-            f"{request.fewest} samples and were left out",
+            f"{len(short)} of {len(spans)} stretches between gaps have fewer than {fewest} samples, "
+            f"which no later step can use, and were left out: they begin in row {listed(rows)}",
         )
-    return kept
+    return [span for span in spans if span not in short]
 
 
 def _split(spans: list[Span], cuts: Sequence[int]) -> list[Span]:

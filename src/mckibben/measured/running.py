@@ -128,7 +128,11 @@ def outcomes(
                 outputs=task.outputs,
                 load=task.load,
                 models=task.models if models == "all" else models,
-                settings=task.settings,
+                settings={
+                    model: own
+                    for model, own in task.settings.items()
+                    if models in ("all", "quick") or model in models
+                },
                 n_folds=task.folds,
                 seed=seed,
                 jobs=jobs,

@@ -56,7 +56,7 @@ def low_pass(
         for name in _chosen(recording, channels)
         if np.ptp(recording[name])  # what is held stays held, to the bit
     }
-    return recording.with_channels({name: recording.units[name] for name in smooth}, **smooth)
+    return recording.processed(smooth)
 
 
 def detrend(recording: Recording, channels: Sequence[str] | None = None) -> Recording:
@@ -78,7 +78,7 @@ def detrend(recording: Recording, channels: Sequence[str] | None = None) -> Reco
         name: recording[name] - place * (place @ recording[name]) / (place @ place)
         for name in _chosen(recording, channels)
     }
-    return recording.with_channels({name: recording.units[name] for name in level}, **level)
+    return recording.processed(level)
 
 
 def _chosen(recording: Recording, channels: Sequence[str] | None) -> Sequence[str]:

@@ -54,7 +54,7 @@ def zeroed(recording: Recording, channels: Sequence[str], over: str) -> Recordin
         If there is no such channel.
     """
     level = {name: _known(recording, name) - rest(recording, name, over) for name in channels}
-    return recording.with_channels({name: recording.units[name] for name in level}, **level)
+    return recording.processed(level)
 
 
 def apart(recordings: Sequence[Recording], channel: str, over: str) -> tuple[float, float] | None:

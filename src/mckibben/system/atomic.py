@@ -34,9 +34,7 @@ def replacing(path: str | Path) -> Iterator[Path]:
     path = Path(path)
     with written(path):
         before = _replaceable(path)
-        new = path.with_name(f"{PART}{secrets.token_hex(8)}.part")
-        # created here and by nobody else: a file or link that was put there before is refused
-        os.close(os.open(new, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666))
+        new = _begun(path)
         try:
             if before is not None and stat.S_ISREG(before.st_mode):
                 new.chmod(stat.S_IMODE(before.st_mode) & 0o777)
@@ -64,6 +62,25 @@ def written(path: str | Path) -> Iterator[None]:
             file=path,
             remedy="give a path in a folder that can be written to, on a disk that is not full",
         ) from None
+
+
+def demand_room(path: Path) -> None:
+    """Refuse a path in whose folder nothing can be written, before any work is done for it.
+
+    Raises
+    ------
+    DataError
+        As `written`.
+    """
+    with written(path):
+        _begun(path).unlink()
+
+
+def _begun(path: Path) -> Path:
+    """Make a file beside one, here and by nobody else: one or a link that was put there is refused."""
+    new = path.with_name(f"{PART}{secrets.token_hex(8)}.part")
+    os.close(os.open(new, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666))
+    return new
 
 
 def _replaceable(path: Path) -> os.stat_result | None:

@@ -161,3 +161,16 @@ class ForceFeedforward(Block):
     def example(cls) -> Self:
         """Return a feedforward with a law that pulls at all lengths of 0 to 5 mm."""
         return cls(PolynomialForce((50.0, 5.0), (-10.0, 5.0)), MultistateFriction.example())
+
+
+def compensator(model: Block) -> Block:
+    """Return what gives a model's commands for a wished-for output: of a force its feedforward.
+
+    Of any other model that is its inverse.
+
+    Raises
+    ------
+    ModelError
+        If there is none.
+    """
+    return ForceFeedforward.of(model) or model.inverse()

@@ -129,5 +129,5 @@ def _check(recording: Recording, first: Recording, names: Sequence[str], one_rat
         raise DataError(
             f"the sample time is {ours:g} s here and {theirs:g} s in {first.source or first.name}",
             file=recording.source,
-            remedy="say --resample SECONDS, or use mckibben.signals.resample",
+            remedy=f"say --resample {max(ours, theirs):.3g}, or use mckibben.signals.resample",
         )

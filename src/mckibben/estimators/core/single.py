@@ -18,8 +18,10 @@ from mckibben.estimators.optimisers.tracker import Tracker
 from mckibben.recording import Recording
 
 MADE_OF_DISPLACEMENT = {
-    "length": ", and a length is the rest length less the displacement",
-    "contraction": ", and a contraction is the displacement over the rest length",
+    "length": ", and a length is the rest length less the displacement: read that column as length, "
+    "with gain -1 and the rest length as offset",
+    "contraction": ", and a contraction is the displacement over the rest length: read that column as "
+    "contraction, with a gain of 1 over the rest length",
 }
 """What of a recording's displacement is asked for."""
 

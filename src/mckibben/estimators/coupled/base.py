@@ -153,12 +153,13 @@ class CoupledEstimator(ErrorsUnknown, Estimator):
                         channel=name,
                         remedy="give all recordings the same channels, or name others",
                     )
-            if len(recording) < FEWEST_SAMPLES:
-                raise DataError(
-                    f"{len(recording)} samples are too few for this model",
-                    file=recording.source,
-                    remedy=f"give recordings of at least {FEWEST_SAMPLES} samples",
-                )
+        longest = max(map(len, every))
+        if longest < FEWEST_SAMPLES:  # shorter ones beside a longer one are passed over below
+            raise DataError(
+                f"{longest} samples are too few for this model",
+                file=first.source,
+                remedy=f"give recordings of at least {FEWEST_SAMPLES} samples",
+            )
         if not self.fits(len(inputs), len(outputs)):
             raise DataError(
                 f"there are {len(inputs)} inputs and {len(outputs)} outputs",
@@ -204,9 +205,9 @@ def _never_alone(recordings: Sequence[Recording], inputs: Sequence[str]) -> str 
 
 
 def driving(recording: Recording) -> tuple[str, ...]:
-    """Return the channels that drive the muscles of a recording, by their names."""
+    """Return the channels that drive the muscles of a recording, by name, the pressure first."""
     several = numbered(recording, "pressure") or numbered(recording, "voltage")
-    return several or one(recording, "voltage", "pressure")
+    return several or one(recording, "pressure", "voltage")
 
 
 def moved(recording: Recording) -> tuple[str, ...]:

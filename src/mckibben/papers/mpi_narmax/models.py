@@ -82,7 +82,8 @@ def fit_models(
         tell(0.2 + 0.55 * place / len(TOLD), name)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", ModelWarning)
-            estimator = registry.load("estimators", told.family)(seed=seed, **told.settings)
+            settings = {"seed": seed, "input": ("voltage",), **told.settings}
+            estimator = registry.load("estimators", told.family)(**settings)
             found = fitted(kept, name, estimator, [recordings[run] for run in told.runs])
         models[name] = found.block
         facts.append((name, told.learned, found.seconds, found.block.n_parameters))

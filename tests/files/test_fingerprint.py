@@ -1,0 +1,186 @@
+"""Rows that were read twice are found, whatever was done to the recordings since."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import mckibben
+from mckibben import DataError, Recording, write
+from mckibben.comparison.shared_stretches import shared_stretches, told
+from mckibben.files.fingerprint import FEWEST, shared_rows
+from mckibben.recording import ROWS
+from mckibben.report import write_report
+from mckibben.signals import irregular_triangle, low_pass, resample, triangle, zeroed
+
+STEP = 0.02
+TIME = np.arange(0, 60, STEP)
+DRIVEN = irregular_triangle(TIME, 12, 5.0, seed=3)
+INPUT, OUTPUT = ["pressure"], ["displacement"]
+
+
+def measured(seed: int) -> np.ndarray:
+    """Rows of time, pressure and displacement, as a sensor of 12 bits gives them."""
+    rng = np.random.default_rng(seed)
+    moved = mckibben.GPI.example().simulate(DRIVEN) + 0.02 * rng.standard_normal(TIME.size)
+    return np.column_stack([TIME, DRIVEN, np.round(moved / 0.01) * 0.01])
+
+
+ROWS_READ = measured(0)
+
+
+def written(path: Path, rows: np.ndarray, jitter: int | None = None) -> Path:
+    time = rows[:, 0]
+    if jitter is not None:
+        time = time + 0.0015 * np.random.default_rng(jitter).uniform(-1, 1, time.size)
+    table = np.column_stack([time, rows[:, 1:]])
+    np.savetxt(
+        path,
+        table,
+        "%.7g",
+        delimiter=",",
+        header="time [s],pressure [bar],displacement [mm]",
+        comments="",
+    )
+    return path
+
+
+def read(path: Path) -> Recording:
+    (found,) = mckibben.read(path)
+    return found
+
+
+CHANGES: dict[str, Callable[[Recording], Recording]] = {
+    "resampled": lambda one: resample(one, 0.03),
+    "zeroed": lambda one: zeroed(one, OUTPUT, "pressure"),
+    "filtered": lambda one: low_pass(one, 5.0),
+}
+
+
+@pytest.mark.filterwarnings("ignore:.*not uniform:mckibben.DataWarning")
+@pytest.mark.parametrize("change", [*CHANGES, "jittered"])
+def test_shared_rows_are_found_after_every_sample_was_changed(tmp_path: Path, change: str) -> None:
+    jittered = change == "jittered"
+    fitted = read(written(tmp_path / "fitted.csv", ROWS_READ[:2000], 1 if jittered else None))
+    tested = read(written(tmp_path / "tested.csv", ROWS_READ[1200:], 2 if jittered else None))
+    if not jittered:
+        fitted, tested = CHANGES[change](fitted), CHANGES[change](tested)
+    (found,) = shared_stretches([fitted, tested], ["pressure"], OUTPUT)
+    assert found.start == pytest.approx(TIME[1200], abs=2)
+    assert found.begins == pytest.approx(found.start, abs=0.01)
+    assert found.share == pytest.approx(800 / 1800, abs=0.1)
+    with pytest.raises(DataError, match=r"fitted to.*those of fitted from"):
+        told({"fit": [fitted], "test": [tested]}, ["pressure"], OUTPUT)
+
+
+def test_they_are_found_in_what_was_written_and_read_again(tmp_path: Path) -> None:
+    whole = read(written(tmp_path / "whole.csv", ROWS_READ))
+    kept = tmp_path / "resampled.csv"
+    mckibben.write(resample(whole, 0.05), kept)
+    assert shared_rows(whole, read(kept), INPUT, OUTPUT)
+
+
+def test_rows_in_pieces_of_another_order_are_found(tmp_path: Path) -> None:
+    rng = np.random.default_rng(5)
+    pieces = rng.permutation(np.split(ROWS_READ[:, 1:], 30), axis=0)
+    shuffled = np.column_stack([TIME, np.concatenate(list(pieces))])
+    first, second = (
+        read(written(tmp_path / f"{name}.csv", rows))
+        for name, rows in (("whole", ROWS_READ), ("shuffled", shuffled))
+    )
+    found = shared_rows(first, second, INPUT, OUTPUT)
+    assert found is not None
+    assert found.share > 0.3
+
+
+def test_parts_of_one_recording_that_do_not_overlap_share_nothing(tmp_path: Path) -> None:
+    whole = resample(read(written(tmp_path / "whole.csv", ROWS_READ)), 0.03)
+    assert shared_rows(whole.slice(0, 1200), whole.slice(1200, len(whole)), INPUT, OUTPUT) is None
+    assert shared_rows(whole.slice(0, 1200), whole.slice(1100, len(whole)), INPUT, OUTPUT)
+
+
+def test_parts_keep_their_rows_whatever_their_time_is(tmp_path: Path) -> None:
+    whole = read(written(tmp_path / "whole.csv", ROWS_READ))
+    parts = [replace(whole.slice(k, k + 1000), start_time=0.0) for k in (0, 1000, 500)]
+    assert shared_rows(parts[0], parts[1], INPUT, OUTPUT) is None
+    moved = replace(resample(parts[2], 0.03), start_time=-7.0)
+    found = shared_rows(whole, moved, INPUT, OUTPUT)
+    assert found is not None
+    assert found.share > 0.9
+    assert found.begins - found.start == pytest.approx(TIME[500] + 7.0)
+    write(parts[1], tmp_path / "part.csv")
+    assert shared_rows(parts[0], read(tmp_path / "part.csv"), INPUT, OUTPUT) is None
+
+
+def test_a_coarse_sensor_gives_no_rows_away_where_the_input_has_noise(tmp_path: Path) -> None:
+    time = np.arange(0, 300, 0.1)
+    runs = []
+    for seed in range(2):
+        rng = np.random.default_rng(seed)
+        driven = triangle(time, 10.0, 4.0)
+        pressure = np.round(driven + 0.01 * rng.standard_normal(time.size), 3)
+        moved = np.round(6.0 * driven + 0.05 * rng.standard_normal(time.size))
+        runs.append(
+            read(written(tmp_path / f"{seed}.csv", np.column_stack([time, pressure, moved])))
+        )
+    assert shared_rows(runs[0], runs[1], [], OUTPUT)
+    assert shared_rows(runs[0], runs[1], INPUT, OUTPUT) is None
+
+
+def test_runs_of_the_same_commands_share_nothing(tmp_path: Path) -> None:
+    runs = [read(written(tmp_path / f"{seed}.csv", measured(seed))) for seed in range(4)]
+    assert not [
+        (k, m) for k in range(4) for m in range(k) if shared_rows(runs[k], runs[m], INPUT, OUTPUT)
+    ]
+
+
+def test_what_a_model_gave_in_place_of_what_was_read_has_no_rows(tmp_path: Path) -> None:
+    whole = read(written(tmp_path / "whole.csv", ROWS_READ))
+    simulated = mckibben.GPI.example().simulate(whole)
+    assert shared_rows(whole, simulated, INPUT, OUTPUT) is None
+    assert shared_rows(whole, whole, INPUT, OUTPUT)
+
+
+def test_fingerprints_stay_small_and_damaged_ones_are_none(tmp_path: Path) -> None:
+    whole = read(written(tmp_path / "whole.csv", ROWS_READ))
+    assert len(whole.meta[ROWS]["displacement"]) <= 4 * np.ceil(16 * FEWEST / 3)
+    for damaged in (
+        3,
+        "rows",
+        {"displacement": 4},
+        {"displacement": "AAAA"},
+        {"displacement": "ä"},
+    ):
+        assert shared_rows(whole.with_meta(**{ROWS: damaged}), whole, INPUT, OUTPUT) is None
+
+
+def test_without_time_rows_are_counted(tmp_path: Path) -> None:
+    paths = [tmp_path / "first.csv", tmp_path / "second.csv"]
+    for path, rows in zip(paths, (ROWS_READ[:2000, 1:], ROWS_READ[500:, 1:]), strict=True):
+        np.savetxt(
+            path,
+            rows,
+            "%.7g",
+            delimiter=",",
+            header="pressure [bar],displacement [mm]",
+            comments="",
+        )
+    first, second = (zeroed(read(path), OUTPUT, "pressure") for path in paths)
+    found = shared_rows(first, second, INPUT, OUTPUT)
+    assert found is not None
+    assert found.begins == found.start + 500
+
+
+def test_it_is_nothing_that_a_person_is_shown(tmp_path: Path) -> None:
+    whole = read(written(tmp_path / "whole.csv", ROWS_READ))
+    assert ROWS in whole.meta
+    assert whole.known == {key: what for key, what in whole.meta.items() if key != ROWS}
+    study = mckibben.study(whole, models=["pi"])
+    write_report(study, tmp_path / "report.html")
+    page = (tmp_path / "report.html").read_text("utf-8")
+    assert "What is known" in page
+    assert whole.meta[ROWS]["displacement"][:20] not in page

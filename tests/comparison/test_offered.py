@@ -17,6 +17,12 @@ def test_a_model_is_told_by_what_it_can_and_not_by_how_it_is_fitted() -> None:
     assert "Asymmetric, saturating loops between two envelopes" in summary("gpi")
 
 
+def test_settings_of_another_model_are_refused() -> None:
+    for name in ("gpi", "pii"):
+        with pytest.raises(ModelError, match=f"is of {name}, and this is pi"):
+            settings_of("pi", [f"{name}.seed=3"])
+
+
 def test_settings_are_read_as_json_or_words() -> None:
     found = settings_of(
         "pi",
@@ -25,13 +31,14 @@ def test_settings_are_read_as_json_or_words() -> None:
             "nonnegative=false",
             "spacing=dense",
             "thresholds=[0, 0.5]",
-            "gpi.seed=3",
+            "pi.seed=3",
         ],
     )
     assert found == {
         "n_operators": 7,
         "nonnegative": False,
         "spacing": "dense",
+        "seed": 3,
         "thresholds": (0, 0.5),
     }
     with pytest.raises(ModelError, match="Remedy"):

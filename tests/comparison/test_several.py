@@ -33,7 +33,7 @@ def test_channels_are_found_by_name() -> None:
     names = ("pressure", "voltage", "displacement", "force")
     single = Recording(dict.fromkeys(names, TIME.astype(np.float64)))
     assert channels_of([single], None, None, None).inputs == ("pressure",)
-    assert channels_of([single], None, None, "force").inputs == ("voltage",)
+    assert channels_of([single], None, None, "force").inputs == ("pressure",)
     t = TIME.astype(np.float64)
     wing = Recording({"voltage": t, "angle": t}, 0.1)
     assert channels_of([wing], None, None, None) == Channels(("voltage",), ("angle",))

@@ -6,6 +6,10 @@ import numpy as np
 import pytest
 
 from mckibben import PI, Recording
+from mckibben.blocks.compose import Parallel
+from mckibben.blocks.force.feedforward import ForceFeedforward
+from mckibben.blocks.force.tondu_lopez import TonduLopez
+from mckibben.comparison.row import Row
 from mckibben.registry import load
 from mckibben.studying.inverting import check_inverse
 
@@ -42,3 +46,19 @@ def test_several_muscles_stand_beside_no_compensation_too() -> None:
     assert found.uncompensated.shape == (400, 2)
     assert found.uncompensated_error is not None
     assert found.uncompensated_error > 10 * found.error
+
+
+def test_a_force_is_compensated_alike_in_the_leaderboard_and_in_the_check() -> None:
+    ahead = ForceFeedforward.example()
+    model, t = ahead.undone, np.arange(400) * 0.05
+    assert isinstance(model, Parallel)
+    driven = {"length": 2.0 + np.sin(t), "pressure": 2.5 - 2.0 * np.cos(0.3 * t)}
+    found = check_inverse(
+        "force", model, model.simulate(Recording(driven, 0.05)).with_channels(**driven)
+    )
+    row = Row("force", block=model)
+    assert found.inverse == row.inverse == ahead
+    assert (found.given, row.to_dict()["inverse"]) == ("pressure", "exact")
+    assert found.error < 1e-9
+    assert found.uncompensated_error is None
+    assert Row("force", block=TonduLopez.example()).to_dict()["inverse"] == "none"

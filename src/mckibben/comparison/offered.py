@@ -82,7 +82,9 @@ def settings_of(model: str, written: Iterable[str]) -> dict[str, Any]:
     for item in written:
         owner, name = _parted(item)
         if owner not in (None, model):
-            continue
+            raise ModelError(
+                f"{item!r} is of {owner}, and this is {model}. Remedy: leave it out, or mend the name."
+            )
         _, equals, text = item.partition("=")
         if not equals or name not in known:
             raise ModelError(

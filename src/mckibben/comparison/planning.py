@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from mckibben import registry
+from mckibben.comparison.belonging import unlike, zeros
 from mckibben.comparison.channels import Channels, Names, channels_of, where_held
 from mckibben.comparison.constant import constant_of
 from mckibben.comparison.coverage import Coverage, coverage_of
@@ -25,7 +26,6 @@ from mckibben.errors import DataError, ModelError
 from mckibben.estimators.coupled.base import CoupledEstimator, schedules
 from mckibben.recording import Recording, listed, reading_notes
 from mckibben.signals import made_manageable
-from mckibben.signals.zeroing import apart
 
 Settings = Mapping[str, Mapping[str, Any]]
 
@@ -71,6 +71,8 @@ class Plan:
         What was done to the recordings.
     shared : tuple of str
         Where recordings are the same data.
+    apart : str
+        Why one model cannot follow some recordings: their signs, zeros, muscles; empty where it can.
     """
 
     data: Data
@@ -82,6 +84,7 @@ class Plan:
     left_out: Mapping[str, str]
     notes: tuple[str, ...]
     shared: tuple[str, ...] = ()
+    apart: str = ""
 
     @cached_property
     def constant(self) -> Tried:
@@ -128,6 +131,7 @@ class Plan:
             notes=self.notes,
             constant=self.constant.row,
             shared=self.shared,
+            apart=self.apart,
         )
 
 
@@ -148,6 +152,8 @@ def plan_of(
 ) -> Plan:
     """Return what a comparison is to do; see `compare`."""
     recordings, tests, checks = listed(train), listed(test), listed(validation)
+    if not isinstance(n_folds, int) or n_folds < 0:
+        raise ModelError(f"there cannot be {n_folds!r:.60} folds. Remedy: give 0, 1, 2 or more.")
     if not recordings:
         raise DataError("there are no recordings to fit", remedy="give at least one")
     every = [*recordings, *tests, *checks]
@@ -196,6 +202,12 @@ def plan_of(
         )
     efforts = {model: registry.load("estimators", model).effort for model in chosen}
     given = settings or {}
+    some = models not in ("all", "quick")
+    if lost := sorted(set(given) - {*(chosen if some else registry.names("estimators")), PER_LOAD}):
+        raise ModelError(
+            f"settings are given for {', '.join(lost)}, and no such model is compared. "
+            "Remedy: add it to the models, or leave its settings out."
+        )
     items = {
         model: Item(model, {"seed": seed} | dict(given.get(model, {})))
         for model in sorted(chosen, key=efforts.__getitem__)
@@ -203,6 +215,7 @@ def plan_of(
     if load is not None and not objections([PER_LOAD], every, replace(channels, scheduling=None)):
         own = {"seed": seed} | dict(given.get(PER_LOAD, {}))
         items |= _one_for_each_load(split.train, load, own)
+    different = _unlike(every, channels)
     return Plan(
         data=Data(split, parts, channels, tuple(checks)),
         items=items,
@@ -214,13 +227,14 @@ def plan_of(
         notes=(
             *notes,
             *held,
-            *_of_several_zeros(every, channels),
+            *different,
             *_about_load(every, channels, load, chosen),
             *_beyond_training(split.train, tests, channels),
             *shared,
             *reading_notes(every),
         ),
         shared=shared,
+        apart=". ".join(f"{one[0].upper()}{one[1:]}" for one in different),
     )
 
 
@@ -274,17 +288,14 @@ def _about_load(
             yield f"{name} is there, and {told_of} is told it: see --load {name}"
 
 
-def _of_several_zeros(recordings: Sequence[Recording], channels: Channels) -> Iterator[str]:
-    """Tell of recordings that rest at different outputs, where no load tells why."""
-    if not channels.single or schedules(recordings):
-        return
-    (given,), (wanted,) = channels.inputs, channels.outputs
-    if found := apart(recordings, wanted, given):
-        yield (
-            f"{wanted} rests at {found[0]:.3g} to {found[1]:.3g} {recordings[0].units[wanted]} where "
-            f"{given} is lowest: a sensor was zeroed anew, or another load hung there. Models take it "
-            f"for what {given} does; see --zero {wanted} and mckibben.signals.zeroed"
-        )
+def _unlike(recordings: Sequence[Recording], channels: Channels) -> tuple[str, ...]:
+    """Return why one model cannot follow some recordings, in words."""
+    if len(channels.outputs) > 1:
+        return ()
+    loads = schedules(recordings, (*channels.inputs, *channels.outputs))
+    names = (*channels.inputs, *channels.scheduled(recordings), *loads)
+    known = (recordings, names, channels.outputs[0], loads)
+    return (*unlike(*known), *zeros(*known))
 
 
 def _beyond_training(
@@ -313,6 +324,10 @@ def _chosen(
     """Return the models to try, and why others of "all" have no place on these recordings."""
     if models not in ("all", "quick"):
         named = models.split(",") if isinstance(models, str) else models
+        if not (isinstance(named, Iterable) and all(isinstance(name, str) for name in named)):
+            raise ModelError(
+                f"models cannot be {models!r:.60}. Remedy: give 'all', 'quick', or a list of names."
+            )
         return tuple(dict.fromkeys(name.strip() for name in named)), {}
     names = registry.names("estimators") if models == "all" else QUICK
     left_out = objections(names, recordings, channels)

@@ -26,6 +26,7 @@ from mckibben.comparison.resampling import Resampling
 from mckibben.comparison.results import CHOICES, Leaderboard
 from mckibben.comparison.row import Row
 from mckibben.comparison.standing import Standing
+from mckibben.comparison.starts import start_of
 from mckibben.comparison.trying import (
     Tried,
     effort_of,
@@ -302,8 +303,7 @@ def _ranking(
         if tried.row is not None and tried.row.test is not None
     }
     errors = {model: errors_on_test(tried.outputs, plan.data) for model, tried in tested.items()}
-    own = errors_on_test(plan.constant.outputs, plan.data)
-    samples = resampling.of(errors, CONSTANT, own)
+    samples = resampling.of(errors, CONSTANT, errors_on_test(plan.constant.outputs, plan.data))
     done = sorted((t.row for t in tested.values() if t.row is not None), key=lambda row: row.order)
     by_test = sorted(map(_rmse, done))
     rows = [
@@ -313,6 +313,7 @@ def _ranking(
             rmse_interval=interval(samples[row.model]),
             off_training=_off_training(row, finished[row.model].outputs, plan),
             drift=drift(row.model),
+            start=start_of(errors[row.model], plan.data.split),
         )
         for row in done
     ]
@@ -378,8 +379,7 @@ def _drift(outputs: Sequence[Array], plan: Plan) -> Drift | None:
                 recordings, outputs, inputs, rows, strict=True
             )
         ]
-        unit = split.test[0].units[name]
-        found.append(drift_of(stretches[:n], stretches[n:], step, name, unit))
+        found.append(drift_of(stretches[:n], stretches[n:], step, name, split.test[0].units[name]))
     told = [drift for drift in found if drift is not None]
     return max(told, key=lambda drift: (drift.certain, drift.share), default=None)
 

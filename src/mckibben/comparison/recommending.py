@@ -8,6 +8,9 @@ from typing import Protocol, TypeVar
 from mckibben.comparison.limits import caution
 from mckibben.numerals import numeral
 
+NONE = "No model is recommended: "
+"""How the reasons begin."""
+
 CONSTANT = "constant"
 """Name of the row that predicts the mean of the training output, whatever the input: never chosen."""
 
@@ -31,6 +34,12 @@ class Ranked(Protocol):
     def test_error(self) -> float:
         """RMSE on the test data, infinite where there is none."""
 
+
+USEFUL = 0.9
+"""Share of the constant's error on the test from which on a model is of no use."""
+
+DOUBTED = 0.5
+"""The same where recordings are known not to go together."""
 
 R = TypeVar("R", bound=Ranked)
 
@@ -61,13 +70,15 @@ def order(
     return validated is None, idle, caution(model) is not None, last, model
 
 
-def recommended(rows: Sequence[R], constant: Ranked | None, unit: str) -> tuple[R | None, str]:
+def recommended(
+    rows: Sequence[R], constant: Ranked | None, unit: str, apart: str = ""
+) -> tuple[R | None, str]:
     """Return the model to recommend, or None and why there is none.
 
     It is the first in the order of the choice that beats the constant in the cross-validation beyond
     what resampling its blocks gives. The test does not choose, but it may take the recommendation
-    away: a model that is no better there than the constant is not to be used, and no other is chosen
-    in its place, since that would be a choice by the test.
+    away: a model that is hardly better there than the constant is not to be used, and no other is
+    chosen in its place, since that would be a choice by the test.
 
     Parameters
     ----------
@@ -77,6 +88,8 @@ def recommended(rows: Sequence[R], constant: Ranked | None, unit: str) -> tuple[
         The constant's; without one the first that did not fail is recommended.
     unit : str
         Of the errors.
+    apart : str
+        What sets recordings apart, which is then why.
     """
     working = [row for row in rows if row.reason is None]
     if not working:
@@ -84,19 +97,33 @@ def recommended(rows: Sequence[R], constant: Ranked | None, unit: str) -> tuple[
     judged = [row for row in working if row.skill_least is not None]
     better = [row for row in judged if row.skill_least is not None and row.skill_least > 0]
     if judged and not better:
+        told = [row for row in judged if _beats(row, constant)]
         return None, (
-            "No model is recommended: on what was left out to validate them, none predicts better than "
-            "the mean of the training output beyond what chance gives. As far as these models can tell "
-            "from so much data, the output does not depend on the input; where it does, it may be by "
-            "lags or dynamics that they lack, and models of rate have (oe, narx, bouc-wen-oscillator)"
+            f"{NONE}on what was left out to validate them, none predicts better than "
+            "the mean of the training output beyond what chance gives. "
+            + (
+                apart
+                or (
+                    f"On the test {told[0].model} does, at {_error(told[0], unit)}: too little was left "
+                    "out to tell. Record more, or give recordings to validate on"
+                    if told
+                    else "As far as these models can tell from so much data, the output does not depend "
+                    "on the input; where it does, it may be by lags or dynamics that they lack, and "
+                    "models of rate have (oe, narx, bouc-wen-oscillator)"
+                )
+            )
         )
     first = (better or working)[0]
-    if constant is not None and not first.test_error < constant.test_error:
+    if constant is not None and not _beats(first, constant, DOUBTED if apart else USEFUL):
         return None, (
-            f"No model is recommended: {first.model} has the least error of those on the training "
+            f"{NONE}{first.model} has the least error of those on the training "
             f"side, but on the test data it is off by {_error(first, unit)} RMSE, and the mean of the "
-            f"training output by {_error(constant, unit)}. The test differs from what was trained on, "
-            "or training is too little: record more, or more alike"
+            f"training output by {_error(constant, unit)}. "
+            + (
+                apart
+                or "The test differs from what was trained on, or training is too little: record more, "
+                "or more alike"
+            )
         )
     return first, ""
 
@@ -105,8 +132,11 @@ def acceptable(row: Ranked, constant: Ranked | None) -> bool:
     """Tell whether nothing is known against a row beside one that is recommended."""
     if row.reason is not None or constant is None:
         return row.reason is None
-    judged = row.skill_least is None or row.skill_least > 0
-    return judged and row.test_error < constant.test_error
+    return (row.skill_least is None or row.skill_least > 0) and _beats(row, constant)
+
+
+def _beats(row: Ranked, constant: Ranked | None, share: float = USEFUL) -> bool:
+    return constant is not None and row.test_error < share * constant.test_error
 
 
 def _error(row: Ranked, unit: str) -> str:

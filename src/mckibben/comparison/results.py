@@ -59,6 +59,8 @@ class Leaderboard(DrawsItself):
         The mean of the training output as a model: what every model has to beat.
     shared : tuple of str
         Where recordings to fit to and to test on are the same data, which the user insisted on.
+    apart : str
+        Why one model cannot follow some recordings: their signs, zeros, muscles; empty where it can.
     choice : Choice or None
         What choosing among so many costs; None without a cross-validation to resample.
     """
@@ -80,6 +82,7 @@ class Leaderboard(DrawsItself):
     stopped: bool = False
     constant: Row | None = None
     shared: tuple[str, ...] = ()
+    apart: str = ""
     choice: Choice | None = None
 
     def __repr__(self) -> str:
@@ -104,7 +107,7 @@ class Leaderboard(DrawsItself):
         run on it at all has failed, and that nothing is recommended where the choice is no better there
         than the constant; see `recommended`.
         """
-        return recommended(self.rows, self.constant, self.unit)[0]
+        return recommended(self.rows, self.constant, self.unit, self.apart)[0]
 
     @property
     def level(self) -> tuple[str, ...]:
@@ -115,7 +118,7 @@ class Leaderboard(DrawsItself):
     @property
     def not_recommended(self) -> str:
         """Why no model is recommended though some worked; else empty."""
-        return recommended(self.rows, self.constant, self.unit)[1]
+        return recommended(self.rows, self.constant, self.unit, self.apart)[1]
 
     @property
     def off_training(self) -> tuple[str, ...]:
@@ -124,9 +127,12 @@ class Leaderboard(DrawsItself):
 
     @property
     def drift(self) -> str:
-        """How the chosen model's error drifts on the test, and what to do about it, if it does."""
+        """How the chosen model's error drifts on the test, and what to do about it, if it does.
+
+        What lies between recordings that do not belong together is no drift.
+        """
         best = self.best
-        if best is None or best.drift is None or not best.drift.certain:
+        if self.apart or best is None or best.drift is None or not best.drift.certain:
             return ""
         better = [row for row in self.rows if row.test_error < best.test_error and row.drift]
         without = [row.model for row in better if row.drift and row.drift.foresees(best.drift)]
@@ -137,13 +143,13 @@ class Leaderboard(DrawsItself):
 
     @property
     def of_models(self) -> tuple[str, ...]:
-        """What is to be said: `choice`, `off_training`, `drift`, and of the chosen one's fit."""
+        """What is to be said: `choice`, `off_training`, `drift`, of the chosen one's test and fit."""
         best = self.best
         drift = [self.drift] if self.drift else []
         if best is None:
             return (*self.off_training, *drift)
         price = [] if self.choice is None else [self.choice.said(self.unit)]
-        said = [*([best.band] if best.band else []), *best.diagnostics.get("notes", ())]
+        said = [*filter(None, (best.start, best.band)), *best.diagnostics.get("notes", ())]
         return (
             *filter(None, price),
             *self.off_training,

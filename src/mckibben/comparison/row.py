@@ -10,12 +10,14 @@ from typing import Any, ClassVar
 import numpy as np
 
 from mckibben.blocks.core.block import Block
+from mckibben.blocks.force.feedforward import compensator
 from mckibben.comparison.banding import TestedBand
 from mckibben.comparison.coverage import OffTraining
 from mckibben.comparison.drift import Drift
 from mckibben.comparison.inverses import inverse_of
 from mckibben.comparison.limits import caution
 from mckibben.comparison.recommending import CONSTANT, order
+from mckibben.comparison.starts import Start
 from mckibben.errors import MckibbenError
 from mckibben.metrics import Scores
 
@@ -90,6 +92,8 @@ class Row:
     drift : Drift or None
         The slow part of the error on the test, of the output where it is largest; None of tests without
         time, or too short to tell.
+    start : Start or None
+        The start of the test, where most of the error lies there.
     band : TestedBand or None
         How its band does on the test, of the chosen model.
     block, banded : Block or None
@@ -119,6 +123,7 @@ class Row:
     memory: Memory | None = None
     off_training: OffTraining | None = None
     drift: Drift | None = None
+    start: Start | None = None
     band: TestedBand | None = None
     block: Block | None = field(default=None, repr=False)
     banded: Block | None = field(default=None, repr=False)
@@ -153,9 +158,9 @@ class Row:
 
     @cached_property
     def inverse(self) -> Block | None:
-        """The model's inverse, or None where it has none."""
+        """What undoes the model, or None where nothing does."""
         try:
-            return None if self.block is None else self.block.inverse()
+            return None if self.block is None else compensator(self.block)
         except MckibbenError:
             return None
 
@@ -205,6 +210,7 @@ class Row:
             "memory": None if self.memory is None else asdict(self.memory),
             "off_training": None if self.off_training is None else self.off_training.to_dict(),
             "drift": None if self.drift is None else self.drift.to_dict(),
+            "start": None if self.start is None else self.start.to_dict(),
             "band": None if self.band is None else self.band.to_dict(),
             "rate_dependent": self.block is not None and bool(self.block.rate_dependent),
             "invertible": self.inverse is not None,

@@ -152,6 +152,11 @@ def next_steps(study: Study) -> list[str]:
             f"Load this page again while models are fitted: {done} of {done + left} are done, "
             f"{_listed(pending)} to come. If the work was stopped, the same command goes on."
         ]
+    if study.leaderboard.not_recommended and study.leaderboard.apart:
+        return [
+            f"{study.leaderboard.apart}. Mend that first, and fit again: --zero {study.output} gives "
+            "one zero, a channel force says what load hung there, other muscles are studied apart."
+        ]
     if study.leaderboard.not_recommended:
         if others := _better_on_the_test(study.leaderboard):
             return [
@@ -208,7 +213,7 @@ def _feedforward(study: Study, check: InverseCheck, best: Row) -> str:
     of = "" if check.model == best.model else f" of {check.model}"
     return (
         f"Use the inverse{of} as feedforward: inverse.json turns a wished-for {study.output} into "
-        f"{study.input} (command at the end). On the muscle itself expect the error of "
+        f"{check.given} (command at the end). On the muscle itself expect the error of "
         f"{check.model if of else 'the model'}, not of the inverse."
     )
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from mckibben.arrays import Array
 from mckibben.blocks.core.block import Block
+from mckibben.blocks.force.feedforward import compensator
 from mckibben.comparison.recommending import acceptable
 from mckibben.comparison.results import Leaderboard
 from mckibben.control.uncompensated import RISE, curve
@@ -70,6 +71,11 @@ class InverseCheck:
     uncompensated_error: float | None = None
     own: bool = False
 
+    @property
+    def given(self) -> str:
+        """What the inverse gives, in words."""
+        return ", ".join(channel.name for channel in self.inverse.outputs)
+
     def to_dict(self) -> dict[str, Any]:
         """Return which model is inverted, and how well."""
         reachable = None if self.reachable is None else list(self.reachable)
@@ -84,8 +90,12 @@ def invert_best(board: Leaderboard, recording: Recording) -> InverseCheck | None
     """
     if board.best is None:
         return None
+    judged = board.best.skill_least is not None
     for row in board.rows:
-        if row.block is None or not acceptable(row, board.constant):
+        unknown = (
+            judged and row.skill_least is None
+        )  # only the test speaks for it, which is no choice
+        if row.block is None or unknown or not acceptable(row, board.constant):
             continue
         try:
             return check_inverse(row.model, row.block, recording)
@@ -115,7 +125,7 @@ def check_inverse(model: str, block: Block, recording: Recording) -> InverseChec
         If the model has no inverse, nothing can be reached whatever happened before, or the inverse
         does not follow the reference.
     """
-    inverse = block.inverse()
+    inverse = compensator(block)
     if len(block.inputs) > 1:
         return _check_on_motion(model, block, inverse, recording)
     lows, highs = block.reachable()
@@ -177,17 +187,18 @@ def _check_on_motion(
 ) -> InverseCheck:
     """Send a recording's motion through an inverse and back through the model."""
     names = [channel.name for channel in block.outputs]
-    held = [name for name in block.scheduling if name in recording]
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ModelWarning)
         wanted = recording.select([channel.name for channel in inverse.inputs])
         given = inverse.simulate(wanted)
-        scheduled = {name: recording[name] for name in held if name not in given}
-        driven = given.with_channels(**scheduled).select([c.name for c in block.inputs])
+        told = {c.name: recording[c.name] for c in block.inputs if c.name not in given}
+        driven = given.with_channels(**told).select([c.name for c in block.inputs])
         output = block.simulate(driven).matrix(names)
     reference = recording.matrix(names)
     span = np.maximum(np.ptp(reference, axis=0), np.finfo(float).tiny)
-    plain = _without(block, recording, reference, recording.sample_time)
+    commanded = inverse.outputs == block.inputs[: len(inverse.outputs)]
+    step = recording.sample_time
+    plain = _without(block, recording, reference, step) if commanded else None
     return InverseCheck(
         model=model,
         inverse=inverse,

@@ -1,0 +1,171 @@
+"""Whether recordings belong together: of one sign, one zero and one muscle."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from mckibben.comparison.recognising import DRIVING
+from mckibben.recording import Recording
+from mckibben.signals.zeroing import apart
+
+COVERS = 0.7
+"""Share of the widest range of the input that recordings cover whose travel is compared."""
+
+ENDS = 0.1
+"""Share of the range that both have at whose ends the travel is read."""
+
+OTHER = 1.5
+"""Ratio of two travels from which on it is another muscle, or another speed."""
+
+REPEATED, WITHIN = 1.1, 0.2
+"""The same where all repeat: of parts that spread by at most such a share of what is between them."""
+
+STILL = 0.02
+"""Share of a channel's largest range, or value, below which it is held in a recording."""
+
+
+@dataclass(frozen=True)
+class Travel:
+    """How far an output moves over the part of an input's range that some recordings share.
+
+    Parameters
+    ----------
+    given, wanted : str
+        Input and output.
+    low, high : float
+        Ends of that part.
+    by_name : tuple of (str, float)
+        Recordings and their travel, from the least to the most.
+    """
+
+    given: str
+    wanted: str
+    low: float
+    high: float
+    by_name: tuple[tuple[str, float], ...]
+
+    @property
+    def turned(self) -> bool:
+        """Whether some move the other way."""
+        return self.by_name[0][1] < 0 < self.by_name[-1][1]
+
+    @property
+    def differs(self) -> bool:
+        """Whether some move so much more than others that they are not of one muscle."""
+        sizes = np.sort(np.abs([travel for _, travel in self.by_name]))
+        if sizes[-1] > OTHER * sizes[0]:
+            return True
+        between = np.diff(sizes)
+        place = int(np.argmax(between)) + 1
+        parts = sizes[:place], sizes[place:]
+        spread = max(float(np.ptp(part)) for part in parts)
+        repeated = min(part.size for part in parts) > 1
+        means = parts[1].mean() > REPEATED * parts[0].mean()
+        return repeated and means and spread <= WITHIN * float(between.max())
+
+    def said(self, units: Mapping[str, str]) -> str:
+        """Return it in words."""
+        (least, less), (most, more) = self.by_name[0], self.by_name[-1]
+        if not self.turned and abs(less) > abs(more):
+            (least, less), (most, more) = (most, more), (least, less)
+        return (
+            f"over {self.low:.3g} to {self.high:.3g} {units[self.given]} of {self.given}, {self.wanted} "
+            f"moves by {less:.3g} {units[self.wanted]} in {least} and by {more:.3g} in {most}"
+        )
+
+
+def alike(
+    recordings: Sequence[Recording], names: Sequence[str], wanted: str
+) -> Iterator[tuple[str, list[Recording]]]:
+    """Yield the one input that moves, and the recordings in which all else is held alike.
+
+    Parameters
+    ----------
+    recordings : sequence of Recording
+    names : sequence of str
+        Inputs, loads and what else may be held.
+    wanted : str
+        Output.
+    """
+    known = [one for one in recordings if wanted in one]
+    if not known:
+        return
+    every = [n for n in (*names, *DRIVING) if n != wanted and all(n in one for one in known)]
+    sizes = {n: max(float(np.abs(one[n]).max()) for one in known) for n in every}
+    moves = {n: [np.ptp(one[n]) > STILL * sizes[n] for one in known] for n in every}
+    driven = any(any(moves[name]) for name in names if name in moves)
+    beside = [n for n in dict.fromkeys(every) if n in names or not driven]
+    groups: dict[tuple[str, ...], list[Recording]] = {}
+    for place, one in enumerate(known):
+        moving = [name for name in beside if moves[name][place]]
+        if len(moving) == 1:
+            rests = [f"{n} {np.median(one[n]):.2g}" for n in beside if n not in moving]
+            groups.setdefault((moving[0], *rests), []).append(one)
+    for (given, *_), group in groups.items():
+        yield given, group
+
+
+def travels(recordings: Sequence[Recording], given: str, wanted: str) -> Travel | None:
+    """Return how far an output moves in recordings of about one range of the input, or None."""
+    widest = max((float(np.ptp(one[given])) for one in recordings), default=0.0)
+    some = [one for one in recordings if np.ptp(one[given]) >= COVERS * widest > 0]
+    if len(some) < 2:
+        return None
+    low = max(float(one[given].min()) for one in some)
+    high = min(float(one[given].max()) for one in some)
+    edge = ENDS * (high - low)
+    if high - low < COVERS * widest * COVERS:
+        return None
+    found = []
+    for one in some:
+        u, y = one[given], one[wanted]
+        ends = [np.median(y[at]) for at in (u >= high - edge, u <= low + edge)]
+        found.append((one.name, float(ends[0] - ends[1])))
+    return Travel(given, wanted, low, high, tuple(sorted(found, key=lambda pair: pair[1])))
+
+
+def unlike(
+    recordings: Sequence[Recording], names: Sequence[str], wanted: str, loads: Sequence[str]
+) -> Iterator[str]:
+    """Yield in words which recordings are of another sign, or another muscle, than the others.
+
+    Parameters
+    ----------
+    recordings : sequence of Recording
+    names : sequence of str
+        Inputs, and what is told beside them.
+    wanted : str
+        Output.
+    loads : sequence of str
+        Those of the names that are loads.
+    """
+    for given, some in alike(recordings, names, wanted):
+        found = travels(some, given, wanted)
+        if found is not None and found.turned:
+            yield f"{found.said(some[0].units)}: the sign of one was turned. Turn it back"
+        elif found is not None and found.differs:
+            why = "another muscle" if loads else "another muscle or load"
+            yield (
+                f"{found.said(some[0].units)}: {why}, or one was driven much faster. Models take all "
+                "for one muscle: fit them apart"
+            )
+
+
+def zeros(
+    recordings: Sequence[Recording], names: Sequence[str], wanted: str, loads: Sequence[str]
+) -> Iterator[str]:
+    """Yield in words where recordings under one load, or under none that is known, rest apart.
+
+    Parameters are those of `unlike`.
+    """
+    for given, some in alike(recordings, names, wanted):
+        if rests := apart(some, wanted, given):
+            why = "another muscle hung there" if loads else "another load hung there"
+            yield (
+                f"{wanted} rests at {rests[0]:.3g} to {rests[1]:.3g} {some[0].units[wanted]} where "
+                f"{given} is lowest: a sensor was zeroed anew, or {why}. Models take it "
+                f"for what {given} does; see --zero {wanted} and mckibben.signals.zeroed"
+            )

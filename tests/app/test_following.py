@@ -120,6 +120,11 @@ def test_a_force_is_estimated_beside_the_measured_one(workspace: Workspace) -> N
     assert error.name == "measured − estimated"
     y = [np.array(curve.y, dtype=float) for curve in (measured, estimated, error)]
     np.testing.assert_allclose(y[2], y[0] - y[1], atol=1e-4)
+    assert not any("of no use" in note for note in found.notes)
+    small = whole.with_channels({"force": "N"}, force=0.01 * whole["force"])
+    workspace.add(small, origin="", call="", name="small")
+    estimate(workspace, {"model": "arm", "recording": "small", "name": "again"}, quiet)
+    assert "off by more than what was measured" in workspace.estimates()["again"].notes[0]
 
 
 def test_steps_and_cycles_are_those_of_the_training_recordings(workspace: Workspace) -> None:

@@ -22,7 +22,7 @@ from mckibben.app.desk import Desk
 from mckibben.app.jobs import Jobs
 from mckibben.app.motions import parsed, reference_recording
 from mckibben.app.offering import offered
-from mckibben.app.pages import data, leaderboard
+from mckibben.app.pages import data, judging
 from mckibben.app.shell import build, load_the_rest
 from mckibben.app.work import fit
 from mckibben.app.workspace import Workspace
@@ -355,7 +355,7 @@ def test_a_model_that_fails_on_the_test_alone_is_named() -> None:
         }
 
     rows = [result("good", 1.0, 2.0), result("unlike", 1.2, 36.0), result("poor", 35.0, 36.0)]
-    (said,) = [text for text in leaderboard.judged(rows) if "hardly better" in text]
+    (said,) = [text for text in judging.judged(rows) if "more than half" in text]
     assert said.startswith("unlike: ")
-    assert not any("hardly" in text for text in leaderboard.judged(rows[:1]))
-    assert leaderboard.judged(rows)[0] == "Last 80 samples of run to test, all before to fit."
+    assert not any("more than half" in text for text in judging.judged(rows[:1]))
+    assert judging.judged(rows)[0] == "Last 80 samples of run to test, all before to fit."

@@ -72,7 +72,7 @@ def test_models_that_predict_worse_are_the_last_plants_and_it_is_said(tmp_path: 
 
 
 @pytest.mark.parametrize(
-    ("plant", "words"), [("bigger", "another muscle"), ("mine", "right by construction")]
+    ("plant", "words"), [("bigger", "are of two muscles"), ("mine", "right by construction")]
 )
 def test_a_loop_on_ones_own_model_is_kept_beside_no_compensation(
     tmp_path: Path, plant: str, words: str

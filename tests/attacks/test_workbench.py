@@ -29,7 +29,7 @@ from mckibben.app import guard, kept, reading
 from mckibben.app.folder import FOLDERS
 from mckibben.app.guard import Guard, checked_token
 from mckibben.app.jobs import Job, Jobs
-from mckibben.app.pages.leaderboard import judged
+from mckibben.app.pages.judging import judged
 from mckibben.app.workspace import Workspace
 from mckibben.files import write
 from mckibben.registry import load

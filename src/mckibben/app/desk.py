@@ -17,6 +17,7 @@ from mckibben.app.fields import said
 from mckibben.app.jobs import Jobs
 from mckibben.app.news import News, Refresh
 from mckibben.app.workspace import Workspace
+from mckibben.comparison.recommending import NONE
 from mckibben.errors import DataError, MckibbenError
 
 if TYPE_CHECKING:
@@ -193,6 +194,15 @@ class Desk:
         setattr(self, other, left)
         setattr(self, side, tuple(name for name in channels if name not in left))
         self._chosen = True
+
+
+def against(results: Sequence[dict[str, Any]]) -> dict[str, str]:
+    """Return the models that are not recommended, each judged by itself, and why."""
+    return {
+        row["name"]: row["not_recommended"].removeprefix(NONE)
+        for row in results
+        if row["not_recommended"]
+    }
 
 
 def not_recommended(results: Sequence[dict[str, Any]]) -> str:

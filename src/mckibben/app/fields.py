@@ -28,10 +28,10 @@ _WAYS = (
     (r"--column (\w+)=('[^']*'|\S+\b)", r"the field Channel (\1)"),
     (r" \([^()]*--[a-z][^()]*(\([^()]*\)[^()]*)?\)", ""),  # what is to be done is said before
     (r"--minutes (\d[\d.]*)", r"\1 minutes"),
-    (r"--(sample-time|resample) SECONDS", "the field of the sample time"),
+    (r"--(sample-time|resample) (SECONDS|\d[\d.]*)", "the field of the sample time"),
     (r"--limits? (\w+)=\S+:[^\s.,]+", r"limits of \1"),
     (r"--load (\w+)", r"\1 among the inputs"),
-    (r"--zero (\w+) \(mckibben\.signals\.zeroed\)", r"“Zero \1 there”, under Data"),
+    (r"--zero (\w+) (?:\(|and )mckibben\.signals\.zeroed\)?", r"“Zero \1 there”, under Data"),
     (r"--zero (\w+)", r"the button that zeroes \1"),
     (r"--set ", "the setting "),
     (
@@ -44,7 +44,7 @@ _WAYS = (
 
 _WORDS = {
     "adjustable": "coefficients that are adjustable",
-    "allow-shared": "“Go on where recordings share data”",
+    "allow-shared": "“Allow the same data in training and test”",
     "check": "the check",
     "column": f"“{READING}”",
     "float32": "“single precision”",

@@ -252,6 +252,7 @@ def estimate(workspace: Workspace, given: dict[str, Any], tell: Tell) -> str:
     for place, channel in enumerate(block.outputs):
         curves = [curve("estimated", time, found[channel.name], "series-1")]
         figures: dict[str, float] = {}
+        useless = []
         if channel.name in recording:
             measured = recording[channel.name]
             error = measured - found[channel.name]
@@ -263,6 +264,12 @@ def estimate(workspace: Workspace, given: dict[str, Any], tell: Tell) -> str:
                 "span": float(np.ptp(measured)),
             }
             said.append(f"{channel.name} RMSE {figures['rmse']:.3g} {channel.unit}")
+            size = float(np.sqrt(np.mean(measured**2)))
+            if figures["rmse"] > size:
+                useless = [
+                    f"{given['model']} is of no use for {channel.name} here: it is off by more than "
+                    f"what was measured, {size:.3g} {channel.unit} RMS"
+                ]
         workspace.write_json(
             "forces",
             name if place == 0 else f"{name}-{channel.name}",
@@ -272,7 +279,7 @@ def estimate(workspace: Workspace, given: dict[str, Any], tell: Tell) -> str:
                 "output": channel.name,
                 "unit": channel.unit,
                 **figures,
-                "notes": notes,
+                "notes": [*useless, *notes],
                 "curves": curves,
             },
         )

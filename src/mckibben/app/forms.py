@@ -47,11 +47,11 @@ def inverse_of(block: Block) -> Block:
         If it has none, or is one already.
     """
     from mckibben.blocks.core.commanding import drives, undoes
-    from mckibben.blocks.force.feedforward import ForceFeedforward
+    from mckibben.blocks.force.feedforward import compensator
 
     if drives(block.outputs[0]) or (undoes(block) and not drives(block.inputs[0])):
         raise ModelError("it is a compensator already. Remedy: choose the model that it undoes.")
-    return ForceFeedforward.of(block) or block.inverse()
+    return compensator(block)
 
 
 def force_of(block: Block) -> Block:

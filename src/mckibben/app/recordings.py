@@ -113,6 +113,13 @@ class Recordings(Folder):
         self._digests: Cache[str] = Cache(MOST_DIGESTS)
         self._changing = threading.RLock()
 
+    def beside(self) -> list[Path]:
+        """Return what looks like recordings in the folder itself, which nobody has dropped."""
+        from mckibben.files.formats import READERS
+
+        found = (path for path in self.folder.iterdir() if path.suffix.casefold() in READERS)
+        return sorted(path for path in found if path.is_file())
+
     # -- files as they came --------------------------------------------------------------------
 
     def keep_upload(self, name: str, content: bytes) -> Path:

@@ -106,6 +106,11 @@ body { background: var(--paper); color: var(--ink) }
 .nicegui-content { padding: .5rem 1rem }
 .q-dialog__inner > .q-card { max-width: min(56rem, 94vw); max-height: 92vh; overflow: auto }
 .q-table__container, .q-uploader { max-width: 100% }
+/* a shade at the right edge, which the end of what scrolls covers, says that there is more */
+.q-table__middle { --ground: #fff;
+  background: linear-gradient(270deg, var(--ground) 2rem, transparent 3rem) local,
+    linear-gradient(270deg, var(--muted), transparent .4rem) scroll }
+.body--dark .q-table__middle { --ground: var(--tint) }
 .modebar-btn { min-width: 24px; min-height: 24px }
 .nicegui-content label, .nicegui-content .q-item__label { overflow-wrap: anywhere }
 .q-select .q-field__native > .ellipsis { white-space: normal }

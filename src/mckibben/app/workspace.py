@@ -80,10 +80,21 @@ class Workspace(Changing):
         return False
 
     def ranked(self) -> list[str]:
-        """Return the models in the order of the choice; those that were not fitted here come last."""
+        """Return the models in the order of the choice.
+
+        Those not fitted here come after the rest, and those that are not recommended last.
+        """
         known = self.models()
-        first = [row["name"] for row in self.results() if row["name"] in known]
-        return [*first, *(name for name in known if name not in first)]
+        refused = {row["name"]: bool(row["not_recommended"]) for row in self.results()}
+        names = [
+            *(name for name in refused if name in known),
+            *(n for n in known if n not in refused),
+        ]
+        return sorted(names, key=lambda name: refused.get(name, False))
+
+    def to_invert(self) -> list[str]:
+        """Return the models that have a compensator, in the order of `ranked`."""
+        return [name for name in self.ranked() if self.invertible(name)]
 
     def twin(self, name: str) -> Twin:
         """Return a model as a plant, with its band where it has one.
@@ -228,4 +239,4 @@ def _rmse(result: dict[str, Any], test: bool = False) -> str:
 def _as_in_a_leaderboard(result: dict[str, Any]) -> tuple[Any, ...]:
     fitted = (result["train"] or {}).get("rmse")
     ranked = order(result["model"], result["validation_rmse"], fitted, result["skill_least"])
-    return not result["current"], "" if result["current"] else result["data"], *ranked
+    return not result["current"], *ranked

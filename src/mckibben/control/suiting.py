@@ -101,7 +101,7 @@ def _pressures(model: Block, plant: Plant, rise: Recording) -> list[str]:
         if high > limits.high + reach or low < limits.low - reach:
             notes.append(
                 f"the compensator is of {name} from {_span(low, high)} {channel.unit}, and {plant.name} "
-                f"takes {_span(limits.low, limits.high)}: it may be of another muscle. {REMEDY}"
+                f"takes {_span(limits.low, limits.high)}: {_why(plant)}"
             )
     return notes
 
@@ -141,10 +141,16 @@ def _strokes(model: Block, plant: Plant, rise: Recording) -> list[str]:
         if np.abs(ours - theirs).max() > APART * abs(theirs[1] - theirs[0]):
             notes.append(
                 f"in a slow rise ({ends}), {channel.name} of {plant.name} goes from {_span(*ours)} "
-                f"{channel.unit}, and of the compensator's model from {_span(*theirs)}: it may be of "
-                f"another muscle. {REMEDY}"
+                f"{channel.unit}, and of the compensator's model from {_span(*theirs)}: {_why(plant)}"
             )
     return notes
+
+
+def _why(plant: Plant) -> str:
+    """Return what may be the reason, and the remedy."""
+    if isinstance(plant, Twin):
+        return "the two models disagree there, or are of two muscles. Remedy: compare their test errors"
+    return f"it may be of another muscle. {REMEDY}"
 
 
 def _span(low: float, high: float) -> str:

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import Any
 
 from mckibben.blocks.core.block import Block
-from mckibben.control.controller import Controller
 from mckibben.control.loop import Tracked, track
 from mckibben.control.roles import Plant, wished
 from mckibben.control.suiting import doubts
@@ -64,7 +63,7 @@ def before(compensator: Block, plant: Plant, reference: Recording, **settings: A
     try:
         rise = slow_rise(plant, reference, **few)
         notes += doubts(compensator, plant, rise)
-        controller: Controller = uncompensated(plant, reference, rise)
+        controller = uncompensated(plant, reference, rise, **few)
         return Before(track(controller, plant, reference, **settings), tuple(notes))
     except MckibbenError as error:
         return Before(None, (*notes, f"there is no run without compensation: {error}"))

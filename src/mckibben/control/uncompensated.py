@@ -2,7 +2,8 @@
 
 All that is known of the muscle is one slow rise of its pressure from the lowest to the highest, as every
 lab has it. A reference is read off that curve: a monotone map without memory, so that what goes down
-goes by the curve that came up. Of several muscles all rise together, and each has its own curve.
+goes by the curve that came up. Of several muscles all rise together, and each has its own curve. Where
+more muscles than motions pull against each other, each rises alone, and moves all along straight lines.
 """
 
 from __future__ import annotations
@@ -23,6 +24,9 @@ RISE = 30.0
 
 KNOTS = 65
 """Of a curve."""
+
+SMALLEST = 1e-3
+"""Weight of a command's size beside what it moves: of all that move alike, the smallest are given."""
 
 
 @dataclass
@@ -62,16 +66,54 @@ class StaticMap(Controller):
         return np.array([np.interp(wanted, *curve) for wanted, curve in pairs])
 
 
+@dataclass
+class StraightMap(Controller):
+    """References by straight lines, one a muscle and motion, and of all commands the smallest.
+
+    Parameters
+    ----------
+    rest : array, shape (m,)
+        What is followed, where all commands are lowest.
+    slopes : array, shape (m, n)
+        Of what is followed over the commands.
+    low, high : array, shape (n,)
+        Commands.
+    """
+
+    rest: Array
+    slopes: Array
+    low: Array
+    high: Array
+
+    def reset(self, sample_time: float) -> None:
+        """Do nothing: it has no memory."""
+
+    def step(self, reference: Array, displacement: Array, scheduled: Array) -> Array:
+        from scipy.optimize import nnls  # slow to load
+
+        small = SMALLEST * float(np.abs(self.slopes).max()) * np.eye(self.low.size)
+        wanted = np.concatenate([reference - self.rest, np.zeros(self.low.size)])
+        above, _ = nnls(np.vstack([self.slopes, small]), wanted)
+        return np.minimum(self.low + above, self.high)
+
+
 def slow_rise(
-    plant: Plant, reference: Recording, *, pressure_loop: bool = True, seed: int = 0
+    plant: Plant,
+    reference: Recording,
+    *,
+    only: str | None = None,
+    pressure_loop: bool = True,
+    seed: int = 0,
 ) -> Recording:
-    """Return what a plant does while its commands rise slowly together.
+    """Return what a plant does while its commands rise slowly together, or one of them alone.
 
     Parameters
     ----------
     plant : Plant
     reference : Recording
         What is to be followed: its sample time, and what it holds at first, are those of the rise.
+    only : str, optional
+        The one that rises, while the others stay lowest.
     pressure_loop : bool
         As of `track`.
     seed : int
@@ -91,6 +133,8 @@ def slow_rise(
     held = [name for name in plant.inputs if name in reference]
     driven = actuated(plant, held)
     ends = np.array([[plant.limits(name).low, plant.limits(name).high] for name in driven])
+    if only is not None:
+        ends[:, 1] = np.where([name == only for name in driven], ends[:, 1], ends[:, 0])
     steps = round(RISE / (reference.sample_time or 1.0))
     first = {name: np.full(steps + 2, reference[name][0]) for name in (*followed, *held)}
     ramp = Ramp(ends[:, 0], ends[:, 1], steps)
@@ -107,7 +151,14 @@ def slow_rise(
     return Recording(channels, reference.sample_time)
 
 
-def uncompensated(plant: Plant, reference: Recording, rise: Recording) -> StaticMap:
+def uncompensated(
+    plant: Plant,
+    reference: Recording,
+    rise: Recording,
+    *,
+    pressure_loop: bool = True,
+    seed: int = 0,
+) -> Controller:
     """Return what follows a reference without compensation, by a plant's slow rise.
 
     Parameters
@@ -117,19 +168,28 @@ def uncompensated(plant: Plant, reference: Recording, rise: Recording) -> Static
         What is to be followed.
     rise : Recording
         From `slow_rise`.
+    pressure_loop, seed
+        As of `slow_rise`.
 
     Raises
     ------
     ModelError
-        If commands and what is followed do not pair, or something does not move.
+        If something does not move.
     """
     followed = followed_by(plant, reference)
     driven = actuated(plant, [name for name in plant.inputs if name in reference])
     if len(followed) != len(driven):
-        raise ModelError(
-            f"{', '.join(driven)} together move {', '.join(followed)}, so no command belongs to one "
-            "motion and is read off its curve. Remedy: compare controllers with one another."
-        )
+        slopes, rests = [], []
+        for name in driven:
+            alone = slow_rise(plant, reference, only=name, pressure_loop=pressure_loop, seed=seed)
+            line = np.polynomial.polynomial.polyfit(
+                alone[name] - alone[name][0], alone.matrix(followed), 1
+            )
+            rests.append(line[0])
+            slopes.append(line[1])
+        ends = [plant.limits(name) for name in driven]
+        low, high = (np.array([getattr(each, end) for each in ends]) for end in ("low", "high"))
+        return StraightMap(np.mean(rests, axis=0), np.column_stack(slopes), low, high)
     return StaticMap([curve(rise[u], rise[y], y) for u, y in zip(driven, followed, strict=True)])
 
 

@@ -12,6 +12,8 @@ from mckibben.app.desk import LONGEST, Desk, guarded, labelled, named
 from mckibben.app.fields import READING
 from mckibben.app.kept import Step
 from mckibben.app.together import differing, sample_times
+from mckibben.comparison.belonging import unlike
+from mckibben.estimators.coupled.base import schedules
 from mckibben.signals.zeroing import apart as zeros_apart
 
 SHOWN = 6
@@ -21,6 +23,7 @@ SHOWN = 6
 def build(desk: Desk) -> None:
     """Show what differs, where something does."""
     hindering(desk)
+    _unlike(desk)
     _zeros(desk)
 
 
@@ -105,10 +108,23 @@ def _sample_times(desk: Desk) -> None:
         named(button.props("outline dense no-caps"), "resample-all")
 
 
+def _unlike(desk: Desk) -> None:
+    """Show where recordings are of another muscle than others, or of another sign."""
+    used = list(desk.workspace.used().values())
+    inputs, outputs = desk.inputs, desk.outputs
+    if len(outputs) > 1 or not all(name in one for one in used for name in (*inputs, *outputs)):
+        return
+    loads = schedules(used, (*inputs, *outputs))
+    said = list(unlike(used, (*inputs, *loads), outputs[0], loads))
+    if said:
+        with named(ui.card().classes("w-full border border-warning gap-1"), "unlike"):
+            ui.label("These recordings do not go together").classes("font-medium")
+            for one in said:
+                ui.label(f"{one[0].upper()}{one[1:]}.").classes("text-sm break-words")
+
+
 def _zeros(desk: Desk) -> None:
     """Offer one zero where one muscle's recordings rest at several, which a load may tell or not."""
-    from mckibben.estimators.coupled.base import schedules
-
     used = list(desk.workspace.used().values())
     (given, *more), (wanted, *others) = desk.inputs, desk.outputs
     known = all(given in one and wanted in one for one in used)

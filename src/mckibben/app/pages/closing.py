@@ -79,21 +79,22 @@ def _plants(desk: Desk, model: str, known: list[str]) -> dict[str, str]:
     """Return what the compensator can be tried on, and what each is, in the order of the choice.
 
     Models of the user's own muscle come first; after the rigs known, which are other muscles, come
-    those that tell nothing: models that do not predict, and the one that is inverted.
+    those that tell nothing: the one that is inverted, and models that do not predict.
     """
     twins: dict[str, str] = {}
+    itself: dict[str, str] = {}
     last: dict[str, str] = {}
     step = desk.compensator[3] if desk.compensator else forms.STEP
     errors, idle = desk.workspace.test_errors(), desk.workspace.idle()
     for name in desk.workspace.plants(model):
         if desk.workspace.same(model, name):
-            last[f"{OWN}{name}"] = f"{name}: {ITSELF}"
+            itself[f"{OWN}{name}"] = f"{name}: {ITSELF}"
         else:
             kind, doubt = (last, f"{IDLE}, ") if name in idle else (twins, "")
             tested = errors.get(name, "not tested")
             kind[f"{OWN}{name}"] = f"{name}: another model of your muscle, {doubt}{tested}"
     rigs = {f"{RIG}{name}": f"{name}: {LIKE}" for name in known if _runs(name, step)}
-    return twins | rigs | last
+    return twins | rigs | itself | last
 
 
 def _runs(rig: str, step: float) -> bool:

@@ -10,9 +10,10 @@ import numpy as np
 from nicegui import ui
 
 from mckibben.app import fields, forms, plots, scripts
-from mckibben.app.desk import Desk, caution, guarded, named, not_recommended, on_event
+from mckibben.app.desk import Desk, against, caution, guarded, named, on_event
 from mckibben.app.drawn import picture
 from mckibben.app.following import compensated, kept_motion
+from mckibben.app.jobs import ENDED
 from mckibben.app.pages import closing, forces, leaderboard, logs, loops
 from mckibben.app.pages.drawing_reference import Sketch
 from mckibben.app.recorded import at_rest, held_for, pace, reached
@@ -22,15 +23,7 @@ from mckibben.comparison.recognising import FORCE
 from mckibben.errors import MckibbenError
 from mckibben.recording import Recording
 
-NONE_YET = (
-    "Fit a model that can be inverted first, under Models: pi, gpi, mpi, cpi, preisach; of several "
-    "muscles, balance."
-)
-
 NONE_PREDICTS = "No model that predicts these data has an inverse: fit others under Models. "
-
-NONE = "No model is recommended: "
-"""How the reasons of a board begin."""
 
 FORCED = (
     "What is modelled is a force: it is estimated while the muscle is held, below, and no motion is "
@@ -42,17 +35,11 @@ def build(desk: Desk) -> None:
     """Build the page."""
     editors: list[Editor] = []
 
-    def found() -> list[str]:
-        """Return what can be inverted: what predicts nothing comes last."""
-        refused = _refused(desk)
-        names = [name for name in desk.workspace.ranked() if desk.workspace.invertible(name)]
-        return sorted(names, key=lambda name: name in refused)
-
     @ui.refreshable
     def shown() -> None:
-        names = found()
+        names = desk.workspace.to_invert()
         if not names:
-            ui.label(FORCED if FORCE in desk.outputs else NONE_YET)
+            ui.label(FORCED if FORCE in desk.outputs else _none_yet(desk))
             return
         leaderboard.doubts(desk, all_refused=False)
         editors[:] = [Editor(desk, names)]
@@ -60,7 +47,7 @@ def build(desk: Desk) -> None:
     def more() -> None:
         # what is being drawn must not vanish because a fit has ended
         if editors:
-            editors[0].offer(found())
+            editors[0].offer(desk.workspace.to_invert())
         else:
             shown.refresh()
 
@@ -70,10 +57,15 @@ def build(desk: Desk) -> None:
     forces.build(desk)
 
 
-def _refused(desk: Desk) -> dict[str, str]:
-    """Return the models that are not recommended, each judged by itself, and why."""
-    why = {row["name"]: not_recommended([row]).removeprefix(NONE) for row in desk.results()}
-    return {name: reason for name, reason in why.items() if reason}
+def _none_yet(desk: Desk) -> str:
+    """Return that nothing can be inverted: what is being fitted, or what is to be."""
+    jobs = [job for job in desk.jobs.jobs.values() if job.kind == "fit" and job.state not in ENDED]
+    if jobs:
+        under_way = ", ".join(job.title for job in jobs)
+        return f"Nothing that can be inverted is fitted yet. Under way: {under_way}."
+    several = len(desk.inputs) > 1
+    kinds = "balance, coupled-pi, sdchm" if several else "pi, gpi, mpi, cpi, preisach, balance"
+    return f"Fit a model that can be inverted first, under Models: {kinds}."
 
 
 def _reach(desk: Desk, model: str) -> dict[str, tuple[float, float]]:
@@ -152,7 +144,7 @@ class Editor:
 
     def _say(self) -> None:
         """Say what speaks against the model chosen, or why it is not the first of the leaderboard."""
-        refused, names = _refused(self.desk), list(self.model.options)
+        refused, names = against(self.desk.results()), list(self.model.options)
         first = next((row["name"] for row in self.desk.results()), self.name)
         text = ""
         if self.name in refused:

@@ -160,7 +160,12 @@ class Sketch:
 
     def _span(self) -> None:
         """Fill in ends of ready-made motions, the one at rest first: well within what can be reached."""
-        first, other = sorted(self.reach[self.now], key=lambda y: abs(y - self.rest[self.now]))
+        rest = self.rest[self.now]
+        first, other = sorted(self.reach[self.now], key=lambda y: abs(y - rest))
+        if 0.1 * abs(other - first) < abs(rest - first) and min(first, other) < rest < max(
+            first, other
+        ):
+            first = rest - 0.1 * (other - rest)  # it rests amid what can be reached
         self.first.set_value(float(f"{first + 0.1 * (other - first):.3g}"))
         self.other.set_value(float(f"{first + 0.9 * (other - first):.3g}"))
 

@@ -73,6 +73,7 @@ def build(desk: Desk) -> None:
             named(
                 ui.button("Take the estimator (JSON)", on_click=guarded(take)), "take-force"
             ).props("outline")
+        error = named(ui.label("").classes("text-sm"), "force-error")
         doubt = named(caution(""), "force-doubt")
         doubt.set_visibility(False)
         ui.label("As C or FMU: under Take away.").classes("text-xs opacity-70")
@@ -87,6 +88,8 @@ def build(desk: Desk) -> None:
         fit.sort(key=lambda name: ("force" not in used[name], name in trained))
         names = {name: f"{name}{trained.get(name, '')}" for name in fit}
         run.set_options(names, value=run.value if run.value in names else next(iter(names), None))
+        known_error = desk.workspace.test_errors().get(str(model.value))
+        error.set_text(f"{model.value}: {known_error}." if known_error else "")
         doubt.set_text(_forgets(desk, str(model.value)))
         doubt.set_visibility(bool(doubt.text))
 

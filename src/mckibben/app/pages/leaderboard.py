@@ -10,10 +10,17 @@ from typing import Any
 import numpy as np
 from nicegui import ui
 
-from mckibben.app import plots
-from mckibben.app.desk import Desk, caution, guarded, named, not_recommended, on_event
+from mckibben.app import fields, plots
+from mckibben.app.desk import (
+    Desk,
+    caution,
+    guarded,
+    named,
+    on_event,
+)
 from mckibben.app.drawn import picture
 from mckibben.app.pages import next_steps
+from mckibben.app.pages.judging import RUNS, drawn_first, judged, of_other_data, share_of_mean
 from mckibben.blocks.core.block import Block
 from mckibben.blocks.core.writing import quantities
 from mckibben.comparison import limits
@@ -66,15 +73,6 @@ OTHER_DATA = (
 )
 
 
-HARDLY = 0.5
-"""Share of the constant's error above which a model tells little."""
-
-UNLIKE = (
-    "on the test hardly better than the constant, unlike in validation: the test moves otherwise than "
-    "what was trained on. Train on a recording like it, too, or take another model."
-)
-
-
 def build(desk: Desk) -> None:
     """Build it."""
     # what a user has chosen stays so when the table is shown anew
@@ -104,7 +102,7 @@ def build(desk: Desk) -> None:
         about = ABOUT.format(heading=heading, by=by, careful=careful)
         ui.label(about).classes("text-xs opacity-70")
         for said in judged(results):
-            ui.label(said).classes("text-sm")
+            ui.label(fields.said(said)).classes("text-sm")
         run = named(ui.select({}, label="Recording").classes("min-w-52"), "closer-run")
         run.set_visibility(False)
         place = named(ui.column().classes("w-full"), "closer")
@@ -135,8 +133,9 @@ def build(desk: Desk) -> None:
 
         table.on_select(on_event(choose))
         run.on_value_change(on_event(pick))
-        kept = [row for row in table.rows if row["name"] in ticked]
-        table.selected = kept or table.rows[:1]
+        old = desk.stale() if results[0]["current"] else set()
+        kept = [row for row in table.rows if row["name"] in ticked and row["name"] not in old]
+        table.selected = kept or [row for row in table.rows if row["name"] == drawn_first(results)]
         ui.timer(0.05, guarded(closer, "Running the model"), once=True)
 
     data = {"known": desk.workspace.data()}
@@ -165,7 +164,7 @@ def doubts(desk: Desk, *, all_refused: bool = True) -> None:
     def shown() -> None:
         _of_other_data(desk.results())
         if all_refused and (why := desk.not_recommended):
-            named(caution(f"{why}."), "not-recommended")
+            named(caution(fields.said(f"{why}.")), "not-recommended")
 
     for topic in ("results", "channels", "recordings"):
         desk.when(topic, shown.refresh)
@@ -196,54 +195,19 @@ def _table(results: Sequence[dict[str, Any]], outputs: Sequence[str]) -> ui.tabl
 
 
 def _row(result: dict[str, Any], columns: Sequence[Column]) -> dict[str, Any]:
-    shown: dict[str, Any] = {column.key: typeset(column.text(result)) for column in columns}
+    ran = (
+        share_of_mean(result) > RUNS
+    )  # else the test is far from all that was trained on, mean and all
+    shown: dict[str, Any] = {
+        column.key: typeset(column.text(result)) + ran * f" {column.flag(result)}".rstrip()
+        for column in columns
+    }
     shown |= {f"{column.key}_by": column.sorted_by(result) for column in columns}
     full = full_name(result["model"])
     title = result["name"] if full == result["name"] else f"{result['name']}: {full}"
-    title += "*" * bool(limits.caution(result["model"])) + _other(result)
+    title += "*" * bool(limits.caution(result["model"])) + of_other_data(result)
+    title += " (not recommended)" * bool(result["not_recommended"])
     return {"name": result["name"], "title": title, "title_by": title} | shown
-
-
-def _other(result: dict[str, Any]) -> str:
-    return "" if result["current"] else " (other data)"
-
-
-def judged(results: Sequence[dict[str, Any]]) -> list[str]:
-    """Return what models are tested on and have to beat, and what speaks against them, or tests."""
-    said = [_sentence(result["split"]) for result in results if result.get("split")]
-    against: dict[str, list[str]] = {}
-    for result in results:
-        constant = result.get("constant") or {}
-        tested = wording.number((constant.get("test") or {}).get("rmse"))
-        validated = wording.number(constant.get("validation_rmse"))
-        if constant:
-            heading, _ = CHOICES[result["chosen_by"]]
-            said.append(
-                f"constant{_other(result)}, the mean of the training output: {heading} {validated}, "
-                f"test RMSE {tested}. Every model has to beat it."
-            )
-        if _unlike(result):
-            against.setdefault(UNLIKE, []).append(f"{result['name']}{_other(result)}")
-        for why in result.get("shared", ()):
-            against.setdefault(why, []).append(f"{result['name']}{_other(result)}")
-    if why_none := not_recommended(results):
-        said.append(why_none)
-    said += [f"{', '.join(names)}: {why}" for why, names in against.items()]
-    return list(dict.fromkeys(said))
-
-
-def _sentence(text: str) -> str:
-    return f"{text[0].upper()}{text[1:]}."
-
-
-def _unlike(result: dict[str, Any]) -> bool:
-    """Tell whether a model is hardly better than the constant on the test, unlike in validation."""
-    constant = result.get("constant") or {}
-    tested, least = ((one.get("test") or {}).get("rmse") for one in (result, constant))
-    validated, limit = (one.get("validation_rmse") for one in (result, constant))
-    fails = tested is not None and least is not None and tested > HARDLY * least
-    failed = validated is not None and limit is not None and validated > HARDLY * limit
-    return fails and not failed
 
 
 async def _closer(
@@ -272,8 +236,8 @@ async def _closer(
     except MckibbenError as error:
         raise ModelError(f"{', '.join(names)} on {recording.name}: {error}") from None
     measured = recording.matrix(desk.outputs)
-    off = {
-        name: float(np.sqrt(np.mean((found - measured)[one.rows] ** 2)))
+    off = {  # the mean over outputs, as in the leaderboard
+        name: float(np.sqrt(np.mean((found - measured)[one.rows] ** 2, axis=0)).mean())
         for name, found in outputs.items()
     }
     unit = recording.units[desk.outputs[0]]

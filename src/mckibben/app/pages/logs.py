@@ -31,7 +31,7 @@ def build(desk: Desk) -> None:
             "(displacement) and the measured pressure; command_pressure too, where there is one."
         ).classes("text-sm")
         with ui.row().classes("items-end gap-3"):
-            names = [name for name in desk.workspace.ranked() if desk.workspace.invertible(name)]
+            names = desk.workspace.to_invert()
             model = named(
                 ui.select(names, value=names[0] if names else None, label="Model that ran inverted")
                 .classes("min-w-52")
@@ -65,7 +65,7 @@ def build(desk: Desk) -> None:
     named(section, "logs")
 
     def more() -> None:
-        names = [name for name in desk.workspace.ranked() if desk.workspace.invertible(name)]
+        names = desk.workspace.to_invert()
         value = desk.model_to_show(str(model.value), names) if names else None
         model.set_options(names, value=value)
 

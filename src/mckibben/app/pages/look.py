@@ -280,7 +280,9 @@ def _words(desk: Desk, given: str, wanted: str) -> None:
 def _untold(desk: Desk, given: str) -> None:
     from mckibben.excitation import untold
 
-    ui.label("What these recordings cannot tell").classes("text-lg")
+    tested = any(entry.role == "test" for entry in desk.workspace.entries())
+    which = "the recordings to train on" if tested else "these recordings"
+    ui.label(f"What {which} cannot tell").classes("text-lg")
     place = named(ui.column().classes("w-full"), "untold")
     inputs = (
         desk.sides.inputs if len(desk.sides.inputs) > 1 else (given,)

@@ -25,15 +25,18 @@ def buttons(desk: Desk, name: str) -> None:
             ui.button(f"Is {name} right?", on_click=lambda: _check(desk, name)).props("outline"),
             "check",
         )
-        minutes = ui.number("Minutes to record", value=3.0, min=0.2, max=60.0).classes("w-36")
-        named(
-            ui.button(
-                "What to record next",
-                on_click=lambda: plan(desk, name, float(minutes.value or 3.0)),
-            ).props("outline"),
-            "plan",
-        )
-    done(desk)
+        if all(one.sample_time is not None for one in desk.workspace.used().values()):
+            minutes = ui.number("Minutes to record", value=3.0, min=0.2, max=60.0).classes("w-36")
+            named(
+                ui.button(
+                    "What to record next",
+                    on_click=lambda: plan(desk, name, float(minutes.value or 3.0)),
+                ).props("outline"),
+                "plan",
+            )
+        else:
+            ui.label("What to record next is planned in time, which these recordings do not have.")
+    done(desk, name)
 
 
 def _check(desk: Desk, name: str) -> None:
@@ -55,12 +58,13 @@ def plan(desk: Desk, name: str | None, minutes: float) -> None:
     desk.changed("jobs")
 
 
-def done(desk: Desk) -> None:
-    """Show checks and plans: how far they are, what they say, and their files."""
+def done(desk: Desk, name: str) -> None:
+    """Show checks of a model and plans for it: how far they are, what they say, and their files."""
 
     @ui.refreshable
     def shown() -> None:
-        jobs = [job for job in desk.jobs.jobs.values() if job.kind in KINDS]
+        every = desk.jobs.jobs.values()
+        jobs = [job for job in every if job.kind in KINDS and job.given.get("name") in (name, "")]
         for job in list(reversed(jobs))[:SHOWN]:
             _line(desk, job)
 

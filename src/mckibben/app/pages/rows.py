@@ -53,6 +53,12 @@ class Rows:
                 "Drop a recording of your muscle: pressure and displacement over time. "
                 "Or open the example, a virtual muscle with a hanging load."
             )
+            if beside := desk.workspace.beside():
+                ui.label(
+                    f"In {desk.workspace.folder} itself, which this workbench keeps its work in, lie "
+                    f"{len(beside)} files of recordings, such as {beside[0].name}: they stay as they "
+                    "are. Drop those that you mean here."
+                )
         self._place = ui.column().classes("w-full gap-3")
         for _ in self._updating():
             pass

@@ -84,7 +84,7 @@ def _field(one: Setting, given: dict[str, str]) -> None:
         named(field, f"set-{one.name}")
         labelled(field, "aria-label", one.name)
         hint = " ".join(filter(None, (f"({allowed(one)})" if allowed(one) else "", one.meaning)))
-        ui.label(hint).classes("text-xs opacity-70 min-w-0 break-words")
+        ui.label(hint.replace("``", "")).classes("text-xs opacity-70 min-w-0 break-words")
 
 
 def _asked(one: Setting, now: str | None, changed: Any) -> Any:

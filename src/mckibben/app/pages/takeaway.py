@@ -7,8 +7,8 @@ from typing import Any
 
 from nicegui import ui
 
-from mckibben.app import scripts
-from mckibben.app.desk import Desk, code, guarded, named
+from mckibben.app import fields, scripts
+from mckibben.app.desk import Desk, against, caution, code, guarded, named
 from mckibben.app.jobs import RUNNING
 from mckibben.app.pages import leaderboard, taking_code
 from mckibben.app.pages.taking_code import CARD, LARGEST, hand_over
@@ -41,6 +41,16 @@ def build(desk: Desk) -> None:
             "take-model",
         )
         selects[:] = [model]
+        doubt = named(caution(""), "take-doubt")
+
+        def say() -> None:
+            why = against(desk.results()).get(str(model.value), "")
+            doubt.set_text(f"{model.value} is not recommended: {fields.said(why)}." if why else "")
+            doubt.set_visibility(bool(why) and not desk.not_recommended)
+
+        model.on_value_change(say)
+        desk.when("results", say)
+        say()
         come()
         with ui.row().classes("w-full gap-4 items-stretch"):
             taking_code.build(desk, model)

@@ -1,6 +1,7 @@
 """Measure long and many recordings: seconds, and memory of all processes together.
 
-Run: python benchmarks/large.py [--samples 10000000] [--recordings 200] [--only long|report|many] [--all]
+Run: python benchmarks/large.py [--samples 10000000] [--recordings 200]
+         [--only calls|long|report|many] [--all]
 """
 
 from __future__ import annotations
@@ -12,6 +13,8 @@ import sys
 import tempfile
 import threading
 import time
+from collections.abc import Callable
+from functools import partial
 from importlib import import_module
 from pathlib import Path
 
@@ -85,16 +88,41 @@ def report() -> None:
     print(f"report of 1000000 samples, {len(MANY)} models: {size / 1e6:.2f} MB, {seconds:.1f} s")
 
 
+def calls() -> None:
+    """Print the seconds of what a person waits for on long recordings."""
+    from mckibben import characterize, untold
+    from mckibben.signals import decimate_minmax
+    from mckibben.validation.describing import describe
+
+    for n, names in ((1_000_000, ("characterize", "decimate")), (100_000, ("untold", "describe"))):
+        whole = recording(n, 0.001, 0)
+        todo: dict[str, Callable[[], object]] = {
+            "characterize": partial(characterize, whole),
+            "decimate": partial(decimate_minmax, whole.time, whole["pressure"], max_points=4000),
+            "untold": partial(untold, [whole]),
+            "describe": partial(describe, GPI.example(), [whole]),
+        }
+        for name in names:
+            times = []
+            for _ in range(3):
+                started = time.perf_counter()
+                todo[name]()
+                times.append(time.perf_counter() - started)
+            print(f"{name} of {n} samples: {min(times):.3f} s, best of {len(times)}", flush=True)
+
+
 def main() -> None:
     """Print everything."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--samples", type=int, default=10_000_000)
     parser.add_argument("--recordings", type=int, default=200)
-    parser.add_argument("--only", choices=("long", "report", "many"))
+    parser.add_argument("--only", choices=("calls", "long", "report", "many"))
     parser.add_argument("--all", action="store_true", help="all models on the long recording too")
     given = parser.parse_args()
     with tempfile.TemporaryDirectory() as place:
         folder = Path(place)
+        if given.only in (None, "calls"):
+            calls()
         if given.only in (None, "report"):
             report()
         if given.only in (None, "long"):
@@ -106,7 +134,7 @@ def main() -> None:
             if given.all:
                 measured("study", "study", long)
             long.unlink()
-        if given.only in ("long", "report"):
+        if given.only in ("calls", "long", "report"):
             return
         many = folder / "many"
         many.mkdir()

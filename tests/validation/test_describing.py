@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import time
 import warnings
 
 import numpy as np
@@ -159,12 +158,3 @@ def test_figures_are_printed_too() -> None:
     found = describe(block, [recording])
     figure = printed.drawn(frequency_response(found.frequency_responses[0]))
     assert [axis.get_xscale() for axis in figure.axes] == ["log", "log"]
-
-
-def test_a_long_recording_takes_seconds() -> None:
-    u = np.asarray(recorded(PI.example(), 100_000)["pressure"])
-    y = PI.example().simulate(u) + np.random.default_rng(0).normal(0, 0.1, u.size)
-    recording = Recording({"pressure": u, "displacement": y}, STEP)
-    started = time.perf_counter()
-    describe(PI.example(), [recording])
-    assert time.perf_counter() - started < 20

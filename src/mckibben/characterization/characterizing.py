@@ -40,9 +40,17 @@ JOULE_PER_SQUARE_METRE = 100.0
 """1 bar mm is 1e5 Pa times 1e-3 m."""
 
 SHAPE = (
-    *("loop_width", "mid_width", "asymmetry", "width_centroid", "loop_area", "loop_area_share"),
+    *(
+        "loop_width",
+        "repeated_width",
+        "mid_width",
+        "asymmetry",
+        "width_centroid",
+        "loop_area",
+        "loop_area_share",
+    ),
     *("loss_per_area", "dead_zone_upper", "dead_zone_lower", "gain", "onset", "saturation"),
-    *("branch_gap", "creep", "creep_time", "drift", "rate_dependence"),
+    *("branch_gap", "creep", "creep_time", "drift", "rate_dependence", "speeds"),
     *("closure_error", "wiping_out_error"),
 )
 """What nothing is known of where the output does not depend on the input."""
@@ -195,7 +203,8 @@ def _measured(runs: Sequence[Recording], said: str, given: str, wanted: str) -> 
     scale, tracks = prepare(runs, given, wanted)
     units = tuple(_unit(runs, channel) for channel in (given, wanted))
     loops = loops_of(tracks, scale)
-    largest = largest_of(loops)
+    repeats = largest_of(loops)
+    largest = repeats[(len(repeats) - 1) // 2] if repeats else None
     curves = _branch_curves(tracks, largest, scale)
     curve = mean_curve(*curves, scale)
     if (left := unexplained(tracks, *curves)) is not None and left > OWN_WAY:
@@ -203,7 +212,7 @@ def _measured(runs: Sequence[Recording], said: str, given: str, wanted: str) -> 
     upper, lower = dead_zones(tracks, scale)
     closure, wiping_out = minor_loop_errors(tracks, scale)
     crept, creep_time = creep(tracks, scale)
-    slope, verdict = rate_dependence(loops)
+    rate = rate_dependence(loops)
     seen = evidence(tracks, scale)
     durations = [run.duration for run in runs]
     steps = {run.sample_time for run in runs}
@@ -225,6 +234,9 @@ def _measured(runs: Sequence[Recording], said: str, given: str, wanted: str) -> 
         output_noise=None if np.isnan(scale.y_noise) else scale.y_noise,
         cycles=tuple(loop.cycle for loop in loops),
         loop_width=None if largest is None else largest.cycle.width,
+        repeated_width=(
+            (repeats[0].cycle.width, repeats[-1].cycle.width) if len(repeats) > 1 else None
+        ),
         mid_width=None if largest is None else largest.mid_width,
         asymmetry=None if largest is None else largest.asymmetry,
         width_centroid=None if largest is None else largest.width_centroid,
@@ -246,8 +258,9 @@ def _measured(runs: Sequence[Recording], said: str, given: str, wanted: str) -> 
         creep=crept,
         creep_time=creep_time,
         drift=drift(loops),
-        rate_dependence=slope,
-        rate_verdict=verdict,
+        rate_dependence=rate.growth,
+        rate_verdict=rate.verdict,
+        speeds=rate.speeds,
         closure_error=closure,
         wiping_out_error=wiping_out,
         p_dependence=seen.dependence,

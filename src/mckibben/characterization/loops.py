@@ -27,6 +27,9 @@ FEWEST = 8
 EQUAL = 0.98
 """Amplitudes from this share of the largest on are as large."""
 
+AS_HIGH, VENTED = 0.05, 0.7
+"""Shares of the amplitude within which repeats turn, and that they have at least."""
+
 PART = 0.5
 """Share of the other branch that a branch at either end of a recording must have to make a loop."""
 
@@ -130,13 +133,27 @@ def loops_of(tracks: Sequence[Track], scale: Scale) -> list[Loop]:
     return found
 
 
-def largest_of(loops: Sequence[Loop]) -> Loop | None:
-    """Return the loop of largest amplitude; of equally large ones the last.
+def largest_of(loops: Sequence[Loop]) -> list[Loop]:
+    """Return the largest loop, and those of recordings that repeat it, from the narrowest to the widest.
 
-    The first often starts from a memory that never comes again.
+    Of equally large ones of a recording it is the last: the first often starts from a memory that never
+    comes again. A repeat turns as high, and may be vented to another end.
     """
-    limit = EQUAL * max((loop.cycle.amplitude for loop in loops), default=0.0)
-    return next((loop for loop in reversed(loops) if loop.cycle.amplitude >= limit), None)
+    found: dict[int, Loop] = {}
+    for number in {loop.cycle.recording for loop in loops}:
+        own = [loop for loop in loops if loop.cycle.recording == number]
+        limit = EQUAL * max(loop.cycle.amplitude for loop in own)
+        found[number] = next(loop for loop in reversed(own) if loop.cycle.amplitude >= limit)
+    if not found:
+        return []
+    largest = max((loop.cycle for loop in found.values()), key=lambda cycle: cycle.amplitude)
+    repeats = (
+        loop
+        for loop in found.values()
+        if loop.cycle.amplitude >= VENTED * largest.amplitude
+        and abs(loop.cycle.high - largest.high) <= AS_HIGH * largest.amplitude
+    )
+    return sorted(repeats, key=lambda loop: loop.cycle.width)
 
 
 def curve(u: Array, y: Array, levels: Array, half: float) -> Array:

@@ -87,7 +87,9 @@ class Characterization(DrawsItself):
     cycles : tuple of Cycle
         Those with enough samples to measure a width.
     loop_width : float or None
-        e_w of the largest cycle [%].
+        e_w of the largest cycle [%]: of a recording's the last, of several recordings' the median one.
+    repeated_width : (float, float) or None
+        Of the narrowest and the widest of several recordings' largest cycles [%].
     mid_width : float or None
         Distance of its branches at mid input [output unit].
     asymmetry : float or None
@@ -115,6 +117,8 @@ class Characterization(DrawsItself):
         Growth of e_w at twice the speed [%].
     rate_verdict : str
         "none", "weak", "strong" or "unknown".
+    speeds : (float, float) or None
+        Mean speeds between which that is told [input unit/s].
     closure_error, wiping_out_error : float or None
         Return-point memory and wiping-out: how far minor loops fail to close, and to be forgotten
         [%].
@@ -157,6 +161,7 @@ class Characterization(DrawsItself):
     output_noise: float | None
     cycles: tuple[Cycle, ...]
     loop_width: float | None
+    repeated_width: Range | None
     mid_width: float | None
     asymmetry: float | None
     width_centroid: float | None
@@ -174,6 +179,7 @@ class Characterization(DrawsItself):
     drift: float | None
     rate_dependence: float | None
     rate_verdict: str
+    speeds: Range | None
     closure_error: float | None
     wiping_out_error: float | None
     p_dependence: float | None = None

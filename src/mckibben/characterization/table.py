@@ -64,7 +64,14 @@ def table(found: Characterization) -> list[Row]:
             "loop width e_w",
             found.loop_width,
             "%",
-            "of the largest cycle: distance of its branches at mid input over its output range",
+            "of the largest cycle: distance of its branches at mid input over its output range; of "
+            "several recordings the median",
+        ),
+        *_ends(
+            ("e_w of the narrowest repeat", "e_w of the widest repeat"),
+            found.repeated_width,
+            "%",
+            "of the largest cycles of several recordings",
         ),
         ("width at mid input", found.mid_width, y, "the same distance in units of the output"),
         (
@@ -124,6 +131,12 @@ def table(found: Characterization) -> list[Row]:
         ("creep time", found.creep_time, "s", "the time over which it crept so far"),
         ("drift", found.drift, y, "change of the output from one cycle to the next alike"),
         ("rate dependence", found.rate_dependence, "%", "growth of e_w at twice the speed"),
+        *_ends(
+            ("slowest compared", "fastest compared"),
+            found.speeds,
+            f"{u}/s".lstrip("/"),
+            "mean speed of the input in cycles alike",
+        ),
         ("rate verdict", found.rate_verdict, "", "from cycles alike at different speed"),
         (
             "closure error",
@@ -139,6 +152,13 @@ def table(found: Characterization) -> list[Row]:
             "output beyond a minor loop against that without one",
         ),
     ]
+
+
+def _ends(
+    names: tuple[str, str], ends: tuple[float, float] | None, unit: str, meaning: str
+) -> list[Row]:
+    """Return a row of either end, of what is known."""
+    return [(name, end, unit, meaning) for name, end in zip(names, ends or (), strict=False)]
 
 
 def _level_rows(found: Characterization, at: str, unit: str) -> tuple[Row, Row]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -86,8 +87,27 @@ def drift(loops: Sequence[Loop]) -> float | None:
     return float(np.median(changes)) if changes else None
 
 
-def rate_dependence(loops: Sequence[Loop]) -> tuple[float | None, str]:
-    """Return how much wider the loop is at twice the speed [% of output range], and a verdict.
+@dataclass(frozen=True)
+class RateDependence:
+    """How the loop width depends on speed.
+
+    Parameters
+    ----------
+    growth : float or None
+        How much wider the loop is at twice the speed [% of output range].
+    verdict : str
+        "none", "weak", "strong" or "unknown".
+    speeds : (float, float) or None
+        The slowest and the fastest mean speed compared [input unit/s].
+    """
+
+    growth: float | None = None
+    verdict: str = "unknown"
+    speeds: tuple[float, float] | None = None
+
+
+def rate_dependence(loops: Sequence[Loop]) -> RateDependence:
+    """Return how much wider the loop is at twice the speed, and a verdict.
 
     A line through e_w over the logarithm of the mean speed, of the cycles between like extremes that
     differ most in speed. The verdict is "none", "weak" or "strong" as twice the speed changes the
@@ -96,24 +116,27 @@ def rate_dependence(loops: Sequence[Loop]) -> tuple[float | None, str]:
     """
     timed = [loop.cycle for loop in loops if loop.cycle.rate is not None]
     if not timed:
-        return None, "unknown"
+        return RateDependence()
     # Any cycle may be the one to compare with; of very many, fifty will do.
     wanted = timed[:: max(1, len(timed) // 50)]
     groups = [[cycle for cycle in timed if _alike(one, cycle)] for one in wanted]
-    speeds = [np.log2([cycle.rate for cycle in group]) for group in groups]  # type: ignore[arg-type]
-    widest = int(np.argmax([np.ptp(speed) for speed in speeds]))
-    speed, widths = speeds[widest], np.array([cycle.width for cycle in groups[widest]])
+    rates = [np.array([cycle.rate for cycle in group], dtype=float) for group in groups]
+    widest = int(np.argmax([np.ptp(np.log2(rate)) for rate in rates]))
+    speed, widths = np.log2(rates[widest]), np.array([cycle.width for cycle in groups[widest]])
     if np.ptp(speed) < np.log2(SPEED_RATIO):
-        return None, "unknown"
+        return RateDependence()
     growth, offset = np.polyfit(speed, widths, 1)
     left = widths - (offset + growth * speed)
     doubt = np.sqrt(left @ left / max(1, speed.size - 2) / np.sum((speed - speed.mean()) ** 2))
     share = abs(growth) / max(float(widths.mean()), LEAST)
     if share < WEAK:
-        return float(growth), "none"
-    if abs(growth) < 2 * doubt:
-        return float(growth), "unknown"
-    return float(growth), "weak" if share < STRONG else "strong"
+        verdict = "none"
+    elif abs(growth) < 2 * doubt:
+        verdict = "unknown"
+    else:
+        verdict = "weak" if share < STRONG else "strong"
+    ends = float(rates[widest].min()), float(rates[widest].max())
+    return RateDependence(float(growth), verdict, ends)
 
 
 def _alike(one: Cycle, other: Cycle) -> bool:

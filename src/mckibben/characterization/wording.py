@@ -83,7 +83,10 @@ def _headline(found: Characterization) -> str:
         shape = ""
         if found.asymmetry is not None:
             shape = ", asymmetric" if found.asymmetry >= ASYMMETRIC else ", symmetric"
-        parts.append(f"{size} ({_percent(width)}){shape} loop")
+        ends = found.repeated_width
+        apart = ends is not None and round(ends[1] - ends[0], 1) >= NOTABLE
+        repeats = f"; {ends[0]:.2g} to {ends[1]:.2g} % in repeats" if ends and apart else ""
+        parts.append(f"{size} ({_percent(width)}{repeats}){shape} loop")
     elif found.branch_gap is not None:
         parts.append(
             f"no cycle is sampled finely enough for a loop width; on average the branches are "
@@ -222,7 +225,12 @@ def _rate(found: Characterization) -> str:
             "same extremes at different speeds."
         )
     if found.rate_verdict == "none" or found.rate_dependence is None:
-        return "The loop does not depend on speed, as far as these cycles tell."
+        slow, fast = found.speeds or (0.0, 0.0)
+        unit = f"{found.input_unit}/s".lstrip("/")
+        return (
+            f"Between mean speeds of {slow:.2g} and {fast:.2g} {unit}, which are all that cycles alike "
+            "were recorded at, the width of the loop does not depend on speed."
+        )
     way = "wider" if found.rate_dependence > 0 else "narrower"
     return (
         f"The loop depends on speed ({found.rate_verdict}): twice as fast, it is "

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mckibben.comparison.recognising import DRIVING
+from mckibben.files.notices import listed
 from mckibben.recording import Recording
 from mckibben.signals.zeroing import apart
 
@@ -22,6 +23,9 @@ OTHER = 1.5
 
 REPEATED, WITHIN = 1.1, 0.2
 """The same where all repeat: of parts that spread by at most such a share of what is between them."""
+
+NAMED = 12
+"""Recordings of a part that are named."""
 
 STILL = 0.02
 """Share of a channel's largest range, or value, below which it is held in a recording."""
@@ -53,28 +57,42 @@ class Travel:
         return self.by_name[0][1] < 0 < self.by_name[-1][1]
 
     @property
+    def parts(self) -> tuple[tuple[tuple[str, float], ...], tuple[tuple[str, float], ...]]:
+        """Those that move less and those that move more, by the widest gap; or the other way."""
+        if self.turned:
+            place = sum(travel < 0 for _, travel in self.by_name)
+            return self.by_name[:place], self.by_name[place:]
+        ordered = sorted(self.by_name, key=lambda pair: abs(pair[1]))
+        place = int(np.argmax(np.diff([abs(travel) for _, travel in ordered]))) + 1
+        return tuple(ordered[:place]), tuple(ordered[place:])
+
+    @property
     def differs(self) -> bool:
         """Whether some move so much more than others that they are not of one muscle."""
-        sizes = np.sort(np.abs([travel for _, travel in self.by_name]))
-        if sizes[-1] > OTHER * sizes[0]:
+        less, more = (np.abs([travel for _, travel in part]) for part in self.parts)
+        if more.max() > OTHER * less.min():
             return True
-        between = np.diff(sizes)
-        place = int(np.argmax(between)) + 1
-        parts = sizes[:place], sizes[place:]
-        spread = max(float(np.ptp(part)) for part in parts)
-        repeated = min(part.size for part in parts) > 1
-        means = parts[1].mean() > REPEATED * parts[0].mean()
-        return repeated and means and spread <= WITHIN * float(between.max())
+        between, spread = more.min() - less.max(), max(np.ptp(less), np.ptp(more))
+        repeated = min(less.size, more.size) > 1 and more.mean() > REPEATED * less.mean()
+        return bool(repeated and spread <= WITHIN * between)
 
     def said(self, units: Mapping[str, str]) -> str:
         """Return it in words."""
-        (least, less), (most, more) = self.by_name[0], self.by_name[-1]
-        if not self.turned and abs(less) > abs(more):
-            (least, less), (most, more) = (most, more), (least, less)
+        less, more = (
+            f"{spanned(sorted((part[0][1], part[-1][1]), key=abs), units[self.wanted])} in "
+            f"{listed([name for name, _ in part], NAMED)}"
+            for part in self.parts
+        )
         return (
             f"over {self.low:.3g} to {self.high:.3g} {units[self.given]} of {self.given}, {self.wanted} "
-            f"moves by {less:.3g} {units[self.wanted]} in {least} and by {more:.3g} in {most}"
+            f"moves by {less} and by {more}"
         )
+
+
+def spanned(ends: Sequence[float], unit: str) -> str:
+    """Return the least and the most, or one where they are alike."""
+    least, most = (f"{end:.3g}" for end in ends)
+    return f"{least} {unit}".rstrip() if least == most else f"{least} to {most} {unit}".rstrip()
 
 
 def alike(

@@ -49,6 +49,20 @@ def test_a_turned_sign_is_told_as_one() -> None:
     assert "the sign of one was turned" in found
 
 
+def test_what_swings_by_itself_tells_no_sign() -> None:
+    """In resonance the output hardly follows the input's own value, this way or that."""
+    t = STEP * np.arange(PRESSURE.size)
+    runs = [
+        Recording(
+            {"pressure": PRESSURE, "displacement": 3 * np.sin(9 * t) + slope * PRESSURE},
+            STEP,
+            meta={"name": name},
+        )
+        for name, slope in (("a", 0.1), ("bb", -0.1))
+    ]
+    assert said(*runs) == []
+
+
 def test_recordings_of_other_ranges_are_not_compared() -> None:
     small = run("a").slice(0, 60)
     assert np.ptp(small["pressure"]) < 0.6 * np.ptp(PRESSURE)

@@ -18,6 +18,9 @@ COVERS = 0.7
 ENDS = 0.1
 """Share of the range that both have at whose ends the travel is read."""
 
+OWN = 0.3
+"""Share of the output's range that the travel has at least: of one that resonates it is chance."""
+
 OTHER = 1.5
 """Ratio of two travels from which on it is another muscle, or another speed."""
 
@@ -140,8 +143,11 @@ def travels(recordings: Sequence[Recording], given: str, wanted: str) -> Travel 
     found = []
     for one in some:
         u, y = one[given], one[wanted]
-        ends = [np.median(y[at]) for at in (u >= high - edge, u <= low + edge)]
-        found.append((one.name, float(ends[0] - ends[1])))
+        top, bottom = (np.median(y[at]) for at in (u >= high - edge, u <= low + edge))
+        if abs(top - bottom) >= OWN * np.ptp(y):
+            found.append((one.name, float(top - bottom)))
+    if len(found) < 2:
+        return None
     return Travel(given, wanted, low, high, tuple(sorted(found, key=lambda pair: pair[1])))
 
 
@@ -163,7 +169,10 @@ def unlike(
     for given, some in alike(recordings, names, wanted):
         found = travels(some, given, wanted)
         if found is not None and found.turned:
-            yield f"{found.said(some[0].units)}: the sign of one was turned. Turn it back"
+            yield (
+                f"{found.said(some[0].units)}: they are of two muscles that move the other way, or the "
+                "sign of one was turned and has to be turned back"
+            )
         elif found is not None and found.differs:
             why = "another muscle" if loads else "another muscle or load"
             yield (

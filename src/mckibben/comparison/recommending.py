@@ -113,12 +113,12 @@ def recommended(
                 )
             )
         )
-    first = (better or working)[0]
+    first, several = (better or working)[0], len(working) > 1
     if constant is not None and not _beats(first, constant, DOUBTED if apart else USEFUL):
         return None, (
-            f"{NONE}{first.model} has the least error of those on the training "
-            f"side, but on the test data it is off by {_error(first, unit)} RMSE, and the mean of the "
-            f"training output by {_error(constant, unit)}. "
+            f"{NONE}{f'{first.model} has the least error of those on the training side, but ' * several}"
+            f"on the test data {'it' if several else first.model} is off by {_error(first, unit)} RMSE, "
+            f"and the mean of the training output by {_error(constant, unit)}. "
             + (
                 apart
                 or "The test differs from what was trained on, or training is too little: record more, "

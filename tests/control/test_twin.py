@@ -395,6 +395,9 @@ def test_an_unpaired_plant_is_followed_by_the_least_commands_along_straight_line
     lines = StraightMap(np.zeros(1), slopes, np.zeros(2), np.full(2, 4.0))
     least = np.linalg.pinv(slopes) @ given
     assert lines.step(given, given, given) == pytest.approx(least, rel=1e-4)
+    # where one is at its limit, another makes up for it
+    lines = StraightMap(np.zeros(1), np.array([[2.0, 0.1]]), np.zeros(2), np.array([1.0, 5.0]))
+    assert lines.slopes @ lines.step(np.array([2.4]), given, given) == pytest.approx(2.4, rel=1e-3)
 
 
 def test_rigs_stand_beside_no_compensation_too() -> None:

@@ -184,3 +184,15 @@ def test_it_is_nothing_that_a_person_is_shown(tmp_path: Path) -> None:
     page = (tmp_path / "report.html").read_text("utf-8")
     assert "What is known" in page
     assert whole.meta[ROWS]["displacement"][:20] not in page
+
+
+def test_other_samples_under_what_is_known_of_a_recording_are_other_data(tmp_path: Path) -> None:
+    """Who simulates and keeps `meta` beside it has not measured the same again."""
+    whole = read(written(tmp_path / "whole.csv", ROWS_READ))
+    other = 1 + 1.5 * (1 - np.cos(TIME / 3))
+    simulated = replace(
+        whole,
+        channels={"pressure": other, "displacement": mckibben.GPI.example().simulate(other)},
+    )
+    assert shared_rows(whole, simulated, INPUT, OUTPUT) is None
+    assert shared_rows(whole, whole, INPUT, OUTPUT)

@@ -251,7 +251,7 @@ def _trust(found: Characterization) -> str:
             f"No cycle of the input is whole: width, area and shape of the loop are those "
             f"{spanning((one.low, one.high), found.input_unit)}, where both branches are."
         )
-    if found.has_loop and not found.drift_excluded:
+    if found.has_loop and found.branch_gap is not None and not found.drift_excluded:
         said.append(
             "The input went up and down once, and drift would part the branches as well: record "
             "several cycles to tell them apart."

@@ -6,7 +6,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
+from mckibben.arrays import Array
 from mckibben.comparison.recognising import DRIVING
 from mckibben.files.notices import listed
 from mckibben.recording import Recording
@@ -16,7 +18,10 @@ COVERS = 0.7
 """Share of the widest range of the input that recordings cover whose travel is compared."""
 
 ENDS = 0.1
-"""Share of the range that both have at whose ends the travel is read."""
+"""Share of the range that both have: so wide is what is looked at round each of its ends."""
+
+SURE = 2.0
+"""Standard errors beyond which travels differ."""
 
 OWN = 0.3
 """Share of the output's range that the travel has at least: of one that resonates it is chance."""
@@ -46,6 +51,10 @@ class Travel:
         Ends of that part.
     by_name : tuple of (str, float)
         Recordings and their travel, from the least to the most.
+    doubt : float
+        Difference of two travels that scatter at the ends may give.
+    one_range : bool
+        Whether the input turns alike in all.
     """
 
     given: str
@@ -53,11 +62,14 @@ class Travel:
     low: float
     high: float
     by_name: tuple[tuple[str, float], ...]
+    doubt: float
+    one_range: bool
 
     @property
     def turned(self) -> bool:
         """Whether some move the other way."""
-        return self.by_name[0][1] < 0 < self.by_name[-1][1]
+        least, most = self.by_name[0][1], self.by_name[-1][1]
+        return least < 0 < most and min(-least, most) > self.doubt
 
     @property
     def parts(self) -> tuple[tuple[tuple[str, float], ...], tuple[tuple[str, float], ...]]:
@@ -73,10 +85,16 @@ class Travel:
     def differs(self) -> bool:
         """Whether some move so much more than others that they are not of one muscle."""
         less, more = (np.abs([travel for _, travel in part]) for part in self.parts)
+        between, spread = more.min() - less.max(), max(np.ptp(less), np.ptp(more))
+        if between <= self.doubt:
+            return False
         if more.max() > OTHER * less.min():
             return True
-        between, spread = more.min() - less.max(), max(np.ptp(less), np.ptp(more))
-        repeated = min(less.size, more.size) > 1 and more.mean() > REPEATED * less.mean()
+        repeated = (
+            self.one_range
+            and min(less.size, more.size) > 1
+            and more.mean() > REPEATED * less.mean()
+        )
         return bool(repeated and spread <= WITHIN * between)
 
     def said(self, units: Mapping[str, str]) -> str:
@@ -135,20 +153,43 @@ def travels(recordings: Sequence[Recording], given: str, wanted: str) -> Travel 
     some = [one for one in recordings if np.ptp(one[given]) >= COVERS * widest > 0]
     if len(some) < 2:
         return None
-    low = max(float(one[given].min()) for one in some)
-    high = min(float(one[given].max()) for one in some)
+    lows, highs = ([float(end(one[given])) for one in some] for end in (np.min, np.max))
+    low, high = max(lows), min(highs)
     edge = ENDS * (high - low)
     if high - low < COVERS * widest * COVERS:
         return None
-    found = []
+    found, scatter = [], [0.0]
     for one in some:
         u, y = one[given], one[wanted]
-        top, bottom = (np.median(y[at]) for at in (u >= high - edge, u <= low + edge))
-        if abs(top - bottom) >= OWN * np.ptp(y):
-            found.append((one.name, float(top - bottom)))
+        top, bottom = (np.abs(u - end) <= edge / 2 for end in (high, low))
+        if not (top.any() and bottom.any()):
+            continue
+        travel = float(np.median(y[top]) - np.median(y[bottom]))
+        if abs(travel) >= OWN * np.ptp(y):
+            found.append((one.name, travel))
+            scatter.append(sum(_scatter(u[at], y[at]) / _visits(at) for at in (top, bottom)))
     if len(found) < 2:
         return None
-    return Travel(given, wanted, low, high, tuple(sorted(found, key=lambda pair: pair[1])))
+    return Travel(
+        given,
+        wanted,
+        low,
+        high,
+        tuple(sorted(found, key=lambda pair: pair[1])),
+        SURE * float(np.sqrt(2 * max(scatter))),
+        max(np.ptp(lows), np.ptp(highs)) <= ENDS * widest,
+    )
+
+
+def _scatter(u: Array, y: Array) -> float:
+    """Return the variance of an output beside a line over the input."""
+    slope = float(np.cov(u, y, ddof=0)[0, 1] / np.var(u)) if np.ptp(u) > 0 else 0.0
+    return float(np.var(y - slope * u))
+
+
+def _visits(there: NDArray[np.bool_]) -> int:
+    """Return how often an input came where it is."""
+    return int(there[0]) + int(np.sum(there[1:] & ~there[:-1]))
 
 
 def unlike(

@@ -89,12 +89,13 @@ class StraightMap(Controller):
         """Do nothing: it has no memory."""
 
     def step(self, reference: Array, displacement: Array, scheduled: Array) -> Array:
-        from scipy.optimize import nnls  # slow to load
+        from scipy.optimize import lsq_linear  # slow to load
 
         small = SMALLEST * float(np.abs(self.slopes).max()) * np.eye(self.low.size)
         wanted = np.concatenate([reference - self.rest, np.zeros(self.low.size)])
-        above, _ = nnls(np.vstack([self.slopes, small]), wanted)
-        return np.minimum(self.low + above, self.high)
+        limits = (0.0, self.high - self.low)
+        found = lsq_linear(np.vstack([self.slopes, small]), wanted, limits, method="bvls")
+        return np.asarray(self.low + found.x)
 
 
 def slow_rise(

@@ -10,7 +10,7 @@ import numpy as np
 
 from mckibben.arrays import Array
 from mckibben.errors import DataError
-from mckibben.files import clocks, instants, plausible, timebase
+from mckibben.files import clocks, glitches, instants, plausible, timebase
 from mckibben.files.assigning import assign
 from mckibben.files.calibration import calibrated
 from mckibben.files.channels import Described
@@ -94,6 +94,7 @@ def choose(table: Table, request: Request, path: Path) -> Choice:
                 plausible.check(
                     channel, channels[channel], unit_of(channel), unit.name, table, path
                 )
+                glitches.check(channel, channels[channel], units[channel], values, table, path)
     if not channels:
         raise DataError(
             "there is no column of numbers", file=path, remedy="give a file with samples in columns"

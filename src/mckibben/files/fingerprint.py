@@ -30,6 +30,9 @@ noise of a sensor lets no two runs agree so long."""
 FEWEST, MOST, SHARE = 256, 2048, 200
 """Hashes that are kept of a channel: one of so many stretches, within limits."""
 
+TELLING, ALIKE = 8, 0.7
+"""Stretches from which on samples there have to correlate by so much, whatever was filtered."""
+
 DROPPED = np.uint64(36)
 """Low bits of a number that do not count: it is told to five significant digits."""
 
@@ -150,11 +153,24 @@ def _shared(first: Recording, second: Recording, name: str) -> tuple[SharedRows 
     last = min(one["hash"].max(), other["hash"].max())  # below it, both kept all that they have
     one, other = (each[each["hash"] <= last] for each in (one, other))
     _, mine, yours = np.intersect1d(one["hash"], other["hash"], return_indices=True)
-    if mine.size == 0:
+    if mine.size == 0 or not _agree(
+        _at(first, name, one["time"][mine]), _at(second, name, other["time"][yours])
+    ):
         return None, True
     begins, times = one["time"][mine], other["time"][yours]
     start, share = int(times.argmin()), mine.size / min(one.size, other.size)
     return SharedRows(float(times[start]), float(times.max()), float(begins[start]), share), True
+
+
+def _at(recording: Recording, name: str, time: Array) -> Array:
+    return np.interp(time, recording.time, recording[name])
+
+
+def _agree(some: Array, others: Array) -> bool:
+    """Tell whether samples are those that were read still, and not put under what is known of them."""
+    if some.size < TELLING or min(np.ptp(some), np.ptp(others)) == 0:
+        return True
+    return bool(abs(np.corrcoef(some, others)[0, 1]) > ALIKE)
 
 
 def _entries(recording: Recording, channel: str) -> NDArray[np.void]:

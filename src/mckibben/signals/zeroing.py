@@ -31,9 +31,12 @@ def rest(recording: Recording, channel: str, over: str) -> float:
     DataError
         If there is no such channel.
     """
+    return _rest(recording, channel, over, LOWEST * float(np.ptp(_known(recording, over))))
+
+
+def _rest(recording: Recording, channel: str, over: str, within: float) -> float:
     driven = _known(recording, over)
-    low = driven <= driven.min() + LOWEST * np.ptp(driven)
-    return float(np.median(_known(recording, channel)[low]))
+    return float(np.median(_known(recording, channel)[driven <= driven.min() + within]))
 
 
 def zeroed(recording: Recording, channels: Sequence[str], over: str) -> Recording:
@@ -60,8 +63,8 @@ def zeroed(recording: Recording, channels: Sequence[str], over: str) -> Recordin
 def apart(recordings: Sequence[Recording], channel: str, over: str) -> tuple[float, float] | None:
     """Return the lowest and the highest rest of recordings that are not of one zero, or None.
 
-    They are not where they rest apart by more than a quarter of what a recording travels, and every
-    input begins alike.
+    They are not where they rest apart by more than a quarter of what the one that moves most travels,
+    and every input begins alike.
 
     Parameters
     ----------
@@ -80,8 +83,9 @@ def apart(recordings: Sequence[Recording], channel: str, over: str) -> tuple[flo
     span = max(float(one[over].max()) for one in recordings) - min(lows)
     if max(lows) - min(lows) > LOWEST * span:
         return None
-    rests = [rest(one, channel, over) for one in recordings]
-    travel = float(np.median([np.ptp(one[channel]) for one in recordings]))
+    near = LOWEST * min(float(np.ptp(one[over])) for one in recordings)
+    rests = [_rest(one, channel, over, near) for one in recordings]
+    travel = max(float(np.ptp(one[channel])) for one in recordings)
     if travel == 0 or max(rests) - min(rests) <= APART * travel:
         return None
     return min(rests), max(rests)

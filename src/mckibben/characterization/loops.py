@@ -30,6 +30,10 @@ EQUAL = 0.98
 AS_HIGH, VENTED = 0.05, 0.7
 """Shares of the amplitude within which repeats turn, and that they have at least."""
 
+CLOSED, ENOUGH = 0.02, 0.8
+"""Shares of the amplitude within which a loop that ends where it began does, and which a closed one has
+at least to stand for one that is not."""
+
 PART = 0.5
 """Share of the other branch that a branch at either end of a recording must have to make a loop."""
 
@@ -83,6 +87,10 @@ class Loop:
         Range of the output.
     area : float
         Area enclosed, input times output.
+    begins, ends : int
+        Its first and last sample.
+    closed : bool
+        Whether it ends where it began, so that its branches are those of one loop.
     """
 
     cycle: Cycle
@@ -91,6 +99,9 @@ class Loop:
     down: Array
     span: float
     area: float
+    begins: int
+    ends: int
+    closed: bool
 
     @property
     def mid_width(self) -> float:
@@ -98,12 +109,15 @@ class Loop:
         return float(abs(self.down[MIDDLE] - self.up[MIDDLE]))
 
     @property
-    def asymmetry(self) -> float:
+    def asymmetry(self) -> float | None:
         """How far the loop is from its own image, turned by half a turn [% of the output range].
 
         Root mean square over the levels of up(mid + s) + down(mid - s) less its mean. Zero for every
-        loop of a classical Prandtl-Ishlinskii model; a bent or saturating loop has more.
+        loop of a classical Prandtl-Ishlinskii model; a bent or saturating loop has more. None where it
+        is not closed.
         """
+        if not self.closed:
+            return None
         sums = self.up + self.down[::-1]
         return 100 * float(np.std(sums)) / self.span
 
@@ -139,6 +153,10 @@ def largest_of(loops: Sequence[Loop]) -> list[Loop]:
     Of equally large ones of a recording it is the last: the first often starts from a memory that never
     comes again. A repeat turns as high, and may be vented to another end.
     """
+    most = max((loop.cycle.amplitude for loop in loops), default=0.0)
+    closed = [loop for loop in loops if loop.closed]
+    if any(loop.cycle.amplitude >= ENOUGH * most for loop in closed):
+        loops = closed
     found: dict[int, Loop] = {}
     for number in {loop.cycle.recording for loop in loops}:
         own = [loop for loop in loops if loop.cycle.recording == number]
@@ -259,7 +277,9 @@ def _loop(number: int, track: Track, piece: slice, tolerance: float) -> Loop | N
         rate = (2 * u[top] - u[0] - u[-1]) / (track.sample_time * (u.size - 1))
     width = 100 * float(abs(down[MIDDLE] - up[MIDDLE])) / span
     cycle = Cycle(number, low, high, None if rate is None else float(rate), width)
-    return Loop(cycle, levels, up, down, span, loop_area(u[covered], y[covered]))
+    closed = bool(abs(u[-1] - u[0]) <= CLOSED * (high - low))
+    area = loop_area(u[covered], y[covered])
+    return Loop(cycle, levels, up, down, span, area, piece.start, piece.stop - 1, closed)
 
 
 def _sums(q: Array, first: NDArray[np.intp], stop: NDArray[np.intp]) -> Array:

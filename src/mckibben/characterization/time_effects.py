@@ -27,8 +27,14 @@ CLEAR = 20
 ALIKE = 0.05
 """Share of the amplitude by which the extremes of two cycles may differ for these to be compared."""
 
+REPEATED = 0.02
+"""The same of cycles whose outputs are compared."""
+
 SPEED_RATIO = 1.5
 """Speeds must differ this much for dependence on rate to be judged."""
+
+FEWEST, SURE = 4, 0.99
+"""Cycles, and level of the interval of what they tell of speed."""
 
 WEAK, STRONG = 0.05, 0.2
 """Change of the loop width at twice the speed, relative to its mean: from here weak, strong."""
@@ -71,12 +77,15 @@ def creep(tracks: Sequence[Track], scale: Scale) -> tuple[float | None, float | 
 def drift(loops: Sequence[Loop]) -> float | None:
     """Return the change of the output from one cycle to the next of the same amplitude.
 
-    Mean over both branches at the same inputs, median over the pairs of neighbouring cycles whose
-    extremes differ by at most a twentieth of the amplitude. None where there is no such pair.
+    Mean over both branches at the same inputs, median over the pairs of cycles that follow each other
+    and whose extremes differ by at most a fiftieth of the amplitude: what else is remembered is then
+    the same. None where there is no such pair.
     """
     changes = []
     for one, other in pairwise(loops):
-        if one.cycle.recording == other.cycle.recording and _alike(one.cycle, other.cycle):
+        follows = one.cycle.recording == other.cycle.recording and one.ends == other.begins
+        closed = one.closed and other.closed
+        if follows and closed and _alike(one.cycle, other.cycle, REPEATED):
             common = (one.levels >= other.levels[0]) & (one.levels <= other.levels[-1])
             later = [
                 np.interp(one.levels[common], other.levels, curve)
@@ -109,12 +118,14 @@ class RateDependence:
 def rate_dependence(loops: Sequence[Loop]) -> RateDependence:
     """Return how much wider the loop is at twice the speed, and a verdict.
 
-    A line through e_w over the logarithm of the mean speed, of the cycles between like extremes that
-    differ most in speed. The verdict is "none", "weak" or "strong" as twice the speed changes the
+    A line through e_w over the logarithm of the mean speed, of the closed cycles between like extremes
+    that differ most in speed. The verdict is "none", "weak" or "strong" as twice the speed changes the
     width by less than 5 %, less than 20 %, or more of its mean; "unknown" where the speeds differ by
-    less than half, or the change is below twice its standard error.
+    less than half, there are fewer than four cycles, or the change is within its 99 % interval.
     """
-    timed = [loop.cycle for loop in loops if loop.cycle.rate is not None]
+    from scipy.special import stdtrit
+
+    timed = [loop.cycle for loop in loops if loop.cycle.rate is not None and loop.closed]
     if not timed:
         return RateDependence()
     # Any cycle may be the one to compare with; of very many, fifty will do.
@@ -127,11 +138,13 @@ def rate_dependence(loops: Sequence[Loop]) -> RateDependence:
         return RateDependence()
     growth, offset = np.polyfit(speed, widths, 1)
     left = widths - (offset + growth * speed)
-    doubt = np.sqrt(left @ left / max(1, speed.size - 2) / np.sum((speed - speed.mean()) ** 2))
+    freedom = max(1, speed.size - 2)
+    doubt = np.sqrt(left @ left / freedom / np.sum((speed - speed.mean()) ** 2))
+    doubt *= stdtrit(freedom, 0.5 + SURE / 2)
     share = abs(growth) / max(float(widths.mean()), LEAST)
     if share < WEAK:
         verdict = "none"
-    elif abs(growth) < 2 * doubt:
+    elif abs(growth) < doubt or speed.size < FEWEST:
         verdict = "unknown"
     else:
         verdict = "weak" if share < STRONG else "strong"
@@ -139,8 +152,8 @@ def rate_dependence(loops: Sequence[Loop]) -> RateDependence:
     return RateDependence(float(growth), verdict, ends)
 
 
-def _alike(one: Cycle, other: Cycle) -> bool:
-    limit = ALIKE * one.amplitude
+def _alike(one: Cycle, other: Cycle, within: float = ALIKE) -> bool:
+    limit = within * one.amplitude
     return abs(one.low - other.low) <= limit and abs(one.high - other.high) <= limit
 
 

@@ -264,13 +264,16 @@ def fitting(model: str, estimator: Any, block: Any) -> list[str]:
 
 
 def paper(one: Written, level: int = 3) -> list[str]:
-    """Return the equations of a model and of its parts, each part of a kind once."""
+    """Return the equations of a model and of its parts, each structure once."""
     lines, seen = [], set()
 
+    def structure(part: Written) -> tuple[Any, ...]:
+        return part.equations, *dict.fromkeys(map(structure, part.parts))
+
     def walk(part: Written, depth: int) -> Iterator[str]:
-        if part.equations in seen:
+        if structure(part) in seen:
             return
-        seen.add(part.equations)
+        seen.add(structure(part))
         if depth and part.equations:
             title = re.sub(r"^\d+\. ", "", part.title.partition(":")[0])
             yield from (f"**{plain(title)}**", "")

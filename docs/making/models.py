@@ -214,7 +214,7 @@ def inverse(block: Any) -> str:
 
 
 def source(block: Any) -> list[str]:
-    """Return what a model's files name as their sources."""
+    """Return what a model's files name as their sources, each title once."""
     found = []
     for kind in dict.fromkeys(leaf.kind for leaf in leaves(described(block))):
         text = inspect.getdoc(sys.modules[registry.load("blocks", kind).__module__]) or ""
@@ -222,7 +222,11 @@ def source(block: Any) -> list[str]:
             plain(" ".join(part.split()))
             for part in re.findall(r"Sources?: (.+?)(?:\n\n|\Z)", text, re.S)
         ]
-    return list(dict.fromkeys(one.rstrip(".") for one in found))
+    places: dict[str, list[str]] = {}
+    for one in dict.fromkeys(one.rstrip(".") for one in found):
+        title, mark, place = one.partition('", ')
+        places.setdefault(title + mark, []).append(place)
+    return [title + "; ".join(filter(None, each)) for title, each in places.items()]
 
 
 def fitting(model: str, estimator: Any, block: Any) -> list[str]:

@@ -214,7 +214,7 @@ def inverse(block: Any) -> str:
 
 
 def source(block: Any) -> list[str]:
-    """Return what a model's files name as their sources."""
+    """Return what a model's files name as their sources, each title once."""
     found = []
     for kind in dict.fromkeys(leaf.kind for leaf in leaves(described(block))):
         text = inspect.getdoc(sys.modules[registry.load("blocks", kind).__module__]) or ""
@@ -222,7 +222,11 @@ def source(block: Any) -> list[str]:
             plain(" ".join(part.split()))
             for part in re.findall(r"Sources?: (.+?)(?:\n\n|\Z)", text, re.S)
         ]
-    return list(dict.fromkeys(one.rstrip(".") for one in found))
+    places: dict[str, list[str]] = {}
+    for one in dict.fromkeys(one.rstrip(".") for one in found):
+        title, mark, place = one.partition('", ')
+        places.setdefault(title + mark, []).append(place)
+    return [title + "; ".join(filter(None, each)) for title, each in places.items()]
 
 
 def fitting(model: str, estimator: Any, block: Any) -> list[str]:
@@ -264,13 +268,16 @@ def fitting(model: str, estimator: Any, block: Any) -> list[str]:
 
 
 def paper(one: Written, level: int = 3) -> list[str]:
-    """Return the equations of a model and of its parts, each part of a kind once."""
+    """Return the equations of a model and of its parts, each structure once."""
     lines, seen = [], set()
 
+    def structure(part: Written) -> tuple[Any, ...]:
+        return part.equations, *dict.fromkeys(map(structure, part.parts))
+
     def walk(part: Written, depth: int) -> Iterator[str]:
-        if part.equations in seen:
+        if structure(part) in seen:
             return
-        seen.add(part.equations)
+        seen.add(structure(part))
         if depth and part.equations:
             title = re.sub(r"^\d+\. ", "", part.title.partition(":")[0])
             yield from (f"**{plain(title)}**", "")

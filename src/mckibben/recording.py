@@ -143,9 +143,6 @@ class Recording(DrawsItself):
         grid = "no time" if self.sample_time is None else f"{self.sample_time:g} s apart"
         return f"Recording({self.name}: {self.n_samples} samples {grid}; {listed})"
 
-    def __str__(self) -> str:
-        return repr(self)
-
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Recording):
             return NotImplemented

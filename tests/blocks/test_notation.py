@@ -11,6 +11,7 @@ from mckibben.blocks.core.block import Block
 from mckibben.blocks.core.inverse import Inverse
 from mckibben.blocks.core.notation import MANY, Written, meanings
 from mckibben.blocks.core.writing import quantities, written
+from mckibben.blocks.coupled.balance import Balance
 from mckibben.blocks.laws.examples import examples
 from mckibben.registry import load, names
 from mckibben.report.mathematics import mathml
@@ -100,3 +101,11 @@ def test_the_springs_of_a_balance_grow_with_what_schedules() -> None:
     own = ["constant force of muscle 1", "spring of muscle 1", "spring of muscle 1 to muscle 2"]
     springs = [by_name[name] for name in (*own, *(f"{name} by pressure_extensor" for name in own))]
     assert springs == ["N", "N/mm", "N/mm", "N/bar", "N/mm bar", "N/mm bar"]
+
+
+def test_a_balance_is_written_in_its_own_letters() -> None:
+    model = Balance.example().inverse()
+    found = written(model)
+    assert found.title.startswith("balance: pressure")
+    assert found.equations == model.inverse().equations()
+    assert not any(r"\hat{u}" in line for part in parts(found) for line in part.numbers)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+import sys
 import zipfile
 from pathlib import Path
 
@@ -19,6 +20,14 @@ def test_the_archives_hold_the_package_and_nothing_else(tmp_path: Path) -> None:
         archive.writestr("tests/__init__.py", "")
     with pytest.raises(ReleaseError, match=r"should not hold tests/__init__\.py"):
         release.look_through(wheel, source)
+
+
+def test_an_ordinary_build_is_small_too(tmp_path: Path) -> None:
+    release.run(
+        sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", str(tmp_path), within=ROOT
+    )
+    (wheel,) = tmp_path.glob("*.whl")
+    assert wheel.stat().st_size < release.LARGEST
 
 
 def copied(folder: Path) -> Path:

@@ -71,9 +71,6 @@ NAMES = (
 
 @pytest.mark.parametrize("name", NAMES)
 def test_it_prints_within_a_terminal(name: str, things: dict[str, Any]) -> None:
-    if name == "recording":  # which a line says, as in messages
-        assert str(things[name]).startswith("Recording(decaying-triangle: 4501 samples")
-        return
     lines = str(things[name]).splitlines()
     assert len(lines) > 2
     assert max(map(len, lines)) <= 80
@@ -192,3 +189,11 @@ def test_a_recording_of_several_muscles_and_one_without_motion() -> None:
     held = Recording({"pressure": still, "temperature": ramp}, 0.1)
     assert len(held.plot()) == 2  # over time
     assert "svg" not in held._repr_html_()
+
+
+def test_a_recording_has_a_line_for_every_channel_and_a_finding_is_short(
+    things: dict[str, Any],
+) -> None:
+    assert "\npressure      bar " in str(things["recording"])
+    assert len(repr(things["recording"]).splitlines()) == 1  # in messages
+    assert repr(things["characterization"]) == str(things["characterization"])

@@ -18,6 +18,7 @@ from mckibben.blocks.memoryless.negative import Negative
 from mckibben.errors import DataError
 from mckibben.report import printed
 from mckibben.report.description_subjects import figures, frequency_response
+from mckibben.report.templating import template
 from mckibben.validation.describing import describe
 
 STEP = 0.05
@@ -135,7 +136,9 @@ def test_of_a_compensator_no_errors_are_given() -> None:
         recording = recorded(block)
     found = describe(block, [recording])
     assert all(one.standard_error is None for one in found.parameters)
-    assert any("inverse" in note for note in found.notes)
+    assert "inverse" in found.unsure
+    page = template("_model.html.j2").render(description=found, figures=figures(found))
+    assert page.count(found.unsure) == 1
 
 
 def test_the_output_named_is_the_only_one_shown() -> None:

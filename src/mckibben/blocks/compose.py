@@ -270,6 +270,7 @@ class PerChannel(Composition):
     """
 
     kind: ClassVar[str] = "per-channel"
+    letter: ClassVar[str] = "C"
 
     parts: Parts
 

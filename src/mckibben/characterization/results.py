@@ -192,6 +192,9 @@ class Characterization(DrawsItself):
     levels: tuple[Level, ...] = ()
     assumed: tuple[str, ...] = ()
 
+    def __repr__(self) -> str:
+        return str(self)
+
     @property
     def has_loop(self) -> bool | None:
         """Whether there is a loop that noise would not give, or no test that says otherwise.

@@ -78,15 +78,18 @@ def print_json(value: Any) -> None:
 
 
 def print_table(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
-    """Print a table on standard output; all columns but the first are aligned right."""
+    """Print a table on standard output; numbers are aligned right, words left."""
     from rich.console import Console
     from rich.table import Table
     from rich.text import Text
 
     table = Table(box=None, pad_edge=False, header_style="bold")
     for index, heading in enumerate(headings):
+        told = [row[index] for row in rows if row[index] not in ("", "-", "–")]
+        numbers = sum(bool(re.match(r"[-−+]?\d", cell)) for cell in told)
+        right = index > 0 and 2 * numbers > len(told)
         table.add_column(
-            Text(visible(heading)), justify="left" if index == 0 else "right", overflow="fold"
+            Text(visible(heading)), justify="right" if right else "left", overflow="fold"
         )
     for row in rows:
         table.add_row(*(Text(visible(cell)) for cell in row))

@@ -1,15 +1,53 @@
 """The bundled recordings: two runs of the virtual rig `mas20-hanging`, of the protocol `field-models`.
 
-``mckibben rig record field-models -o FOLDER`` records them anew, to the bit.
+``mckibben rig record field-models -o FOLDER`` records them anew, to the bit. The package holds the steps
+from sample to sample, in the resolution of the rig's sensors, which pack into a fifth.
 """
 
 from __future__ import annotations
 
+import lzma
+import tempfile
+from itertools import accumulate
 from pathlib import Path
 
-FOLDER = Path(__file__).parent
+from mckibben.system.atomic import replacing
+from mckibben.system.caches import place
 
-TRAIN, TEST = FOLDER / "decaying-triangle.csv", FOLDER / "irregular-triangle.csv"
+PACKED = Path(__file__).parent
+
+NAMES = ("decaying-triangle.csv", "irregular-triangle.csv")
+
+
+def _unpacked() -> Path:
+    """Return a folder with the recordings, their descriptions, and ``protocol.json``."""
+    folder = (place() or Path(tempfile.mkdtemp())) / "example"
+    folder.mkdir(mode=0o700, exist_ok=True)
+    contents = {path.name: path.read_bytes() for path in PACKED.glob("*.json")}
+    for name, content in (contents | _tables()).items():
+        path = folder / name
+        if not path.is_file() or path.read_bytes() != content:
+            with replacing(path) as new:
+                new.write_bytes(content)
+    return folder
+
+
+def _tables() -> dict[str, bytes]:
+    lines = lzma.decompress((PACKED / "steps.txt.xz").read_bytes()).decode().splitlines()
+    counts = [list(accumulate(map(int, line.split()))) for line in lines]
+    found = {}
+    for name, pressures, displacements in zip(NAMES, counts[::2], counts[1::2], strict=True):
+        rows = "".join(
+            f"{round(0.02 * k, 2)},{round(0.0024 * p, 4)},{round(0.01 * d, 2)}\n"
+            for k, (p, d) in enumerate(zip(pressures, displacements, strict=True))
+        )
+        found[name] = f"time,pressure,displacement\n{rows}".encode()
+    return found
+
+
+FOLDER = _unpacked()
+
+TRAIN, TEST = (FOLDER / name for name in NAMES)
 """A recording to fit models to, and one to test them on: pressure [bar], displacement [mm]."""
 
 

@@ -67,6 +67,12 @@ class ModelDescription:
     recordings: tuple[str, ...]
     fitted: bool
 
+    @property
+    def unsure(self) -> str:
+        """Why most of its parameters have no standard error; empty where most have."""
+        said = [one.said for one in self.parameters]
+        return max(said, key=said.count) if 2 * len(list(filter(None, said))) > len(said) else ""
+
     def to_dict(self) -> dict[str, Any]:
         """Return it as a JSON-ready dict; what is not known is None."""
         found: dict[str, Any] = _plain(self)
@@ -121,8 +127,7 @@ def describe(
         responses = frequency_responses(block, recordings, sure.covariance, sure.half_width, output)
         loops = () if responses else describing_functions(block, recordings, output)
         found = criteria(block, recordings, left, sure.n_effective, fitted)
-    notes = [f"Standard errors are not given: {reason}."] if reason else []
-    notes += [
+    notes = [
         f"The loops of {one.output.name} are not compared: {one.said}." for one in loops if one.said
     ]
     return ModelDescription(

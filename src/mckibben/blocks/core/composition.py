@@ -33,11 +33,13 @@ class Composition(Block):
     parameters: ClassVar[tuple[str, ...]] = ("parts",)
     together: ClassVar[Callable[[Iterable[float]], float]] = max  # of dead times side by side
 
+    letter: ClassVar[str] = "P"  # of its parts in equations
+
     parts: tuple[Block, ...]
 
     def equations(self) -> tuple[str, ...]:
         """Return how the parts come together: ``y`` of them all, ``u`` going into each."""
-        marks = [f"P_{{{place + 1}}}" for place in range(len(self.parts))]
+        marks = [f"{self.letter}_{{{place + 1}}}" for place in range(len(self.parts))]
         return (self.joined(marks),)
 
     @abstractmethod

@@ -8,6 +8,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING, Any
 
+from mckibben.blocks.core.commanding import commands
+from mckibben.blocks.core.inverse import Inverse
 from mckibben.blocks.core.notation import (
     FEW,
     MANY,
@@ -147,6 +149,8 @@ def _walked(value: Any, index: tuple[int, ...] = ()) -> Iterator[tuple[tuple[int
 def written(part: Parametrised, title: str = "", units: Units | None = None) -> Written:
     """Return a block, or a part of one, on paper.
 
+    A muscle's model that is solved from a law, as a balance of forces, is that law with its letters.
+
     Parameters
     ----------
     title : str
@@ -154,6 +158,9 @@ def written(part: Parametrised, title: str = "", units: Units | None = None) -> 
     units : dict of str to str, optional
         Of the block that it is a part of.
     """
+    if isinstance(part, Inverse) and not commands(part):
+        law = part.forward
+        return written(law, title or _title(part, "").replace(part.title, law.title, 1))
     units = channel_units(part) or units or {}
     inner: list[Written] = []
     for field in fields(part):  # type: ignore[arg-type]

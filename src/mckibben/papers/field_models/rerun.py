@@ -47,7 +47,7 @@ SOURCE = Source(
     "Analysis and modeling of a pneumatic artificial muscle system",
     "Which of four models comes closest to a muscle that lifts 20 kg: NARX, Box-Jenkins, "
     "Prandtl-Ishlinskii, or a second-order process with a zero?",
-    authors="Tran, Nguyen, and others",
+    authors="Vinh-Phuc Tran, Chanh-Nghiem Nguyen, and others",
 )
 
 SEEDS, QUICK_SEEDS = 10, 3

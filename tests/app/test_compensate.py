@@ -324,16 +324,35 @@ def test_the_compensator_shown_is_taken_away(tmp_path: Path) -> None:
     async def look(user: User) -> None:
         user.find(marker="tab-take").click()
         await until(user, "take-form")
-        assert (only(user, "take-model").value, only(user, "take-form").value) == ("a", "model")
+        assert (only(user, "take-model").value, only(user, "take-form").value) == ("a", "inverse")
         user.find(marker="tab-compensate").click()
         await until(user, "wave")
         await turn(user, "b")
         await drawn(user)
         user.find(marker="tab-take").click()
+        await later(lambda: only(user, "take-model").value == "b")
         await later(lambda: only(user, "take-form").value == "inverse")
-        assert only(user, "take-model").value == "b"
 
     visit(workspace_with(tmp_path, a=PI.example(), b=WEAKER), look)
+
+
+def test_what_is_taken_away_first_compensates(tmp_path: Path) -> None:
+    oscillator = load("blocks", "duhem-oscillator").example()
+    workspace = workspace_with(tmp_path, a=oscillator, b=PI.example())
+    assert (workspace.ranked(), workspace.to_invert()) == (["a", "b"], ["b"])
+
+    async def look(user: User) -> None:
+        user.find(marker="tab-take").click()
+        await until(user, "take-form")
+        assert (only(user, "take-model").value, only(user, "take-form").value) == ("b", "inverse")
+        await user.should_see("models/b.json")
+        only(user, "take-model").set_value("a")
+        await user.should_see("a has no inverse: it compensates nothing.", retries=200)
+        await later(lambda: only(user, "take-form").value == "model")
+        only(user, "take-model").set_value("b")
+        await later(lambda: only(user, "take-form").value == "inverse")
+
+    visit(workspace, look)
 
 
 def test_steps_and_motions_begin_as_the_training_recordings_were(tmp_path: Path) -> None:

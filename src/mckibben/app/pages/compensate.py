@@ -10,7 +10,7 @@ import numpy as np
 from nicegui import ui
 
 from mckibben.app import fields, forms, plots, scripts
-from mckibben.app.desk import Desk, against, caution, guarded, named, on_event
+from mckibben.app.desk import Desk, against, caution, guarded, labelled, named, on_event
 from mckibben.app.drawn import picture
 from mckibben.app.following import compensated, kept_motion
 from mckibben.app.jobs import ENDED
@@ -133,6 +133,7 @@ class Editor:
         self.doubt = named(caution(""), "not-recommended")
         self._say()
         desk.when("channels", self._say)
+        desk.when("jobs", self._title)
         with ui.row().classes("w-full items-start gap-4"):
             self.left = ui.column().classes("min-w-0 w-full lg:w-[34rem] gap-2")
             with ui.column().classes("min-w-0 flex-1 basis-80 gap-2"):
@@ -151,9 +152,7 @@ class Editor:
             text = NONE_PREDICTS * all(name in refused for name in names)
             text += f"{self.name} is not recommended: {refused[self.name]}."
         elif first not in names and self.name == names[0]:
-            text = (
-                f"{first}, first of the leaderboard, has no inverse; {self.name} is the next one."
-            )
+            text = f"{first}, {self._first}, has no inverse; {self.name} is the next one."
             if none := self.desk.not_recommended:
                 text = f"{none}. {text}"
         self.doubt.set_text(fields.said(text))
@@ -163,8 +162,21 @@ class Editor:
         best = next((row["name"] for row in self.desk.results()), None)
         stale = self.desk.stale()
         words = {name: " (other data)" if name in stale else "" for name in names}
-        words |= {best: " (first of the leaderboard)"} if best in words else {}
+        words |= {best: f" ({self._first})"} if best in words else {}
         return {name: f"{name}{words[name]}" for name in names}
+
+    @property
+    def _first(self) -> str:
+        """What the best model is: other fits may still find a better one."""
+        fitting = any(job.kind == "fit" for job in self.desk.jobs.active())
+        return f"first of the leaderboard{' so far' * fitting}"
+
+    def _title(self) -> None:
+        """Say anew what is first, where fits have begun or ended."""
+        titles = self._titles(list(self.model.options))
+        if titles != self.model.options:
+            self.model.set_options(titles, value=self.name)
+        self._say()
 
     def offer(self, names: list[str]) -> None:
         """Offer other models, without disturbing what is drawn; one of data that were is not kept."""
@@ -195,6 +207,8 @@ class Editor:
         known = pace(desk.workspace, name)
         if block.sample_time or not self.step.value:
             self.step.set_value(known.step)
+        timed = bool(block.sample_time or known.shortest)
+        labelled(self.step, "hint", "" if timed else "assumed: no recording has a time")
         inverse = forms.inverse_of(block)
         outputs = [c for c in inverse.inputs if c.name not in inverse.scheduling]
         units = {channel.name: channel.unit for channel in inverse.inputs}

@@ -160,7 +160,9 @@ class Sketch:
 
     def _span(self) -> None:
         """Fill in ends of ready-made motions, the one at rest first: well within what can be reached."""
-        rest = self.rest[self.now]
+        rest, unit = self.rest[self.now], self.channels[self.now].unit
+        for field, end in ((self.first, "From"), (self.other, "To")):
+            field.set_label(f"{end} [{unit}]")
         first, other = sorted(self.reach[self.now], key=lambda y: abs(y - rest))
         if 0.1 * abs(other - first) < abs(rest - first) and min(first, other) < rest < max(
             first, other

@@ -107,11 +107,16 @@ class Intake:
         self.left += [one for one in problems if one.held]
         with self.place:
             if read:
-                await asyncio.to_thread(desk.workspace.warm)
-                desk.settle_channels()
-                desk.changed("recordings", "log")
-                self._done(told)
-                await desk.news.settled()
+                n = sum(map(len, read.values()))
+                with doing(text := f"Showing {n} recording{'s' * (n > 1)}"):
+                    self.reading.set_text(f"{text} …")
+                    await asyncio.to_thread(desk.workspace.warm)
+                    desk.settle_channels()
+                    desk.changed("recordings", "log")
+                    self._done(told)
+                    await desk.news.settled()
+                    if self.reading.text == f"{text} …":  # else others are being read by now
+                        self.reading.set_text("")
                 tell_of(read)
             else:
                 self._done(told)

@@ -12,6 +12,7 @@ from mckibben.app.desk import Desk, against, caution, code, guarded, named
 from mckibben.app.jobs import RUNNING
 from mckibben.app.pages import leaderboard, taking_code
 from mckibben.app.pages.taking_code import CARD, LARGEST, hand_over
+from mckibben.app.recordings import Role
 from mckibben.errors import DataError
 from mckibben.system.ordinary import read_bytes
 
@@ -92,7 +93,7 @@ def _figures(desk: Desk, model: Any) -> None:
         async def draw() -> None:
             from mckibben.report.figures import plot_model, plot_recording
 
-            role = "test" if desk.workspace.with_role("test") else "train"
+            role: Role = "test" if desk.workspace.with_role("test") else "train"
             recordings = desk.workspace.with_role(role)
             if not recordings:
                 raise DataError("there is no recording to draw", remedy="add one under Data")

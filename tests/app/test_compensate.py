@@ -17,7 +17,7 @@ pytest.importorskip("nicegui")
 from nicegui import ui
 from nicegui.testing import User
 
-from mckibben import PI, Banded, Recording
+from mckibben import PI, Banded, Recording, read
 from mckibben.app.desk import Desk
 from mckibben.app.following import compensated, kept_motion
 from mckibben.app.jobs import Jobs, note
@@ -355,6 +355,23 @@ def test_what_is_taken_away_first_compensates(tmp_path: Path) -> None:
     visit(workspace, look)
 
 
+def test_a_motion_is_found_again_when_the_page_is_loaded_again(tmp_path: Path) -> None:
+    workspace = workspace_with(tmp_path, a=PI.example())
+
+    async def look(user: User) -> None:
+        await drawn(user)
+        await user.open("/")
+        user.find(marker="tab-compensate").click()
+        await until(user, "motion-again")
+        user.find(marker="motion-again").click()
+        await until(user, "pressure-plot")
+
+    visit(workspace, look)
+    files = (workspace.path("runs", f"{name}.csv") for name in ("reference", "reference-2"))
+    (first,), (again,) = (read(file, informative=False) for file in files)
+    np.testing.assert_array_equal(first["displacement"], again["displacement"])
+
+
 def test_steps_and_motions_begin_as_the_training_recordings_were(tmp_path: Path) -> None:
     workspace = workspace_with(tmp_path, a=PI.example())
     wave = 5.0 - 5.0 * np.cos(2 * np.pi * np.arange(1200) / 400)
@@ -380,7 +397,7 @@ def test_ready_made_motions_begin_at_rest(tmp_path: Path, gain: float) -> None:
     async def look(user: User) -> None:
         user.find(marker="tab-compensate").click()
         await until(user, "wave")
-        first, other = (float(field(user, label).value) for label in ("From", "To"))
+        first, other = (float(field(user, label).value) for label in ("From [mm]", "To [mm]"))
         assert (other - first) * gain > 0
         user.find(marker="wave").click()
         assert only(user, "points").value.startswith(f"0 {first:g}\n")

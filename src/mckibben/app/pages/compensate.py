@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from nicegui import ui
 
-from mckibben.app import fields, forms, plots, scripts
+from mckibben.app import fields, forms, motions, plots, scripts
 from mckibben.app.desk import Desk, against, caution, guarded, labelled, named, on_event
 from mckibben.app.drawn import picture
 from mckibben.app.following import compensated, kept_motion
@@ -21,6 +21,7 @@ from mckibben.blocks.core.commanding import COMMANDS
 from mckibben.blocks.core.fields import Channel
 from mckibben.comparison.recognising import FORCE
 from mckibben.errors import MckibbenError
+from mckibben.files import read
 from mckibben.recording import Recording
 
 NONE_PREDICTS = "No model that predicts these data has an inverse: fit others under Models. "
@@ -141,6 +142,8 @@ class Editor:
         self._blank()
         self.model.on_value_change(on_event(lambda _: self._turned()))
         self._sketch()
+        self._loops()
+        self._offer_again()
         ui.timer(0.05, guarded(self._forms, "Looking what it can be used as"), once=True)
 
     def _say(self) -> None:
@@ -236,7 +239,7 @@ class Editor:
         self._sketch()
         self.sketch.resume(before)
         self._blank()
-        self.runs.clear()
+        self._loops()
         await self._forms()
 
     def _look_under(self) -> None:
@@ -254,6 +257,33 @@ class Editor:
         self.shown.clear()
         with self.shown:
             ui.label("What the motion needs, and a closed loop, come here.").classes("opacity-70")
+
+    def _loops(self, file: str = "") -> None:
+        """Show loops with the model, also those of before the page was loaded."""
+        asked = self._asked
+        self.runs.clear()
+        with self.runs:
+            loops.build(
+                self.desk, self.name, lambda: file if self._asked is asked else "", self.ticks
+            )
+
+    def _offer_again(self) -> None:
+        """Offer the newest motion that is kept: whoever loads the page again has drawn it."""
+        folder = self.desk.workspace.path("runs", "reference.csv").parent
+        paths = sorted(folder.glob("reference*.csv"), key=lambda path: path.stat().st_mtime_ns)
+        if not paths:
+            return
+
+        async def again() -> None:
+            found = await asyncio.to_thread(read, paths[-1], informative=False)
+            sketch = self.sketch
+            names = sketch.units, sketch.channels, sketch.held
+            sketch.take(motions.of_file(paths[-1], found, *names))
+            await self._show()
+
+        with self.shown:
+            text = f"Show {paths[-1].stem} again, the newest motion kept"
+            named(ui.button(text, on_click=guarded(again)).props("outline no-caps"), "motion-again")
 
     async def _forms(self) -> None:
         """Offer what the model can be used as."""
@@ -305,9 +335,7 @@ class Editor:
         with self.shown:
             self._pressures(name, reference, given, notes)
             closing.build(desk, name, form, settings, file)
-        self.runs.clear()
-        with self.runs:
-            loops.build(desk, name, lambda: file if self._asked is asked else "", self.ticks)
+        self._loops(file)
 
     def _figures(self, model: str, reference: Recording, given: Recording) -> None:
         desk, sketch = self.desk, self.sketch

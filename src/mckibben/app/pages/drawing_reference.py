@@ -303,9 +303,13 @@ class Sketch:
             what = "another motion was wished for while it was read"
             raise DataError(what, file=path, remedy="drop it again")
         given = motions.of_file(path, found, self.units, self.channels, self.held)
+        self.take(given)
+
+    def take(self, given: Recording) -> None:
+        """Take a whole motion in place of what is drawn."""
         self._keep()
         self.file = given
-        self.duration.set_value(float(f"{self.file.duration or self.usual:.5g}"))
+        self.duration.set_value(float(f"{given.duration or self.usual:.5g}"))
         self.draw()
 
     # -- what it shows and gives -----------------------------------------------------------------

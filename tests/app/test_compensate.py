@@ -20,7 +20,7 @@ from nicegui.testing import User
 from mckibben import PI, Banded, Recording, read
 from mckibben.app.desk import Desk
 from mckibben.app.following import compensated, kept_motion
-from mckibben.app.jobs import Jobs, note
+from mckibben.app.jobs import Job, Jobs, note
 from mckibben.app.motions import reference_recording
 from mckibben.app.pages import closing, compensate
 from mckibben.app.recorded import reached
@@ -383,6 +383,31 @@ def test_steps_and_motions_begin_as_the_training_recordings_were(tmp_path: Path)
         await until(user, "wave")
         assert field(user, "Time between steps [s]").value == 0.1
         assert field(user, "Duration [s]").value == 80.0
+
+    visit(workspace, look)
+
+
+def test_a_step_that_no_recording_tells_is_said_to_be_assumed(tmp_path: Path) -> None:
+    async def look(user: User) -> None:
+        user.find(marker="tab-compensate").click()
+        await until(user, "wave")
+        assert "assumed" in field(user, "Time between steps [s]").props["hint"]
+
+    visit(workspace_with(tmp_path, a=PI.example()), look)
+
+
+def test_the_first_is_so_far_while_fits_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    workspace = workspace_with(tmp_path, a=PI.example())
+    workspace.write_json("results", "a", {"status": "ok", "model": "pi", "validation_rmse": 1.0})
+    fitting = [Job("gpi", "fit", {})]
+    monkeypatch.setattr(Jobs, "active", lambda self: list(fitting))
+
+    async def look(user: User) -> None:
+        user.find(marker="tab-compensate").click()
+        await until(user, "wave")
+        assert only(user, "invert").options["a"] == "a (first of the leaderboard so far)"
 
     visit(workspace, look)
 

@@ -108,15 +108,14 @@ class Intake:
         with self.place:
             if read:
                 n = sum(map(len, read.values()))
-                with doing(text := f"Showing {n} recording{'s' * (n > 1)}"):
-                    self.reading.set_text(f"{text} …")
-                    await asyncio.to_thread(desk.workspace.warm)
-                    desk.settle_channels()
-                    desk.changed("recordings", "log")
-                    self._done(told)
-                    await desk.news.settled()
-                    if self.reading.text == f"{text} …":  # else others are being read by now
-                        self.reading.set_text("")
+                self.reading.set_text(f"Showing {n} recording{'s' * (n > 1)} …")
+                await asyncio.to_thread(desk.workspace.warm)
+                desk.settle_channels()
+                desk.changed("recordings", "log")
+                self._done(told)
+                await desk.news.settled()
+                if not self.coming:  # else it tells what is being read by now
+                    self.reading.set_text("")
                 tell_of(read)
             else:
                 self._done(told)

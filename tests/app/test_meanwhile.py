@@ -74,6 +74,7 @@ def test_what_is_taken_is_what_was_chosen_at_the_click(
         user.find(marker="tab-take").click()
         await until(user, "take-json")
         await asyncio.sleep(0.5)
+        only(user, "take-form").set_value("model")
         with held(monkeypatch, forms, "made") as made:
             user.find(marker="take-json").click()
             await later(made.begun.is_set)

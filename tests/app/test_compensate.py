@@ -17,10 +17,10 @@ pytest.importorskip("nicegui")
 from nicegui import ui
 from nicegui.testing import User
 
-from mckibben import PI, Banded, Recording
+from mckibben import PI, Banded, Recording, read
 from mckibben.app.desk import Desk
 from mckibben.app.following import compensated, kept_motion
-from mckibben.app.jobs import Jobs, note
+from mckibben.app.jobs import Job, Jobs, note
 from mckibben.app.motions import reference_recording
 from mckibben.app.pages import closing, compensate
 from mckibben.app.recorded import reached
@@ -324,16 +324,52 @@ def test_the_compensator_shown_is_taken_away(tmp_path: Path) -> None:
     async def look(user: User) -> None:
         user.find(marker="tab-take").click()
         await until(user, "take-form")
-        assert (only(user, "take-model").value, only(user, "take-form").value) == ("a", "model")
+        assert (only(user, "take-model").value, only(user, "take-form").value) == ("a", "inverse")
         user.find(marker="tab-compensate").click()
         await until(user, "wave")
         await turn(user, "b")
         await drawn(user)
         user.find(marker="tab-take").click()
+        await later(lambda: only(user, "take-model").value == "b")
         await later(lambda: only(user, "take-form").value == "inverse")
-        assert only(user, "take-model").value == "b"
 
     visit(workspace_with(tmp_path, a=PI.example(), b=WEAKER), look)
+
+
+def test_what_is_taken_away_first_compensates(tmp_path: Path) -> None:
+    oscillator = load("blocks", "duhem-oscillator").example()
+    workspace = workspace_with(tmp_path, a=oscillator, b=PI.example())
+    assert (workspace.ranked(), workspace.to_invert()) == (["a", "b"], ["b"])
+
+    async def look(user: User) -> None:
+        user.find(marker="tab-take").click()
+        await until(user, "take-form")
+        assert (only(user, "take-model").value, only(user, "take-form").value) == ("b", "inverse")
+        await user.should_see("models/b.json")
+        only(user, "take-model").set_value("a")
+        await user.should_see("a has no inverse: it compensates nothing.", retries=200)
+        await later(lambda: only(user, "take-form").value == "model")
+        only(user, "take-model").set_value("b")
+        await later(lambda: only(user, "take-form").value == "inverse")
+
+    visit(workspace, look)
+
+
+def test_a_motion_is_found_again_when_the_page_is_loaded_again(tmp_path: Path) -> None:
+    workspace = workspace_with(tmp_path, a=PI.example())
+
+    async def look(user: User) -> None:
+        await drawn(user)
+        await user.open("/")
+        user.find(marker="tab-compensate").click()
+        await until(user, "motion-again")
+        user.find(marker="motion-again").click()
+        await until(user, "pressure-plot")
+
+    visit(workspace, look)
+    files = (workspace.path("runs", f"{name}.csv") for name in ("reference", "reference-2"))
+    (first,), (again,) = (read(file, informative=False) for file in files)
+    np.testing.assert_array_equal(first["displacement"], again["displacement"])
 
 
 def test_steps_and_motions_begin_as_the_training_recordings_were(tmp_path: Path) -> None:
@@ -351,6 +387,31 @@ def test_steps_and_motions_begin_as_the_training_recordings_were(tmp_path: Path)
     visit(workspace, look)
 
 
+def test_a_step_that_no_recording_tells_is_said_to_be_assumed(tmp_path: Path) -> None:
+    async def look(user: User) -> None:
+        user.find(marker="tab-compensate").click()
+        await until(user, "wave")
+        assert "assumed" in field(user, "Time between steps [s]").props["hint"]
+
+    visit(workspace_with(tmp_path, a=PI.example()), look)
+
+
+def test_the_first_is_so_far_while_fits_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    workspace = workspace_with(tmp_path, a=PI.example())
+    workspace.write_json("results", "a", {"status": "ok", "model": "pi", "validation_rmse": 1.0})
+    fitting = [Job("gpi", "fit", {})]
+    monkeypatch.setattr(Jobs, "active", lambda self: list(fitting))
+
+    async def look(user: User) -> None:
+        user.find(marker="tab-compensate").click()
+        await until(user, "wave")
+        assert only(user, "invert").options["a"] == "a (first of the leaderboard so far)"
+
+    visit(workspace, look)
+
+
 @pytest.mark.parametrize("gain", [3.0, -3.0])
 def test_ready_made_motions_begin_at_rest(tmp_path: Path, gain: float) -> None:
     workspace = workspace_with(tmp_path, a=PI.example())
@@ -361,7 +422,7 @@ def test_ready_made_motions_begin_at_rest(tmp_path: Path, gain: float) -> None:
     async def look(user: User) -> None:
         user.find(marker="tab-compensate").click()
         await until(user, "wave")
-        first, other = (float(field(user, label).value) for label in ("From", "To"))
+        first, other = (float(field(user, label).value) for label in ("From [mm]", "To [mm]"))
         assert (other - first) * gain > 0
         user.find(marker="wave").click()
         assert only(user, "points").value.startswith(f"0 {first:g}\n")

@@ -64,6 +64,10 @@ def test_no_option_of_the_command_line_reaches_a_page() -> None:
             "these are assumed: voltage in V; say --unit CHANNEL=UNIT where that is wrong",
             "these are assumed: voltage in V; give units by “How it was read” where that is wrong",
         ),
+        (
+            "say --column CHANNEL=COLUMN where that is wrong",
+            "change the field Channel where that is wrong",
+        ),
         ("as in --unit force=kN", "as in the field Unit (kN, say, of force)"),
         ("as in --unit force=UNIT", "as in the field Unit of force"),
         (

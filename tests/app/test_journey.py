@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.app.browsing import SLOW, seen, visited, workbench
+from tests.app.browsing import SLOW, opened, seen, visited, workbench
 from tests.tools import where
 
 pytest.importorskip("playwright.sync_api")
@@ -89,6 +89,38 @@ def test_from_the_example_to_a_c_folder(page: Any, tmp_path: Path) -> None:
     seen(page, "take-report").click()
     assert b"<html" in downloaded(page, "get-report")
     assert "models=" in page.locator("body").inner_text()
+
+
+def test_back_is_the_step_before_and_ticks_stay(page: Any) -> None:
+    def at(tab: str) -> None:
+        page.wait_for_function(
+            "name => document.querySelector(`[data-testid=tab-${name}]`)"
+            ".getAttribute('aria-selected') === 'true'",
+            arg=tab,
+        )
+
+    seen(page, "example").click()
+    seen(page, "recording-irregular-triangle")
+    opened(page, "models")
+    seen(page, "untick").click()
+    seen(page, "about-pi").click()
+    seen(page, "model-pi").and_(page.locator("[aria-checked=true]")).wait_for()
+    opened(page, "look")
+    page.go_back()
+    at("models")
+    page.go_back()
+    at("data")
+    assert "tab=" not in page.url
+    page.go_forward()
+    at("models")
+    assert "tab=Models" in page.url
+    page.go_forward()
+    at("look")
+    page.go_back()
+    at("models")
+    page.reload()
+    seen(page, "model-pi").and_(page.locator("[aria-checked=true]")).wait_for()
+    assert page.locator("[data-testid^=model-][aria-checked=true]").count() == 1
 
 
 def upload(page: Any, name: str, content: bytes) -> None:

@@ -18,10 +18,10 @@ pytest.importorskip("nicegui")
 from nicegui.testing import User
 
 from mckibben import PI, Recording, write
-from mckibben.app import forms, recorded
+from mckibben.app import forms, recorded, shell
 from mckibben.app.adding import Problem
 from mckibben.app.desk import Desk
-from mckibben.app.jobs import Jobs
+from mckibben.app.jobs import Job, Jobs
 from mckibben.app.kept import Step
 from mckibben.app.pages import drawing_reference, editing, forces, importing, taking_code
 from mckibben.app.workspace import Workspace
@@ -74,6 +74,7 @@ def test_what_is_taken_is_what_was_chosen_at_the_click(
         user.find(marker="tab-take").click()
         await until(user, "take-json")
         await asyncio.sleep(0.5)
+        only(user, "take-form").set_value("model")
         with held(monkeypatch, forms, "made") as made:
             user.find(marker="take-json").click()
             await later(made.begun.is_set)
@@ -242,3 +243,13 @@ def test_a_part_of_what_is_not_there_any_more_is_not_cut(tmp_path: Path) -> None
     asyncio.run(cut())
     assert workspace.entry("run").steps == (first,)
     assert len(workspace.recording("run")) == 100
+
+
+@pytest.mark.parametrize(("state", "told"), [("done", 0), ("cancelled", 1), ("failed", 1)])
+def test_only_what_did_not_end_well_covers_the_page(
+    state: str, told: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    said: list[str] = []
+    monkeypatch.setattr("nicegui.ui.notify", lambda text, **how: said.append(how["position"]))
+    shell._say(Job("pi", "fit", {}, state=state, message="no"))
+    assert said == ["bottom"] * told

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import os
+import shlex
 import subprocess
 import sys
 from pathlib import Path
@@ -147,6 +148,18 @@ def test_calls_of_loops_run(form: str, law: str, workspace: Workspace) -> None:
             exec(call, {"mckibben": mckibben})
     finally:
         os.chdir(here)
+
+
+@pytest.mark.parametrize(("kind", "sides"), [("time", ("pressure", "displacement")), ("loops", ())])
+def test_the_command_of_a_figure_runs(
+    kind: str, sides: tuple[str, ...], workspace: Workspace
+) -> None:
+    fitted(workspace, "pi")
+    command = scripts.plot_call(workspace, "train", "pi", kind, sides, "figure.svg")
+    words = shlex.split(command.removeprefix("mckibben "))
+    whole = [sys.executable, "-m", "mckibben.cli.main", *words]
+    subprocess.run(whole, check=True, cwd=workspace.folder)
+    assert (workspace.folder / "figure.svg").is_file()
 
 
 def test_names_in_calls_are_of_the_package() -> None:

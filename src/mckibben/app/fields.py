@@ -24,6 +24,7 @@ _WAYS = (
     (r"say --unit (\w+)=UNIT", rf"give the unit of \1 by “{READING}”"),
     (r"--unit (\w+)=UNIT", r"the field Unit of \1"),
     (r"--unit (\w+)=(\S+\b)", r"the field Unit (\2, say, of \1)"),
+    (r"say --column CHANNEL=COLUMN", "change the field Channel"),
     (r"--column CHANNEL=COLUMN", "the field Channel"),
     (r"--column (\w+)=('[^']*'|\S+\b)", r"the field Channel (\1)"),
     (r" \([^()]*--[a-z][^()]*(\([^()]*\)[^()]*)?\)", ""),  # what is to be done is said before

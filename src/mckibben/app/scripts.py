@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -63,6 +64,19 @@ def track_call(law: str, compensator: str, plant: str, reference: str) -> str:
             "mckibben.control.track(law, plant, reference)",
         ]
     )
+
+
+def plot_call(
+    workspace: Workspace, role: str, model: str, kind: str, sides: Sequence[str], target: str
+) -> str:
+    """Return the command that draws the recordings of a role: their sides, or else a model on them."""
+    files = [entry.path for entry in workspace.entries() if entry.role == role]
+    words = ["mckibben", "plot", *(str(path.relative_to(workspace.folder)) for path in files)]
+    if sides:
+        words += ["--input", sides[0], "--output", sides[1]]
+    else:
+        words += ["--model", f"models/{model}.json"]
+    return shlex.join([*words, "--kind", kind, "-o", target])
 
 
 def simulate_call(block: str, file: str) -> str:

@@ -18,7 +18,7 @@ from mckibben import registry
 from mckibben.app import busy, fields, theme
 from mckibben.app.desk import Desk, code, hinted, labelled, named, tell, told, unexpected
 from mckibben.app.fields import shortened
-from mckibben.app.jobs import ENDED, RUNNING, Job, Jobs
+from mckibben.app.jobs import DONE, ENDED, RUNNING, Job, Jobs
 from mckibben.app.workspace import Workspace
 from mckibben.system.workers import PRELOADED
 
@@ -165,11 +165,24 @@ def _panels(desk: Desk, tabs: ui.tabs, tab: dict[str, ui.tab]) -> None:
                 built.discard(name)
                 raise
 
+    back: dict[str, str] = {}
+
+    def returned(event: Any) -> None:
+        """Go where the browser has gone, back or forth: its address is that of the step already."""
+        name = event.args if event.args in PAGES else "Data"
+        if name != tabs.value:
+            back["to"] = name
+            tabs.set_value(name)
+
+    ui.add_head_html(f"<script>{RETURNED}</script>")
+    ui.on("returned", returned)
+
     async def opened(event: Any) -> None:
         name = str(event.value)
         if name in PAGES:
             address = json.dumps(f"?{urlencode({TAB: name})}")
-            ui.run_javascript(f"history.replaceState(history.state, '', {address})")
+            if back.pop("to", "") != name:
+                ui.run_javascript(f"history.pushState(history.state, '', {address})")
             await show(name)
 
     panels.on_value_change(opened)
@@ -225,12 +238,13 @@ def _watch(desk: Desk) -> None:
 
 
 def _say(job: Job) -> None:
-    text = fields.said(f"{shortened(job.title, 40)}: {job.said}")[:300]
+    """Say how a job has ended, unless it is well: that the header and the page tell."""
+    title = shortened(job.title, 40)
     if job.state == "failed":
-        ui.notify(text, type="negative", multi_line=True, timeout=10_000)
-    else:
-        text = f"{shortened(job.title, 40)}: {job.state}"  # what came of it is on the page
-        ui.notify(text, type="info", position="bottom-right", timeout=2500)
+        text = fields.said(f"{title}: {job.said}")[:300]
+        ui.notify(text, type="negative", multi_line=True, position="bottom", timeout=6000)
+    elif job.state != DONE:
+        ui.notify(f"{title}: {job.state}", type="info", position="bottom", timeout=2500)
 
 
 async def _match(desk: Desk, dark: ui.dark_mode) -> None:
@@ -301,6 +315,12 @@ FIRST = ("mckibben.files", "pandas")
 
 SELECTED = '(value) => { element.props["model-value"] = value }'
 """Where handlers of events are made, ``element`` is what they are of."""
+
+RETURNED = f"""
+window.addEventListener("popstate", () =>
+  emitEvent("returned", new URLSearchParams(location.search).get("{TAB}") ?? ""))
+"""
+"""Tells where the browser's own buttons, back and forth, have gone."""
 
 IS_DARK = "() => emit(document.body.classList.contains('body--dark'))"
 """Tells which theme is shown, which until :func:`_match` has asked is known to the browser alone."""

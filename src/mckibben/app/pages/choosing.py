@@ -56,9 +56,9 @@ class Choice:
         if look != self._looks or found == self.shown:  # a later look knows better
             return
         names = [offer.model for _, offers in found.groups for offer in offers]
-        kept = [model for model in self.ticked if model in names]
-        unticked = not self.ticked and self.shown is not None and bool(self.shown.groups)
-        self.shown, self.ticked = found, kept if kept or unticked else list(found.start)
+        chosen = self.desk.ticked
+        kept = [model for model in chosen or () if model in names]
+        self.shown, self.ticked = found, kept if kept or chosen == [] else list(found.start)
         self.said.set_text(said(found.recognised))
         self.possible = bool(found.groups)
         self.actions.set_visibility(True)
@@ -108,7 +108,9 @@ class Choice:
             )
             labelled(named(box.props("dense"), f"model-{offer.model}"), "aria-label", offer.title)
             self.boxes[offer.model] = box
-            with ui.column().classes("gap-0 flex-1 min-w-0"):
+            words = named(ui.column().classes("gap-0 flex-1 min-w-0"), f"about-{offer.model}")
+            words.classes("cursor-pointer").on("click", lambda: box.set_value(not box.value))
+            with words:
                 ui.label(f"{offer.title} · {offer.model}").classes("text-sm break-words")
                 ui.label(f"{offer.can} {_about(offer)}".strip()).classes(
                     "text-xs opacity-70 break-words"
@@ -130,6 +132,7 @@ class Choice:
 
     def _tick(self, model: str, on: bool) -> None:
         self.ticked = [name for name in self.ticked if name != model] + [model] * on
+        self.desk.ticked = self.ticked
         self._count()
 
     def _count(self) -> None:

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from nicegui import ui
 
-from mckibben.app import fields, forms, plots, scripts
-from mckibben.app.desk import Desk, against, caution, guarded, named, on_event
+from mckibben.app import fields, forms, motions, plots, scripts
+from mckibben.app.desk import Desk, against, caution, guarded, labelled, named, on_event
 from mckibben.app.drawn import picture
 from mckibben.app.following import compensated, kept_motion
 from mckibben.app.jobs import ENDED
@@ -21,6 +21,7 @@ from mckibben.blocks.core.commanding import COMMANDS
 from mckibben.blocks.core.fields import Channel
 from mckibben.comparison.recognising import FORCE
 from mckibben.errors import MckibbenError
+from mckibben.files import read
 from mckibben.recording import Recording
 
 NONE_PREDICTS = "No model that predicts these data has an inverse: fit others under Models. "
@@ -133,6 +134,7 @@ class Editor:
         self.doubt = named(caution(""), "not-recommended")
         self._say()
         desk.when("channels", self._say)
+        desk.when("jobs", self._title)
         with ui.row().classes("w-full items-start gap-4"):
             self.left = ui.column().classes("min-w-0 w-full lg:w-[34rem] gap-2")
             with ui.column().classes("min-w-0 flex-1 basis-80 gap-2"):
@@ -140,6 +142,8 @@ class Editor:
         self._blank()
         self.model.on_value_change(on_event(lambda _: self._turned()))
         self._sketch()
+        self._loops()
+        self._offer_again()
         ui.timer(0.05, guarded(self._forms, "Looking what it can be used as"), once=True)
 
     def _say(self) -> None:
@@ -151,9 +155,7 @@ class Editor:
             text = NONE_PREDICTS * all(name in refused for name in names)
             text += f"{self.name} is not recommended: {refused[self.name]}."
         elif first not in names and self.name == names[0]:
-            text = (
-                f"{first}, first of the leaderboard, has no inverse; {self.name} is the next one."
-            )
+            text = f"{first}, {self._first}, has no inverse; {self.name} is the next one."
             if none := self.desk.not_recommended:
                 text = f"{none}. {text}"
         self.doubt.set_text(fields.said(text))
@@ -163,8 +165,21 @@ class Editor:
         best = next((row["name"] for row in self.desk.results()), None)
         stale = self.desk.stale()
         words = {name: " (other data)" if name in stale else "" for name in names}
-        words |= {best: " (first of the leaderboard)"} if best in words else {}
+        words |= {best: f" ({self._first})"} if best in words else {}
         return {name: f"{name}{words[name]}" for name in names}
+
+    @property
+    def _first(self) -> str:
+        """What the best model is: other fits may still find a better one."""
+        fitting = any(job.kind == "fit" for job in self.desk.jobs.active())
+        return f"first of the leaderboard{' so far' * fitting}"
+
+    def _title(self) -> None:
+        """Say anew what is first, where fits have begun or ended."""
+        titles = self._titles(list(self.model.options))
+        if titles != self.model.options:
+            self.model.set_options(titles, value=self.name)
+        self._say()
 
     def offer(self, names: list[str]) -> None:
         """Offer other models, without disturbing what is drawn; one of data that were is not kept."""
@@ -195,6 +210,8 @@ class Editor:
         known = pace(desk.workspace, name)
         if block.sample_time or not self.step.value:
             self.step.set_value(known.step)
+        timed = bool(block.sample_time or known.shortest)
+        labelled(self.step, "hint", "" if timed else "assumed: no recording has a time")
         inverse = forms.inverse_of(block)
         outputs = [c for c in inverse.inputs if c.name not in inverse.scheduling]
         units = {channel.name: channel.unit for channel in inverse.inputs}
@@ -222,7 +239,7 @@ class Editor:
         self._sketch()
         self.sketch.resume(before)
         self._blank()
-        self.runs.clear()
+        self._loops()
         await self._forms()
 
     def _look_under(self) -> None:
@@ -240,6 +257,33 @@ class Editor:
         self.shown.clear()
         with self.shown:
             ui.label("What the motion needs, and a closed loop, come here.").classes("opacity-70")
+
+    def _loops(self, file: str = "") -> None:
+        """Show loops with the model, also those of before the page was loaded."""
+        asked = self._asked
+        self.runs.clear()
+        with self.runs:
+            loops.build(
+                self.desk, self.name, lambda: file if self._asked is asked else "", self.ticks
+            )
+
+    def _offer_again(self) -> None:
+        """Offer the newest motion that is kept: whoever loads the page again has drawn it."""
+        folder = self.desk.workspace.path("runs", "reference.csv").parent
+        paths = sorted(folder.glob("reference*.csv"), key=lambda path: path.stat().st_mtime_ns)
+        if not paths:
+            return
+
+        async def again() -> None:
+            found = await asyncio.to_thread(read, paths[-1], informative=False)
+            sketch = self.sketch
+            names = sketch.units, sketch.channels, sketch.held
+            sketch.take(motions.of_file(paths[-1], found, *names))
+            await self._show()
+
+        with self.shown:
+            text = f"Show {paths[-1].stem} again, the newest motion kept"
+            named(ui.button(text, on_click=guarded(again)).props("outline no-caps"), "motion-again")
 
     async def _forms(self) -> None:
         """Offer what the model can be used as."""
@@ -291,9 +335,7 @@ class Editor:
         with self.shown:
             self._pressures(name, reference, given, notes)
             closing.build(desk, name, form, settings, file)
-        self.runs.clear()
-        with self.runs:
-            loops.build(desk, name, lambda: file if self._asked is asked else "", self.ticks)
+        self._loops(file)
 
     def _figures(self, model: str, reference: Recording, given: Recording) -> None:
         desk, sketch = self.desk, self.sketch

@@ -160,7 +160,9 @@ class Sketch:
 
     def _span(self) -> None:
         """Fill in ends of ready-made motions, the one at rest first: well within what can be reached."""
-        rest = self.rest[self.now]
+        rest, unit = self.rest[self.now], self.channels[self.now].unit
+        for field, end in ((self.first, "From"), (self.other, "To")):
+            field.set_label(f"{end} [{unit}]")
         first, other = sorted(self.reach[self.now], key=lambda y: abs(y - rest))
         if 0.1 * abs(other - first) < abs(rest - first) and min(first, other) < rest < max(
             first, other
@@ -301,9 +303,13 @@ class Sketch:
             what = "another motion was wished for while it was read"
             raise DataError(what, file=path, remedy="drop it again")
         given = motions.of_file(path, found, self.units, self.channels, self.held)
+        self.take(given)
+
+    def take(self, given: Recording) -> None:
+        """Take a whole motion in place of what is drawn."""
         self._keep()
         self.file = given
-        self.duration.set_value(float(f"{self.file.duration or self.usual:.5g}"))
+        self.duration.set_value(float(f"{given.duration or self.usual:.5g}"))
         self.draw()
 
     # -- what it shows and gives -----------------------------------------------------------------

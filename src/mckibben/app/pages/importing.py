@@ -107,11 +107,15 @@ class Intake:
         self.left += [one for one in problems if one.held]
         with self.place:
             if read:
+                n = sum(map(len, read.values()))
+                self.reading.set_text(f"Showing {n} recording{'s' * (n > 1)} …")
                 await asyncio.to_thread(desk.workspace.warm)
                 desk.settle_channels()
                 desk.changed("recordings", "log")
                 self._done(told)
                 await desk.news.settled()
+                if not self.coming:  # else it tells what is being read by now
+                    self.reading.set_text("")
                 tell_of(read)
             else:
                 self._done(told)

@@ -11,11 +11,12 @@ import numpy as np
 from nicegui import ui
 
 from mckibben.app.desk import LONGEST, Desk, guarded, hinted, labelled, named, refused, told
+from mckibben.app.drawn import Drawn
 from mckibben.app.fields import READING, said
+from mckibben.app.pages import shared_notes
 from mckibben.app.pages.asking import ask_again
 from mckibben.app.recordings import Entry
 from mckibben.errors import MckibbenError
-from mckibben.files.notices import is_plain
 from mckibben.recording import Recording
 
 SHOWN = 6
@@ -59,11 +60,16 @@ class Rows:
                     f"{len(beside)} files of recordings, such as {beside[0].name}: they stay as they "
                     "are. Drop those that you mean here."
                 )
+        Drawn(desk, self._lots, lambda: shared_notes.show(self._lots()), "recordings", "coming")
         self._place = ui.column().classes("w-full gap-3")
         for _ in self._updating():
             pass
         for topic in ("recordings", "coming"):
             desk.when(topic, self.update)
+
+    def _lots(self) -> list[dict[str, str]]:
+        """Return the notes that are not said under each recording."""
+        return shared_notes.shared(self.desk.workspace.entries())
 
     async def update(self) -> None:
         """Show what is there now; clicks are answered between one row and the next."""
@@ -72,7 +78,11 @@ class Rows:
 
     def _updating(self) -> Iterator[None]:
         """Show what is there now, and yield after every row that is made."""
-        entries = {entry.name: entry for entry in self.desk.workspace.entries()}
+        lots = self._lots()
+        entries = {
+            entry.name: replace(entry, notes=shared_notes.own(entry, lots))
+            for entry in self.desk.workspace.entries()
+        }
         states = {name: state_of(entry) for name, entry in entries.items()}
         self._empty.set_visibility(not entries and not self.coming())
         for name in self._rows.keys() - entries.keys():
@@ -124,11 +134,8 @@ class Rows:
                 "text-xs opacity-70 break-words"
             )
             _aside_said(recording, name)
-            for note in [note for note in entry.notes if not is_plain(note)][:SHOWN]:
-                named(
-                    ui.label(said(note)).classes("text-xs text-amber-900 dark:text-amber-300"),
-                    f"note-{name}",
-                )
+            for note in entry.notes[:SHOWN]:
+                named(ui.label(said(note)).classes(shared_notes.COLOUR), f"note-{name}")
 
     def _button(self, icon: str, word: str, name: str, action: Callable[[Desk, str], None]) -> None:
         button = ui.button(icon=icon, on_click=lambda: action(self.desk, name)).props("flat dense")

@@ -7,11 +7,12 @@ from typing import Any
 
 from nicegui import ui
 
-from mckibben.app import fields, scripts
+from mckibben.app import fields, forms, scripts
 from mckibben.app.desk import Desk, against, caution, code, guarded, named
 from mckibben.app.jobs import RUNNING
 from mckibben.app.pages import leaderboard, taking_code
 from mckibben.app.pages.taking_code import CARD, LARGEST, hand_over
+from mckibben.app.recordings import Role
 from mckibben.errors import DataError
 from mckibben.system.ordinary import read_bytes
 
@@ -31,7 +32,7 @@ def build(desk: Desk) -> None:
 
     @ui.refreshable
     def shown() -> None:
-        names = desk.workspace.ranked()
+        names = _offered(desk)
         if not names:
             ui.label("Fit a model first, under Models.")
             return
@@ -56,11 +57,11 @@ def build(desk: Desk) -> None:
             taking_code.build(desk, model)
             _figures(desk, model)
             _report(desk)
-        _script(desk)
+        _script(desk, model)
 
     def more() -> None:
         if selects:
-            names = desk.workspace.ranked() or [selects[0].value]
+            names = _offered(desk) or [selects[0].value]
             selects[0].set_options(names, value=desk.model_to_show(selects[0].value, names))
         else:
             shown.refresh()
@@ -75,6 +76,12 @@ def build(desk: Desk) -> None:
     shown()
 
 
+def _offered(desk: Desk) -> list[str]:
+    """Return the models, those that have a compensator first: one of them is what is taken away."""
+    able = desk.workspace.to_invert()
+    return [*able, *(name for name in desk.workspace.ranked() if name not in able)]
+
+
 def _figures(desk: Desk, model: Any) -> None:
     with ui.card().classes(CARD):
         ui.label("Figures for print").classes("text-lg")
@@ -86,22 +93,25 @@ def _figures(desk: Desk, model: Any) -> None:
         async def draw() -> None:
             from mckibben.report.figures import plot_model, plot_recording
 
-            recordings = desk.workspace.with_role("test") or desk.workspace.with_role("train")
+            role: Role = "test" if desk.workspace.with_role("test") else "train"
+            recordings = desk.workspace.with_role(role)
             if not recordings:
                 raise DataError("there is no recording to draw", remedy="add one under Data")
             # as it is at the click
             what, name, place = str(kind.value), str(model.value), desk.outputs.index(output.value)
             stem = what if what in ("time", "loop") else f"{name}-{what}"
             path = desk.workspace.new_path("takeaway", f"{stem}.{form.value}")
+            sides = desk.looked_at(recordings)[place] if what in ("time", "loop") else ()
+            call = scripts.plot_call(desk.workspace, role, name, what, sides, path.name)
 
             def save() -> None:
-                if what in ("time", "loop"):
-                    plot_recording(recordings, *desk.looked_at(recordings)[place], what, path)
+                if sides:
+                    plot_recording(recordings, *sides, what, path)
                 else:
                     plot_model(desk.workspace.model(name), recordings, what, path)
 
             await asyncio.to_thread(save)
-            hand_over(desk, path, f"mckibben plot ... --kind {what} -o {path.name}")
+            hand_over(desk, path, call)
 
         named(ui.button("Draw it", on_click=guarded(draw)), "take-figure")
 
@@ -156,9 +166,12 @@ def _report(desk: Desk) -> None:
         writing()
 
 
-def _script(desk: Desk) -> None:
+def _script(desk: Desk, model: Any) -> None:
     def text() -> str:
-        return scripts.script(desk.workspace, desk.results(), desk.channels, desk.compensator)
+        name, shown = str(model.value), desk.compensator
+        if (shown is None or shown[0] != name) and desk.workspace.invertible(name):
+            shown = name, "inverse", {}, forms.STEP
+        return scripts.script(desk.workspace, desk.results(), desk.channels, shown)
 
     with ui.card().classes("w-full"):
         ui.label("The same as a script").classes("text-lg")
@@ -169,6 +182,7 @@ def _script(desk: Desk) -> None:
 
         for topic in ("results", "recordings", "channels", "compensator"):
             desk.when(topic, shown.refresh)
+        model.on_value_change(shown.refresh)
         shown()
         named(
             ui.button(

@@ -11,7 +11,7 @@ from typing import Any
 from nicegui import ui
 
 from mckibben.app import forms
-from mckibben.app.desk import Desk, guarded, named, on_event
+from mckibben.app.desk import Desk, caution, guarded, named, on_event
 from mckibben.app.recorded import pace
 from mckibben.app.workspace import Workspace
 from mckibben.blocks.core.block import Block
@@ -44,12 +44,13 @@ def build(desk: Desk, model: Any) -> None:
     """
     with ui.card().classes(CARD):
         ui.label("Model and code").classes("text-lg")
+        usual = {"form": "inverse" if desk.workspace.invertible(str(model.value)) else "model"}
+        first = usual["form"]
         form = named(
-            ui.select({"model": forms.FORMS["model"]}, value="model", label="Used as").classes(
-                "w-full"
-            ),
+            ui.select({first: forms.FORMS[first]}, value=first, label="Used as").classes("w-full"),
             "take-form",
         )
+        lacking = named(caution(""), "take-no-inverse")
         fields = {
             key: ui.number(label, value=forms.DEFAULTS[key], min=0).classes("w-full")
             for own in forms.SETTINGS.values()
@@ -145,6 +146,9 @@ def build(desk: Desk, model: Any) -> None:
             for key, field in fields.items():
                 field.set_visibility(key in forms.SETTINGS.get(kind, ()))
             rows["ros2"].set_visibility(kind in forms.COMPENSATORS)
+            lacks = not desk.workspace.invertible(str(model.value))
+            lacking.set_visibility(lacks)
+            lacking.set_text(f"{model.value} has no inverse: it compensates nothing." * lacks)
 
         async def offer() -> None:
             name, before = str(model.value), (form.value, step.value)
@@ -152,7 +156,11 @@ def build(desk: Desk, model: Any) -> None:
             known = await asyncio.to_thread(pace, desk.workspace, name) if found else None
             offered = {key: forms.FORMS[key] for key in found}
             if offered and name == str(model.value):
-                value = form.value if form.value in offered else next(iter(offered))
+                chosen = form.value in offered and form.value != usual["form"]
+                usual["form"] = next(
+                    (use for use in forms.COMPENSATORS if use in offered), found[0]
+                )
+                value = form.value if chosen else usual["form"]
                 shown, use, settings, own = desk.compensator or ("", "", {}, forms.STEP)
                 if before != (form.value, step.value):  # what was chosen meanwhile stays
                     pass

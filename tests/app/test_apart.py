@@ -71,6 +71,29 @@ def test_recordings_of_several_zeros_get_one(tmp_path: Path, load: float | None)
     assert workspace.recording("two")["displacement"].min() > 29
 
 
+def test_recordings_of_another_muscle_are_set_unused_at_once(tmp_path: Path) -> None:
+    workspace = Workspace(tmp_path)
+    u = 2 - 2 * np.cos(np.arange(400) * 0.05)
+    for name, gain in (("one", 1.0), ("two", 1.01), ("other", 3.0)):
+        run = Recording({"pressure": u, "displacement": gain * u}, 0.05)
+        workspace.add(run, origin="", call="", name=name)
+
+    async def look(user: User) -> None:
+        await user.should_see(marker="unlike", retries=100)
+        await user.should_see("Set 2 unused")
+        user.find(marker="aside-other").click()
+        await user.should_not_see(marker="unlike", retries=100)
+
+    visit(workspace, look)
+    assert [workspace.entry(n).role for n in ("one", "two", "other")] == [
+        "train",
+        "train",
+        "unused",
+    ]
+    workspace.undo()
+    assert workspace.entry("other").role == "train"
+
+
 def arm(seed: float) -> Recording:
     time = np.arange(400) * 0.05
     given = {f"pressure_{k}": 2 + np.sin(k * time + seed) for k in (1, 2, 3)}

@@ -134,6 +134,11 @@ def no_load() -> list[Recording]:
     return [run(drive(COMPLETE), None, seed=seed) for seed in (0, 1)]
 
 
+def one_load_known() -> list[Recording]:
+    u = drive(COMPLETE)
+    return [run(u, load, seed=seed) for seed, load in enumerate((None, np.full(len(u), 20.0)))]
+
+
 def against_a_spring() -> list[Recording]:
     u = drive(COMPLETE)
     return [run(u, 20.0 + 4.0 * muscle(u), seed=seed) for seed in (0, 1)]
@@ -210,6 +215,7 @@ def test_where_one_thing_is_lacking_it_alone_is_said(what: str) -> None:
     [
         (creeping_on, "creep", "still moves"),
         (no_load, "load", "no load is recorded"),
+        (one_load_known, "load", "a load is recorded in 1 of 2 recordings"),
         (against_a_spring, "load", "as a spring's would"),
     ],
 )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -135,21 +135,26 @@ def source(workspace: Workspace, entry: Entry) -> Path:
 
 def replaced(desk: Desk, names: Sequence[str], reading: Reading) -> list[Recording]:
     """Read the files of recordings otherwise, all or none, and return what came of the first."""
+    return replaced_each(desk, dict.fromkeys(names, reading))
+
+
+def replaced_each(desk: Desk, readings: Mapping[str, Reading]) -> list[Recording]:
+    """Do as `replaced`, each in its own way, as one change."""
     workspace = desk.workspace
-    read: dict[Path, list[Recording]] = {}
-    paths = {}
-    for name in names:
+    read: dict[tuple[Path, str], list[Recording]] = {}
+    made, uploads = {}, {}
+    for name, reading in readings.items():
         entry = workspace.entry(name)
-        path = paths[name] = source(workspace, entry)
-        if path not in read:
-            read[path] = read_upload(path, reading)
+        path = source(workspace, entry)
+        key = path, reading.model_dump_json()
+        if key not in read:
+            read[key] = read_upload(path, reading)
         if not entry.upload:  # its samples become a file, to be read otherwise again
-            paths[name] = _as_upload(workspace, entry)
-            read[paths[name]] = read.pop(path)
-    calls = {name: scripts.read_call(str(path), options(reading)) for name, path in paths.items()}
-    made = {name: (read[paths[name]], call) for name, call in calls.items()}
-    workspace.read_again(made, reading, {name: path.name for name, path in paths.items()})
-    return made[names[0]][0]
+            path = _as_upload(workspace, entry)
+        uploads[name] = path.name
+        made[name] = read[key], scripts.read_call(str(path), options(reading))
+    workspace.read_again(made, readings, uploads)
+    return next(iter(made.values()))[0]
 
 
 def _as_upload(workspace: Workspace, entry: Entry) -> Path:

@@ -147,7 +147,7 @@ class Changing(Undoing):
     def read_again(
         self,
         found: Mapping[str, tuple[Sequence[Recording], str]],
-        reading: kept.Reading,
+        readings: kept.Reading | Mapping[str, kept.Reading],
         uploads: Mapping[str, str] | None = None,
     ) -> list[str]:
         """Replace what was read by what was read otherwise; steps are done anew.
@@ -161,8 +161,8 @@ class Changing(Undoing):
         ----------
         found : mapping of str to (sequence of Recording, str)
             By the names of recordings, what is in their files now, and the call that reads it.
-        reading : Reading
-            How it was read.
+        readings : Reading or mapping of str to Reading
+            How all of it was read, or each by its recording's name.
         uploads : mapping of str to str, optional
             The files among the uploads, where they are others than before.
         """
@@ -174,6 +174,7 @@ class Changing(Undoing):
             if name in new:  # a stretch of what was read otherwise already
                 continue
             entry = self.entry(name)
+            reading = readings if isinstance(readings, kept.Reading) else readings[name]
             places = [entry.part] if entry.part < len(read) else [0]
             if entry.reading.gaps != "split" and reading.gaps == "split":
                 places = list(range(len(read)))

@@ -225,9 +225,9 @@ def _on_grid(
     """Return the spans on one grid: as they are where times are uniform, else resampled."""
     cuts = [at for at in timebase.gaps(time) for start, stop in spans if start < at < stop]
     if cuts and request.gaps == "error":
-        length = _seconds(float(time[cuts[0]] - time[cuts[0] - 1]), choice)
+        lengths = [_seconds(float(time[at] - time[at - 1]), choice) for at in cuts]
         raise DataError(
-            f"there is a gap of {length:.6g} s before this row ({len(cuts)} gap(s) in all)",
+            f"there is a gap of {lengths[0]:.6g} s before this row{_among(lengths)}",
             file=path,
             channel="time",
             row=table.row(int(cuts[0])),
@@ -258,6 +258,16 @@ def _on_grid(
             }
         pieces.append(Piece(samples, seconds, _seconds(float(t[0]), choice)))
     return pieces
+
+
+def _among(lengths: Sequence[float]) -> str:
+    """Return how long several gaps are, of which the first is told [s]."""
+    if len(lengths) < 2:
+        return ""
+    return (
+        f" ({len(lengths)} gaps in all: the longest {max(lengths):.3g} s, the median "
+        f"{np.median(lengths):.3g} s, together {sum(lengths):.3g} s)"
+    )
 
 
 def _announce_bridges(

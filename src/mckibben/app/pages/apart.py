@@ -11,9 +11,11 @@ from mckibben.app import adding
 from mckibben.app.desk import LONGEST, Desk, guarded, labelled, named
 from mckibben.app.fields import READING
 from mckibben.app.kept import Step
+from mckibben.app.pages import loads
 from mckibben.app.together import differing, sample_times
-from mckibben.comparison.belonging import unlike
+from mckibben.comparison.belonging import alike, travels, unlike
 from mckibben.estimators.coupled.base import schedules
+from mckibben.files.notices import listed
 from mckibben.signals.zeroing import apart as zeros_apart
 
 SHOWN = 6
@@ -22,6 +24,7 @@ SHOWN = 6
 
 def build(desk: Desk) -> None:
     """Show what differs, where something does."""
+    loads.build(desk)
     hindering(desk)
     _unlike(desk)
     _zeros(desk)
@@ -67,16 +70,7 @@ def _channels(desk: Desk) -> None:
                 named(button.props("outline dense"), "join")
         for channels, names in found.items():
             own = [channel for channel in channels if channel not in common]
-            listed = ", ".join(names[:SHOWN]) + (" …" if len(names) > SHOWN else "")
-            with ui.row().classes("items-center w-full"):
-                said = f"{listed}: {', '.join(own) or 'nothing else'}"
-                ui.label(said[:LONGEST]).classes("flex-1 min-w-40 text-sm break-words")
-                button = ui.button(
-                    f"Set {len(names)} unused",
-                    on_click=guarded(partial(_set_aside, desk, names)),
-                )
-                labelled(button.props("outline dense"), "aria-label", f"Set {listed} unused")
-                named(button, f"aside-{names[0]}")
+            _aside(desk, names, f"{listed(names, SHOWN)}: {', '.join(own) or 'nothing else'}")
 
 
 async def _join(desk: Desk, pairs: list[tuple[str, ...]]) -> None:
@@ -114,13 +108,37 @@ def _unlike(desk: Desk) -> None:
     inputs, outputs = desk.inputs, desk.outputs
     if len(outputs) > 1 or not all(name in one for one in used for name in (*inputs, *outputs)):
         return
-    loads = schedules(used, (*inputs, *outputs))
-    said = list(unlike(used, (*inputs, *loads), outputs[0], loads))
-    if said:
-        with named(ui.card().classes("w-full border border-warning gap-1"), "unlike"):
-            ui.label("These recordings do not go together").classes("font-medium")
-            for one in said:
-                ui.label(f"{one[0].upper()}{one[1:]}.").classes("text-sm break-words")
+    told = schedules(used, (*inputs, *outputs))
+    names = (*inputs, *told)
+    said = list(unlike(used, names, outputs[0], told))
+    if not said:
+        return
+    with named(ui.card().classes("w-full border border-warning gap-1"), "unlike"):
+        ui.label("These recordings do not go together").classes("font-medium")
+        for one in said:
+            ui.label(f"{one[0].upper()}{one[1:]}.").classes("text-sm break-words")
+        for part in _parts(desk, names, outputs[0]):
+            _aside(desk, part, listed(part, SHOWN))
+
+
+def _parts(desk: Desk, names: tuple[str, ...], wanted: str) -> list[list[str]]:
+    """Return the recordings of which some are unlike others, in parts, by their names here."""
+    used = desk.workspace.used()
+    called = [run.with_meta(name=name) for name, run in used.items()]
+    found = [travels(some, given, wanted) for given, some in alike(called, names, wanted)]
+    apart = [one for one in found if one is not None and (one.turned or one.differs)]
+    return [[name for name, _ in part] for one in apart for part in one.parts]
+
+
+def _aside(desk: Desk, names: list[str], said: str) -> None:
+    """Show names, and a button that sets them unused."""
+    with ui.row().classes("items-center w-full"):
+        ui.label(said[:LONGEST]).classes("flex-1 min-w-40 text-sm break-words")
+        button = ui.button(
+            f"Set {len(names)} unused", on_click=guarded(partial(_set_aside, desk, names))
+        )
+        labelled(button.props("outline dense"), "aria-label", f"Set {listed(names, SHOWN)} unused")
+        named(button, f"aside-{names[0]}")
 
 
 def _zeros(desk: Desk) -> None:

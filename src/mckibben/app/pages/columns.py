@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import count
 from typing import Any
 
 from nicegui import ui
 
-from mckibben.app.desk import named
+from mckibben.app.desk import labelled, named
 from mckibben.app.kept import Reading
 from mckibben.app.reading import Seen
 from mckibben.errors import DataError
@@ -31,6 +32,7 @@ class ReadingFields:
         self._found = found
         self._lines = [_column(place, column, reading) for place, column in enumerate(found)]
         self._held: list[dict[str, Any]] = []
+        self._places = count()
         self._constants = ui.column().classes("w-full gap-2")
         for channel, (value, unit) in reading.constants.items():
             self._add(channel, value, unit)
@@ -39,8 +41,8 @@ class ReadingFields:
 
     def _add(self, channel: str = "force", value: float | None = None, unit: str = "N") -> None:
         """Show the fields of a constant; one without a value is none."""
-        place = len(self._held)
-        with self._constants, ui.row().classes("items-center w-full gap-2"):
+        place = next(self._places)
+        with self._constants, ui.row().classes("items-center w-full gap-2") as row:
             ui.label("Held, in no column").classes("w-44 font-medium")
             fields = {
                 "channel": _channel(channel, list(dict.fromkeys([*STANDARD_UNITS, channel]))),
@@ -48,10 +50,17 @@ class ReadingFields:
                 "unit": ui.input("Unit", value=unit).classes("w-20"),
             }
             ui.label("g and kg are weights that hang there").classes("text-xs opacity-70")
+            remove = ui.button(icon="delete", on_click=lambda: self._remove(row, fields))
+            named(remove.props("flat dense"), f"constant-remove-{place}")
+            labelled(remove, "aria-label", "Take this constant out")
         for word, element in fields.items():
             named(element, f"constant-{word}-{place}")
             element.props["aria-label"] = f"{word} of a constant"
         self._held.append(fields)
+
+    def _remove(self, row: ui.row, fields: dict[str, Any]) -> None:
+        self._held = [each for each in self._held if each is not fields]
+        row.delete()
 
     def reading(self, rate: float | None, gaps: Any, *, explicit: bool) -> Reading:
         """Return what the fields say; what goes without saying is left unsaid.

@@ -175,6 +175,8 @@ class Followed(Kept):
     reference: Text = ""
     rmse: dict[str, Number] = {}
     largest: dict[str, Number] = {}
+    offset: dict[str, Number] = {}
+    scatter: dict[str, Number] = {}
     uncompensated: dict[str, Number] = {}
     units: dict[str, Text] = {}
     held: dict[str, Number] = {}

@@ -80,7 +80,7 @@ def _unlike(result: dict[str, Any]) -> bool:
     constant = result.get("constant") or {}
     tested, least = ((one.get("test") or {}).get("rmse") for one in (result, constant))
     validated, limit = (one.get("validation_rmse") for one in (result, constant))
-    if None in (tested, least, validated, limit):
+    if tested is None or least is None or validated is None or limit is None:
         return False
     return bool(tested > HARDLY * least and validated <= HARDLY * limit)
 

@@ -22,7 +22,7 @@ from mckibben.app.desk import Desk
 from mckibben.app.following import compensated, kept_motion
 from mckibben.app.jobs import Job, Jobs, note
 from mckibben.app.motions import reference_recording
-from mckibben.app.pages import closing, compensate
+from mckibben.app.pages import closing, compensate, loops
 from mckibben.app.recorded import reached
 from mckibben.app.work import fit
 from mckibben.app.workspace import Workspace
@@ -497,8 +497,15 @@ def test_why_a_loop_failed_stays_until_it_is_run_again(tmp_path: Path) -> None:
 def test_runs_that_gain_nothing_and_plants_that_scatter_are_said(tmp_path: Path) -> None:
     workspace = workspace_with(tmp_path, a=PI.example(), b=WEAKER)
     replace(Banded.example(), forward=WEAKER).save(workspace.path("banded", "b.json"))
-    for name, rmse, plant in (("a-good", 0.5, "b"), ("a-bad", 1.5, "c")):
+    figures = (
+        ("a-good", 0.5, "b", 0.1, 0.4),
+        ("a-bad", 1.5, "c", 0.1, 0.0),
+        ("a-off", 0.9, "d", -0.8, 0.1),
+    )
+    for name, rmse, plant, offset, scatter in figures:
         run = {"model": "a", "plant": plant, "controller": "pid", "rmse": {"displacement": rmse}}
+        run |= {"offset": {"displacement": offset}, "scatter": {"displacement": scatter}}
+        run |= {"units": {"displacement": "mm"}}
         workspace.write_json("runs", name, run | {"uncompensated": {"displacement": 1.0}})
 
     async def look(user: User) -> None:
@@ -512,6 +519,7 @@ def test_runs_that_gain_nothing_and_plants_that_scatter_are_said(tmp_path: Path)
         assert said == {
             "pid on c: no better than without compensation.",
             "pid on b: the plant scatters as its band says, which no compensator foresees.",
+            "pid on d: " + loops.OFFSET.format("−0.800\xa0mm"),
         }
 
     visit(workspace, look)

@@ -359,3 +359,20 @@ def test_a_model_that_fails_on_the_test_alone_is_named() -> None:
     assert said.startswith("unlike: ")
     assert not any("more than half" in text for text in judging.judged(rows[:1]))
     assert judging.judged(rows)[0] == "Last 80 samples of run to test, all before to fit."
+    # what was not validated is not unlike its validation, and it is said why there is none
+    alone = [rows[1] | {"validation_rmse": None, "validation_failed": "too few cycles"}]
+    assert not any("more than half" in text for text in judging.judged(alone))
+    assert "(too few cycles)" in judging.unvalidated(alone)
+    assert judging.unvalidated(rows) == ""
+    early = [row | {"start": {"said": "half of it lies early"}} for row in rows[:2]]
+    assert "good, unlike: half of it lies early." in judging.judged(early)
+
+
+def test_a_band_is_shaded_behind_the_curves() -> None:
+    t = np.arange(3.0)
+    figure = plots.lines([("model", t, t, "series-1")], x="time [s]", y="displacement [mm]")
+    plots.shaded(figure, t, (t - 1, t + 1), "series-1", "band of model")
+    band, model = figure["data"]
+    assert (band["name"], band["fill"], model["name"]) == ("band of model", "toself", "model")
+    assert band["x"] == [0, 1, 2, 2, 1, 0]
+    assert band["y"] == [-1, 0, 1, 3, 2, 1]

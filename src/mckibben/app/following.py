@@ -91,6 +91,8 @@ def loop(workspace: Workspace, given: dict[str, Any], tell: Tell) -> str:
             "reference": str(given["reference"]),
             "rmse": errors,
             "largest": {channel: float(value) for channel, value in found.largest.items()},
+            "offset": {channel: _offset(recording, channel) for channel in errors},
+            "scatter": {channel: float(value) for channel, value in found.scatter.items()},
             "uncompensated": {} if without.tracked is None else dict(without.tracked.rmse),
             "units": units,
             "held": {c: None if np.ptp(reference[c]) else float(reference[c][0]) for c in beside},
@@ -105,6 +107,12 @@ def loop(workspace: Workspace, given: dict[str, Any], tell: Tell) -> str:
     return ", ".join(
         f"{channel} RMSE {value:.3g} {units[channel]}" for channel, value in errors.items()
     )
+
+
+def _offset(recording: Recording, channel: str) -> float:
+    """Return by how much a channel is off its reference on average, without the approach."""
+    scored = recording.time >= 0.0
+    return float((recording[channel] - recording[f"reference_{channel}"])[scored].mean())
 
 
 def compensated(

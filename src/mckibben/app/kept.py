@@ -127,6 +127,12 @@ class Constant(Kept):
     test: Figures | None = None
 
 
+class Said(Kept):
+    """Figures of which the words are shown; of results kept by older versions there are none."""
+
+    said: Text = ""
+
+
 class Fitted(Kept):
     """What came of a fit."""
 
@@ -140,9 +146,12 @@ class Fitted(Kept):
     chosen_by: Literal["cross-validation", "validation", "given", "fit"] = "cross-validation"
     settings: dict[str, Any] = {}
     validation_rmse: Error = None
+    validation_failed: Text | None = None
     test: Figures | None = None
     train: Figures | None = None
     memory: Memory | None = None
+    start: Said | None = None
+    band: Said | None = None
     outputs: dict[Text, Figures] = {}
     n_parameters: Count | None = None
     fit_seconds: Number = None
@@ -166,6 +175,8 @@ class Followed(Kept):
     reference: Text = ""
     rmse: dict[str, Number] = {}
     largest: dict[str, Number] = {}
+    offset: dict[str, Number] = {}
+    scatter: dict[str, Number] = {}
     uncompensated: dict[str, Number] = {}
     units: dict[str, Text] = {}
     held: dict[str, Number] = {}

@@ -114,6 +114,25 @@ def window(recording: Recording, channels: list[str], low: float, high: float) -
     return found
 
 
+def shaded(figure: Json, time: Array, ends: tuple[Array, Array], colour: str, name: str) -> None:
+    """Shade what lies between the lower and the upper end of a band, behind a figure's curves.
+
+    Parameters
+    ----------
+    figure : dict
+        From `figures`; it is changed.
+    time : array, shape (n,)
+    ends : (array, array), each of shape (n,)
+    colour, name : str
+    """
+    (t, low), (back, high) = (over_time(time, end, POINTS) for end in ends)
+    around = np.append(t, back[::-1]), np.append(low, high[::-1])
+    x, y = (_listed(values) for values in around)
+    trace = {"type": "scatter", "mode": "lines", "name": text(name), "x": x, "y": y}
+    look = {"fill": "toself", "fillcolor": f"--{colour}", "line": {"width": 0}, "opacity": 0.25}
+    figure["data"].insert(0, trace | look | {"hoverinfo": "skip"})
+
+
 def lines(
     curves: list[tuple[str, Array, Array, str]],
     *,

@@ -17,6 +17,7 @@ from mckibben.errors import MckibbenError
 from mckibben.numerals import numeral
 
 if TYPE_CHECKING:  # loaded when they are first used, so that the page is there at once
+    from mckibben.blocks.bands.band import Band
     from mckibben.blocks.core.block import Block
     from mckibben.control import Twin
 
@@ -95,6 +96,16 @@ class Workspace(Changing):
     def to_invert(self) -> list[str]:
         """Return the models that have a compensator, in the order of `ranked`."""
         return [name for name in self.ranked() if self.invertible(name)]
+
+    def band(self, name: str) -> Band | None:
+        """Return the band of a model, or None where it has none."""
+        from mckibben.blocks.bands.banded import Banded
+
+        if self.path("banded", f"{name}.json").exists():
+            with suppress(MckibbenError):
+                block = self.model(name, "banded")
+                return block.band if isinstance(block, Banded) else None
+        return None
 
     def twin(self, name: str) -> Twin:
         """Return a model as a plant, with its band where it has one.

@@ -77,8 +77,8 @@ class TestedBand:
         )
 
     def to_dict(self) -> dict[str, Any]:
-        """Return it for JSON."""
-        return asdict(self)
+        """Return it for JSON, and in words."""
+        return asdict(self) | {"said": str(self)}
 
 
 def tested_band(

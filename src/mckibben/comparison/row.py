@@ -201,6 +201,7 @@ class Row:
             "train": train,
             "test": test,
             "validation_rmse": self.validation_rmse,
+            "validation_failed": self.invalid,
             "outputs": {
                 name: asdict(scores) | {"validation_rmse": self.validation_by_output.get(name)}
                 for name, scores in self.outputs.items()

@@ -41,8 +41,8 @@ class Start:
     seconds: float | None
 
     def to_dict(self) -> dict[str, Any]:
-        """Return its numbers."""
-        return asdict(self)
+        """Return its numbers, and what they say."""
+        return asdict(self) | {"said": str(self)}
 
     def __str__(self) -> str:
         """Say where the error lies."""

@@ -149,7 +149,15 @@ def _strokes(model: Block, plant: Plant, rise: Recording) -> list[str]:
 def _why(plant: Plant) -> str:
     """Return what may be the reason, and the remedy."""
     if isinstance(plant, Twin):
-        return "the two models disagree there, or are of two muscles. Remedy: compare their test errors"
+        known = [
+            f"{plain(name)} {_span(*ends)}" for name, ends in known_ranges(plant.forward).items()
+        ]
+        far = f"recordings of {plant.name} reached {', '.join(known)}: beyond, it extrapolates"
+        within = "within these" if known else "within what was recorded"
+        return (
+            f"the two models disagree there, or are of two muscles. {f'{far}. ' * bool(known)}"
+            f"Remedy: stay {within}, or record more, and fit both again"
+        )
     return f"it may be of another muscle. {REMEDY}"
 
 

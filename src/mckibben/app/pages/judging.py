@@ -39,6 +39,8 @@ def judged(results: Sequence[dict[str, Any]]) -> list[str]:
             )
         if _unlike(result):
             doubted.setdefault(UNLIKE, []).append(f"{result['name']}{of_other_data(result)}")
+        if start := (result.get("start") or {}).get("said"):
+            doubted.setdefault(f"{start}.", []).append(f"{result['name']}{of_other_data(result)}")
         for why in result.get("shared", ()):
             doubted.setdefault(why, []).append(f"{result['name']}{of_other_data(result)}")
     if why_none := not_recommended(results):
@@ -58,6 +60,17 @@ def judged(results: Sequence[dict[str, Any]]) -> list[str]:
     return list(dict.fromkeys(said))
 
 
+def unvalidated(results: Sequence[dict[str, Any]]) -> str:
+    """Return why there is no validated error though the split has parts for it; else nothing."""
+    if results[0]["chosen_by"] == "fit" or any(
+        result["validation_rmse"] is not None for result in results
+    ):
+        return ""
+    whys = dict.fromkeys(filter(None, (result["validation_failed"] for result in results)))
+    why = f" ({'; '.join(whys)})" if whys else ""
+    return f"No model was validated, for a fit to a part of the training data failed{why}. "
+
+
 def _sentence(text: str) -> str:
     return f"{text[0].upper()}{text[1:]}."
 
@@ -67,9 +80,9 @@ def _unlike(result: dict[str, Any]) -> bool:
     constant = result.get("constant") or {}
     tested, least = ((one.get("test") or {}).get("rmse") for one in (result, constant))
     validated, limit = (one.get("validation_rmse") for one in (result, constant))
-    fails = tested is not None and least is not None and tested > HARDLY * least
-    failed = validated is not None and limit is not None and validated > HARDLY * limit
-    return fails and not failed
+    if tested is None or least is None or validated is None or limit is None:
+        return False
+    return bool(tested > HARDLY * least and validated <= HARDLY * limit)
 
 
 def drawn_first(results: Sequence[dict[str, Any]]) -> str:

@@ -20,7 +20,15 @@ from mckibben.app.desk import (
 )
 from mckibben.app.drawn import picture
 from mckibben.app.pages import next_steps
-from mckibben.app.pages.judging import RUNS, drawn_first, judged, of_other_data, share_of_mean
+from mckibben.app.pages.judging import (
+    RUNS,
+    drawn_first,
+    judged,
+    of_other_data,
+    share_of_mean,
+    unvalidated,
+)
+from mckibben.arrays import Array
 from mckibben.blocks.core.block import Block
 from mckibben.blocks.core.writing import quantities
 from mckibben.comparison import limits
@@ -33,6 +41,7 @@ from mckibben.errors import MckibbenError, ModelError
 from mckibben.numerals import numeral, typeset
 from mckibben.recording import Recording
 from mckibben.report import subjects, wording
+from mckibben.report.drawing import series_colour
 
 PARAMETERS = 12
 """Of a page of the table of parameters."""
@@ -99,7 +108,9 @@ def build(desk: Desk) -> None:
         table = _table(results, desk.outputs)
         heading, by = CHOICES[results[0]["chosen_by"]]
         careful = CAREFUL if any(limits.caution(result["model"]) for result in results) else ""
-        about = ABOUT.format(heading=heading, by=by, careful=careful)
+        if none := unvalidated(results):
+            heading, by = CHOICES["fit"]
+        about = none + ABOUT.format(heading=heading, by=by, careful=careful)
         ui.label(about).classes("text-xs opacity-70")
         for said in judged(results):
             ui.label(fields.said(said)).classes("text-sm")
@@ -225,13 +236,14 @@ async def _closer(
     recording, known = one.recording, split.train
     blocks = {name: desk.workspace.model(name) for name in names}
 
-    def modelled() -> dict[str, Any]:
-        return {
+    def modelled() -> tuple[dict[str, Array], dict[str, Array]]:
+        found = {
             name: run_free(block, recording, desk.outputs, known) for name, block in blocks.items()
         }
+        return found, _bands(desk, recording, found)
 
     try:
-        outputs = await asyncio.to_thread(modelled)
+        outputs, bands = await asyncio.to_thread(modelled)
         pairs = await asyncio.to_thread(desk.looked_at, [recording])
     except MckibbenError as error:
         raise ModelError(f"{', '.join(names)} on {recording.name}: {error}") from None
@@ -247,6 +259,10 @@ async def _closer(
         errors = "; ".join(f"{name} {wording.number(rmse, 3)} {unit}" for name, rmse in off.items())
         where = " of that part" if one.part is not None else ""
         named(ui.label(f"On {one.title}. RMSE{where}: {errors}."), "closer-on")
+        said = {row["name"]: (row["band"] or {}).get("said") for row in desk.results()}
+        for name in bands:
+            if said.get(name):
+                named(ui.label(f"{name}: {said[name]}.").classes("text-sm"), "closer-band")
         drawings = []
         for output, pair in enumerate(pairs):
             own = {name: found[:, output] for name, found in outputs.items()}
@@ -257,7 +273,15 @@ async def _closer(
             ]
         for number, drawing in enumerate(drawings):
             with ui.row().classes("w-full"):
-                for figure in plots.figures(drawing, height=360):
+                for place, figure in enumerate(plots.figures(drawing, height=360)):
+                    # over time: the first drawing of an output, and the last half of its residuals
+                    output, kind = divmod(number, 3)
+                    for name, ends in bands.items() if (kind, place) in ((0, 0), (2, 1)) else ():
+                        centre = outputs[name][:, output] if kind else 0.0
+                        low, high = ends[:, output].T - centre
+                        colour = series_colour(list(blocks).index(name))
+                        label = f"band of {name}"
+                        plots.shaded(figure, recording.time, (low, high), colour, label)
                     figure["layout"]["showlegend"] = True
                     plot = picture(desk, figure, f"closer-{number}")
                     plot.classes("flex-1 min-w-72", remove="w-full")
@@ -267,6 +291,20 @@ async def _closer(
                     named(_parameters(block), f"parameters-{name}")
 
     return draw, {name: each.title for name, each in parts.items()}
+
+
+def _bands(desk: Desk, recording: Recording, modelled: dict[str, Array]) -> dict[str, Array]:
+    """Return the lower and upper ends, shape (n, k, 2), of the models' outputs that have a band."""
+    found = {}
+    for name, outputs in modelled.items():
+        band = desk.workspace.band(name)
+        # of a band of other channels, nothing is told of these
+        if band is None or tuple(c.name for c in band.given) != tuple(desk.outputs):
+            continue
+        given = np.hstack([recording.matrix(c.name for c in band.driving), outputs])
+        ends = band.simulate(given, sample_time=recording.sample_time)
+        found[name] = ends.reshape(*outputs.shape, 3)[:, :, 1:]
+    return found
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,9 +18,18 @@ from mckibben.arrays import Array
 from mckibben.errors import MckibbenError
 from mckibben.files import read
 from mckibben.report import wording
+from mckibben.report.drawing import series_colour
 
 DRAWN = 4
 """The newest runs of a motion, which are drawn until a user ticks others."""
+
+NOTABLE = 0.7
+"""Share of the RMSE above which an offset, or what a plant's band drew, is most of it."""
+
+OFFSET = (
+    "most of the error is one offset of {}: the plant begins on another branch, or rests elsewhere, "
+    "than the compensator's model. On a rig give it a zero first, or add feedback (feedforward-pid)."
+)
 
 COLUMNS = {
     "title": "Run",
@@ -89,7 +98,7 @@ def build(desk: Desk, model: str, drawn: Callable[[], str], ticks: Ticks) -> Non
         if len(motions) > 1 or drawn() not in ("", latest):
             text = "Errors compare only within a motion: tick the runs that are to be drawn."
             named(ui.label(text).classes("text-sm"), "motions")
-        for text, names in _remarks(desk, found).items():
+        for text, names in _remarks(found).items():
             if names:
                 named(caution(f"{', '.join(titles[n] for n in names)}: {text}"), "runs-remark")
         for note in dict.fromkeys(note for run in found.values() for note in run.notes):
@@ -125,10 +134,9 @@ def _newest_first(desk: Desk, runs: dict[str, Followed]) -> dict[str, Followed]:
 def _titles(runs: dict[str, Followed]) -> dict[str, str]:
     """Return what runs are called: by law and plant, and what was held; else also by their names."""
     titles = {name: ", ".join([_what(run), *_held(run)]) for name, run in runs.items()}
-    many = Counter((run.reference, titles[name]) for name, run in runs.items())
+    many = Counter(titles.values())
     return {
-        name: title if many[runs[name].reference, title] == 1 else f"{title} ({name})"
-        for name, title in titles.items()
+        name: title if many[title] == 1 else f"{title} ({name})" for name, title in titles.items()
     }
 
 
@@ -145,17 +153,22 @@ def _held(run: Followed) -> list[str]:
     ]
 
 
-def _remarks(desk: Desk, runs: dict[str, Followed]) -> dict[str, list[str]]:
+def _remarks(runs: dict[str, Followed]) -> dict[str, list[str]]:
     """Return what the figures of runs do not say, and of which."""
-    no_better, scattering = [], []
+    no_better, scattering, offsets = [], [], dict[str, list[str]]()
     for name, run in runs.items():
         plain = run.uncompensated
         pairs = [(run.rmse[key], plain.get(key)) for key in run.rmse]
         if any(own is not None and other is not None and own >= other for own, other in pairs):
             no_better.append(name)
-        if run.plant and desk.workspace.path("banded", f"{run.plant}.json").exists():
-            scattering.append(name)
-    return {
+        for channel, rmse in run.rmse.items():
+            offset, scatter = run.offset.get(channel), run.scatter.get(channel)
+            if rmse and offset is not None and abs(offset) > NOTABLE * rmse:
+                text = OFFSET.format(_listed({channel: offset}, run.units))
+                offsets.setdefault(text, []).append(name)
+            elif rmse and scatter is not None and scatter > NOTABLE * rmse:
+                scattering.append(name)
+    return offsets | {
         "no better than without compensation.": no_better,
         "the plant scatters as its band says, which no compensator foresees.": scattering,
     }
@@ -203,13 +216,17 @@ def _pictures(
     curves: dict[tuple[str, bytes], list[tuple[str, Array, Array, str]]] = {}
     about: dict[tuple[str, bytes], tuple[str, str]] = {}
     uncompensated: set[str] = set()
-    for place, name in enumerate(runs):
+    # from the oldest of all, so that a newer run changes no other's colour
+    colours = {name: series_colour(place) for place, name in enumerate(reversed(titles))}
+    for name in runs:
         try:
             (run,) = read(desk.workspace.path("runs", f"{name}.csv"), informative=False)
         except (MckibbenError, ValueError):
             continue
         if run.duration is not None and run.start_time < 0:  # the approach is not scored
             run = run.slice(round(-run.start_time / (run.sample_time or 1.0)), len(run))
+        # what is asked for at a step is due, and recorded, at the next: drawn as it was planned
+        time = run.time - (run.sample_time or 0.0)
         of = runs[name]
         there = ", ".join([of.plant or of.rig, *_held(of)])
         for channel in of.rmse:
@@ -219,12 +236,12 @@ def _pictures(
             # under another load the same motion has another file
             key = channel, run[wished].tobytes()
             about.setdefault(key, (f"{channel} [{run.units[channel]}]", motions[of.reference]))
-            own = curves.setdefault(key, [("reference", run.time, run[wished], "measured")])
-            colour, without = f"series-{place % 6 + 1}", f"no compensation on {there}"
+            own = curves.setdefault(key, [("reference", time, run[wished], "measured")])
+            without = f"no compensation on {there}"
             if plain in run and not any(curve[0] == without for curve in own):
                 uncompensated.add(without)
-                own.append((without, run.time, run[plain], colour))
-            own.append((titles[name], run.time, run[channel], colour))
+                own.append((without, time, run[plain], "muted"))
+            own.append((titles[name], time, run[channel], colours[name]))
     if not curves:
         ui.label("Tick a run to see it.").classes("opacity-70")
     several = len(curves) > len({channel for channel, _ in curves})

@@ -26,6 +26,7 @@ from mckibben.app.pages import data, judging
 from mckibben.app.shell import build, load_the_rest
 from mckibben.app.work import fit
 from mckibben.app.workspace import Workspace
+from mckibben.arrays import Array
 from mckibben.registry import load
 from mckibben.report import subjects
 from tests.app.test_jobs import filled
@@ -369,7 +370,7 @@ def test_a_model_that_fails_on_the_test_alone_is_named() -> None:
 
 
 def test_a_band_is_shaded_behind_the_curves() -> None:
-    t = np.arange(3.0)
+    t: Array = np.arange(3.0)
     figure = plots.lines([("model", t, t, "series-1")], x="time [s]", y="displacement [mm]")
     plots.shaded(figure, t, (t - 1, t + 1), "series-1", "band of model")
     band, model = figure["data"]

@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
-from weakref import WeakKeyDictionary, WeakSet
+from weakref import WeakSet
 
 from nicegui import ui
 
@@ -31,9 +31,6 @@ SHARED = ("recordings", "results", "runs", "log")
 """Topics of the workspace; the others are of one page."""
 
 _DESKS: WeakSet[Desk] = WeakSet()
-
-_TICKED: WeakKeyDictionary[Workspace, list[str]] = WeakKeyDictionary()
-"""Models ticked last over a workspace, for pages that are loaded again."""
 
 
 @dataclass(eq=False)
@@ -71,15 +68,6 @@ class Desk:
     def output(self) -> str:
         """The first output."""
         return self.outputs[0]
-
-    @property
-    def ticked(self) -> list[str] | None:
-        """The models that a user has ticked to be fitted, here or before this page was loaded again."""
-        return _TICKED.get(self.workspace)
-
-    @ticked.setter
-    def ticked(self, models: list[str]) -> None:
-        _TICKED[self.workspace] = models
 
     @property
     def sides(self) -> Channels:

@@ -39,6 +39,7 @@ class Workspace(Changing):
         self._models: Cache[Block] = Cache(MOST_MODELS)
         self._inverses: Cache[bool] = Cache(MOST_MODELS)
         self._rigs: Cache[list[str]] = Cache(MOST_MODELS)
+        self.ticked: list[str] | None = None  # models to fit, kept for pages that are loaded again
 
     def models(self) -> list[str]:
         """Return the names of the models that can be loaded."""

@@ -56,7 +56,7 @@ class Choice:
         if look != self._looks or found == self.shown:  # a later look knows better
             return
         names = [offer.model for _, offers in found.groups for offer in offers]
-        chosen = self.desk.ticked
+        chosen = self.desk.workspace.ticked
         kept = [model for model in chosen or () if model in names]
         self.shown, self.ticked = found, kept if kept or chosen == [] else list(found.start)
         self.said.set_text(said(found.recognised))
@@ -132,7 +132,7 @@ class Choice:
 
     def _tick(self, model: str, on: bool) -> None:
         self.ticked = [name for name in self.ticked if name != model] + [model] * on
-        self.desk.ticked = self.ticked
+        self.desk.workspace.ticked = self.ticked
         self._count()
 
     def _count(self) -> None:

@@ -370,7 +370,7 @@ def test_a_model_that_fails_on_the_test_alone_is_named() -> None:
 
 
 def test_a_band_is_shaded_behind_the_curves() -> None:
-    t: Array = np.arange(3.0)
+    t: Array = np.arange(3, dtype=float)
     figure = plots.lines([("model", t, t, "series-1")], x="time [s]", y="displacement [mm]")
     plots.shaded(figure, t, (t - 1, t + 1), "series-1", "band of model")
     band, model = figure["data"]

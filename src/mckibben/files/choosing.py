@@ -196,11 +196,12 @@ def _assumed(
     finite = np.abs(values[np.isfinite(values)])
     largest = float(finite.max()) if finite.size else 0.0
     if expected == "bar" and largest > IMPLAUSIBLE_BAR:
+        fitting = plausible.meant(largest, expected, expected)
         raise DataError(
             f"it has no unit and reaches {largest:g}, which cannot be bar",
             file=path,
             channel=channel,
-            remedy=f"say its unit, as in --unit {channel}=kPa or --unit {channel}=psi",
+            remedy=f"say its unit, as in --unit {channel}={f' or --unit {channel}='.join(fitting[:2])}",
         )
     hint = ""
     if expected == "mm" and 0 < largest < 0.5:

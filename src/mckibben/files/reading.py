@@ -12,7 +12,8 @@ import numpy as np
 
 from mckibben.arrays import Array
 from mckibben.errors import DataError
-from mckibben.files import sources, timebase
+from mckibben.files import rates, sources, timebase
+from mckibben.files.assigning import of_matrix
 from mckibben.files.channels import about
 from mckibben.files.choosing import ASSUMED, Choice, choose
 from mckibben.files.fingerprint import fingerprint
@@ -155,6 +156,8 @@ def _recordings(table: Table, request: Request, path: Path, digest: str) -> list
         )
     step = _stated_step(choice, table, request, path)
     measured = choice.time if step is None else None
+    if step is None and measured is None and (columns := of_matrix(table, time=True)):
+        warn(path, f"no column of times is named; say --column time=COLUMN{columns}")
     if measured is not None:
         timebase.check(measured, table, path)
     order = np.arange(n, dtype=float) if measured is None else measured
@@ -194,7 +197,8 @@ def _stated_step(choice: Choice, table: Table, request: Request, path: Path) -> 
     """Return the sample time that the caller or the file states, which the times must not deny."""
     step = table.sample_time if request.rate is None else 1.0 / request.rate
     if step is None and choice.time is None and not table.own:
-        return request.described.time.sample_time
+        said = request.described.time.sample_time
+        return rates.sample_time(table.rates, path) if said is None else said
     if step is None:
         return None
     if table.sample_time is not None and abs(step - table.sample_time) > 1e-3 * step:

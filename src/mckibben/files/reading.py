@@ -176,7 +176,7 @@ def _recordings(table: Table, request: Request, path: Path, digest: str) -> list
     when = (
         begin + (step or 1.0) * order if measured is None else convert(order, choice.time_unit, "s")
     )
-    rows = fingerprint({name: choice.channels[name] for name in channels}, when)
+    rows = fingerprint({name: choice.recorded[name] for name in channels}, when)
     meta = _meta(choice, table, path, digest)
     found = [
         Recording(

@@ -99,6 +99,8 @@ def test_nothing_is_assumed_of_the_columns_of_a_matrix(tmp_path: Path) -> None:
         (recording,) = mckibben.read(path)
     assert list(recording.channels) == ["data_1", "data_2", "data_3"]
     assert recording.sample_time is None
+    with pytest.raises(DataError, match=r"named 'data'. Remedy: name one of data\[1\], data\[2\]"):
+        mckibben.read(path, columns={"pressure": "data"})
     path = tmp_path / "b.mat"
     write_matrix(path, np.column_stack([P, X]))
     with pytest.warns(DataWarning, match=r"one of data\[1\], data\[2\]$"):

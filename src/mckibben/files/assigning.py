@@ -119,11 +119,13 @@ def _column(wanted: str, channel: str, table: Table, path: Path) -> Column:
     for reading in readings:
         matches = [column for column in table.columns if reading(column)]
         if len(matches) > 1:
+            headers = listed([column.header for column in matches])
+            numbered = matches[0].matrix is not None
             raise DataError(
                 f"{len(matches)} columns are named {wanted!r}",
                 file=path,
                 channel=channel,
-                remedy="give them different headers",
+                remedy=f"name one of {headers}" if numbered else "give them different headers",
             )
         if matches:
             return matches[0]

@@ -66,13 +66,15 @@ def read(
         Ends in ``.csv .tsv .txt .dat .parquet .mat .h5 .hdf5 .tdms .xlsx .bag .mcap .db3``; or a
         folder of such files: a bag of ROS 2, files with one signal each, or several recordings.
     columns : mapping of str to str, optional
-        Channel -> column, by its header with or without the unit. Standard channels are found by
+        Channel -> column, by its header with or without the unit; ``data[1]`` is the first column of a
+        matrix ``data``. Standard channels are found by
         common names (``p``, ``Druck``, ``position``, ...) without it. ``time`` is a channel here.
     units : mapping of str to str, optional
         Channel -> unit, such as ``{"pressure": "kPa"}``; goes before what the header says.
     rate : float, optional
-        Samples per second, positive, where there is no column of times. Without either, the
-        recording has no time. Channels with times of their own are put on a clock of this rate.
+        Samples per second, positive, where there is no column of times. Without either, a scalar
+        beside the samples may tell it, such as ``fs``, or the recording has no time. Channels with
+        times of their own are put on a clock of this rate.
     gaps : {"error", "split", "interpolate"}
         What to do where time is missing (a step of more than three median steps) or a sample is
         (blank, NaN or infinite): refuse, cut into several recordings, or bridge linearly.

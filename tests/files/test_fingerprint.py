@@ -84,6 +84,19 @@ def test_they_are_found_in_what_was_written_and_read_again(tmp_path: Path) -> No
     assert shared_rows(whole, read(kept), INPUT, OUTPUT)
 
 
+@pytest.mark.parametrize("calibration", [(-1.0, 0.0), (2.0, 3.0)])
+def test_they_are_found_whatever_gain_and_offset_were_read_with(
+    tmp_path: Path, calibration: tuple[float, float]
+) -> None:
+    path = written(tmp_path / "a.csv", ROWS_READ)
+    (turned,) = mckibben.read(path, calibration={"displacement": calibration})
+    assert not np.array_equal(turned["displacement"], read(path)["displacement"])
+    found = shared_rows(read(path), turned, INPUT, OUTPUT)
+    assert found is not None
+    assert found.share == 1.0
+    assert turned.meta[ROWS] == read(path).meta[ROWS]
+
+
 def test_rows_in_pieces_of_another_order_are_found(tmp_path: Path) -> None:
     rng = np.random.default_rng(5)
     pieces = rng.permutation(np.split(ROWS_READ[:, 1:], 30), axis=0)

@@ -10,6 +10,7 @@ import pytest
 
 import mckibben
 from mckibben import DataError, DataWarning, Recording
+from mckibben.arrays import Array
 
 K = np.arange(40.0)
 P = 100 * (1 + np.sin(K / 6))
@@ -55,6 +56,82 @@ def test_mat_struct(tmp_path: Path) -> None:
     check(recording)
 
 
+MATRIX: dict[str, Any] = GIVEN | {
+    "columns": {"time": "data[1]", "pressure": "data[2]", "displacement": "data[3]"}
+}
+
+
+def write_matrix(path: Path, matrix: Array, **others: Array) -> None:
+    import h5py
+    from scipy.io import savemat
+
+    variables = {"data": matrix, **others}
+    if path.suffix == ".mat":
+        savemat(path, variables, format="4" if path.stem == "old" else "5")
+        return
+    with h5py.File(path, "w") as file:
+        for name, values in variables.items():
+            file[f"run/{name}"] = values
+
+
+@pytest.mark.parametrize("name", ["old.mat", "new.mat", "a.h5"])
+@pytest.mark.parametrize("transposed", [False, True])
+def test_columns_of_a_matrix_are_named_by_number(
+    tmp_path: Path, name: str, transposed: bool
+) -> None:
+    matrix = np.column_stack([T, P, X])
+    write_matrix(tmp_path / name, matrix.T if transposed else matrix)
+    (recording,) = mckibben.read(tmp_path / name, channels=["pressure", "displacement"], **MATRIX)
+    check(recording)
+    assert list(recording.channels) == ["pressure", "displacement"]
+
+
+def test_nothing_is_assumed_of_the_columns_of_a_matrix(tmp_path: Path) -> None:
+    path = tmp_path / "a.mat"
+    write_matrix(path, np.column_stack([T, P, X]))
+    with pytest.raises(DataError) as refused:
+        mckibben.read(path, channels=["pressure", "displacement"])
+    assert refused.value.remedy == (
+        "name its column with --column pressure=COLUMN, one of data[1], data[2], data[3]; "
+        "data[1] rises evenly, as time does: --column time=data[1]"
+    )
+    with pytest.warns(DataWarning, match=r"no column of times is named.*--column time=data\[1\]"):
+        (recording,) = mckibben.read(path)
+    assert list(recording.channels) == ["data_1", "data_2", "data_3"]
+    assert recording.sample_time is None
+    with pytest.raises(DataError, match=r"named 'data'. Remedy: name one of data\[1\], data\[2\]"):
+        mckibben.read(path, columns={"pressure": "data"})
+    path = tmp_path / "b.mat"
+    write_matrix(path, np.column_stack([P, X]))
+    with pytest.warns(DataWarning, match=r"one of data\[1\], data\[2\]$"):
+        mckibben.read(path)
+
+
+def test_a_matrix_goes_with_vectors_of_its_length(tmp_path: Path) -> None:
+    path = tmp_path / "a.mat"
+    write_matrix(path, np.column_stack([P, X]), t=T, gains=T[:3], table=np.ones((20, 2)))
+    (recording,) = mckibben.read(
+        path, **GIVEN, columns={"pressure": "data[1]", "displacement": "data[2]"}
+    )
+    check(recording)
+    assert recording.meta["ignored_columns"] == ["gains", "table[1]", "table[2]"]
+
+
+@pytest.mark.parametrize("shape", [(40, 40), (40, 5), (65, 1000), (40, 2, 2)])
+def test_other_matrices_are_no_channels(tmp_path: Path, shape: tuple[int, ...]) -> None:
+    for name in ("a.mat", "a.h5"):
+        write_matrix(tmp_path / name, np.ones(shape))
+        with pytest.raises(DataError, match="no vectors of numbers"):
+            mckibben.read(tmp_path / name)
+
+
+def test_the_name_of_a_matrix_may_say_unit_and_channel(tmp_path: Path) -> None:
+    write_matrix(tmp_path / "a.mat", np.ones((5, 2)), t=T, p_kPa=np.column_stack([P, 2 * P]))
+    (recording,) = mckibben.read(tmp_path / "a.mat", units={"time": "s"})
+    assert list(recording.channels) == ["pressure_1", "pressure_2"]
+    assert recording["pressure_2"] == pytest.approx(P / 50)
+
+
 def test_mat_7_3(tmp_path: Path) -> None:
     import h5py
 
@@ -71,6 +148,67 @@ def test_mat_7_3(tmp_path: Path) -> None:
     (recording,) = mckibben.read(path, **GIVEN)
     check(recording)
     assert list(recording.channels) == ["displacement", "pressure"]
+
+
+def write_scalars(path: Path, scalars: dict[str, float], **vectors: Array) -> None:
+    import h5py
+    from scipy.io import savemat
+
+    variables = {"p_kPa": P, "disp_cm": X, **vectors, **scalars}
+    if path.suffix == ".mat":
+        savemat(path, variables if path.stem == "old" else {"run": variables}, format="5")
+        return
+    with h5py.File(path, "w") as file:
+        for name, values in variables.items():
+            file[f"run/{name}"] = values
+
+
+@pytest.mark.parametrize("name", ["old.mat", "new.mat", "a.h5"])
+@pytest.mark.parametrize(
+    "scalars",
+    [{"Fs": 50.0}, {"dt": 0.02}, {"SampleRate": 50}, {"fs": 50, "Ts": 0.02}],
+    ids=lambda scalars: "+".join(scalars),
+)
+def test_a_scalar_tells_the_sample_time(
+    tmp_path: Path, name: str, scalars: dict[str, float]
+) -> None:
+    write_scalars(tmp_path / name, scalars)
+    with pytest.warns(DataWarning, match=r"there are no times.*0\.02 s between samples"):
+        (recording,) = mckibben.read(tmp_path / name)
+    check(recording)
+    assert any("there are no times" in note for note in recording.notes)
+    assert mckibben.read(tmp_path / name, rate=25)[0].sample_time == 0.04
+
+
+@pytest.mark.parametrize("name", ["old.mat", "a.h5"])
+@pytest.mark.parametrize(
+    ("scalars", "problem"),
+    [
+        ({"fs": 50.0, "dt": 0.01}, "contradict each other"),
+        ({"fs": 0.0}, "fs = 0: this cannot be"),
+        ({"Ts": -0.02}, "Ts = -0.02: this cannot be"),
+        ({"fs": np.nan}, "fs = nan: this cannot be"),
+        ({"dt": np.inf, "fs": 50.0}, "these cannot be"),
+    ],
+)
+def test_scalars_that_cannot_be_are_refused_where_they_count(
+    tmp_path: Path, name: str, scalars: dict[str, float], problem: str
+) -> None:
+    write_scalars(tmp_path / name, scalars)
+    with pytest.raises(DataError, match=f"{problem}.*Remedy: say .* with --rate"):
+        mckibben.read(tmp_path / name)
+    check(mckibben.read(tmp_path / name, rate=50)[0])
+    write_scalars(tmp_path / name, scalars, time_s=T)
+    check(mckibben.read(tmp_path / name)[0])
+
+
+def test_a_scalar_goes_with_a_matrix(tmp_path: Path) -> None:
+    write_matrix(tmp_path / "a.mat", np.column_stack([P, X]), fs=np.array(50.0))
+    columns = {"pressure": "data[1]", "displacement": "data[2]"}
+    units = {"pressure": "kPa", "displacement": "cm"}
+    with pytest.warns(DataWarning, match="fs = 50 is taken"):
+        (recording,) = mckibben.read(tmp_path / "a.mat", columns=columns, units=units)
+    check(recording)
 
 
 @pytest.mark.parametrize("ending", [".h5", ".hdf5"])

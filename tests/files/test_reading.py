@@ -143,6 +143,16 @@ def test_pressures_of_hundreds_of_bar_are_not_believed(table: Write) -> None:
     assert read_one(path, units={"pressure": "kPa"})["pressure"] == pytest.approx(PRESSURE)
 
 
+@pytest.mark.parametrize(
+    ("per_bar", "fitting"), [(1e5, "Pa"), (100.0, "kPa or --unit pressure=psi"), (1e9, "mPa")]
+)
+def test_the_remedy_names_units_that_fit(table: Write, per_bar: float, fitting: str) -> None:
+    path = table(pressure=[per_bar * p for p in PRESSURE])
+    with pytest.raises(DataError) as refused:
+        mckibben.read(path)
+    assert refused.value.remedy == f"say its unit, as in --unit pressure={fitting}"
+
+
 def test_given_units_go_before_the_header(table: Write) -> None:
     recording = read_one(table(pressure_bar=PRESSURE), units={"pressure": "psi"})
     assert recording["pressure"] == pytest.approx(0.0689475729 * np.array(PRESSURE))

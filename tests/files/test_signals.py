@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -137,6 +138,18 @@ def test_what_cannot_be_told_is_asked(tmp_path: Path, headers: dict[str, str]) -
         mckibben.read(tmp_path)
     with pytest.raises(DataError, match="neither their names"):
         roles(tmp_path)
+
+
+@pytest.mark.parametrize(("rate", "step"), [(50.0, 0.02), (25.0, None)])
+def test_a_scalar_in_all_files_tells_the_sample_time(
+    tmp_path: Path, rate: float, step: float | None
+) -> None:
+    from scipy.io import savemat
+
+    savemat(tmp_path / "pressure_bar.mat", {"value": P, "fs": 50.0})
+    savemat(tmp_path / "displacement_mm.mat", {"value": X, "fs": rate})
+    with nullcontext() if step is None else pytest.warns(DataWarning, match="fs = 50 is taken"):
+        assert one(tmp_path).sample_time == step
 
 
 def test_join_tells_which_belong_together(tmp_path: Path) -> None:

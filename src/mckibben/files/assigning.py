@@ -12,6 +12,7 @@ from mckibben.files.headers import LONGEST, by_units, channel_of, parse, snake_c
 from mckibben.files.notices import listed, warn
 from mckibben.files.request import Request
 from mckibben.files.table import Column, Table
+from mckibben.files.timebase import rises_evenly
 from mckibben.files.units import find
 
 ROLES = ("reference_", "command_")
@@ -118,11 +119,13 @@ def _column(wanted: str, channel: str, table: Table, path: Path) -> Column:
     for reading in readings:
         matches = [column for column in table.columns if reading(column)]
         if len(matches) > 1:
+            headers = listed([column.header for column in matches])
+            numbered = matches[0].matrix is not None
             raise DataError(
                 f"{len(matches)} columns are named {wanted!r}",
                 file=path,
                 channel=channel,
-                remedy="give them different headers",
+                remedy=f"name one of {headers}" if numbered else "give them different headers",
             )
         if matches:
             return matches[0]
@@ -141,7 +144,8 @@ def _require(named: Mapping[str, Column], table: Table, request: Request, path: 
                 f"there is no such channel; the columns are {_listed(table)}",
                 file=path,
                 channel=channel,
-                remedy=f"name its column with --column {channel}=COLUMN",
+                remedy=f"name its column with --column {channel}=COLUMN"
+                f"{of_matrix(table, time='time' not in named)}",
             )
     for word, option, asked in (
         ("unit", "--unit", request.units),
@@ -155,6 +159,18 @@ def _require(named: Mapping[str, Column], table: Table, request: Request, path: 
                     channel=channel,
                     remedy=f"give {option} for one of them",
                 )
+
+
+def of_matrix(table: Table, *, time: bool) -> str:
+    """Return what to add to a remedy where columns are those of a matrix, whose names tell nothing."""
+    columns = [column for column in table.columns if column.matrix is not None]
+    if not columns:
+        return ""
+    said = f", one of {listed([column.header for column in columns])}"
+    first = columns[0]
+    if time and first.values is not None and rises_evenly(first.values):
+        said += f"; {first.header} rises evenly, as time does: --column time={first.header}"
+    return said
 
 
 def _by_units(named: Mapping[str, Column], request: Request) -> dict[str, str]:

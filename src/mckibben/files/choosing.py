@@ -35,6 +35,8 @@ class Choice:
     ----------
     channels, units : dict
         Samples and unit of every channel.
+    recorded : dict
+        The channels as they are without gain and offset, by which the same rows are known again.
     time : numpy.ndarray or None
         In the unit ``time_unit``, so that the digits recorded can still be seen.
     meta : dict
@@ -43,6 +45,7 @@ class Choice:
 
     channels: dict[str, Array]
     units: dict[str, str]
+    recorded: dict[str, Array]
     time: Array | None
     time_unit: str
     meta: dict[str, Any]
@@ -72,6 +75,7 @@ def choose(table: Table, request: Request, path: Path) -> Choice:
     named, left_out = assign(table, request, path)
     named, dropped = clocks.on_one(named, request, path)
     left_out += dropped
+    before = named
     named, calibration = calibrated(named, request.described, request.calibration)
     found = _Findings(ignored=[*table.meta.get("ignored_columns", ()), *left_out])
     time, time_unit = None, "s"
@@ -79,6 +83,7 @@ def choose(table: Table, request: Request, path: Path) -> Choice:
         time, time_unit = _time(named.pop("time"), table, request, path, found)
     channels: dict[str, Array] = {}
     units: dict[str, str] = {}
+    recorded: dict[str, Array] = {}
     for channel, column in named.items():
         values = _numbers(channel, column, table, request, path, found)
         if values is not None:
@@ -87,7 +92,9 @@ def choose(table: Table, request: Request, path: Path) -> Choice:
             target = unit.target if target is None else target
             keeps = target is None or (table.own and unit_of(channel) is None)
             units[channel] = unit.name if keeps or target is None else target
-            channels[channel] = convert(values, unit.name, units[channel])
+            channels[channel] = recorded[channel] = convert(values, unit.name, units[channel])
+            if channel in calibration and (raw := before[channel].values) is not None:
+                recorded[channel] = convert(raw, unit.name, units[channel])
             if units[channel] != unit.name:
                 found.converted.append(f"{channel} from {unit.name} to {units[channel]}")
             if not table.own or channel in request.units:
@@ -111,7 +118,7 @@ def choose(table: Table, request: Request, path: Path) -> Choice:
         "calibration": calibration,
     }
     meta = {name: note for name, note in notes.items() if note}
-    return Choice(channels, units, time, time_unit, meta)
+    return Choice(channels, units, recorded, time, time_unit, meta)
 
 
 def _numbers(
@@ -196,11 +203,12 @@ def _assumed(
     finite = np.abs(values[np.isfinite(values)])
     largest = float(finite.max()) if finite.size else 0.0
     if expected == "bar" and largest > IMPLAUSIBLE_BAR:
+        fitting = plausible.meant(largest, expected, expected)
         raise DataError(
             f"it has no unit and reaches {largest:g}, which cannot be bar",
             file=path,
             channel=channel,
-            remedy=f"say its unit, as in --unit {channel}=kPa or --unit {channel}=psi",
+            remedy=f"say its unit, as in --unit {channel}={f' or --unit {channel}='.join(fitting[:2])}",
         )
     hint = ""
     if expected == "mm" and 0 < largest < 0.5:

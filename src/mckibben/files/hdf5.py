@@ -1,4 +1,4 @@
-"""HDF5: the one-dimensional data sets anywhere in its tree, with the units in their attributes.
+"""HDF5: the vectors, and matrices of a few, anywhere in its tree, with the units in their attributes.
 
 A data set of HDF5 can name another file that holds its samples. One that does is refused: whoever
 sends a file must not choose what else is read.
@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 from io import BufferedReader
 from operator import add, ge
 from pathlib import Path
@@ -16,10 +17,10 @@ from typing import Any, NoReturn
 import numpy as np
 
 from mckibben.errors import DataError
-from mckibben.files import hdf5_pieces
+from mckibben.files import hdf5_pieces, rates
 from mckibben.files.chunks import DEFLATE, FLETCHER32, SHUFFLE, unpacked
 from mckibben.files.limits import MOST_TEXT, Budget
-from mckibben.files.table import Column, Table, column, of_equal_length
+from mckibben.files.table import Column, Table, column, columns_of, is_matrix, of_equal_length
 from mckibben.system.extras import demand
 
 
@@ -38,29 +39,37 @@ def read(file: BufferedReader, path: Path) -> list[Table]:
     hdf5_pieces.look(file)
     budget = Budget(file, path)
     found: dict[str, Column] = {}
+    told: dict[str, float] = {}
     numbers = (h5py.h5t.INTEGER, h5py.h5t.FLOAT, h5py.h5t.ENUM, h5py.h5t.BITFIELD)
     with h5py.File(file, "r") as tree:
         for place, data in _data_sets(tree, budget):
             _refuse_elsewhere(place, data, path)
+            name = place.rpartition("/")[2]
+            rate = data.size == 1 and rates.is_one(name)
             vector = data.ndim == 1 or (data.ndim == 2 and 1 in data.shape)
             # types can be made of types without end: those are not asked for more
             number = data.id.get_type().get_class() in numbers
-            if vector and number and data.dtype.kind in "biuf" and not _is_text(data):
+            matrix = not vector and is_matrix(data.shape or ())
+            wanted = number and (vector or matrix or rate)
+            if wanted and data.dtype.kind in "biuf" and not _is_text(data):
                 budget.samples(data.size)
                 if data.chunks is not None:
                     steps = zip(data.shape, data.chunks, strict=True)
                     padded = math.prod(-(-n // step) * step for n, step in steps)
                     budget.at_once(max(math.prod(data.chunks), padded // 2))
-                samples = _samples(place, data, file, path).reshape(-1)
+                samples = _samples(place, data, file, path)
                 unit = _text(data, "units") or _text(data, "unit")
-                found[place] = column(place.rpartition("/")[2], samples, unit)
+                if rate:
+                    told[place] = float(samples.reshape(-1)[0])
+                elif matrix:
+                    budget.parts(min(data.shape))
+                    found |= columns_of(place, name, samples, unit)
+                else:
+                    found[place] = column(name, samples.reshape(-1), unit)
         budget.parts(h5py.h5a.get_num_attrs(tree.id))
         meta = {name: _plain(tree, name) for name in tree.attrs}
-    return [
-        of_equal_length(
-            found, path, meta={name: value for name, value in meta.items() if value is not None}
-        )
-    ]
+    meta = {name: value for name, value in meta.items() if value is not None}
+    return [replace(of_equal_length(found, path, meta=meta), rates=told)]
 
 
 def _data_sets(tree: Any, budget: Budget) -> Iterator[tuple[str, Any]]:

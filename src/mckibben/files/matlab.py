@@ -1,4 +1,4 @@
-"""MATLAB files: vectors, or structs of them; version 7.3 is HDF5 underneath.
+"""MATLAB files: vectors and matrices of a few, or structs of them; version 7.3 is HDF5 underneath.
 
 Versions 4 and 5 are read here, by "MAT-File Format" (MathWorks): what is no vector is passed over,
 what a variable unpacks to is bounded, and structs within structs are followed to a certain depth.
@@ -10,6 +10,7 @@ import math
 import struct
 import zlib
 from collections.abc import Iterator
+from dataclasses import replace
 from io import BufferedReader
 from pathlib import Path
 from typing import Any
@@ -17,9 +18,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mckibben.files import hdf5
+from mckibben.files import hdf5, rates
 from mckibben.files.limits import Budget
-from mckibben.files.table import Column, Table, column, of_equal_length
+from mckibben.files.table import Column, Table, column, columns_of, is_matrix, of_equal_length
 
 _HEADER = 128
 _MATRIX, _COMPRESSED = 14, 15
@@ -50,10 +51,11 @@ def read(file: BufferedReader, path: Path) -> list[Table]:
     if order is None or 0 in start[:4]:
         file.seek(0)
         order = "<" if 0 <= int.from_bytes(start[:4], "little", signed=True) <= 5000 else ">"
-        found = _Version4(order, Budget(file, path)).read(file)
+        vectors: _Vectors = _Version4(order, Budget(file, path))
     else:
-        found = _Version5(order, Budget(file, path)).read(file)
-    return [of_equal_length(found, path, meta={})]
+        vectors = _Version5(order, Budget(file, path))
+    found = vectors.read(file)
+    return [replace(of_equal_length(found, path, meta={}), rates=vectors.rates)]
 
 
 class _Vectors:
@@ -63,10 +65,18 @@ class _Vectors:
         self._order = order
         self._budget = budget
         self._found: dict[str, Column] = {}
+        self.rates: dict[str, float] = {}
+
+    def read(self, file: BufferedReader) -> dict[str, Column]:
+        """Read the variables from where the file stands."""
+        raise NotImplementedError
 
     def _add(self, place: str, shape: tuple[int, ...], cells: NDArray[Any]) -> None:
         """Add numbers, or the lines of a table of characters, if they are a vector."""
+        name = place.rpartition(".")[2]
         if math.prod(shape) == 1:
+            if cells.size == 1 and cells.dtype.kind != "U" and rates.is_one(name):
+                self.rates[place] = float(cells[0])
             return
         if cells.size != math.prod(shape):
             raise ValueError(f"{cells.size} elements in a matrix of {shape}")
@@ -76,7 +86,11 @@ class _Vectors:
             lines = np.ascontiguousarray(cells.reshape(shape, order="F"))
             cells, shape = lines.view(f"U{shape[-1]}")[..., 0], shape[:-1]
         if sum(n != 1 for n in shape) == 1 or not cells.size:
-            self._found[place] = column(place.rpartition(".")[2], cells.reshape(-1))
+            self._found[place] = column(name, cells.reshape(-1))
+        elif cells.dtype.kind != "U" and is_matrix(shape):
+            self._budget.parts(min(shape))
+            matrix = cells.reshape(shape, order="F")
+            self._found |= columns_of(place, name, matrix, None)
 
 
 class _Version4(_Vectors):

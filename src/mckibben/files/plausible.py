@@ -76,7 +76,7 @@ def check(
         file=path,
         channel=channel,
         row=table.row(at),
-        remedy=f"say its unit, as in --unit {channel}={_meant(values[at], read_in, target)}, or "
+        remedy=f"say its unit, as in --unit {channel}={meant(values[at], read_in, target)[0]}, or "
         "correct that cell",
     )
 
@@ -92,9 +92,11 @@ def doubt(channel: str, values: Array, path: Path) -> None:
         )
 
 
-def _meant(value: float, read_in: str, target: str) -> str:
-    """Return the unit in which what was read is nearest to what is usual."""
+def meant(value: float, read_in: str, target: str) -> list[str]:
+    """Return the units in which what was read is within ten times what is usual, or else nearest."""
     read = convert(np.array([abs(value)]), target, read_in)
     sizes = {unit: float(convert(read, unit, target)[0]) for unit in SPELLINGS[target]}
     usual = math.log(USUAL.get(target, 1.0))
-    return min(sizes, key=lambda unit: abs(math.log(max(sizes[unit], 1e-300)) - usual))
+    off = {unit: abs(math.log(max(size, 1e-300)) - usual) for unit, size in sizes.items()}
+    nearest, *others = sorted(off, key=lambda unit: off[unit])
+    return [nearest, *(unit for unit in others if off[unit] < math.log(10.0))]

@@ -12,7 +12,8 @@ import numpy as np
 
 from mckibben.arrays import Array
 from mckibben.errors import DataError
-from mckibben.files import sources, timebase
+from mckibben.files import rates, sources, timebase
+from mckibben.files.assigning import of_matrix
 from mckibben.files.channels import about
 from mckibben.files.choosing import ASSUMED, Choice, choose
 from mckibben.files.fingerprint import fingerprint
@@ -65,13 +66,15 @@ def read(
         Ends in ``.csv .tsv .txt .dat .parquet .mat .h5 .hdf5 .tdms .xlsx .bag .mcap .db3``; or a
         folder of such files: a bag of ROS 2, files with one signal each, or several recordings.
     columns : mapping of str to str, optional
-        Channel -> column, by its header with or without the unit. Standard channels are found by
+        Channel -> column, by its header with or without the unit; ``data[1]`` is the first column of a
+        matrix ``data``. Standard channels are found by
         common names (``p``, ``Druck``, ``position``, ...) without it. ``time`` is a channel here.
     units : mapping of str to str, optional
         Channel -> unit, such as ``{"pressure": "kPa"}``; goes before what the header says.
     rate : float, optional
-        Samples per second, positive, where there is no column of times. Without either, the
-        recording has no time. Channels with times of their own are put on a clock of this rate.
+        Samples per second, positive, where there is no column of times. Without either, a scalar
+        beside the samples may tell it, such as ``fs``, or the recording has no time. Channels with
+        times of their own are put on a clock of this rate.
     gaps : {"error", "split", "interpolate"}
         What to do where time is missing (a step of more than three median steps) or a sample is
         (blank, NaN or infinite): refuse, cut into several recordings, or bridge linearly.
@@ -155,6 +158,8 @@ def _recordings(table: Table, request: Request, path: Path, digest: str) -> list
         )
     step = _stated_step(choice, table, request, path)
     measured = choice.time if step is None else None
+    if step is None and measured is None and (columns := of_matrix(table, time=True)):
+        warn(path, f"no column of times is named; say --column time=COLUMN{columns}")
     if measured is not None:
         timebase.check(measured, table, path)
     order = np.arange(n, dtype=float) if measured is None else measured
@@ -173,7 +178,7 @@ def _recordings(table: Table, request: Request, path: Path, digest: str) -> list
     when = (
         begin + (step or 1.0) * order if measured is None else convert(order, choice.time_unit, "s")
     )
-    rows = fingerprint({name: choice.channels[name] for name in channels}, when)
+    rows = fingerprint({name: choice.recorded[name] for name in channels}, when)
     meta = _meta(choice, table, path, digest)
     found = [
         Recording(
@@ -194,7 +199,8 @@ def _stated_step(choice: Choice, table: Table, request: Request, path: Path) -> 
     """Return the sample time that the caller or the file states, which the times must not deny."""
     step = table.sample_time if request.rate is None else 1.0 / request.rate
     if step is None and choice.time is None and not table.own:
-        return request.described.time.sample_time
+        said = request.described.time.sample_time
+        return rates.sample_time(table.rates, path) if said is None else said
     if step is None:
         return None
     if table.sample_time is not None and abs(step - table.sample_time) > 1e-3 * step:

@@ -103,8 +103,10 @@ def joined(tables: Mapping[Path, Table], names: Sequence[str], request: Request)
                 file=next(iter(tables)).parent,
                 remedy=REMEDY,
             )
-        same = all(table.sample_time == first.sample_time for table in tables.values())
-        return Table(columns, first.lines, first.sample_time if same else None, first.start_time)
+        stated = (first.sample_time, first.rates)
+        same = all((table.sample_time, table.rates) == stated for table in tables.values())
+        step, told = stated if same else (None, {})
+        return Table(columns, first.lines, step, first.start_time, rates=told)
     for path, clock in zip(tables, clocks, strict=True):
         if len(clock) != 1:
             raise DataError(

@@ -13,6 +13,13 @@ from numpy.typing import NDArray
 
 from mckibben.arrays import Array
 from mckibben.errors import DataError
+from mckibben.files.headers import parse
+
+WIDEST = 64
+"""Columns of a matrix that are channels, as of arrays in messages; what has more is no recording."""
+
+SLENDER = 10
+"""Rows for each column that such a matrix has at least."""
 
 
 @dataclass(frozen=True)
@@ -54,6 +61,8 @@ class Column:
         Times of the samples [s], where not all columns were sampled together.
     held : bool
         Whether the last sample holds until the next, as counts and switches do.
+    matrix : str, optional
+        The place of the matrix that it is a column of.
     """
 
     header: str
@@ -64,6 +73,7 @@ class Column:
     says: str | None = None
     times: Array | None = None
     held: bool = False
+    matrix: str | None = None
 
     @property
     def label(self) -> str:
@@ -85,6 +95,8 @@ class Table:
         The time grid [s] where the file states it; ``sample_time`` is None otherwise.
     meta : mapping
         What else the file holds.
+    rates : mapping of str to float
+        Scalars named as rates or sample times are, by their places; they are not looked at yet.
     name : str, optional
         The name of this recording among several in the file.
     own : bool
@@ -96,6 +108,7 @@ class Table:
     sample_time: float | None = None
     start_time: float = 0.0
     meta: Mapping[str, Any] = field(default_factory=dict)
+    rates: Mapping[str, float] = field(default_factory=dict)
     name: str | None = None
     own: bool = False
 
@@ -128,6 +141,27 @@ def column(header: str, values: NDArray[Any], unit: str | None = None) -> Column
     return Column(header, None, unit, texts=[str(value) for value in values])
 
 
+def is_matrix(shape: Sequence[int]) -> bool:
+    """Tell whether the rows or the columns of a matrix are channels: few, and long."""
+    return len(shape) == 2 and 2 <= min(shape) <= WIDEST and max(shape) >= SLENDER * min(shape)
+
+
+def columns_of(
+    place: str, header: str, matrix: NDArray[Any], unit: str | None
+) -> dict[str, Column]:
+    """Return the channels of a matrix by their places: ``data[1]`` is the first column of ``data``."""
+    name = parse(header)
+    channels = matrix if matrix.shape[0] < matrix.shape[1] else matrix.T
+    return {
+        f"{place}[{i}]": replace(
+            column(f"{header}[{i}]", np.ascontiguousarray(values), unit or name.unit),
+            says=f"{name.name}_{i}",
+            matrix=place,
+        )
+        for i, values in enumerate(channels, start=1)
+    }
+
+
 def printable(table: Table) -> Table:
     r"""Return a foreign table whose words hold nothing that steers a terminal or turns text round.
 
@@ -142,12 +176,14 @@ def printable(table: Table) -> Table:
             header=plain(column.header),
             unit=None if column.unit is None else plain(column.unit),
             says=None if column.says is None else plain(column.says),
+            matrix=None if column.matrix is None else plain(column.matrix),
         )
         for column in table.columns
     )
     name = None if table.name is None else plain(table.name)
     meta = {plain(key): _plain_value(value) for key, value in table.meta.items()}
-    return replace(table, columns=columns, name=name, meta=meta)
+    rates = {plain(place): value for place, value in table.rates.items()}
+    return replace(table, columns=columns, name=name, meta=meta, rates=rates)
 
 
 def plain(text: str) -> str:
@@ -175,17 +211,20 @@ def of_equal_length(
 ) -> Table:
     """Return the table of the columns that have the commonest length, the longest of several.
 
+    A matrix counts as one.
+
     Parameters
     ----------
     columns : mapping of str to Column
         By their place in the file; those that are left out are listed in the table's ``meta``.
     """
-    lengths = Counter(_length(column) for column in columns.values() if _length(column) > 1)
+    parts = {column.matrix or place: _length(column) for place, column in columns.items()}
+    lengths = Counter(length for length in parts.values() if length > 1)
     if not lengths:
         raise DataError(
             "there are no vectors of numbers in it",
             file=path,
-            remedy="save each channel as one vector, all of one length",
+            remedy="save each channel as one vector, all of one length, or as a column of one matrix",
         )
     common = max(lengths, key=lambda length: (lengths[length], length))
     left_out = [place for place, column in columns.items() if _length(column) != common]

@@ -161,6 +161,14 @@ def agrees(time: Array, step: float) -> bool:
     return bool(np.all(off <= max(resolution(time), 1e-3 * step)))
 
 
+def rises_evenly(values: Array) -> bool:
+    """Tell whether values are as times are: each by as much above the last, or nearly."""
+    steps = np.diff(values)
+    return bool(
+        np.all(steps > 0) and np.all(np.abs(steps - np.median(steps)) < 0.5 * np.median(steps))
+    )
+
+
 def resample(time: Array, samples: Array, step: float) -> Array:
     """Return samples on the grid of this step that starts at the first time, linear between."""
     n = int((time[-1] - time[0]) / step + 1e-6) + 1

@@ -163,6 +163,8 @@ def _conclude(study: Study, folder: Path) -> None:
             f"Without compensation, {check.given} read off one slow rise, that is "
             f"{numeral(100 * check.uncompensated_error, 2)} %. On the muscle, the model's comes on top."
         )
+    if study.not_looped:
+        say(f"No loop was closed: {study.not_looped}")
     for name, tracked in study.loops.items():
         errors = ", ".join(numeral(error, 2) for error in tracked.rmse.values())
         say(f"Following a recorded motion on {study.plant}: {name}, RMSE {errors} mm.")

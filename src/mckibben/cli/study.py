@@ -131,6 +131,7 @@ def _say(study: Study, folder: Path) -> None:
 
 def _conclude(study: Study, folder: Path) -> None:
     from mckibben.report.answers import answers
+    from mckibben.report.wording import another_inverted
 
     print_leaderboard(study.leaderboard)
     say()
@@ -139,6 +140,8 @@ def _conclude(study: Study, folder: Path) -> None:
             say(f"- {gap}")
     for question, answer in answers(study):
         say(f"{question} {answer[0]}")
+    if another := another_inverted(study):
+        say(f"{another}.")
     check = study.inverse
     if check is not None and check.reachable is not None:
         low, high = check.reachable

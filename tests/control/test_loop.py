@@ -124,6 +124,24 @@ def test_the_arm_follows_with_feedback() -> None:
     assert max(found.rmse.values()) < 1.0
 
 
+@pytest.mark.parametrize("first", [-0.02, 2.52])
+def test_noise_beyond_a_range_is_no_wish(first: float) -> None:
+    names = [f"displacement_{k}" for k in (1, 2, 3)]
+    rest = {name: np.full(3, 30.0) for name in names}
+    wanted = Recording(rest | {"pressure_extensor": np.array([first, 1.0, 1.0])}, 0.05)
+    pid = PIDFeedback.of(
+        tuple(Channel(name, "mm") for name in names),
+        tuple(Channel(f"pressure_{k}", "bar") for k in (1, 2, 3)),
+        *[(0.0,) * 3] * 3,
+        limits=(0.0, 2.5),
+    )
+    rig = load_rig("soft-arm")
+    track(pid, rig, wanted, approach=0.1)
+    away = wanted.with_channels(pressure_extensor=wanted["pressure_extensor"] + 10 * (first - 1.0))
+    with pytest.raises(DataError, match=r"takes 0 to 2\.5.*begin it within"):
+        track(pid, rig, away, approach=0.1)
+
+
 def test_bad_loops_are_refused() -> None:
     controller = BLOCK.inverse()
     with pytest.raises(DataError, match="no displacement"):

@@ -1,14 +1,17 @@
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from mckibben.cli.leaderboards import print_leaderboard
 from mckibben.comparison.row import Memory
 from mckibben.report.commands import Typed, commands
 from mckibben.report.wording import (
+    another_inverted,
     duration,
     next_steps,
     number,
@@ -51,7 +54,15 @@ def test_another_model_may_be_the_one_to_invert() -> None:
     found = study()
     assert found.inverse is not None
     other = replace(found, inverse=replace(found.inverse, model="pi"))
-    assert "the next of the leaderboard that can is pi" in " ".join(verdict(other))
+    words = " ".join(verdict(other))
+    assert (
+        "gpi cannot be inverted on these data; the first after it that has one is pi, wi" in words
+    )
+    rows = found.leaderboard.rows
+    stuck = replace(found.leaderboard, rows=(replace(rows[0], block=None), *rows[1:]))
+    said = another_inverted(replace(other, leaderboard=stuck))
+    assert re.match(r"gpi has no inverse; .* is pi, with [\d.]+ times its test error$", said)
+    assert another_inverted(found) == ""
     none = replace(found, inverse=None)
     assert "None of the models that worked can be inverted" in " ".join(verdict(none))
 
@@ -65,15 +76,17 @@ def test_another_model_with_the_lowest_test_error_is_named_beside_the_choice() -
     assert f"Lowest test RMSE: {first.model}" in words
 
 
-def test_models_that_tie_with_the_best_are_named() -> None:
+def test_models_that_tie_with_the_best_are_named(capsys: pytest.CaptureFixture[str]) -> None:
     found = study()
     rows = list(found.leaderboard.rows)
     rows[1] = replace(rows[1], difference_interval=(-0.1, 0.1))
     tied = replace(found, leaderboard=replace(found.leaderboard, rows=tuple(rows)))
-    assert "Level with it on the test data, as far as they can tell: mpi." in " ".join(
-        verdict(tied)
-    )
-    assert "Level with it" not in " ".join(verdict(found))
+    assert "Not told apart from the chosen model on this test: mpi." in " ".join(verdict(tied))
+    print_leaderboard(tied.leaderboard)
+    printed = capsys.readouterr().out
+    assert "≈ not told apart from the chosen model on this test: the interval" in printed
+    assert "first measured output, as simulate --initial measured has it" in printed
+    assert "Not told apart" not in " ".join(verdict(found))
 
 
 def test_next_steps_answer_what_is_wrong() -> None:

@@ -1,16 +1,19 @@
 from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
-from mckibben import GPI, PI, Recording, study
+from mckibben import GPI, PI, DataError, Recording, study
 from mckibben.blocks.core.block import Block
 from mckibben.blocks.core.fields import Channel
+from mckibben.files import read, write
+from mckibben.rigs import load_rig
 from mckibben.signals import irregular_triangle, triangle
 from mckibben.studying.inverting import check_inverse, invert_best
-from mckibben.studying.loops import closed_loops
+from mckibben.studying.loops import closed_loops, named, recorded_rig
 
 TIME = np.arange(0, 24, 0.02)
 
@@ -88,7 +91,7 @@ def test_no_loop_tells_a_regulator_pressures_as_volts(
     model = replace(GPI.example(), input=Channel(driven, "V" if closed else "bar"))
     row = SimpleNamespace(model="gpi", inverse=model.inverse())
     board: Any = SimpleNamespace(rows=[row], outputs=("displacement",))
-    assert bool(closed_loops(board, "gpi", "rail", [train], 0)) is closed
+    assert bool(closed_loops(board, "gpi", load_rig("rail"), [train], 0)) is closed
 
 
 @pytest.mark.parametrize(
@@ -115,3 +118,35 @@ def test_a_load_that_is_told_is_no_loop_of_the_muscles(
     assert found.loop_width == pytest.approx(plain.loop_width, rel=0.1)
     assert found.effects[0].change == pytest.approx(-10.0, rel=0.1)
     assert said in found.sentences[-1]
+
+
+def test_a_loop_is_closed_on_the_rig_as_it_was_changed(tmp_path: Path) -> None:
+    stock = load_rig("mas20-hanging")
+    heavy = stock.changed({"payload": 7.0, "muscle.friction.extending": [0.3, 0.7, 1, 1, 1, 0.8]})
+    given = Recording({"pressure": np.linspace(0, 3, 20)}, 0.05)
+    write(heavy.run(given), tmp_path / "run.csv")
+    (run,) = read(tmp_path / "run.csv")
+    rebuilt = recorded_rig([run, heavy.changed({"start.pressure": 1.0}).run(given)])
+    assert rebuilt == heavy.changed({})
+    assert rebuilt is not None
+    assert named(rebuilt) == "mas20-hanging (changed: muscle.friction.extending, payload)"
+    plain = recorded_rig([stock.run(given)])
+    assert plain is not None
+    assert named(plain) == "mas20-hanging"
+    assert recorded_rig([given, given]) is None
+
+
+@pytest.mark.parametrize(
+    ("meta", "match"),
+    [
+        ({"rig": "rail v2 (virtual)"}, "whether its rig rail was changed"),
+        ({"rig": "rail v0 (virtual)", "rig_changes": {}}, "is of rail v0"),
+        ({"rig": "rail v2 (virtual)", "rig_changes": {"crane": 1}}, "no parameter 'crane'"),
+        ({}, "not all of one virtual rig"),
+    ],
+)
+def test_no_loop_is_closed_on_a_rig_that_is_not_known(meta: dict[str, Any], match: str) -> None:
+    given = Recording({"voltage": np.linspace(0, 3, 20)}, 0.05)
+    other = load_rig("rail").run(given)
+    with pytest.raises(DataError, match=match):
+        recorded_rig([given.with_meta(**meta), other])

@@ -44,7 +44,8 @@ def told(tell: Callable[[float, str], None], last: str = "") -> Callable[[Standi
 def print_leaderboard(board: Leaderboard) -> None:
     """Print a leaderboard as a table, what is chosen, and what is to be said of models that failed."""
     from mckibben.comparison.columns import columns_of_board
-    from mckibben.comparison.results import CHOICES
+    from mckibben.comparison.free_run import STARTED
+    from mckibben.comparison.results import CHOICES, NOT_TOLD
 
     columns = [column for column in columns_of_board(board) if column.key in PRINTED]
     heading, _ = CHOICES[board.chosen_by]
@@ -57,9 +58,10 @@ def print_leaderboard(board: Leaderboard) -> None:
             rows.append([name, *(column.text(given) for column in columns)])
     say(f"Split: {board.split}.")
     print_table(["model", *(column.label for column in columns)], rows)
-    say("All run free. Rank: by test RMSE. Gap between branches kept: 100 % is right, 0 forgets.")
+    say(f"All run free. {STARTED}")
+    say("Rank: by test RMSE. Gap between branches kept: 100 % is right, 0 forgets.")
     if board.level:
-        say("≈ level with the chosen model: the interval of the difference on the test holds 0.")
+        say(f"≈ {NOT_TOLD}: the interval of the difference holds 0.")
     if board.constant is not None and board.rows:
         say("constant: the mean of the training output, which every model has to beat.")
     if board.chosen:

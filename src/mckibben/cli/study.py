@@ -131,6 +131,7 @@ def _say(study: Study, folder: Path) -> None:
 
 def _conclude(study: Study, folder: Path) -> None:
     from mckibben.report.answers import answers
+    from mckibben.report.wording import another_inverted
 
     print_leaderboard(study.leaderboard)
     say()
@@ -139,6 +140,8 @@ def _conclude(study: Study, folder: Path) -> None:
             say(f"- {gap}")
     for question, answer in answers(study):
         say(f"{question} {answer[0]}")
+    if another := another_inverted(study):
+        say(f"{another}.")
     check = study.inverse
     if check is not None and check.reachable is not None:
         low, high = check.reachable
@@ -163,6 +166,8 @@ def _conclude(study: Study, folder: Path) -> None:
             f"Without compensation, {check.given} read off one slow rise, that is "
             f"{numeral(100 * check.uncompensated_error, 2)} %. On the muscle, the model's comes on top."
         )
+    if study.not_looped:
+        say(f"No loop was closed: {study.not_looped}")
     for name, tracked in study.loops.items():
         errors = ", ".join(numeral(error, 2) for error in tracked.rmse.values())
         say(f"Following a recorded motion on {study.plant}: {name}, RMSE {errors} mm.")

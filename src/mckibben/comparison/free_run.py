@@ -20,6 +20,12 @@ from mckibben.recording import Recording
 PERIODIC = "periodic"
 """In the ``meta`` of a recording that is one period of a motion which repeats itself."""
 
+STARTED = (
+    "Memory starts as training left it where the test goes on from there; else, with one driving input, "
+    "from what best explains the first measured output, as simulate --initial measured has it."
+)
+"""How models are run free here, where a saved one starts by its own rule."""
+
 AWAY = 1e3
 """Ranges of the measured output by which a model that is off has run away."""
 

@@ -26,6 +26,9 @@ CHOICES = {
 }
 """What a model may be chosen by: the heading of its figure, and in words. The test is not among them."""
 
+NOT_TOLD = "not told apart from the chosen model on this test"
+"""Of a model that is `level`: too few data, or as good."""
+
 
 @dataclass(frozen=True, repr=False)
 class Leaderboard(DrawsItself):

@@ -16,7 +16,7 @@ from mckibben.control.controller import BlockController, Controller
 from mckibben.control.pressure_loop import PressureLoop
 from mckibben.control.preview import samples_ahead
 from mckibben.control.reach import Beyond, beyond, ends, outside
-from mckibben.control.roles import Plant, followed_by, roles, wished
+from mckibben.control.roles import Plant, followed_by, resting, roles, wished
 from mckibben.control.twin import Twin
 from mckibben.errors import DataError, ModelError
 from mckibben.recording import Recording, standard_unit
@@ -144,8 +144,8 @@ def track(
     rng = generator(seed)
     followed = followed_by(plant, reference)
     driven, held = roles(plant, reference)
-    starts = {f"start.{name}": float(reference[name][0]) for name in held}
-    settings = {"sample_time": step, **starts}
+    starts = resting(plant, {name: float(reference[name][0]) for name in held})
+    settings: dict[str, float] = {"sample_time": step, **starts}
     scatters = isinstance(plant, Twin) and plant.scatters
     if scatters:
         settings["scatter_after"] = approach

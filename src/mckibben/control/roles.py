@@ -17,6 +17,9 @@ from mckibben.recording import Recording
 MOVED = ("displacement", "angle")
 """What motions are called: of a muscle, and of a joint."""
 
+NOISE = 0.01
+"""Share of a rig's range by which what is held may begin beyond it: noise of a sensor."""
+
 
 class Plant(Protocol):
     """What can be controlled: the step interface of rigs."""
@@ -85,6 +88,32 @@ def roles(plant: Plant, reference: Recording) -> tuple[list[str], list[str]]:
     """Return the inputs that a controller drives, and those that a reference holds."""
     held = [name for name in plant.inputs if name in reference]
     return actuated(plant, held), held
+
+
+def resting(plant: Plant, held: Mapping[str, float]) -> dict[str, float]:
+    """Return the settings of a plant that rests at what is held; noise beyond a rig's range is no wish.
+
+    Raises
+    ------
+    DataError
+        Where it is farther beyond.
+    """
+    found = {}
+    for name, value in held.items():
+        found[f"start.{name}"] = value
+        if isinstance(plant, Twin):  # is told what was recorded, whatever it is
+            continue
+        limits = plant.limits(name)
+        near, beyond = min(max(value, limits.low), limits.high), NOISE * (limits.high - limits.low)
+        if abs(value - near) > beyond:
+            raise DataError(
+                f"the reference begins at {value:g}, and {plant.name!r} takes {limits.low:g} to "
+                f"{limits.high:g}",
+                channel=name,
+                remedy="begin it within that range, or leave the column out where nothing needs it",
+            )
+        found[f"start.{name}"] = near
+    return found
 
 
 def actuated(plant: Plant, held: Collection[str]) -> list[str]:

@@ -18,7 +18,7 @@ from mckibben.arrays import Array
 from mckibben.blocks.core.commanding import COMMANDS
 from mckibben.blocks.core.fields import Channel
 from mckibben.blocks.feedback.pid import PIDFeedback
-from mckibben.control.roles import MOVED, Plant, actuated
+from mckibben.control.roles import MOVED, Plant, actuated, resting
 from mckibben.control.twin import Twin
 from mckibben.errors import ModelError
 from mckibben.recording import standard_unit
@@ -71,7 +71,7 @@ def tune_pid(
     untuned = untuned_pid(plant, scheduled)
     followed = [channel.name for channel in untuned.driven]
     driven = [channel.name for channel in untuned.given]
-    starts = {f"start.{name}": value for name, value in scheduled.items()}
+    starts = resting(plant, scheduled)
     if isinstance(plant, Twin):  # what differs from run to run is no gain
         starts["scatter_after"] = NEVER
     rig = plant.changed({"sample_time": sample_time, **starts})

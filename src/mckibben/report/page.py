@@ -71,7 +71,8 @@ def write_report(study: Study, path: str | Path) -> None:
 def page(study: Study, typed: Typed | None = None) -> str:
     """Return the report of a study as HTML, with how it was asked for on the command line, if it was."""
     from mckibben.comparison.columns import columns_of_board
-    from mckibben.comparison.results import CHOICES
+    from mckibben.comparison.free_run import STARTED
+    from mckibben.comparison.results import CHOICES, NOT_TOLD
 
     every = shown(study)
     pictured = drawn(every)
@@ -99,6 +100,8 @@ def page(study: Study, typed: Typed | None = None) -> str:
         bars=_bars(study.leaderboard),
         columns=columns_of_board(study.leaderboard),
         choices=CHOICES,
+        not_told=NOT_TOLD,
+        started=STARTED,
         reading=notes_by_file(measured),
         notes=[note for note in study.notes if note not in reading_notes(measured)],
         wording=wording,

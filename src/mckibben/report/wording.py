@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mckibben.comparison.recommending import acceptable
+from mckibben.comparison.results import NOT_TOLD
 from mckibben.metrics import Scores
 from mckibben.numerals import numeral, typeset
 
@@ -90,9 +91,7 @@ def verdict(study: Study) -> list[str]:
         f"at worst by {number(best.test.max_error)} {board.unit}.",
     ]
     if board.level:
-        sentences.append(
-            f"Level with it on the test data, as far as they can tell: {_listed(board.level)}."
-        )
+        sentences.append(f"{NOT_TOLD[0].upper()}{NOT_TOLD[1:]}: {_listed(board.level)}.")
     if best.caution is not None:
         sentences.append(
             f"{best.model} is good only near the motions it was fitted to: {best.caution}."
@@ -120,10 +119,7 @@ def _invertibility(study: Study, best: Row) -> str:
         return "The first of the leaderboard that can be inverted is inverted when all are fitted."
     if check is None:
         return "None of the models that worked can be inverted."
-    if check.model == best.model:
-        which = "It can be inverted"
-    else:
-        which = f"It cannot be inverted here; the next of the leaderboard that can is {check.model}"
+    which = another_inverted(study) or "It can be inverted"
     if check.reachable is None:
         motion = "what the model makes of the test" if check.own else "the test's motion"
         share = percent(check.error)
@@ -132,6 +128,20 @@ def _invertibility(study: Study, best: Row) -> str:
     return (
         f"{which}: any {study.output} from {number(low)} to {number(high)} "
         f"{study.leaderboard.unit} can be asked for, whatever happened before."
+    )
+
+
+def another_inverted(study: Study) -> str:
+    """Return why not the chosen model is inverted, but another, and its error; empty where it is."""
+    best, check = study.leaderboard.best, study.inverse
+    if best is None or check is None or check.model == best.model:
+        return ""
+    (other,) = (row for row in study.leaderboard.rows if row.model == check.model)
+    times = numeral(other.test_error / max(best.test_error, 1e-300), 2)
+    lacks = "has no inverse" if best.inverse is None else "cannot be inverted on these data"
+    return (
+        f"{best.model} {lacks}; the first after it that has one is {check.model}, with {times} "
+        "times its test error"
     )
 
 

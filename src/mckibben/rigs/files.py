@@ -12,8 +12,9 @@ from pydantic import BaseModel, ValidationError
 
 from mckibben import registry
 from mckibben.errors import DataError
+from mckibben.recording import Recording
 from mckibben.rigs.refusals import limits, refused, unit
-from mckibben.rigs.rig import Rig
+from mckibben.rigs.rig import CHANGES, Rig
 from mckibben.system.atomic import write_text
 from mckibben.system.ordinary import DESCRIPTION, read_text
 
@@ -69,6 +70,59 @@ def describe(rig: Rig) -> str:
     lines = [f'format = "{FORMAT}"', f"format_version = {FORMAT_VERSION}"]
     _write_section(rig, "", lines)
     return "\n".join(lines) + "\n"
+
+
+def changes(rig: Rig) -> dict[str, Any] | None:
+    """Return how a rig differs from the published one of its name; None where there is none.
+
+    >>> changes(load_rig("mas20-hanging").changed({"payload": 10.0}))
+    {'payload': 10.0}
+    """
+    if rig.name not in rig_names():
+        return None
+    return _differing(_fields(load_rig(rig.name)), _fields(rig))
+
+
+def recorded_on(recording: Recording) -> Rig | None:
+    """Return the rig that a recording was made on, rebuilt; None where it names no published one.
+
+    Raises
+    ------
+    DataError
+        If that was another version, or what was changed is not known or makes no rig.
+    """
+    named = str(recording.meta.get("rig", ""))
+    name, given = named.partition(" ")[0], recording.meta.get(CHANGES)
+    if name not in rig_names():
+        return None
+    rig = load_rig(name)
+    if named != rig.signature:
+        raise DataError(
+            f"{recording.name} is of {named[:60]}, not of {rig.signature}",
+            remedy="record it again, or name the rig",
+        )
+    if not isinstance(given, dict):
+        raise DataError(
+            f"{recording.name} does not say whether its rig {name} was changed",
+            remedy="record it again, or name the rig",
+        )
+    return rig.changed(given)
+
+
+def _fields(rig: Rig) -> dict[str, Any]:
+    """Return what makes a rig, as JSON has it."""
+    return rig.model_dump(mode="json", exclude={"title", "source"})
+
+
+def _differing(known: dict[str, Any], own: dict[str, Any], path: str = "") -> dict[str, Any]:
+    found: dict[str, Any] = {}
+    for name, value in own.items():
+        before = known.get(name)
+        if isinstance(before, dict) and isinstance(value, dict) and value.keys() == before.keys():
+            found |= _differing(before, value, f"{path}{name}.")
+        elif value != before:
+            found[path + name] = value
+    return found
 
 
 def _write_section(section: BaseModel, path: str, lines: list[str]) -> None:

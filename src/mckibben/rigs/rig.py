@@ -25,6 +25,10 @@ ROOM_TEMPERATURE = 20.0
 """Where every muscle starts [degC]."""
 
 
+CHANGES = "rig_changes"
+"""In the ``meta`` of what a rig recorded: how it differs from the published one."""
+
+
 class Rig(DrawsItself, Section, ABC):
     """What every rig has, whatever its set-up.
 
@@ -207,13 +211,17 @@ class Rig(DrawsItself, Section, ABC):
         -------
         Recording
             On the grid of ``inputs``: what was measured, and inputs that have no sensor as they
-            were applied. ``meta["saturated"]`` counts samples whose command the hardware limited.
+            were applied. ``meta["saturated"]`` counts samples whose command the hardware limited;
+            ``meta["rig_changes"]`` says how it differs from the published rig of its name.
 
         Raises
         ------
         DataError
             On missing or unknown channels, or a recording without time.
         """
+        from mckibben.rigs.files import changes
+
+        changed = changes(self)
         given, saturated = self._commanded().of_recording(inputs)
         step = float(inputs.sample_time or 0.0)  # one without is refused above
         traces = self._march(self._at_rest().copy(), given, step, held)
@@ -237,7 +245,8 @@ class Rig(DrawsItself, Section, ABC):
             start_time=inputs.start_time,
             meta={
                 **{key: value for key, value in inputs.meta.items() if key not in PROVENANCE},
-                "rig": f"{self.name} v{self.version} (virtual)",
+                "rig": self.signature,
+                **({} if changed is None else {CHANGES: changed}),
                 **self.known(),
                 **({} if ideal else {"seed": seed}),
                 **({"saturated": saturated} if saturated else {}),
@@ -290,6 +299,11 @@ class Rig(DrawsItself, Section, ABC):
     def limits(self, name: str) -> Range:
         """Return what the hardware lets through on an input channel."""
         return self.range[name] if name in self.range else self.range[quantity(name)]
+
+    @property
+    def signature(self) -> str:
+        """Return how recordings name it."""
+        return f"{self.name} v{self.version} (virtual)"
 
     @property
     def resting(self) -> Array:

@@ -9,9 +9,10 @@ import numpy as np
 
 from mckibben.comparison.results import Leaderboard
 from mckibben.control import UNCOMPENSATED, Tracked, before, control_law, track, tune_pid
-from mckibben.errors import MckibbenError
+from mckibben.errors import DataError, MckibbenError
 from mckibben.recording import Recording
-from mckibben.rigs import load_rig
+from mckibben.rigs import Rig
+from mckibben.rigs.files import changes, recorded_on
 
 LONGEST = 200.0
 """Of the motion that is followed [s]."""
@@ -20,17 +21,32 @@ SMOOTHED = 0.5
 """Half of the window that a measured motion is smoothed over before it is followed [s]."""
 
 
-def published_rig(recordings: Sequence[Recording]) -> str | None:
-    """Return the published rig that recordings say they come from."""
-    named = str(recordings[0].meta.get("rig", "")).partition(" ")[0]
-    try:
-        return load_rig(named).name if named else None
-    except MckibbenError:
-        return None
+def recorded_rig(recordings: Sequence[Recording]) -> Rig | None:
+    """Return the virtual rig that recordings come from, as it was then; None where they name none.
+
+    Raises
+    ------
+    DataError
+        If it cannot be rebuilt, or there are several.
+    """
+    rigs = [recorded_on(recording) for recording in recordings]
+    # where commands rest is no matter of the rig: a loop begins at its reference
+    kinds = [None if rig is None else rig.changed({"start": {}}) for rig in rigs]
+    if any(kind != kinds[0] for kind in kinds):
+        raise DataError(
+            "the recordings are not all of one virtual rig", remedy="name the rig to close it on"
+        )
+    return rigs[0]
+
+
+def named(rig: Rig) -> str:
+    """Return the name of a rig, and what is changed of the published one."""
+    changed = ", ".join(changes(rig) or ())
+    return f"{rig.name} (changed: {changed})" if changed else rig.name
 
 
 def closed_loops(
-    board: Leaderboard, chosen: str, plant: str, tests: Sequence[Recording], seed: int
+    board: Leaderboard, chosen: str, rig: Rig, tests: Sequence[Recording], seed: int
 ) -> dict[str, Tracked]:
     """Return what came of following a measured motion without compensation, and with what there is.
 
@@ -43,12 +59,11 @@ def closed_loops(
     ----------
     chosen : str
         Model whose inverse is combined with PID.
-    plant : str
-        Name of the rig.
+    rig : Rig
+        To close them on.
     tests : sequence of Recording
         Of which the one that moves most in its stillest output is followed.
     """
-    rig = load_rig(plant)
     inverses = {row.model: row.inverse for row in board.rows if row.inverse is not None}
     if not {channel.name for channel in inverses[chosen].outputs} <= set(rig.inputs):
         return {}

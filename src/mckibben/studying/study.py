@@ -22,9 +22,10 @@ from mckibben.control.twin import COMMAND
 from mckibben.errors import DataError
 from mckibben.excitation import Gap, untold
 from mckibben.recording import Recording, listed
+from mckibben.rigs import load_rig
 from mckibben.studying.checking import check_on_test
 from mckibben.studying.inverting import InverseCheck, invert_best
-from mckibben.studying.loops import closed_loops, published_rig
+from mckibben.studying.loops import closed_loops, named, recorded_rig
 from mckibben.studying.reviewing import Review, review
 from mckibben.system.progress import telling
 from mckibben.system.showing import DrawsItself
@@ -51,7 +52,9 @@ class Study(DrawsItself):
     loops : mapping of str to Tracked
         What came of following a measured motion on a virtual rig, by controller.
     plant : str or None
-        The rig.
+        The rig, and what is changed of the published one.
+    not_looped : str
+        Why no loop was closed on the rig that the recordings name; empty where it was.
     load : str or None
         The channel that models are told as the load, where one was named.
     notes : tuple of str
@@ -76,6 +79,7 @@ class Study(DrawsItself):
     inverse: InverseCheck | None
     loops: Mapping[str, Tracked] = field(default_factory=dict, repr=False)
     plant: str | None = None
+    not_looped: str = ""
     load: str | None = None
     notes: tuple[str, ...] = ()
     untold: tuple[Gap, ...] = ()
@@ -151,7 +155,7 @@ def study(
         As for `compare`.
     rig : str, optional
         Virtual rig to close loops on; default the one that recordings of several muscles say they come
-        from.
+        from, with what was changed of it.
     found : callable, optional
         Told the study as far as it is: when it is known what the muscle does, before any model is
         fitted, then whenever a model is finished.
@@ -245,11 +249,17 @@ def study(
             description=describe(block, split.train, fitted=True),
         )
     so_far = replace(so_far, inverse=invert_best(board, so_far.test[0]))
-    if not channels.single:
-        plant = rig or published_rig(recordings)
-        if so_far.inverse is not None and plant is not None:
-            loops = closed_loops(board, so_far.inverse.model, plant, so_far.test, seed)
-            so_far = replace(so_far, loops=loops, plant=plant)
+    undone = so_far.inverse
+    if not channels.single and undone is not None:
+        try:
+            plant = recorded_rig([*recordings, *tests]) if rig is None else load_rig(rig)
+        except DataError as error:
+            if rig is not None:
+                raise
+            plant, so_far = None, replace(so_far, not_looped=str(error))
+        if plant is not None:
+            loops = closed_loops(board, undone.model, plant, so_far.test, seed)
+            so_far = replace(so_far, loops=loops, plant=named(plant))
     if found is not None:
         found(so_far)
     if clear:

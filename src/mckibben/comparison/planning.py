@@ -17,6 +17,7 @@ from mckibben.comparison.constant import constant_of
 from mckibben.comparison.coverage import Coverage, coverage_of
 from mckibben.comparison.kept import Kept, source
 from mckibben.comparison.offered import objections
+from mckibben.comparison.recognising import FORCE, HELD, OF_FORCE, lacks_displacement
 from mckibben.comparison.results import Leaderboard
 from mckibben.comparison.row import Row
 from mckibben.comparison.shared_stretches import TESTED, told
@@ -170,6 +171,8 @@ def plan_of(
             held = (
                 f"{named.outputs[0]} is held throughout, and so {channels.outputs[0]} is modelled",
             )
+    if outputs is None and lacks_displacement(every) and channels.outputs == (FORCE,):
+        held = ("there is no displacement, and so force is modelled; or name another output",)
     unit = _checked(recordings, [*tests, *checks], channels)
     roles = {"fit": recordings, "validate": checks, "test": tests}
     shared = told(
@@ -215,7 +218,7 @@ def plan_of(
     if load is not None and not objections([PER_LOAD], every, replace(channels, scheduling=None)):
         own = {"seed": seed} | dict(given.get(PER_LOAD, {}))
         items |= _one_for_each_load(split.train, load, own)
-    different = _unlike(every, channels)
+    different = (*_untold(every, channels), *_unlike(every, channels))
     return Plan(
         data=Data(split, parts, channels, tuple(checks)),
         items=items,
@@ -286,6 +289,23 @@ def _about_load(
         elif channels.single and moves:
             told_of = f"no model but {', '.join(finding)}" if finding else "no model"
             yield f"{name} is there, and {told_of} is told it: see --load {name}"
+
+
+def _untold(recordings: Sequence[Recording], channels: Channels) -> Iterator[str]:
+    """Tell of a length that force depends on, and that no model is told."""
+    if channels.outputs != (FORCE,):
+        return
+    for name in OF_FORCE:
+        if name in (*channels.inputs, *channels.scheduled(recordings)):
+            return
+        values = [one[name] for one in recordings if name in one]
+        samples = np.concatenate(values) if values else np.zeros(1)
+        if np.ptp(samples) > HELD * np.abs(samples).max():
+            yield (
+                f"{name} varies, force depends on it, and no model is told it: leave --input out, or "
+                f"give --input {name}, and force is modelled of it and of the pressure"
+            )
+            return
 
 
 def _unlike(recordings: Sequence[Recording], channels: Channels) -> tuple[str, ...]:

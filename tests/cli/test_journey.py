@@ -230,3 +230,13 @@ def test_a_length_that_no_model_of_force_is_told_is_named(cli: Cli, tmp_path: Pa
     done = cli("compare", train, "--test", test, *asked)
     assert "length varies, force depends on it, and no model is told it" in done.out + done.err
     assert "Record more" not in done.out
+
+
+def test_a_pressure_beyond_training_is_told_of_force_by_length(cli: Cli, tmp_path: Path) -> None:
+    train, test = _driven(tmp_path)
+    (run,) = read(test)
+    beyond = tmp_path / "beyond.csv"
+    changed = {name: run[name] for name in ("length", "force")} | {"pressure": 2 * run["pressure"]}
+    write(Recording(changed, 0.02), beyond)
+    done = cli("compare", train, "--test", beyond, "--models", "force-bilinear")
+    assert "beyond: pressure goes from" in done.out + done.err

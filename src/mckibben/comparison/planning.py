@@ -17,7 +17,13 @@ from mckibben.comparison.constant import constant_of
 from mckibben.comparison.coverage import Coverage, coverage_of
 from mckibben.comparison.kept import Kept, source
 from mckibben.comparison.offered import objections
-from mckibben.comparison.recognising import FORCE, HELD, OF_FORCE, lacks_displacement
+from mckibben.comparison.recognising import (
+    FORCE,
+    HELD,
+    OF_FORCE,
+    PRESSURE,
+    lacks_displacement,
+)
 from mckibben.comparison.results import Leaderboard
 from mckibben.comparison.row import Row
 from mckibben.comparison.shared_stretches import TESTED, told
@@ -293,11 +299,10 @@ def _about_load(
 
 def _untold(recordings: Sequence[Recording], channels: Channels) -> Iterator[str]:
     """Tell of a length that force depends on, and that no model is told."""
-    if channels.outputs != (FORCE,):
+    told_of = (*channels.inputs, *channels.scheduled(recordings))
+    if channels.outputs != (FORCE,) or any(name in told_of for name in OF_FORCE):
         return
     for name in OF_FORCE:
-        if name in (*channels.inputs, *channels.scheduled(recordings)):
-            return
         values = [one[name] for one in recordings if name in one]
         samples = np.concatenate(values) if values else np.zeros(1)
         if np.ptp(samples) > HELD * np.abs(samples).max():
@@ -308,12 +313,20 @@ def _untold(recordings: Sequence[Recording], channels: Channels) -> Iterator[str
             return
 
 
+def _known(recordings: Sequence[Recording], channels: Channels) -> tuple[str, ...]:
+    """Return what models are told; those of force by length find the pressure by themselves."""
+    names = (*channels.inputs, *channels.scheduled(recordings))
+    by_length = channels.outputs == (FORCE,) and any(name in OF_FORCE for name in names)
+    found = by_length and PRESSURE not in names and all(PRESSURE in one for one in recordings)
+    return (*names, PRESSURE) if found else names
+
+
 def _unlike(recordings: Sequence[Recording], channels: Channels) -> tuple[str, ...]:
     """Return why one model cannot follow some recordings, in words."""
     if len(channels.outputs) > 1:
         return ()
     loads = schedules(recordings, (*channels.inputs, *channels.outputs))
-    names = (*channels.inputs, *channels.scheduled(recordings), *loads)
+    names = (*_known(recordings, channels), *loads)
     known = (recordings, names, channels.outputs[0], loads)
     return (*unlike(*known), *zeros(*known))
 
@@ -322,7 +335,7 @@ def _beyond_training(
     train: Sequence[Recording], tests: Sequence[Recording], channels: Channels
 ) -> Iterator[str]:
     """Tell of tests whose inputs go where those of no training recording do."""
-    for name in (*channels.inputs, *channels.scheduled(train)):
+    for name in _known(train, channels):
         trained = np.concatenate([recording[name] for recording in train if name in recording])
         low, high = float(trained.min()), float(trained.max())
         margin = BEYOND * (high - low)

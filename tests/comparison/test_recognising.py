@@ -7,7 +7,7 @@ import pytest
 
 from mckibben import Recording
 from mckibben.comparison.channels import Channels, channels_of, where_held
-from mckibben.comparison.recognising import moved_by, recognised
+from mckibben.comparison.recognising import moved_by, recognised, varies
 
 T = np.linspace(0.0, 9.0, 50)
 
@@ -144,3 +144,4 @@ def test_at_one_length_force_is_of_pressure() -> None:
     held = run("pressure", "length", "force", held=("length",))
     for outputs in (None, "force"):
         assert channels_of([held], None, outputs, None) == Channels(("pressure",), ("force",))
+    assert not varies([np.r_[4.0, np.full(200, 3.0)]])

@@ -19,10 +19,10 @@ from mckibben.comparison.kept import Kept, source
 from mckibben.comparison.offered import objections
 from mckibben.comparison.recognising import (
     FORCE,
-    HELD,
     OF_FORCE,
     PRESSURE,
     lacks_displacement,
+    varies,
 )
 from mckibben.comparison.results import Leaderboard
 from mckibben.comparison.row import Row
@@ -303,9 +303,7 @@ def _untold(recordings: Sequence[Recording], channels: Channels) -> Iterator[str
     if channels.outputs != (FORCE,) or any(name in told_of for name in OF_FORCE):
         return
     for name in OF_FORCE:
-        values = [one[name] for one in recordings if name in one]
-        samples = np.concatenate(values) if values else np.zeros(1)
-        if np.ptp(samples) > HELD * np.abs(samples).max():
+        if varies([one[name] for one in recordings if name in one]):
             yield (
                 f"{name} varies, force depends on it, and no model is told it: leave --input out, or "
                 f"give --input {name}, and force is modelled of it and of the pressure"

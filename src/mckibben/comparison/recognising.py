@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from mckibben.arrays import Array
 from mckibben.recording import Recording
 
 DRIVING = ("pressure", "voltage", "command", "input", "u", "p")
@@ -34,6 +35,9 @@ FORCE = "force"
 
 OF_FORCE, PRESSURE = ("length", "displacement"), "pressure"
 """What force laws are of: the first that there is, beside the pressure."""
+
+MOST = (1.0, 99.0)
+"""Percentiles between which a length is, but for the way to where it is held."""
 
 HELD = 0.01
 """Share of its largest value by which a length varies at least where a force can be learned of it."""
@@ -83,11 +87,18 @@ def force_over(
     meant = lacks_displacement(recordings) if outputs is None else tuple(outputs) == (FORCE,)
     for name in OF_FORCE if meant else ():
         asked = inputs is None or set(inputs) in ({name}, {name, PRESSURE})
-        if asked and all({name, PRESSURE, FORCE} <= {*one.channels} for one in recordings):
-            samples = np.concatenate([one[name] for one in recordings])
-            if np.ptp(samples) > HELD * np.abs(samples).max():
-                return name
+        there = all({name, PRESSURE, FORCE} <= {*one.channels} for one in recordings)
+        if asked and there and varies([one[name] for one in recordings]):
+            return name
     return None
+
+
+def varies(lengths: Sequence[Array]) -> bool:
+    """Tell whether lengths, of all recordings, are held at more than one; how it is come to aside."""
+    samples = np.concatenate([*lengths, np.zeros(0)])
+    if not samples.size:
+        return False
+    return bool(np.ptp(np.percentile(samples, MOST)) > HELD * np.abs(samples).max())
 
 
 def lacks_displacement(recordings: Sequence[Recording]) -> bool:

@@ -191,3 +191,52 @@ def test_of_held_lengths_the_force_is_compared(cli: Cli, tmp_path: Path) -> None
     done = cli("compare", files[0], files[2], "--test", files[1], "--models", "balance-force")
     assert done.code == 0, done.err
     assert "displacement is held throughout, and so force is modelled" in done.out + done.err
+
+
+def _driven(folder: Path) -> list[str]:
+    """Return files of force where pressure and length both move."""
+    time = np.arange(0, 20, 0.02)
+    files = []
+    for seed in (1, 2):
+        u, length = (
+            irregular_triangle(time, 8, most, seed=seed + more)
+            for most, more in ((5.0, 0), (30.0, 4))
+        )
+        samples = {"pressure": u, "length": 170 + length, "force": u * (20 + 2 * length) + length}
+        files.append(folder / f"driven{seed}.csv")
+        write(Recording(samples, 0.02), files[-1])
+    return [str(file) for file in files]
+
+
+@pytest.mark.parametrize("asked", [(), ("--output", "force")])
+def test_force_by_length_and_pressure_is_compared(
+    cli: Cli, tmp_path: Path, asked: tuple[str, ...]
+) -> None:
+    train, test = _driven(tmp_path)
+    done = cli(
+        "compare", train, "--test", test, "--models", "force-bilinear,balance", *asked, "--json"
+    )
+    assert done.code == 0, done.err
+    board = json.loads(done.out)
+    rows = {row["model"]: row for row in board["rows"]}
+    assert board["chosen"] == "force-bilinear"
+    assert rows["force-bilinear"]["test"]["rmse"] < 0.1
+    assert rows["balance"]["reason"].startswith("length is in mm, which is no pressure of a muscle")
+
+
+def test_a_length_that_no_model_of_force_is_told_is_named(cli: Cli, tmp_path: Path) -> None:
+    train, test = _driven(tmp_path)
+    asked = ("--input", "pressure", "--output", "force", "--models", "pi")
+    done = cli("compare", train, "--test", test, *asked)
+    assert "length varies, force depends on it, and no model is told it" in done.out + done.err
+    assert "Record more" not in done.out
+
+
+def test_a_pressure_beyond_training_is_told_of_force_by_length(cli: Cli, tmp_path: Path) -> None:
+    train, test = _driven(tmp_path)
+    (run,) = read(test)
+    beyond = tmp_path / "beyond.csv"
+    changed = {name: run[name] for name in ("length", "force")} | {"pressure": 2 * run["pressure"]}
+    write(Recording(changed, 0.02), beyond)
+    done = cli("compare", train, "--test", beyond, "--models", "force-bilinear")
+    assert "beyond: pressure goes from" in done.out + done.err

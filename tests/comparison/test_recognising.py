@@ -7,7 +7,7 @@ import pytest
 
 from mckibben import Recording
 from mckibben.comparison.channels import Channels, channels_of, where_held
-from mckibben.comparison.recognising import moved_by, recognised
+from mckibben.comparison.recognising import moved_by, recognised, varies
 
 T = np.linspace(0.0, 9.0, 50)
 
@@ -112,3 +112,36 @@ def test_a_comparison_of_held_lengths_is_of_force() -> None:
     assert where_held([*held, run(*names)], found) == found
     slack = [run(*names, held=("displacement", "force"))]
     assert where_held(slack, found) == found
+
+
+@pytest.mark.parametrize(
+    ("names", "inputs", "outputs", "over"),
+    [
+        ("pressure length force", None, None, "length"),
+        ("pressure length force", None, "force", "length"),
+        ("pressure length force", "length", None, "length"),
+        ("pressure length force", ["pressure", "length"], ["force"], "length"),
+        ("pressure displacement force", None, "force", "displacement"),
+        ("pressure displacement length force", None, "force", "length"),
+    ],
+)
+def test_force_is_of_length_and_models_find_the_pressure(
+    names: str, inputs: str | list[str] | None, outputs: str | list[str] | None, over: str
+) -> None:
+    found = channels_of([run(*names.split())], inputs, outputs, None)
+    assert found == Channels((over,), ("force",))
+
+
+def test_force_is_not_modelled_unasked_where_anything_else_is() -> None:
+    told = ["pressure", "length", "force"]
+    assert channels_of([run(*told)], "pressure", "force", None).inputs == ("pressure",)
+    assert channels_of([run(*told)], None, "length", None).outputs == ("length",)
+    for other in ("displacement", "angle", "position"):
+        assert channels_of([run(*told, other)], None, None, None).outputs != ("force",)
+
+
+def test_at_one_length_force_is_of_pressure() -> None:
+    held = run("pressure", "length", "force", held=("length",))
+    for outputs in (None, "force"):
+        assert channels_of([held], None, outputs, None) == Channels(("pressure",), ("force",))
+    assert not varies([np.r_[4.0, np.full(200, 3.0)]])

@@ -254,15 +254,17 @@ class Reading:
             begun = self.read([first], asked)
             every = inputs is None and outputs is None and _is_held(begun)
         except DataError:
-            if not self._finds_its_own(first):
+            if not self._finds_its_own(first, or_of_force=True):
                 raise
             every = True
         if every:
             return [self.read(some, named, informative=False) for some in files]
         return [begun + self.read(rest, asked), *(self.read(some, asked) for some in others)]
 
-    def _finds_its_own(self, file: Path) -> bool:
-        """Tell whether a file is of several muscles, or a loop's log of commands alone."""
+    def _finds_its_own(self, file: Path, *, or_of_force: bool = False) -> bool:
+        """Tell whether a file is of several muscles, a loop's log, or of force by length alone."""
+        from mckibben.comparison.recognising import lacks_displacement
+
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             try:
@@ -271,7 +273,8 @@ class Reading:
                 if SEVERAL.fullmatch(error.channel or ""):
                     raise
                 return False  # what is wrong with one muscle's file is said by whoever asks
-        return any(map(SEVERAL.fullmatch, found.channels))
+        alone = or_of_force and lacks_displacement([found])
+        return alone or any(map(SEVERAL.fullmatch, found.channels))
 
 
 def _is_held(recordings: Sequence[Recording]) -> bool:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mckibben.comparison.recognising import FORCE, any_moves
+from mckibben.comparison.recognising import FORCE, any_moves, force_over, lacks_displacement
 from mckibben.errors import DataError
 from mckibben.estimators.coupled.base import driving, loads_among, moved, schedules
 from mckibben.recording import Recording
@@ -68,13 +68,19 @@ def channels_of(
 ) -> Channels:
     """Return the channels that a comparison is about; a force beside other inputs is a load, too.
 
+    Force by length is told the pressure by the models of it, so that this is no input.
+
     Raises
     ------
     DataError
         If a recording lacks the load, or a channel is named twice.
     """
+    over = None if load else force_over(recordings, _several(inputs), _several(outputs))
+    if over is not None:
+        return Channels((over,), (FORCE,))
+    usual = FORCE if lacks_displacement(recordings) else "displacement"
     given = _named(recordings, inputs, _by_name(recordings, driving, "pressure"))
-    wanted = _named(recordings, outputs, _by_name(recordings, moved, "displacement"))
+    wanted = _named(recordings, outputs, _by_name(recordings, moved, usual))
     found = loads_told(recordings, Channels(given, wanted, (load,) if load else None))
     told = found.scheduling or ()
     named = (*found.inputs, *found.outputs, *told)
@@ -144,6 +150,10 @@ def _by_name(
     if len(several) > 1 or not found:
         return several or (usual,)
     return (usual,) if any(usual in recording for recording in recordings) else several or found
+
+
+def _several(names: Names) -> Sequence[str] | None:
+    return (names,) if isinstance(names, str) else names
 
 
 def _named(

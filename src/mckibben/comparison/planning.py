@@ -17,6 +17,13 @@ from mckibben.comparison.constant import constant_of
 from mckibben.comparison.coverage import Coverage, coverage_of
 from mckibben.comparison.kept import Kept, source
 from mckibben.comparison.offered import objections
+from mckibben.comparison.recognising import (
+    FORCE,
+    OF_FORCE,
+    PRESSURE,
+    lacks_displacement,
+    varies,
+)
 from mckibben.comparison.results import Leaderboard
 from mckibben.comparison.row import Row
 from mckibben.comparison.shared_stretches import TESTED, told
@@ -170,6 +177,8 @@ def plan_of(
             held = (
                 f"{named.outputs[0]} is held throughout, and so {channels.outputs[0]} is modelled",
             )
+    if outputs is None and lacks_displacement(every) and channels.outputs == (FORCE,):
+        held = ("there is no displacement, and so force is modelled; or name another output",)
     unit = _checked(recordings, [*tests, *checks], channels)
     roles = {"fit": recordings, "validate": checks, "test": tests}
     shared = told(
@@ -215,7 +224,7 @@ def plan_of(
     if load is not None and not objections([PER_LOAD], every, replace(channels, scheduling=None)):
         own = {"seed": seed} | dict(given.get(PER_LOAD, {}))
         items |= _one_for_each_load(split.train, load, own)
-    different = _unlike(every, channels)
+    different = (*_untold(every, channels), *_unlike(every, channels))
     return Plan(
         data=Data(split, parts, channels, tuple(checks)),
         items=items,
@@ -288,12 +297,34 @@ def _about_load(
             yield f"{name} is there, and {told_of} is told it: see --load {name}"
 
 
+def _untold(recordings: Sequence[Recording], channels: Channels) -> Iterator[str]:
+    """Tell of a length that force depends on, and that no model is told."""
+    told_of = (*channels.inputs, *channels.scheduled(recordings))
+    if channels.outputs != (FORCE,) or any(name in told_of for name in OF_FORCE):
+        return
+    for name in OF_FORCE:
+        if varies([one[name] for one in recordings if name in one]):
+            yield (
+                f"{name} varies, force depends on it, and no model is told it: leave --input out, or "
+                f"give --input {name}, and force is modelled of it and of the pressure"
+            )
+            return
+
+
+def _known(recordings: Sequence[Recording], channels: Channels) -> tuple[str, ...]:
+    """Return what models are told; those of force by length find the pressure by themselves."""
+    names = (*channels.inputs, *channels.scheduled(recordings))
+    by_length = channels.outputs == (FORCE,) and any(name in OF_FORCE for name in names)
+    found = by_length and PRESSURE not in names and all(PRESSURE in one for one in recordings)
+    return (*names, PRESSURE) if found else names
+
+
 def _unlike(recordings: Sequence[Recording], channels: Channels) -> tuple[str, ...]:
     """Return why one model cannot follow some recordings, in words."""
     if len(channels.outputs) > 1:
         return ()
     loads = schedules(recordings, (*channels.inputs, *channels.outputs))
-    names = (*channels.inputs, *channels.scheduled(recordings), *loads)
+    names = (*_known(recordings, channels), *loads)
     known = (recordings, names, channels.outputs[0], loads)
     return (*unlike(*known), *zeros(*known))
 
@@ -302,7 +333,7 @@ def _beyond_training(
     train: Sequence[Recording], tests: Sequence[Recording], channels: Channels
 ) -> Iterator[str]:
     """Tell of tests whose inputs go where those of no training recording do."""
-    for name in (*channels.inputs, *channels.scheduled(train)):
+    for name in _known(train, channels):
         trained = np.concatenate([recording[name] for recording in train if name in recording])
         low, high = float(trained.min()), float(trained.max())
         margin = BEYOND * (high - low)

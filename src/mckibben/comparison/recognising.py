@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from mckibben.arrays import Array
 from mckibben.recording import Recording
 
 DRIVING = ("pressure", "voltage", "command", "input", "u", "p")
@@ -31,6 +32,15 @@ ASKED = ("reference_", "command_")
 """Beginnings of the names of what a loop is told: these are no measurements."""
 
 FORCE = "force"
+
+OF_FORCE, PRESSURE = ("length", "displacement"), "pressure"
+"""What force laws are of: the first that there is, beside the pressure."""
+
+MOST = (1.0, 99.0)
+"""Percentiles between which a length is, but for the way to where it is held."""
+
+HELD = 0.01
+"""Share of its largest value by which a length varies at least where a force can be learned of it."""
 
 Sides = tuple[tuple[str, ...], tuple[str, ...]]
 
@@ -61,6 +71,44 @@ def recognised(recordings: Sequence[Recording], channels: Sequence[str]) -> Side
     if FORCE in rest and outputs and not any_moves(recordings, outputs):
         return outputs[:1], (FORCE,)
     return inputs, outputs or ((FORCE,) if FORCE in rest else tuple((rest or list(channels))[:1]))
+
+
+def force_over(
+    recordings: Sequence[Recording], inputs: Sequence[str] | None, outputs: Sequence[str] | None
+) -> str | None:
+    """Return the length or displacement of which, beside pressure, force is to be modelled, or None.
+
+    Parameters
+    ----------
+    recordings : sequence of Recording
+    inputs, outputs : sequence of str or None
+        Those asked for. Force is meant by its name, or where `lacks_displacement`.
+    """
+    meant = lacks_displacement(recordings) if outputs is None else tuple(outputs) == (FORCE,)
+    for name in OF_FORCE if meant else ():
+        asked = inputs is None or set(inputs) in ({name}, {name, PRESSURE})
+        there = all({name, PRESSURE, FORCE} <= {*one.channels} for one in recordings)
+        if asked and there and varies([one[name] for one in recordings]):
+            return name
+    return None
+
+
+def varies(lengths: Sequence[Array]) -> bool:
+    """Tell whether lengths, of all recordings, are held at more than one; how it is come to aside."""
+    samples = np.concatenate([*lengths, np.zeros(0)])
+    if not samples.size:
+        return False
+    return bool(np.ptp(np.percentile(samples, MOST)) > HELD * np.abs(samples).max())
+
+
+def lacks_displacement(recordings: Sequence[Recording]) -> bool:
+    """Tell whether force by length and pressure is all there is to model: nothing else is moved."""
+    others = (*ALONG, *TURNED)
+    return all(
+        {OF_FORCE[0], PRESSURE, FORCE} <= {*one.channels}
+        and not any(name.startswith(others) for name in one.channels if name != OF_FORCE[0])
+        for one in recordings
+    ) and any_moves(recordings, (FORCE,))
 
 
 def moved_by(recordings: Sequence[Recording], given: str, channels: Sequence[str]) -> str:

@@ -75,6 +75,10 @@ AT_START = 0.02
 """Displacement at the start of a run that is none, relative to the range."""
 
 
+PRESSURES = ("bar", "V", "")
+"""Units of what drives a muscle; where none is said, whoever names it is believed."""
+
+
 @dataclass(kw_only=True, repr=False, eq=False)
 class BalanceEstimator(CoupledEstimator):
     """Balance of forces with friction and relaxation of muscles in parallel, under load, scheduled.
@@ -148,6 +152,22 @@ class BalanceEstimator(CoupledEstimator):
     ridge: Annotated[float, Interval(ge=0, le=1)] = 1e-6
     steps: Annotated[int, Interval(ge=0, le=1000)] = 25
     prior: Told = None
+
+    @classmethod
+    def objection(
+        cls,
+        recordings: Sequence[Recording],
+        inputs: Sequence[str],
+        outputs: Sequence[str],
+        scheduling: Sequence[str] | None = None,
+    ) -> str | None:
+        for name in inputs:
+            unit = next((one.units[name] for one in recordings if name in one), "")
+            if unit not in PRESSURES:
+                return (
+                    f"{name} is in {unit}, which is no pressure of a muscle, nor a valve's voltage"
+                )
+        return super().objection(recordings, inputs, outputs, scheduling)
 
     def data(
         self, recordings: Recording | Sequence[Recording], rows: Sequence[Mask] | None = None

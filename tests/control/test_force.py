@@ -44,7 +44,8 @@ class Stand:
         return Stand(settings["sample_time"], settings["start.length"])
 
     def limits(self, name: str) -> SimpleNamespace:
-        return SimpleNamespace(low=-9.0, high=9.0)
+        low, high = {"length": (150.0, 250.0)}.get(name, (-9.0, 9.0))
+        return SimpleNamespace(low=low, high=high)
 
     def reset(self, seed: int = 0) -> np.ndarray:
         self.stream = MODEL.stream(self.time)

@@ -22,7 +22,7 @@ PERIODIC = "periodic"
 
 STARTED = (
     "Memory starts as training left it where the test goes on from there; else, with one driving input, "
-    "from what best explains the first measured output, as simulate --initial measured has it."
+    "from what best explains the first measured output: what simulate calls a measured start."
 )
 """How models are run free here, where a saved one starts by its own rule."""
 

@@ -136,6 +136,8 @@ def channels(
         given = tuple(name for name in ("force", "length") if name in first)[:1] or given
         if inputs is None and given == ("force",) and "length" in first:
             driven = (*driven, "length")
+    if inputs is None and given == ("force",) and "pressure" not in driven and "pressure" in first:
+        driven = ("pressure", *driven)  # which models of force by length find by themselves
     for recording in recordings:
         if absent := [name for name in (*driven, *given) if name not in recording]:
             raise DataError(

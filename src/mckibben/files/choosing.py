@@ -101,7 +101,8 @@ def choose(table: Table, request: Request, path: Path) -> Choice:
                 plausible.check(
                     channel, channels[channel], unit_of(channel), unit.name, table, path
                 )
-                glitches.check(channel, channels[channel], units[channel], values, table, path)
+                if unit_of(channel) is not None:
+                    glitches.check(channel, channels[channel], units[channel], values, table, path)
     if not channels:
         raise DataError(
             "there is no column of numbers", file=path, remedy="give a file with samples in columns"

@@ -6,7 +6,7 @@ import math
 import tomllib
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from pydantic import BaseModel, ValidationError
 
@@ -14,9 +14,14 @@ from mckibben import registry
 from mckibben.errors import DataError
 from mckibben.recording import Recording
 from mckibben.rigs.refusals import limits, refused, unit
-from mckibben.rigs.rig import CHANGES, Rig
 from mckibben.system.atomic import write_text
 from mckibben.system.ordinary import DESCRIPTION, read_text
+
+if TYPE_CHECKING:
+    from mckibben.rigs.rig import Rig  # which says what was changed of a published one
+
+CHANGES = "rig_changes"
+"""In the ``meta`` of what a rig recorded: how it differs from the published one."""
 
 FORMAT = "mckibben-rig"
 FORMAT_VERSION = 1

@@ -15,6 +15,7 @@ from mckibben.arrays import Array
 from mckibben.errors import DataError
 from mckibben.recording import PROVENANCE, Recording
 from mckibben.rigs.commands import Commands
+from mckibben.rigs.files import CHANGES, changes
 from mckibben.rigs.parameters import AGEING, Air, Muscle, Range, Section, Sensor, parameter
 from mckibben.rigs.refusals import refused
 from mckibben.rigs.system import Demands, State, System, Traces
@@ -23,10 +24,6 @@ from mckibben.system.showing import DrawsItself
 
 ROOM_TEMPERATURE = 20.0
 """Where every muscle starts [degC]."""
-
-
-CHANGES = "rig_changes"
-"""In the ``meta`` of what a rig recorded: how it differs from the published one."""
 
 
 class Rig(DrawsItself, Section, ABC):
@@ -219,8 +216,6 @@ class Rig(DrawsItself, Section, ABC):
         DataError
             On missing or unknown channels, or a recording without time.
         """
-        from mckibben.rigs.files import changes
-
         changed = changes(self)
         given, saturated = self._commanded().of_recording(inputs)
         step = float(inputs.sample_time or 0.0)  # one without is refused above

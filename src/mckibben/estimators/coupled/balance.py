@@ -161,13 +161,14 @@ class BalanceEstimator(CoupledEstimator):
         outputs: Sequence[str],
         scheduling: Sequence[str] | None = None,
     ) -> str | None:
-        for name in inputs:
+        known = super().objection(recordings, inputs, outputs, scheduling)
+        for name in inputs if known is None else ():
             unit = next((one.units[name] for one in recordings if name in one), "")
             if unit not in PRESSURES:
                 return (
                     f"{name} is in {unit}, which is no pressure of a muscle, nor a valve's voltage"
                 )
-        return super().objection(recordings, inputs, outputs, scheduling)
+        return known
 
     def data(
         self, recordings: Recording | Sequence[Recording], rows: Sequence[Mask] | None = None

@@ -85,7 +85,7 @@ def test_models_that_tie_with_the_best_are_named(capsys: pytest.CaptureFixture[s
     print_leaderboard(tied.leaderboard)
     printed = capsys.readouterr().out
     assert "≈ not told apart from the chosen model on this test: the interval" in printed
-    assert "first measured output, as simulate --initial measured has it" in printed
+    assert "See simulate --initial measured." in printed
     assert "Not told apart" not in " ".join(verdict(found))
 
 

@@ -58,7 +58,7 @@ def print_leaderboard(board: Leaderboard) -> None:
             rows.append([name, *(column.text(given) for column in columns)])
     say(f"Split: {board.split}.")
     print_table(["model", *(column.label for column in columns)], rows)
-    say(f"All run free. {STARTED}")
+    say(f"All run free. {STARTED} See simulate --initial measured.")
     say("Rank: by test RMSE. Gap between branches kept: 100 % is right, 0 forgets.")
     if board.level:
         say(f"≈ {NOT_TOLD}: the interval of the difference holds 0.")

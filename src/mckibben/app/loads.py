@@ -7,11 +7,9 @@ import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
-GRAVITY = 9.80665
-"""Standard gravity [m/s²]."""
+import numpy as np
 
-IN_NEWTONS = {"g": 1e-3 * GRAVITY, "kg": GRAVITY, "N": 1.0}
-"""Units of loads, and what one of each pulls with [N]."""
+from mckibben.files.units import convert, weight
 
 _AMOUNT = r"(?P<value>\d{1,6}(?:\.\d{1,6})?)[ _-]?(?P<unit>kg|g|N)(?![A-Za-z0-9])"
 _WORD = r"(?i:loads?|payload|weights?|mass)"
@@ -35,7 +33,7 @@ class Load:
     @property
     def force(self) -> float:
         """What it pulls with [N]."""
-        return self.value * IN_NEWTONS[self.unit]
+        return float(convert(np.array([self.value]), weight(self.unit), "N")[0])
 
 
 def load_in(name: str) -> Load | None:

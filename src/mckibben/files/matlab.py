@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 import struct
 import zlib
+from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from dataclasses import replace
 from io import BufferedReader
@@ -58,7 +59,7 @@ def read(file: BufferedReader, path: Path) -> list[Table]:
     return [replace(of_equal_length(found, path, meta={}), rates=vectors.rates)]
 
 
-class _Vectors:
+class _Vectors(ABC):
     """Those that were found, by the dotted place where they stand."""
 
     def __init__(self, order: str, budget: Budget) -> None:
@@ -67,9 +68,9 @@ class _Vectors:
         self._found: dict[str, Column] = {}
         self.rates: dict[str, float] = {}
 
+    @abstractmethod
     def read(self, file: BufferedReader) -> dict[str, Column]:
         """Read the variables from where the file stands."""
-        raise NotImplementedError
 
     def _add(self, place: str, shape: tuple[int, ...], cells: NDArray[Any]) -> None:
         """Add numbers, or the lines of a table of characters, if they are a vector."""

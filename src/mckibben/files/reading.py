@@ -306,21 +306,21 @@ def _refuse_constant(channels: Channels, spans: list[Span], request: Request, pa
 def _long_enough(spans: list[Span], table: Table, request: Request, path: Path) -> list[Span]:
     """Return the spans that are not too short to be of use: of a split, to any later step."""
     fewest = FEWEST if len(spans) > 1 else request.fewest
-    short = [span for span in spans if span[1] - span[0] < fewest]
-    if len(short) == len(spans):
+    kept = [span for span in spans if span[1] - span[0] >= fewest]
+    if not kept:
         raise DataError(
             f"no stretch without gaps has {fewest} samples",
             file=path,
             remedy="say --gaps interpolate, or give a recording with fewer gaps",
         )
-    if short:
-        rows = [f"{table.row(start)}" for start, _ in short]
+    if len(kept) < len(spans):
+        rows = [f"{table.row(start)}" for start, stop in spans if stop - start < fewest]
         warn(
             path,
-            f"{len(short)} of {len(spans)} stretches between gaps have fewer than {fewest} samples, "
+            f"{len(rows)} of {len(spans)} stretches between gaps have fewer than {fewest} samples, "
             f"which no later step can use, and were left out: they begin in row {listed(rows)}",
         )
-    return [span for span in spans if span not in short]
+    return kept
 
 
 def _split(spans: list[Span], cuts: Sequence[int]) -> list[Span]:

@@ -1,0 +1,220 @@
+"""What a suite of tests catches: fixes of the history taken back, and deliberate faults.
+
+    python benchmarks/power.py --at REVISION [--long] [--golden] [--only reverted|faults]
+
+Takes back, one at a time, the source side of 20 fixes drawn at random (``--seed``) from those commits
+that touch source and tests, are small, and still apply in reverse; then plants the faults of
+`FAULTS`. After each, runs the tests of the rooms that were touched as they stand at ``REVISION``: the
+tests that the fix came with, the rooms' own, the contracts; with ``--golden``, the golden cases where
+these notice nothing. It stays until the rooms are rebuilt, to show that tests became fewer, not blinder.
+"""
+
+from __future__ import annotations
+
+import argparse
+import io
+import json
+import os
+import random
+import signal
+import subprocess
+import sys
+import tarfile
+import tempfile
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+
+MOST_LINES = 60
+"""Changed lines of source in a commit that still counts as one fix."""
+
+SECONDS = 480
+"""Longest run of tests for one change; one that does not end by then counts as caught."""
+
+FAULTS = [
+    # (file below src/mckibben, what stands there, what is planted)
+]
+
+
+@dataclass(frozen=True)
+class Change:
+    """One fault in the source."""
+
+    name: str
+    files: tuple[str, ...]
+    """Below the root of the repository."""
+    tests: tuple[str, ...]
+    """Tests that came with it."""
+    patch: str = ""
+    """To be applied in reverse; or"""
+    replaced: tuple[str, str] = ("", "")
+    """what stands in the one file, and what is to stand there."""
+
+
+def git(*words: str, text: str = "") -> str:
+    """Return what git prints."""
+    found = subprocess.run(
+        ["git", *words], cwd=ROOT, input=text, capture_output=True, text=True, check=True
+    )
+    return found.stdout
+
+
+def reverted(base: str, seed: int, n: int) -> list[Change]:
+    """Return fixes up to a revision to take back, drawn at random."""
+    fixes: list[Change] = []
+    commits = git("log", "--no-merges", "--format=%h", base).split()
+    random.Random(seed).shuffle(commits)
+    for commit in commits:
+        rows = [
+            line.split("\t")
+            for line in git("show", "--numstat", "--format=", commit).splitlines()
+            if "=>" not in line
+        ]
+        source = [r for r in rows if r[2].startswith("src/mckibben/") and r[2].endswith(".py")]
+        tests = tuple(r[2] for r in rows if r[2].startswith("tests/") and "/test_" in r[2])
+        if not source or not tests or sum(int(r[0]) + int(r[1]) for r in source) > MOST_LINES:
+            continue
+        files = tuple(r[2] for r in source)
+        patch = git("show", "--format=", commit, "--", *files)
+        tried = subprocess.run(
+            ["git", "apply", "-R", "--check", "-"],
+            cwd=ROOT,
+            input=patch,
+            text=True,
+            capture_output=True,
+        )
+        if tried.returncode == 0:
+            title = git("log", "-1", "--format=%h %s", commit).strip()
+            fixes.append(Change(title, files, tests, patch=patch))
+        if len(fixes) == n:
+            break
+    return fixes
+
+
+def faults() -> Iterator[Change]:
+    """Give the deliberate faults."""
+    for file, old, new in FAULTS:
+        yield Change(
+            f"{file}: {old!r} -> {new!r}", (f"src/mckibben/{file}",), (), replaced=(old, new)
+        )
+
+
+def plant(change: Change, tree: Path) -> dict[Path, str]:
+    """Change the source of a tree, and return its files as they were."""
+    here = [tree / file for file in change.files if (tree / file).exists()]
+    before = {path: path.read_text("utf-8") for path in here}
+    if change.patch:
+        subprocess.run(
+            ["git", "apply", "-R", "-"], cwd=tree, input=change.patch, text=True, check=True
+        )
+        return before
+    ((path, text),) = before.items()
+    old, new = change.replaced
+    if text.count(old) != 1:
+        raise ValueError(f"{change.name}: stands there {text.count(old)} times")
+    path.write_text(text.replace(old, new), "utf-8")
+    return before
+
+
+def rooms(change: Change, tree: Path) -> list[str]:
+    """Return the tests of the rooms that a change touches."""
+    found = ["tests/contracts"]
+    for file in change.files:
+        parts = Path(file).parts[2:]
+        room = f"tests/{parts[0]}" if len(parts) > 1 else f"tests/test_{parts[0]}"
+        found.append(room)
+    return [room for room in dict.fromkeys(found) if (tree / room).exists()]
+
+
+def fails(tree: Path, words: list[str]) -> bool:
+    """Run Python in a tree and return whether it failed, or did not end."""
+    paths = os.pathsep.join((str(tree / "src"), str(tree)))
+    environment = os.environ | {"PYTHONPATH": paths}
+    run = subprocess.Popen(
+        [sys.executable, "-m", *words],
+        cwd=tree,
+        env=environment,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        start_new_session=True,
+    )
+    try:
+        printed, _ = run.communicate(timeout=SECONDS)
+    except subprocess.TimeoutExpired:
+        os.killpg(run.pid, signal.SIGKILL)
+        return True
+    if run.returncode not in (0, 1, 2, 5):  # failures are 1, in collection 2; no test at all is 5
+        print(printed[-2000:], file=sys.stderr)
+    return run.returncode not in (0, 5)
+
+
+def caught(change: Change, tree: Path, options: argparse.Namespace) -> str:
+    """Return what notices a change, empty if nothing does."""
+    before = plant(change, tree)
+    marks = ["-m", "long or not long"] if options.long else []
+    pytest = ["pytest", "-x", "-q", "-n", str(options.processes), *marks]
+    own = [test for test in change.tests if (tree / test).exists()]
+    try:
+        if own and fails(tree, [*pytest, *own]):
+            return "its own tests"
+        if fails(tree, [*pytest, *rooms(change, tree)]):
+            return "tests of its rooms"
+        if options.golden and fails(tree, ["tests.golden"]):
+            return "golden cases"
+    finally:
+        for path, text in before.items():
+            path.write_text(text, "utf-8")
+        for path in {tree / file for file in change.files} - before.keys():
+            path.unlink()  # taking a fix back had made it
+    return ""
+
+
+def main() -> None:
+    """Run one suite over all changes, and print what it catches."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--at", default="HEAD", help="revision whose tests and source are run")
+    parser.add_argument("--base", default="886f2af", help="newest commit that a fix may be")
+    parser.add_argument("--seed", type=int, default=40)
+    parser.add_argument("--fixes", type=int, default=20)
+    parser.add_argument("--long", action="store_true", help="tests marked long, too")
+    parser.add_argument("--golden", action="store_true", help="golden cases, too")
+    parser.add_argument("--only", choices=("reverted", "faults"))
+    parser.add_argument("--processes", type=int, default=2)
+    parser.add_argument("--list", action="store_true", help="print what would be changed")
+    parser.add_argument("--output", type=Path, help="a JSON file of what was caught by what")
+    options = parser.parse_args()
+
+    changes: list[Change] = []
+    if options.only != "faults":
+        changes += reverted(options.base, options.seed, options.fixes)
+    if options.only != "reverted":
+        changes += faults()
+    if options.list:
+        print("\n".join(change.name for change in changes))
+        return
+    found: dict[str, str] = {}
+    with tempfile.TemporaryDirectory() as folder:
+        tree = Path(folder)
+        archive = subprocess.run(
+            ["git", "archive", options.at], cwd=ROOT, capture_output=True, check=True
+        )
+        with tarfile.open(fileobj=io.BytesIO(archive.stdout)) as packed:
+            packed.extractall(tree, filter="data")
+        for change in changes:
+            begun = time.perf_counter()
+            found[change.name] = caught(change, tree, options)
+            seconds = time.perf_counter() - begun
+            print(
+                f"{found[change.name] or 'NOTHING':20} {seconds:5.0f} s  {change.name}", flush=True
+            )
+            if options.output:
+                options.output.write_text(json.dumps(found, indent=1), "utf-8")
+    print(f"caught: {sum(map(bool, found.values()))} of {len(found)}")
+
+
+if __name__ == "__main__":
+    main()

@@ -61,8 +61,12 @@ def vector(values: ArrayLike) -> tuple[float, ...]:
     return tuple(np.asarray(values, dtype=np.float64).tolist())
 
 
-STRICT = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
-"""How blocks validate their fields: no unknown ones, no silent conversion, nothing infinite."""
+STRICT = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False, validate_default=True)
+"""How blocks validate their fields: no unknown ones, no silent conversion, nothing infinite.
+
+Defaults are validated too: a field without one takes the attribute of that name of a base class, as
+``sample_time = None`` of `Block`, which must not pass for a value.
+"""
 
 
 @validated_dataclass(frozen=True, config=STRICT)

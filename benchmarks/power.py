@@ -12,6 +12,7 @@ these notice nothing. It stays until the rooms are rebuilt, to show that tests b
 from __future__ import annotations
 
 import argparse
+import ast
 import io
 import json
 import os
@@ -31,12 +32,40 @@ ROOT = Path(__file__).parents[1]
 MOST_LINES = 60
 """Changed lines of source in a commit that still counts as one fix."""
 
-SECONDS = 480
-"""Longest run of tests for one change; one that does not end by then counts as caught."""
+SECONDS = 900
+"""Longest run of tests for one change; what does not end by then has caught nothing."""
 
+FILES, SPLITS = "src/mckibben/files", "src/mckibben/comparison/splits.py"
 FAULTS = [
-    # (file below src/mckibben, what stands there, what is planted)
+    # file, what stands there once, what is planted: readers and units off by ten, other splits
+    (
+        f"{FILES}/cells.py",
+        "else np.concatenate(self._parts)",
+        "else 10 * np.concatenate(self._parts)",
+    ),
+    (
+        f"{FILES}/topics.py",
+        "values.astype(np.float64), unit",
+        "10 * values.astype(np.float64), unit",
+    ),
+    (f"{FILES}/tdms.py", "return values[:at]", "return 10 * values[:at]"),
+    (f"{FILES}/parquet.py", "= cells.to_numpy()", "= 10 * cells.to_numpy()"),
+    (f"{FILES}/hdf5.py", "else samples", "else 10 * samples"),
+    (
+        f"{FILES}/calibration.py",
+        "gain * column.values + offset",
+        "gain * column.values + 10 * offset",
+    ),
+    (f"{FILES}/units.py", '"kPa": "kPa"', '"hPa": "kPa"'),
+    (f"{FILES}/units.py", '"cm": "cm"', '"dm": "cm"'),
+    (f"{FILES}/units.py", '"ms": "ms ', '"centisecond": "ms '),
+    (SPLITS, "HELD_OUT = 0.25", "HELD_OUT = 0.35"),
+    (SPLITS, "% n\n        ", "% (n + 1)\n        "),
+    (SPLITS, "place % EVERY == EVERY - 1", "place % EVERY == 0"),
 ]
+COMPILED = ("kernel", "summing_kernel", "inlined", "deferred")
+SIGNS = 8
+"""Kernels, drawn at random, in which one sign is turned."""
 
 
 @dataclass(frozen=True)
@@ -94,12 +123,36 @@ def reverted(base: str, seed: int, n: int) -> list[Change]:
     return fixes
 
 
-def faults() -> Iterator[Change]:
+def faults(seed: int) -> Iterator[Change]:
     """Give the deliberate faults."""
     for file, old, new in FAULTS:
-        yield Change(
-            f"{file}: {old!r} -> {new!r}", (f"src/mckibben/{file}",), (), replaced=(old, new)
-        )
+        yield Change(f"{file}: {old.strip()} -> {new.strip()}", (file,), (), replaced=(old, new))
+    kernels = [
+        (path, function)
+        for path in sorted((ROOT / "src/mckibben").rglob("*.py"))
+        for function in ast.parse(path.read_text("utf-8")).body
+        if isinstance(function, ast.FunctionDef)
+        and any(ast.unparse(mark).partition("(")[0] in COMPILED for mark in function.decorator_list)
+    ]
+    chance = random.Random(seed)
+    planted = 0
+    for path, function in chance.sample(kernels, len(kernels)):
+        sums = [
+            node
+            for node in ast.walk(function)
+            if isinstance(node, ast.BinOp | ast.AugAssign)
+            and isinstance(node.op, ast.Add | ast.Sub)
+        ]
+        if sums and planted < SIGNS:
+            planted += 1
+            text = path.read_text("utf-8")
+            turned = chance.choice(sums)
+            turned.op = ast.Sub() if isinstance(turned.op, ast.Add) else ast.Add()
+            old = "\n".join(text.splitlines()[function.lineno - 1 : function.end_lineno])
+            function.decorator_list = []
+            name = f"{path.relative_to(ROOT)}: {function.name}: {ast.unparse(turned)}"
+            file = str(path.relative_to(ROOT))
+            yield Change(name, (file,), (), replaced=(old, ast.unparse(function)))
 
 
 def plant(change: Change, tree: Path) -> dict[Path, str]:
@@ -130,7 +183,7 @@ def rooms(change: Change, tree: Path) -> list[str]:
 
 
 def fails(tree: Path, words: list[str]) -> bool:
-    """Run Python in a tree and return whether it failed, or did not end."""
+    """Run Python in a tree and return whether it failed."""
     paths = os.pathsep.join((str(tree / "src"), str(tree)))
     environment = os.environ | {"PYTHONPATH": paths}
     run = subprocess.Popen(
@@ -146,7 +199,8 @@ def fails(tree: Path, words: list[str]) -> bool:
         printed, _ = run.communicate(timeout=SECONDS)
     except subprocess.TimeoutExpired:
         os.killpg(run.pid, signal.SIGKILL)
-        return True
+        print(f"{' '.join(words)} did not end", file=sys.stderr)
+        return False
     if run.returncode not in (0, 1, 2, 5):  # failures are 1, in collection 2; no test at all is 5
         print(printed[-2000:], file=sys.stderr)
     return run.returncode not in (0, 5)
@@ -162,7 +216,7 @@ def caught(change: Change, tree: Path, options: argparse.Namespace) -> str:
         if own and fails(tree, [*pytest, *own]):
             return "its own tests"
         if fails(tree, [*pytest, *rooms(change, tree)]):
-            return "tests of its rooms"
+            return "its rooms' tests"
         if options.golden and fails(tree, ["tests.golden"]):
             return "golden cases"
     finally:
@@ -192,7 +246,7 @@ def main() -> None:
     if options.only != "faults":
         changes += reverted(options.base, options.seed, options.fixes)
     if options.only != "reverted":
-        changes += faults()
+        changes += faults(options.seed)
     if options.list:
         print("\n".join(change.name for change in changes))
         return

@@ -1,7 +1,7 @@
 """Measure long and many recordings: seconds, and memory of all processes together.
 
 Run: python benchmarks/large.py [--samples 10000000] [--recordings 200]
-         [--only calls|long|report|many] [--all]
+         [--only long|many]
 """
 
 from __future__ import annotations
@@ -13,9 +13,6 @@ import sys
 import tempfile
 import threading
 import time
-from collections.abc import Callable
-from functools import partial
-from importlib import import_module
 from pathlib import Path
 
 import numpy as np
@@ -25,7 +22,6 @@ from mckibben.signals import irregular_triangle
 
 FEW = ("pi", "gpi")
 SEVERAL = ("pi", "mpi", "gpi", "bouc-wen")
-MANY = (*SEVERAL, "p2uz", "cpi")
 
 
 def recording(n: int, sample_time: float, seed: int) -> Recording:
@@ -76,65 +72,23 @@ def memory(session: int) -> int:
     return total
 
 
-def report() -> None:
-    """Print the size of a study's report of a million samples, and the seconds that it takes to make."""
-    from mckibben import study
-    from mckibben.report.page import page
-
-    found = study(recording(1_000_000, 0.001, 0), models=MANY)
-    started = time.perf_counter()
-    size = len(page(found).encode())
-    seconds = time.perf_counter() - started
-    print(f"report of 1000000 samples, {len(MANY)} models: {size / 1e6:.2f} MB, {seconds:.1f} s")
-
-
-def calls() -> None:
-    """Print the seconds of what a person waits for on long recordings."""
-    from mckibben import characterize, untold
-    from mckibben.signals import decimate_minmax
-    from mckibben.validation.describing import describe
-
-    for n, names in ((1_000_000, ("characterize", "decimate")), (100_000, ("untold", "describe"))):
-        whole = recording(n, 0.001, 0)
-        todo: dict[str, Callable[[], object]] = {
-            "characterize": partial(characterize, whole),
-            "decimate": partial(decimate_minmax, whole.time, whole["pressure"], max_points=4000),
-            "untold": partial(untold, [whole]),
-            "describe": partial(describe, GPI.example(), [whole]),
-        }
-        for name in names:
-            times = []
-            for _ in range(3):
-                started = time.perf_counter()
-                todo[name]()
-                times.append(time.perf_counter() - started)
-            print(f"{name} of {n} samples: {min(times):.3f} s, best of {len(times)}", flush=True)
-
-
 def main() -> None:
     """Print everything."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--samples", type=int, default=10_000_000)
     parser.add_argument("--recordings", type=int, default=200)
-    parser.add_argument("--only", choices=("calls", "long", "report", "many"))
-    parser.add_argument("--all", action="store_true", help="all models on the long recording too")
+    parser.add_argument("--only", choices=("long", "many"))
     given = parser.parse_args()
     with tempfile.TemporaryDirectory() as place:
         folder = Path(place)
-        if given.only in (None, "calls"):
-            calls()
-        if given.only in (None, "report"):
-            report()
-        if given.only in (None, "long"):
+        if given.only != "many":
             long = folder / "long.parquet"
             write(recording(given.samples, 0.001, 0), long)
             print(f"one recording of {given.samples} samples, {long.stat().st_size / 1e6:.0f} MB")
             measured("compare --models pi,gpi", "compare", long, "--models", ",".join(FEW))
             measured("study --quick", "study", long, "--quick")
-            if given.all:
-                measured("study", "study", long)
             long.unlink()
-        if given.only in ("calls", "long", "report"):
+        if given.only == "long":
             return
         many = folder / "many"
         many.mkdir()
@@ -144,20 +98,6 @@ def main() -> None:
         print(f"{given.recordings} recordings of 2000 samples, {len(SEVERAL)} models")
         for jobs in (1, os.cpu_count() or 1):
             measured(f"--jobs {jobs}", *words, "--jobs", str(jobs))
-        for workers in (1, os.cpu_count() or 1):
-            on_a_cluster(workers, words)
-
-
-def on_a_cluster(n: int, words: tuple[str | Path, ...]) -> None:
-    """Do the same on a Dask cluster of so many processes on this machine."""
-    try:
-        cluster_of = import_module("distributed").LocalCluster
-    except ImportError:
-        print("  Dask is not installed")
-        return
-    with cluster_of(n_workers=n, threads_per_worker=1, dashboard_address=":0") as cluster:
-        where = cluster.scheduler_address
-        measured(f"--dask, {n} worker(s); memory of the client", *words, "--dask", where)
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Measure speed, beside plain NumPy and C, and print one table.
+"""Measure speed, beside plain C, and print one table.
 
 Run: python benchmarks/run.py [--quick]
 """
@@ -6,14 +6,16 @@ Run: python benchmarks/run.py [--quick]
 from __future__ import annotations
 
 import argparse
+import ctypes
 import os
 import platform
+import shutil
+import subprocess
 import tempfile
 import time
 from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numba
 import numpy as np
@@ -22,9 +24,6 @@ from numpy.typing import NDArray
 from mckibben import (
     GPI,
     PI,
-    GPIEstimator,
-    MPIEstimator,
-    RDPIEstimator,
     Recording,
     compare,
     load_rig,
@@ -32,12 +31,10 @@ from mckibben import (
 )
 from mckibben.blocks.core.block import Block
 from mckibben.blocks.play_type.envelopes.tanh import Tanh
-from mckibben.papers.multistate_friction.published import multistate_friction
 from mckibben.rigs import record
 from mckibben.signals import decaying_triangle
 from mckibben.signals.protocol import protocol
 from microcontroller import compositions
-from references import Compiled, numpy_gpi, numpy_pi
 
 Array = NDArray[np.float64]
 
@@ -77,75 +74,55 @@ def models(n: int) -> tuple[PI, GPI]:
     return pi, GPI(radii, weights, rising, falling, (0.0, 5.0))
 
 
-def kernels(quick: bool) -> None:
+class Compiled:
+    """The loops of ``play.c``, compiled by gcc into a folder.
+
+    Parameters
+    ----------
+    folder : Path
+        Where the library is put.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        library = folder / "play.so"
+        source = Path(__file__).with_name("play.c")
+        command = ["gcc", "-O3", "-march=native", "-shared", "-fPIC", "-std=c99"]
+        subprocess.run([*command, "-o", library, source, "-lm"], check=True)
+        self._library = ctypes.CDLL(str(library))
+
+    def run(self, block: PI | GPI, u: Array) -> Array:
+        """Return the output of a PI model, or of a GPI model with tanh envelopes, but for its offset."""
+        r, w = np.array(block.thresholds), np.array(block.weights)
+        start = u[:1] if isinstance(block, PI) else block.rising(u[:1])
+        s, y = start - r, np.empty_like(u)
+        envelopes = [] if isinstance(block, PI) else [[*block.rising.pack(), *block.falling.pack()]]
+        arrays = [r, w, s, *map(np.array, envelopes), u, y]
+        pointers = [array.ctypes.data_as(ctypes.c_void_p) for array in arrays]
+        sizes = ctypes.c_size_t(u.size), ctypes.c_size_t(r.size)
+        getattr(self._library, block.kind)(*sizes, *pointers)
+        return y
+
+
+def kernels() -> None:
     """Nanoseconds per operator and sample."""
     u = excitation(200_000)
+    print("\nkernels, 200 000 samples [ns per operator and sample]; 64 sets are on all cores")
+    print(f"{'model':>6} {'operators':>9} {'mckibben':>9} {'64 at once':>10} {'C -O3':>7}")
     with tempfile.TemporaryDirectory() as folder:
-        compiled = Compiled(Path(folder)) if Compiled.available() else None
-        print(
-            "\nkernels, 200 000 samples [ns per operator and sample]; one core, and 64 sets on all cores"
-        )
-        print(
-            f"{'model':>6} {'operators':>9} {'mckibben':>9} {'64 at once':>10} {'C -O3':>7} {'NumPy':>7}"
-        )
+        compiled = Compiled(Path(folder)) if shutil.which("gcc") else None
         for n in (10, 100):
             for block in models(n):
                 scale = 1e9 / (u.size * n)
                 ours = best_of(5, partial(block.simulate, u)) * scale
                 many = batched(block, u) * scale / 64
-                short = u[:: 20 if quick else 4]
-                slow_run, c_run = (
-                    (partial(numpy_pi, block), compiled and partial(compiled.pi, block))
-                    if isinstance(block, PI)
-                    else (partial(numpy_gpi, block), compiled and partial(compiled.gpi, block))
-                )
-                slow = best_of(1, partial(slow_run, short)) * 1e9 / (short.size * n)
-                c = best_of(5, partial(c_run, u)) * scale if c_run else float("nan")
-                print(f"{block.kind:>6} {n:>9} {ours:9.3f} {many:10.3f} {c:7.3f} {slow:7.1f}")
-        _, gpi = models(10)
-        envelopes = best_of(5, lambda: (gpi.rising(u), gpi.falling(u))) * 1e9 / u.size
-        print(f"both tanh envelopes: {envelopes:.1f} ns a sample")
+                c = best_of(5, partial(compiled.run, block, u)) * scale if compiled else np.nan
+                print(f"{block.kind:>6} {n:>9} {ours:9.3f} {many:10.3f} {c:7.3f}")
 
 
 def batched(block: Block, u: Array) -> float:
     """Return the time of 64 parameter sets at once [s], on all cores."""
     sets = np.repeat(block.pack()[np.newaxis], 64, axis=0)
     return best_of(3, lambda: block.simulate_many(sets, u))
-
-
-def fits(quick: bool) -> None:
-    """Time and error of GPI identification, beside particle swarms on all parameters."""
-    u = excitation(10_000)
-    _, truth = models(11)
-    creep = 0.15 * np.sin(np.linspace(0, 9, u.size))
-    noise = 0.02 * np.random.default_rng(0).standard_normal(u.size)
-    recording = Recording({"pressure": u, "displacement": truth.simulate(u) + creep + noise}, 0.01)
-    estimator = GPIEstimator(n_operators=10)
-    seconds = best_of(3, lambda: estimator.fit(recording))
-    print("\nGPI, N = 10, on 10 000 samples of progressive amplitude")
-    print(
-        f"  variable projection, multi-start: {seconds:.2f} s, RMSE {estimator.diagnostics_.rmse:.4f} mm"
-    )
-    swarms: list[tuple[str, dict[str, Any]]] = [
-        ("c1 = c2 = 2, inertia .9 to .4", {}),
-        (
-            "c1 = c2 = 0.5, inertia .7",
-            {"pso_c1": 0.5, "pso_c2": 0.5, "pso_inertia_start": 0.7, "pso_inertia_end": 0.7},
-        ),
-    ]
-    for name, settings in swarms:
-        ends, started = [], time.perf_counter()
-        for seed in range(5 if quick else 20):
-            swarm = GPIEstimator(n_operators=10, method="pso", seed=seed, **settings).fit(recording)
-            ends.append(swarm.diagnostics_.rmse)
-        each = (time.perf_counter() - started) / len(ends)
-        print(
-            f"  swarm 20 x 50 on all 17, {name}: {each:.2f} s each, RMSE best {min(ends):.4f}, median "
-            f"{np.median(ends):.4f} mm of {len(ends)} seeds"
-        )
-    for other in (MPIEstimator(), RDPIEstimator()):
-        seconds = best_of(1, partial(other.fit, recording))
-        print(f"  {type(other).__name__}: {seconds:.2f} s, RMSE {other.diagnostics_.rmse:.4f} mm")
 
 
 def field() -> None:
@@ -171,15 +148,6 @@ def field() -> None:
     started = time.perf_counter()
     board = compare(train, test)
     print(f"  compare, all {len(board.rows)}: {time.perf_counter() - started:.0f} s")
-    print("\nsimulation of 200 000 samples [ms]")
-    u = excitation(200_000)
-    for name in ("bouc-wen", "gbw", "duhem", "maxwell-slip", "preisach"):
-        block = registry.load("estimators", name)().fit(train).model_
-        print(f"  {name:>14}: {1e3 * best_of(3, partial(block.simulate, u)):.1f}")
-    friction = multistate_friction()
-    inputs = np.column_stack([200 - 3 * u, u])
-    seconds = best_of(3, partial(friction.simulate, inputs, sample_time=0.01))
-    print(f"  {'multistate-11':>14}: {1e3 * seconds:.1f}")
 
 
 def three_muscles() -> Iterator[tuple[str, Block, Array]]:
@@ -245,8 +213,7 @@ def main() -> None:
     quick = parser.parse_args().quick
     print(f"{processor()}, {os.cpu_count()} cores; {platform.platform()}")
     print(f"Python {platform.python_version()}, numba {numba.__version__}, NumPy {np.__version__}")
-    kernels(quick)
-    fits(quick)
+    kernels()
     field()
     streams()
     rigs(quick)

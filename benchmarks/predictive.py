@@ -1,10 +1,10 @@
 """What looking ahead gains where limits are active, and what it costs.
 
-    python benchmarks/predictive.py            # five minutes; wants gcc, and DAQP and OSQP if there
+    python benchmarks/predictive.py            # minutes; wants gcc
     python benchmarks/predictive.py --quick
 
-Prints tables: errors over those of the clipped inverse, in the model and on virtual rigs; our solver
-beside DAQP and OSQP; time in C on this machine; instructions on an emulated Cortex-M4F.
+Prints tables: errors over those of the clipped inverse; time in C on this machine; instructions on an
+emulated Cortex-M4F.
 """
 
 from __future__ import annotations
@@ -12,29 +12,23 @@ from __future__ import annotations
 import subprocess
 import sys
 import tempfile
-import time
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 
-import mckibben
-from mckibben import Block, Recording
+from mckibben import Block
 from mckibben.arrays import Array
 from mckibben.blocks.coupled.balance import Balance
 from mckibben.blocks.play_type.gpi import GPI
 from mckibben.blocks.play_type.pi import PI
-from mckibben.blocks.predictive.plan import plan, plan_scratch
-from mckibben.blocks.predictive.plan_one import plan_one
 from mckibben.blocks.predictive.predictive import Predictive
-from mckibben.blocks.predictive.supply import allowed, limit_rows
-from mckibben.control import track
+from mckibben.blocks.predictive.supply import allowed
 from mckibben.export.c.emulation import emulate, missing_tools
 from mckibben.export.c.project import export_c
-from mckibben.registry import load
 
 STEP, LENGTH, HORIZON = 0.01, 800, 20
 QUICK = "--quick" in sys.argv
@@ -132,135 +126,6 @@ def cases() -> Iterator[tuple[str, Block, tuple[float, ...], dict[str, float]]]:
     )
 
 
-def on_rigs() -> None:
-    print("\n## On virtual rigs, with models identified on one recording\n")
-    print(
-        "| rig | model | rate [bar/s] | at a limit | no limit | clipped | over it: horizon 20 | 40 |"
-    )
-    print("|---|---|---:|---:|---:|---:|---:|---:|")
-    for rig_name in ("mas20-hanging",):
-        rig = mckibben.load_rig(rig_name)
-        step = rig.sample_time
-        rng = np.random.default_rng(1)
-        train = rig.run(recorded(wander(rng, 4000, 0.5, 5.0, 30), step), seed=1)
-        for kind in ("gpi", "mpi", "balance"):
-            model = (
-                load("estimators", kind)().fit([train.select(["pressure", "displacement"])]).model_
-            )
-            for rate in (6.0, 3.0):
-                rows = []
-                for seed in SEEDS:
-                    path = wander(np.random.default_rng(100 + seed), 1500, 0.6, 4.8, 20)
-                    reference = rig.run(recorded(path, step), seed=50).select(["displacement"])
-                    inverse = model.inverse()
-                    plain = track(inverse, rig, reference, slew=rate, settle=1.0)
-                    free = track(inverse, rig, reference, settle=1.0)
-                    found = [free.rmse["displacement"], plain.rmse["displacement"]]
-                    for horizon in (HORIZON, 2 * HORIZON):
-                        block = Predictive(
-                            inverse, horizon=horizon, rate_limit=rate, pressure_range=(0.0, 6.0)
-                        )
-                        tracked = track(block, rig, reference, slew=rate, settle=1.0)
-                        found.append(tracked.rmse["displacement"] / found[1])
-                    rows.append([plain.clipped / 1500, *found])
-                share, free_error, clip, ahead, further = np.median(rows, axis=0)
-                print(
-                    f"| {rig_name} | {kind} | {rate:g} | {100 * share:.0f} % | "
-                    f"{free_error:.3g} mm | {clip:.3g} mm | {ahead:.2f} | {further:.2f} |",
-                    flush=True,
-                )
-
-
-def recorded(pressure: Array, step: float) -> Recording:
-    return Recording({"pressure": pressure}, step, {"pressure": "bar"})
-
-
-def solvers() -> None:
-    print("\n## One plan of 20 samples\n")
-    print("| muscles | limits a sample | ours | steps | DAQP | OSQP | difference from DAQP |")
-    print("|---:|---:|---:|---:|---:|---:|---:|")
-    for n in (1, 2, 3):
-        rng = np.random.default_rng(n)
-        rows = limit_rows(
-            np.zeros(n), np.full(n, 5.0), 0.06, 2.5 * n, 0.05 * n if n > 1 else np.inf, np.ones(n)
-        )
-        times: dict[str, list[float]] = {"ours": [], "daqp": [], "osqp": []}
-        steps, off = [], []
-        for _ in range(40):
-            slopes = rng.uniform(2.0, 6.0, (HORIZON, 1, 1)) * np.eye(n)
-            slopes = slopes + 0.8 * (n > 1) * rng.standard_normal((HORIZON, n, n))
-            nominal = 2.2 + np.cumsum(0.25 * rng.standard_normal((HORIZON, n)), axis=0)
-            before = np.clip(nominal[0] + 0.1, 0.0, 2.4)
-            found, scratch = nominal.copy(), np.zeros(plan_scratch(HORIZON, n, len(rows)))
-            given = (rows, before, slopes.reshape(-1), nominal, np.zeros_like(nominal))
-            solve_ours = plan_one if n == 1 else plan
-            solve_ours(*given, found, scratch)
-            started = time.perf_counter()
-            steps.append(solve_ours(*given, found, scratch) or 0)
-            times["ours"].append(time.perf_counter() - started)
-            problem = dense(rows, before, slopes, nominal)
-            for name, solve in (("daqp", by_daqp), ("osqp", by_osqp)):
-                answer = solve(*problem)
-                if answer is not None:
-                    times[name].append(answer[1])
-                    if name == "daqp":
-                        off.append(float(np.abs(answer[0].reshape(found.shape) - found).max()))
-        told = [f"{1e6 * np.median(t):.0f} µs" if t else "-" for t in times.values()]
-        print(
-            f"| {n} | {len(rows)} | {told[0]} | {np.median(steps):.0f}, at most {max(steps)} | "
-            f"{told[1]} | {told[2]} | {max(off, default=np.nan):.1e} bar |",
-            flush=True,
-        )
-
-
-def dense(rows: Array, before: Array, slopes: Array, nominal: Array) -> tuple[Array, ...]:
-    """Return a plan's problem as min x H x / 2 + f x, A x <= b."""
-    length, n = nominal.shape
-    hessian, linear = np.zeros((length * n, length * n)), np.zeros(length * n)
-    table, bounds = np.zeros((length * len(rows), length * n)), np.tile(rows[:, 1], length)
-    for t in range(length):
-        own = slice(t * n, t * n + n)
-        hessian[own, own] = slopes[t].T @ slopes[t]
-        linear[own] = -hessian[own, own] @ nominal[t]
-        for i, row in enumerate(rows):
-            table[t * len(rows) + i, own] = row[2:]
-            if row[0] > 0 and t > 0:
-                table[t * len(rows) + i, t * n - n : t * n] = -row[2:]
-            elif row[0] > 0:
-                bounds[i] += row[2:] @ before
-    return hessian, linear, table, bounds
-
-
-def by_daqp(
-    hessian: Array, linear: Array, table: Array, bounds: Array
-) -> tuple[Array, float] | None:
-    try:
-        import daqp
-    except ImportError:
-        return None
-    started = time.perf_counter()
-    kinds = np.zeros(len(bounds), dtype=np.int32)
-    found = daqp.solve(hessian, linear, table, bounds, np.full(len(bounds), -1e30), kinds)
-    return found[0], time.perf_counter() - started
-
-
-def by_osqp(
-    hessian: Array, linear: Array, table: Array, bounds: Array
-) -> tuple[Array, float] | None:
-    try:
-        import osqp
-    except ImportError:
-        return None
-    from scipy import sparse
-
-    solver = osqp.OSQP()
-    upper, rows = sparse.csc_matrix(np.triu(hessian)), sparse.csc_matrix(table)
-    low = np.full(len(bounds), -np.inf)
-    solver.setup(upper, linear, rows, low, bounds, verbose=False, eps_abs=1e-6, eps_rel=1e-6)
-    found = solver.solve()
-    return found.x, found.info.run_time
-
-
 TIMING = """
 #include <stdio.h>
 #include <time.h>
@@ -345,16 +210,8 @@ def on_a_microcontroller() -> None:
             )
 
 
-PARTS: tuple[Callable[[], None], ...] = (
-    solvers,
-    on_this_machine,
-    on_a_microcontroller,
-    in_the_model,
-    on_rigs,
-)
-
-
 if __name__ == "__main__":
     warnings.simplefilter("ignore")
-    for part in PARTS:
-        part()
+    in_the_model()
+    on_this_machine()
+    on_a_microcontroller()

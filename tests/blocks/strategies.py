@@ -6,13 +6,16 @@ import numpy as np
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from mckibben import EUPI, GPI, PI, Polynomial, RateDependentPI
+from mckibben import EUPI, GPI, PI, Polynomial, RateDependentPI, Series
+from mckibben import PiecewiseLinear as Curve
 from mckibben.blocks.core.fields import vector
 from mckibben.blocks.laws.trial import through
 from mckibben.blocks.play_type.envelopes.base import Envelope
 from mckibben.blocks.play_type.envelopes.exponential import Exponential
 from mckibben.blocks.play_type.envelopes.piecewise_linear import PiecewiseLinear
 from mckibben.blocks.play_type.envelopes.tanh import Tanh
+from mckibben.blocks.preisach_type.krasnoselskii_pokrovskii import KrasnoselskiiPokrovskii
+from mckibben.blocks.preisach_type.preisach import Preisach
 
 Array = NDArray[np.float64]
 
@@ -124,3 +127,23 @@ def increasing_cubics(draw: st.DrawFn, low: float, high: float) -> Polynomial:
     square, cube = draw(numbers(-0.2, 0.2)) * linear, draw(numbers(-0.1, 0.3)) * linear
     centre, scale = (low + high) / 2, (high - low) / 2
     return Polynomial((draw(numbers(-5, 5)), linear, square, cube), centre, scale, (low, high))
+
+
+@st.composite
+def modified_models(draw: st.DrawFn) -> Series:
+    """Draw a Prandtl-Ishlinskii model and a curve that increases over all that it can give."""
+    model = draw(pi_models())
+    size = float(np.abs(model.weights).sum()) * (HIGH - LOW + max(model.thresholds))
+    low, high = model.offset - size, model.offset + size
+    if draw(st.booleans()):
+        return Series((model, draw(increasing_cubics(low, high))))
+    steps = draw(st.lists(numbers(0.1, 2.0), min_size=4, max_size=4))
+    values = vector(np.cumsum([0.0, *steps]) * (high - low))
+    return Series((model, Curve(vector(np.linspace(low, high, 5)), values)))
+
+
+@st.composite
+def preisach_models(draw: st.DrawFn) -> Preisach | KrasnoselskiiPokrovskii:
+    kind = draw(st.sampled_from([Preisach, KrasnoselskiiPokrovskii]))
+    weights = draw(st.lists(numbers(0.01, 2.0), min_size=15, max_size=15))
+    return kind(vector(np.linspace(LOW, HIGH, 6)), tuple(weights), draw(numbers(-5.0, 5.0)))

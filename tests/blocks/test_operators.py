@@ -1,0 +1,222 @@
+"""Play, Prandtl-Ishlinskii and Preisach models, and curves: closed forms and cases by hand.
+
+The laws that they share are in `tests.contracts.test_memory`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from mckibben import EUPI, GPI, PI, Affine, ModelWarning, PiecewiseLinear, Play, Polynomial
+from mckibben import RateDependentPI as RatedPI
+from mckibben.blocks.core.fields import vector
+from mckibben.blocks.play_type.eupi import eupi_matrix
+from mckibben.blocks.play_type.gpi import gpi_matrix
+from mckibben.blocks.play_type.maxwell_slip import slip_matrix
+from mckibben.blocks.play_type.play import play_matrix
+from mckibben.blocks.preisach_type.preisach import DEPTH, Preisach
+from tests.blocks.strategies import HIGH, LOW, eupi_models, gpi_models, numbers, paths, pi_models
+
+Array = NDArray[np.float64]
+
+
+# -- play operators ------------------------------------------------------------------------------
+
+
+@given(numbers(-3.0, 3.0), numbers(0.05, 2.0), numbers(0.0, 1.0))
+def test_the_dead_zone_is_twice_the_threshold(peak: float, r: float, share: float) -> None:
+    """After a peak the output holds until the input has come back by 2 r, then follows."""
+    outputs = Play(r).simulate([peak - 10.0, peak, peak - 2 * r * share, peak - 2 * r - 1.0])
+    np.testing.assert_allclose(outputs[1:], [peak - r, peak - r, peak - r - 1.0], atol=1e-12)
+
+
+def test_starts() -> None:
+    assert Play(1.0).simulate([3.0, 2.0]).tolist() == [2.0, 2.0]
+    assert Play(1.0).simulate([3.0, 2.0], initial="virgin").tolist() == [2.0, 2.0]
+    assert Play(1.0).simulate([0.5, 0.0], initial="virgin").tolist() == [0.0, 0.0]
+    assert Play(1.0).simulate([0.5, 0.0], initial=[1.2]).tolist() == [1.2, 1.0]
+    assert Play(1.0, initial=(1.2,)).simulate([0.5, 0.0]).tolist() == [1.2, 1.0]
+
+
+# -- operators side by side, from which estimators find weights ------------------------------------
+
+
+@pytest.mark.kernel
+@given(paths(), st.lists(numbers(0.01, 1.0), min_size=1, max_size=6))
+def test_play_operators_side_by_side_are_single_operators(u: Array, steps: list[float]) -> None:
+    r = np.cumsum(steps)
+    operators = np.empty((u.size, r.size))
+    play_matrix(u, r, u[0] - r, operators)
+    for column, threshold in zip(operators.T, r.tolist(), strict=True):
+        np.testing.assert_array_equal(column, Play(threshold).simulate(u))
+
+
+@pytest.mark.kernel
+@given(gpi_models(), paths())
+def test_generalised_operators_side_by_side_are_the_model(model: GPI, u: Array) -> None:
+    r, rising, falling = np.array(model.thresholds), model.rising(u), model.falling(u)
+    operators = np.empty((u.size, r.size))
+    gpi_matrix(u, rising, falling, r, rising[0] - r, operators)
+    np.testing.assert_allclose(operators @ model.weights, model.simulate(u), atol=1e-10)
+
+
+@pytest.mark.kernel
+@given(eupi_models(), paths())
+def test_unparallel_operators_side_by_side_are_the_model(model: EUPI, u: Array) -> None:
+    bare = replace(model, polynomial=(0.0, 0.0, 0.0), offset=0.0)
+    r = np.array(model.thresholds)
+    operators = np.empty((u.size, r.size))
+    edges = model.falling_slope, model.falling_threshold
+    eupi_matrix(u - LOW, *edges, r, u[0] - LOW - r, operators)
+    np.testing.assert_allclose(operators @ model.weights, bare.simulate(u), atol=1e-10)
+
+
+@pytest.mark.kernel
+def test_springs_side_by_side_are_each_alone() -> None:
+    u, limits = np.random.default_rng(0).uniform(0.0, 5.0, 300), np.array([0.2, 0.9, 2.0])
+    stiffness, ratio = 1.3, 0.7
+    deflections = np.empty((u.size, limits.size))
+    slip_matrix(u, limits, stiffness, ratio, limits.copy(), deflections)
+    for limit, found in zip(limits.tolist(), deflections.T, strict=True):
+        s, expected = limit, [limit]
+        for move in np.diff(u).tolist():
+            s = min(s + move, limit) if move >= 0 else max(s + stiffness * move, -ratio * limit)
+            expected.append(s)
+        np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-14)
+
+
+# -- models ----------------------------------------------------------------------------------------
+
+
+def closed_form(model: PI) -> tuple[PI, tuple[float, ...]]:
+    """Return the textbook inverse, itself a PI model, and the state of its operators after a rise.
+
+    r^_i = sum_{j<=i} w_j (r_i - r_j), w^_0 = 1 / w_0, w^_i = -w_i / (S_i S_{i-1}) with S_i the
+    partial sums; operator i of a model that only rose to y is at y - r^_i.
+    """
+    r, w = np.array(model.thresholds), np.array(model.weights)
+    partial = np.cumsum(w)
+    thresholds = [float(w[: i + 1] @ (r[i] - r[: i + 1])) for i in range(r.size)]
+    weights = [1 / w[0], *(-w[1:] / (partial[1:] * partial[:-1]))]
+    return PI(tuple(thresholds), vector(weights)), tuple(thresholds)
+
+
+@given(pi_models(), paths(0.1, 4.9))
+def test_the_inverse_is_the_textbook_closed_form(model: PI, u: Array) -> None:
+    references = model.simulate(u)
+    inverse, r_hat = closed_form(model)
+    risen = [float(references[0]) - model.offset - r for r in r_hat]
+    expected = inverse.simulate(references - model.offset, initial=risen)
+    np.testing.assert_allclose(model.inverse().simulate(references), expected, atol=1e-9 * HIGH)
+
+
+def test_two_ranges_of_memory_by_hand() -> None:
+    model = PI((0.0, 0.5), (3.0, 1.0))
+    assert model.simulate([0.0, 2.0, 1.0, 1.5]).tolist() == [-0.5, 7.5, 4.5, 6.0]
+    assert model.inverse().simulate([-0.5, 7.5, 4.5, 6.0]).tolist() == [0.0, 2.0, 1.0, 1.5]
+
+
+def test_unparallel_edges_by_hand() -> None:
+    """Rises along x - 1; falls along 2 x + 0.5 once it meets it."""
+    model = EUPI((1.0,), (1.0,), 2.0, 0.5, (0.0, 0.0, 0.0), 0.0, (0.0, 5.0))
+    assert model.simulate([0.0, 4.0, 2.0, 1.0, 0.5, 3.0]).tolist() == [-1, 3, 3, 2.5, 1.5, 2]
+
+
+def test_a_held_reference_holds_the_input() -> None:
+    """Rounding must not be taken for a reversal, on which the input jumps across the dead zone."""
+    model = GPI.example()
+    u = np.concatenate([np.linspace(0.5, 4.5, 40), np.linspace(4.5, 1.0, 40), np.full(500, 1.0)])
+    recovered = model.inverse().simulate(model.simulate(u))
+    assert np.ptp(recovered[-500:]) == 0.0
+
+
+def test_the_rate_is_filtered_exactly_on_a_ramp() -> None:
+    """After a time t on a ramp of rate v the filtered rate is v (1 - exp(-t / tau))."""
+    model = RatedPI((0.0,), (1.0,), (0.0,), rate_time_constant=0.3)
+    t = np.arange(200) * 0.01
+    outputs = model.simulate(2.0 * t, sample_time=0.01)
+    np.testing.assert_allclose(outputs, 2.0 * (1 - np.exp(-t / 0.3)) * 2.0 * t, atol=1e-12)
+
+
+def relays(model: Preisach, inputs: Array) -> Array:
+    """Count relays, one to every cell: they switch at the level above and at the level below."""
+    n = len(model.levels) - 1
+    cells = [(i, j) for i in range(n) for j in range(i + 1)]
+    up = np.zeros(len(cells), dtype=bool)
+    outputs = []
+    for u in inputs:
+        for k, (i, j) in enumerate(cells):
+            if u >= model.levels[i + 1]:
+                up[k] = True
+            elif u <= model.levels[j]:
+                up[k] = False
+        outputs.append(model.offset + 2 * float(np.array(model.weights)[up].sum()))
+    return np.array(outputs)
+
+
+@given(st.lists(st.integers(0, 5), min_size=2, max_size=60))
+@settings(max_examples=100, deadline=None)
+def test_at_its_levels_preisachs_model_is_a_sum_of_relays(places: list[int]) -> None:
+    model = Preisach.example()
+    inputs = np.array(model.levels)[places]
+    np.testing.assert_allclose(model.simulate(inputs), relays(model, inputs), atol=1e-12)
+
+
+@pytest.mark.kernel
+def test_preisachs_model_forgets_the_smallest_of_too_many_loops_and_no_other() -> None:
+    """Ever smaller loops nest; when the input leaves them all, nothing of them is left."""
+    block = Preisach.example()
+    low, high = block.limits
+    shrinking = 0.5 * (low + high) + 0.45 * (high - low) * (-0.95) ** np.arange(DEPTH + 12)
+    around = np.array([low, high, *shrinking, high, low + 0.3 * (high - low)])
+    directly = np.array([low, high, high, low + 0.3 * (high - low)])
+    outputs = block.simulate(around)
+    assert outputs[-1] == pytest.approx(block.simulate(directly)[-1], rel=1e-12)
+    inputs = block.inverse().simulate(outputs)
+    np.testing.assert_allclose(block.simulate(inputs), outputs, atol=1e-9 * np.ptp(outputs))
+
+
+# -- curves ----------------------------------------------------------------------------------------
+
+
+def test_a_polynomial_that_is_flat_at_an_end_has_an_inverse_still() -> None:
+    parabola = Polynomial((0.0, 0.0, 1.0), input_range=(0.0, 2.0))
+    u = np.linspace(0.0, 2.0, 101)
+    np.testing.assert_allclose(parabola.inverse().simulate(parabola.simulate(u)), u, atol=1e-12)
+
+
+def test_a_polynomial_gives_the_ends_of_its_range_for_what_is_beyond() -> None:
+    curve = Polynomial.example()
+    low, high = (float(end[0]) for end in curve.reachable())
+    with pytest.warns(ModelWarning):
+        recovered = curve.inverse().simulate([low - 1, high + 1, low, high])
+    assert recovered.tolist() == [0.0, 10.0, 0.0, 10.0]
+
+
+@given(st.data())
+def test_a_piecewise_linear_curve_is_numpys_between_its_knots(data: st.DataObject) -> None:
+    steps = data.draw(st.lists(numbers(0.01, 3.0), min_size=3, max_size=8))
+    rises = data.draw(st.lists(numbers(0.01, 3.0), min_size=len(steps), max_size=len(steps)))
+    knots, values = vector(np.cumsum(steps)), vector(np.cumsum(rises))
+    curve = PiecewiseLinear(knots, values)
+    x = np.array(data.draw(st.lists(numbers(knots[0], knots[-1]), min_size=1, max_size=20)))
+    np.testing.assert_allclose(curve.simulate(x), np.interp(x, knots, values), atol=1e-12)
+    np.testing.assert_allclose(curve.inverse().simulate(curve.simulate(x)), x, atol=1e-9)
+
+
+def test_a_piecewise_linear_curve_goes_on_straight_beyond_its_ends() -> None:
+    curve = PiecewiseLinear((0.0, 1.0, 3.0), (0.0, 2.0, 3.0))
+    assert curve.simulate([-1.0, 5.0]).tolist() == [-2.0, 4.0]
+
+
+@pytest.mark.parametrize("gain", [-40.0, 0.01])
+def test_an_affine_map_is_undone(gain: float) -> None:
+    block, u = Affine(gain, 3.0), np.array([-50.0, 0.0, 7.5])
+    np.testing.assert_allclose(block.simulate(u), gain * u + 3.0, rtol=1e-15)
+    np.testing.assert_allclose(block.inverse().simulate(block.simulate(u)), u, atol=1e-12)

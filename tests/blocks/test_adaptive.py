@@ -13,20 +13,14 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from mckibben import Block, ModelError, Series, load
-from mckibben.blocks.adaptive.adaptable import Adaptable
 from mckibben.blocks.adaptive.adaptive import Adaptive, taught
-from mckibben.blocks.adaptive.adaptive_series import AdaptiveSeries, adaptive
+from mckibben.blocks.adaptive.adaptive_series import adaptive
 from mckibben.blocks.adaptive.drift import alarm_limit
 from mckibben.blocks.adaptive.learning import (
     READY,
     SENSES,
     covariance_of,
-    learn,
-    start_root,
-    start_sense,
-    trusted,
 )
-from mckibben.blocks.compose import PerChannel
 from mckibben.blocks.dynamic.creep import Creep
 from mckibben.blocks.feedback.feedforward_feedback import FeedforwardFeedback
 from mckibben.blocks.feedback.pid import PIDFeedback
@@ -80,6 +74,7 @@ def rms(values: Array) -> float:
     return float(np.sqrt(np.mean(values**2)))
 
 
+@pytest.mark.kernel
 @pytest.mark.parametrize("model", MODELS, ids=lambda model: model.kind)
 @settings(max_examples=8, deadline=None)
 @given(seed=st.integers(0, 2**32 - 1), size=st.sampled_from([0.01, 1.0, 1e3, 1e200]))
@@ -136,23 +131,7 @@ def test_noise_makes_the_input_turn_no_more_often_than_the_reference() -> None:
     assert turns(given) == turns(asked)
 
 
-@pytest.mark.parametrize("helps", [True, False])
-def test_what_is_learnt_is_used_as_far_as_it_helped(helps: bool) -> None:
-    """Against least squares of the fit's errors over what was learnt beside it."""
-    rng, n, share = np.random.default_rng(7), 4000, 0.001
-    sense, settings, one = start_sense(0.1), np.array([share, 0.1, 1.0]), np.ones(1)
-    fresh = start_root(np.eye(1))
-    made_up = rng.standard_normal(n)
-    for change in made_up.tolist():  # what is learnt is made to be so far from the fit
-        theta, root = np.array([change]), fresh.copy()
-        measured = (0.6 * change if helps else -change) + 0.1 * rng.standard_normal()
-        learn(
-            *(settings, one, one, fresh, theta, root, sense, one, np.zeros(3)),
-            *(measured, change, 0.0, 0.0),
-        )
-    assert trusted(sense) == pytest.approx(0.6 if helps else 0.0, abs=0.05)
-
-
+@pytest.mark.kernel
 def test_outliers_cost_little() -> None:
     model, rng = PI.example(), np.random.default_rng(2)
     asked = references(model, 60.0)
@@ -167,6 +146,7 @@ def test_outliers_cost_little() -> None:
     assert rms(np.array(errors)) < 0.02
 
 
+@pytest.mark.kernel
 @pytest.mark.parametrize("measured", ["absent", "frozen"])
 def test_a_sensor_that_fails_teaches_nothing(measured: str) -> None:
     model = PI.example()
@@ -180,6 +160,7 @@ def test_a_sensor_that_fails_teaches_nothing(measured: str) -> None:
     assert np.abs(change).max() < (1e-15 if measured == "absent" else 0.01)
 
 
+@pytest.mark.kernel
 def test_nothing_blows_up_where_nothing_moves() -> None:
     model = GPI.example()
     block = Adaptive(model, 5.0, 0.02)
@@ -197,128 +178,86 @@ def test_nothing_blows_up_where_nothing_moves() -> None:
     assert np.abs(theta[:-1] / model.weights - 1).max() < 0.3
 
 
-def test_the_root_is_that_of_its_covariance() -> None:
-    spread = PI.example().spread
-    np.testing.assert_allclose(covariance_of(start_root(spread), len(spread)), spread, rtol=1e-12)
+def experienced(block: Any, seconds: float = 10.0) -> tuple[Array, Array]:
+    """Return a learner's state after readings 10 % above what was asked, and what was asked."""
+    asked = references(PI.example(), seconds)
+    stream = block.stream(STEP)
+    for y in asked:
+        stream.step([y, 1.1 * y])
+    return np.array(stream.state), asked
 
 
 @pytest.mark.parametrize("model", [*MODELS, CREEPING], ids=lambda model: model.kind)
 def test_saved_and_resumed_it_goes_on_to_the_bit(model: Block, tmp_path: Path) -> None:
-    block = adaptive(model, 10.0, 0.05)
-    rng = np.random.default_rng(4)
-    asked = references(PI.example(), 10.0)
-    pairs = np.column_stack([asked, asked + rng.normal(0, 0.3, asked.size)])
-    whole = block.stream(STEP)
-    expected = [whole.step(pair).copy() for pair in pairs]
-    first = block.stream(STEP)
-    for pair in pairs[:500]:
-        first.step(pair)
-    block.resumed(first.state).save(tmp_path / "learnt.json")
-    second = load(tmp_path / "learnt.json").stream(STEP)
-    np.testing.assert_array_equal(
-        [second.step(pair).copy() for pair in pairs[500:]], expected[500:]
-    )
+    block: Any = adaptive(model, 10.0, 0.05)
+    state, asked = experienced(block)
+    block.resumed(state).save(tmp_path / "learnt.json")
+    again, going_on = load(tmp_path / "learnt.json").stream(STEP), block.stream(STEP, initial=state)
+    for y in asked:
+        np.testing.assert_array_equal(again.step([y, y]), going_on.step([y, y]))
 
 
 @pytest.mark.parametrize("model", [PI.example(), CREEPING], ids=["pi", "series"])
-@pytest.mark.parametrize("noise", [1e-300, 1e160])
-def test_noise_that_no_sensor_has_is_refused(model: Block, noise: float) -> None:
-    with pytest.raises(ModelError, match=r"noise of .* Remedy: give the standard deviation"):
-        adaptive(model, 20.0, noise)
-
-
-@pytest.mark.parametrize("time", [1e-9, 1e12])
-def test_times_that_nothing_is_learnt_in_are_refused(time: float) -> None:
-    with pytest.raises(ModelError, match=r"time of .*Remedy: give 0\.001 to 1e\+09 s"):
-        adaptive(PI.example(), time, 0.02)
-    for extreme in (1e-3, 1e9):
-        assert 0 < alarm_limit(extreme, 3) < 10
-
-
-def test_what_cannot_learn_says_what_can() -> None:
-    with pytest.raises(ModelError, match=r"cannot learn while it runs.*Remedy: adapt a pi"):
-        adaptive(PerChannel.example(), 20.0, 0.02)
-    with pytest.raises(ModelError, match=r"learns already.*Remedy"):
-        adaptive(Adaptive.example(), 20.0, 0.02)
+def test_vented_it_keeps_what_is_learnt_and_not_where_it_was(model: Block, tmp_path: Path) -> None:
+    block: Any = adaptive(model, 10.0, 0.05)
+    state, asked = experienced(block)
+    block.resumed(state, memory=False).save(tmp_path / "learnt.json")
+    resumed: Any = load(tmp_path / "learnt.json")
+    first = np.array([asked[0], asked[0]])
+    begun, fresh = resumed.initial_state(first), block.initial_state(first)
+    assert str(resumed.present(begun)) == str(block.present(state))
+    if isinstance(resumed, Adaptive):
+        own = resumed.fixed.n_states
+        np.testing.assert_array_equal(begun[:own], fresh[:own])
 
 
 def test_a_memory_that_never_came_of_running_is_refused() -> None:
     block = Adaptive(PI.example(), 10.0, 0.05)
-    stream, asked = block.stream(STEP), references(PI.example(), 2.0)
-    for y in asked:
-        stream.step([y, y + 0.01])
-    kept = block.resumed(stream.state).memory
-    assert kept is not None
-    for place in range(len(kept)):
-        spoilt = np.array(kept)
-        spoilt[place] = 1e18
-        try:
-            block_of = replace(block, memory=tuple(spoilt.tolist()))
-        except ModelError:
-            continue
-        run = block_of.stream(STEP)  # what the sensor read last may be anything
-        assert np.abs([run.step([y, y])[0] for y in asked]).max() < 10.0
+    memory = block.resumed(experienced(block, 2.0)[0]).memory
+    assert memory is not None
     for place in (0, block.fixed.n_states + 1, -SENSES + READY):
-        spoilt = np.array(kept)
+        spoilt = np.array(memory)
         spoilt[place] = 1e18
-        with pytest.raises(ModelError, match=r"in the memory of 'adaptive' cannot.*Remedy"):
+        with pytest.raises(ModelError, match="'adaptive'"):
             replace(block, memory=tuple(spoilt.tolist()))
 
 
 @pytest.mark.parametrize("model", [PI.example(), CREEPING], ids=["pi", "series"])
-def test_vented_it_keeps_what_is_learnt(model: Block, tmp_path: Path) -> None:
-    block = adaptive(model, 10.0, 0.05)
-    asked = references(PI.example(), 10.0)
-    stream = block.stream(STEP)
-    for y in asked:
-        stream.step([y, 1.1 * y])
-    block.resumed(stream.state, memory=False).save(tmp_path / "learnt.json")
-    resumed = load(tmp_path / "learnt.json")
-    assert isinstance(resumed, type(block))
-    first = np.array([asked[0], asked[0]])
-    state = resumed.initial_state(first)
-    fresh = block.initial_state(first)
-    assert str(resumed.present(state)) == str(block.present(stream.state))
-    core = resumed.core if isinstance(resumed, AdaptiveSeries) else resumed
-    own = core.fixed.n_states
-    if core is resumed:
-        np.testing.assert_array_equal(state[:own], fresh[:own])
-    again = resumed.stream(STEP)
-    assert np.isfinite([again.step([y, y]) for y in asked]).all()
+def test_before_anything_is_measured_nothing_has_drifted(model: Block) -> None:
+    block: Any = adaptive(model, 20.0, 0.02)
+    for state in (block.stream(STEP).state, block.initial_state(np.zeros(2))):
+        assert not any(block.drift(state).changes)
+        assert not block.drift(state).alarm
 
 
-def test_a_memory_of_another_model_is_refused() -> None:
-    with pytest.raises(ModelError, match=r"memory of 'adaptive' has 3 numbers.*Remedy"):
-        replace(Adaptive.example(), memory=(0.0, 1.0, 2.0))
-    with pytest.raises(ModelError, match=r"cannot learn while it runs.*Remedy"):
-        adaptive(Creep.example(), 10.0)
-    with pytest.raises(ModelError, match=r"0 parts of this series can learn.*Remedy"):
-        AdaptiveSeries(Series((Creep.example(),)), 10.0, 0.1)
-
-
-def test_drift_is_told_in_a_sentence() -> None:
+def test_a_gain_that_drifts_is_found_and_nothing_else() -> None:
     model = PI.example()
-    block = adaptive(model, 20.0, 0.02)
+    block: Any = adaptive(model, 20.0, 0.02)
     stream, plant = block.stream(STEP), changed(model, 1.2, 0.0).stream()
     reading, rng = 0.0, np.random.default_rng(5)
     for y in references(model, 60.0):
         reading = plant.step(stream.step([y, reading or y])[0])[0] + 0.02 * rng.standard_normal()
     found = block.drift(stream.state)
     assert found.alarm
-    assert "gain 20 % higher" in str(found)
-    assert "friction" in str(found)
-    assert "unchanged" in str(found)
-    assert not block.drift(block.stream(STEP).block.initial_state(np.zeros(2))).alarm
+    assert found.changes[0] == pytest.approx(0.2, abs=0.005)
+    assert (np.abs(found.by_errors[1:]) < 2.0).all()
 
 
-@pytest.mark.parametrize("model", [PI.example(), CREEPING], ids=["pi", "series"])
-def test_before_anything_is_measured_nothing_has_drifted(model: Block) -> None:
-    block = adaptive(model, 20.0, 0.02)
-    for state in (block.stream(STEP).state, block.initial_state(np.zeros(2))):
-        found = block.drift(state)
-        assert str(found) == "nothing measured yet"
-        assert not any(found.changes)
-        assert not found.alarm
+@needs("cc")
+@pytest.mark.parametrize("model", [GPI.example(), CREEPING], ids=["gpi", "series"])
+def test_c_is_python_also_where_the_sensor_fails(model: Block, tmp_path: Path) -> None:
+    block, rng = adaptive(model, 10.0, 0.05), np.random.default_rng(6)
+    asked = references(GPI.example() if model.kind == "gpi" else Series.example(), 30.0)
+    pairs = np.column_stack([asked, asked + rng.normal(0, 0.3, asked.size)])
+    if block.n_missable:
+        pairs[rng.random(asked.size) < 0.05, 1] = np.nan
+    expected = block.simulate(pairs, sample_time=STEP)
+    for single, tolerance in ((False, 1e-12), (True, 1e-4)):
+        folder = tmp_path / f"c{single}"
+        export_c(block, folder, name="muscle", sample_time=STEP, single=single)
+        outputs, statuses = CompiledModel(folder, "muscle", 2, 1).run(pairs)
+        assert not statuses.any()
+        assert np.abs(outputs - expected).max() <= tolerance * np.ptp(expected)
 
 
 def test_alarms_are_false_no_more_often_than_told() -> None:
@@ -363,34 +302,3 @@ def test_beside_feedback_it_shares_what_is_measured() -> None:
     asked = references(model, 40.0)
     given = closed(block, [changed(model)], asked, 0.02)
     assert rms((given - asked)[3000:]) < 0.02
-
-
-@needs("cc")
-@pytest.mark.parametrize("name", ["gpi", "series", "creeping", "feedback"])
-def test_c_is_python(name: str, tmp_path: Path) -> None:
-    model: Any = {"gpi": GPI.example(), "series": Series.example()}.get(name, CREEPING)
-    block: Block = adaptive(model, 10.0, 0.05)
-    if name == "feedback":
-        gains = ((0.01,), (0.05,), (0.0,))
-        pid = PIDFeedback.of(model.outputs, model.inputs, *gains, limits=(0.0, 5.0))
-        block = FeedforwardFeedback.of(adaptive(model, 10.0, 0.05), pid)
-    rng = np.random.default_rng(6)
-    asked = references(model if model.kind == "gpi" else Series.example(), 30.0)
-    pairs = np.column_stack([asked, asked + rng.normal(0, 0.3, asked.size)])
-    if block.n_missable:
-        pairs[rng.random(asked.size) < 0.05, 1] = np.nan
-    expected = block.simulate(pairs, sample_time=STEP)
-    for single, tolerance in ((False, 1e-12), (True, 1e-4)):
-        folder = tmp_path / f"c{single}"
-        export_c(block, folder, name="muscle", sample_time=STEP, single=single)
-        outputs, statuses = CompiledModel(folder, "muscle", 2, 1).run(pairs)
-        assert not statuses.any()
-        assert np.abs(outputs - expected).max() <= tolerance * np.ptp(expected)
-
-
-def test_every_family_says_what_its_parameters_are() -> None:
-    for model in MODELS:
-        assert isinstance(model, Adaptable)
-        assert model.spread.shape == (model.taught.size,) * 2
-        assert (np.linalg.eigvalsh(model.spread) > 0).all()
-        np.testing.assert_allclose(model.group_changes(model.taught), 0.0, atol=1e-15)

@@ -12,14 +12,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from mckibben import ModelError
 from mckibben.blocks.adaptive.adaptive import Adaptive
 from mckibben.blocks.core.inverse import Inverse
 from mckibben.blocks.coupled.balance import Balance
 from mckibben.blocks.coupled.balance_adapting import (
     FRICTION,
     KINDS,
-    OFFSET,
     STIFFNESS,
     answer,
     retune,
@@ -94,6 +92,7 @@ def test_model_and_inverse_match_at_every_step(balance: Balance, seed: int, wild
             measured = measured + rng.choice([0.0, 1e3, np.nan, -30.0], n)
 
 
+@pytest.mark.kernel
 @settings(max_examples=15, deadline=None)
 @given(balances(), st.integers(0, 1000))
 def test_what_garbage_teaches_is_a_balance_still(balance: Balance, seed: int) -> None:
@@ -114,6 +113,7 @@ def test_what_garbage_teaches_is_a_balance_still(balance: Balance, seed: int) ->
     assert np.linalg.eigvalsh(matrix)[0] > 0
 
 
+@pytest.mark.kernel
 @settings(max_examples=15, deadline=None)
 @given(balances(m=0, n_lags=0))
 def test_slopes_are_those_of_equilibria(balance: Balance) -> None:
@@ -140,6 +140,7 @@ def test_slopes_are_those_of_equilibria(balance: Balance) -> None:
         np.testing.assert_allclose(slopes[:, i], expected, rtol=1e-5, atol=1e-6 * np.ptp(y) + 1e-6)
 
 
+@pytest.mark.kernel
 @settings(max_examples=20, deadline=None)
 @given(balances(), st.integers(0, 1000))
 def test_retuned_coefficients_are_those_of_the_block_retaught(balance: Balance, seed: int) -> None:
@@ -202,28 +203,20 @@ def single() -> Balance:
     )
 
 
-def test_softer_springs_are_made_up_for_and_told() -> None:
+@pytest.mark.parametrize(
+    ("kind", "factor", "name"), [(STIFFNESS, 0.85, "springs"), (FRICTION, 1.3, "friction")]
+)
+def test_what_changed_is_made_up_for_and_found(kind: int, factor: float, name: str) -> None:
     balance = single()
     block = Adaptive(Inverse(balance), 20.0, 0.02)
-    loop, errors = followed(block, changed_by(balance, STIFFNESS, 0.85), 4000)
-    fixed = np.abs(errors[:200]).max()
-    assert np.sqrt((errors[-1000:] ** 2).mean()) < 0.05 * fixed
+    loop, errors = followed(block, changed_by(balance, kind, factor), 4000)
+    assert np.sqrt((errors[-1000:] ** 2).mean()) < 0.05 * np.abs(errors[:200]).max() + 0.005
     drift = block.drift(loop.state)
-    told = dict(zip((g.name for g in drift.groups), drift.changes, strict=True))
-    assert told["springs"] == pytest.approx(-0.15, abs=0.03)
+    changes = dict(zip((g.name for g in drift.groups), drift.changes, strict=True))
+    assert changes.pop(name) == pytest.approx(factor - 1.0, abs=0.2 * abs(factor - 1.0))
     assert drift.alarm
-    assert "springs" in str(drift)
-    assert "softer" in str(drift)
-    assert "friction unchanged" in str(drift) or "friction" in str(drift).split("; ")[-1]
-
-
-def test_more_friction_is_learnt_as_friction() -> None:
-    balance = single()
-    block = Adaptive(Inverse(balance), 20.0, 0.02)
-    loop, _ = followed(block, changed_by(balance, FRICTION, 1.3), 4000)
-    changes = block.drift(loop.state).changes
-    assert changes[2] == pytest.approx(0.3, abs=0.06)
-    assert abs(changes[0]) < 0.03
+    _, errors = followed(block, balance.inverse(), 4000)
+    assert np.sqrt((errors**2).mean()) < 0.01  # without a change it is as good as fixed
 
 
 def test_several_muscles_learn_together() -> None:
@@ -235,12 +228,7 @@ def test_several_muscles_learn_together() -> None:
     assert np.abs(errors[:20]).max() > 0.3
 
 
-def test_without_drift_it_is_as_good_as_fixed() -> None:
-    balance = single()
-    _, errors = followed(Adaptive(Inverse(balance), 20.0, 0.02), balance.inverse(), 4000)
-    assert np.sqrt((errors**2).mean()) < 0.01
-
-
+@pytest.mark.kernel
 @pytest.mark.parametrize("fault", [np.nan, 12.0])
 def test_a_sensor_that_drops_out_or_stands_still_teaches_nothing(fault: float) -> None:
     balance = single()
@@ -254,6 +242,38 @@ def test_a_sensor_that_drops_out_or_stands_still_teaches_nothing(fault: float) -
     np.testing.assert_allclose(theta, balance.taught, atol=0.02)
 
 
+@needs("cc")
+@pytest.mark.parametrize(
+    ("change", "single"),
+    [
+        ({"pushes": (8.0, 2.0)}, False),
+        pytest.param({}, False, marks=pytest.mark.long),
+        pytest.param({"settled": True, "tare": True}, False, marks=pytest.mark.long),
+        pytest.param({}, True, marks=pytest.mark.long),
+    ],
+)
+def test_c_gives_the_same_numbers(change: dict[str, Any], single: bool, tmp_path: Path) -> None:
+    from mckibben.export import export_c
+    from mckibben.export.c.building import CompiledModel
+
+    block = Adaptive(Inverse(replace(Balance.example(), **change)), 5.0, 0.1)
+    asked, rng = path(Balance.example(), 4, 2000), np.random.default_rng(1)
+    measured = 0.95 * asked[:, :2] + 1.0 + 0.1 * rng.standard_normal((2000, 2))
+    measured = np.vstack([measured[:1], measured[:-1]])
+    measured[700] *= 3.0
+    measured[1000:1030] = measured[1000]
+    inputs = np.hstack([asked, measured])
+    if single:
+        inputs = inputs.astype(np.float32).astype(np.float64)
+    export_c(block, tmp_path / "c", name="muscle", sample_time=STEP, single=single)
+    outputs, statuses = CompiledModel(tmp_path / "c", "muscle", 6, 2).run(inputs)
+    assert not statuses.any()
+    expected = block.simulate(inputs, sample_time=STEP)
+    far = np.abs(outputs - expected) / np.ptp(expected, axis=0)
+    # measured as it is, parameters run into their bounds, where single precision strays
+    assert far.max() <= (1e-3 if single else 1e-12)
+
+
 def test_it_goes_on_where_it_was_stopped() -> None:
     balance = single()
     block, asked = Adaptive(Inverse(balance), 5.0, 0.02), path(balance, 5, 200)
@@ -264,45 +284,3 @@ def test_it_goes_on_where_it_was_stopped() -> None:
     second = Loop(block.resumed(first.state))
     again = [second.step(s, 0.95 * s) for s in asked[100:]]
     np.testing.assert_array_equal(straight[100:], again)
-
-
-def test_what_is_told_of_an_area_needs_a_load() -> None:
-    """A muscle alone, without a load that is measured: forces are known but for their unit."""
-    assert all(kind != 2 for _, kind in single().learnt)
-    loaded = Balance.example()
-    assert {(0, 2), (1, 2)} <= set(loaded.learnt)
-
-
-def test_a_balance_learns_as_a_compensator_only() -> None:
-    with pytest.raises(ModelError, match="does not learn"):
-        Adaptive(single(), 20.0, 0.02)
-
-
-@needs("cc")
-@pytest.mark.parametrize("single_precision", [False, True])
-@pytest.mark.parametrize("change", [{}, {"pushes": (8.0, 2.0)}, {"settled": True, "tare": True}])
-def test_c_gives_the_same_numbers(
-    change: dict[str, Any], single_precision: bool, tmp_path: Path
-) -> None:
-    from mckibben.export import export_c
-    from mckibben.export.c.building import CompiledModel
-
-    balance = replace(Balance.example(), **change)
-    block, rng = Adaptive(Inverse(balance), 5.0, 0.1), np.random.default_rng(1)
-    asked = path(balance, 4, 2000)
-    measured = 0.95 * asked[:, :2] + 1.0 + 0.1 * rng.standard_normal((2000, 2))
-    measured = np.vstack([measured[:1], measured[:-1]])
-    measured[700] *= 3.0
-    measured[1000:1030] = measured[1000]
-    inputs = np.hstack([asked, measured])
-    if single_precision:
-        inputs = inputs.astype(np.float32).astype(np.float64)
-    export_c(block, tmp_path / "c", name="muscle", sample_time=STEP, single=single_precision)
-    outputs, statuses = CompiledModel(tmp_path / "c", "muscle", 6, 2).run(inputs)
-    assert not statuses.any()
-    expected = block.simulate(inputs, sample_time=STEP)
-    far = np.abs(outputs - expected) / np.ptp(expected, axis=0)
-    # measured as it is, parameters run into their bounds, where single precision strays
-    assert far.max() <= (1e-3 if single_precision else 1e-12)
-    kinds = np.array([kind for _, kind in balance.learnt])
-    assert (kinds == OFFSET).sum() == 2

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
-from itertools import pairwise
 from typing import Literal
 
 import numpy as np
@@ -15,7 +14,6 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from mckibben import ModelError
 from mckibben.blocks.differential.bouc_wen import BoucWen
 from mckibben.blocks.differential.duhem import Duhem
 from mckibben.blocks.differential.generalized_bouc_wen import GeneralizedBoucWen
@@ -106,20 +104,3 @@ def test_z_stays_within_its_bounds(turns: list[float], sigma: float) -> None:
     assert np.abs(model.simulate(turns)).max() <= 1 + 1e-12
     wide = replace(GeneralizedBoucWen.example(), polynomial=(0.0,), weight=1.0)
     assert np.abs(wide.simulate(turns)).max() <= wide.bound + 1e-12
-
-
-@pytest.mark.parametrize("model", [BoucWen.example(), GeneralizedBoucWen.example()])
-def test_steps_add_up(model: BoucWen | GeneralizedBoucWen) -> None:
-    turns = turning(4)
-    fine = np.concatenate([np.linspace(a, b, 50) for a, b in pairwise(turns)])
-    assert model.simulate(fine)[-1] == pytest.approx(model.simulate(turns)[-1], rel=1e-12)
-
-
-def test_shapes_that_would_run_away_are_refused() -> None:
-    with pytest.raises(ModelError, match=r"shape.*add up to less than 1"):
-        replace(GeneralizedBoucWen.example(), shape=(0.5, 0.5, 0.1, 0.0, 0.0))
-    with pytest.raises(ModelError, match="exponent"):
-        replace(BoucWen.example(), exponent=3)  # type: ignore[arg-type]
-    falling = replace(BoucWen.example(), weight=-50.0)
-    with pytest.raises(ModelError, match="no inverse: its output may fall"):
-        falling.inverse()

@@ -9,9 +9,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter, lsim
 
-from mckibben import ModelError
 from mckibben.blocks.dynamic.creep import Creep
-from mckibben.blocks.dynamic.narx_polynomial import NarxPolynomial
 from mckibben.blocks.dynamic.process_model import ProcessModel
 from mckibben.blocks.dynamic.transfer_function import TransferFunction
 from mckibben.papers.field_models.published import process_model
@@ -77,23 +75,3 @@ def test_transfer_function_is_scipys_filter() -> None:
     y = model.simulate(INPUT, initial="virgin", sample_time=STEP)
     filtered = lfilter(model.numerator, [1.0, *model.denominator], INPUT - model.input_offset)
     np.testing.assert_allclose(y, filtered + model.output_offset, atol=1e-12)
-
-
-def test_discrete_models_refuse_another_sample_time() -> None:
-    for model in (TransferFunction.example(), NarxPolynomial.example()):
-        with pytest.raises(ModelError, match=r"holds for a sample time of 0.01 s.*resample"):
-            model.simulate(INPUT, sample_time=0.02)
-
-
-def test_models_without_an_inverse_say_why() -> None:
-    late = replace(TransferFunction.example(), numerator=(0.0, 1.0))
-    with pytest.raises(ModelError, match="answers a sample late"):
-        late.inverse()
-    with pytest.raises(ModelError, match="would make it unstable"):
-        replace(TransferFunction.example(), numerator=(1.0, -2.0)).inverse()
-    with pytest.raises(ModelError, match=r"P2UZ.*lags its input"):
-        process_model().inverse()
-    with pytest.raises(ModelError, match="nothing keeps its output rising"):
-        NarxPolynomial.example().inverse()
-    with pytest.raises(ModelError, match="254 samples"):
-        replace(STRUCTURES["P1"], delay=5.0).simulate(INPUT, sample_time=STEP)

@@ -16,8 +16,7 @@ from mckibben.blocks.dynamic.process_model import ProcessModel
 from mckibben.blocks.dynamic.transfer_function import TransferFunction
 from mckibben.blocks.memoryless.affine import Affine
 from mckibben.blocks.memoryless.negative import Negative
-from mckibben.blocks.play_type.pi import PI
-from mckibben.errors import DataError, ModelError
+from mckibben.errors import DataError
 
 STEP = 0.01
 
@@ -103,15 +102,6 @@ def test_a_sine_comes_out_as_the_frequency_response_says(name: str) -> None:
     found = (y @ turned) / ((u - u.mean())[-1000:] @ turned)
     expected = system.response(np.array([frequency]))[0, 0, 0]
     assert abs(found - expected) < 2e-4 * abs(expected) + 1e-3 * (name == "creep")
-
-
-def test_what_cannot_be_handed_over_says_so() -> None:
-    with pytest.raises(ModelError, match="not linear"):
-        PI.example().to_scipy(STEP)
-    with pytest.raises(ModelError, match="give a sample time"):
-        ProcessModel(1.0, (0.1,), None, None, 0.05).to_scipy()
-    with pytest.raises(ModelError, match="not linear"):
-        Series((PI.example(), Creep.example())).to_scipy(STEP)
 
 
 def test_without_python_control_its_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -11,10 +11,9 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from mckibben import ModelError, Parallel, Recording
+from mckibben import Parallel, Recording
 from mckibben.blocks.force.feedforward import ForceFeedforward
 from mckibben.blocks.force.multistate_friction import EIGHTEEN, ELEVEN, MultistateFriction
-from mckibben.blocks.force.tondu_lopez import TonduLopez
 from mckibben.papers.multistate_friction.published import multistate_friction, static_force
 
 Array = NDArray[np.float64]
@@ -79,13 +78,6 @@ def test_friction_takes_energy_and_never_gives_more_than_it_stored(
     assert np.all(work + slack >= -stored - 1e-9)
 
 
-def test_a_closed_loop_takes_energy() -> None:
-    cycle = 192.5 + 7.0 * np.sin(np.linspace(0, 6 * np.pi, 3001))
-    f = force(multistate_friction(), cycle)
-    last = slice(2000, 3001)
-    assert np.trapezoid(f[last], cycle[last]) > 100.0
-
-
 def test_printed_limits_are_reached_both_ways() -> None:
     model = multistate_friction()
     slow = np.concatenate([np.linspace(180, 200, 4001), np.linspace(200, 180, 4001)])
@@ -110,15 +102,6 @@ def test_feedforward_is_exact(gain: float) -> None:
     given = Recording({"length": length, "pressure": pressure}, STEP)
     reached = Parallel((law, friction)).simulate(given)["force"]
     np.testing.assert_allclose(reached, wanted, atol=1e-9)
-
-
-def test_what_has_no_inverse_says_what_to_do() -> None:
-    with pytest.raises(ModelError, match="ForceFeedforward"):
-        static_force().inverse()
-    with pytest.raises(ModelError, match="ForceFeedforward"):
-        multistate_friction().inverse()
-    with pytest.raises(ModelError, match="not linear in pressure"):
-        ForceFeedforward(TonduLopez.example())
 
 
 def test_printed_static_force_at_some_points() -> None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mckibben import ModelError
 from mckibben.papers.mpi_narmax.published import POLYNOMIAL, TURNING_POINT
 from mckibben.registry import load
 
@@ -63,13 +62,3 @@ def test_the_printed_map_turns_where_it_is_said_to() -> None:
     turns = [root.real for root in np.roots(slope) if abs(root.imag) < 1e-9 and root.real > 0]
     assert min(turns) == pytest.approx(TURNING_POINT, abs=1e-4)
     assert np.polyval(POLYNOMIAL, TURNING_POINT) == pytest.approx(48.77, abs=0.01)
-
-
-def test_modified_prandtl_ishlinskii_needs_time_and_has_no_inverse() -> None:
-    model = load("published", "mpi-narmax-mpi")()
-    assert [(channel.name, channel.unit) for channel in model.inputs] == [("voltage", "V")]
-    assert [(channel.name, channel.unit) for channel in model.outputs] == [("displacement", "mm")]
-    with pytest.raises(ModelError, match=r"sample time.*Remedy:"):
-        model.simulate([0.1, 1.0])
-    with pytest.raises(ModelError, match=r"no inverse.*Remedy:"):
-        model.inverse()

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from mckibben import ModelError, Recording
+from mckibben import Recording
 from mckibben.blocks.dynamic.process_model import ProcessModel
 from mckibben.blocks.dynamic.state_network import StateNetwork
 
@@ -52,11 +52,6 @@ def test_without_units_it_is_linear() -> None:
     np.testing.assert_allclose(given, expected, atol=1e-4 * np.ptp(expected))
 
 
-def test_it_rests_under_a_first_input_that_stays() -> None:
-    held = MODEL.simulate(np.full(50, 2.0), sample_time=STEP)
-    np.testing.assert_allclose(held, held[0], rtol=1e-6)
-
-
 def test_a_held_input_goes_in_steps() -> None:
     held = replace(MODEL, hold="zero")
     steps = np.repeat([0.0, 1.0, -2.0], 20)
@@ -73,22 +68,3 @@ def test_steady_states_repeat() -> None:
     wave = Recording({"force": np.sin(2 * np.pi * np.arange(100) / 50)}, STEP)
     found = MODEL.steady_state(wave)["displacement"]
     np.testing.assert_allclose(found[:50], found[50:], atol=1e-9)
-
-
-@pytest.mark.parametrize(
-    "rows",
-    [
-        {"linear": ((0.0, 1.0),)},
-        {"hidden": ((1.0, 0.0, 0.0),)},
-        {"readout": ((1.0,), (1.0,))},
-        {"hidden": ()},
-    ],
-)
-def test_rows_that_do_not_fit_are_refused(rows: Any) -> None:
-    with pytest.raises(ModelError, match=r"rows of weights.*Remedy"):
-        replace(MODEL, **rows)
-
-
-def test_a_rate_too_fast_for_the_substeps_is_refused() -> None:
-    with pytest.raises(ModelError, match=r"too fast for 2 substep.*Remedy: at least"):
-        MODEL.simulate(FORCE, sample_time=1.0)

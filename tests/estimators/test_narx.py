@@ -106,6 +106,7 @@ def test_slopes_of_free_runs_are_those_of_finite_differences(
     np.testing.assert_allclose(slopes, np.transpose(differences), atol=1e-6 * np.ptp(slopes))
 
 
+@pytest.mark.kernel
 def test_feeding_back_agrees_with_its_twin() -> None:
     rng = np.random.default_rng(4)
     slopes, by_past = rng.standard_normal((50, 3)), rng.uniform(-0.5, 0.5, (50, 2))

@@ -108,6 +108,7 @@ ELEMENTS = [
 
 
 @pytest.mark.parametrize(("follow", "model"), ELEMENTS)
+@pytest.mark.kernel
 def test_runs_with_derivatives_are_those_of_the_block_and_exact(follow: Any, model: Any) -> None:
     step, n = 0.01, 60
     inputs = np.append(0.0, 1.5 * np.sin(0.3 * np.arange(1, n + 1)))

@@ -18,6 +18,7 @@ from tests.estimators.test_oscillator import missed, shaken
 Array = NDArray[np.float64]
 
 
+@pytest.mark.kernel
 def test_runs_with_derivatives_are_those_of_the_block_and_exact() -> None:
     model, n = StateNetwork.example(), 30
     force = 3.0 * np.sin(0.3 * np.arange(1, n + 1))
@@ -45,6 +46,7 @@ def test_runs_with_derivatives_are_those_of_the_block_and_exact() -> None:
         np.testing.assert_allclose(slopes[:, place], expected, atol=1e-7)
 
 
+@pytest.mark.kernel
 def test_a_run_that_leaves_all_bounds_ends() -> None:
     weights = np.array([[5.0, 0.0, 1.0]]), np.zeros((1, 3)), np.zeros((1, 1))
     given, none = np.empty(50), np.empty((0, 7))

@@ -14,6 +14,8 @@ from numpy.typing import NDArray
 from mckibben import DataError
 from mckibben.signals import branches, cycles, noise_level, reversals, sine, staircase, triangle
 
+pytestmark = pytest.mark.kernel
+
 Array = NDArray[np.float64]
 
 LEVELS = st.lists(st.integers(-8, 8).map(float), min_size=2, max_size=60).map(np.array)

@@ -16,7 +16,7 @@ from scipy.optimize import minimize, minimize_scalar
 
 from mckibben import ModelWarning
 from mckibben.blocks.core.block import Block
-from mckibben.blocks.core.fields import Channel, vector
+from mckibben.blocks.core.fields import vector
 from mckibben.blocks.coupled.balance import Balance
 from mckibben.blocks.coupled.load_estimate import LoadEstimate
 from mckibben.blocks.laws.trial import wander
@@ -316,21 +316,3 @@ def test_a_hanging_load_swings_as_newton_says() -> None:
 
     assert missed(0.02) < 0.01  # less than the noise, and so is what half the step changes
     assert missed(0.01) < 0.7 * missed(0.02)
-
-
-def test_numbers_are_in_the_units_of_its_channels() -> None:
-    metric = Balance.example()
-    turning = replace(
-        metric,
-        driven=tuple(Channel(one.name, "rad") for one in metric.driven),
-        given=tuple(Channel(f"voltage_{k}", "V") for k, _ in enumerate(metric.driven)),
-    )
-    relative = replace(turning, areas=((1.0, -0.1, 0.0), (1.1, -0.1, 0.0)))
-    for block, friction, walls in (
-        (metric, "N/mm", "mm/bar"),
-        (turning, "N/rad", "rad/V"),
-        (relative, "V/rad", "rad/V"),
-    ):
-        assert block.unit_of("friction", (0, 0)) == friction
-        assert block.unit_of("walls", (0,)) == walls
-    assert turning.unit_of("springs", (0, 1)) == "N/rad"

@@ -1,31 +1,23 @@
-"""Every block says how it is written, and what each of its numbers is."""
+"""Every block has equations, and every number of it a name, a unit and a meaning."""
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator
+from dataclasses import replace
 
 import pytest
 
-from mckibben.blocks.core.block import Block
-from mckibben.blocks.core.inverse import Inverse
-from mckibben.blocks.core.notation import MANY, Written, meanings
+from mckibben.blocks.core.fields import Channel
+from mckibben.blocks.core.notation import Written
 from mckibben.blocks.core.writing import quantities, written
 from mckibben.blocks.coupled.balance import Balance
 from mckibben.blocks.laws.examples import examples
-from mckibben.registry import load, names
 from mckibben.report.mathematics import mathml
 
 EXAMPLES = examples()
 
-SHARED = {"input_scale"}
-"""Documented in one breath with a field of another unit."""
-
-IN_WORDS = {"command", "bar per contraction"}
-"""Units that docstrings tell in words."""
-
-OLD = {"force-balance"}
-"""Kept for files alone: nothing identifies it, and its numbers have no names."""
+OLD = {"force-balance", "force-balance-inverse"}
+"""For old files alone: nothing identifies it, and its numbers have no names."""
 
 
 def parts(of: Written) -> Iterator[Written]:
@@ -48,64 +40,31 @@ def test_equations_are_there_and_browsers_can_set_them(title: str) -> None:
 def test_every_parameter_has_a_unit_and_a_meaning(title: str) -> None:
     block = EXAMPLES[title]
     found = quantities(block)
-    assert len(found) == block.n_parameters
-    assert len({one.name for one in found}) == len(found)
-    if title.removesuffix("-inverse") not in OLD:
-        assert all(one.meaning for one in found)
-        assert not any("{" in one.unit for one in found)
-
-
-@pytest.mark.parametrize("title", sorted(EXAMPLES))
-def test_every_number_of_a_short_model_is_written_out(title: str) -> None:
-    block = EXAMPLES[title]
-    if block.n_parameters > MANY or title.startswith(tuple(OLD)):
-        pytest.skip("its numbers are in its file")
-    text = " ".join(line for part in parts(written(block)) for line in part.numbers)
-    mantissas = text.replace(r" \times 10^{", "e")
-    for value in block.pack().tolist():
-        assert f"{value:.4g}" in mantissas, value
-
-
-@pytest.mark.parametrize("kind", names("blocks"))
-def test_units_declared_are_those_documented(kind: str) -> None:
-    """Where a docstring gives one unit of a field in brackets, the notation gives the same."""
-    cls = load("blocks", kind)
-    documented = meanings(cls)
-    for field in cls.notation.symbols:
-        found = re.findall(r"\[([^\]]+)\]", documented.get(field, ""))
-        declared = cls.notation.unit(field)
-        own = field not in SHARED and not any(mark in declared for mark in "{|")
-        if own and len(found) == 1 and found[0] not in IN_WORDS:
-            assert declared == found[0], field
-
-
-def test_an_inverse_is_written_as_what_it_undoes() -> None:
-    block: Block = EXAMPLES["pi"].inverse()
-    assert isinstance(block, Inverse)
-    found = written(block)
-    assert found.parts[0].equations == written(EXAMPLES["pi"]).equations
-    assert [one.unit for one in quantities(block)] == [
-        one.unit for one in quantities(EXAMPLES["pi"])
-    ]
+    assert len({one.name for one in found}) == len(found) == block.n_parameters
+    assert all(one.meaning for one in found)
+    assert not any("{" in one.unit for one in found)
 
 
 def test_units_follow_the_channels() -> None:
-    by_name = {one.name: one.unit for one in quantities(EXAMPLES["rate-dependent-pi"])}
-    assert by_name["weights 1"] == "mm/bar"
-    assert by_name["rate weights 1"] == "mm s/bar^2"
-    assert by_name["offset"] == "mm"
-
-
-def test_the_springs_of_a_balance_grow_with_what_schedules() -> None:
-    by_name = {one.name: one.unit for one in quantities(EXAMPLES["balance"])}
+    rated = {one.name: one.unit for one in quantities(EXAMPLES["rate-dependent-pi"])}
+    assert [rated[name] for name in ("weights 1", "rate weights 1", "offset")] == [
+        *("mm/bar", "mm s/bar^2", "mm"),
+    ]
+    balance = {one.name: one.unit for one in quantities(EXAMPLES["balance"])}
     own = ["constant force of muscle 1", "spring of muscle 1", "spring of muscle 1 to muscle 2"]
-    springs = [by_name[name] for name in (*own, *(f"{name} by pressure_extensor" for name in own))]
+    springs = [balance[name] for name in (*own, *(f"{name} by pressure_extensor" for name in own))]
     assert springs == ["N", "N/mm", "N/mm", "N/bar", "N/mm bar", "N/mm bar"]
-
-
-def test_a_balance_is_written_in_its_own_letters() -> None:
-    model = Balance.example().inverse()
-    found = written(model)
-    assert found.title.startswith("balance: pressure")
-    assert found.equations == model.inverse().equations()
-    assert not any(r"\hat{u}" in line for part in parts(found) for line in part.numbers)
+    metric = Balance.example()
+    turning = replace(
+        metric,
+        driven=tuple(Channel(one.name, "rad") for one in metric.driven),
+        given=tuple(Channel(f"voltage_{k}", "V") for k, _ in enumerate(metric.driven)),
+    )
+    relative = replace(turning, areas=((1.0, -0.1, 0.0), (1.1, -0.1, 0.0)))
+    for block, friction, walls in (
+        (metric, "N/mm", "mm/bar"),
+        (turning, "N/rad", "rad/V"),
+        (relative, "V/rad", "rad/V"),
+    ):
+        assert block.unit_of("friction", (0, 0)) == friction
+        assert block.unit_of("walls", (0,)) == walls

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterator, Sequence
+from typing import Any
 
 import numpy as np
 import pytest
@@ -17,7 +18,6 @@ from mckibben.blocks.dynamic.process_model import ProcessModel
 from mckibben.excitation import untold
 from mckibben.signals import triangle
 from mckibben.system.threads import one_blas_thread
-from tests.recordings import MEASURED
 
 Array = NDArray[np.float64]
 
@@ -91,16 +91,6 @@ def pair(legs: Sequence[Leg], **settings: object) -> list[Recording]:
 def whats(recordings: Sequence[Recording], **settings: object) -> list[str]:
     """Return the names of what cannot be told."""
     return [gap.what for gap in untold(recordings, **settings)]  # type: ignore[arg-type]
-
-
-def test_what_moves_too_little_to_compute_with_counts_as_held() -> None:
-    u = 1e-300 * drive([(level, 0.2, 0.0) for level in TURNS])  # at one speed, which is told
-    tiny = Recording({"pressure": u, "displacement": 1e300 * u}, STEP)
-    assert untold([tiny], ["pressure"], ["displacement"])
-
-
-def test_of_recordings_that_tell_it_all_nothing_is_said() -> None:
-    assert untold(pair(COMPLETE)) == ()
 
 
 def one_speed() -> list[Recording]:
@@ -186,114 +176,6 @@ def alone() -> list[Recording]:
     return [run(np.concatenate([u, u]), np.repeat([50.0, 150.0], u.size))]
 
 
-LACKING: dict[str, Callable[[], list[Recording]]] = {
-    "rate": one_speed,
-    "creep": no_holds,
-    "minor loops": major_only,
-    "one-sided loops": from_above_only,
-    "load": one_load,
-    "time": without_time,
-    "noise": noisy,
-    "resolution": coarse,
-    "clipped": clipped,
-    "start": begun_inside,
-    "repeats": nothing_twice,
-    "test": alone,
-}
-
-
-@pytest.mark.parametrize("what", LACKING)
-def test_where_one_thing_is_lacking_it_alone_is_said(what: str) -> None:
-    gaps = untold(LACKING[what]())
-    assert [gap.what for gap in gaps] == [what]
-    assert gaps[0].sentence.endswith(".")
-    assert gaps[0].remedy.endswith(".")
-
-
-@pytest.mark.parametrize(
-    ("made", "what", "said"),
-    [
-        (creeping_on, "creep", "still moves"),
-        (no_load, "load", "no load is recorded"),
-        (one_load_known, "load", "a load is recorded in 1 of 2 recordings"),
-        (against_a_spring, "load", "as a spring's would"),
-    ],
-)
-def test_other_ways_to_lack_it(made: Callable[[], list[Recording]], what: str, said: str) -> None:
-    (gap,) = untold(made())
-    assert gap.what == what
-    assert said in gap.sentence
-
-
-def test_a_test_that_goes_further() -> None:
-    far = run(drive([(5.0, 1.0, 0.0), (0.0, 1.0, 0.0)]))
-    (gap,) = untold(pair(COMPLETE), tests=[far])
-    assert gap.what == "range"
-    assert "5 bar" in gap.sentence
-    assert whats(pair(COMPLETE), tests=[run(drive([(3.9, 1.0, 0.0), (0.1, 1.0, 0.0)]))]) == []
-
-
-def test_copies_tell_nothing_more() -> None:
-    one = pair(COMPLETE)[0]
-    assert untold([one, one]) == untold([one])
-
-
-def test_a_muscle_that_is_held_is_judged_by_its_force() -> None:
-    (one, other) = pair(COMPLETE)
-    held = [
-        Recording(
-            {
-                "pressure": r["pressure"],
-                "displacement": np.full(len(r), d),
-                "force": r["displacement"],
-            },
-            r.sample_time,
-        )
-        for r, d in ((one, 0.0), (other, 10.0))
-    ]
-    assert "steps of that size" not in " ".join(gap.sentence for gap in untold(held))
-    assert "force" not in " ".join(gap.what for gap in untold(held))
-
-
-def test_a_force_that_creeps_ends_no_hold() -> None:
-    u = drive([(4.0, 1.0, 20.0), (1.0, 1.0, 20.0)])
-    force = 100.0 * u + 40.0 * lag(u, 8.0)
-    one = Recording({"pressure": u, "force": force}, STEP)
-    creep = next(gap for gap in untold(one, "pressure", "force") if gap.what == "creep")
-    assert creep.evidence["hold"] > 18.0
-    assert creep.evidence["moved"] > 0.01
-
-
-def test_a_model_without_parameters_that_tell_is_said() -> None:
-    many = PI(tuple(np.linspace(0, 3, 200)), (0.01,) * 200)
-    (gap,) = [gap for gap in untold(pair(COMPLETE), model=many) if gap.what == "parameters"]
-    assert "cannot be said" in gap.sentence
-
-
-def test_levels_recorded_once_each_hide_the_way_between() -> None:
-    u = np.random.default_rng(3).uniform(0, 4, 300)
-    gaps = {
-        gap.what: gap
-        for gap in untold([Recording({"pressure": u, "displacement": muscle(u)}, 4.0)])
-    }
-    assert "sampling" in gaps
-    assert "noise" not in gaps
-
-
-@pytest.mark.parametrize("still", ["pressure", "displacement"])
-def test_what_does_not_move_tells_nothing(still: str) -> None:
-    one = run(drive(COMPLETE))
-    (first, *_) = untold([one.with_channels(**{still: np.ones(len(one))})])
-    assert first.what == "still"
-
-
-def test_an_input_that_never_turns_back() -> None:
-    (first, *_) = untold([run(drive([(4.0, 0.2, 0.0)]))])
-    assert (first.what, first.severity) == ("hysteresis", 0.95)
-
-
-# -- several muscles ------------------------------------------------------------------------------
-
 BASE = np.concatenate([drive(COMPLETE), np.zeros(round(15 / STEP))])
 
 
@@ -332,33 +214,120 @@ def arms(u: Array, stiffnesses: Sequence[float] = (0.0, 1.0)) -> list[Recording]
     return [held_load(arm(u, level, seed)) for seed, level in enumerate(stiffnesses)]
 
 
-def test_an_arm_that_tells_it_all() -> None:
-    assert untold(arms(apart_and_together())) == ()
+def arms_as_one() -> list[Recording]:
+    return arms(np.column_stack([BASE, 0.8 * BASE]))
 
 
-def test_muscles_that_move_as_one() -> None:
-    u = np.column_stack([BASE, 0.8 * BASE])
-    assert whats(arms(u)) == ["coupling"]
-    assert "as one" in untold(arms(u))[0].sentence
-
-
-def test_muscles_that_never_move_together() -> None:
+def arms_never_together() -> list[Recording]:
     rest = np.zeros_like(BASE)
-    u = np.column_stack([np.concatenate([BASE, rest]), np.concatenate([rest, BASE])])
-    assert whats(arms(u)) == ["together"]
+    return arms(np.column_stack([np.concatenate([BASE, rest]), np.concatenate([rest, BASE])]))
 
 
-def test_a_muscle_that_never_moves() -> None:
-    assert whats(arms(np.column_stack([BASE, np.zeros_like(BASE)]))) == ["resting", "still"][:1]
+def arms_of_which_one_rests() -> list[Recording]:
+    return arms(np.column_stack([BASE, np.zeros_like(BASE)]))
 
 
-def test_an_extensor_that_rests() -> None:
-    u = apart_and_together()
-    runs = [
+def extensor_at_rest() -> list[Recording]:
+    runs = arms(apart_and_together(), (1.0, 1.0))
+    return [
         one.with_channels(force=np.full(len(one), level))
-        for one, level in zip(arms(u, (1.0, 1.0)), (10.0, 60.0), strict=True)
+        for one, level in zip(runs, (10.0, 60.0), strict=True)
     ]
-    assert whats(runs) == ["stiffness"]
+
+
+LACKING: list[tuple[Callable[[], list[Recording]], list[str]]] = [
+    (lambda: pair(COMPLETE), []),
+    (one_speed, ["rate"]),
+    (no_holds, ["creep"]),
+    (creeping_on, ["creep"]),
+    (major_only, ["minor loops"]),
+    (from_above_only, ["one-sided loops"]),
+    (one_load, ["load"]),
+    (no_load, ["load"]),
+    (one_load_known, ["load"]),
+    (against_a_spring, ["load"]),
+    (without_time, ["time"]),
+    (noisy, ["noise"]),
+    (coarse, ["resolution"]),
+    (clipped, ["clipped"]),
+    (begun_inside, ["start"]),
+    (nothing_twice, ["repeats"]),
+    (alone, ["test"]),
+    (lambda: arms(apart_and_together()), []),
+    (arms_as_one, ["coupling"]),
+    (arms_never_together, ["together"]),
+    (arms_of_which_one_rests, ["resting"]),
+    (extensor_at_rest, ["stiffness"]),
+]
+
+
+@pytest.mark.parametrize(("made", "what"), LACKING)
+def test_what_is_lacking_is_told_and_nothing_else(
+    made: Callable[[], list[Recording]], what: list[str]
+) -> None:
+    assert whats(made()) == what
+
+
+@pytest.mark.parametrize(
+    ("made", "first"),
+    [
+        (lambda one: one.with_channels(pressure=np.ones(len(one))), "still"),
+        (lambda one: one.with_channels(displacement=np.ones(len(one))), "still"),
+        (lambda _: run(drive([(4.0, 0.2, 0.0)])), "hysteresis"),
+    ],
+)
+def test_what_stands_in_the_way_of_all_else_comes_first(
+    made: Callable[[Recording], Recording], first: str
+) -> None:
+    gaps = untold([made(run(drive(COMPLETE)))])
+    severities = [gap.severity for gap in gaps]
+    assert gaps[0].what == first
+    assert severities == sorted(severities, reverse=True)
+    assert json.loads(json.dumps([gap.to_dict() for gap in gaps]))[0]["what"] == first
+
+
+def test_a_test_that_goes_further() -> None:
+    far, near = (
+        run(drive([(top, 1.0, 0.0), (end, 1.0, 0.0)])) for top, end in ((5, 0), (3.9, 0.1))
+    )
+    assert whats(pair(COMPLETE), tests=[far]) == ["range"]
+    assert whats(pair(COMPLETE), tests=[near]) == []
+
+
+def test_copies_tell_nothing_more() -> None:
+    one = pair(COMPLETE)[0]
+    assert untold([one, one]) == untold([one])
+
+
+def test_a_muscle_that_is_held_is_judged_by_its_force() -> None:
+    held = [
+        Recording(
+            {
+                "pressure": r["pressure"],
+                "displacement": np.full(len(r), level),
+                "force": r["displacement"],
+            },
+            r.sample_time,
+        )
+        for r, level in zip(pair(COMPLETE), (0.0, 10.0), strict=True)
+    ]
+    assert {"force", "resolution", "still"}.isdisjoint(whats(held))
+
+
+def test_a_force_that_creeps_ends_no_hold() -> None:
+    u = drive([(4.0, 1.0, 20.0), (1.0, 1.0, 20.0)])
+    force = 100.0 * u + 40.0 * lag(u, 8.0)
+    one = Recording({"pressure": u, "force": force}, STEP)
+    creep = next(gap for gap in untold(one, "pressure", "force") if gap.what == "creep")
+    assert creep.evidence["hold"] > 18.0
+    assert creep.evidence["moved"] > 0.01
+
+
+def test_levels_recorded_once_each_hide_the_way_between() -> None:
+    u = np.random.default_rng(3).uniform(0, 4, 300)
+    found = whats([Recording({"pressure": u, "displacement": muscle(u)}, 4.0)])
+    assert "sampling" in found
+    assert "noise" not in found
 
 
 def stand(lengths: Sequence[Array], pressures: Sequence[Array]) -> list[Recording]:
@@ -378,17 +347,14 @@ def stand(lengths: Sequence[Array], pressures: Sequence[Array]) -> list[Recordin
 
 def test_a_test_stand_whose_length_is_held() -> None:
     u = drive(COMPLETE)
-    gaps = {gap.what for gap in untold(stand([np.full(u.size, x) for x in (180, 190)], [u, u]))}
-    assert "isometric" in gaps
-    both = {
-        gap.what
-        for gap in untold(stand([180 + 5 * u, np.full(u.size, 190.0)], [np.full(u.size, 3.0), u]))
-    }
+    held = whats(stand([np.full(u.size, x) for x in (180, 190)], [u, u]))
+    assert "isometric" in held
+    both = whats(stand([180 + 5 * u, np.full(u.size, 190.0)], [np.full(u.size, 3.0), u]))
     assert "isometric or isobaric" in both
     assert "isometric" not in both
 
 
-# -- that what is said is true --------------------------------------------------------------------
+# -- what is called lacking scatters in fits, and what is not does not -----------------------------
 
 
 def hysteresis(u: Array) -> Array:
@@ -418,48 +384,54 @@ def spread(columns: Sequence[Array], effect: Sequence[Array], seeds: int = 20) -
     return float(np.std(measured @ alone / max(alone @ alone, 1e-300)))
 
 
-def told(u: Sequence[Array]) -> set[str]:
-    """Return what runs of a muscle alone cannot tell."""
-    return {gap.what for gap in untold([run(one, None) for one in u])}
-
-
 ONE_SPEED = triangle(np.arange(0, 60, STEP), period=10.0, peaks=4.0)
 
+Truth = tuple[list[Recording], list[Array], list[Array]]
+"""Runs, what else is fitted to each, and the effect of which they tell or not."""
 
-def test_rate_dependence_that_is_untold_comes_out_anyhow_and_told_it_does_not() -> None:
+
+def of_rate(lacking: bool) -> Truth:
     """A lag of 0.5 s of a twentieth of the gain, beside free hysteresis."""
     fast, slow = (triangle(np.arange(0, 6 * p, STEP), period=p, peaks=4.0) for p in (2.0, 20.0))
-    for runs, lacking in (([ONE_SPEED], True), ([ONE_SPEED, fast, slow], False)):
-        assert ("rate" in told(runs)) == lacking
-        error = spread([hysteresis(u) for u in runs], [0.4 * lag(u, 0.5) for u in runs])
-        assert error > 0.5 if lacking else error < 0.2
+    runs = [ONE_SPEED] if lacking else [ONE_SPEED, fast, slow]
+    return (
+        [run(u, None) for u in runs],
+        [hysteresis(u) for u in runs],
+        [0.4 * lag(u, 0.5) for u in runs],
+    )
 
 
-def test_creep_that_is_untold_comes_out_anyhow_and_told_it_does_not() -> None:
+def of_creep(lacking: bool) -> Truth:
     """Creep over 200 s of a twentieth of the gain, beside free hysteresis and lags."""
-    legs = [(level, 1.5, 40.0) for level in (1.2, 4.0, 2.8, 0.0)]
-    for runs, lacking in (([ONE_SPEED], True), ([ONE_SPEED, drive(legs)], False)):
-        assert ("creep" in told(runs)) == lacking
-        beside = [np.column_stack([hysteresis(u), lag(u, 0.5), lag(u, 2.0)]) for u in runs]
-        error = spread(beside, [0.4 * lag(u, 200.0) for u in runs])
-        assert error > 0.5 if lacking else error < 0.2
+    held = drive([(level, 1.5, 40.0) for level in (1.2, 4.0, 2.8, 0.0)])
+    runs = [ONE_SPEED] if lacking else [ONE_SPEED, held]
+    beside = [np.column_stack([hysteresis(u), lag(u, 0.5), lag(u, 2.0)]) for u in runs]
+    return [run(u, None) for u in runs], beside, [0.4 * lag(u, 200.0) for u in runs]
 
 
-def test_a_load_that_is_untold_comes_out_anyhow_and_told_it_does_not() -> None:
+def of_load(lacking: bool) -> Truth:
     u = drive(CYCLES)
-    for forces, lacking in (((50.0, 50.0), True), ((50.0, 150.0), False)):
-        runs = [run(u, force, seed=seed) for seed, force in enumerate(forces)]
-        assert ("load" in whats(runs)) == lacking
-        error = spread([hysteresis(u)] * 2, [0.05 * one["force"] for one in runs])
-        assert error > 0.5 if lacking else error < 0.2
+    runs = [run(u, f, seed=k) for k, f in enumerate((50.0, 50.0 if lacking else 150.0))]
+    return runs, [hysteresis(u)] * 2, [0.05 * one["force"] for one in runs]
 
 
-def test_coupling_that_is_untold_comes_out_anyhow_and_told_it_does_not() -> None:
-    apart = apart_and_together()
-    for u, lacking in ((np.column_stack([BASE, 0.8 * BASE]), True), (apart, False)):
-        assert ("coupling" in whats(arms(u))) == lacking
-        error = spread([hysteresis(u[:, 0])], [0.3 * u[:, 1]])
-        assert error > 0.5 if lacking else error < 0.2
+def of_coupling(lacking: bool) -> Truth:
+    u = np.column_stack([BASE, 0.8 * BASE]) if lacking else apart_and_together()
+    return arms(u), [hysteresis(u[:, 0])], [0.3 * u[:, 1]]
+
+
+@pytest.mark.parametrize("lacking", [True, False])
+@pytest.mark.parametrize(
+    ("what", "truth"),
+    [("rate", of_rate), ("creep", of_creep), ("load", of_load), ("coupling", of_coupling)],
+)
+def test_what_is_lacking_comes_out_anyhow_and_what_is_not_does_not(
+    what: str, truth: Callable[[bool], Truth], lacking: bool
+) -> None:
+    runs, beside, effect = truth(lacking)
+    assert (what in whats(runs)) == lacking
+    error = spread(beside, effect)
+    assert error > 0.5 if lacking else error < 0.2
 
 
 @pytest.fixture(autouse=True, scope="module")
@@ -467,9 +439,6 @@ def one_thread() -> Iterator[None]:
     """Keep small matrices on one core."""
     with one_blas_thread():
         yield
-
-
-# -- parameters of a model ------------------------------------------------------------------------
 
 
 PROCESS = ProcessModel(gain=8.0, time_constants=(60.0, 0.3), output_offset=2.0)
@@ -509,23 +478,10 @@ def test_parameters_that_are_untold_come_out_anyhow_and_told_they_do_not() -> No
         assert slow > 0.4 if lacking else slow < 0.1
 
 
-def test_a_model_that_the_recordings_do_not_fit_is_refused() -> None:
-    with pytest.raises(DataError, match="pressure"):
-        untold([run(ONE_SPEED).select(["force", "displacement"])], "force", "displacement", PROCESS)
+# -- whatever is recorded --------------------------------------------------------------------------
 
 
-# -- where it is shown ----------------------------------------------------------------------------
-
-
-def test_gaps_come_most_important_first_and_as_json() -> None:
-    gaps = untold([run(ONE_SPEED, None)])
-    severities = [gap.severity for gap in gaps]
-    assert severities == sorted(severities, reverse=True)
-    assert json.loads(json.dumps([gap.to_dict() for gap in gaps]))[0]["what"] == gaps[0].what
-    assert str(gaps[0]) == f"{gaps[0].sentence} {gaps[0].remedy}"
-
-
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=10, deadline=None)
 @given(
     speed=st.floats(0.05, 5.0),
     low=st.floats(0.0, 3.0),
@@ -543,72 +499,35 @@ def test_what_is_said_of_speed_does_not_depend_on_scale(
     assert gap.evidence["fast"] == pytest.approx(unit * speed, rel=0.05)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=40, deadline=None)
 @given(data=st.data(), n=st.integers(10, 80), two=st.booleans(), timed=st.booleans())
 def test_whatever_is_recorded_something_or_nothing_is_said(
     data: st.DataObject, n: int, two: bool, timed: bool
 ) -> None:
-    values = st.lists(st.sampled_from([0.0, 0.5, 1.0, -2.0, 1e6]), min_size=n, max_size=n)
+    values = st.lists(st.sampled_from([0.0, 0.5, 1.0, -2.0, 1e6, 1e-300]), min_size=n, max_size=n)
     names = ["pressure_1", "displacement_1"] + ["pressure_2", "displacement_2"] * two
     beside = data.draw(st.sampled_from([[], ["force"], ["pressure_extensor"]]))
     channels = {name: np.array(data.draw(values)) for name in (*names, *beside)}
-    first = Recording(channels, 0.1)
-    second = Recording(channels, 0.1 if timed else None)
-    for gap in untold([first, second]):
-        assert gap.sentence.endswith(".")
+    for gap in untold([Recording(channels, 0.1), Recording(channels, 0.1 if timed else None)]):
         assert 0 < gap.severity <= 1
         assert "nan" not in str(gap)
 
 
-def test_recordings_that_cannot_be_judged_are_refused() -> None:
-    one = run(ONE_SPEED, None)
-    with pytest.raises(DataError, match="at least one"):
-        untold([])
-    with pytest.raises(DataError, match="voltage"):
-        untold([one], "voltage")
-    with pytest.raises(DataError, match="displacement"):
-        untold([one, one.select(["pressure"])])
-
-
-# -- measured muscles -----------------------------------------------------------------------------
-
-
-def measured(name: str) -> list[Recording]:
-    """Return a set of measured recordings."""
-    from mckibben.measured.sets import sets_in
-
-    if not (MEASURED / name).exists():
-        pytest.skip("the measured recordings are not here")
-    (found,) = sets_in(MEASURED / name)
-    return found.recordings()
-
-
-@pytest.mark.filterwarnings("ignore::mckibben.errors.DataWarning")
 @pytest.mark.parametrize(
-    ("name", "inputs", "outputs", "said", "not_said"),
+    ("given", "names", "said"),
     [
-        ("festo_dmsp10_static", None, None, {"rate", "minor loops"}, {"repeats", "start", "noise"}),
-        ("festo_dmsp10_levels", None, None, {"sampling"}, {"minor loops", "noise", "hysteresis"}),
-        ("festo_isometric_20mm", None, None, {"isometric", "minor loops"}, {"repeats", "rate"}),
-        ("cavatappi_loads", None, None, {"one-sided loops"}, {"load", "rate", "minor loops"}),
-        ("sma_wing", None, None, {"one-sided loops", "load"}, {"minor loops", "clipped"}),
+        (lambda one: [], [], "at least one"),
+        (lambda one: [one], ["voltage"], "voltage"),
+        (lambda one: [one, one.select(["pressure"])], [], "displacement"),
         (
-            "soft_arm_three_muscles",
-            ["input_1", "input_2", "input_3"],
-            ["displacement_1", "displacement_2"],
-            {"together"},
-            {"coupling", "resting", "minor loops", "rate"},
+            lambda one: [one.select(["force", "displacement"])],
+            ["force", "displacement", PROCESS],
+            "pressure",
         ),
-        ("bouc_wen_benchmark", "force", "displacement", set(), {"hysteresis", "sampling", "rate"}),
     ],
 )
-def test_measured_recordings(
-    name: str,
-    inputs: list[str] | None,
-    outputs: list[str] | None,
-    said: set[str],
-    not_said: set[str],
+def test_recordings_that_cannot_be_judged_are_refused(
+    given: Callable[[Recording], list[Recording]], names: list[Any], said: str
 ) -> None:
-    found = set(whats(measured(name), inputs=inputs, outputs=outputs))
-    assert said <= found
-    assert not found & not_said
+    with pytest.raises(DataError, match=said):
+        untold(given(run(ONE_SPEED)), *names)

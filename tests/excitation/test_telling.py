@@ -11,10 +11,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
 
 from mckibben import PI, DataError, Recording
-from mckibben.blocks.dynamic.process_model import ProcessModel
 from mckibben.excitation import untold
 from mckibben.signals import triangle
 from mckibben.system.threads import one_blas_thread
@@ -441,62 +439,7 @@ def one_thread() -> Iterator[None]:
         yield
 
 
-PROCESS = ProcessModel(gain=8.0, time_constants=(60.0, 0.3), output_offset=2.0)
-
-
-def processed(u: Array, seed: int) -> Recording:
-    """Return what a process with a slow and a fast time constant gives, with noise."""
-    y = PROCESS.simulate(u, sample_time=STEP)
-    noise = 0.02 * np.random.default_rng(seed).standard_normal(u.size)
-    return Recording({"pressure": u, "displacement": y + noise}, STEP)
-
-
-def refitted(runs: Sequence[Recording]) -> Array:
-    """Return the logarithms of slow and fast time constant that fit best, by another's search."""
-
-    def residual(theta: Array) -> Array:
-        gain, offset, *times = np.exp(theta)
-        model = ProcessModel(gain=gain, time_constants=tuple(times), output_offset=offset)
-        return np.concatenate([model.simulate(r)["displacement"] - r["displacement"] for r in runs])
-
-    start = np.log([8.0, 2.0, 60.0, 0.3])
-    found = least_squares(residual, start, bounds=(start - 3, start + 3), max_nfev=20)
-    return np.asarray(found.x[2:])
-
-
-def test_parameters_that_are_untold_come_out_anyhow_and_told_they_do_not() -> None:
-    short = drive([(4.0, 4.0, 0.0), (1.0, 4.0, 0.0)] * 2)
-    long = drive([(4.0, 4.0, 40.0), (1.0, 4.0, 40.0)])
-    for runs, lacking in (([short], True), ([short, long], False)):
-        gaps = untold([processed(u, 0) for u in runs], model=PROCESS)
-        said = [gap.sentence for gap in gaps if gap.what == "parameters"]
-        assert any("ime constants 1" in sentence for sentence in said) == lacking
-        assert not any("ime constants 2" in sentence for sentence in said)
-        found = np.array([refitted([processed(u, seed) for u in runs]) for seed in range(4)])
-        slow, fast = np.std(found, axis=0)
-        assert fast < 0.2
-        assert slow > 0.4 if lacking else slow < 0.1
-
-
 # -- whatever is recorded --------------------------------------------------------------------------
-
-
-@settings(max_examples=10, deadline=None)
-@given(
-    speed=st.floats(0.05, 5.0),
-    low=st.floats(0.0, 3.0),
-    span=st.floats(0.5, 4.0),
-    unit=st.sampled_from([1.0, 0.01]),
-)
-def test_what_is_said_of_speed_does_not_depend_on_scale(
-    speed: float, low: float, span: float, unit: float
-) -> None:
-    t = np.arange(0, 8 * span / speed, span / speed / 200)
-    u = low + triangle(t, period=2 * span / speed, peaks=span)
-    one = Recording({"pressure": unit * u, "displacement": unit * muscle(u)}, float(t[1]))
-    (gap,) = (gap for gap in untold([one]) if gap.what == "rate")
-    assert gap.evidence["slow"] == pytest.approx(unit * speed, rel=0.05)
-    assert gap.evidence["fast"] == pytest.approx(unit * speed, rel=0.05)
 
 
 @settings(max_examples=40, deadline=None)
@@ -519,11 +462,6 @@ def test_whatever_is_recorded_something_or_nothing_is_said(
         (lambda one: [], [], "at least one"),
         (lambda one: [one], ["voltage"], "voltage"),
         (lambda one: [one, one.select(["pressure"])], [], "displacement"),
-        (
-            lambda one: [one.select(["force", "displacement"])],
-            ["force", "displacement", PROCESS],
-            "pressure",
-        ),
     ],
 )
 def test_recordings_that_cannot_be_judged_are_refused(

@@ -6,15 +6,18 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from scipy.optimize import least_squares
 from scipy.signal import lfilter
 from scipy.stats import binom
 
-from mckibben import PI, Recording
+from mckibben import PI, PIEstimator, Recording
 from mckibben.arrays import Array
-from mckibben.blocks.compose import Series
+from mckibben.blocks.compose import Parallel
 from mckibben.blocks.core.block import Block
-from mckibben.blocks.dynamic.creep import Creep
+from mckibben.blocks.core.fields import DISPLACEMENT, PRESSURE, Channel
+from mckibben.blocks.coupled.coupling import Coupling
 from mckibben.blocks.dynamic.transfer_function import TransferFunction
+from mckibben.blocks.memoryless.affine import Affine
 from mckibben.estimators.core.autoregression import autoregression
 from mckibben.validation.parameters import parameters, residuals, sureness
 
@@ -45,8 +48,6 @@ def noise(seed: int, memory: float, n: int = SAMPLES, deviation: float = 0.1) ->
 
 def fitted(block: Block, u: Array, y: Array) -> Block:
     """Return the least squares fit of the free run, found by a search that is none of the package's."""
-    from scipy.optimize import least_squares
-
     start = block.pack()
     free = start != 0
 
@@ -85,13 +86,8 @@ def covered(block: Block, u: Array, memory: float, seeds: int) -> tuple[int, int
 
 
 MODELS: dict[str, tuple[Block, Input, int]] = {
-    "pi": (PI(THRESHOLDS, (3.0, 1.5, 0.9, 0.5), 2.0), wave, 60),
-    "oe": (TransferFunction((0.9, -0.55), (-1.2, 0.25), STEP, 0.0, 2.0), steps, 60),
-    "cpi": (
-        Series((PI(THRESHOLDS, (3.0, 1.5, 0.9, 0.5), 2.0), Creep((0.08, 0.1), (1.5, 12.0)))),
-        wave,
-        10,
-    ),
+    "pi": (PI(THRESHOLDS, (3.0, 1.5, 0.9, 0.5), 2.0), wave, 25),
+    "oe": (TransferFunction((0.9, -0.55), (-1.2, 0.25), STEP, 0.0, 2.0), steps, 25),
 }
 
 
@@ -129,27 +125,10 @@ def test_what_is_not_determined_is_said_and_has_no_number() -> None:
     assert found[0].standard_error is not None
     assert found[3].standard_error is None
     assert found[3].interval is None
-    assert found[3].said == "not determined by these recordings: it moves nothing in them"
-
-
-def test_what_only_a_sum_tells_is_told_apart_from_what_nothing_tells() -> None:
-    from mckibben.blocks.core.fields import DISPLACEMENT
-    from mckibben.blocks.memoryless.affine import Affine
-
-    u = wave()
-    pi = Series((MODELS["pi"][0], Affine(3.0, 1.5, DISPLACEMENT, DISPLACEMENT)))
-    y = np.asarray(pi.simulate(u)) + noise(1, 0.0)
-    recording = Recording({"pressure": u, "displacement": y}, STEP)
-    sure = sureness(pi, [recording], residuals(pi, [recording]))
-    assert all(said.endswith("only together with others") for said in sure.said)
 
 
 def test_what_is_told_beside_what_only_a_sum_tells_scatters_as_said() -> None:
     """Of y = a z(u) + (b + c) u, z a creeping part, a is as unsure as with b + c free, not known."""
-    from mckibben.blocks.compose import Parallel
-    from mckibben.blocks.core.fields import DISPLACEMENT, PRESSURE
-    from mckibben.blocks.memoryless.affine import Affine
-
     line = Affine(1.5, 0.0, PRESSURE, DISPLACEMENT)
     block = Parallel((PI((0.3,), (3.0,), 0.0), line, Affine(0.7, 0.0, PRESSURE, DISPLACEMENT)))
     u = wave()
@@ -174,8 +153,6 @@ def test_what_is_told_beside_what_only_a_sum_tells_scatters_as_said() -> None:
 
 @pytest.mark.parametrize("memory", [0.0, 0.9])
 def test_fits_and_descriptions_say_the_same(memory: float) -> None:
-    from mckibben.estimators.play_type.pi import PIEstimator
-
     block, u = MODELS["pi"][0], wave()
     y = np.asarray(block.simulate(u)) + noise(1, memory)
     recording = Recording({"pressure": u, "displacement": y}, STEP)
@@ -192,34 +169,8 @@ def test_a_parameter_at_its_bound_has_no_error() -> None:
     y = np.asarray(block.simulate(u)) + noise(1, 0.0)
     recording = Recording({"pressure": u, "displacement": y}, STEP)
     found = parameters(block, sureness(block, [recording], residuals(block, [recording])))
-    assert [one.said[:1] for one in found] == ["", "0", "0", "", ""]
-
-
-def test_what_is_exactly_1_is_a_choice() -> None:
-    """As the area to which all forces of a balance are relative: it frees the others."""
-    from mckibben.blocks.core.fields import DISPLACEMENT
-    from mckibben.blocks.memoryless.affine import Affine
-
-    u = wave()
-    block = Series((MODELS["pi"][0], Affine(1.0, 0.0, DISPLACEMENT, DISPLACEMENT)))
-    y = np.asarray(block.simulate(u)) + noise(1, 0.0)
-    recording = Recording({"pressure": u, "displacement": y}, STEP)
-    found = parameters(block, sureness(block, [recording], residuals(block, [recording])))
-    assert [one.said[:9] for one in found[-2:]] == ["exactly 1", "0: at a b"]
-    assert all(one.standard_error is not None for one in found[:-2])
-
-
-def test_of_long_recordings_a_share_stands_for_the_whole() -> None:
-    block = MODELS["pi"][0]
-    u = np.tile(wave(), 140)
-    y = np.asarray(block.simulate(u)) + noise(1, 0.5, u.size)
-    whole = Recording({"pressure": u, "displacement": y}, STEP)
-    half = whole.slice(0, u.size // 2)
-    errors = []
-    for recording in (half, whole):
-        sure = sureness(block, [recording], residuals(block, [recording]))
-        errors.append(np.sqrt(np.diag(sure.covariance)))
-    np.testing.assert_allclose(errors[0] / errors[1], np.sqrt(2), rtol=0.05)
+    none = [one.standard_error is None for one in found]
+    assert none == [False, True, True, False, False]
 
 
 @pytest.mark.parametrize("a", [(), (0.9,), (1.2, -0.5)])
@@ -236,9 +187,6 @@ def test_an_autoregression_is_found_again(a: tuple[float, ...]) -> None:
 
 
 def test_outputs_each_have_residuals_of_their_own() -> None:
-    from mckibben.blocks.core.fields import Channel
-    from mckibben.blocks.coupled.coupling import Coupling
-
     u = np.column_stack([wave(), steps()])
     names = ("pressure_1", "pressure_2"), ("displacement_1", "displacement_2")
     driven = tuple(Channel(name, "bar") for name in names[0])

@@ -18,23 +18,8 @@ from mckibben.blocks.core.block import Block
 class Faulty:
     """A muscle that is a model of pressure to displacement, with faults beside.
 
-    Parameters
-    ----------
-    muscle : Block
-    gain : float
-        Of the displacement: below 1 of a stiffer muscle.
-    lag : float
-        Time constant of the regulator [s].
-    dead : int
-        Steps by which pressure follows its command late.
-    late : int
-        Steps by which displacement is measured late.
-    noise : float
-        Standard deviation of the measured displacement [mm].
-    drift : float
-        Of the displacement, over a minute [mm].
-    high : float
-        Highest pressure [bar].
+    Its displacement has a gain, a drift [mm/min] and noise [mm], and is measured some samples late;
+    its regulator lags [s] and follows some samples late, up to a highest pressure [bar].
     """
 
     muscle: Block

@@ -5,9 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-import pytest
 
-from mckibben import PI, Recording, compare
+from mckibben import PI, Recording
 from mckibben.comparison.belonging import unlike, zeros
 from mckibben.signals import triangle
 
@@ -38,15 +37,11 @@ def test_repeats_and_loads_that_are_known_belong_together() -> None:
 def test_another_muscle_moves_otherwise_under_the_same_load() -> None:
     (found,) = said(run("a"), run("bb", 1.8))
     assert "in a and by" in found
-    assert "in bb: another muscle or load, or one was driven much faster" in found
+    assert "in bb" in found
+    assert len(said(run("a"), run("bb", -1.0, 3.0))) == 1
     assert said(run("a"), run("bb", 1.3)) == []
     runs = [run(name, gain) for name, gain in (("a", 1), ("bb", 1.01), ("c", 1.25), ("dd", 1.26))]
-    assert "another muscle" in said(*runs)[0]  # repeats show that it is no chance
-
-
-def test_a_turned_sign_is_told_as_one() -> None:
-    (found,) = said(run("a"), run("bb", -1.0, 3.0))
-    assert "the sign of one was turned" in found
+    assert said(*runs)  # repeats show that it is no chance
 
 
 def test_other_amplitudes_and_rests_are_no_other_muscle() -> None:
@@ -93,24 +88,8 @@ def test_what_swings_by_itself_tells_no_sign() -> None:
     assert said(*runs) == []
 
 
-def test_recordings_of_other_ranges_are_not_compared() -> None:
-    small = run("a").slice(0, 60)
-    assert np.ptp(small["pressure"]) < 0.6 * np.ptp(PRESSURE)
-    assert list(unlike([small, run("bb", 2.0)], ["pressure"], "displacement", ())) == []
-
-
 def test_held_lengths_are_compared_at_the_same_length() -> None:
     runs = [run("a", displacement_2=0.0), run("bb", 0.5, displacement_2=10.0)]
     names = ("displacement_2", "pressure")
     assert said(*runs, names=names) == []
     assert said(*runs, run("ccc", 1.8, displacement_2=0.0), names=names)
-
-
-@pytest.mark.parametrize("gain", [1.0, 2.5, -1.0])
-def test_a_comparison_tells_it_and_gives_it_as_the_reason(gain: float) -> None:
-    runs = [run("a"), run("bb"), run("ccc", gain)]
-    found = compare(runs[:2], test=runs[2:], models=["pi"])
-    told = ["another muscle" in note or "turned" in note for note in found.notes]
-    assert any(told) == bool(found.apart) == (gain != 1)
-    assert (found.best is None) == (gain != 1)
-    assert ("the sign of one was turned" in found.not_recommended) == (gain < 0)

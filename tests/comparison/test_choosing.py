@@ -1,6 +1,10 @@
+"""What is to be expected of a choice among models: of errors whose truth is known."""
+
+from __future__ import annotations
+
 import numpy as np
 
-from mckibben.comparison.choosing import Choice, choice_of
+from mckibben.comparison.choosing import choice_of
 
 SIZES = [100] * 32
 
@@ -17,7 +21,7 @@ def rmse(pieces: list[tuple[float]]) -> float:
 def test_what_is_to_be_expected_is_what_comes_of_the_choice() -> None:
     """Twenty models that are equally good: the least error is too low, what is expected is not."""
     least, expected = [], []
-    for seed in range(200):
+    for seed in range(100):
         rng = np.random.default_rng(seed)
         models = {f"m{k}": squares(rng, 1.0) for k in range(20)}
         choice = choice_of(models, SIZES, seed)
@@ -59,18 +63,3 @@ def test_the_mean_over_outputs_chooses() -> None:
 def test_one_model_or_few_pieces_are_no_choice() -> None:
     assert choice_of({"a": [(1.0,)] * 8}, [10] * 8, 0) is None
     assert choice_of({"a": [(1.0,)] * 3, "b": [(2.0,)] * 3}, [10] * 3, 0) is None
-
-
-def test_empty_pieces_do_no_harm() -> None:
-    pieces = [(1.0,), (0.0,)] * 8
-    choice = choice_of({"a": pieces, "b": [(2.0,), (0.0,)] * 8}, [10, 0] * 8, 0)
-    assert choice is not None
-    assert np.isfinite(choice.expected)
-
-
-def test_it_is_said_in_words() -> None:
-    words = Choice(3, {"gpi": 0.9, "mpi": 0.1}, 0.5, 0.52).said("mm")
-    assert "among 3" in words
-    assert "0.500 mm" in words
-    assert "4.0 %" in words
-    assert "gpi in 90 %" in words

@@ -1,3 +1,7 @@
+"""Free runs begin where measured memory is: at its peak, at what came before, at a period."""
+
+from __future__ import annotations
+
 from dataclasses import replace
 
 import numpy as np
@@ -63,18 +67,10 @@ def test_only_the_first_measured_output_is_looked_at() -> None:
     )
 
 
-def test_blocks_without_memory_work() -> None:
-    block = replace(Affine.example(), input=PI.example().input)
-    recording = Recording({"pressure": U, "displacement": block.simulate(U)}, 0.01)
-    np.testing.assert_array_equal(
-        run_free(block, recording, "displacement"), recording["displacement"]
-    )
-
-
 def test_overflow_is_refused() -> None:
     block = replace(Affine.example(), gain=1e308, input=PI.example().input)
     recording = Recording({"pressure": U, "displacement": U}, 0.01)
-    with pytest.raises(ModelError, match="not finite"):
+    with pytest.raises(ModelError):
         run_free(block, recording, "displacement")
 
 

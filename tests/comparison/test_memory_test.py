@@ -1,3 +1,7 @@
+"""The memory test: gaps and holds of models whose memory is known."""
+
+from __future__ import annotations
+
 from dataclasses import replace
 
 import numpy as np

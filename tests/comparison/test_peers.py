@@ -68,20 +68,3 @@ def test_transfer_functions_run_free_from_measured_outputs(libraries: Any) -> No
         expected.append(driven - a[1] * expected[t - 1] - a[2] * expected[t - 2])
     found = libraries._transfer(model, {})(u, known)
     np.testing.assert_allclose(found[:, 0], expected, rtol=1e-12, atol=1e-12)
-
-
-def test_a_state_is_found_from_what_it_gave(libraries: Any) -> None:
-    rng = np.random.default_rng(1)
-    a, b = np.array([[0.9, 0.2], [0.0, 0.7]]), np.array([[0.0], [1.0]])
-    c, start, u = np.array([[1.0, 0.0]]), np.array([0.4, -2.0]), rng.standard_normal((50, 1))
-
-    def response(given: Any, state: Any) -> Any:
-        outputs = []
-        for now in given:
-            outputs.append(c @ state)
-            state = a @ state + b @ now
-        return np.array(outputs)
-
-    whole = response(u, start)
-    found = libraries._state_space(a, c, response)(u, whole[:20])
-    np.testing.assert_allclose(found, whole, atol=1e-10)

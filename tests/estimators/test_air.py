@@ -72,25 +72,10 @@ def test_limits_are_found_where_they_show_and_kept_where_they_are_given() -> Non
     assert (told.supply, told.ambient) == (7.0, -0.5)
 
 
-def test_no_hysteresis_is_found_to_be_none() -> None:
-    found, estimator = fitted(replace(REGULATOR, hysteresis=0.0), 3)
-    assert found.hysteresis < 0.005
-    if found.hysteresis == 0:
-        assert estimator.diagnostics_.at_bounds == (2,)
 
 
-def test_other_dead_times_are_told_to_be_worse() -> None:
-    _, estimator = fitted(REGULATOR)
-    (note,) = estimator.diagnostics_.notes
-    assert "dead time 0.03 s" in note
-    assert "at 0.02 s" in note
-    assert "at 0.04 s" in note
 
 
-def test_a_swarm_finds_it_too() -> None:
-    swarm = AirEstimator(method="pso-ls", pso_particles=12, pso_iterations=20)
-    found = swarm.fit(recorded(REGULATOR)).model_
-    np.testing.assert_allclose(found.pack(), REGULATOR.pack(), rtol=0.02, atol=0.005)
 
 
 def test_what_is_no_command_is_refused() -> None:
@@ -108,24 +93,3 @@ def test_what_is_no_command_is_refused() -> None:
         AirEstimator().fit(replace(run, sample_time=None))
 
 
-def test_the_command_line_fits_inverts_and_undoes(cli: Cli, tmp_path: Path) -> None:
-    named = replace(
-        REGULATOR, input=Channel("command_pressure", "bar"), gain=1.0, ambient=0.0, dead_time=0.02
-    )
-    volts = 0.5 * commands()
-    noisy = recorded(named, volts=volts)
-    run = Recording(
-        {"command_pressure": volts, "pressure": noisy["pressure"]},
-        STEP,
-        {"command_pressure": "bar"},
-    )
-    write(run, tmp_path / "run.csv")
-    model, inverse = tmp_path / "air.json", tmp_path / "inverse.json"
-    channels = ["--input", "command_pressure", "--output", "pressure"]
-    result = cli("fit", "air", tmp_path / "run.csv", *channels, "-o", model, "--json")
-    assert result.code == 0, result.err
-    assert json.loads(result.out)["rmse"] < 1.05 * NOISE
-    result = cli("invert", model, "-o", inverse)
-    assert result.code == 0, result.err
-    assert "Reachable" in result.out
-    assert load(inverse) == load(model).inverse()

@@ -101,41 +101,7 @@ def test_one_inflation_of_a_held_muscle_tells_of_other_lengths() -> None:
     assert np.sqrt(np.mean(off**2)) < 0.04 * SHEET.force
 
 
-def test_noise_counts_independent_samples() -> None:
-    rng = np.random.default_rng(0)
-    white = rng.standard_normal(20_000)
-    assert noise_of([white[:9000], white[9000:]]) == pytest.approx(1.0, rel=0.2)
-    slow = np.zeros(20_000)
-    for k in range(1, slow.size):
-        slow[k] = 0.9 * slow[k - 1] + white[k]
-    assert noise_of([slow]) == pytest.approx(1.0 / 0.1, rel=0.2)  # of its sums
 
 
-def test_priors_of_several_muscles_are_refused() -> None:
-    run = moved(1, 10.0)
-    two = Recording(
-        {
-            "pressure_1": run["pressure"],
-            "pressure_2": run["pressure"][::-1],
-            "displacement_1": run["displacement"],
-            "displacement_2": run["displacement"][::-1],
-        },
-        STEP,
-    )
-    with pytest.raises(ModelError, match="of one muscle"):
-        BalanceEstimator(prior="rail").fit(two)
 
 
-def test_priors_are_named_or_files(tmp_path: Path) -> None:
-    path = tmp_path / "sheet.toml"
-    content = SHEET.model_dump(exclude_none=True) | {"like": "rail"}
-    path.write_text(
-        "\n".join(f"{k} = {v!r}".replace("'", '"') for k, v in content.items()), encoding="utf-8"
-    )
-    run, settings = moved(1, 5.0), SETTINGS | {"steps": 2}
-    of_file, of_path = (
-        BalanceEstimator(prior=given, **settings).fit(run).model_ for given in (str(path), path)
-    )
-    assert of_file == of_path
-    named = BalanceEstimator(prior="rail", **settings).fit(run).model_
-    assert named != of_file

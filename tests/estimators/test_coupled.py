@@ -122,41 +122,10 @@ def test_coupling_is_found_by_least_squares() -> None:
     np.testing.assert_allclose(found.matrix, truth.matrix, atol=1e-9)
 
 
-def test_muscles_that_never_move_alone_are_said() -> None:
-    both = runs(ForceBalance.example().inverse())[2::3]
-    with pytest.raises(DataError, match=r"pressure_1.*alone.*fit balance"):
-        registry.load("estimators", "sdchm")().fit(both)
-    names = ["pressure_1", "pressure_2"], ["displacement_1", "displacement_2"]
-    for model in ("sdchm", "sdchm-published", "coupled-pi"):
-        objection = registry.load("estimators", model).objection
-        assert "pressure_1 moves alone in no run" in str(objection(both, *names))
-        assert objection(runs(ForceBalance.example().inverse()), *names) is None
-    registry.load("estimators", "balance")(n_lags=0, steps=2).fit(both)
 
 
-def test_bad_recordings_are_named(balance_runs: list[Recording]) -> None:
-    fit = registry.load("estimators", "balance")().fit
-    with pytest.raises(DataError, match="displacement_1"):
-        fit(Recording({"pressure_1": waves(), "pressure_2": waves()}, STEP))
-    stiff = balance_runs[0]
-    others = stiff.select([name for name in stiff.channels if name != "pressure_extensor"])
-    with pytest.raises(DataError, match="pressure_extensor"):
-        fit([stiff, others])
-    with pytest.raises(DataError, match="too few"):
-        fit(balance_runs[0].slice(0, 20))
-    with pytest.raises(ModelError, match="degree"):
-        registry.load("estimators", "balance")(degree=9).fit(balance_runs)
 
 
-@pytest.mark.parametrize("lost", ["pressure_2", "displacement_2"])
-def test_the_order_of_recordings_does_not_hide_a_muscle(
-    lost: str, balance_runs: list[Recording]
-) -> None:
-    whole = balance_runs[0]
-    less = whole.select([name for name in whole.channels if name != lost])
-    for given in ([less, whole], [whole, less]):
-        with pytest.raises(DataError, match=lost):
-            registry.load("estimators", "balance")().fit(given)
 
 
 def test_projected_derivatives_agree_with_differences() -> None:
@@ -178,24 +147,8 @@ def test_projected_derivatives_agree_with_differences() -> None:
         assert gradient[k] == pytest.approx(slope, rel=0.02, abs=1e-3 * np.abs(gradient).max())
 
 
-def test_the_printed_start_of_a_gpi_model_is_stationary() -> None:
-    rng = np.random.default_rng(0)
-    u = np.concatenate([[0.0], rng.uniform(0, 2.5, 50)])
-    r = np.arange(11) / 10 * 2.5
-    flat = np.zeros_like(u)  # tanh(0 u + 0) + 0
-    operators = np.empty((u.size, r.size))
-    gpi_matrix(u, flat, flat, r, named_state("virgin", r, 0.0, 0.0), operators)
-    assert not operators.any()  # nor then do weights of 0 see a slope, nor envelopes of theirs
 
 
-def test_swarms_start_is_the_printed_one() -> None:
-    rng = np.random.default_rng(3)
-    x = rng.uniform(0, 40, (200, 2))
-    problem = Problem(x, x**2, Consequents(False, 1e-9))
-    found = swarmed(problem, 3, printed_swarm(particles=1, iterations=0), 5, Tracker())
-    start = np.random.default_rng(5).standard_normal(12)
-    np.testing.assert_array_equal(found.centres.ravel(), start[:6])
-    np.testing.assert_array_equal(found.widths.ravel(), np.abs(start[6:]))
 
 
 def test_a_problems_cost_orders_as_the_printed_loss() -> None:
@@ -209,24 +162,3 @@ def test_a_problems_cost_orders_as_the_printed_loss() -> None:
     assert problem.cost(sets) ** 2 * y.shape[1] == pytest.approx(np.mean((errors**2).sum(axis=1)))
 
 
-@pytest.mark.parametrize(
-    ("name", "kind", "method"),
-    [
-        *((name, "two muscles", method) for name in ("sdchm", "tsfnn") for method in ("ls", "pso")),
-        *(("mpi-narmax", "loaded", method) for method in ("trust-region", "pso")),
-    ],
-)
-def test_an_interrupt_of_the_networks_search_keeps_the_best(
-    name: str, kind: str, method: str
-) -> None:
-    def impatient(share: float, best: float) -> None:
-        if share > 0.4 and np.isfinite(best):
-            raise KeyboardInterrupt
-
-    estimator = quick(name, kind, method=method)
-    with pytest.raises(KeyboardInterrupt), whole_searches():
-        estimator.fit(recorded(kind), progress=impatient)
-    assert not hasattr(estimator, "model_")
-    estimator.fit(recorded(kind), progress=impatient)
-    assert estimator.diagnostics_.interrupted
-    assert estimator.score(recorded(kind)) > 0.3

@@ -56,10 +56,6 @@ def test_known_outputs_tell_how_far_elements_had_crept(block: Block) -> None:
     np.testing.assert_allclose(begun_state(block, rest, inputs, y, STEP, early), crept, atol=1e-8)
 
 
-def test_only_creep_whose_start_is_fitted_has_such_places() -> None:
-    n = SLOW.parts[0].n_states
-    assert begun_places(SLOW) == [n, n + 1]
-    assert begun_places(Series((PI.example(), replace(CREEP, initial="first_sample")))) == []
 
 
 def test_a_drift_from_before_the_recording_is_found_and_gone_on_from() -> None:
@@ -77,20 +73,6 @@ def test_a_drift_from_before_the_recording_is_found_and_gone_on_from() -> None:
     assert found.diagnostics_.rmse < 0.5 * settled.diagnostics_.rmse
 
 
-def test_an_interrupt_leaves_the_settled_model() -> None:
-    train = worked(SLOW, 120, 100, 0.01)
-    shares: list[float] = []
-
-    def stop(share: float, best: float) -> None:
-        shares.append(share)
-        if share > 0.55:
-            raise KeyboardInterrupt
-
-    found = CreepPIEstimator().fit(train, progress=stop)
-    assert found.diagnostics_.interrupted
-    assert shares == sorted(shares)
-    settled = CreepPIEstimator(settled=True).fit(train)
-    np.testing.assert_array_equal(found.model_.pack(), settled.model_.pack())
 
 
 def test_where_the_muscle_was_settled_nothing_is_made_up() -> None:
@@ -125,29 +107,5 @@ def test_moves_of_what_was_begun_are_those_of_finite_differences() -> None:
     np.testing.assert_allclose(moves, differences, atol=2e-4 * np.abs(moves).max())
 
 
-@pytest.mark.parametrize("seed", range(5))
-def test_linear_parameters_of_either_sign_are_solved_for_beside_others(seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    basis = rng.standard_normal((60, 5))
-    target = basis @ rng.uniform(-1, 1, 5) + 3 + 0.1 * rng.standard_normal(60)
-    least = np.array([-np.inf, 0.0, 0.2, -np.inf, 0.0])
-    reference = lsq_linear(
-        np.column_stack([basis, np.ones(60)]),
-        target,
-        (np.append(least, -np.inf), np.inf),
-        tol=1e-14,
-        method="bvls",
-    )
-    x, offset = solve_linear(basis, target, nonnegative=True, least=least)
-    np.testing.assert_allclose([*x, offset], reference.x, rtol=1e-6, atol=1e-8)
 
 
-def test_two_columns_that_are_one_are_told_together() -> None:
-    rng = np.random.default_rng(0)
-    basis = rng.standard_normal((60, 3))
-    twice = np.column_stack([basis, basis[:, 0]])
-    target = basis @ [-2.0, 0.5, 1.0] + 3
-    x, offset = solve_linear(
-        twice, target, nonnegative=True, least=np.array([-np.inf, 0, 0, -np.inf])
-    )
-    np.testing.assert_allclose([x[0] + x[3], x[1], x[2], offset], [-2, 0.5, 1, 3], atol=1e-9)

@@ -178,10 +178,6 @@ def test_frequency_is_read_off_the_input() -> None:
         assert dominant_frequency(data.runs[0]) == pytest.approx(frequency, rel=0.1)
 
 
-def test_memory_needs_no_frequency() -> None:
-    runs = [sines(w, 150.0) for w in (0.5, 2.0)]
-    fit: Any = ActivationMemoryEstimator().fit(runs)
-    assert fit.diagnostics_.rmse < 0.05 * np.ptp(runs[0]["pressure"])
 
 
 class TestBalanceForce:
@@ -218,16 +214,5 @@ class TestBalanceForce:
         ]
         np.testing.assert_allclose(np.concatenate(forces[0]), np.concatenate(forces[1]), atol=1e-6)
 
-    def test_it_says_where_it_has_no_place(self) -> None:
-        runs = isometric(static_force())
-        assert BalanceForceEstimator.objection(runs, ["length"], ["force"]) is None
-        assert BalanceForceEstimator.objection(runs, ["pressure"], ["force"]) is not None
-        bare = [run.select(["length", "force"]) for run in runs]
-        assert "pressure" in str(BalanceForceEstimator.objection(bare, ["length"], ["force"]))
 
 
-def test_models_of_what_rests_in_every_recording_are_not_offered() -> None:
-    runs = isometric(static_force())
-    for name in ("pi", "balance", "arx"):
-        found = registry.load("estimators", name).objection(runs, ["length"], ["force"])
-        assert "rests in every recording" in str(found)

@@ -102,23 +102,10 @@ def test_force_is_estimated_from_a_length_as_from_its_shortening(
     assert apart < 0.04 * np.ptp(train[-1]["force"])
 
 
-def test_a_load_is_asked_for(runs: dict[str, Recording]) -> None:
-    bare = runs["status-1"].select(["voltage", "displacement"])
-    with pytest.raises(DataError, match="force"):
-        registry.load("estimators", "mpi-narmax")().fit(bare)
 
 
-def test_runs_of_different_rates_are_refused(train: list[Recording]) -> None:
-    with pytest.raises(DataError, match="resample"):
-        registry.load("estimators", "mpi-narmax")().fit([train[0], resample(train[1], 0.1)])
 
 
-def test_a_trust_region_finds_what_even_sets_do_not(train: list[Recording]) -> None:
-    estimator_class = registry.load("estimators", "mpi-narmax")
-    even, refined = (
-        estimator_class(method=method, n_sets=2).fit(train) for method in ("ls", "trust-region")
-    )
-    assert refined.diagnostics_.rmse <= 1.02 * even.diagnostics_.rmse
 
 
 def test_force_comes_with_an_interval_from_runs_left_out(

@@ -146,23 +146,5 @@ def test_an_unstable_model_is_refused_unless_it_is_asked_for() -> None:
     assert not stable(calm.unpack(wild), data)
 
 
-def test_a_comparison_survives_models_that_fail() -> None:
-    from mckibben import compare
-
-    recording = loop()
-    board = compare(
-        recording,
-        models=["narx", "pi"],
-        settings={"narx": {"degree": 6, "output_lags": 20, "input_lags": 20}},
-        n_folds=0,
-        jobs=1,
-    )
-    failed = {row.model: row.reason for row in board.rows if row.reason is not None}
-    assert "too many to choose from" in failed["narx"]
-    assert board.best is not None
 
 
-def test_too_many_candidates_are_refused() -> None:
-    estimator = load("estimators", "narx")(degree=5, output_lags=6, input_lags=6)
-    with pytest.raises(ModelError, match=r"products.*too many.*Remedy"):
-        estimator.fit(loop())

@@ -83,10 +83,6 @@ def test_an_element_of_unknown_shape_is_found(name: str) -> None:
     assert missed(found.model_, test, True) < 0.2 * NOISE
 
 
-def test_a_steady_state_that_is_not_said_to_be_one_is_mistaken() -> None:
-    noisy, test = shaken("hardening", periodic=True)
-    found = BoucWenOscillatorEstimator().fit(noisy)
-    assert missed(found.model_, test, True) > NOISE
 
 
 def test_an_offset_is_found_where_there_is_one() -> None:

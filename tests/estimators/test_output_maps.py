@@ -47,6 +47,3 @@ def test_bernstein_pieces_are_integrals_of_bernstein_polynomials() -> None:
         np.testing.assert_allclose(pieces[:, k], integral, atol=1e-8)
 
 
-def test_unknown_map_is_refused() -> None:
-    with pytest.raises(ModelError, match="Remedy"):
-        output_map("spline", 3)

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from mckibben import ModelError
 from mckibben.blocks.dynamic.state_network import StateNetwork
 from mckibben.estimators.dynamic.state_network import StateNetworkEstimator
 from mckibben.estimators.dynamic.state_network_slopes import follow_network
@@ -66,9 +65,3 @@ def test_hysteresis_in_a_loop_is_learned_without_being_told_of() -> None:
     )
     assert several < 0.03
     assert several < 0.4 * one
-
-
-def test_what_cannot_be_learned_from_is_refused() -> None:
-    noisy, _ = shaken("slipping", periodic=True)
-    with pytest.raises(ModelError, match=r"are not fitted.*periodic=true"):
-        StateNetworkEstimator(initial="fitted").fit(noisy)

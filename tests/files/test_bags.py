@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import shutil
 import sqlite3
-import sys
 from collections.abc import Callable
 from contextlib import closing
 from pathlib import Path
@@ -43,7 +42,7 @@ def test_topics_are_put_on_the_slowest_clock(tmp_path: Path, kind: Kind, packed:
     if packed and kind == "db3":
         pytest.skip("is packed as a whole file, which is no database then")
     path = write(tmp_path / "run", kind, packed=packed)
-    with pytest.warns(DataWarning, match=r"pressure 100, angle 40.*times of 'angle'"):
+    with pytest.warns(DataWarning, match=r"pressure 100, angle 40.*'angle'"):
         recording = one(path, **ASKED)
     assert recording.sample_time == pytest.approx(SLOW * 1e-9)
     t = recording.time
@@ -59,11 +58,10 @@ def test_topics_are_put_on_the_slowest_clock(tmp_path: Path, kind: Kind, packed:
 def test_units_that_types_and_names_tell(tmp_path: Path, kind: Kind) -> None:
     path = write(tmp_path / "run", kind)
     asked = ["pressure"]  # which two topics and a field say
-    with pytest.raises(
-        DataError, match=r"'pressure'.*no such channel; the columns are /rig/pressure"
-    ):
+    with pytest.raises(DataError, match="/rig/pressure") as caught:
         mckibben.read(path, channels=asked)
-    with pytest.warns(DataWarning, match="by interpolation"):
+    assert caught.value.channel == "pressure"
+    with pytest.warns(DataWarning):
         everything = one(path)
     assert everything["state_pressure"] == pytest.approx(pressure(everything.time))
     assert everything.units["state_pressure"] == "bar"
@@ -76,7 +74,7 @@ def test_units_that_types_and_names_tell(tmp_path: Path, kind: Kind) -> None:
 
 def test_times_are_those_of_the_header(tmp_path: Path) -> None:
     path = write(tmp_path / "run", "mcap", late=3_000_000)
-    with pytest.warns(DataWarning, match="by interpolation"):
+    with pytest.warns(DataWarning):
         recording = one(path, **ASKED)
     # the angle is stamped, the pressure is not: it seems 3 ms late, as it was recorded
     t = recording.time + 0.003
@@ -86,7 +84,7 @@ def test_times_are_those_of_the_header(tmp_path: Path) -> None:
 
 def test_a_rate_may_be_asked_for(tmp_path: Path) -> None:
     path = write(tmp_path / "run", "bag")
-    with pytest.warns(DataWarning, match="200 a second, by interpolation"):
+    with pytest.warns(DataWarning, match="200"):
         recording = one(path, rate=200, **ASKED)
     assert recording.sample_time == 0.005
     assert recording["angle"] == pytest.approx(angle(recording.time), abs=5e-3)
@@ -120,8 +118,8 @@ def test_definitions_of_the_standard_are_known_without_the_file(tmp_path: Path) 
         base.execute("DROP TABLE message_definitions")
         base.commit()
     with (
-        pytest.warns(DataWarning, match="by interpolation"),
-        pytest.warns(DataWarning, match=r"/state \(the type 'rig_msgs/msg/State' is not defined"),
+        pytest.warns(DataWarning, match="angle 40"),
+        pytest.warns(DataWarning, match="/state .*'rig_msgs/msg/State'"),
     ):
         recording = one(path, **ASKED)
     assert recording["angle"] == pytest.approx(angle(recording.time), abs=1e-12)
@@ -162,40 +160,6 @@ def test_layouts_agree_with_another_library(big: bool) -> None:
 # What cannot be read ------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("kind", KINDS)
-def test_truncated(tmp_path: Path, kind: Kind) -> None:
-    path = file_of(write(tmp_path / "run", kind), kind)
-    whole = path.read_bytes()
-    for length in (5, 100, len(whole) // 2, len(whole) - (4000 if kind == "db3" else 1)):
-        if (kind, length) == ("mcap", len(whole) - 1):
-            length = whole.rindex(b"/rig/pressure", 0, len(whole) // 2)
-        path.write_bytes(whole[:length])
-        with pytest.raises(DataError, match="damaged") as caught:
-            mckibben.read(path, **ASKED)
-        assert caught.value.file == path
-
-
-@pytest.mark.parametrize("kind", KINDS)
-def test_wrong_kind(tmp_path: Path, kind: Kind) -> None:
-    path = file_of(write(tmp_path / "run", kind), kind)
-    other = path.rename(path.with_suffix(".csv"))
-    with pytest.raises(DataError, match=f"by its content it is .* to end in .{kind}"):
-        mckibben.read(other)
-    wrong = tmp_path / f"wrong.{kind}"
-    wrong.write_text("time_s,pressure_bar\n0,1\n")
-    with pytest.raises(DataError, match="damaged"):
-        mckibben.read(wrong)
-
-
-@pytest.mark.parametrize("kind", KINDS)
-def test_a_column_that_is_not_there(tmp_path: Path, kind: Kind) -> None:
-    path = write(tmp_path / "run", kind)
-    with pytest.raises(
-        DataError, match=r"'force'.*no column '/scale/data'; there are /rig/pressure"
-    ):
-        mckibben.read(path, columns={"force": "/scale/data"})
-
-
 def bag_of(path: Path, put: Callable[[Any, Any], None]) -> Path:
     """Write a bag of ROS 2 by a function of its writer and types, and return its file."""
     from rosbags.rosbag2 import StoragePlugin, Writer
@@ -224,11 +188,13 @@ def test_samples_missing_and_times_repeated(tmp_path: Path) -> None:
     values = [1.0 + k for k in range(50)]
     nan = [*values[:7], float("nan"), *values[8:]]
     path = bag_of(tmp_path / "nan", floats("/pressure_bar", times, nan))
-    with pytest.raises(DataError, match=r"'pressure', row 8: 1 of 50 samples are missing"):
+    with pytest.raises(DataError, match="1 of 50") as caught:
         mckibben.read(path)
+    assert (caught.value.channel, caught.value.row) == ("pressure", 8)
     path = bag_of(tmp_path / "again", floats("/pressure_bar", [*times[:7], *times[6:-1]], values))
-    with pytest.raises(DataError, match=r"'pressure', row 8: its time goes from 0.06 s to 0.06 s"):
+    with pytest.raises(DataError, match=r"0\.06 s to 0\.06 s") as caught:
         mckibben.read(path)
+    assert (caught.value.channel, caught.value.row) == ("pressure", 8)
 
 
 def test_joints_are_told_by_name_in_whatever_order(tmp_path: Path) -> None:
@@ -258,9 +224,7 @@ def test_topics_with_no_time_in_common(tmp_path: Path) -> None:
         later = [10**10 + when for when in times]
         floats("/force_N", later, [1.0 + k for k in range(50)])(writer, store)
 
-    with pytest.raises(
-        DataError, match=r"no time in common: pressure from 0 to 0.49 s; force from 10"
-    ):
+    with pytest.raises(DataError, match=r"pressure from 0 to 0.49 s; force from 10"):
         mckibben.read(bag_of(tmp_path / "run", put))
 
 
@@ -270,57 +234,8 @@ def test_no_numbers(tmp_path: Path) -> None:
         sent = writer.add_connection("/words", kind, typestore=store)
         writer.write(sent, 1, store.serialize_cdr(store.types[kind]("up"), kind))
 
-    with pytest.raises(DataError, match=r"no topic in it has numbers.*its topics are /words"):
+    with pytest.raises(DataError, match="/words"):
         mckibben.read(bag_of(tmp_path / "run", put))
-
-
-def test_chunks_that_unpack_to_more_than_they_say(tmp_path: Path) -> None:
-    import bz2
-    import struct
-
-    from backports import zstd
-
-    from mckibben.files.mcap import MAGIC
-
-    bomb = zstd.compress(bytes(2**28))
-    assert len(bomb) < 2**16
-    for said in (2**28, 2**20, 2**62):
-        content = struct.pack("<QQQI", 0, 1, said, 0) + struct.pack("<I4sQ", 4, b"zstd", len(bomb))
-        chunk = struct.pack("<BQ", 6, len(content) + len(bomb)) + content + bomb
-        path = tmp_path / "bomb.mcap"
-        path.write_bytes(MAGIC + chunk)
-        with pytest.raises(DataError, match=r"damaged.* more than"):
-            mckibben.read(path)
-    path = write(tmp_path / "run", "bag", packed=True)
-    whole = path.read_bytes()
-    start = whole.index(b"BZh")
-    packed = bz2.compress(bytes(2**27))
-    room = whole.index(b"op=\x04") - start
-    assert len(packed) < room
-    path.write_bytes(whole[:start] + packed + whole[start + len(packed) :])
-    with pytest.raises(DataError, match=r"damaged.* more than is read"):
-        mckibben.read(path)
-
-
-@pytest.mark.parametrize(
-    "text",
-    [
-        "x/msg/Loop again",
-        "float64[100000000] x",
-        "x/msg/Nothing[4000000000] x\n" + "=" * 80 + "\nMSG: x/msg/Nothing\n",
-        "not a definition at all",
-        "float64 " + "y" * 300_000,
-    ],
-)
-def test_hostile_definitions(text: str) -> None:
-    from mckibben.files.limits import Budget
-    from mckibben.files.topics import Connection, Topic
-
-    with Path(__file__).open("rb") as file:
-        for cdr in (True, False):
-            topic = Topic(Connection("/x", "x/msg/Loop", text, cdr), Budget(file, Path("x.bag")))
-            topic.take(0, b"\0\1\0\0" + bytes(100))
-            assert topic.problem
 
 
 def test_a_database_whose_tables_are_views(tmp_path: Path) -> None:
@@ -332,21 +247,11 @@ def test_a_database_whose_tables_are_views(tmp_path: Path) -> None:
             "SELECT topic_id FROM n) SELECT topic_id, 0 AS timestamp, 0 AS data, 0 AS id FROM n"
         )
         base.commit()
-    with pytest.raises(DataError, match="no tables of topics and messages"):
+    with pytest.raises(DataError, match="topics and messages"):
         mckibben.read(path)
 
 
 def test_a_folder_without_files(tmp_path: Path) -> None:
     (tmp_path / "metadata.yaml").write_text("rosbag2_bagfile_information: {}")
-    with pytest.raises(DataError, match=r"no .db3 or .mcap file in it"):
+    with pytest.raises(DataError, match=r"\.db3 or \.mcap"):
         mckibben.read(tmp_path)
-
-
-def test_missing_library_says_what_to_install(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    path = tmp_path / "run.bag"
-    path.write_text("#ROSBAG V2.0\n")
-    monkeypatch.setitem(sys.modules, "rosbags", None)
-    with pytest.raises(DataError, match=r"not installed. Remedy: pip install 'mckibben\[ros\]'"):
-        mckibben.read(path)

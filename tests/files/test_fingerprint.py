@@ -14,7 +14,6 @@ from mckibben import DataError, Recording, write
 from mckibben.comparison.shared_stretches import shared_stretches, told
 from mckibben.files.fingerprint import FEWEST, shared_rows
 from mckibben.recording import ROWS
-from mckibben.report import write_report
 from mckibben.signals import irregular_triangle, low_pass, resample, triangle, zeroed
 
 STEP = 0.02
@@ -73,7 +72,7 @@ def test_shared_rows_are_found_after_every_sample_was_changed(tmp_path: Path, ch
     assert found.start == pytest.approx(TIME[1200], abs=2)
     assert found.begins == pytest.approx(found.start, abs=0.01)
     assert found.share == pytest.approx(800 / 1800, abs=0.1)
-    with pytest.raises(DataError, match=r"fitted to.*those of fitted from"):
+    with pytest.raises(DataError, match="fitted"):
         told({"fit": [fitted], "test": [tested]}, ["pressure"], OUTPUT)
 
 
@@ -186,17 +185,6 @@ def test_without_time_rows_are_counted(tmp_path: Path) -> None:
     found = shared_rows(first, second, INPUT, OUTPUT)
     assert found is not None
     assert found.begins == found.start + 500
-
-
-def test_it_is_nothing_that_a_person_is_shown(tmp_path: Path) -> None:
-    whole = read(written(tmp_path / "whole.csv", ROWS_READ))
-    assert ROWS in whole.meta
-    assert whole.known == {key: what for key, what in whole.meta.items() if key != ROWS}
-    study = mckibben.study(whole, models=["pi"])
-    write_report(study, tmp_path / "report.html")
-    page = (tmp_path / "report.html").read_text("utf-8")
-    assert "What is known" in page
-    assert whole.meta[ROWS]["displacement"][:20] not in page
 
 
 def test_other_samples_under_what_is_known_of_a_recording_are_other_data(tmp_path: Path) -> None:

@@ -31,14 +31,14 @@ def written(path: Path, at: float | None, column: int, n: int = 1) -> Path:
 @pytest.mark.parametrize(("at", "column"), [(999.0, 1), (-20.0, 1), (-9999.0, 2), (65535.0, 2)])
 def test_what_cannot_be_is_refused_by_its_row(tmp_path: Path, at: float, column: int) -> None:
     path = written(tmp_path / "run.csv", at, column)
-    with pytest.raises(DataError, match=f"row {ROW}.*correct that cell") as caught:
+    with pytest.raises(DataError, match=f"row {ROW}") as caught:
         read(path)
     assert caught.value.channel == ("pressure", "displacement")[column - 1]
 
 
 @pytest.mark.parametrize("n", [1, 3])
 def test_what_stands_alone_is_told(tmp_path: Path, n: int) -> None:
-    with pytest.warns(DataWarning, match=f"displacement, row {ROW}: it is 100 mm there"):
+    with pytest.warns(DataWarning, match=f"displacement, row {ROW}: .*100 mm"):
         (found,) = read(written(tmp_path / "run.csv", 100.0, 2, n))
     assert any("100 mm" in note for note in found.notes)
 

@@ -1,28 +1,482 @@
-"""Every malformed file gives its error, and none anything else."""
+"""A reader answers or raises a `DataError` that names the file, the channel and the row.
 
+``CASES`` are files that are wrong, each in one way, for reading pressure and displacement. Sound files
+of every format are damaged at random beside them.
+"""
+
+from __future__ import annotations
+
+import io
+import math
+import os
+import tempfile
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
+import h5py
+import numpy as np
+import openpyxl
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from nptdms import ChannelObject, TdmsWriter
+from scipy.io import savemat
 
 import mckibben
-from mckibben import DataError
-from tests.files.malformed import CASES, CHANNELS, Case
+from mckibben import DataError, Recording
+from tests.files.rosbags_made import write as write_bag
+
+N = 30
+TIME = [k / 10 for k in range(N)]
+PRESSURE = [round(2 + math.sin(k / 3), 4) for k in range(N)]
+DISPLACEMENT = [round(10 - 3 * math.cos(k / 3), 4) for k in range(N)]
+CHANNELS = ("pressure", "displacement")
+
+Maker = Callable[[Path], object]
 
 
-def test_there_are_enough_of_them() -> None:
-    assert len(CASES) >= 60
-    assert len({case.name for case in CASES}) == len(CASES)
+@dataclass(frozen=True)
+class Case:
+    """One malformed file.
+
+    Parameters
+    ----------
+    name : str
+        Of the file.
+    content : bytes or callable
+        What is in it, or what makes it when called with its path.
+    channel, row : str, int, optional
+        The channel and row that the error has to give.
+    names : str
+        A cell, column, unit, number or format that the problem has to name.
+    options : mapping
+        What to give to `mckibben.read` beside the channels.
+    """
+
+    name: str
+    content: bytes | Maker
+    channel: str | None = None
+    row: int | None = None
+    names: str = ""
+    options: Mapping[str, Any] = field(default_factory=dict)
+
+    def write(self, folder: Path) -> Path:
+        """Make the file in a folder and return its path."""
+        path = folder / self.name
+        if callable(self.content):
+            self.content(path)
+        else:
+            path.write_bytes(self.content)
+        return path
+
+
+# Makers --------------------------------------------------------------------------------
+
+
+def csv(**columns: Sequence[object]) -> bytes:
+    """Return a table of text."""
+    rows = [",".join(columns)]
+    rows += [",".join(map(str, row)) for row in zip(*columns.values(), strict=True)]
+    return ("\n".join(rows) + "\n").encode()
+
+
+def sound(**columns: Sequence[object]) -> dict[str, Sequence[object]]:
+    """Return sound columns, some replaced or added."""
+    return {
+        "time_s": TIME,
+        "pressure_bar": PRESSURE,
+        "displacement_mm": DISPLACEMENT,
+        **columns,
+    }
+
+
+def good(**columns: Sequence[object]) -> bytes:
+    """Return a sound table, with columns replaced or added."""
+    return csv(**sound(**columns))
+
+
+def put(samples: Sequence[object], at: int, cell: object) -> list[object]:
+    """Return samples with one replaced; sample ``at`` is line ``at + 2`` of the file."""
+    return [cell if k == at else sample for k, sample in enumerate(samples)]
+
+
+def line(number: int, text: str) -> bytes:
+    """Return a sound table with one line, counted from 1, replaced."""
+    lines = good().decode().splitlines()
+    lines[number - 1] = text
+    return ("\n".join(lines) + "\n").encode()
+
+
+def headers(text: str) -> bytes:
+    """Return a sound table under another header."""
+    return line(1, text)
+
+
+def gapped(lengths: Sequence[int], pause: float) -> bytes:
+    """Return a sound table with pauses between stretches of these lengths."""
+    time = [i * pause + k / 10 for i, length in enumerate(lengths) for k in range(length)]
+    return good(time_s=time[:N])
+
+
+def parquet(**columns: object) -> bytes:
+    buffer = io.BytesIO()
+    pq.write_table(pa.table(columns), buffer)
+    return buffer.getvalue()
+
+
+def mat(form: Any = "5", **variables: object) -> bytes:
+    buffer = io.BytesIO()
+    savemat(buffer, variables, format=form)  # type: ignore[arg-type]  # the stubs know no buffers
+    return buffer.getvalue()
+
+
+def hdf5(**datasets: object) -> bytes:
+    """Return an HDF5 file; a tuple declares a data set of that shape and writes nothing."""
+    buffer = io.BytesIO()
+    with h5py.File(buffer, "w") as file:
+        for name, samples in datasets.items():
+            if isinstance(samples, tuple):
+                file.create_dataset(name, shape=samples, dtype="f8", chunks=True)
+            else:
+                file[name] = samples
+    return buffer.getvalue()
+
+
+def chunk(content: bytes, **packing: Any) -> bytes:
+    """Return an HDF5 file with one chunk of 160 bytes that is this instead."""
+    buffer = io.BytesIO()
+    with h5py.File(buffer, "w") as file:
+        data = file.create_dataset("pressure_bar", (20,), "f8", chunks=(20,), **packing)
+        data.id.write_direct_chunk((0,), content)
+    return buffer.getvalue()
+
+
+def tdms(increments: Sequence[float] = (0.1, 0.1), n: int = N) -> bytes:
+    """Return a TDMS file with pressure and displacement."""
+    buffer = io.BytesIO()
+    channels = zip(CHANNELS, (PRESSURE, DISPLACEMENT), ("bar", "mm"), increments, strict=True)
+    with TdmsWriter(buffer) as writer:
+        writer.write_segment(
+            [
+                ChannelObject(
+                    "run", name, np.array(samples[:n]), {"unit_string": unit, "wf_increment": step}
+                )
+                for name, samples, unit, step in channels
+            ]
+        )
+    return buffer.getvalue()
+
+
+def xlsx(**columns: Sequence[object]) -> bytes:
+    """Return a spreadsheet."""
+    book = openpyxl.Workbook(write_only=True)
+    sheet = book.create_sheet("Data")
+    sheet.append(list(columns))
+    for row in zip(*columns.values(), strict=True):
+        sheet.append(row)
+    buffer = io.BytesIO()
+    book.save(buffer)
+    return buffer.getvalue()
+
+
+def bag(kind: Any) -> bytes:
+    """Return a bag of ROS, without a channel that is called displacement."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = write_bag(Path(folder) / "run", kind)
+        return next(path.glob(f"*.{kind}")).read_bytes() if path.is_dir() else path.read_bytes()
+
+
+def described(text: str) -> Maker:
+    """Make a sound table, and a description of its folder beside it."""
+
+    def make(path: Path) -> None:
+        path.write_bytes(good())
+        (path.parent / "channels.toml").write_text(text)
+
+    return make
+
+
+def outside(path: Path) -> None:
+    """Have the samples in another file."""
+    (path.parent / "secret").write_bytes(bytes(range(160)))
+    with h5py.File(path, "w") as file:
+        where = [(str(path.parent / "secret"), 0, 160)]
+        file.create_dataset("pressure_bar", (20,), "f8", external=where)
+
+
+def virtual(path: Path) -> None:
+    """Have the samples in a data set of another file."""
+    other = path.parent / "secret"
+    other.write_bytes(HDF5)
+    with h5py.File(path, "w") as file:
+        layout = h5py.VirtualLayout((N,), "f8")
+        layout[:] = h5py.VirtualSource(str(other), "pressure_bar", (N,))
+        file.create_virtual_dataset("pressure_bar", layout)
+
+
+GARBAGE = bytes(range(256)) * 4
+PARQUET = parquet(pressure_bar=PRESSURE, displacement_mm=DISPLACEMENT)
+MAT = mat(pressure=PRESSURE, displacement=DISPLACEMENT)
+HDF5 = hdf5(pressure_bar=PRESSURE, displacement_mm=DISPLACEMENT)
+XLSX = xlsx(pressure_bar=PRESSURE, displacement_mm=DISPLACEMENT)
+BAG, MCAP, DB3 = bag("bag"), bag("mcap"), bag("db3")
+UNITS = {"units": {"pressure": "bar", "displacement": "mm"}}
+P, X, T = CHANNELS[0], CHANNELS[1], "time"
+
+CASES: list[Case] = [
+    # No file, or none that is known
+    Case("missing.csv", lambda path: None),
+    Case("folder.csv", Path.mkdir),
+    Case("link.csv", lambda path: path.symlink_to(path.name)),
+    Case("pipe.csv", os.mkfifo),
+    Case("pipe.h5", os.mkfifo),
+    Case("device.mat", lambda path: path.symlink_to("/dev/zero")),
+    Case("book.xls", b"\xd0\xcf\x11\xe0", names="'.xls'"),
+    Case("notes.docx", b"PK\x03\x04", names="'.docx'"),
+    Case("no_ending", good()),
+    # Content of another kind
+    Case("workbook.csv", b"PK\x03\x04\x14\0\x06\0"),
+    Case("old_workbook.csv", b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1", names="Excel"),
+    Case("parquet.csv", PARQUET, names="Parquet"),
+    Case("hdf5.csv", HDF5, names="HDF5"),
+    Case("matlab.csv", MAT, names="MATLAB"),
+    Case("tdms.txt", tdms(), names="TDMS"),
+    Case("mcap.bag", MCAP, names="MCAP"),
+    Case("bag.csv", BAG),
+    Case("db3.csv", DB3),
+    Case("spreadsheet.csv", XLSX),
+    Case("picture.csv", b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR"),
+    Case("escapes.csv", headers("time_s,\x1b[31mpressure,displacement_mm")),
+    Case("garbage.csv", GARBAGE),
+    Case("zeros.csv", bytes(1000)),
+    Case("half_utf16.csv", "pressure".encode("utf-16")[:-1]),
+    # Empty, or without samples
+    Case("empty.csv", b""),
+    Case("blank.csv", b"\n \n\n"),
+    Case("bom_only.csv", b"\xef\xbb\xbf"),
+    Case("comments.csv", b"# rig 1\n% date\n"),
+    Case("header_only.csv", b"time_s,pressure_bar,displacement_mm\n"),
+    Case("units_only.csv", b"time,pressure,displacement\ns,bar,mm\n", T, 2, "'s'"),
+    Case("prose.txt", b"This is no table.\nIt only says so.\n", P),
+    Case("one_sample.csv", good().partition(b"0.1,")[0], names="1 sample"),
+    Case("nine_samples.csv", b"\n".join(good().splitlines()[:10]), names="9 sample"),
+    # Lines
+    Case("short_line.csv", line(12, "1.0,2.0"), row=12, names="2 cells"),
+    Case("long_line.csv", line(13, "1.1,2.0,9.0,7"), row=13, names="4 cells"),
+    Case("cut_off.csv", good()[:-14], row=31),
+    Case("short_header.csv", headers("time_s,pressure_bar"), row=2, names="3 cells"),
+    Case("quote.csv", line(6, '"0.4,2.9,9.0'), row=6),
+    Case("decimal_commas.csv", line(3, "0,1,2,3,7,0"), row=3, names="6 cells"),
+    Case("long.csv", line(3, "1" * 20_000_000), row=3, names="20000000"),
+    # Columns
+    Case("no_names.csv", good().partition(b"\n")[2], P, names="column_1"),
+    Case("other_names.csv", headers("time_s,a,b"), P, names="time_s, a, b"),
+    Case("no_displacement.csv", csv(time_s=TIME, pressure_bar=PRESSURE), X),
+    Case("text_only.csv", csv(pressure=["high"] * N, displacement=["low"] * N), P, 2),
+    Case("text_column.csv", good(pressure_bar=["high"] * N), P, 2),
+    Case("text_cell.csv", good(pressure_bar=put(PRESSURE, 8, "n.d.")), P, 10, "'n.d.'"),
+    Case("unit_in_cell.csv", good(displacement_mm=put(DISPLACEMENT, 3, "9 mm")), X, 5, "'9 mm'"),
+    Case("hex_cell.csv", good(pressure_bar=put(PRESSURE, 0, "0x1F")), P, 2, "'0x1F'"),
+    Case("two_pressures.csv", good(p_kPa=PRESSURE), P, names="'pressure_bar' and 'p_kPa'"),
+    Case("two_strokes.csv", good(**{"Stroke (mm)": DISPLACEMENT}), X, names="'Stroke (mm)'"),
+    Case("same_header.csv", headers("time_s,pressure_bar,pressure_bar"), P),
+    Case("two_times.csv", good(t_ms=TIME), T, names="'time_s' and 't_ms'"),
+    Case("no_such_column.csv", good(), P, names="'P9'", options={"columns": {"pressure": "P9"}}),
+    Case(
+        "mapped_text.csv",
+        good(branch=["up"] * N),
+        P,
+        2,
+        options={"columns": {"pressure": "branch"}},
+    ),
+    # Units
+    Case("unknown_unit.csv", headers("time_s,pressure [foo],displacement_mm"), P, names="'foo'"),
+    Case("pressure_in_mm.csv", headers("time_s,pressure_mm,displacement_mm"), P, names="'mm'"),
+    Case("stroke_in_kg.csv", headers("time_s,p_bar,displacement (kg)"), X, names="'kg'"),
+    Case("time_in_volts.csv", headers("time (V),p_bar,displacement_mm"), T, names="'V'"),
+    Case(
+        "kilopascals.csv",
+        csv(pressure=[100 * p for p in PRESSURE], displacement_mm=DISPLACEMENT),
+        P,
+        names="bar",
+    ),
+    Case("given_unit.csv", good(), P, names="'blub'", options={"units": {"pressure": "blub"}}),
+    Case("given_volts.csv", good(), P, names="'V'", options={"units": {"pressure": "V"}}),
+    Case("unit_of_nothing.csv", good(), "force", options={"units": {"force": "N"}}),
+    # Samples
+    Case("nan.csv", good(pressure_bar=put(PRESSURE, 4, "NaN")), P, 6, "1 of 30"),
+    Case("blank_cell.csv", good(displacement_mm=put(DISPLACEMENT, 9, "")), X, 11, "1 of 30"),
+    Case("infinite.csv", good(pressure_bar=put(PRESSURE, 29, "-inf")), P, 31),
+    Case("overflow.csv", good(pressure_bar=put(PRESSURE, 2, "1e999")), P, 4),
+    Case("blank_column.csv", good(pressure_bar=[""] * N), P, 2),
+    Case("constant.csv", good(pressure_bar=[2.5] * N), P, names="2.5"),
+    # Time
+    Case("no_instant.csv", good(time_s=put(TIME, 5, "")), T, 7),
+    Case("infinite_time.csv", good(time_s=put(TIME, 5, "inf")), T, 7),
+    Case("repeated.csv", good(time_s=put(TIME, 5, 0.4)), T, 7, "0.4"),
+    Case("frozen_clock.csv", good(time_s=[0.0] * N), T, 3, "0"),
+    Case("backwards.csv", good(time_s=put(TIME, 5, 0.05)), T, 7, "from 0.4 to 0.05"),
+    Case("clock_reset.csv", good(time_s=TIME[:20] + TIME[:10]), T, 22),
+    Case("clock_text.csv", good(time_s=["noon"] * N), T, 2, "'noon'"),
+    Case("text_instant.csv", good(time_s=put(TIME, 7, "late")), T, 9, "'late'"),
+    Case("gap.csv", gapped((12, 18), 60.0), T, 14, "58.9 s"),
+    Case("gaps_only.csv", gapped((6,) * 5, 9.0), options={"gaps": "split"}),
+    Case("long_gap.csv", gapped((15, 15), 1e6), T, options={"gaps": "interpolate"}),
+    Case("zero_rate.csv", good(), options={"rate": 0}),
+    Case("negative_rate.csv", good(), names="-10", options={"rate": -10}),
+    Case("no_rate.csv", good(), options={"rate": math.nan}),
+    Case("endless_rate.csv", good(), options={"rate": math.inf}),
+    Case("other_rate.csv", good(), T, names="50", options={"rate": 50}),
+    Case("policy.csv", good(), names="'ignore'", options={"gaps": "ignore"}),
+    # Parquet
+    Case("garbage.parquet", b"PAR1" + GARBAGE),
+    Case("text.parquet", good()),
+    Case("no_rows.parquet", parquet(pressure_bar=np.zeros(0))),
+    Case(
+        "null.parquet",
+        parquet(pressure_bar=put(PRESSURE, 4, None), displacement_mm=DISPLACEMENT),
+        P,
+        5,
+        "1 of 30",
+    ),
+    Case("lists.parquet", parquet(pressure=[[1.0]] * N, displacement=DISPLACEMENT), P, 1),
+    # MATLAB
+    Case("garbage.mat", GARBAGE),
+    Case("text.mat", good()),
+    Case("scalars.mat", mat(pressure=2.0, displacement=7.0)),
+    Case("strings.mat", mat(pressure="high")),
+    Case("huge.mat", MAT[:144] + b"\xff\xff\xff\x7f" * 4 + MAT[160:]),
+    Case(
+        "nan.mat",
+        mat(pressure=put(PRESSURE, 4, np.nan), displacement=DISPLACEMENT),
+        P,
+        5,
+        "1 of 30",
+        UNITS,
+    ),
+    Case("no_units.mat", mat(pressure=np.multiply(PRESSURE, 200)), X),
+    # HDF5
+    Case("signature_only.h5", HDF5[:8]),
+    Case("text.h5", good()),
+    Case("empty.h5", hdf5()),
+    Case("images.hdf5", hdf5(pressure=np.zeros((9, 9)))),
+    Case("huge.h5", hdf5(pressure_bar=(10**14,)), names="100000000000000"),
+    Case("unequal.h5", hdf5(pressure_bar=PRESSURE, displacement_mm=DISPLACEMENT[:20]), X),
+    Case("wrong_sum.h5", chunk(bytes(160) + b"\1\2\3\4", fletcher32=True)),
+    Case("outside.h5", outside, names="'pressure_bar'"),
+    Case("outside.mat", outside, names="'pressure_bar'"),
+    Case("virtual.h5", virtual, names="'pressure_bar'"),
+    # TDMS
+    Case("garbage.tdms", b"TDSm" + GARBAGE),
+    Case("cut_off.tdms", tdms()[:-5]),
+    Case("text.tdms", good()),
+    Case("no_samples.tdms", tdms(n=0)),
+    Case("two_clocks.tdms", tdms(increments=(0.1, 0.2))),
+    # Spreadsheets
+    Case("garbage.xlsx", b"PK\x03\x04" + GARBAGE),
+    Case("text.xlsx", good()),
+    Case("words.xlsx", xlsx(pressure=["high"] * N)),
+    Case("few.xlsx", xlsx(pressure_bar=PRESSURE[:8], displacement_mm=DISPLACEMENT[:8])),
+    Case("no_column.xlsx", xlsx(pressure_bar=PRESSURE), X),
+    Case("blank.xlsx", xlsx(**sound(pressure_bar=put(PRESSURE, 4, None))), P, 6, "1 of 30"),
+    Case("word.xlsx", xlsx(**sound(pressure_bar=put(PRESSURE, 4, "high"))), P, 6, "'high'"),
+    Case("error.xlsx", xlsx(**sound(pressure_bar=put(PRESSURE, 4, "#DIV/0!"))), P, 6, "'#DIV/0!'"),
+    Case("backwards.xlsx", xlsx(**sound(time_s=put(TIME, 5, 0.05))), T, 7, "from 0.4 to 0.05"),
+    Case("no_instant.xlsx", xlsx(**sound(time_s=put(TIME, 5, None))), T, 7),
+    # Bags
+    Case("garbage.mcap", b"\x89MCAP0\r\n" + GARBAGE),
+    Case("text.mcap", good()),
+    Case("text.bag", good()),
+    Case("garbage.bag", b"#ROSBAG V2.0\n" + GARBAGE),
+    Case("text.db3", good()),
+    Case("garbage.db3", b"SQLite format 3\0" + GARBAGE),
+    Case("no_topic.mcap", MCAP, P, names="/rig/pressure"),
+    Case(
+        "no_column.db3",
+        DB3,
+        "force",
+        names="'/scale/data'",
+        options={"columns": {"force": "/scale/data"}},
+    ),
+    # Descriptions of the folder
+    Case(
+        "no_described.csv",
+        described("[channels.pressure]\ncolumn = 'A0'"),
+        P,
+        names="no column 'A0'",
+    ),
+]
 
 
 @pytest.mark.filterwarnings("ignore::mckibben.DataWarning")
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
-def test_error(case: Case, tmp_path: Path) -> None:
+def test_a_malformed_file_is_refused_by_file_channel_and_row(case: Case, tmp_path: Path) -> None:
     path = case.write(tmp_path)
     with pytest.raises(DataError) as caught:
         mckibben.read(path, channels=CHANNELS, **case.options)
-    message = str(caught.value)
-    assert message.startswith(str(path))
-    assert case.problem in message
-    assert (caught.value.channel, caught.value.row) == (case.channel, case.row)
-    assert "Remedy: " in message
-    assert "\n" not in message
+    error = caught.value
+    assert (error.file, error.channel, error.row) == (path, case.channel, case.row)
+    assert case.names in error.problem
+    assert error.remedy
+    assert "\n" not in str(error)
+    assert len(str(error)) < 1500
+
+
+# Damaged at random ------------------------------------------------------------------------------
+
+SOUND: dict[str, bytes] = {
+    ".csv": good(),
+    ".parquet": PARQUET,
+    ".mat": MAT,
+    ".h5": HDF5,
+    ".tdms": tdms(),
+    ".xlsx": XLSX,
+    ".bag": BAG,
+    ".mcap": MCAP,
+    ".db3": DB3,
+}
+
+
+def answers(path: Path, content: bytes) -> None:
+    """Read a file, and fail unless that gives recordings of the file or an error that names it."""
+    path.write_bytes(content)
+    refused: DataError | None = None
+    recordings: list[Recording] = []
+    try:
+        recordings = mckibben.read(path)
+    except DataError as error:
+        refused = error
+    if refused is None:
+        assert recordings
+        assert all(isinstance(one, Recording) for one in recordings)
+    else:
+        assert refused.file == path
+        assert refused.remedy
+
+
+@pytest.mark.filterwarnings("ignore::mckibben.DataWarning")
+@pytest.mark.parametrize("ending", SOUND)
+def test_a_damaged_file_is_read_or_refused(ending: str, tmp_path: Path) -> None:
+    content, path = SOUND[ending], tmp_path / f"run{ending}"
+    rng = np.random.default_rng(len(content))
+    answers(path, content)
+    for length in (3, 100, *rng.integers(0, len(content), 6).tolist(), len(content) - 1):
+        answers(path, content[:length])
+    for _ in range(12):
+        damaged = bytearray(content)
+        for place in rng.integers(0, len(content), int(rng.integers(1, 5))):
+            damaged[place] = rng.integers(256)
+        answers(path, bytes(damaged))
+
+
+@pytest.mark.filterwarnings("ignore::mckibben.DataWarning")
+@settings(deadline=None, max_examples=100)
+@given(content=st.binary(max_size=300))
+def test_any_bytes_are_a_recording_or_a_data_error(
+    tmp_path_factory: pytest.TempPathFactory, content: bytes
+) -> None:
+    answers(tmp_path_factory.mktemp("any") / "a.csv", content)

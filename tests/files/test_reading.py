@@ -52,7 +52,7 @@ def test_what_was_held_is_a_channel_whatever_the_columns(table: Write) -> None:
     assert read_one(path, constants={"flow": (2, "")}, channels=["flow"])["flow"][0] == 2
     mckibben.write(found, path)
     assert read_one(path, constants={"force": (1, "kN")})["force"][0] == 1000
-    with pytest.raises(DataError, match="no column and not time"):
+    with pytest.raises(DataError, match="load"):
         read_one(path, constants={"load": (1, "N")}, columns={"load": "force"})
     with pytest.raises(DataError, match="does not convert to N"):
         read_one(path, constants={"force": (1, "mm")})
@@ -77,41 +77,19 @@ def test_a_mapped_column_goes_before_an_alias(table: Write) -> None:
     assert recording.meta["ignored_columns"] == ["displacement_mm"]
 
 
-def test_two_columns_of_one_channel(table: Write) -> None:
-    path = table(position_mm=POSITION, stroke_mm=PRESSURE)
-    with pytest.raises(
-        DataError, match=r"'position_mm' and 'stroke_mm' both hold it.*--column displacement="
-    ):
-        mckibben.read(path)
-
-
-def test_a_channel_that_is_not_there(table: Write) -> None:
-    with pytest.raises(DataError, match=r"'force'.*columns are a, b.*--column force=COLUMN"):
-        mckibben.read(table(a=PRESSURE, b=POSITION), channels=["force"])
-
-
-def test_a_column_that_is_not_there(table: Write) -> None:
-    with pytest.raises(DataError, match="no column 'c'; there are a, b"):
-        mckibben.read(table(a=PRESSURE, b=POSITION), columns={"force": "c"})
-
-
-def test_text_asked_for(table: Write) -> None:
-    path = table(pressure=["up"] * N, b=POSITION)
-    with pytest.raises(DataError, match="'pressure', row 2: column 'pressure' holds text"):
-        mckibben.read(path, channels=["pressure"])
-    assert read_one(path).meta["ignored_columns"] == ["pressure"]
+def test_text_is_left_out_where_it_is_not_asked_for(table: Write) -> None:
+    assert read_one(table(pressure=["up"] * N, b=POSITION)).meta["ignored_columns"] == ["pressure"]
 
 
 def test_a_cell_that_is_no_number(table: Write) -> None:
     cells = [*PRESSURE[:7], "n.d.", *PRESSURE[8:]]
-    for channels in (None, ["b"]):
-        with pytest.raises(DataError, match=r"'pressure', row 9: 'n.d.' is not a number"):
-            mckibben.read(table(pressure_bar=cells, b=POSITION), channels=channels)
-    with pytest.warns(DataWarning, match=r"'a' is left out: 'n.d.'"):
+    for header, channels in (("pressure_bar", None), ("pressure_bar", ["b"]), ("a", ["a"])):
+        with pytest.raises(DataError, match=r"'n\.d\.'") as caught:
+            mckibben.read(table(**{header: cells, "b": POSITION}), channels=channels)
+        assert (caught.value.channel, caught.value.row) == (header.partition("_")[0], 9)
+    with pytest.warns(DataWarning, match=r"'a'.*'n\.d\.'"):
         recording = read_one(table(a=cells, b=POSITION))
     assert list(recording.channels) == ["b"]
-    with pytest.raises(DataError, match=r"'a', row 9: 'n.d.' is not a number"):
-        mckibben.read(table(a=cells, b=POSITION), channels=["a"])
 
 
 # Units ---------------------------------------------------------------------------------------
@@ -120,25 +98,24 @@ def test_a_cell_that_is_no_number(table: Write) -> None:
 def test_assumed_units_are_said_once(table: Write) -> None:
     with pytest.warns(DataWarning) as caught:
         read_one(table(pressure=PRESSURE, displacement=POSITION, level=POSITION))
-    assert [str(warning.message).partition(": ")[2] for warning in caught] == [
-        "no unit is given, so these are assumed: pressure in bar, displacement in mm; "
-        "say --unit CHANNEL=UNIT where that is wrong"
-    ]
+    (warning,) = caught
+    assert "pressure in bar, displacement in mm" in str(warning.message)
+    assert "level" not in str(warning.message).partition(": ")[2]
 
 
-def test_metres_are_suspected(table: Write) -> None:
-    with pytest.warns(DataWarning, match=r"at most 0.013: is it in m\?"):
-        read_one(table(displacement=[x / 1000 for x in POSITION]))
-
-
-def test_percent_is_suspected(table: Write) -> None:
-    with pytest.warns(DataWarning, match=r"up to 13: is it in %\?"):
-        read_one(table(contraction=POSITION))
+@pytest.mark.parametrize(
+    ("header", "factor", "suspected"), [("displacement", 1e-3, "m"), ("contraction", 1.0, "%")]
+)
+def test_other_units_are_suspected(
+    table: Write, header: str, factor: float, suspected: str
+) -> None:
+    with pytest.warns(DataWarning, match=rf"{header}.* in {suspected}\?"):
+        read_one(table(**{header: [factor * x for x in POSITION]}))
 
 
 def test_pressures_of_hundreds_of_bar_are_not_believed(table: Write) -> None:
     path = table(pressure=[100 * p for p in PRESSURE])
-    with pytest.raises(DataError, match=r"cannot be bar.*--unit pressure=kPa"):
+    with pytest.raises(DataError, match="--unit pressure=kPa"):
         mckibben.read(path)
     assert read_one(path, units={"pressure": "kPa"})["pressure"] == pytest.approx(PRESSURE)
 
@@ -150,7 +127,7 @@ def test_the_remedy_names_units_that_fit(table: Write, per_bar: float, fitting: 
     path = table(pressure=[per_bar * p for p in PRESSURE])
     with pytest.raises(DataError) as refused:
         mckibben.read(path)
-    assert refused.value.remedy == f"say its unit, as in --unit pressure={fitting}"
+    assert refused.value.remedy.endswith(f"--unit pressure={fitting}")
 
 
 def test_given_units_go_before_the_header(table: Write) -> None:
@@ -159,19 +136,12 @@ def test_given_units_go_before_the_header(table: Write) -> None:
 
 
 @pytest.mark.parametrize(
-    ("header", "options", "message"),
-    [
-        ("pressure (foo)", {}, "'foo' is unknown.*--unit pressure=kPa"),
-        ("pressure_mm", {}, "cannot be in 'mm'.*--unit pressure=bar"),
-        ("force [kg]", {}, "cannot be in 'kg'"),
-        ("pressure", {"units": {"pressure": "stone"}}, "cannot be in 'stone'"),
-        ("flow", {"units": {"flow": "blub"}}, "'blub' is unknown"),
-        ("pressure_bar", {"units": {"force": "N"}}, "'force'.*not there"),
-    ],
+    ("header", "units", "named"),
+    [("force [kg]", {}, "'kg'"), ("pressure", {"pressure": "stone"}, "'stone'")],
 )
-def test_wrong_units(table: Write, header: str, options: dict[str, Any], message: str) -> None:
-    with pytest.raises(DataError, match=message):
-        mckibben.read(table(**{header: PRESSURE}), **options)
+def test_wrong_units(table: Write, header: str, units: dict[str, str], named: str) -> None:
+    with pytest.raises(DataError, match=named):
+        mckibben.read(table(**{header: PRESSURE}), units=units)
 
 
 def test_gauge_pressure_is_noted_and_no_offset_removed(table: Write) -> None:
@@ -194,15 +164,14 @@ def test_other_channels_keep_units_that_the_package_has_none_for(table: Write) -
 @pytest.mark.parametrize("cell", ["", "NaN", "inf", "-inf", "NA"])
 def test_a_missing_sample_stops_by_default(table: Write, cell: str) -> None:
     cells = [*PRESSURE[:7], cell, *PRESSURE[8:]]
-    with pytest.raises(
-        DataError, match=r"'pressure', row 9: 1 of 40 samples are missing.*--gaps interpolate"
-    ):
+    with pytest.raises(DataError, match=r"1 of 40 .*--gaps interpolate") as caught:
         mckibben.read(table(pressure_bar=cells, force_N=POSITION))
+    assert (caught.value.channel, caught.value.row) == ("pressure", 9)
 
 
 def test_missing_samples_of_a_channel_not_asked_for(table: Write) -> None:
     path = table(pressure_bar=PRESSURE, force_N=blank(POSITION, 3))
-    with pytest.warns(DataWarning, match="'force' is left out: 1"):
+    with pytest.warns(DataWarning, match="'force'.*: 1"):
         assert list(read_one(path, channels=["pressure"]).channels) == ["pressure"]
 
 
@@ -210,7 +179,7 @@ def test_missing_samples_interpolated_and_ends_cut(table: Write) -> None:
     holes = (0, 1, 10, 11, 39)
     path = table(time_s=K / 10, pressure_bar=blank(PRESSURE, *holes), force_N=POSITION)
     with (
-        pytest.warns(DataWarning, match=r"2 row.* at the start and 1 at the end were cut"),
+        pytest.warns(DataWarning, match=r" 2 .* 1 "),
         pytest.warns(DataWarning, match="2 missing sample"),
     ):
         recording = read_one(path, gaps="interpolate")
@@ -226,7 +195,7 @@ def test_missing_samples_interpolated_and_ends_cut(table: Write) -> None:
 def test_missing_samples_split(table: Write, timed: bool) -> None:
     time = {"time_s": K / 10} if timed else {}
     path = table(**time, pressure_bar=blank(PRESSURE, 15), force_N=blank(POSITION, 16, 20))
-    with pytest.warns(DataWarning, match="1 of 3 stretches"):
+    with pytest.warns(DataWarning, match="1 of 3 "):
         first, second = mckibben.read(path, gaps="split", rate=None if timed else 10)
     assert first["pressure"].tolist() == PRESSURE[:15]
     assert second["force"].tolist() == POSITION[21:]
@@ -238,13 +207,14 @@ def test_constant_channel_is_refused_only_where_asked_for(table: Write) -> None:
     path = table(pressure_bar=[1.5] * N, force_N=POSITION)
     assert read_one(path).n_samples == N
     assert read_one(path, channels=["force"]).n_samples == N
-    with pytest.raises(DataError, match=r"'pressure': it is constant, at 1.5"):
+    with pytest.raises(DataError, match=r" 1\.5") as caught:
         mckibben.read(path, channels=["pressure"])
+    assert caught.value.channel == "pressure"
 
 
 def test_a_short_or_constant_recording_is_one_where_nothing_is_learned(table: Write) -> None:
     path = table(pressure_bar=[2.0] * 3, time_s=[0.0, 0.1, 0.2])
-    with pytest.raises(DataError, match="too few, at least 10"):
+    with pytest.raises(DataError, match="10"):
         mckibben.read(path, channels=["pressure"])
     recording = read_one(path, channels=["pressure"], informative=False)
     assert recording["pressure"].tolist() == [2.0] * 3
@@ -261,25 +231,25 @@ def test_measured_files(measured: Measured) -> None:
     levels = read_one(measured("festo_dmsp10_levels"), channels=["pressure", "displacement"])
     assert levels.sample_time == 4.0
     assert levels.start_time == 204.0
-    with pytest.warns(DataWarning, match="'input_V' as voltage, 'output_deg' as angle"):
+    with pytest.warns(DataWarning, match="'input_V'.*'output_deg'"):
         wing = read_one(measured("sma_wing"))
     assert dict(wing.units) == {"branch": "", "voltage": "V", "angle": "rad"}
 
 
 def test_measured_file_with_gaps(measured: Measured) -> None:
     path = measured("cavatappi_loads", "sample1_load200g")
-    with pytest.raises(DataError, match=r"row 102.*430 gap"):
+    with pytest.raises(DataError, match=r"row 102.*430"):
         mckibben.read(path)
     parts = mckibben.read(path, gaps="split")
     assert len(parts) == 431
     assert {part.sample_time for part in parts} == {0.001}
     assert sum(part.n_samples for part in parts) == 43100
-    with pytest.warns(DataWarning, match="430 gap"):
+    with pytest.warns(DataWarning, match="430"):
         assert read_one(path, gaps="interpolate").sample_time == 0.001
 
 
 def test_measured_file_with_jitter(measured: Measured) -> None:
-    with pytest.warns(DataWarning, match="not uniform|by their units"):
+    with pytest.warns(DataWarning, match="trial_00"):
         recording = read_one(measured("soft_arm_three_muscles", "trial_00"))
     assert recording.sample_time == pytest.approx(1 / 12.04, rel=1e-3)
     assert recording.duration == pytest.approx(288, rel=1e-2)

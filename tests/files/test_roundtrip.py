@@ -104,7 +104,7 @@ def test_stale_sidecar_is_ignored_with_a_warning(recording: Recording, tmp_path:
         warnings.simplefilter("always")
         (back,) = mckibben.read(path)
     told = [str(warning.message) for warning in caught if warning.category is DataWarning]
-    assert any("describes another version" in text for text in told)
+    assert len(told) == 2
     assert any("pressure in bar" in text for text in told)
     assert back.meta["file"] == str(path)
     assert back.sample_time == pytest.approx(1 / 30)
@@ -113,7 +113,17 @@ def test_stale_sidecar_is_ignored_with_a_warning(recording: Recording, tmp_path:
 
 @pytest.mark.parametrize(
     "text",
-    ["", "{", "[]", "null", '{"format": "other"}', '{"@context": "http://www.w3.org/ns/csvw"}'],
+    [
+        *(
+            "",
+            "{",
+            "[]",
+            "null",
+            '{"format": "other"}',
+            '{"@context": "http://www.w3.org/ns/csvw"}',
+        ),
+        *("[" * 100_000, "9" * 5000),
+    ],
 )
 def test_broken_sidecar_is_ignored_with_a_warning(
     recording: Recording, tmp_path: Path, text: str
@@ -121,7 +131,7 @@ def test_broken_sidecar_is_ignored_with_a_warning(
     path = tmp_path / "a.csv"
     mckibben.write(recording, path)
     (tmp_path / "a.csv-metadata.json").write_text(text)
-    with pytest.warns(DataWarning, match="not a description"):
+    with pytest.warns(DataWarning, match="a.csv"):
         assert mckibben.read(path, units=UNITS)[0].n_samples == 50
 
 
@@ -133,7 +143,7 @@ def test_parquet_changed_by_another_program_is_read_as_foreign(
     path = tmp_path / "a.parquet"
     mckibben.write(recording, path)
     pq.write_table(pq.read_table(path).slice(0, 20), path)
-    with pytest.warns(DataWarning, match="of other samples"):
+    with pytest.warns(DataWarning, match="a.parquet"):
         assert mckibben.read(path, units=UNITS)[0].n_samples == 20
 
 
@@ -141,20 +151,20 @@ def test_columns_of_no_telling_name_are_taken_by_their_units(tmp_path: Path) -> 
     path = tmp_path / "arm.csv"
     rows = "\n".join(f"{k * 0.1},{k},{k % 3},{k * 2},{k % 5}" for k in range(20))
     path.write_text(f"time_s,u1_V,u2_V,y1_cm,q2\n{rows}")
-    with pytest.warns(DataWarning, match="'u1_V' as voltage_1, 'u2_V' as voltage_2, 'y1_cm' as"):
+    with pytest.warns(DataWarning, match="'u1_V'.*voltage_1.*'y1_cm'"):
         (recording,) = mckibben.read(path)
     assert list(recording.channels) == ["voltage_1", "voltage_2", "displacement_1", "q2"]
     assert recording["displacement_1"][1] == 20.0
-    assert any("'u1_V' as voltage_1" in note for note in recording.notes)
+    assert len(recording.notes) == 1
 
 
 @pytest.mark.parametrize("said", [{"channels": ["input"]}, {"units": {"input": "mV"}}])
 def test_what_is_spoken_of_by_its_own_name_keeps_it(tmp_path: Path, said: Any) -> None:
     path = tmp_path / "wing.csv"
     path.write_text("input_V,output_deg\n" + "\n".join(f"{k % 5},{k % 3}" for k in range(20)))
-    with pytest.warns(DataWarning, match="'output_deg' as angle"):
+    with pytest.warns(DataWarning, match="'output_deg'"):
         assert list(mckibben.read(path, **said)[0].channels) == ["input", "angle"]
-    with pytest.warns(DataWarning, match="'input_V' as voltage, 'output_deg' as angle"):
+    with pytest.warns(DataWarning, match="'input_V'.*'output_deg'"):
         assert list(mckibben.read(path)[0].channels) == ["voltage", "angle"]
 
 
@@ -171,26 +181,25 @@ def test_own_files_follow_columns_units_rate_and_channels(tmp_path: Path) -> Non
     (two,) = mckibben.read(path, columns={"displacement": "y"}, units={"pressure": "kPa"})
     assert np.allclose(two["displacement"], 10 * k)
     assert np.allclose(two["pressure"], k / 100)
-    with pytest.raises(DataError, match=r"channel 'force'.*no such channel.*--column force=COLUMN"):
+    with pytest.raises(DataError) as caught:
         mckibben.read(path, channels=["force"])
+    assert caught.value.channel == "force"
 
 
 def test_rate_that_the_file_denies_is_refused(recording: Recording, tmp_path: Path) -> None:
     mckibben.write(recording, tmp_path / "a.csv")
-    with pytest.raises(DataError, match=r"30 samples per second.*leave --rate out"):
+    with pytest.raises(DataError, match=r"30 .*--rate"):
         mckibben.read(tmp_path / "a.csv", rate=25)
 
 
-@pytest.mark.parametrize("ending", [".mat", ".xlsx", "", ".h5"])
-def test_other_endings_cannot_be_written(recording: Recording, tmp_path: Path, ending: str) -> None:
-    with pytest.raises(DataError, match=r"cannot be written.*\.csv, \.tsv, \.parquet"):
-        mckibben.write(recording, tmp_path / f"a{ending}")
-
-
-@pytest.mark.parametrize("ending", ENDINGS)
-def test_missing_folder_is_an_error(recording: Recording, tmp_path: Path, ending: str) -> None:
-    with pytest.raises(DataError, match="folder does not exist"):
-        mckibben.write(recording, tmp_path / "no" / f"a{ending}")
+@pytest.mark.parametrize("name", ["a.mat", "a.xlsx", "a", "no/a.csv", "no/a.tsv", "no/a.parquet"])
+def test_other_endings_and_missing_folders_are_refused(
+    recording: Recording, tmp_path: Path, name: str
+) -> None:
+    with pytest.raises(DataError) as caught:
+        mckibben.write(recording, tmp_path / name)
+    assert caught.value.file in (tmp_path / name, (tmp_path / name).parent)
+    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize("ending", ENDINGS)
@@ -200,6 +209,7 @@ def test_missing_folder_is_an_error(recording: Recording, tmp_path: Path, ending
         Recording({"time": np.arange(10, dtype=float)}),
         Recording({"a\nb": np.arange(10, dtype=float)}),
         Recording({" ": np.arange(10, dtype=float)}),
+        Recording({"x": np.arange(10, dtype=float)}, units={"x": "\x1b[2J"}),
         Recording({"x": np.arange(10, dtype=float)}, meta={"a": {1, 2}}),
         Recording({"x": np.arange(10, dtype=float)}, meta={"a": float("nan")}),
     ],

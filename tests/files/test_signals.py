@@ -72,23 +72,24 @@ def test_clocks_of_their_own_become_the_slowest(tmp_path: Path) -> None:
     slow = T[::5] + 0.003
     put(tmp_path / "pressure_bar.csv", {"time_s": T, "value": 5 * T})
     put(tmp_path / "displacement_mm.csv", {"time_ms": 1000 * slow, "value": slow})
-    with pytest.warns(DataWarning, match=r"displacement 10, pressure 50.*times of 'displacement'"):
+    with pytest.warns(DataWarning, match=r"displacement 10, pressure 50.*'displacement'"):
         recording = one(tmp_path)
     assert recording.sample_time == pytest.approx(0.1)
     assert recording.time == pytest.approx(slow)
     assert recording["pressure"] == pytest.approx(5 * slow)
     assert recording["displacement"] == pytest.approx(slow)
-    with pytest.warns(DataWarning, match="100 a second"):
+    with pytest.warns(DataWarning, match="100"):
         assert one(tmp_path, rate=100).sample_time == pytest.approx(0.01)
 
 
 def test_times_may_be_called_otherwise(tmp_path: Path) -> None:
     put(tmp_path / "pressure_bar.csv", {"stamp_ms": 1000 * T, "value": 5 * T})
     put(tmp_path / "displacement_mm.csv", {"stamp_ms": 1000 * T[::2], "value": T[::2]})
-    with pytest.raises(DataError, match="no such channel"):
+    with pytest.raises(DataError) as caught:
         mckibben.read(tmp_path, channels=["displacement"])
+    assert caught.value.channel == "displacement"
     (tmp_path / NAME).write_text('[time]\ncolumn = "stamp"\n')
-    with pytest.warns(DataWarning, match="times of 'displacement'"):
+    with pytest.warns(DataWarning, match="'displacement'"):
         recording = one(tmp_path)
     assert recording.sample_time == pytest.approx(0.04)
     assert recording["pressure"] == pytest.approx(5 * recording.time)
@@ -98,14 +99,12 @@ def test_a_gap_of_the_faster_channel_is_not_bridged_unasked(tmp_path: Path) -> N
     kept = np.delete(np.arange(N), np.arange(20, 40))
     put(tmp_path / "pressure_bar.csv", {"time_s": T[kept], "value": P[kept]})
     put(tmp_path / "displacement_mm.csv", {"time_s": T[::2], "value": X[::2]})
-    with (
-        pytest.warns(DataWarning, match="by interpolation"),
-        pytest.raises(DataError, match="'pressure', row 11: 10 of 30 samples are missing"),
-    ):
+    with pytest.warns(DataWarning), pytest.raises(DataError, match="10 of 30") as caught:
         mckibben.read(tmp_path)
+    assert (caught.value.channel, caught.value.row) == ("pressure", 11)
     with (
-        pytest.warns(DataWarning, match="by interpolation"),
-        pytest.warns(DataWarning, match="10 missing sample"),
+        pytest.warns(DataWarning, match="displacement 25, pressure 50"),
+        pytest.warns(DataWarning, match=": 10 "),
     ):
         assert one(tmp_path, gaps="interpolate").n_samples == 30
 
@@ -134,9 +133,9 @@ def test_recordings_of_one_channel_are_several(tmp_path: Path) -> None:
 def test_what_cannot_be_told_is_asked(tmp_path: Path, headers: dict[str, str]) -> None:
     for name, header in headers.items():
         put(tmp_path / f"{name}.csv", {"time_s": T, header: P})
-    with pytest.raises(DataError, match=r"neither their names nor .*join = \["):
+    with pytest.raises(DataError, match=r"join = \["):
         mckibben.read(tmp_path)
-    with pytest.raises(DataError, match="neither their names"):
+    with pytest.raises(DataError, match=r"join = \["):
         roles(tmp_path)
 
 
@@ -185,23 +184,20 @@ def bad(folder: Path, name: str, **columns: Any) -> Path:
 
 @pytest.mark.filterwarnings("ignore::mckibben.DataWarning")
 @pytest.mark.parametrize(
-    ("columns", "channel", "row", "problem"),
+    ("columns", "channel", "row"),
     [
-        ({"value": X}, "time", None, "0 columns of times, where another file has one"),
-        ({"time_s": T, "t": T, "value": X}, "time", None, "2 columns of times"),
-        ({"time_s": T + 100, "value": X}, "pressure", None, "no time in common"),
-        ({"time_s": T[::-1], "value": X}, "time", 3, "goes back"),
-        ({"time_s": [*T[:5], *T[4:-1]], "value": X}, "time", 7, "is repeated"),
-        ({"time_s": T, "value": [*X[:5], np.nan, *X[6:]]}, "displacement", 7, "1 of 60 samples"),
-        ({"time_s": [*T[:5], np.nan, *T[6:]], "value": X}, "time", 7, "the time is missing"),
+        ({"value": X}, "time", None),
+        ({"time_s": T, "t": T, "value": X}, "time", None),
+        ({"time_s": T + 100, "value": X}, "pressure", None),
+        ({"time_s": T[::-1], "value": X}, "time", 3),
+        ({"time_s": [*T[:5], *T[4:-1]], "value": X}, "time", 7),
+        ({"time_s": T, "value": [*X[:5], np.nan, *X[6:]]}, "displacement", 7),
+        ({"time_s": [*T[:5], np.nan, *T[6:]], "value": X}, "time", 7),
     ],
 )
-def test_bad_files_of_signals(
-    tmp_path: Path, columns: Any, channel: str, row: int | None, problem: str
-) -> None:
+def test_bad_files_of_signals(tmp_path: Path, columns: Any, channel: str, row: int | None) -> None:
     with pytest.raises(DataError) as caught:
         mckibben.read(bad(tmp_path, "displacement", **columns))
-    assert problem in caught.value.problem
     assert (caught.value.channel, caught.value.row) == (channel, row)
     assert tmp_path in (caught.value.file, getattr(caught.value.file, "parent", None))
     assert caught.value.remedy
@@ -210,17 +206,18 @@ def test_bad_files_of_signals(
 def test_lengths_that_differ(tmp_path: Path) -> None:
     put(tmp_path / "pressure.csv", {"value": P})
     put(tmp_path / "displacement.csv", {"value": X[:-1]})
-    with pytest.raises(DataError, match=r"displacement.csv 59, pressure.csv 60.*Remedy"):
+    with pytest.raises(DataError, match=r"displacement.csv 59, pressure.csv 60"):
         mckibben.read(tmp_path)
 
 
 def test_a_part_that_is_missing_or_no_signal(tmp_path: Path) -> None:
     (tmp_path / NAME).write_text('[[files]]\njoin = ["a.csv", "b.csv"]\n')
     put(tmp_path / "a.csv", {"time_s": T, "pressure_bar": P})
-    with pytest.raises(DataError, match=r"b.csv: it cannot be read \(no such file"):
+    with pytest.raises(DataError, match=r"b\.csv") as caught:
         mckibben.read(tmp_path)
+    assert caught.value.file == tmp_path / "b.csv"
     put(tmp_path / "b.csv", {"time_s": T, "force_N": P, "displacement_mm": X})
-    with pytest.raises(DataError, match=r"b.csv.*2 columns of numbers, where one signal"):
+    with pytest.raises(DataError, match=r"b\.csv.* 2 "):
         mckibben.read(tmp_path / "a.csv")
 
 
@@ -230,7 +227,7 @@ def test_measured_files_of_one_signal(tmp_path: Path) -> None:
         pytest.skip(f"{source} is not here")
     for path in source.glob("*.mat"):
         shutil.copy(path, tmp_path)
-    with pytest.raises(DataError, match=r"differ in length.*join"):
+    with pytest.raises(DataError, match="join"):
         mckibben.read(tmp_path)
     (tmp_path / NAME).write_text(
         f"[time]\nsample_time = {1 / 750!r}\n"
@@ -249,6 +246,6 @@ Measured = Callable[..., Path]
 
 def test_held_lengths_are_taken_as_they_are(measured: Measured) -> None:
     held = measured("festo_isometric_20mm", "muscle12cm_contracted10mm_run1")
-    with pytest.warns(DataWarning, match="not uniform"):
+    with pytest.warns(DataWarning, match="contracted10mm"):
         recording = one(held, channels=["pressure", "displacement", "force"])
     assert np.ptp(recording["displacement"]) == 0

@@ -102,10 +102,6 @@ def test_what_is_no_unit(text: str) -> None:
     assert find(text) is None
 
 
-def test_units_without_a_place_in_the_package_are_kept() -> None:
-    assert known("l/min").target is None
-
-
 @given(st.text(max_size=12))
 def test_any_text_is_a_unit_or_none(text: str) -> None:
     unit = find(text)

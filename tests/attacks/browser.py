@@ -16,8 +16,6 @@ import pytest
 
 from tests.tools import where
 
-BROWSER = where("chromium")
-
 OPTIONS = [
     "--no-sandbox",
     "--disable-dev-shm-usage",
@@ -40,6 +38,19 @@ HOSTILE = (
     "<a href='https://cloud.example/press'>press</a>"
 )
 """A name that runs a script, or leads elsewhere, wherever it is taken for markup."""
+
+RUN = f"window['{PROBE}']=1"
+
+SCRIPTS = (
+    f'" :x="{RUN}" onclick="{RUN}',
+    f'x\' :data-y="{RUN}"',
+    f"<img src=x onerror={RUN}>",
+    f'```\n<script>{RUN}</script>\n<a href="javascript:{RUN}">click</a>\n```',
+    f'`${{{RUN}}}` {{{{ constructor.constructor("{RUN}")() }}}}',
+    f'<svg onload="{RUN}"></svg>',
+    HOSTILE,
+)
+"""Names and notes that run a script wherever a page takes them for code."""
 
 CLICKABLE = (
     "button, summary, select, input, label, a:not([href^='http']), [role=button], .modebar-btn,"
@@ -109,7 +120,7 @@ def watched(own: str) -> Iterator[Watched]:
     """
     play_with = pytest.importorskip("playwright.sync_api").sync_playwright
     with play_with() as play:
-        browser = play.chromium.launch(executable_path=BROWSER, args=OPTIONS)
+        browser = play.chromium.launch(executable_path=where("chromium"), args=OPTIONS)
         parts = urlsplit(own)
         ours = own if parts.scheme == "file" else f"{parts.scheme}://{parts.netloc}/"
         context = browser.new_context(viewport={"width": 1280, "height": 900})

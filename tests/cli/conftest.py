@@ -1,45 +1,21 @@
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from mckibben import GPI, Recording, write
-from mckibben.cli.main import run
 from mckibben.signals import irregular_triangle, triangle
-
-
-@dataclass
-class Result:
-    """What a call of the command line left behind."""
-
-    code: int
-    out: str
-    err: str
-
+from tests.attacks.commands import Result, call
 
 Cli = Callable[..., Result]
 
 
 @pytest.fixture
-def cli(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Cli:
+def cli() -> Cli:
     """Call the command line in this process."""
-
-    def call(*arguments: object) -> Result:
-        monkeypatch.setattr(sys, "argv", ["mckibben", *map(str, arguments)])
-        capsys.readouterr()
-        try:
-            run()
-            code = 0
-        except SystemExit as leaving:
-            code = int(leaving.code or 0)
-        printed = capsys.readouterr()
-        return Result(code, printed.out, printed.err)
-
     return call
 
 

@@ -32,14 +32,14 @@ def test_a_fit_begins_from_a_muscle_or_says_what_is_wrong(cli: Cli, tmp_path: Pa
     assert plain.read_text("utf-8") != told.read_text("utf-8")
     nobody = cli(*asked, tmp_path / "x.json", "--prior", "nobody")
     assert nobody.code == 2
-    assert "no muscle 'nobody'" in nobody.err
+    assert "'nobody'" in nobody.err
     sheet = tmp_path / "sheet.toml"
     sheet.write_text("diameter_mm = 20\nrest_length_mm = 200\nmax_force_N = 1500\n")
     for said in (["--prior", sheet], ["--set", f"prior={sheet}"]):
         onto = cli(*asked, sheet, *said, "--force")
         assert onto.code == 2
-        assert "it is read from" in onto.err
+        assert "sheet.toml" in onto.err
     assert sheet.read_text().startswith("diameter_mm")
     other = cli("fit", "pi", tmp_path / "run.csv", "-o", tmp_path / "x.json", "--prior", "rail")
     assert other.code == 2
-    assert "leave --prior out" in other.err
+    assert "--prior" in other.err

@@ -1,0 +1,288 @@
+"""Nothing is overwritten: no input, no file of somebody's, nothing that a link leads to."""
+
+from __future__ import annotations
+
+import errno
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from mckibben import GPI
+from mckibben.comparison.kept import Kept
+from mckibben.errors import DataError
+from mckibben.outputs import MANIFEST, Results, is_figure
+from mckibben.report import printed
+from mckibben.report.drawing import Curve, Drawing, Panel
+from mckibben.system import manifest
+from mckibben.system.atomic import PART, write_text
+from tests.cli.calls import CALLS, MODEL, RUN, files
+from tests.cli.conftest import Cli
+
+FILES = [name for name, call in CALLS.items() if call.words and call.words[-1].startswith("out.")]
+FILES.remove("ros")  # which goes on for as long as its references come
+"""Commands that write a file."""
+
+FOLDERS = [name for name, call in CALLS.items() if call.own]
+"""Commands that write a folder."""
+
+
+def forced(command: str) -> str:
+    return "--overwrite" if command.startswith("export") else "--force"
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder with one file of every kind, which is the current one."""
+    monkeypatch.chdir(tmp_path)
+    files(tmp_path)
+    return tmp_path
+
+
+def held(folder: Path) -> dict[str, bytes]:
+    """Return every file below a folder."""
+    return {
+        str(path.relative_to(folder)): path.read_bytes()
+        for path in folder.rglob("*")
+        if path.is_file()
+    }
+
+
+@pytest.mark.parametrize("way", ["itself", "another spelling", "a second name", "a link"])
+@pytest.mark.parametrize("command", [name for name in CALLS if CALLS[name].reads])
+def test_no_command_writes_over_what_it_reads(
+    cli: Cli, folder: Path, command: str, way: str
+) -> None:
+    *words, out = CALLS[command].words
+    for given in CALLS[command].reads:
+        onto = Path(given)
+        if way == "another spelling":
+            (folder / "sub").mkdir(exist_ok=True)
+            onto = Path("sub", "..", given)
+        elif way != "itself":
+            onto = Path(f"second-{Path(given).stem}{Path(out).suffix}")
+            onto.unlink(missing_ok=True)
+            (os.link if way == "a second name" else os.symlink)(given, onto)
+        before = held(folder)
+        for force in ((), (forced(command),)):
+            result = cli(*command.split(), *words, onto, *force)
+            assert result.code == 2, result.out
+            assert onto.name in result.err
+        assert held(folder) == before
+
+
+@pytest.mark.parametrize("command", FILES)
+def test_a_file_of_somebody_s_needs_force_and_ours_does_not(
+    cli: Cli, folder: Path, command: str
+) -> None:
+    words, out = (*command.split(), *CALLS[command].words), folder / CALLS[command].words[-1]
+    out.write_text("mine\n")
+    refused = cli(*words)
+    assert refused.code == 2
+    assert forced(command) in refused.err
+    assert out.read_text() == "mine\n"
+    if command == "export fmu":  # replaces nothing but what an export wrote
+        assert cli(*words, forced(command)).code == 2
+        assert out.read_text() == "mine\n"
+        out.unlink()
+    done = cli(*words, forced(command))
+    assert done.code == 0, done.err
+    assert out.read_bytes() != b"mine\n"
+    if command in ("rig new", "export fmu"):
+        assert cli(*words).code == 2  # whoever wrote it
+        assert cli(*words, forced(command)).code == 0
+        return
+    assert cli(*words).code == 0
+    if out.suffix != ".json":  # a model that was edited is one still
+        changed = out.read_bytes()[:-1]
+        out.write_bytes(changed)
+        assert cli(*words).code == 2
+        assert out.read_bytes() == changed
+
+
+@pytest.mark.parametrize("command", FOLDERS)
+def test_a_file_of_somebody_s_in_a_folder_stays(cli: Cli, folder: Path, command: str) -> None:
+    out = folder / "out"
+    out.mkdir()
+    (out / CALLS[command].own).write_text("mine")
+    refused = cli(*command.split(), *CALLS[command].words)
+    assert refused.code == 2
+    assert "out" in refused.err
+    left = held(out)
+    left.pop("protocol.json", None)  # what a recording of a rig is for
+    assert left == {CALLS[command].own: b"mine"}
+
+
+@pytest.mark.parametrize("command", [name for name in FILES if name != "rig new"])
+def test_a_full_disk_is_reported_with_the_file_and_costs_nothing(
+    cli: Cli, folder: Path, command: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(self: Path, target: object) -> Any:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    before = held(folder)
+    monkeypatch.setattr(Path, "replace", full)
+    result = cli(*command.split(), *CALLS[command].words)
+    assert result.code == 2
+    assert CALLS[command].words[-1] in result.err
+    assert os.strerror(errno.ENOSPC) in result.err
+    assert held(folder) == before
+
+
+@pytest.mark.skipif(
+    not Path("/proc/self").is_dir(), reason="has no folder that nobody can write to"
+)
+@pytest.mark.parametrize("command", [name for name in FILES if not name.startswith("export")])
+def test_a_folder_that_cannot_be_written_to_is_refused_before_any_work(
+    cli: Cli, folder: Path, command: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("mckibben.files.read", None)
+    *words, out = CALLS[command].words
+    result = cli(*command.split(), *words, f"/proc/mine{Path(out).suffix}")
+    assert result.code == 2
+    assert "/proc/mine" in result.err
+
+
+@pytest.mark.long
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no device is always full here")
+def test_full_standard_output_is_reported() -> None:
+    with Path("/dev/full").open("w") as full:
+        done = subprocess.run(
+            [sys.executable, "-m", "mckibben.cli.main", "info", "--models"],
+            stdout=full,
+            stderr=subprocess.PIPE,
+            text=True,
+            check=False,
+        )
+    assert done.returncode == 2
+    assert len(done.stderr.splitlines()) == 1
+
+
+# Descriptions, manifests, seals -------------------------------------------------------------------
+
+
+def test_a_description_beside_the_output_is_guarded_too(cli: Cli, folder: Path) -> None:
+    beside, own = folder / "out.csv-metadata.json", folder / "run.csv-metadata.json"
+    beside.write_text('{"notes": "mine"}')
+    assert cli("simulate", MODEL, RUN, "-o", "out.csv").code == 2
+    assert beside.read_text() == '{"notes": "mine"}'
+    before = own.read_bytes()
+    assert cli("fit", "pi", RUN, "-o", own, "--force").code == 2
+    assert own.read_bytes() == before
+
+
+@pytest.mark.parametrize("kind", ["png", "svg", "pdf"])
+def test_a_figure_that_its_user_changed_is_a_strangers(tmp_path: Path, kind: str) -> None:
+    path = tmp_path / f"figure.{kind}"
+    x = np.linspace(0, 1, 20)
+    printed.save(Drawing((Panel("x", "y", (Curve(x, x, "a", "series-1"),), "a"),)), path)
+    drawn = path.read_bytes()
+    assert is_figure(path)
+    n = len(drawn)
+    for changed in (drawn + b"\n", drawn[: n // 2] + b"!" + drawn[n // 2 + 1 :], drawn[:4]):
+        path.write_bytes(changed)
+        assert not is_figure(path)
+
+
+def test_models_of_an_earlier_study_go_and_what_was_changed_stays(cli: Cli, folder: Path) -> None:
+    words = ["study", RUN, "--test", "two.csv", "--jobs", "1", "-o", "out", "--models"]
+    assert cli(*words, "pi").code == 0
+    out = folder / "out"
+    shutil.copy(MODEL, out / "models" / "kept-by-hand.json")
+    assert cli(*words, "arx").code == 0
+    models = sorted(path.name for path in (out / "models").iterdir())
+    assert models == ["arx.json", "kept-by-hand.json"]
+    listed = manifest.read(out / MANIFEST)
+    assert "models/arx.json" in listed
+    assert "models/pi.json" not in listed
+    assert all(manifest.holds(out / name, digests) for name, digests in listed.items())
+    (out / "report.html").write_text("my own words")
+    assert cli(*words, "pi").code == 2
+    assert (out / "report.html").read_text() == "my own words"
+    assert (out / "models" / "arx.json").exists()
+
+
+def test_results_are_not_written_over_recordings_in_the_same_folder(cli: Cli, folder: Path) -> None:
+    runs = folder / "runs"
+    runs.mkdir()
+    for name in ("a.csv", "leaderboard.csv"):
+        shutil.copy(RUN, runs / name)
+    before = held(runs)
+    for force in ((), ("--force",)):
+        result = cli("compare", "runs", "-o", "runs", "--models", "pi", *force)
+        assert result.code == 2
+        assert "leaderboard.csv" in result.err
+    assert held(runs) == before
+
+
+def test_a_hostile_manifest_removes_nothing_elsewhere(tmp_path: Path) -> None:
+    (tmp_path / "mine").write_text("mine")
+    (tmp_path / "elsewhere").mkdir()
+    (tmp_path / "elsewhere" / "pi.json").write_text("mine")
+    out = tmp_path / "out"
+    out.mkdir()
+    (out / "models").symlink_to(tmp_path / "elsewhere")
+    names = ("../mine", str(tmp_path / "mine"), "models/pi.json")
+    (out / MANIFEST).write_text(manifest.lines({n: [manifest.digest(b"mine")] for n in names}))
+    results = Results(out, force=True)
+    results.clear()
+    assert (tmp_path / "mine").exists()
+    assert (tmp_path / "elsewhere" / "pi.json").exists()
+    with pytest.raises(DataError):
+        results.write_text("models/pi.json", "new")
+
+
+def test_digests_that_the_user_took_make_nothing_ours(cli: Cli, folder: Path) -> None:
+    out = folder / "out"
+    out.mkdir()
+    for name in ("thesis.csv", "report.html", "leaderboard.csv"):
+        (out / name).write_text("mine")
+    theirs = "".join(f"{manifest.digest(b'mine')}  {path.name}\n" for path in out.iterdir())
+    (out / MANIFEST).write_text(theirs)
+    before = held(out)
+    refused = cli("compare", *CALLS["compare"].words)
+    assert refused.code == 2
+    assert MANIFEST in refused.err
+    Results(out, force=True).clear()
+    assert held(out) == before
+    # in a manifest of ours, names that no command gives are somebody else's
+    (out / MANIFEST).write_text(manifest.HEAD + theirs)
+    Results(out).clear()
+    assert sorted(path.name for path in out.iterdir()) == [MANIFEST, "thesis.csv"]
+
+
+def test_what_is_unfinished_is_cleared_and_what_somebody_put_there_stays(tmp_path: Path) -> None:
+    (tmp_path / "unfinished").mkdir()
+    (tmp_path / "unfinished" / "thesis.json").write_text("mine")
+    kept = Kept(tmp_path)
+    kept.put("pi", GPI.example())
+    assert len(list((tmp_path / "unfinished").iterdir())) == 2
+    kept.clear()
+    assert [path.name for path in (tmp_path / "unfinished").iterdir()] == ["thesis.json"]
+
+
+def test_planted_links_are_not_written_through_and_rights_stay(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "victim").write_text("mine")
+    for name in (f"{PART}{'00' * 8}.part", "out"):
+        (tmp_path / name).symlink_to(tmp_path / "victim")
+    write_text(tmp_path / "out", "new")
+    assert not (tmp_path / "out").is_symlink()
+    assert (tmp_path / "out").read_text() == "new"
+    (tmp_path / "out").chmod(0o600)
+    write_text(tmp_path / "out", "newer")
+    assert (tmp_path / "out").stat().st_mode & 0o777 == 0o600
+    monkeypatch.setattr("mckibben.system.atomic.secrets.token_hex", lambda n: "00" * n)
+    with pytest.raises(DataError):  # even if the name were guessed
+        write_text(tmp_path / "out", "newest")
+    assert (tmp_path / "victim").read_text() == "mine"
+    os.mkfifo(tmp_path / "pipe")
+    with pytest.raises(DataError):
+        write_text(tmp_path / "pipe", "three")
+    assert (tmp_path / "pipe").is_fifo()

@@ -13,6 +13,8 @@ import pytest
 
 from mckibben.cli.main import run
 
+pytestmark = pytest.mark.long
+
 ROOT = Path(__file__).parents[2]
 TUTORIALS = sorted((ROOT / "docs" / "tutorials").glob("*.md"))
 NOTEBOOKS = runpy.run_path(str(ROOT / "docs" / "notebooks.py"))
@@ -61,36 +63,6 @@ def test_tutorial_runs_as_a_notebook(
     running = shell(monkeypatch)
     for cell in cells:
         running.run_cell(cell).raise_error()
-
-
-def test_notebooks_are_what_jupyter_reads(tmp_path: Path) -> None:
-    nbformat = pytest.importorskip("nbformat")
-    folder = tmp_path / "notebooks"
-    written = NOTEBOOKS["write"](folder)
-    assert len(written) == len(TUTORIALS)
-    for path in written:
-        found = nbformat.read(path, as_version=4)
-        nbformat.validate(found)
-        for cell in found.cells:
-            for target in re.findall(r"\]\(([^)#\s]+)", cell.source):
-                if cell.cell_type == "markdown" and not target.startswith("http"):
-                    assert (folder / target).exists(), f"{path.name}: {target}"
-
-
-def test_every_tutorial_is_in_the_index() -> None:
-    index = (ROOT / "docs" / "index.md").read_text(encoding="utf-8")
-    for path in TUTORIALS:
-        assert f"tutorials/{path.stem}\n" in index
-
-
-def test_links_between_pages_lead_somewhere() -> None:
-    pages = [*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")]
-    for page in pages:
-        if "_generated" in page.parts or "_build" in page.parts:
-            continue
-        for target in re.findall(r"\]\(([^)#\s]+)", page.read_text(encoding="utf-8")):
-            if not target.startswith("http") and "_generated" not in target:
-                assert (page.parent / target).exists(), f"{page.name}: {target}"
 
 
 def test_readme_runs_as_it_stands_from_top_to_bottom(

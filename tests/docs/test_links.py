@@ -1,0 +1,88 @@
+"""Links lead somewhere, and the commands that pages show exist with their options."""
+
+from __future__ import annotations
+
+import re
+import runpy
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+import typer
+
+from mckibben import registry
+from mckibben.cli.main import app
+from mckibben.comparison.limits import limits
+
+ROOT = Path(__file__).parents[2]
+PAGES = [
+    page
+    for page in (*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md"))
+    if not {"_generated", "_build"} & set(page.parts)
+]
+TUTORIALS = sorted((ROOT / "docs" / "tutorials").glob("*.md"))
+SHELL = re.compile(r"^```(?:bash|sh|shell)\n(.*?)^```|(?<!`)`(mckibben [^`\n]+)`", re.M | re.S)
+
+
+def shown(page: Path) -> Iterator[str]:
+    """Give the commands of a page, of blocks and within sentences."""
+    if page.name == "CHANGELOG.md":  # which keeps those that there were
+        return
+    for block, inline in SHELL.findall(page.read_text(encoding="utf-8")):
+        for line in (block or inline).replace("\\\n", " ").splitlines():
+            for part in re.split(r"&&|\||;| # ", line):
+                if part.strip().startswith("mckibben "):
+                    yield part.strip()
+
+
+def unknown(line: str, root: Any) -> list[str]:
+    """Return the words of a command that the command line does not have."""
+    command, lacking = root, []
+    for word in line.split()[1:]:
+        options = {option for one in command.params for option in (*one.opts, *one.secondary_opts)}
+        if word.startswith("-") and not re.match(r"-\d", word):
+            if word.split("=")[0] not in {*options, "--help", "--version"}:
+                lacking.append(word)
+        elif word in getattr(command, "commands", ()):
+            command = command.commands[word]
+        elif hasattr(command, "commands") and not word.isupper() and word.isalpha():
+            lacking.append(word)
+    return lacking
+
+
+def test_commands_exist_with_their_options() -> None:
+    root = typer.main.get_command(app)
+    lines = [(page.name, line) for page in PAGES for line in shown(page)]
+    assert len(lines) > 100
+    assert unknown("mckibben fitt", root) == ["fitt"]
+    assert unknown("mckibben fit gpi --outputs x", root) == ["--outputs"]
+    assert [(name, line, bad) for name, line in lines if (bad := unknown(line, root))] == []
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_links_between_pages_lead_somewhere(page: Path) -> None:
+    for target in re.findall(r"\]\(([^)#\s]+)", page.read_text(encoding="utf-8")):
+        if not target.startswith("http") and "_generated" not in target:
+            assert (page.parent / target).exists(), target
+
+
+def test_tutorials_are_in_the_index_and_are_notebooks_too(tmp_path: Path) -> None:
+    nbformat = pytest.importorskip("nbformat")
+    index = (ROOT / "docs" / "index.md").read_text(encoding="utf-8")
+    assert [path for path in TUTORIALS if f"tutorials/{path.stem}\n" not in index] == []
+    folder = tmp_path / "notebooks"
+    written = runpy.run_path(str(ROOT / "docs" / "notebooks.py"))["write"](folder)
+    assert len(written) == len(TUTORIALS)
+    for path in written:
+        found = nbformat.read(path, as_version=4)
+        nbformat.validate(found)
+        for cell in found.cells:
+            for target in re.findall(r"\]\(([^)#\s]+)", cell.source):
+                if cell.cell_type == "markdown" and not target.startswith("http"):
+                    assert (folder / target).exists(), f"{path.name}: {target}"
+
+
+def test_every_model_has_its_limits_and_nothing_else_has() -> None:
+    assert sorted(limits()) == sorted(registry.names("estimators"))
+    assert all({"can", "cannot"} <= set(one) for one in limits().values())

@@ -14,7 +14,8 @@ import pytest
 from mckibben.blocks.laws.examples import examples
 from mckibben.export import export_c
 from mckibben.export.c.parts import PRIMITIVES
-from tests.export.test_c import MODELS, SAMPLE_TIME, difference, path_for, simulated
+from tests.export.building import SAMPLE_TIME
+from tests.export.models import MODELS, difference, path_for, simulated
 from tests.tools import needs
 
 DOCS = Path(__file__).parents[2] / "docs" / "deploy"

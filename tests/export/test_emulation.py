@@ -13,7 +13,9 @@ from mckibben import Block, ModelError
 from mckibben.blocks.laws.examples import examples
 from mckibben.export.c import emulation
 from mckibben.export.c.emulation import emulate
-from tests.export.test_c import MODELS, SAMPLE_TIME, SINGLE
+from tests.export.building import SAMPLE_TIME
+from tests.export.models import MODELS
+from tests.export.test_c import SINGLE
 from tests.tools import needs
 
 

@@ -19,7 +19,8 @@ from mckibben import Block, DataError, ModelError
 from mckibben.blocks.laws.examples import examples
 from mckibben.export import export_fmu
 from mckibben.export.fmu.toolchains import own_platform
-from tests.export.test_c import MODELS, SAMPLE_TIME, difference, path_for, simulated
+from tests.export.building import SAMPLE_TIME
+from tests.export.models import MODELS, difference, path_for, simulated
 from tests.tools import needs
 
 Array = NDArray[np.float64]

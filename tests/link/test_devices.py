@@ -25,7 +25,7 @@ from mckibben.files import read
 from mckibben.link import Descriptor, Link, LinkError, open_port
 from mckibben.link.trying import emulated, hosted
 from tests.attacks.commands import call
-from tests.export.test_c import path_for
+from tests.export.models import path_for
 from tests.export.test_emulation import emulated as with_emulator
 from tests.tools import needs
 

@@ -55,8 +55,6 @@ LONG = tuple(
         "estimators/test_coupled.py",
         "estimators/test_linear.py",
         "estimators/test_loads.py",
-        "export/test_c_checkers.py",
-        "export/test_emulation.py",
         "link/test_devices.py",
         "papers",
         "stream/test_link.py",

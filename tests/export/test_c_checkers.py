@@ -11,12 +11,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mckibben.blocks.laws.examples import examples
 from mckibben.export import export_c
 from mckibben.export.c.parts import PRIMITIVES
-from tests.export.building import SAMPLE_TIME
+from tests.export.building import FLAGS, SAMPLE_TIME
 from tests.export.models import MODELS, difference, path_for, simulated
 from tests.tools import needs
+
+pytestmark = pytest.mark.long
 
 DOCS = Path(__file__).parents[2] / "docs" / "deploy"
 SHOWN = ("SDIHC", "MPI-NARMAX", "preisach-inverse", "multistate-friction", "feedforward-feedback")
@@ -31,17 +32,13 @@ def run(command: Sequence[str | Path], cwd: Path) -> str:
 
 
 @needs("clang")
-@pytest.mark.parametrize(
-    ("name", "single"),
-    [*((name, False) for name in examples()), *((name, True) for name in SHOWN)],
-)
+@pytest.mark.parametrize("single", [False, True], ids=["double", "float32"])
+@pytest.mark.parametrize("name", SHOWN)
 def test_sanitizers_find_nothing(name: str, single: bool, tmp_path: Path) -> None:
     folder = export_c(MODELS[name], tmp_path / "c", sample_time=SAMPLE_TIME, single=single)
-    sanitizers = "-fsanitize=address,undefined,float-cast-overflow"
-    warnings = ["-Wall", "-Wextra", "-Wconversion", "-Wdouble-promotion", "-Werror", "-pedantic"]
+    sanitizers = ["-fsanitize=address,undefined,float-cast-overflow", "-fno-sanitize-recover=all"]
     sources = [*sorted((folder / "src").glob("*.c")), folder / "test" / "model_selftest.c"]
-    command = ["clang", "-std=c99", "-O0", "-ffp-contract=off", *warnings, sanitizers]
-    command += ["-fno-sanitize-recover=all", "-Isrc"]
+    command = ["clang", *FLAGS, "-O0", *sanitizers, "-Isrc"]
     run([*command, *sources, "-lm", "-o", "selftest"], folder)
     run([folder / "selftest"], folder)
 
@@ -78,9 +75,8 @@ def test_misra_findings_are_those_that_are_justified(tmp_path: Path) -> None:
 
 
 @needs("g++")
-@pytest.mark.parametrize("name", SHOWN)
-def test_cplusplus_can_include_and_link_it(name: str, tmp_path: Path) -> None:
-    block = MODELS[name]
+def test_cplusplus_can_include_and_link_it(tmp_path: Path) -> None:
+    block = MODELS["SDIHC"]
     folder = export_c(block, tmp_path / "c", name="muscle", sample_time=SAMPLE_TIME)
     main = folder / "main.cpp"
     n_in, n_out = len(block.inputs), len(block.outputs)
@@ -131,10 +127,8 @@ def test_octave_gives_pythons_numbers(tmp_path: Path) -> None:
         muscle_mex('reset');
         z = [muscle_mex('step', u(1:50, :)); muscle_mex('step', u(51:end, :))];
         f = fopen('y.bin', 'w'); fwrite(f, [y status z]', 'double'); fclose(f);
-        try muscle_mex(u(:, 1)); fprintf('taken'); catch e; fprintf('%s', e.message); end
     """
-    told = run(["octave-cli", "--no-gui", "--norc", "--eval", script], folder)
-    assert "give a real double matrix of 4 column" in told
+    run(["octave-cli", "--no-gui", "--norc", "--eval", script], folder)
     table = np.fromfile(folder / "y.bin").reshape(len(inputs), -1)
     n = len(block.outputs)
     assert difference(table[:, :n], expected) <= 1e-12

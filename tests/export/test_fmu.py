@@ -6,7 +6,8 @@ import shutil
 import subprocess
 import sys
 import zipfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -32,10 +33,7 @@ def needs_compiler(test: Callable[..., None]) -> Callable[..., None]:
 
 
 VERSIONS = ("2.0", "3.0")
-SHOWN = (
-    *("gpi-inverse", "SDIHC", "MPI-NARMAX", "process-model", "feedforward-feedback"),
-    "pi-adaptive",
-)
+SHOWN = ("SDIHC", pytest.param("pi-adaptive", marks=pytest.mark.long))
 
 
 def exported(block: Block, folder: Path, version: Any, **settings: Any) -> Path:
@@ -84,23 +82,16 @@ def test_fmpy_gives_pythons_numbers(name: str, version: str, tmp_path: Path) -> 
     assert difference(outputs, simulated(block, inputs)) <= 1e-12
 
 
-@needs_compiler
-def test_a_parameter_changed_is_seen(tmp_path: Path) -> None:
-    block = MODELS["gpi-inverse"]
-    parameters, inputs = block.pack(), path_for(block, 1, 150)
-    parameters[0] *= 1 + 1e-6
-    outputs = through_fmpy(exported(block.unpack(parameters), tmp_path, "2.0"), block, inputs)
-    assert difference(outputs, simulated(block, inputs)) > 1e-12
-
-
-@pytest.mark.parametrize("version", VERSIONS)
-@pytest.mark.parametrize("kind", examples())
+@pytest.mark.parametrize(
+    ("kind", "version"), [(kind, VERSIONS[k % 2]) for k, kind in enumerate(examples())]
+)
 def test_every_block_makes_a_valid_description(kind: str, version: str, tmp_path: Path) -> None:
     validation = pytest.importorskip("fmpy.validation")
     path = exported(MODELS[kind], tmp_path, version, platforms=[])
     assert validation.validate_fmu(str(path)) == []
 
 
+@pytest.mark.long
 @needs_compiler
 @needs("cmake")
 @pytest.mark.parametrize("version", VERSIONS)
@@ -115,6 +106,7 @@ def test_it_rebuilds_from_its_own_sources(version: str, tmp_path: Path) -> None:
     assert difference(through_fmpy(path, block, inputs), simulated(block, inputs)) <= 1e-12
 
 
+@pytest.mark.long
 @needs_compiler
 @needs("libtbb.so.12")
 @pytest.mark.parametrize("version", VERSIONS)
@@ -136,44 +128,56 @@ def test_a_second_importer_gives_pythons_numbers(version: str, tmp_path: Path) -
     assert difference(np.array(outputs), simulated(block, inputs)) <= 1e-12
 
 
-@needs_compiler
-@pytest.mark.parametrize("version", VERSIONS)
-def test_state_is_kept_and_restored(version: str, tmp_path: Path) -> None:
+@contextmanager
+def running(path: Path, version: str) -> Iterator[Any]:
+    """Give an instance of an FMU that waits for its first step."""
     fmpy = pytest.importorskip("fmpy")
-    block, inputs = MODELS["gpi"], path_for(MODELS["gpi"], 1, 40)
-    path = exported(block, tmp_path, version)
-    description = fmpy.read_model_description(str(path))
     place = fmpy.extract(str(path))
+    description = fmpy.read_model_description(str(path))
     unit = fmpy.instantiate_fmu(place, description, "CoSimulation")
     if version == "2.0":
         unit.setupExperiment(startTime=0.0)
     unit.enterInitializationMode()
     unit.exitInitializationMode()
-    get, put = (
-        (unit.getReal, unit.setReal) if version == "2.0" else (unit.getFloat64, unit.setFloat64)
-    )
-
-    def run(rows: Array, start: int) -> list[float]:
-        found = []
-        for k, row in enumerate(rows, start=start):
-            put([0], [row[0]])
-            unit.doStep(k * SAMPLE_TIME, SAMPLE_TIME)
-            found.append(get([1])[0])
-        return found
-
-    run(inputs[:20], 0)
-    kept = unit.getFMUstate() if version == "2.0" else unit.getFMUState()
-    first = run(inputs[20:], 20)
-    if version == "2.0":
-        unit.setFMUstate(kept)
-        unit.freeFMUstate(kept)
-    else:
-        unit.setFMUState(kept)
-        unit.freeFMUState(kept)
-    assert run(inputs[20:], 20) == first
-    unit.terminate()
+    yield unit
     unit.freeInstance()
     shutil.rmtree(place)
+
+
+@needs_compiler
+@pytest.mark.parametrize("version", VERSIONS)
+def test_state_is_kept_and_restored(version: str, tmp_path: Path) -> None:
+    inputs = path_for(MODELS["gpi"], 1, 40)
+    real, state = ("Real", "FMUstate") if version == "2.0" else ("Float64", "FMUState")
+    with running(exported(MODELS["gpi"], tmp_path, version), version) as unit:
+
+        def run(rows: Array, start: int) -> list[float]:
+            found = []
+            for k, row in enumerate(rows, start=start):
+                getattr(unit, f"set{real}")([0], [row[0]])
+                unit.doStep(k * SAMPLE_TIME, SAMPLE_TIME)
+                found.append(getattr(unit, f"get{real}")([1])[0])
+            return found
+
+        run(inputs[:20], 0)
+        saved = getattr(unit, f"get{state}")()
+        first = run(inputs[20:], 20)
+        getattr(unit, f"set{state}")(saved)
+        getattr(unit, f"free{state}")(saved)
+        assert run(inputs[20:], 20) == first
+        unit.terminate()
+
+
+@needs_compiler
+@pytest.mark.parametrize("version", VERSIONS)
+def test_time_that_goes_back_or_too_far_is_an_error(version: str, tmp_path: Path) -> None:
+    path = exported(MODELS["creep"], tmp_path, version)
+    for steps in ([(1.0, 0.01), (0.5, 0.01)], [(0.0, 1e300)], [(0.0, 0.0)], [(0.0, -1.0)]):
+        with running(path, version) as unit:
+            for time, step in steps[:-1]:
+                unit.doStep(time, step)
+            with pytest.raises(Exception, match=r"(?i)error|status"):
+                unit.doStep(*steps[-1])
 
 
 @needs_compiler
@@ -194,60 +198,28 @@ def test_communication_steps_may_be_longer_or_shorter_than_the_models(tmp_path: 
         assert result["displacement_output"][-1] == pytest.approx(expected[39, 0], rel=1e-12)
 
 
-@needs_compiler
-@pytest.mark.parametrize("version", VERSIONS)
-def test_time_that_goes_back_or_too_far_is_an_error(version: str, tmp_path: Path) -> None:
-    fmpy = pytest.importorskip("fmpy")
-    path = exported(MODELS["creep"], tmp_path, version)
-    description, place = fmpy.read_model_description(str(path)), fmpy.extract(str(path))
-    for steps in ([(1.0, 0.01), (0.5, 0.01)], [(0.0, 1e300)], [(0.0, 0.0)], [(0.0, -1.0)]):
-        unit = fmpy.instantiate_fmu(place, description, "CoSimulation")
-        if version == "2.0":
-            unit.setupExperiment(startTime=0.0)
-        unit.enterInitializationMode()
-        unit.exitInitializationMode()
-        for time, step in steps[:-1]:
-            unit.doStep(time, step)
-        with pytest.raises(Exception, match=r"(?i)error|status"):
-            unit.doStep(*steps[-1])
-        unit.freeInstance()
-    shutil.rmtree(place)
-
-
-def test_fmi_2_has_no_name_for_some_platforms(tmp_path: Path) -> None:
-    with pytest.raises(ModelError, match=r"no name for linux-arm.*Remedy: ask for FMI 3.0"):
-        exported(MODELS["pi"], tmp_path, "2.0", platforms=["linux-arm"])
-
-
-def test_the_same_model_gives_the_same_bytes(tmp_path: Path) -> None:
-    for folder in (tmp_path / "a", tmp_path / "b"):
-        folder.mkdir()
-    first, again = (
-        exported(MODELS["SDIHC"], tmp_path / folder, "3.0", platforms=[]) for folder in "ab"
-    )
-    assert first.read_bytes() == again.read_bytes()
-
-
-def test_an_existing_file_stays_unless_asked(tmp_path: Path) -> None:
+def test_what_makes_no_fmu_is_refused(tmp_path: Path) -> None:
     block = MODELS["pi"]
-    path = exported(block, tmp_path, "2.0", platforms=[])
-    before = path.read_bytes()
-    with pytest.raises(DataError, match="exists already"):
-        exported(block, tmp_path, "3.0", platforms=[])
-    assert path.read_bytes() == before
-    exported(block, tmp_path, "3.0", platforms=[], overwrite=True)
-    assert path.read_bytes() != before
-
-
-def test_bad_requests_name_a_remedy(tmp_path: Path) -> None:
-    block = MODELS["pi"]
-    with pytest.raises(DataError, match=r"ends in \.fmu"):
+    with pytest.raises(DataError, match=r"\.fmu"):
         export_fmu(block, tmp_path / "model.zip")
-    with pytest.raises(ModelError, match=r"no platform 'amiga'.*Remedy: use one of linux"):
+    with pytest.raises(ModelError, match="amiga"):
         export_fmu(block, tmp_path / "model.fmu", platforms=["amiga"])
-    with pytest.raises(ModelError, match=r"depends on the rate.*Remedy: give the time"):
+    with pytest.raises(ModelError, match="linux-arm"):  # which FMI 2 has no name for
+        exported(block, tmp_path, "2.0", platforms=["linux-arm"])
+    with pytest.raises(ModelError, match="--sample-time"):
         export_fmu(MODELS["creep"], tmp_path / "model.fmu", platforms=[])
     assert list(tmp_path.iterdir()) == []
+
+
+def test_the_same_model_gives_the_same_bytes_and_a_file_stays(tmp_path: Path) -> None:
+    path = exported(MODELS["SDIHC"], tmp_path, "3.0", platforms=[])
+    before = path.read_bytes()
+    with pytest.raises(DataError) as refused:
+        exported(MODELS["pi"], tmp_path, "3.0", platforms=[])
+    assert refused.value.file == path
+    assert path.read_bytes() == before
+    exported(MODELS["SDIHC"], tmp_path, "3.0", platforms=[], overwrite=True)
+    assert path.read_bytes() == before
 
 
 @pytest.mark.parametrize("version", VERSIONS)
@@ -263,6 +235,7 @@ def test_units_are_in_si(version: str, tmp_path: Path) -> None:
     assert float(displacement.get("factor", "1")) == 1e-3
 
 
+@pytest.mark.long
 @needs("x86_64-w64-mingw32-gcc")
 @pytest.mark.parametrize(("version", "function"), [("2.0", "fmi2DoStep"), ("3.0", "fmi3DoStep")])
 def test_the_windows_library_exports_the_interface(

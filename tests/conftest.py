@@ -55,7 +55,6 @@ LONG = tuple(
         "estimators/test_coupled.py",
         "estimators/test_linear.py",
         "estimators/test_loads.py",
-        "link/test_devices.py",
         "papers",
         "stream/test_link.py",
         "studying/test_log.py",

@@ -49,14 +49,18 @@ def expected(inputs: np.ndarray) -> np.ndarray:
 
 
 @pytest.mark.parametrize("server", [twin, pytest.param(Compiled, marks=needs("cc"))])
-def test_over_a_good_line_the_device_is_the_model(server: Callable[[], Twin | Compiled]) -> None:
+def test_over_a_good_line_the_device_is_the_model(
+    server: Callable[[], Twin | Compiled], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Frames are counted from anywhere, and beyond the last number from 0 again."""
+    monkeypatch.setattr("os.urandom", lambda n: b"\xf0" + b"\xff" * (n - 1))
     with linked(server(), []) as link:
         assert stepped(link, INPUTS) == expected(INPUTS).tolist()
         assert link.statistics.repeated == link.statistics.dropped == 0
         assert link.counts().steps == len(INPUTS)
 
 
-@settings(max_examples=150)
+@settings(max_examples=80)
 @given(FAULTY)
 def test_each_input_is_applied_once_in_order_or_not_at_all(faults: list[tuple[str, int]]) -> None:
     server = twin()
@@ -106,13 +110,13 @@ def test_a_silent_host_leaves_the_safe_outputs() -> None:
     assert server.outputs[0] == SERVING.safe["displacement"]
 
 
-def test_a_host_that_does_not_want_it_is_told_that_the_device_let_go() -> None:
+def test_a_host_may_refuse_to_lead_again() -> None:
     server = twin()
     link = linked(server, [], reopen=False, watchdog=0.02)
     link.step([5.0])
     for _ in range(3):
         server.tick()
-    with pytest.raises(LinkError, match="leads no more: is safe"):
+    with pytest.raises(LinkError):
         link.step([5.0])
 
 
@@ -147,7 +151,7 @@ def test_the_devices_own_timer_steps_where_the_host_does_not() -> None:
         assert len(found) <= 1
         link.keep()
     assert link.state().steps >= steps + 8
-    with pytest.raises(LinkError, match=r"Remedy: call set\(\)"):
+    with pytest.raises(LinkError, match=r"set\(\)"):
         link.step([1.0])
 
 
@@ -155,7 +159,7 @@ def test_what_is_beyond_limits_is_not_sent() -> None:
     server = twin()
     link = linked(server, [])
     for wrong in ([6.1], [float("nan")], [1.0, 2.0], ["x"]):
-        with pytest.raises(DataError, match="Remedy"):
+        with pytest.raises(DataError):
             link.step(wrong)
     assert not server.applied
 
@@ -165,18 +169,18 @@ def test_coefficients_move_within_limits_and_all_at_once() -> None:
     link = linked(server, [])
     own = link.coefficients()
     np.testing.assert_array_equal(own, block().c_numbers(None))
-    assert SERVING.adjustable == 0.25
-    _, more = coefficient_limits(Wiring(block(), None), 0.25)
+    _, more = coefficient_limits(Wiring(block(), None), SERVING.adjustable)
     assert (more != own).any()
     link.load_coefficients(more)
     np.testing.assert_array_equal(link.coefficients(), more)
-    wrong = own.copy()
-    wrong[-1] *= 2
-    with pytest.raises(LinkError, match="beyond limits"):
-        link.load_coefficients(wrong)
+    for wrong in ([*own[:-1], 2 * own[-1]], own[:-1]):
+        with pytest.raises(LinkError):
+            link.load_coefficients(np.array(wrong))
     np.testing.assert_array_equal(link.coefficients(), more)
-    with pytest.raises(LinkError, match=r"for .* that can be set"):
-        link.load_coefficients(own[:-1])
+    server.switch_on()  # which loses what was loaded: such a device is led no more
+    with pytest.raises(LinkError):
+        link.step([1.0])
+    assert not server.applied
 
 
 def test_memory_is_carried_to_another_device() -> None:
@@ -186,31 +190,16 @@ def test_memory_is_carried_to_another_device() -> None:
     assert stepped(other, INPUTS[100:]) == expected(INPUTS)[100:].tolist()
 
 
-def test_a_device_that_has_lost_what_was_loaded_is_led_no_more() -> None:
-    server = twin()
-    link = linked(server, [])
-    link.load_coefficients(link.coefficients())
-    server.switch_on()
-    with pytest.raises(LinkError, match="has lost the numbers"):
-        link.step([1.0])
-    assert not server.applied
-
-
-def test_another_model_is_told() -> None:
-    with pytest.raises(LinkError, match="holds model 0123456789abcdef, not fedcba9876543210"):
+def test_another_model_is_not_led() -> None:
+    with pytest.raises(LinkError, match=r"0123456789abcdef.*fedcba9876543210"):
         linked(twin(), [], fingerprint="fedcba9876543210")
     server = twin()
     link = linked(server, [])
     server.fingerprint = bytes(8)
     server.switch_on()
-    with pytest.raises(LinkError, match="holds model 0000000000000000 now"):
+    with pytest.raises(LinkError, match="0000000000000000"):
         link.step([1.0])
     assert not server.applied
-
-
-def test_nothing_that_answers_is_told() -> None:
-    with pytest.raises(LinkError, match=r"nothing has answered for 3 s.*Remedy: see that"):
-        linked(twin(), [("lose", 0)] * 1000)
 
 
 class Babbler:
@@ -234,13 +223,15 @@ class Babbler:
         pass
 
 
-@settings(max_examples=200)
+@settings(max_examples=100)
 @given(st.lists(st.binary(max_size=60).map(lambda body: b"\0" + body), max_size=8))
-def test_a_device_that_talks_nonsense_is_an_error_in_words(answers: list[bytes]) -> None:
+def test_a_device_that_talks_nonsense_or_nothing_is_an_error(answers: list[bytes]) -> None:
     identity = Line(server := twin(), iter([]))
     identity.write(Frame(1, 0, 1).packed())
     (frame,) = Reader().feed(identity.read(0.0))
     assert server.fingerprint in frame.body
     babbler = Babbler([*answers, frame.body])
-    with pytest.raises(DataError, match="Remedy"):
+    with pytest.raises(DataError):
         Link(babbler, clock=lambda: babbler.time, lock_step=True).step([1.0])
+    with pytest.raises(LinkError):
+        linked(twin(), [("lose", 0)] * 1000)

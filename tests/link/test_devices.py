@@ -5,10 +5,8 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
-from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -59,18 +57,22 @@ def terminals() -> Iterator[tuple[int, str]]:
         os.close(theirs)
 
 
+@pytest.mark.long
 @needs("cc")
-@pytest.mark.parametrize("name", ["pi", "process-model"])
-def test_a_process_gives_the_numbers_of_the_export(name: str, tmp_path: Path) -> None:
-    inputs = inputs_of(name, 300)
-    with (
-        hosted(examples()[name], sample_time=SAMPLE_TIME, single=True, serving=SERVING) as line,
-        Link(line, lock_step=True, timeout=1.0, patience=30.0) as link,
-    ):
+def test_a_process_gives_the_numbers_of_the_export_until_it_is_switched_off(
+    tmp_path: Path,
+) -> None:
+    inputs = inputs_of("process-model", 300)
+    block = examples()["process-model"]
+    with hosted(block, sample_time=SAMPLE_TIME, single=True, serving=SERVING) as line:
+        link = Link(line, lock_step=True, timeout=1.0, patience=30.0)
         outputs = [link.step(row).outputs for row in inputs]
-    np.testing.assert_array_equal(outputs, single(name, tmp_path / "c", inputs))
+    np.testing.assert_array_equal(outputs, single("process-model", tmp_path / "c", inputs))
+    with pytest.raises(DataError):
+        link.step([1.0])
 
 
+@pytest.mark.long
 @with_emulator
 @needs("cc")
 def test_firmware_answers_with_the_numbers_of_the_export(tmp_path: Path) -> None:
@@ -90,6 +92,7 @@ def test_firmware_answers_with_the_numbers_of_the_export(tmp_path: Path) -> None
         assert link.counts().dropped > 0
 
 
+@pytest.mark.long
 @needs("cc")
 def test_a_missing_measurement_takes_no_reference_with_it() -> None:
     block = examples()["pi-adaptive"]
@@ -107,14 +110,15 @@ def test_a_missing_measurement_takes_no_reference_with_it() -> None:
     ):
         assert link.device.n_missable == 1
         found = [link.step(row).outputs for row in inputs]
-        with pytest.raises(DataError, match="beyond the limits"):
+        with pytest.raises(DataError):
             link.step([np.nan, 1.0])
     np.testing.assert_allclose(found, expected, rtol=1e-12)
 
 
+@pytest.mark.long
 @needs("cc")
 def test_served_exports_of_all_kinds_compile(tmp_path: Path) -> None:
-    for number, name in enumerate(("balance", "gpi-inverse", "feedforward-feedback", "play")):
+    for number, name in enumerate(("balance", "gpi-inverse", "feedforward-feedback", "negative")):
         block = examples()[name]
         channels = [channel.name for channel in (*block.inputs, *block.outputs)]
         wide = Serving(dict.fromkeys(channels, (-9.0, 9.0)), adjustable=0.2 if number % 2 else 0.0)
@@ -126,21 +130,6 @@ def test_served_exports_of_all_kinds_compile(tmp_path: Path) -> None:
         compile_c(sources, tmp_path / f"{name}.elf", options=options)
 
 
-@needs("cc")
-def test_nothing_is_left_over_where_no_number_can_be_adjusted(tmp_path: Path) -> None:
-    wide = Serving({"displacement": (-9.0, 9.0)}, adjustable=0.25)
-    folder = export_c(examples()["negative"], tmp_path / "c", sample_time=SAMPLE_TIME, serving=wide)
-    options = [f"-I{folder / 'src'}", "-Wall", "-Wextra", "-Werror", "-c"]
-    compile_c([folder / "src" / "model.c"], tmp_path / "model.o", options=options)
-
-
-@pytest.mark.parametrize("period", [1e-9, 9e-7, 1e4])
-def test_periods_that_a_device_cannot_tell_are_refused(period: float, tmp_path: Path) -> None:
-    serving = Serving(SERVING.limits, watchdog=1e6)
-    with pytest.raises(ModelError, match=r"whole microseconds.*from 1e-6 to 4295 s"):
-        export_c(examples()["play"], tmp_path / "c", sample_time=period, serving=serving)
-
-
 def test_a_port_is_opened_by_name_and_closed() -> None:
     with terminals() as (ours, name):
         port, other = open_port(name), Descriptor(ours)
@@ -150,23 +139,24 @@ def test_a_port_is_opened_by_name_and_closed() -> None:
         assert port.read(1.0) == b"\x03\x04\x11"
         assert port.read(0.0) == b""
         other.close()
-        with pytest.raises(DataError, match=r"has been closed by the other end.*Remedy"):
+        with pytest.raises(DataError):
             port.read(1.0)
         port.close()
         port.close()
-        with pytest.raises(DataError, match="has been closed"):
+        with pytest.raises(DataError):
             port.write(b"x")
 
 
 def test_what_is_no_port_is_refused(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("x")
     for wrong in (tmp_path / "file", "/dev/null", tmp_path / "absent"):
-        with pytest.raises(DataError, match="Remedy"):
+        with pytest.raises(DataError, match=str(wrong)):
             open_port(wrong)
-    with pytest.raises(DataError, match="17 bits a second"):
+    with pytest.raises(DataError, match="17"):
         open_port("/dev/null", baud=17)
 
 
+@pytest.mark.long
 @needs("cc")
 def test_the_command_line_looks_leads_and_records(tmp_path: Path) -> None:
     folder = export_c(examples()["pi"], tmp_path / "c", sample_time=0.01, serving=SERVING)
@@ -188,15 +178,14 @@ def test_the_command_line_looks_leads_and_records(tmp_path: Path) -> None:
             (expected,) = examples()["pi"].simulate([2.0])
             assert recording["displacement"][-1] == pytest.approx(expected, rel=1e-12)
             for wrong in ("pressure=7", "force=1", "pressure"):
-                refused = call("link", name, "--set", wrong)
-                assert refused.code == 2
-                assert "Remedy" in refused.err
+                assert call("link", name, "--set", wrong).code == 2
             assert "safe after" in call("link", name).out
         finally:
             process.kill()
             process.wait()
 
 
+@pytest.mark.long
 @needs("cc")
 @pytest.mark.parametrize("name", ["pi-adaptive", "adaptive-series"])
 def test_what_was_learnt_is_read_and_gone_on_from(name: str) -> None:
@@ -215,7 +204,7 @@ def test_what_was_learnt_is_read_and_gone_on_from(name: str) -> None:
             link.step(row)
             stream.step(row)
         memory = link.memory()
-        with pytest.raises(LinkError, match="is fixed"):
+        with pytest.raises(LinkError):
             link.load_memory(memory)
         gone_on = [link.step(row).outputs for row in inputs[100:]]
     state = state_of(block, memory, SAMPLE_TIME)
@@ -225,61 +214,51 @@ def test_what_was_learnt_is_read_and_gone_on_from(name: str) -> None:
         Link(line, lock_step=True, timeout=1.0, patience=30.0) as link,
     ):
         np.testing.assert_array_equal([link.step(row).outputs for row in inputs[100:]], gone_on)
-    with pytest.raises(DataError, match="the memory has 3 numbers"):
+    with pytest.raises(DataError):
         state_of(block, memory[:3], SAMPLE_TIME)
 
 
-@cache
-def followed(*options: str) -> tuple[str, str]:
-    """Run the example for two seconds; return what it tells of errors, and what was learnt, as saved."""
-    example = Path(__file__).parents[2] / "examples" / "robot_firmware.py"
-    with tempfile.TemporaryDirectory() as place:
-        model, learnt, picture = (Path(place) / name for name in ("a.json", "b.json", "c.png"))
-        Adaptive(GPI.example(), 60.0, 0.05).save(model)
-        files = [str(picture), "--model", str(model), "--save", str(learnt)]
-        command = [sys.executable, str(example), *files, "--duration", "2", *options]
-        told = subprocess.run(command, capture_output=True, text=True, check=True).stdout
-        assert "The device took 400 steps" in told
-        assert picture.stat().st_size > 10_000
-        return told.partition("\n")[2], learnt.read_text()
-
-
-@needs("cc")
-def test_the_example_runs() -> None:
-    assert "adaptive: followed within" in followed("--here", "--fast")[0]
-
-
+@pytest.mark.long
 @with_emulator
 @needs("cc")
-def test_the_example_gives_the_same_numbers_at_any_pace_and_on_the_microcontroller() -> None:
-    assert followed() == followed("--here", "--fast")
+def test_the_example_gives_the_same_numbers_at_any_pace_and_on_the_microcontroller(
+    tmp_path: Path,
+) -> None:
+    example = Path(__file__).parents[2] / "examples" / "robot_firmware.py"
+    model, learnt, picture = (tmp_path / name for name in ("a.json", "b.json", "c.png"))
+    Adaptive(GPI.example(), 60.0, 0.05).save(model)
+    files = [str(picture), "--model", str(model), "--save", str(learnt), "--duration", "2"]
+    found = []
+    for options in ([], ["--here", "--fast"]):
+        command = [sys.executable, str(example), *files, *options]
+        printed = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+        found.append((printed.partition("\n")[2], learnt.read_text()))
+    assert found[0] == found[1]
+    assert picture.stat().st_size > 10_000
 
 
 REFUSED = {
-    "does not know between what limits pressure, displacement": Serving(),
-    "the safe value of displacement is 90": Serving(SERVING.limits, {"displacement": 90.0}),
-    "'speed' is no channel": Serving({"speed": (0.0, 1.0)}),
-    "a watchdog of nan s": Serving(SERVING.limits, watchdog=float("nan")),
-    "a watchdog of 0.001 s": Serving(SERVING.limits, watchdog=0.001),
-    "adjustable by 1.5": Serving(SERVING.limits, adjustable=1.5),
-    "the limits of pressure are 3 and 1": Serving({**SERVING.limits, "pressure": (3.0, 1.0)}),
+    "pressure, displacement": Serving(),
+    "displacement is 90": Serving(SERVING.limits, {"displacement": 90.0}),
+    "'speed'": Serving({"speed": (0.0, 1.0)}),
+    "nan s": Serving(SERVING.limits, watchdog=float("nan")),
+    "0.001 s": Serving(SERVING.limits, watchdog=0.001),
+    "1.5": Serving(SERVING.limits, adjustable=1.5),
+    "pressure are 3 and 1": Serving({**SERVING.limits, "pressure": (3.0, 1.0)}),
 }
 
 
-@pytest.mark.parametrize("complaint", REFUSED)
-def test_what_cannot_be_served_is_refused(complaint: str, tmp_path: Path) -> None:
-    serving, block = REFUSED[complaint], examples()["play"]
-    with pytest.raises(ModelError, match=rf"{complaint}.*Remedy:"):
+@pytest.mark.parametrize("named", REFUSED)
+def test_what_cannot_be_served_is_refused(named: str, tmp_path: Path) -> None:
+    serving, block = REFUSED[named], examples()["play"]
+    with pytest.raises(ModelError, match=named):
         export_c(block, tmp_path / "c", sample_time=SAMPLE_TIME, serving=serving)
-    with pytest.raises(ModelError, match="has no time of its own"):
-        export_c(block, tmp_path / "c", serving=SERVING)
 
 
-@needs("cc")
-def test_a_device_that_is_switched_off_is_told() -> None:
-    with hosted(examples()["play"], sample_time=SAMPLE_TIME, serving=SERVING) as line:
-        link = Link(line, lock_step=True)
-        link.step([1.0])
-    with pytest.raises(DataError, match="Remedy"):
-        link.step([1.0])
-    assert issubclass(LinkError, DataError)
+@pytest.mark.parametrize("period", [None, 1e-9, 9e-7, 1e4])
+def test_periods_that_a_device_cannot_count_are_refused(
+    period: float | None, tmp_path: Path
+) -> None:
+    serving = Serving(SERVING.limits, watchdog=1e6)
+    with pytest.raises(ModelError):
+        export_c(examples()["play"], tmp_path / "c", sample_time=period, serving=serving)

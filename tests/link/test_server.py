@@ -7,7 +7,6 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
-import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -72,39 +71,8 @@ def sent_by(server: Twin | Compiled, most: int) -> Iterator[int]:
         yield byte
 
 
-@pytest.mark.parametrize("which", ["twin", pytest.param("C", marks=needs("cc"))])
-def test_numbers_are_staged_from_the_first_on_and_loaded_whole(which: str) -> None:
-    server: Twin | Compiled = twin() if which == "twin" else Compiled()
-    own, sequence = block().c_numbers(None), 0
-
-    def told(kind: int, body: bytes) -> int:
-        nonlocal sequence
-        sequence += 1
-        for byte in Frame(kind, 1, sequence, body).packed():
-            server.receive(byte)
-        (answer,) = Reader().feed(bytes(sent_by(server, 600)))
-        return answer.body[0]
-
-    def staged(first: int, n: int, what: int = 0) -> int:
-        return told(8, struct.pack("<BH", what, first) + own[first : first + n].tobytes())
-
-    told_ = server.fingerprint
-    print_ = bytes.fromhex(told_) if isinstance(told_, str) else told_
-    assert told(3, print_ + struct.pack("<BI", 1, 5)) == 0
-    assert staged(1, 1) == 7
-    assert staged(0, 1) == 0
-    assert staged(2, 1) == 7
-    assert told(9, b"\0") == 7
-    assert staged(0, 1) == staged(1, len(own) - 1) == 0
-    assert told(9, b"\1") == 7
-    assert told(9, b"\0") == 0
-    assert told(9, b"\0") == 7
-    assert staged(0, 1) == 0
-    assert told(8, b"\0\1\0" + bytes(8 * len(own))) == 3
-
-
 @needs("cc")
-@settings(max_examples=200)
+@settings(max_examples=120)
 @given(st.lists(doings(), min_size=10, max_size=30))
 def test_c_answers_as_the_twin_does(told: list[tuple[str, bytes | int]]) -> None:
     servers: list[Twin | Compiled] = [own := twin(), Compiled()]

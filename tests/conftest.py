@@ -56,7 +56,6 @@ LONG = tuple(
         "estimators/test_linear.py",
         "estimators/test_loads.py",
         "papers",
-        "stream/test_link.py",
         "studying/test_log.py",
         "system/test_compiling.py",
         "system/test_progress.py",

@@ -68,32 +68,27 @@ def test_feedforward_gives_the_force_exactly_where_the_model_is_the_plant() -> N
     found = track(ahead, Stand(), reference(), approach=2.0, pressure_loop=False)
     assert found.rmse["force"] < 1e-9
     assert found.recording.units["reference_force"] == "N"
+    assert ForceFeedforward.of(LAW) == ForceFeedforward(LAW)
     blind = track(ForceFeedforward(LAW), Stand(), reference(), approach=2.0, pressure_loop=False)
     assert blind.rmse["force"] > 30.0
-
-
-def test_feedforward_is_of_force_models_only() -> None:
-    assert ForceFeedforward.of(LAW) == ForceFeedforward(LAW)
     assert ForceFeedforward.of(PI.example()) is None
 
 
 def test_commands_follow_a_force_on_the_test_stand(cli: Cli, tmp_path: Path) -> None:
     wanted = tmp_path / "wanted.csv"
-    write(reference(), wanted)
+    write(reference().slice(0, 300), wanted)
     reached = {}
     for name, model in (("friction", MODEL), ("static", LAW)):
         model.save(tmp_path / f"{name}.json")
         ahead = tmp_path / f"{name}-ahead.json"
         result = cli("invert", tmp_path / f"{name}.json", "-o", ahead)
         assert result.code == 0, result.err
-        assert "Pressure by force and length" in result.out
-        options = ["--rig", "mas10-test-stand", "--reference", wanted, "--approach", 3]
+        options = ["--rig", "mas10-test-stand", "--reference", wanted, "--approach", 2]
         result = cli("track", ahead, *options, "--json")
         assert result.code == 0, result.err
         reached[name] = json.loads(result.out)["rmse"]["force"]
     assert reached["friction"] < 0.7 * reached["static"]
-    result = cli("track", ahead, *options, "--controller", "pid")
-    assert (result.code, "PID follows a displacement" in result.err) == (2, True)
+    assert cli("track", ahead, *options, "--controller", "pid").code == 2
     without = tmp_path / "without.csv"
     write(reference().select(["force"]), without)
     result = cli("track", ahead, "--rig", "mas10-test-stand", "--reference", without)
@@ -114,7 +109,7 @@ def test_runs_that_hold_the_length_are_fitted_together(cli: Cli, tmp_path: Path)
     assert json.loads(result.out)["rmse"] < 1e-6
     alone = cli("fit", "force-bilinear", files[0], *channels, "-o", tmp_path / "law.json")
     assert alone.code == 2
-    assert "constant" in alone.err
+    assert "length" in alone.err
 
 
 @pytest.mark.parametrize("elements", [EACH_WAY, ("shared", "both", "shortening")])

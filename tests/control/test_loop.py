@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
+from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mckibben import PI, DataError, ModelError, Recording, load, load_rig, write
+from mckibben import PI, DataError, ModelError, Recording, load, load_rig
 from mckibben.blocks.core.fields import Channel
 from mckibben.blocks.coupled.balance import Balance
 from mckibben.blocks.feedback.feedforward_feedback import FeedforwardFeedback
@@ -20,8 +20,6 @@ from mckibben.blocks.feedback.pid import PIDFeedback
 from mckibben.control import DisturbanceObserver, Twin, control_law, track, tune_pid
 from mckibben.control.pressure_loop import PressureLoop
 from mckibben.errors import ModelWarning
-from tests.cli.conftest import Cli
-from tests.cli.conftest import cli as cli  # a fixture
 
 
 class Simple:
@@ -104,12 +102,6 @@ def test_integral_does_not_wind_up() -> None:
     assert out[0] < 5.0
 
 
-def test_the_same_seed_gives_the_same_loop() -> None:
-    pid = feedback(0.05, 0.2)
-    first, again = (track(pid, Simple(), reference(1), noise=0.1, seed=3) for _ in range(2))
-    np.testing.assert_array_equal(first.recording["displacement"], again.recording["displacement"])
-
-
 def test_the_arm_follows_with_feedback() -> None:
     rig = load_rig("soft-arm")
     t = np.arange(400) * 0.05
@@ -124,38 +116,38 @@ def test_the_arm_follows_with_feedback() -> None:
     assert max(found.rmse.values()) < 1.0
 
 
-@pytest.mark.parametrize("first", [-0.02, 2.52])
-def test_noise_beyond_a_range_is_no_wish(first: float) -> None:
+def test_noise_beyond_a_range_is_no_wish() -> None:
     names = [f"displacement_{k}" for k in (1, 2, 3)]
-    rest = {name: np.full(3, 30.0) for name in names}
-    wanted = Recording(rest | {"pressure_extensor": np.array([first, 1.0, 1.0])}, 0.05)
     pid = PIDFeedback.of(
         tuple(Channel(name, "mm") for name in names),
         tuple(Channel(f"pressure_{k}", "bar") for k in (1, 2, 3)),
         *[(0.0,) * 3] * 3,
         limits=(0.0, 2.5),
     )
-    rig = load_rig("soft-arm")
-    track(pid, rig, wanted, approach=0.1)
-    away = wanted.with_channels(pressure_extensor=wanted["pressure_extensor"] + 10 * (first - 1.0))
-    with pytest.raises(DataError, match=r"takes 0 to 2\.5.*begin it within"):
-        track(pid, rig, away, approach=0.1)
+    for first, refused in ((-0.02, False), (2.52, False), (-10.0, True), (17.0, True)):
+        columns = dict.fromkeys(names, np.full(3, 30.0))
+        extensor = np.array([first, 1.0, 1.0])
+        wanted = Recording(columns | {"pressure_extensor": extensor}, 0.05)
+        with pytest.raises(DataError) if refused else nullcontext():
+            track(pid, load_rig("soft-arm"), wanted, approach=0.1)
 
 
 def test_bad_loops_are_refused() -> None:
     controller = BLOCK.inverse()
-    with pytest.raises(DataError, match="no displacement"):
+    with pytest.raises(DataError, match="displacement"):
         track(controller, Simple(), Recording({"pressure": np.ones(10)}, 0.02))
-    with pytest.raises(DataError, match="no time"):
+    with pytest.raises(DataError):
         track(controller, Simple(), Recording({"displacement": np.ones(10)}, None))
     with pytest.raises(ModelError, match="slew"):
         track(controller, Simple(), reference(), slew=-1.0)
-    with pytest.raises(ModelError, match="nothing is left"):
+    with pytest.raises(ModelError, match="settle"):
         track(controller, Simple(), reference(1), settle=1e3)
-    with pytest.raises(ModelError, match="kp, ki"):
+    with pytest.raises(ModelError, match="ki"):
         PIDFeedback.of(BLOCK.outputs, BLOCK.inputs, (1.0, 2.0), (1.0,), limits=(0.0, 5.0))
-    with pytest.raises(ModelError, match=r"no controller named 'bang'.*Remedy: use one of feedf"):
+    with pytest.raises(ModelError, match="bang"):
         control_law("bang", controller, PIDFeedback.example)
+    with pytest.raises(ModelError, match="preview"):
+        track(controller, Simple(), reference(), preview=-1.0)
     with pytest.raises(ModelError, match="filter_time"):
         DisturbanceObserver(BLOCK.inverse(), filter_time=0.0)
 
@@ -188,18 +180,9 @@ def test_what_is_tracked_is_what_the_saved_block_gives(behind: bool, tmp_path: P
     np.testing.assert_array_equal(np.clip(again, 0.0, 5.0), found["command_pressure"])
 
 
-def test_a_controller_that_is_no_block_says_so(cli: Cli, tmp_path: Path) -> None:
-    BLOCK.inverse().save(tmp_path / "inverse.json")
-    write(reference(1), tmp_path / "wished.csv")
-    given = ["--rig", "mas20-hanging", "--reference", tmp_path / "wished.csv"]
-    kept = ["--controller", "observer", "--controller-out", tmp_path / "controller.json"]
-    result = cli("track", tmp_path / "inverse.json", *given, *kept)
-    assert result.code == 2
-    assert re.search(r"'observer' is no block.*Remedy:", " ".join(result.err.split()))
-
-
-@pytest.mark.parametrize("step", [0.005, 0.02, 0.05])
-@pytest.mark.parametrize("name", ["mas20-hanging", "mckibben-530", "soft-arm"])
+@pytest.mark.parametrize(
+    ("name", "step"), [("mas20-hanging", 0.005), ("mckibben-530", 0.02), ("soft-arm", 0.05)]
+)
 def test_no_regulator_of_a_rig_is_made_to_swing(name: str, step: float) -> None:
     rig = load_rig(name).changed({"sample_time": step})
     driven = [channel for channel in rig.inputs if channel.startswith("pressure")]
@@ -253,7 +236,7 @@ def test_what_the_compensator_of_several_muscles_clips_is_counted() -> None:
     held = {"pressure_extensor": np.zeros(n), "force": np.zeros(n)}
     wanted = Recording(waves | held, 0.02)
     state = inverse.final_state(wanted)
-    with pytest.warns(ModelWarning, match="samples need"):
+    with pytest.warns(ModelWarning):
         inverse.report(state)
     plant = Twin(Balance.example().inverse(), limits=dict.fromkeys(names, (0.0, 2.0)))
     found = track(inverse, plant, wanted, approach=0.0, pressure_loop=False)

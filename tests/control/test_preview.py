@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mckibben import PI, ModelError, Recording, Series, write
+from mckibben import PI, Recording, Series, write
 from mckibben.blocks.core.fields import Channel
 from mckibben.blocks.dynamic.air import Air
 from mckibben.blocks.feedback.feedforward_feedback import FeedforwardFeedback
@@ -96,6 +96,7 @@ def test_an_observer_and_an_estimated_load_pass_the_preview_on() -> None:
     assert error(observer) < 0.02 * SPAN
     assert error(observer) < 0.3 * error(observer, 0.0)
     channel = Channel("displacement", "mm")
+    assert BlockController(feedback()).preview == 0.0
     estimated = EstimatedLoad(
         BlockController(KNOWN.inverse()), Affine(0.0, 0.0, channel, Channel("force", "N"))
     )
@@ -103,42 +104,19 @@ def test_an_observer_and_an_estimated_load_pass_the_preview_on() -> None:
     assert error(estimated) < 1e-9 * SPAN
 
 
-def test_feedback_alone_has_no_use_for_a_preview() -> None:
-    assert BlockController(feedback()).preview == 0.0
-    assert error(feedback(), 0.2) == error(feedback())
-
-
-def test_a_preview_out_of_range_is_refused() -> None:
-    with pytest.raises(ModelError, match=r"preview is -1.*Remedy"):
-        error(KNOWN.inverse(), -1.0)
-
-
 def test_the_command_line_previews(cli: Cli, tmp_path: Path) -> None:
-    air = Air(0.6, 0.0, 0.05, 0.03, 0.07, 0.06, 0.0, 6.0, (0.0, 10.0))
-    muscle = PI((0.0, 0.3, 0.8), (3.0, 1.5, 1.0), 0.0, (0.0, 6.0))
-    Series((air, muscle)).inverse().save(tmp_path / "inverse.json")
-    write(wanted(), tmp_path / "wished.csv")
-    given = ["--rig", "rail", "--reference", tmp_path / "wished.csv"]
+    command = Channel("command_pressure", "bar")  # which drives the rig's pressure
+    air = Air(1.0, 0.0, 0.05, 0.03, 0.07, 0.06, 0.0, 6.0, (0.0, 6.0), input=command)
+    Series((air, PI.example())).inverse().save(tmp_path / "inverse.json")
+    write(wanted().slice(0, 200), tmp_path / "wished.csv")
+    given = ["--rig", "mas20-hanging", "--reference", tmp_path / "wished.csv", "--approach", 1]
     out = tmp_path / "run.csv"
     commands = []
     for ahead in ([], ["--preview", 0.06], ["--preview", 0]):
         result = cli("track", tmp_path / "inverse.json", *given, *ahead, "-o", out, "--force")
         assert result.code == 0, result.err
         commands.append(out.read_text())
+    assert "command_pressure" in commands[0].splitlines()[0]
     assert commands[0] == commands[1] != commands[2]
-    kept = ["--controller", "feedforward-pid", "--controller-out", tmp_path / "robot.json"]
-    result = cli("track", tmp_path / "inverse.json", *given, *kept)
-    assert result.code == 2
-    assert "--preview 0" in " ".join(result.err.split())
-
-
-def test_commands_of_a_pressure_drive_the_rigs_pressure(cli: Cli, tmp_path: Path) -> None:
-    command = Channel("command_pressure", "bar")
-    air = Air(1.0, 0.0, 0.02, 0.03, 0.07, 0.04, 0.0, 6.0, (0.0, 6.0), input=command)
-    Series((air, PI.example())).inverse().save(tmp_path / "inverse.json")
-    write(wanted(), tmp_path / "wished.csv")
-    out = tmp_path / "run.csv"
-    given = ["--rig", "mas20-hanging", "--reference", tmp_path / "wished.csv", "-o", out]
-    result = cli("track", tmp_path / "inverse.json", *given)
-    assert result.code == 0, result.err
-    assert "command_pressure" in out.read_text().splitlines()[0]
+    saving = ["--controller", "feedforward-pid", "--controller-out", tmp_path / "robot.json"]
+    assert cli("track", tmp_path / "inverse.json", *given, *saving).code == 2  # no block previews

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -137,11 +136,6 @@ def test_scatter_of_few_runs_does_not_jump() -> None:
         assert inside.mean() > level - 0.03
 
 
-def test_a_twin_names_its_model_and_band() -> None:
-    assert "band 0.9" in repr(Twin(Banded(MODEL, band())))
-    assert "'pi', limits={'pressure': (0.0, 5.0)}" in repr(Twin(MODEL))
-
-
 def test_the_approach_does_not_scatter_and_scatter_is_told() -> None:
     twin = Twin(Banded(MODEL, band(0.5)))
     found = track(MODEL.inverse(), twin, wave(1000), approach=2.0)
@@ -173,50 +167,40 @@ def test_a_compensator_beats_no_compensation_and_says_where_it_proves_nothing() 
     assert with_it.rmse["displacement"] < 1e-9 * (HIGH - LOW)
     assert without.tracked is not None
     assert without.tracked.rmse["displacement"] > 0.02 * (HIGH - LOW)
-    (note,) = without.notes
-    assert re.search(r"very model.*right by construction.*Remedy: .*another model", note)
-    banded = before(MODEL.inverse(), Twin(Banded(MODEL, band())), reference)
-    assert "draws from the band" in " ".join(banded.notes)
+    assert len(without.notes) == 1
+    assert before(MODEL.inverse(), Twin(Banded(MODEL, band())), reference).notes
+    straight = PI((0.0,), ((HIGH - LOW) / 5.0,), LOW, (0.0, 5.0))
+    needless = before(straight.inverse(), Twin(straight), wave(500)).tracked
+    assert needless is not None
+    assert needless.rmse["displacement"] < 1e-6
+    assert before(MODEL.inverse(), load_rig("rail").changed({}), wave(100), approach=0.5).tracked
 
 
 def test_pressures_recorded_with_a_reference_are_passed_over() -> None:
     bare = wave(200)
     both = bare.with_channels({"pressure": "bar"}, pressure=np.full(200, 1.15))
-    found = [track(MODEL.inverse(), Twin(MODEL), one, approach=1.0).rmse for one in (bare, both)]
-    assert found[0] == found[1]
-    tracked = [
-        before(MODEL.inverse(), Twin(MODEL), one, approach=1.0).tracked for one in (bare, both)
-    ]
-    assert tracked[0] is not None
-    assert tracked[1] is not None
-    assert tracked[0].rmse == tracked[1].rmse
-
-
-def test_what_has_no_hysteresis_needs_no_compensation() -> None:
-    straight = PI((0.0,), ((HIGH - LOW) / 5.0,), LOW, (0.0, 5.0))
-    found = before(straight.inverse(), Twin(straight), wave(500))
-    assert found.tracked is not None
-    assert found.tracked.rmse["displacement"] < 1e-6
+    errors = []
+    for one in (bare, both):
+        without = before(MODEL.inverse(), Twin(MODEL), one, approach=1.0).tracked
+        assert without is not None
+        errors.append((track(MODEL.inverse(), Twin(MODEL), one, approach=1.0).rmse, without.rmse))
+    assert errors[0] == errors[1]
 
 
 @pytest.mark.parametrize(
-    ("size", "pressure", "words"),
-    [(1.0, 5.0, ""), (1.1, 5.0, ""), (2.0, 5.0, "in a slow rise"), (1.0, 3.0, "takes 0 to 3")],
+    ("size", "range_", "n_notes"),
+    [
+        *((1.0, (0.0, 5.0), 0), (1.1, (0.0, 5.0), 0), (1.0, (0.3, 4.9), 0)),
+        *((2.0, (0.0, 5.0), 1), (1.0, (0.0, 3.0), 1)),
+    ],
 )
-def test_a_plant_of_other_dimensions_is_told(size: float, pressure: float, words: str) -> None:
+def test_a_plant_of_other_dimensions_is_noted(
+    size: float, range_: tuple[float, float], n_notes: int
+) -> None:
     """A specimen 10 % off is one's own muscle; one of twice the stroke, or another range, is not."""
     weights = tuple(size * weight * 1.001 for weight in MODEL.weights)
-    plant = Twin(replace(MODEL, weights=weights), limits={"pressure": (0.0, pressure)})
-    notes = " ".join(before(MODEL.inverse(), plant, wave(300), approach=1.0).notes)
-    assert (words in notes) if words else not notes
-
-
-def test_ranges_a_little_apart_are_of_one_muscle() -> None:
-    plant = Twin(
-        replace(MODEL, weights=tuple(1.001 * w for w in MODEL.weights)),
-        limits={"pressure": (0.3, 4.9)},
-    )
-    assert not before(MODEL.inverse(), plant, wave(300), approach=1.0).notes
+    plant = Twin(replace(MODEL, weights=weights), limits={"pressure": range_})
+    assert len(before(MODEL.inverse(), plant, wave(300), approach=1.0).notes) == n_notes
 
 
 def test_several_muscles_of_a_twin_are_tracked_together() -> None:
@@ -239,6 +223,11 @@ def test_pid_is_tuned_on_a_twin() -> None:
     pid = tune_pid(Twin(lagging), sample_time=STEP)
     assert isinstance(pid, PIDFeedback)
     assert track(pid, Twin(lagging), wave()).rmse["displacement"] < 0.2 * (HIGH - LOW)
+    # a model without time is no plant for feedback
+    assert doubts_of_feedback("pid", Twin(MODEL))
+    assert not doubts_of_feedback("feedforward", Twin(MODEL))
+    assert not doubts_of_feedback("pid", Twin(lagging))
+    assert not doubts_of_feedback("pid", load_rig("mas20-hanging"))
 
 
 def test_pid_is_tuned_for_the_steepest_part_of_a_muscle_that_is_flat_in_its_middle() -> None:
@@ -264,7 +253,7 @@ def test_pid_is_tuned_where_displacement_falls_as_pressure_rises() -> None:
     tracked = track(pid, twin, wanted, approach=5.0, settle=2.0)
     assert tracked.rmse["displacement"] < 0.05 * (HIGH - LOW)
     still = replace(turned, gain=1e-300)
-    with pytest.raises(ModelError, match="pressure moves nothing"):
+    with pytest.raises(ModelError, match="pressure"):
         tune_pid(Twin(Series((MODEL, still)), limits={"pressure": (0.0, 8.0)}), sample_time=STEP)
 
 
@@ -280,94 +269,77 @@ def test_feedback_is_the_same_where_everything_counts_the_other_way() -> None:
         assert np.array_equal(here.step(row), there.step(-row))
 
 
-def test_feedback_on_a_model_without_time_is_doubted() -> None:
-    lagging = Series((MODEL, registered("blocks", "creep").example()))
-    assert "answers at once" in doubts_of_feedback("pid", Twin(MODEL))[0]
-    assert not doubts_of_feedback("feedforward", Twin(MODEL))
-    assert not doubts_of_feedback("pid", Twin(lagging))
-    assert not doubts_of_feedback("pid", load_rig("mas20-hanging"))
-
-
 @pytest.mark.parametrize(("given", "moved"), [("voltage", "angle"), ("input", "output")])
 def test_loops_are_closed_whatever_the_channels_are_called(given: str, moved: str) -> None:
     model = replace(MODEL, input=Channel(given, "V"), output=Channel(moved, "rad"))
     twin = Twin(model, limits={given: (0.0, 8.0)})
+    assert twin.driving == {given}
     reference = Recording({moved: wave()["displacement"]}, STEP, units={moved: "rad"})
     tracked = track(model.inverse(), twin, reference, approach=5.0, settle=2.0)
     assert tracked.rmse[moved] < 1e-9
-    lagging = Series(
-        (
-            model,
-            replace(
-                registered("blocks", "creep").example(), input=model.output, output=model.output
-            ),
-        )
+    creep = replace(
+        registered("blocks", "creep").example(), input=model.output, output=model.output
     )
-    pid = tune_pid(Twin(lagging, limits={given: (0.0, 8.0)}), sample_time=STEP)
-    assert pid.outputs[0].name == given
+    lagging = Twin(Series((model, creep)), limits={given: (0.0, 8.0)})
+    assert tune_pid(lagging, sample_time=STEP).outputs[0].name == given
 
 
 def test_bad_twins_are_refused() -> None:
-    with pytest.raises(ModelError, match=r"gives pressure.*not its inverse"):
-        Twin(MODEL.inverse())
-    with pytest.raises(DataError, match="no such input"):
-        Twin(MODEL, limits={"voltage": (0, 1)})
-    with pytest.raises(DataError, match="low, then high"):
-        Twin(MODEL, limits={"pressure": (3, 1)})
-    with pytest.raises(DataError, match="no setting 'payload'"):
+    for limits in ({"voltage": (0, 1)}, {"pressure": (3, 1)}):
+        with pytest.raises(DataError, match=next(iter(limits))):
+            Twin(MODEL, limits=limits)
+    with pytest.raises(DataError, match="payload"):
         Twin(MODEL).changed({"payload": 3.0})
-    with pytest.raises(DataError, match=r"call reset\(\) first"):
+    with pytest.raises(DataError):  # before it is reset
         Twin(MODEL).step([1.0])
-    unbounded = Twin(replace(MODEL, input_range=None))
-    with pytest.raises(ModelError, match="how far its pressure may go"):
-        unbounded.reset()
     discrete = registered("blocks", "transfer-function").example()
-    with pytest.raises(ModelError, match=r"steps of 0.01 s.*resample"):
+    with pytest.raises(ModelError, match=r"0\.01 s"):
         Twin(discrete, sample_time=0.02)
     assert Twin(discrete).sample_time == 0.01
     law = registered("blocks", "tondu-lopez").example()
-    with pytest.raises(DataError, match=r"channel 'length'.*held"):
+    with pytest.raises(DataError, match="length"):
         Twin(law, limits={"pressure": (0.0, 4.0)}).reset()
+    for impossible in (MODEL.inverse(), replace(MODEL, input_range=None)):
+        with pytest.raises(ModelError, match="pressure"):
+            Twin(impossible).reset()
 
 
 def test_a_compensator_is_tried_on_ones_own_muscle(cli: Cli, tmp_path: Path) -> None:
-    inverse, model, other = (tmp_path / f"{name}.json" for name in ("inverse", "model", "other"))
+    inverse, model = (tmp_path / f"{name}.json" for name in ("inverse", "model"))
     MODEL.inverse().save(inverse)
     Banded(MODEL, band()).save(model)
-    replace(MODEL, weights=tuple(3 * weight for weight in MODEL.weights)).save(other)
     write(wave(400), tmp_path / "wished.csv")
-    asked = ["--reference", tmp_path / "wished.csv", "--approach", 1]
-    result = cli("track", inverse, "--plant", model, *asked, "--json")
+    given = ["--reference", tmp_path / "wished.csv", "--approach", 1]
+    result = cli("track", inverse, "--plant", model, *given, "--json")
     assert result.code == 0, result.err
     found = json.loads(result.out)
     assert found["plant"] == {"name": "model", "virtual_rig": False}
     assert found["rmse"]["displacement"] > 0.01
     assert found["uncompensated"]["rmse"]["displacement"] > found["rmse"]["displacement"]
-    assert "draws from the band" in found["notes"][0]
-    result = cli("track", inverse, "--plant", other, *asked)
-    assert result.code == 0, result.err
-    said = " ".join(result.out.split())
-    assert "no compensation" in said
-    assert "the two models disagree there" in said
+    assert len(found["notes"]) == 1
 
 
 @pytest.mark.parametrize(
-    ("options", "words"),
+    ("options", "named"),
     [
-        ([], "tried on one plant"),
-        (["--plant", "model.json", "--rig", "mas20-hanging"], "tried on one plant"),
-        (["--rig", "mas20-hanging", "--limits", "pressure=0:3"], "limits of its own"),
-        (["--plant", "model.json", "--limits", "pressure=0:3:1"], "two numbers"),
-        (["--plant", "model.json", "--limits", "pressure=3:0"], "low, then high"),
-        (["--plant", "model.json", "--limits", "voltage=0:3"], "no such input"),
-        (["--plant", "inverse.json"], "not its inverse"),
+        ([], "--plant"),
+        (["--plant", "model.json", "--rig", "mas20-hanging"], "--rig"),
+        (["--rig", "mas20-hanging", "--limits", "pressure=0:3"], "limits"),
+        (["--plant", "model.json", "--limits", "pressure=0:3:1"], "pressure"),
+        (["--plant", "model.json", "--limits", "pressure=3:0"], "pressure"),
+        (["--plant", "model.json", "--limits", "voltage=0:3"], "voltage"),
+        (["--plant", "inverse.json"], "pressure"),
         (["--plant", "absent.json"], "absent.json"),
-        (["--plant", "discrete.json"], "steps of 0.01 s"),
+        (["--plant", "discrete.json"], "0.01 s"),
         (["--plant", "model.json", "--seed", "-1"], "seed"),
+        (
+            ["--rig", "mas20-hanging", "--controller", "observer", "--controller-out", "c.json"],
+            "observer",
+        ),
     ],
 )
-def test_bad_plants_are_one_sentence(
-    cli: Cli, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, options: list[str], words: str
+def test_bad_plants_are_refused(
+    cli: Cli, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, options: list[str], named: str
 ) -> None:
     monkeypatch.chdir(tmp_path)
     MODEL.save("model.json")
@@ -376,8 +348,7 @@ def test_bad_plants_are_one_sentence(
     write(wave(100), tmp_path / "wished.csv")
     result = cli("track", "inverse.json", "--reference", "wished.csv", *options)
     assert result.code == 2
-    assert words in " ".join(result.err.split())
-    assert "Traceback" not in result.err
+    assert named in " ".join(result.err.split())
 
 
 def test_an_unpaired_plant_is_followed_by_the_least_commands_along_straight_lines() -> None:
@@ -400,11 +371,6 @@ def test_an_unpaired_plant_is_followed_by_the_least_commands_along_straight_line
     assert lines.slopes @ lines.step(np.array([2.4]), given, given) == pytest.approx(2.4, rel=1e-3)
 
 
-def test_rigs_stand_beside_no_compensation_too() -> None:
-    found = before(MODEL.inverse(), load_rig("rail").changed({}), wave(100), approach=0.5)
-    assert found.tracked is not None
-
-
 def test_what_is_out_of_reach_is_counted_and_told_apart(cli: Cli, tmp_path: Path) -> None:
     """On the model itself all error is there, though the plant takes all pressures of the model."""
     wanted = wave(500)
@@ -420,25 +386,7 @@ def test_what_is_out_of_reach_is_counted_and_told_apart(cli: Cli, tmp_path: Path
     MODEL.inverse().save(tmp_path / "inverse.json")
     MODEL.save(tmp_path / "model.json")
     write(wanted, tmp_path / "wished.csv")
-    asked = (
-        "inverse.json",
-        "--plant",
-        "model.json",
-        "--reference",
-        "wished.csv",
-        "--approach",
-        "1",
-    )
-    given = [tmp_path / one if one.endswith((".json", ".csv")) else one for one in asked]
-    assert f"{beyond.samples} samples of the reference" in cli("track", *given).out
-    told = json.loads(cli("track", *given, "--json").out)["out_of_reach"]["displacement"]
-    assert told["samples"] == beyond.samples
-
-
-def test_an_input_of_any_name_drives_a_twin_that_has_no_other() -> None:
-    model = replace(MODEL, input=Channel("force", "N"))
-    twin = Twin(model, limits={"force": (0.0, 3.0)})
-    assert twin.driving == {"force"}
-    wished = LOW + (HIGH - LOW) * np.linspace(0.1, 0.3, 50)
-    followed = track(model.inverse(), twin, Recording({"displacement": wished}, STEP))
-    assert np.ptp(followed.recording["command_force"]) > 0
+    given = ["--reference", tmp_path / "wished.csv", "--approach", 1, "--json"]
+    result = cli("track", tmp_path / "inverse.json", "--plant", tmp_path / "model.json", *given)
+    printed = json.loads(result.out)["out_of_reach"]["displacement"]
+    assert printed["samples"] == beyond.samples

@@ -16,108 +16,90 @@ from mckibben.rigs import describe, load_rig, rig_from_data_sheet, rig_names, sa
 from mckibben.rigs.data_sheet import _loop_width
 from mckibben.system.ordinary import DESCRIPTION
 
+GOOD = describe(load_rig("mas20-hanging"))
+
 
 @pytest.mark.parametrize("name", rig_names())
-def test_a_saved_rig_is_equal(name: str, tmp_path: Path) -> None:
+def test_a_saved_rig_is_equal_and_every_parameter_has_its_meaning(
+    name: str, tmp_path: Path
+) -> None:
     rig = load_rig(name)
     assert rig.name == name
     save_rig(rig, tmp_path / "copy.toml")
     assert load_rig(tmp_path / "copy.toml") == rig
-
-
-@pytest.mark.parametrize("name", rig_names())
-def test_a_description_names_every_parameter_with_its_meaning(name: str) -> None:
-    text = describe(load_rig(name))
-    written = tomllib.loads(text)
-    assert set(load_rig(name).model_dump()) <= set(written)
+    text = describe(rig)
+    assert set(rig.model_dump()) <= set(tomllib.loads(text))
     for line in text.splitlines():
         plain = not line or line.startswith(("[", "setup", "format", "name", "title", "source"))
         assert plain or "#" in line, line
 
 
-def test_an_unknown_rig_lists_the_known_ones() -> None:
-    with pytest.raises(DataError, match=r"no rig 'mas30'.*mas20-hanging.*\.toml"):
-        load_rig("mas30")
-
-
-WRONG: dict[str, list[tuple[object, str]]] = {
-    "muscle.braid_angle": [(90.0, "at most 80"), (5.0, "at least 10"), (60.0, "below 54.7")],
-    "muscle.length": [(0.0, "at least 10"), (-200.0, "at least 10"), ("long", "length at rest")],
-    "muscle.c10": [(-1.0, "at least 0"), (float("nan"), "Mooney"), (float("inf"), "Mooney")],
-    "muscle.wall": [(15.0, "fills the diameter"), (0.0, "above 0")],
-    "muscle.friction.stiffness": [((-1.0,) * 6, "presliding"), ((1.0,), "one number an element")],
-    "muscle.friction.contracting": [((float("nan"),) * 6, "resists contraction")],
-    "muscle.creep.time": [((0.0, 1.0), "fades")],
-    "air.valve_time": [(0.0, "at least 0.001")],
-    "air.polytropic": [(2.0, "at most 1.4")],
-    "payload": [(-1.0, "at least 0"), ("heavy", "mass hanging")],
-    "sample_time": [(0.0, "above 0"), (None, "time between two samples")],
-    "integration_step": [(0.1, "at most 0.005")],
-    "start.pressure": [(7.0, "not within its range 0 to 6"), (float("nan"), "start")],
-    "start.voltage": [(1.0, "'voltage' is no input")],
-    "range.pressure.low": [(6.0, "high 6 is not above low 6")],
-    "sensor": [({}, "there is none"), ({"smell": {}}, "'smell' cannot be measured")],
-    "range": [({}, "none for the input 'pressure'"), ({"pressure": {}}, "highest")],
-    "version": [(0, "at least 1"), (1.5, "integer")],
-    "name": [("Mas 20", "short name"), ("", "short name")],
+WRONG: dict[str, tuple[object, ...]] = {
+    "muscle.braid_angle": (90.0, 5.0, 60.0),
+    "muscle.length": (0.0, -200.0, "long"),
+    "muscle.c10": (-1.0, float("nan"), float("inf")),
+    "muscle.wall": (15.0, 0.0),
+    "muscle.friction.stiffness": ((-1.0,) * 6, (1.0,)),
+    "muscle.friction.contracting": ((float("nan"),) * 6,),
+    "muscle.creep.time": ((0.0, 1.0),),
+    "air.valve_time": (0.0,),
+    "air.polytropic": (2.0,),
+    "payload": (-1.0, "heavy"),
+    "sample_time": (0.0, None),
+    "integration_step": (0.1,),
+    "start.pressure": (7.0, float("nan")),
+    "start.voltage": (1.0,),
+    "range.pressure.low": (6.0,),
+    "sensor": ({}, {"smell": {}}),
+    "range": ({}, {"pressure": {}}),
+    "version": (0, 1.5),
+    "name": ("Mas 20", ""),
+    # of which there are none
+    "mass": (1.0,),
+    "muscle.colour": (1.0,),
+    "muscle.length.unit": (1.0,),
+    "a.b.c": (1.0,),
 }
 
 
-@pytest.mark.parametrize(
-    ("path", "value", "match"),
-    [(path, value, match) for path, cases in WRONG.items() for value, match in cases],
-)
-def test_impossible_parameters_are_refused_by_name(path: str, value: object, match: str) -> None:
-    with pytest.raises(DataError) as refused:
-        load_rig("mas20-hanging").changed({path: value})
-    text = str(refused.value)
-    assert match in text
-    assert "Remedy:" in text
-
-
-@pytest.mark.parametrize("path", ["mass", "muscle.colour", "muscle.length.unit", "a.b.c"])
-def test_unknown_parameters_are_refused(path: str) -> None:
-    with pytest.raises(DataError, match=r"has no parameter .*mckibben rig show mas20-hanging"):
-        load_rig("mas20-hanging").changed({path: 1.0})
-
-
-GOOD = describe(load_rig("mas20-hanging"))
+@pytest.mark.parametrize("path", WRONG)
+def test_impossible_and_unknown_parameters_are_refused_by_name(path: str) -> None:
+    for value in WRONG[path]:
+        with pytest.raises(DataError, match=path.split(".")[0]):
+            load_rig("mas20-hanging").changed({path: value})
 
 
 @pytest.mark.parametrize(
-    ("text", "match"),
+    ("text", "named"),
     [
-        ("", "does not begin with format"),
-        ("time,pressure\n0,1\n", "not TOML"),
-        (GOOD[: len(GOOD) // 2], "missing|not TOML"),
-        (GOOD.replace("format_version = 1", "format_version = 9"), "format_version is 9"),
-        (GOOD.replace('setup = "moving-end"', 'setup = "rocket"'), "setup is 'rocket'.*moving-end"),
-        (GOOD.replace("wall =", "wal ="), "'muscle.wal'|'muscle.wall' is missing"),
-        (GOOD + "\n[engine]\npower = 3\n", "no parameter 'engine'"),
+        (b"", "format"),
+        (b"time,pressure\n0,1\n", "TOML"),
+        (b"a = " + b"[" * 5000, "TOML"),
+        (b"\xff\xfe\x00" * 50, "text"),
+        (b"#" * (DESCRIPTION + 1), "bytes"),
+        (GOOD[: len(GOOD) // 2], "missing|TOML"),
+        (GOOD.replace("format_version = 1", "format_version = 9"), "9"),
+        (GOOD.replace('setup = "moving-end"', 'setup = "rocket"'), "rocket"),
+        (GOOD.replace("wall =", "wal ="), "'muscle.wal'|'muscle.wall'"),
+        (GOOD + "\n[engine]\npower = 3\n", "engine"),
         (GOOD.replace("length = 200.0", "length = nan"), "muscle.length"),
-        (GOOD.replace("length = 200.0", 'length = "200 mm"'), "muscle.length.*length at rest"),
+        (GOOD.replace("length = 200.0", 'length = "200 mm"'), "muscle.length"),
     ],
 )
-def test_a_wrong_file_is_refused_by_name(text: str, match: str, tmp_path: Path) -> None:
+def test_a_wrong_file_is_refused_by_name(text: str | bytes, named: str, tmp_path: Path) -> None:
     file = tmp_path / "rig.toml"
-    file.write_text(text, encoding="utf-8")
-    with pytest.raises(DataError, match=match) as refused:
+    file.write_bytes(text if isinstance(text, bytes) else text.encode())
+    with pytest.raises(DataError, match=named) as refused:
         load_rig(file)
     assert str(file) in str(refused.value)
 
 
-def test_binary_huge_and_missing_files_are_refused(tmp_path: Path) -> None:
-    (tmp_path / "binary.toml").write_bytes(b"\xff\xfe\x00" * 50)
-    with pytest.raises(DataError, match="not text"):
-        load_rig(tmp_path / "binary.toml")
-    (tmp_path / "huge.toml").write_bytes(b"#" * (DESCRIPTION + 1))
-    with pytest.raises(DataError, match="bytes are more than"):
-        load_rig(tmp_path / "huge.toml")
-    with pytest.raises(DataError, match="no such file"):
-        load_rig(tmp_path / "missing.toml")
-    (tmp_path / "deep.toml").write_text("a = " + "[" * 5000, encoding="utf-8")
-    with pytest.raises(DataError, match="not TOML"):
-        load_rig(tmp_path / "deep.toml")
+def test_names_of_no_rig_are_refused(tmp_path: Path) -> None:
+    for wrong in ("mas30", tmp_path / "missing.toml"):
+        with pytest.raises(DataError, match=str(wrong)):
+            load_rig(wrong)
+    with pytest.raises(DataError, match=r"\.toml"):
+        save_rig(load_rig("rail"), tmp_path / "rail.json")
 
 
 @settings(max_examples=80, deadline=None)
@@ -129,11 +111,6 @@ def test_damaged_files_never_do_worse_than_a_refusal(junk: bytes, place: int) ->
         file.write_bytes(whole[:place] + junk + whole[place + len(junk) :])
         with suppress(DataError):
             load_rig(file)
-
-
-def test_a_rig_file_must_be_named_toml_and_is_not_lost(tmp_path: Path) -> None:
-    with pytest.raises(DataError, match=r"ends in \.toml"):
-        save_rig(load_rig("rail"), tmp_path / "rail.json")
 
 
 def test_a_data_sheet_makes_a_rig_with_its_numbers() -> None:
@@ -154,16 +131,16 @@ def test_a_data_sheet_makes_a_rig_with_its_numbers() -> None:
 
 
 @pytest.mark.parametrize(
-    ("change", "match"),
+    "change",
     [
-        ({"diameter": -1.0}, "diameter is -1"),
-        ({"max_force": 20.0}, "braid angle of .* degrees.*pull some"),
-        ({"max_contraction": 0.5}, "more than the braid allows.*below 0."),
-        ({"loop_width": 0.9}, "from 0.05 to 0.5"),
-        ({"length": float("nan")}, "length is nan"),
+        {"diameter": -1.0},
+        {"max_force": 20.0},
+        {"max_contraction": 0.5},
+        {"loop_width": 0.9},
+        {"length": float("nan")},
     ],
 )
-def test_numbers_that_no_muscle_has_are_refused(change: dict[str, float], match: str) -> None:
+def test_numbers_that_no_muscle_has_are_refused(change: dict[str, float]) -> None:
     sheet = {
         "diameter": 20.0,
         "length": 200.0,
@@ -171,5 +148,5 @@ def test_numbers_that_no_muscle_has_are_refused(change: dict[str, float], match:
         "max_force": 1500.0,
         "max_contraction": 0.25,
     }
-    with pytest.raises(DataError, match=match):
+    with pytest.raises(DataError):
         rig_from_data_sheet(name="mine", **(sheet | change))

@@ -10,12 +10,10 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from mckibben.recording import Recording
-from mckibben.rigs import Rig, load_rig, rig_names
-from mckibben.rigs.physics.motion import march
+from mckibben.rigs import load_rig, rig_names
 from mckibben.rigs.rig import quantity
 from mckibben.rigs.setups.moving_end import MovingEnd
 from mckibben.signals import irregular_triangle, sine, triangle
-from tests.rigs.energy import bladder_energy
 
 ATMOSPHERE = 1.013
 
@@ -171,7 +169,7 @@ def works(run: Recording, first: int) -> tuple[float, float]:
     return float(0.1 * mean @ np.diff(volume)), float(force @ moved)
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(2))
 def test_closed_cycles_of_pressure_and_load_make_no_energy(seed: int) -> None:
     rig = load_rig("rail").changed(
         {"return_force": 0.0, "guide_friction": 0.0, "start.force": 20.0, "moved_mass": 0.05}
@@ -212,40 +210,6 @@ def test_without_losses_a_cycle_costs_nothing() -> None:
     run = rig.run(Recording({"voltage": volt, "force": pull}, step), ideal=True)
     given, done = works(run, round(period / step))
     assert given - done == pytest.approx(0.0, abs=2e-3 * np.ptp(run["displacement"]) * 100)
-
-
-def test_what_is_lost_is_what_was_dissipated() -> None:
-    rig = load_rig("rail").changed({"guide_friction": 0.0})
-    system, step, n = rig._built(), 5e-4, 40_000
-    time = np.arange(n) * step
-    states, motion = rig._at_rest().copy()
-    before = float(states["dissipated"][0])
-    stored_before = stored(rig, states, motion)
-    commands = 0.6 * sine(time, 5.0, 9.0, 0.1)[:, None]
-    rows = np.empty((n, 6))
-    loads = np.zeros((n, 1))
-    march(*system, states, motion, commands, loads, np.zeros(n), False, 1, step, rows)
-    mean = 0.5 * (rows[1:, 2] + rows[:-1, 2])
-    given = 0.1 * float(mean @ np.diff(rows[:, 4]))
-    lost = float(states["dissipated"][0]) - before
-    gain = stored(rig, states, motion) - stored_before
-    # What the bladder's contact stores belongs to the air: over whole cycles it is nothing.
-    assert given == pytest.approx(lost + gain, rel=0.01)
-
-
-def stored(rig: Rig, states: np.ndarray, motion: np.ndarray) -> float:
-    """Return the energy in bladder, friction, creep, motion and what hangs [N mm]."""
-    muscle, state = rig._built().muscles[0], states[0]
-    rubber = bladder_energy(
-        muscle["c10"], muscle["c01"], muscle["cos2"], muscle["sin2"], muscle["length"], state["x"]
-    )
-    n, m = int(muscle["n_elements"]), int(muscle["n_branches"])
-    drawn = 0.5 * float(np.sum(state["friction"][:n] ** 2 / muscle["friction"][:n]))
-    crept = 0.5 * float(np.sum(state["creep"][:m] ** 2 / muscle["creep"][:m]))
-    mass = float(rig._built().mechanism["mass"][0, 0])
-    moving = 0.5 * mass * float(motion["speed"][0, 0]) ** 2
-    lifted = float(rig._built().mechanism["weight"][0, 0] * motion["place"][0, 0])
-    return float(rubber) + drawn + crept + moving + lifted
 
 
 @pytest.mark.parametrize("pressure", [1.0, 3.0, 6.0])

@@ -57,9 +57,6 @@ LONG = tuple(
         "estimators/test_loads.py",
         "papers",
         "studying/test_log.py",
-        "system/test_compiling.py",
-        "system/test_progress.py",
-        "system/test_workers.py",
         "validation/test_check.py",
         "validation/test_regression.py",
     )

@@ -102,6 +102,16 @@ def test_integral_does_not_wind_up() -> None:
     assert out[0] < 5.0
 
 
+def test_the_same_seed_gives_the_same_loop() -> None:
+    pid = feedback(0.05, 0.2)
+    first, again, other = (
+        track(pid, Simple(), reference(1), noise=0.1, seed=seed).recording["displacement"]
+        for seed in (3, 3, 4)
+    )
+    np.testing.assert_array_equal(first, again)
+    assert not np.array_equal(first, other)
+
+
 def test_the_arm_follows_with_feedback() -> None:
     rig = load_rig("soft-arm")
     t = np.arange(400) * 0.05

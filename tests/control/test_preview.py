@@ -97,6 +97,7 @@ def test_an_observer_and_an_estimated_load_pass_the_preview_on() -> None:
     assert error(observer) < 0.3 * error(observer, 0.0)
     channel = Channel("displacement", "mm")
     assert BlockController(feedback()).preview == 0.0
+    assert error(feedback(), 0.2) == error(feedback())
     estimated = EstimatedLoad(
         BlockController(KNOWN.inverse()), Affine(0.0, 0.0, channel, Channel("force", "N"))
     )

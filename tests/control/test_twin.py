@@ -269,7 +269,7 @@ def test_feedback_is_the_same_where_everything_counts_the_other_way() -> None:
         assert np.array_equal(here.step(row), there.step(-row))
 
 
-@pytest.mark.parametrize(("given", "moved"), [("voltage", "angle"), ("input", "output")])
+@pytest.mark.parametrize(("given", "moved"), [("voltage", "angle"), ("force", "output")])
 def test_loops_are_closed_whatever_the_channels_are_called(given: str, moved: str) -> None:
     model = replace(MODEL, input=Channel(given, "V"), output=Channel(moved, "rad"))
     twin = Twin(model, limits={given: (0.0, 8.0)})

@@ -14,8 +14,7 @@ import numba
 import numpy as np
 import pytest
 
-from mckibben.blocks.play_type.pi import PI, pi_kernel
-from mckibben.system.compiling import Deferred, deferred, resolved
+from mckibben.system.compiling import deferred, resolved
 
 HEAVY = {"sklearn", "numba", "scipy.optimize", "pandas", "joblib", "pint", "plotly"}
 """Half a second to several, each."""
@@ -62,24 +61,24 @@ def double(x: float) -> float:
     return 2.0 * x
 
 
-@pytest.mark.parametrize(
-    "first",
-    [
-        "import mckibben; mckibben.GPIEstimator",
-        "from mckibben import registry\n"
-        "for group, names in registry.PLUGINS.items():\n"
-        "    for name in names: registry.load(group, name)",
-        "from mckibben import PI, GPIEstimator\n"
-        "assert repr(GPIEstimator()) and PI((0.0,), (1.0,), 0.0, (0.0, 5.0)).inverse()",
-    ],
-    ids=["estimator", "every plug-in", "made"],
-)
-def test_importing_loads_nothing_heavy(first: str, tmp_path: Path) -> None:
-    tell = f"import sys; print(*sorted({HEAVY} & set(sys.modules)))"
-    assert printed(f"{first}\n{tell}", tmp_path) == [""]
-    assert "scipy.optimize" in printed(f"{first}\nimport scipy.optimize\n{tell}", tmp_path)[0]
+def test_importing_loads_nothing_heavy(tmp_path: Path) -> None:
+    code = f"""
+import sys
+def told(): print(*sorted({HEAVY} & set(sys.modules)))
+from mckibben import PI, GPIEstimator, registry
+for group, names in registry.PLUGINS.items():
+    for name in names: registry.load(group, name)
+assert repr(GPIEstimator()) and PI((0.0,), (1.0,), 0.0, (0.0, 5.0)).inverse()
+told()
+import scipy.optimize
+told()
+"""
+    before, after = printed(code, tmp_path)
+    assert before == ""
+    assert "scipy.optimize" in after
 
 
+@pytest.mark.long
 def test_kernels_that_call_kernels_are_found_compiled_by_the_next_process(tmp_path: Path) -> None:
     (tmp_path / "written.py").write_text(WRITTEN)
     here = str(tmp_path / "cache")
@@ -125,31 +124,35 @@ print(given, sum(result.dispatcher.stats.cache_hits.values()))
 """
 
 
-@pytest.mark.parametrize(
-    ("was", "becomes", "expected"),
-    [
-        ("3.0 * x", "4.0 * x", "8.0 0"),
-        ("SIZE, UNREAD = 2.0, 1.0", "SIZE, UNREAD = 5.0, 1.0", "15.0 0"),
-        ("[1.0]", "[2.0]", "12.0 0"),
-        ("@deferred", "@__import__('functools').partial(deferred, fastmath=True)", "6.0 0"),
-        ("UNREAD = 2.0, 1.0", "UNREAD = 2.0, 3.0", "6.0 1"),
-    ],
-    ids=["code", "number", "table", "options", "what nothing reads"],
-)
-def test_a_kernel_kept_notices_what_changes_in_the_files_that_it_calls(
-    was: str, becomes: str, expected: str, tmp_path: Path
-) -> None:
-    texts = {"called": CALLED, "between": BETWEEN, "calling": CALLING}
-    for name, text in texts.items():
-        (tmp_path / f"{name}.py").write_text(text)
+CHANGES = {
+    "code": ("3.0 * x", "4.0 * x", "8.0 0"),
+    "number": ("SIZE, UNREAD = 2.0", "SIZE, UNREAD = 5.0", "20.0 0"),
+    "table": ("[1.0]", "[2.0]", "40.0 0"),
+    "options": (
+        "@deferred",
+        "@__import__('functools').partial(deferred, fastmath=True)",
+        "40.0 0",
+    ),
+    "what nothing reads": ("= 5.0, 1.0", "= 5.0, 3.0", "40.0 1"),
+}
+
+
+@pytest.mark.long
+def test_a_kernel_kept_notices_what_changes_in_the_files_that_it_calls(tmp_path: Path) -> None:
+    text = CALLED
+    for name, content in {"called": CALLED, "between": BETWEEN, "calling": CALLING}.items():
+        (tmp_path / f"{name}.py").write_text(content)
     own = {"NUMBA_CACHE_DIR": str(tmp_path / "cache"), "PYTHONDONTWRITEBYTECODE": "1"}
     assert printed(ASK, tmp_path, **own) == ["6.0 0"]
     assert printed(ASK, tmp_path, **own) == ["6.0 1"]
-    assert was in CALLED
-    (tmp_path / "called.py").write_text(CALLED.replace(was, becomes))
-    assert printed(ASK, tmp_path, **own) == [expected]
+    for what, (was, becomes, expected) in CHANGES.items():
+        assert was in text
+        text = text.replace(was, becomes)
+        (tmp_path / "called.py").write_text(text)
+        assert printed(ASK, tmp_path, **own) == [expected], what
 
 
+@pytest.mark.long
 def test_kernels_run_uncompiled(tmp_path: Path) -> None:
     (tmp_path / "written.py").write_text(WRITTEN)
     assert printed(RUN, tmp_path, NUMBA_DISABLE_JIT="1") == ["None", "None"]
@@ -172,13 +175,6 @@ def test_threads_that_ask_at_once_share_one_function() -> None:
     with ThreadPoolExecutor(8) as pool:
         found = [pool.submit(ask) for _ in range(8)]
     assert len({id(one.result()) for one in found}) == 1
-
-
-def test_nothing_stands_between_a_stream_and_the_compiled_kernel() -> None:
-    assert isinstance(pi_kernel, Deferred)
-    assert PI.kernel is pi_kernel
-    assert resolved(PI.inverse_kernel) is resolved(resolved(PI.inverse_kernel))
-    assert not isinstance(resolved(pi_kernel), Deferred)
 
 
 def test_kernels_travel_to_other_processes() -> None:

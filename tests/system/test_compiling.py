@@ -19,30 +19,6 @@ from mckibben.system.compiling import deferred, resolved
 HEAVY = {"sklearn", "numba", "scipy.optimize", "pandas", "joblib", "pint", "plotly"}
 """Half a second to several, each."""
 
-WRITTEN = """
-from mckibben.system.compiling import deferred
-
-@deferred
-def half(x):
-    return 0.5 * x
-
-@deferred
-def quarter(x):
-    return half(half(x))
-
-@deferred
-def unused(x):
-    return x
-"""
-
-RUN = """
-import written
-assert written.quarter(8.0) == 2.0
-stats = getattr(written.quarter.dispatcher, "stats", None)
-print(stats and (sum(stats.cache_hits.values()), sum(stats.cache_misses.values())))
-print(written.unused._dispatcher)
-"""
-
 
 def printed(code: str, folder: Path, **environment: str) -> list[str]:
     """Return the lines that a fresh process prints."""
@@ -76,14 +52,6 @@ told()
     before, after = printed(code, tmp_path)
     assert before == ""
     assert "scipy.optimize" in after
-
-
-@pytest.mark.long
-def test_kernels_that_call_kernels_are_found_compiled_by_the_next_process(tmp_path: Path) -> None:
-    (tmp_path / "written.py").write_text(WRITTEN)
-    here = str(tmp_path / "cache")
-    assert printed(RUN, tmp_path, NUMBA_CACHE_DIR=here) == ["(0, 1)", "None"]
-    assert printed(RUN, tmp_path, NUMBA_CACHE_DIR=here) == ["(1, 0)", "None"]
 
 
 CALLED = """
@@ -154,8 +122,6 @@ def test_a_kernel_kept_notices_what_changes_in_the_files_that_it_calls(tmp_path:
 
 @pytest.mark.long
 def test_kernels_run_uncompiled(tmp_path: Path) -> None:
-    (tmp_path / "written.py").write_text(WRITTEN)
-    assert printed(RUN, tmp_path, NUMBA_DISABLE_JIT="1") == ["None", "None"]
     code = (
         "from mckibben.registry import load\n"
         "for kind in ('gpi', 'duhem'):\n"

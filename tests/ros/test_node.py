@@ -86,50 +86,47 @@ def test_pressures_are_those_of_the_stream_within_limits(low: float, high: float
 
 
 def test_a_late_reference_is_held_and_silence_is_safe() -> None:
-    """Up to the time-out the last reference stands; then it is safe, and memory stands."""
+    """Up to the time-out the last good reference stands; then it is safe, and memory stands."""
     lines = Lines()
-    one = node(lines, safe=0.5, timeout=0.105)
-    said: dict[int, tuple[float, ...]]
-    said = {k: (wave(k),) for k in [*range(1, 60), *range(100, 150)]}
-    given = run(one, lines, said, 150)
+    one = node(lines, reference=Topic("r", KINDS["Float64MultiArray"]), safe=0.5, timeout=0.105)
+    bad = [(np.nan,), (np.inf,), (), (1.0, 2.0)]
+    sent: dict[int, tuple[float, ...]] = {k: (wave(k),) for k in [*range(1, 60), *range(100, 150)]}
+    given = run(one, lines, sent | {k: bad[k % 4] for k in range(60, 80)}, 150)
     stream = INVERSE.stream(PERIOD)
     held = [stream.step(wave(min(k, 59))).tolist() for k in range(1, 70)]
     assert given[0] == [0.5]
     assert given[1:70] == held
     assert given[70:100] == [[0.5]] * 30
     assert given[100:] == [stream.step(wave(k)).tolist() for k in range(100, 150)]
-    assert one.silences == 1
+    assert (one.silences, one.refused) == (1, 20)
 
 
-def test_the_end_is_safe_whatever_ends_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """And all is closed, where nothing more can be recorded too."""
+def test_a_run_is_recorded_and_its_end_is_safe_whatever_ends_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     lines = Lines()
-    one = node(lines, safe=0.25, record=tmp_path / "run.mcap")
+    topics = {"pressure": Topic("p", KINDS["FluidPressure"]), "measured": Topic("displacement")}
+    one = node(lines, safe=0.25, record=tmp_path / "run.mcap", **topics)
+    given = []
 
     def full(*_: object) -> None:
         raise OSError(28, "no space left")
 
     def turns() -> Any:
-        lines.say("r", wave(0))
-        yield 0
-        assert lines.lines["p"].sent[-1].data > 0.25
-        monkeypatch.setattr("mckibben.ros.recording.Recorder.write", full)
-        yield 1
+        for k in range(100):
+            lines.say("r", wave(k))
+            lines.say("displacement", wave(k) + 0.5)
+            given.append(one.step(PERIOD * k, DAY + round(1e9 * PERIOD) * k)[0])
+        with monkeypatch.context() as patch:
+            patch.setattr("mckibben.ros.recording.Recorder.write", full)
+            yield 0
 
     with pytest.raises(OSError, match="no space left"):
-        one.run(turns(), lambda: 0.0, lambda: DAY)
-    assert lines.lines["p"].sent[-1].data == 0.25
-
-
-def test_numbers_that_are_none_are_not_applied() -> None:
-    lines = Lines()
-    one = node(lines, reference=Topic("r", KINDS["Float64MultiArray"]), timeout=0.05)
-    bad = [(np.nan,), (np.inf,), (), (1.0, 2.0)]
-    said = {0: (wave(0),)} | {k + 1: each for k, each in enumerate(bad * 5)}
-    given = run(one, lines, said, 21)
-    assert one.refused == 20
-    assert given[5] == given[0]  # held
-    assert given[7:] == [[0.0]] * 14  # and refused messages do not keep the watchdog quiet
+        one.run(turns(), lambda: 1.0, lambda: DAY + 10**9)
+    assert lines.lines["p"].sent[-1].fluid_pressure == 0.25e5
+    (found,) = read(tmp_path / "run.mcap", units={"displacement": "mm"})
+    np.testing.assert_allclose(found["pressure"][:100], given, rtol=1e-12)
+    np.testing.assert_array_equal(found["displacement"], [wave(k) + 0.5 for k in range(100)])
 
 
 def test_what_else_is_asked_for_comes_from_its_topic() -> None:
@@ -177,25 +174,6 @@ def test_what_cannot_run_is_refused(options: dict[str, Any], tmp_path: Path) -> 
     with pytest.raises((DataError, ModelError)):
         node(Lines(), record=tmp_path / "run.mcap", **options)
     assert not (tmp_path / "run.mcap").exists()
-
-
-def test_a_run_is_recorded(tmp_path: Path) -> None:
-    lines = Lines()
-    one = node(
-        lines,
-        pressure=Topic("p", KINDS["FluidPressure"]),
-        measured=Topic("displacement"),
-        record=tmp_path / "run.mcap",
-    )
-    given = []
-    for k in range(100):
-        lines.say("r", wave(k))
-        lines.say("displacement", wave(k) + 0.5)
-        given += one.step(PERIOD * k, DAY + round(1e9 * PERIOD) * k)
-    one.close()
-    (found,) = read(tmp_path / "run.mcap", units={"displacement": "mm"})
-    np.testing.assert_allclose(found["pressure"], given, rtol=1e-12)
-    np.testing.assert_array_equal(found["displacement"], [wave(k) + 0.5 for k in range(100)])
 
 
 def test_what_has_been_learnt_outlives_silence_and_is_gone_on_from() -> None:

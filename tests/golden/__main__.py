@@ -75,8 +75,10 @@ def run(cases: list[Case], processes: int) -> Iterator[tuple[Case, Answer]]:
         for case in cases:
             yield case, answer(case)
         return
+    from tests.golden.__main__ import answer_by_name as by_name  # not that of "__main__"
+
     with ProcessPoolExecutor(processes, mp_context=get_context("spawn")) as pool:
-        asked = {pool.submit(answer_by_name, case.name): case for case in cases}
+        asked = {pool.submit(by_name, case.name): case for case in cases}
         for ready in as_completed(asked):
             yield asked[ready], ready.result()
 
@@ -123,7 +125,8 @@ def main() -> int:
         return update([all_cases()[options.update]], options.because)
     cases = chosen(options.patterns, options.slow)
     if options.new:
-        return update([case for case in cases if load(case.name) is None], options.because)
+        new = [case for case in cases if load(case.name) is None]
+        return update(new, options.because, options.processes)
     here, began = machine(), time.perf_counter()
     skipped = [c for c in cases if any(not (SHARED / need).is_dir() for need in c.needs)]
     counts: dict[str, int] = {"skipped": len(skipped)}
@@ -152,12 +155,12 @@ def main() -> int:
     return int(failed > 0)
 
 
-def update(cases: list[Case], because: str) -> int:
+def update(cases: list[Case], because: str, processes: int = 1) -> int:
     """Store what cases answer now, with a reason; a right value is not overwritten by a wrong one."""
     if not because:
         sys.exit('say why: --because "..."')
     refused = 0
-    for case, given in run(cases, 2 if len(cases) > 1 else 1):
+    for case, given in run(cases, processes):
         before = load(case.name)
         if before and before.expected_to_fail and verdict(case, given, machine())[0] != "mended":
             print(f"{case.name}: its right value is stored, and this is another: edit it by hand")

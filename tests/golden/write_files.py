@@ -135,6 +135,9 @@ def times() -> None:
     }
     for name, form in forms.items():
         written(f"{name}.csv", text("timestamp," + rest, (stamps(form, start), *two)))
+    start = start.replace(month=4, day=3)  # the day is known by the dots alone
+    german = stamps(forms["dates-german"], start)
+    written("dates-dots.csv", text("timestamp," + rest, (german, *two)))
     days = [f"{1 + k % 9:02d}/{2 + k // 9:02d}/2026" for k in range(N)]
     written("dates-ambiguous.csv", text("date," + rest, (days, *two)))
     clock = stamps(lambda at: f"{at:%H:%M:%S.%f}"[:-3], datetime(2026, 1, 1, 9, 30, tzinfo=UTC))

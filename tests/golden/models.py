@@ -1,0 +1,237 @@
+"""Models that golden cases run, and the inputs that they run over.
+
+Models are made by public names only: registered kinds and printed models by name, compositions by the
+package's own classes. Inputs are written here, so that they stay when a block's own limits change.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mckibben import GPI, PI, Block, Channel, ModelError, ModelWarning, Parallel, PerChannel, Series
+from mckibben.registry import load, names
+
+Array = NDArray[np.float64]
+
+SAMPLE_TIME = 0.01
+N_SAMPLES = 180
+
+RANGES: dict[str, tuple[tuple[float, float], ...]] = {
+    "air": ((0.0, 10.0),),
+    "braid-equilibrium": ((0.0, 8.0),),
+    "chou-hannaford": ((3.0, 5.5), (0.0, 5.0)),
+    "force-feedforward": ((-5.0, 100.0), (0.0, 2.0)),
+    "inverse": ((4.5, 29.5),),
+    "load-estimate": ((0.0, 8.0), (0.0, 8.0), (0.0, 4.0), (0.0, 4.0), (0.0, 3.0)),
+    "polynomial": ((-1.0, 9.0),),
+    "predictive": ((4.5, 29.5),),
+    "recurrent-fuzzy-network": ((0.0, 45.0), (0.0, 150.0)),
+    "tondu-lopez": ((3.8, 5.0), (0.0, 5.0)),
+    "adaptive": ((4.5, 29.5), (0.0, 0.0)),
+    "adaptive-series": ((6.5, 25.5), (0.0, 0.0)),
+    "feedforward-feedback": (
+        (0.0, 8.0),
+        (0.0, 8.0),
+        (0.0, 0.0),
+        (0.0, 0.0),
+        (0.0, 3.0),
+        (0.0, 9.0),
+    ),
+    "published activation-pressure-profile": ((0.0, 0.25), (0.0, 200.0)),
+    "published field-models-p2uz": ((1.0, 5.5),),
+    "published field-models-pi": ((1.0, 5.5),),
+    "published mpi-narmax-mpi": ((0.0, 10.0),),
+    "published multistate-static-force": ((165.0, 200.0), (0.0, 5.0)),
+    "published multistate-friction": ((165.0, 200.0), (0.0, 5.0)),
+    "published sdchm-coupling": ((0.0, 40.0),) * 3,
+    "air and muscle": ((0.0, 10.0),),
+    "MPI-NARMAX": ((0.0, 5.0), (0.0, 150.0)),
+    "adaptive gpi": ((-7.0, 10.0), (0.0, 0.0)),
+    "predictive, all limits": ((-7.0, 10.0),),
+    "predictive balance": ((0.0, 6.0), (0.0, 6.0), (0.0, 3.0), (0.0, 9.0)),
+    "adaptive balance": ((0.0, 6.0), (0.0, 6.0), (0.0, 3.0), (0.0, 9.0), (0.0, 0.0), (0.0, 0.0)),
+}
+"""Lowest and highest value of every input; 0 to 5 where nothing is said."""
+
+SLOW = {"published mpi-narmax-mpi": 20}
+"""Times as slow as others, since its output grows with the ninth power of the input's rate."""
+
+MEASURED = "_measured"
+"""Inputs named so are what a plant answers, 5 % more than was asked for a sample ago."""
+
+
+def example(kind: str, **changes: Any) -> Any:
+    """Return the example of a registered kind, with other fields."""
+    return replace(load("blocks", kind).example(), **changes)
+
+
+def block(kind: str, *fields: Any, **named: Any) -> Any:
+    """Return a block of a registered kind."""
+    return load("blocks", kind)(*fields, **named)
+
+
+def _numbered(stem: str, n: int = 3) -> tuple[Channel, ...]:
+    return tuple(Channel(f"{stem}_{k}", "mm") for k in range(1, n + 1))
+
+
+def _manipulator() -> Block:
+    """Return hysteresis of three muscles, coupling, and rules scheduled by an extensor."""
+    free, coupled, given = map(
+        _numbered, ("displacement_free", "displacement_coupled", "displacement")
+    )
+    muscles = tuple(
+        example(kind, input=Channel(f"pressure_{k}", "bar"), output=free[k - 1])
+        for k, kind in enumerate(("pi", "gpi", "eupi"), start=1)
+    )
+    gains = ((1.0, 0.1, 0.05), (0.08, 1.0, 0.1), (0.02, 0.12, 1.0))
+    consequents = tuple(
+        1.0 + 0.1 * rule / 16 if i == j else 0.05 * (i - 1)
+        for rule in range(16)
+        for j in range(3)
+        for i in range(4)
+    )
+    rules = block(
+        "fuzzy-network",
+        ((0.0, 20.0),) * 3 + ((0.0, 2.5),),
+        ((15.0, 15.0),) * 3 + ((1.0, 1.2),),
+        consequents,
+        coupled,
+        given,
+        (Channel("pressure_extensor", "bar"),),
+        False,
+        ((-40.0, 60.0),) * 3,
+    )
+    return Series((PerChannel(muscles), block("coupling", gains, free, coupled), rules))
+
+
+def _joint() -> Block:
+    """Return two muscles in balance that move one coordinate."""
+    balance = example("balance")
+    angle = Channel("angle", "mm")
+    return Series(
+        (balance.inverse(), block("coupling", ((0.5,), (-0.5,)), balance.driven, (angle,)))
+    )
+
+
+def _loaded_network() -> Block:
+    network = example("recurrent-fuzzy-network")
+    return Series((example("pi", output=network.driven[0]), network))
+
+
+def _compositions() -> dict[str, Block]:
+    balance = example("balance")
+    feedforward = example("force-feedforward")
+    pi, gpi, creep = PI.example(), GPI.example(), example("creep")
+    return {
+        "creeping muscle": Series((pi, creep)),
+        "muscles in parallel": Parallel((pi, gpi)),
+        "air and muscle": Series((example("air"), pi)),
+        "muscle behind contact": Series((example("contact"), gpi)),
+        "SDCHM": _manipulator(),
+        "MPI-NARMAX": _loaded_network(),
+        "joint": _joint(),
+        "heavy muscles": example("balance", mass=(0.01, 0.02), pushes=(), bladders=()),
+        "slack muscles": example("balance", pushes=(8.0, 2.0)),
+        "limited muscles": example("balance", pressure_range=(0.0, 1.2)),
+        "adaptive gpi": block("adaptive", gpi, 20.0, 0.05),
+        "adaptive balance": block("adaptive", balance.inverse(), 20.0, 0.05),
+        "predictive, all limits": block(
+            "predictive",
+            gpi.inverse(),
+            10,
+            rate_limit=30.0,
+            pressure_range=(0.2, 4.6),
+            total_limit=4.2,
+            flow_limit=20.0,
+        ),
+        "predictive balance": block(
+            "predictive", balance, 6, 40.0, (0.0, 4.0), total_limit=6.0, volumes=(1.0, 2.0)
+        ),
+        "pi from a given memory": replace(pi, initial=(0.1, 0.2, 0.3, 0.4)),
+        "force after known friction": replace(
+            feedforward, friction=replace(feedforward.friction, initial=(0.5, -0.2, 0.1, 2.0))
+        ),
+        **{
+            f"virgin {kind}": example(kind, initial="virgin")
+            for kind in ("air", "pi", "gpi", "preisach", "duhem", "bouc-wen", "eupi")
+        },
+    }
+
+
+def _of_envelopes() -> dict[str, Block]:
+    found: dict[str, Block] = {}
+    for kind in names("envelopes"):
+        rising, falling = load("envelopes", kind).examples()
+        found[f"gpi {kind}"] = replace(GPI.example(), rising=rising, falling=falling)
+    return found
+
+
+def registered() -> dict[str, Block]:
+    """Return an example of every registered kind, and every printed model."""
+    found: dict[str, Block] = {kind: example(kind) for kind in names("blocks")}
+    return found | {f"published {name}": load("published", name)() for name in names("published")}
+
+
+def all_models() -> dict[str, Block]:
+    """Return all models by name."""
+    return registered() | _compositions() | _of_envelopes()
+
+
+def with_inverses(models: dict[str, Block]) -> dict[str, Block]:
+    """Return models, and the inverse of each that has one."""
+    found = dict(models)
+    for name, model in models.items():
+        try:
+            found[f"{name}, inverse"] = model.inverse()
+        except ModelError:
+            continue
+    return found
+
+
+def path(seed: int, n: int = N_SAMPLES) -> Array:
+    """Return a path within 0 and 1: a major loop, nested loops, random turns, each with a rest."""
+    rng = np.random.default_rng(seed)
+    loops = (0.1, 1.0, 0.0, 1.0, 0.3, 0.8, 0.45, 0.7) if seed % 10 == 0 else ()
+    turns = np.concatenate([loops, rng.random(24)])
+    on_the_way = 5 + np.floor(9 * rng.random(turns.size))
+    at_rest = np.floor(5 * rng.random(turns.size))
+    places = np.cumsum(np.column_stack([on_the_way, at_rest + 1]).ravel())
+    return np.interp(np.arange(n), places, np.repeat(turns, 2))
+
+
+def between(ranges: Sequence[tuple[float, float]], seed: int = 0, n: int = N_SAMPLES) -> Array:
+    """Return a path in each range, shape (n, channels)."""
+    return np.column_stack(
+        [low + (high - low) * path(seed + k, n) for k, (low, high) in enumerate(ranges)]
+    )
+
+
+def inputs_of(name: str, model: Block, seed: int = 0, n: int = N_SAMPLES) -> Array:
+    """Return inputs of a model, shape (n, n_inputs)."""
+    channels = [channel.name for channel in model.inputs]
+    ranges, slow = RANGES.get(name, ((0.0, 5.0),) * len(channels)), SLOW.get(name, 1)
+    inputs = between(ranges, seed, n)
+    if slow > 1:
+        instants = np.arange(n) / slow
+        inputs = np.column_stack([np.interp(instants, np.arange(n), line) for line in inputs.T])
+    for place, channel in enumerate(channels):
+        if channel.endswith(MEASURED):
+            asked = inputs[:, channels.index(channel.removesuffix(MEASURED))]
+            inputs[1:, place] = 1.05 * asked[:-1] + 0.02 * path(seed + 50 + place, n)[1:]
+            inputs[0, place] = asked[0]
+    if model.n_missable:
+        inputs[n // 2 : n // 2 + 8, -model.n_missable :] = np.nan
+    return inputs
+
+
+def simulated(model: Block, inputs: Array, initial: Any = None) -> Array:
+    """Return outputs, shape (n, n_outputs); warnings of what was clipped are not looked at."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ModelWarning)
+        return model.simulate(inputs, initial=initial, sample_time=SAMPLE_TIME)

@@ -183,15 +183,12 @@ def all_models() -> dict[str, Block]:
     return registered() | _compositions() | _of_envelopes()
 
 
-def with_inverses(models: dict[str, Block]) -> dict[str, Block]:
-    """Return models, and the inverse of each that has one."""
-    found = dict(models)
-    for name, model in models.items():
-        try:
-            found[f"{name}, inverse"] = model.inverse()
-        except ModelError:
-            continue
-    return found
+def inverse_of(model: Block) -> Block | None:
+    """Return the inverse of a model, None where it has none."""
+    try:
+        return model.inverse()
+    except ModelError:
+        return None
 
 
 def path(seed: int, n: int = N_SAMPLES) -> Array:

@@ -1,9 +1,10 @@
-"""Imports point one way: no module imports from a layer above its own."""
+"""Imports point one way: none from a layer above one's own, and none in a circle of modules."""
 
 from __future__ import annotations
 
 import ast
 from collections.abc import Iterator
+from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
 import pytest
@@ -117,6 +118,38 @@ def test_imports_point_down(path: Path) -> None:
     assert not upward, f"{own} imports {upward} from above"
     if own in STANDS_ON:
         assert set(imported(path)) <= STANDS_ON[own]
+
+
+def run(tree: ast.AST) -> Iterator[ast.AST]:
+    """Give all that runs: what is imported for types alone does not."""
+    for node in ast.iter_child_nodes(tree):
+        if not (isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING"):
+            yield node
+            yield from run(node)
+
+
+def test_imports_go_round_in_no_circle() -> None:
+    trees = {
+        ".".join(path.relative_to(SOURCE.parent).with_suffix("").parts).removesuffix(
+            ".__init__"
+        ): ast.parse(path.read_text(encoding="utf-8"))
+        for path in MODULES
+    }
+    graph: dict[str, set[str]] = {}
+    for name, tree in trees.items():
+        graph[name] = set()
+        for node in run(tree):
+            if isinstance(node, ast.Import):
+                graph[name] |= {alias.name for alias in node.names} & trees.keys()
+            elif isinstance(node, ast.ImportFrom):
+                inner = {f"{node.module}.{alias.name}" for alias in node.names}
+                graph[name] |= (inner | {str(node.module)}) & trees.keys()
+                if inner <= trees.keys():  # modules of a package, which itself is not asked for
+                    graph[name].discard(str(node.module))
+    try:
+        TopologicalSorter(graph).prepare()
+    except CycleError as error:
+        pytest.fail(" -> ".join(error.args[1]))
 
 
 def test_registry_names_modules_that_exist() -> None:

@@ -1,15 +1,16 @@
 """Programs and libraries that some tests need and the README's test line does not install.
 
-A test says so by `needs`: it is skipped where the tool is not, and selected by ``-m
-"tool(name='clang')"``. ``python -m tests.tools lacking`` prints such an expression for all that this
-machine lacks, ``python -m tests.tools packages`` what installs them.
+A test says so by `needs`, and is skipped where the tool is not. ``python -m tests.tools install [TOOL
+...]`` installs those named, or all, with apt-get where there is one.
 """
 
 from __future__ import annotations
 
 import ctypes
 import shutil
+import subprocess
 import sys
+from collections.abc import Sequence
 
 import pytest
 
@@ -57,10 +58,19 @@ def skip_without_tools(item: pytest.Item) -> None:
         pytest.skip(f"there is no {', '.join(lacking)}")
 
 
+def install(tools: Sequence[str]) -> None:
+    """Install tools of `PACKAGES`, with what they depend on; where that fails, tests are skipped."""
+    packages = sorted({*" ".join(PACKAGES[tool] for tool in tools if not where(tool)).split()})
+    if not packages or shutil.which("apt-get") is None:
+        return
+    asked = ["apt-get", "install", "-y", "-qq", "--no-install-recommends", *packages]
+    for command in (["apt-get", "update", "-qq"], asked):
+        if subprocess.run(command, stdout=subprocess.DEVNULL, check=False).returncode:
+            print(f"not installed, so that tests will be skipped: {' '.join(packages)}")
+            return
+
+
 if __name__ == "__main__":
-    if sys.argv[1:] == ["packages"]:
-        print(" ".join(sorted({*" ".join(PACKAGES.values()).split()})))
-    elif sys.argv[1:] == ["lacking"]:
-        print(" or ".join(f"tool(name={tool!r})" for tool in PACKAGES if where(tool) is None))
-    else:
-        sys.exit("say packages or lacking")
+    if sys.argv[1:2] != ["install"] or {*sys.argv[2:]} - PACKAGES.keys():
+        sys.exit(f"python -m tests.tools install [{' | '.join(PACKAGES)}]")
+    install(sys.argv[2:] or list(PACKAGES))

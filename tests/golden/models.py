@@ -6,20 +6,16 @@ package's own classes. Inputs are written here, so that they stay when a block's
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mckibben import GPI, PI, Block, Channel, ModelError, ModelWarning, Parallel, PerChannel, Series
+from mckibben import GPI, PI, Block, Channel, Parallel, PerChannel, Series
 from mckibben.registry import load, names
+from tests.golden.running import Array
 
-Array = NDArray[np.float64]
-
-SAMPLE_TIME = 0.01
 N_SAMPLES = 180
 
 RANGES: dict[str, tuple[tuple[float, float], ...]] = {
@@ -183,14 +179,6 @@ def all_models() -> dict[str, Block]:
     return registered() | _compositions() | _of_envelopes()
 
 
-def inverse_of(model: Block) -> Block | None:
-    """Return the inverse of a model, None where it has none."""
-    try:
-        return model.inverse()
-    except ModelError:
-        return None
-
-
 def path(seed: int, n: int = N_SAMPLES) -> Array:
     """Return a path within 0 and 1: a major loop, nested loops, random turns, each with a rest."""
     rng = np.random.default_rng(seed)
@@ -225,10 +213,3 @@ def inputs_of(name: str, model: Block, seed: int = 0, n: int = N_SAMPLES) -> Arr
     if model.n_missable:
         inputs[n // 2 : n // 2 + 8, -model.n_missable :] = np.nan
     return inputs
-
-
-def simulated(model: Block, inputs: Array, initial: Any = None) -> Array:
-    """Return outputs, shape (n, n_outputs); warnings of what was clipped are not looked at."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", ModelWarning)
-        return model.simulate(inputs, initial=initial, sample_time=SAMPLE_TIME)

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
-import warnings
 from collections.abc import Iterator
 from functools import cache, partial
 from pathlib import Path
@@ -13,41 +11,26 @@ from typing import Any
 import numpy as np
 
 import mckibben
-from mckibben import Block, ModelError, ModelWarning, Recording
+from mckibben import GPI, Block, ModelError, Recording
+from mckibben.registry import load, names
 from tests.golden.case import Case, Tree
-from tests.golden.models import (
+from tests.golden.models import all_models, inputs_of
+from tests.golden.running import (
     SAMPLE_TIME,
     Array,
-    all_models,
-    inputs_of,
+    inverted,
+    refused,
+    same,
+    scheduling_of,
     simulated,
+    stored,
+    streamed,
 )
 
 EVERY, SELDOM = 3, 6
 """Of a run, every so many samples are stored, and the sum of all; fewer of what is much like another."""
 
-EXACT_INVERSE = 1e-9
-"""How far a model behind its inverse may be from its reference, relative to the reference's span."""
-
 models = cache(all_models)
-
-
-def refused(error: Exception) -> dict[str, Tree]:
-    return {"refused": type(error).__name__}
-
-
-def streamed(model: Block, inputs: Array) -> Array:
-    stream = model.stream(SAMPLE_TIME)
-    return np.array([stream.step(row).copy() for row in inputs])
-
-
-def stored(run: Array) -> Tree:
-    return {"samples": run[::EVERY], "sums": [math.fsum(column) for column in run.T]}
-
-
-def same(first: Array, second: Array) -> bool:
-    """Tell whether two arrays are equal to the bit."""
-    return first.shape == second.shape and first.tobytes() == second.tobytes()
 
 
 def recorded(model: Block, inputs: Array) -> Recording | None:
@@ -101,30 +84,7 @@ def reference(model: Block, inputs: Array, name: str) -> Array:
         span = np.ptp(wanted, axis=0)
         shape = (wanted - wanted.min(axis=0)) / np.where(span > 0, span, 1.0)
         wanted = low + (0.02 + 0.96 * shape) * (high - low)
-    return np.column_stack([wanted, inputs[:, len(model.inputs) - len(model.scheduling) :]])
-
-
-def inverted(model: Block, inputs: Array, name: str) -> Tree:
-    """Return commands of the inverse over a reference, and whether the model then follows it."""
-    try:
-        inverse = model.inverse()
-    except ModelError as error:
-        return refused(error)
-    given = reference(model, inputs, name)
-    n, late = len(model.outputs), round(model.dead_time / SAMPLE_TIME)
-    with warnings.catch_warnings(record=True) as clipped:
-        warnings.simplefilter("always", ModelWarning)
-        commands = inverse.simulate(given, sample_time=SAMPLE_TIME)
-    followed = simulated(model, np.column_stack([commands, given[:, n:]]))
-    wanted = given[: len(given) - late, :n]
-    apart = np.abs(followed[late:] - wanted).max() / np.ptp(wanted, axis=0).min()
-    low, high = inverse.reachable()
-    return {
-        "commands": stored(commands),
-        "stream is batch": same(streamed(inverse, given), commands),
-        "exact": "clipped" if clipped else bool(apart <= EXACT_INVERSE),
-        "reachable": np.array([low, high]),
-    }
+    return np.column_stack([wanted, scheduling_of(model, inputs)])
 
 
 def answers(name: str, folder: Path) -> Tree:
@@ -142,13 +102,13 @@ def answers(name: str, folder: Path) -> Tree:
     return channels | {
         "json": json.dumps(model.to_dict()),
         "saved": same(simulated(mckibben.load(folder / "model.json"), inputs), outputs),
-        "simulated": stored(outputs),
+        "simulated": stored(outputs, EVERY),
         "stream is batch": same(streamed(model, inputs), outputs),
         "halves are one run": halves(model, inputs, outputs),
         "virgin": other_starts(model, inputs),
         "many": many(model, inputs),
         "reachable": np.array([low, high]),
-        "inverse": inverted(model, inputs, name),
+        "inverse": inverted(model, reference(model, inputs, name), EVERY),
     }
 
 
@@ -170,9 +130,26 @@ def resumed(folder: Path) -> Tree:
     return taken
 
 
+def envelope(kind: str, folder: Path) -> Tree:
+    """Return both envelopes of a kind over their inputs, and the way back, as one operator has them."""
+    del folder
+    rising, falling = load("envelopes", kind).examples()
+    model = GPI((0.0,), (1.0,), input_range=(0.0, 5.0), rising=rising, falling=falling)
+    up = np.linspace(0.0, 5.0, 41)
+    outputs = simulated(model, np.concatenate([up, up[::-1]])[:, np.newaxis])
+    return {
+        "json": json.dumps(model.to_dict()),
+        "outputs": outputs,
+        "back": simulated(model.inverse(), outputs),
+        "reachable": np.array(model.reachable()),
+    }
+
+
 def cases() -> Iterator[Case]:
-    """Yield a case for every model, and one on the starts of all."""
+    """Yield a case for every model, and for each envelope, and one on the starts of all."""
     yield Case("blocks/resumed", "simulate(inputs, initial=final_state(recording))", resumed)
+    for kind in names("envelopes"):
+        yield Case(f"blocks/envelope-{kind}", f"GPI with {kind} alone", partial(envelope, kind))
     for name in models():
         yield Case(
             f"blocks/{name.replace(',', '').replace(' ', '-').lower()}",

@@ -12,14 +12,9 @@ from mckibben import Block, ModelError
 from mckibben.export import export_c
 from tests.export.building import Precision, build
 from tests.golden.case import Case, Tree
-from tests.golden.models import (
-    SAMPLE_TIME,
-    Array,
-    all_models,
-    inputs_of,
-    inverse_of,
-    simulated,
-)
+from tests.golden.models import all_models, inputs_of
+from tests.golden.rooms.saved import of_file
+from tests.golden.running import SAMPLE_TIME, Array, inverse_of, scheduling_of, simulated
 
 EVERY = 4
 """So many samples are stored; C is the same step at each."""
@@ -34,8 +29,11 @@ WITHOUT_C: dict[Precision, tuple[str, ...]] = {
 
 
 def models_with_inputs(precision: Precision) -> dict[str, tuple[Block, Array]]:
-    """Return models and inverses with what they are run over: inverses over what models gave."""
-    found: dict[str, tuple[Block, Array]] = {}
+    """Return models and inverses with what they are run over: inverses over what models gave.
+
+    Models that are no longer fitted, but that files hold, are among them.
+    """
+    found = {name: saved[:2] for name, saved in of_file("0.1.0-fitted").items()}
     for name, model in all_models().items():
         if name in WITHOUT_C[precision]:
             continue
@@ -43,8 +41,7 @@ def models_with_inputs(precision: Precision) -> dict[str, tuple[Block, Array]]:
         found[name] = (model, inputs)
         inverse = inverse_of(model)
         if inverse is not None:
-            scheduling = inputs[:, len(model.inputs) - len(model.scheduling) :]
-            given = np.column_stack([simulated(model, inputs), scheduling])
+            given = np.column_stack([simulated(model, inputs), scheduling_of(model, inputs)])
             found[f"{name}, inverse"] = (inverse, given)
     return found
 

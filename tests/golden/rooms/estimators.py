@@ -1,0 +1,174 @@
+"""Every estimator on two data sets: errors, and the parameters that the data determine, within 0.5 %."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mckibben import Recording, registry
+from tests.golden.case import Case, Leaf, Tree, flat
+from tests.golden.plants import noise, runs
+from tests.golden.stored import load
+
+SMALL = {"n_operators": 4, "n_starts": 4, "n_refined": 1}
+LOADED = {"input": ("pressure",), "output": ("displacement",), "scheduling": ("force",)}
+ONE = {"input": ("pressure",), "output": ("displacement",), "scheduling": ()}
+SENT = {"input": "voltage", "output": "pressure"}
+STOPS = {"n_stops": 3, "n_lags": 1, "elasticity": 3}
+MEMORY = {"memory": "pi", "memory_settings": {"n_operators": 4}, "n_sets": 1, "n_friction": 2}
+SWARM = {"particles": 6, "iterations": 4, "search_samples": 400}
+SHAKEN = {"substeps": 4}
+
+SINGLE: Mapping[str, Mapping[str, Any]] = {
+    "armax": {},
+    "arx": {},
+    "balance": STOPS | ONE,
+    "bj": {},
+    "bouc-wen": {},
+    "cpi": {"n_operators": 4},
+    "duhem": {},
+    "eupi": SMALL,
+    "gbw": {},
+    "gpi": SMALL,
+    "kp": {"n_levels": 5},
+    "maxwell-slip": {"n_operators": 4},
+    "mms": SMALL,
+    "mpi": SMALL,
+    "narx-play": {"n_terms": 6, "n_play": 3},
+    "oe": {},
+    "p1": {},
+    "p1z": {},
+    "p2": {},
+    "p2u": {},
+    "p2uz": {},
+    "p2z": {},
+    "p3": {},
+    "pi": {"n_operators": 4},
+    "preisach": {"n_levels": 5},
+    "rdpi": SMALL,
+}
+OF_FORCE: Mapping[str, Mapping[str, Any]] = {
+    "balance-force": STOPS,
+    "force-bilinear": {},
+    "force-chou": {},
+    "force-minh": {},
+    "force-petrovic": {},
+    "force-schindele": {},
+    "force-tondu": {},
+    "multistate": {},
+    "multistate-11": {"n_starts": 8},
+    "multistate-18": {},
+}
+OF_ARM: Mapping[str, Mapping[str, Any]] = {
+    "balance": STOPS,
+    "coupled-memory": {},
+    "coupled-pi": {},
+    "sdchm": MEMORY,
+    "sdchm-published": SWARM,
+    "tsfnn": {"n_sets": 2},
+}
+SHOWN = {
+    ("muscle", "bundled"): SINGLE,
+    ("bench", "bench-rougher"): OF_FORCE,
+    ("activated", "activated-rougher"): {"activation-memory": {}, "activation-pressure": {}},
+    ("commanded", "commanded-slower"): {
+        "air": {"n_starts": 4},
+        "narx": SENT | {"n_terms": 6},
+        "narx-network": SENT | {"n_units": 2, "n_starts": 4},
+    },
+    ("shaken", "shaken-softer"): {
+        "bouc-wen-oscillator": SHAKEN,
+        "duhem-oscillator": SHAKEN,
+        "state-network": {"substeps": 1, "n_states": 2, "n_units": 1, "n_steps": 100},
+    },
+    ("lifted", "lifted-stiffer"): {
+        "balance": STOPS | LOADED,
+        "coupled-memory": LOADED,
+        "mpi-narmax": LOADED | {"n_sets": 2, "method": "ls"},
+    },
+    ("arm", "arm-looser"): OF_ARM,
+}
+"""Two plants -> the estimators fitted to both, with settings that make it quick."""
+
+CHANCE: Mapping[str, float] = {"narx-network": 0.5, "sdchm-published": 0.1, "state-network": 0.3}
+"""Model -> how far its errors may move: trained from chance, last bits choose."""
+
+DETERMINED = 5e-4
+"""How far a parameter may move, relative to its size, where the output moves by a thousandth."""
+
+
+def fit(model: str, settings: Mapping[str, Any], plant: str, moved: float = 0.0) -> dict[str, Tree]:
+    """Return errors of a fit and, by their names in its file, the parameters of the model."""
+    recordings = [_moved(run, moved) for run in runs(plant)]
+    estimator = registry.load("estimators", model)(**settings).fit(recordings)
+    known = estimator.diagnostics_
+    return {
+        "rmse": known.rmse,
+        "rmse_from_rest": known.rmse_from_rest,
+        "r2": estimator.score(recordings),
+        "n_samples": known.n_samples,
+        "n_parameters": estimator.model_.n_parameters,
+        "model": {
+            key: value
+            for key, value in estimator.model_.to_dict().items()
+            if key not in ("format", "version")
+        },
+    }
+
+
+def _moved(run: Recording, share: float) -> Recording:
+    """Return a recording whose outputs have a little more noise."""
+    outputs = [name for name in run.channels if name.startswith("displacement")] or ["force"]
+    if "contraction" in run or "voltage" in run:
+        outputs = ["pressure"]
+    return run.with_channels(
+        **{
+            name: run[name] + noise(99, share * float(np.std(run[name])), len(run))
+            for name in outputs
+        }
+    )
+
+
+def determined(case: str, model: str, settings: Mapping[str, Any], plant: str) -> dict[str, Leaf]:
+    """Return a fit without what the data do not determine, which was found when it was stored."""
+    found = flat(fit(model, settings, plant))
+    held = load(case)
+    if held is None:
+        other = flat(fit(model, settings, plant, moved=1e-3))
+        names = {name for name in found if _same(found[name], other.get(name))}
+    else:
+        names = set(held.leaves)
+    return {
+        name: value
+        for name, value in found.items()
+        if name in names or not name.startswith("model/")
+    }
+
+
+def _same(one: Any, other: Any) -> bool:
+    if isinstance(one, float) and isinstance(other, float):
+        return bool(abs(one - other) <= DETERMINED * abs(one))
+    return bool(one == other)
+
+
+def run(case: str, model: str, settings: Mapping[str, Any], plant: str, folder: Path) -> Tree:
+    """Return what is compared of a fit."""
+    return determined(case, model, settings, plant)
+
+
+def cases() -> Iterator[Case]:
+    """Yield every estimator on two plants."""
+    for plants, models in SHOWN.items():
+        for model, settings in models.items():
+            for plant in plants:
+                name = f"estimators/{model}/{plant}"
+                yield Case(
+                    name,
+                    f"estimators[{model!r}](**{dict(settings)}).fit(plants.runs({plant!r}))",
+                    partial(run, name, model, settings, plant),
+                    {"n_*": 0.0, "r*": CHANCE.get(model, 0.005), "*": 0.005},
+                )

@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from mckibben import DataError, ModelError, Recording, load, write
-from mckibben.blocks.core.fields import Channel
+from mckibben import DataError, ModelError, Recording
 from mckibben.blocks.dynamic.air import Air
 from mckibben.estimators.dynamic.air import AirEstimator
-from tests.cli.conftest import Cli
 from tests.cli.conftest import cli as cli  # a fixture
 
 STEP, NOISE = 0.01, 0.005

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import replace
 
 import numpy as np
@@ -13,19 +12,13 @@ from mckibben.arrays import Array
 from mckibben.blocks.compose import Series
 from mckibben.blocks.core.fields import DISPLACEMENT, FORCE, PRESSURE
 from mckibben.blocks.core.inverse import Inverse
-from mckibben.blocks.core.saving import from_dict
 from mckibben.blocks.coupled.balance import Balance
 from mckibben.blocks.coupled.load_estimate import load_of
-from mckibben.blocks.memoryless.affine import Affine
 from mckibben.blocks.memoryless.contact import Contact
-from mckibben.control.beyond import beyond_known
 from mckibben.estimators.coupled.balance import BalanceEstimator
 from mckibben.estimators.coupled.balance_loads import under
-from mckibben.estimators.coupled.balance_search import Search
 from mckibben.estimators.coupled.balance_slopes import run
-from mckibben.estimators.coupled.balance_words import sentences
 from mckibben.estimators.optimisers.constrained import constrained_least_squares
-from mckibben.estimators.optimisers.tracker import Tracker
 from mckibben.signals.broadband import random_wave
 
 STEP = 0.05

@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pytest
 
-from mckibben import ModelError, Recording, muscles
+from mckibben import Recording, muscles
 from mckibben.arrays import Array
 from mckibben.blocks.core.block import Block
 from mckibben.blocks.coupled.load_estimate import load_of, parts_of
 from mckibben.estimators.coupled.balance import BalanceEstimator
-from mckibben.estimators.coupled.balance_prior import noise_of
 from mckibben.muscles import Prior, Sheet
 from mckibben.muscles.prior import of_muscles
 from mckibben.muscles.traits import traits

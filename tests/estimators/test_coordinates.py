@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from mckibben import DataError, Recording, load
+from mckibben import Recording, load
 from mckibben.estimators.coupled.balance import BalanceEstimator
 from mckibben.signals.broadband import random_wave
 

@@ -8,20 +8,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mckibben import GPI, DataError, ModelError, Recording, registry
+from mckibben import GPI, Recording, registry
 from mckibben.blocks.compose import PerChannel, Series
 from mckibben.blocks.core.fields import Channel
 from mckibben.blocks.coupled.coupling import Coupling
 from mckibben.blocks.coupled.force_balance import ForceBalance
-from mckibben.blocks.play_type.gpi import gpi_matrix
-from mckibben.blocks.play_type.memory import named_state
 from mckibben.estimators.coupled.fuzzy import Consequents, Fitted, Problem, Sets
 from mckibben.estimators.coupled.fuzzy_fit import solve_in_parts
 from mckibben.estimators.coupled.fuzzy_projection import sensitivities
-from mckibben.estimators.coupled.fuzzy_swarm import printed_swarm, swarmed
 from mckibben.estimators.coupled.sdchm import coupled, softest
-from mckibben.estimators.optimisers.tracker import Tracker, whole_searches
-from tests.estimators.examples import quick, recorded
 
 STEP = 0.05
 

@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
-from scipy.optimize import lsq_linear
 
 from mckibben import PI, Recording
 from mckibben.blocks.compose import Series

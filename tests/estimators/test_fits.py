@@ -11,8 +11,6 @@ import pytest
 from mckibben import (
     GPI,
     PI,
-    DataError,
-    GPIEstimator,
     ModelError,
     MPIEstimator,
     PIEstimator,
@@ -21,9 +19,7 @@ from mckibben import (
     Recording,
 )
 from mckibben.blocks.core.block import Block
-from mckibben.estimators.core.searching import SearchingEstimator
-from mckibben.registry import load, names
-from tests.estimators.examples import example_for, quick
+from tests.estimators.examples import quick
 
 TIME = np.linspace(0, 1, 1500)
 PRESSURE = 2.5 * (1 - 0.7 * np.floor(6 * TIME).clip(0, 5) / 5) * (1 - np.cos(12 * np.pi * TIME))

@@ -8,12 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mckibben import DataError, Recording, registry
+from mckibben import DataError, Recording
 from mckibben.blocks.core.saving import from_dict, to_dict
 from mckibben.blocks.force.multistate_friction import EACH_WAY, MultistateFriction
 from mckibben.blocks.force.tondu_lopez import TonduLopez
 from mckibben.estimators.coupled.balance_force import BalanceForceEstimator
-from mckibben.estimators.force.activation_memory import ActivationMemoryEstimator
 from mckibben.estimators.force.activation_pressure import (
     ActivationPressureEstimator,
     dominant_frequency,

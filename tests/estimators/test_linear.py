@@ -19,8 +19,6 @@ from mckibben.comparison.free_run import run_free
 from mckibben.estimators.core.affine_match import affine_match
 from mckibben.estimators.core.checking import training_data
 from mckibben.estimators.linear.polynomials import Orders, errors
-from mckibben.estimators.linear.prediction_error import evaluate
-from mckibben.estimators.play_type.gpi import GPIEstimator
 from mckibben.registry import load
 
 Array = NDArray[np.float64]

@@ -8,7 +8,7 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from mckibben import ModelError, Recording
+from mckibben import Recording
 from mckibben.blocks.dynamic.narx_polynomial import NarxPolynomial
 from mckibben.blocks.play_type.gpi import GPI
 from mckibben.comparison.memory_test import hold_test

@@ -5,7 +5,6 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from mckibben.blocks.core.fields import DISPLACEMENT
-from mckibben.errors import ModelError
 from mckibben.estimators.core.output_maps import MAPS, output_map
 
 weights = arrays(float, 5, elements=st.floats(1e-3, 10))

@@ -9,6 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
+from tests.tools import where
+
 Leaf = None | bool | int | float | str | np.ndarray
 Tree = Leaf | Mapping[str, "Tree"] | Sequence["Tree"]
 
@@ -38,8 +40,8 @@ class Case:
         Pattern of leaves' paths (as of `fnmatch`) -> relative tolerance; the first that matches
         counts, ``{"*": EXACT}`` where none is named. It is relative to the stored value, in an array
         to its largest magnitude. `None` as tolerance leaves a leaf uncompared but for its kind.
-    needs : sequence of str
-        Folders of shared recordings without which the case is skipped.
+    needs, tools : sequence of str
+        Folders of shared recordings, and programs of `tests.tools`, without which the case is skipped.
     slow : bool
         Left out where not asked for by ``--slow``.
     """
@@ -49,7 +51,14 @@ class Case:
     run: Callable[[Path], Tree]
     tolerances: Mapping[str, float | None] = field(default_factory=lambda: {"*": EXACT})
     needs: Sequence[str] = ()
+    tools: Sequence[str] = ()
     slow: bool = False
+
+    @property
+    def possible(self) -> bool:
+        """Whether all that it needs is here."""
+        there = all((SHARED / folder).is_dir() for folder in self.needs)
+        return there and all(where(tool) for tool in self.tools)
 
     def tolerance(self, leaf: str) -> float | None:
         """Return how far a leaf may move, relative to its stored value."""

@@ -77,5 +77,6 @@ def cases() -> Iterator[Case]:
             f"export_c(model, ..., single={precision != 'double'}), compiled and run",
             partial(outputs_of, precision),
             {"*": tolerance},
+            tools=("cc",),
         )
     yield Case("c/refused", "export_c(model, ...)", refusals)

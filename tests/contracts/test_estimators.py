@@ -98,7 +98,7 @@ def test_predict_and_score_are_of_the_measured_outputs(name: str, kind: str) -> 
         np.mean(1 - ((y - z) ** 2).mean(axis=0) / y.var(axis=0))
     )
     assert estimator.score(runs) > 0.3
-    with pytest.raises(NotFittedError, match="fit first"):
+    with pytest.raises(NotFittedError):
         clone(estimator).predict(runs)
 
 
@@ -148,28 +148,22 @@ def test_an_interrupt_keeps_the_best_or_leaves_nothing(name: str, kind: str) -> 
 
 def test_absent_channels_are_named(name: str, kind: str) -> None:
     made, first = KINDS[kind], recorded(kind)[0]
-    for channel in estimated_from(name, kind):
-        bare = first.select([other for other in made.channels if other != channel])
-        with pytest.raises(DataError, match=rf"'?{channel}'?.*Remedy"):
-            quick(name, kind).fit([*recorded(kind)[1:], bare])
-
-
-def estimated_from(name: str, kind: str) -> tuple[str, ...]:
-    """Return the channels that a model of a kind of recording is told, and those that it gives."""
     model = fitted(name, kind).model_
-    return tuple(channel.name for channel in (*model.inputs, *model.outputs))
+    for channel in (one.name for one in (*model.inputs, *model.outputs)):
+        bare = first.select([other for other in made.channels if other != channel])
+        with pytest.raises(DataError, match=channel):
+            quick(name, kind).fit([*recorded(kind)[1:], bare])
 
 
 def test_bad_recordings_and_settings_are_refused(name: str, kind: str) -> None:
     runs, given = recorded(kind), KINDS[kind].inputs[0]
     fit = quick(name, kind).fit
-    with pytest.raises(DataError, match=r"no recordings.*Remedy"):
-        fit([])
-    with pytest.raises(DataError, match=r"too few.*Remedy"):
-        fit([run.slice(0, 2) for run in runs])
-    with pytest.raises(DataError, match=rf"'{given}'.*constant.*Remedy"):
+    for bad in ([], [run.slice(0, 2) for run in runs]):
+        with pytest.raises(DataError):
+            fit(bad)
+    with pytest.raises(DataError, match=given):
         fit([run.with_channels(**{given: np.ones(len(run))}) for run in runs])
-    with pytest.raises(ModelError, match=r"seed is -1.*Remedy"):
+    with pytest.raises(ModelError, match=r"seed.*-1"):
         quick(name, kind, seed=-1).fit(runs)
     assert not hasattr(quick(name, kind), "model_")
 

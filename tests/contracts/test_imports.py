@@ -1,4 +1,4 @@
-"""Imports point one way: none from a layer above one's own, and none in a circle of modules."""
+"""Imports point one way: none from a layer above, and in no circle."""
 
 from __future__ import annotations
 
@@ -14,16 +14,7 @@ import mckibben
 SOURCE = Path(mckibben.__file__).parent
 
 LAYERS = (
-    {
-        "errors",
-        "arrays",
-        "registry",
-        "presets",
-        "numerals",
-        "version",
-        "example",
-        "system",
-    },
+    {"errors", "arrays", "registry", "presets", "numerals", "version", "example", "system"},
     {"recording", "signals", "metrics", "characterization"},
     {"files"},
     {"rigs"},
@@ -43,45 +34,37 @@ LAYERS = (
 )
 """Lowest first."""
 
+BASE = {"arrays", "errors"}
+
 STANDS_ON = {
-    "files": {
-        "files",
-        "recording",
-        "arrays",
-        "errors",
-        "registry",
-        "system",
-    },
-    "rigs": {
-        *("rigs", "recording", "signals", "arrays", "errors", "registry", "system"),
-    },
-    "export": {
-        "export",
-        "blocks",
-        "arrays",
-        "errors",
-        "registry",
-        "system",
-    },
-    "stream": {"stream", "blocks", "arrays", "errors"},
-    "link": {"link", "export", "blocks", "arrays", "errors"},
+    "files": {"files", "recording", "registry", "system", *BASE},
+    "rigs": {"rigs", "recording", "signals", "registry", "system", *BASE},
+    "export": {"export", "blocks", "registry", "system", *BASE},
+    "stream": {"stream", "blocks", *BASE},
+    "link": {"link", "export", "blocks", *BASE},
     "control": {
-        *("control", "blocks", "recording", "signals"),
-        *("arrays", "errors", "registry", "numerals", "system"),
+        *("control", "blocks", "recording", "signals", "registry", "numerals", "system"),
+        *BASE,
     },
     "environments": {
-        *("environments", "control", "blocks", "rigs", "recording", "signals", "arrays", "errors"),
-        "system",
+        *("environments", "control", "blocks", "rigs", "recording", "signals", "system"),
+        *BASE,
     },
 }
 """What some members may import and no more: a rig's physics knows nothing of models."""
 
-MODULES = [path for path in sorted(SOURCE.rglob("*.py")) if path != SOURCE / "__init__.py"]
+
+def name_of(path: Path) -> str:
+    parts = path.relative_to(SOURCE.parent).with_suffix("").parts
+    return ".".join(parts).removesuffix(".__init__")
 
 
-def member(path: Path) -> str:
-    """Return the folder or file directly in the package that a module belongs to."""
-    return path.relative_to(SOURCE).with_suffix("").parts[0]
+TREES = {
+    name_of(path): ast.parse(path.read_text(encoding="utf-8"))
+    for path in sorted(SOURCE.rglob("*.py"))
+    # the package's face imports everything when asked for it, and gives the version to all
+    if path != SOURCE / "__init__.py"
+}
 
 
 def layer(name: str) -> int:
@@ -91,73 +74,40 @@ def layer(name: str) -> int:
     raise AssertionError(f"{name!r} is in no layer: add it to LAYERS where it belongs")
 
 
-def imported(path: Path) -> Iterator[str]:
-    """Give the members of the package that a module imports, wherever in its text."""
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+def all_of(tree: ast.AST, typing: bool) -> Iterator[ast.AST]:
+    """Give the nodes of a tree, with those that are imported for types alone or without."""
+    for node in ast.iter_child_nodes(tree):
+        if typing or not (isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING"):
+            yield node
+            yield from all_of(node, typing)
+
+
+def imported(name: str, typing: bool = True) -> Iterator[str]:
+    """Give the modules of the package that a module imports, wherever in its text."""
+    for node in all_of(TREES[name], typing):
         if isinstance(node, ast.Import):
             found = [alias.name for alias in node.names]
         elif isinstance(node, ast.ImportFrom):
-            assert node.level == 0, f"{path}: relative imports hide where they point"
-            whole = node.module == "mckibben"
-            found = [
-                f"mckibben.{alias.name}" if whole else node.module or "" for alias in node.names
-            ]
+            assert node.level == 0, f"{name}: relative imports hide where they point"
+            inner = [f"{node.module}.{alias.name}" for alias in node.names]
+            found = [one if one in TREES else node.module or "" for one in inner]
+            assert node.module != "mckibben" or {*inner} <= {*TREES, "mckibben.__version__"}
         else:
             continue
-        for name in found:
-            package, _, rest = name.partition(".")
-            own = rest.partition(".")[0]
-            if package == "mckibben" and own and own != "__version__":
-                yield own
+        yield from (one for one in found if one in TREES)
 
 
-@pytest.mark.parametrize("path", MODULES, ids=lambda path: str(path.relative_to(SOURCE)))
-def test_imports_point_down(path: Path) -> None:
-    own = member(path)
-    upward = {name for name in imported(path) if layer(name) > layer(own)}
+@pytest.mark.parametrize("name", TREES)
+def test_imports_point_down(name: str) -> None:
+    own, members = name.split(".")[1], {one.split(".")[1] for one in imported(name)}
+    upward = {member for member in members if layer(member) > layer(own)}
     assert not upward, f"{own} imports {upward} from above"
-    if own in STANDS_ON:
-        assert set(imported(path)) <= STANDS_ON[own]
-
-
-def run(tree: ast.AST) -> Iterator[ast.AST]:
-    """Give all that runs: what is imported for types alone does not."""
-    for node in ast.iter_child_nodes(tree):
-        if not (isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING"):
-            yield node
-            yield from run(node)
+    assert members <= STANDS_ON.get(own, members)
 
 
 def test_imports_go_round_in_no_circle() -> None:
-    trees = {
-        ".".join(path.relative_to(SOURCE.parent).with_suffix("").parts).removesuffix(
-            ".__init__"
-        ): ast.parse(path.read_text(encoding="utf-8"))
-        for path in MODULES
-    }
-    graph: dict[str, set[str]] = {}
-    for name, tree in trees.items():
-        graph[name] = set()
-        for node in run(tree):
-            if isinstance(node, ast.Import):
-                graph[name] |= {alias.name for alias in node.names} & trees.keys()
-            elif isinstance(node, ast.ImportFrom):
-                inner = {f"{node.module}.{alias.name}" for alias in node.names}
-                graph[name] |= (inner | {str(node.module)}) & trees.keys()
-                if inner <= trees.keys():  # modules of a package, which itself is not asked for
-                    graph[name].discard(str(node.module))
+    graph = {name: {*imported(name, typing=False)} for name in TREES}
     try:
         TopologicalSorter(graph).prepare()
     except CycleError as error:
         pytest.fail(" -> ".join(error.args[1]))
-
-
-def test_registry_names_modules_that_exist() -> None:
-    from mckibben.registry import PLUGINS
-
-    for group in PLUGINS.values():
-        for found in group.values():
-            location = found if isinstance(found, str) else found.location
-            module, _, _ = location.partition(":")
-            place = SOURCE.parent / module.replace(".", "/")
-            assert place.with_suffix(".py").is_file() or (place / "__init__.py").is_file()

@@ -1,76 +1,53 @@
-"""What is on disk is registered, and what is registered is on disk and loads."""
+"""What is on disk is registered, and what is registered is on disk, loads and is what it says."""
 
 from __future__ import annotations
 
 import inspect
-from collections.abc import Iterator
+import sys
+import types
+from collections.abc import Callable, Iterator
+from dataclasses import fields
 from importlib import import_module
+from importlib.metadata import EntryPoint
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
 import pytest
+from sklearn.base import clone
 
 import mckibben
-from mckibben import Block, ModelError
+from mckibben import Block, ModelError, PIEstimator
 from mckibben.blocks.play_type.envelopes import Envelope
+from mckibben.estimators.core.estimator import Estimator
+from mckibben.presets import Chosen, preset
 from mckibben.registry import PLUGINS, REPLACED, load, names
+from mckibben.report.notebook.face import Face
+from mckibben.rigs import Rig
+from mckibben.signals.protocol import protocol
 
 SOURCE = Path(mckibben.__file__).parent
 EVERYTHING = [(group, name) for group in PLUGINS for name in PLUGINS[group]]
+PRESETS = [(group, name) for group, name in EVERYTHING if isinstance(load(group, name), Chosen)]
 
 
 def modules_under(folder: str) -> Iterator[ModuleType]:
-    """Import and give every module of a folder of the package, which may be absent."""
+    """Import and give every module of a folder of the package."""
     for path in sorted((SOURCE / folder).rglob("*.py")):
         parts = path.relative_to(SOURCE).with_suffix("").parts
         yield import_module(".".join(("mckibben", *parts)).removesuffix(".__init__"))
 
 
-def concrete(base: type, *folders: str) -> set[type]:
-    """Return the concrete subclasses of a class that the modules of some folders define."""
+def concrete(base: type, folder: str) -> set[Any]:
+    """Return the concrete subclasses of a class that the modules of a folder define."""
     return {
         value
-        for folder in folders
         for module in modules_under(folder)
         for _, value in inspect.getmembers(module, inspect.isclass)
         if value.__module__ == module.__name__
         and issubclass(value, base)
         and not inspect.isabstract(value)
     }
-
-
-def registered(group: str) -> set[Any]:
-    return {inspect.unwrap(load(group, name)) for name in PLUGINS[group]}
-
-
-@pytest.mark.parametrize(("group", "name"), EVERYTHING)
-def test_loads(group: str, name: str) -> None:
-    assert callable(load(group, name))
-
-
-def test_every_block_is_registered() -> None:
-    assert concrete(Block, "blocks") == registered("blocks")
-
-
-def test_every_face_is_registered() -> None:
-    from mckibben.report.notebook.face import Face
-
-    assert concrete(Face, "report/notebook") == registered("faces")
-
-
-def test_every_envelope_is_registered() -> None:
-    assert concrete(Envelope, "blocks/play_type/envelopes") == registered("envelopes")
-
-
-def test_every_published_model_is_registered() -> None:
-    assert functions("papers", "published") == registered("published")
-
-
-def test_every_estimator_is_registered() -> None:
-    from mckibben.estimators.core.estimator import Estimator
-
-    assert concrete(Estimator, "estimators") == registered("estimators")
 
 
 def functions(folder: str, named: str = "") -> set[Any]:
@@ -84,70 +61,119 @@ def functions(folder: str, named: str = "") -> set[Any]:
     }
 
 
-def test_every_protocol_is_registered() -> None:
-    from mckibben.signals.protocol import protocol
-
-    assert functions("papers", "protocol") == registered("protocols")
-    for name in PLUGINS["protocols"]:
-        assert protocol(name).name == name
-
-
-def test_every_excitation_is_registered() -> None:
-    found = {
+def of_time() -> set[Any]:
+    """Return the functions of signals whose first argument is a time."""
+    return {
         function
         for function in functions("signals")
         if next(iter(inspect.signature(function).parameters), "") == "time"
     }
-    assert found == registered("signals")
 
 
-def test_every_setup_is_registered() -> None:
-    from mckibben.rigs import Rig
+ON_DISK: dict[str, Callable[[], set[Any]]] = {
+    "blocks": lambda: concrete(Block, "blocks"),
+    "envelopes": lambda: concrete(Envelope, "blocks/play_type/envelopes"),
+    "estimators": lambda: concrete(Estimator, "estimators"),
+    "faces": lambda: concrete(Face, "report/notebook"),
+    "protocols": lambda: functions("papers", "protocol"),
+    "published": lambda: functions("papers", "published"),
+    "setups": lambda: concrete(Rig, "rigs"),
+    "signals": of_time,
+}
 
-    assert concrete(Rig, "rigs") == registered("setups")
+
+@pytest.mark.parametrize("group", PLUGINS)
+def test_what_is_on_disk_is_registered_in_order_and_loads(group: str) -> None:
+    registered = {inspect.unwrap(load(group, name)) for name in PLUGINS[group]}
+    assert all(callable(found) for found in registered)
+    if group not in {"controllers", "papers"}:
+        assert ON_DISK[group]() == registered
+    assert list(PLUGINS[group]) == sorted(PLUGINS[group])
+    assert list(names(group)) == sorted(names(group))
+
+
+def test_protocols_setups_and_signals_bear_their_names() -> None:
+    for name in PLUGINS["protocols"]:
+        assert protocol(name).name == name
     for name in PLUGINS["setups"]:
         assert load("setups", name).model_fields["setup"].default == name
+    for name in PLUGINS["signals"]:
+        assert load("signals", name).__name__ == name.replace("-", "_")
 
 
-def test_every_group_is_checked_here() -> None:
-    assert set(PLUGINS) == {
-        "blocks",
-        "controllers",
-        "envelopes",
-        "estimators",
-        "faces",
-        "papers",
-        "protocols",
-        "published",
-        "setups",
-        "signals",
-    }
+def test_every_public_name_is_there() -> None:
+    assert all(getattr(mckibben, name) is not None for name in mckibben.__all__)
 
 
-@pytest.mark.parametrize("name", [name for name in mckibben.__all__ if not name.startswith("__")])
-def test_every_public_name_is_there(name: str) -> None:
-    assert getattr(mckibben, name) is not None
-
-
-def test_unknown_name_lists_the_known_ones() -> None:
-    with pytest.raises(
-        ModelError, match=r"no block named .ip.*Remedy: use one of activation-memory"
-    ):
+def test_an_unknown_name_is_refused_and_one_that_is_gone_leads_to_its_successor() -> None:
+    with pytest.raises(ModelError, match=r"(?s)'ip'.*activation-memory"):
         load("blocks", "ip")
+    for group, replaced in REPLACED.items():
+        for name, successor in replaced.items():
+            assert name not in names(group)
+            with pytest.raises(ModelError, match=f"{name}.*'{successor}'"):
+                load(group, name)
+            assert callable(load(group, successor))
 
 
-@pytest.mark.parametrize(
-    ("group", "name"), [(group, name) for group in REPLACED for name in REPLACED[group]]
-)
-def test_a_name_that_is_gone_leads_to_what_does_its_work(group: str, name: str) -> None:
-    successor = REPLACED[group][name]
-    assert name not in names(group)
-    with pytest.raises(ModelError, match=rf"{name}.*is gone. Remedy: use '{successor}'"):
-        load(group, name)
-    assert callable(load(group, successor))
+# -- presets: a class with settings chosen ---------------------------------------------------------
 
 
-def test_names_are_in_order() -> None:
-    for group in PLUGINS:
-        assert list(names(group)) == sorted(names(group))
-        assert list(PLUGINS[group]) == sorted(PLUGINS[group])
+@pytest.mark.parametrize(("group", "name"), PRESETS)
+def test_a_preset_makes_its_class_with_its_settings(group: str, name: str) -> None:
+    chosen = load(group, name)
+    made = chosen()
+    assert type(made) is inspect.unwrap(chosen)
+    assert {field.name: field.default for field in fields(chosen)} == made.get_params()
+    assert clone(made).get_params() == made.get_params()
+    assert chosen.settings.items() <= made.get_params().items()
+    assert chosen(seed=3).get_params() == made.get_params() | {"seed": 3}
+
+
+def test_settings_override_those_of_a_preset_and_others_are_refused_by_its_name() -> None:
+    p2 = load("estimators", "p2")
+    assert (p2(structure="P3").structure, p2().structure) == ("P3", "P2")
+    with pytest.raises(TypeError, match=r"'p2'.*'poles'.*structure"):
+        p2(poles=2)
+
+
+def test_a_preset_answers_what_is_asked_of_its_class() -> None:
+    p2, multistate = load("estimators", "p2"), load("estimators", "multistate")
+    assert (p2.effort, multistate.effort) == (type(p2()).effort, 3.0)
+    assert multistate.objection([], ["pressure"], ["displacement"])
+    with pytest.raises(AttributeError):
+        _ = p2.nothing_of_that_name
+
+
+def test_class_methods_see_the_preset(monkeypatch: pytest.MonkeyPatch) -> None:
+    class Asked(PIEstimator):
+        @classmethod
+        def operators(cls) -> int:
+            return cls().n_operators
+
+    module = types.ModuleType("asked")
+    module.Asked = Asked  # type: ignore[attr-defined]
+    monkeypatch.setitem(sys.modules, "asked", module)
+    assert Chosen("few", preset("asked:Asked", "A few.", n_operators=3)).operators() == 3
+
+
+def test_another_package_gives_a_preset_by_an_entry_point(monkeypatch: pytest.MonkeyPatch) -> None:
+    outside = types.ModuleType("outside")
+    location = "mckibben.estimators.play_type.pi:PIEstimator"
+    outside.few = preset(location, "A PI model of three operators.", n_operators=3)  # type: ignore[attr-defined]
+    monkeypatch.setitem(sys.modules, "outside", outside)
+    entry = EntryPoint("pi-of-three", "outside:few", "mckibben.estimators")
+    monkeypatch.setattr(mckibben.registry, "entry_points", lambda group: [entry])
+    mckibben.registry._locations.cache_clear()
+    try:
+        assert "pi-of-three" in names("estimators")
+        assert load("estimators", "pi-of-three")().n_operators == 3
+    finally:
+        mckibben.registry._locations.cache_clear()
+
+
+def test_estimators_are_abstract_or_final() -> None:
+    ours = concrete(Estimator, "estimators")
+    for cls in ours:
+        overridden = [base for base in cls.__mro__[1:] if base in ours]
+        assert not overridden, f"{cls} overrides {overridden[0]}: give that a setting instead"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 import sys
 import zipfile
@@ -12,13 +13,15 @@ import pytest
 from tests import release
 from tests.release import ROOT, ReleaseError
 
+pytestmark = pytest.mark.long
+
 
 def test_the_archives_hold_the_package_and_nothing_else(tmp_path: Path) -> None:
     wheel, source = release.build(tmp_path)
     release.look_through(wheel, source)
     with zipfile.ZipFile(wheel, "a") as archive:
         archive.writestr("tests/__init__.py", "")
-    with pytest.raises(ReleaseError, match=r"should not hold tests/__init__\.py"):
+    with pytest.raises(ReleaseError, match=r"tests/__init__\.py"):
         release.look_through(wheel, source)
 
 
@@ -40,7 +43,7 @@ def test_the_version_is_one_everywhere(tmp_path: Path) -> None:
     assert release.agreed_version(ROOT)
     root = copied(tmp_path)
     (root / "CITATION.cff").write_text("version: 0.0.1\n")
-    with pytest.raises(ReleaseError, match=r"CITATION\.cff says 0\.0\.1"):
+    with pytest.raises(ReleaseError, match=r"CITATION\.cff.*0\.0\.1"):
         release.agreed_version(root)
 
 
@@ -53,10 +56,10 @@ def test_a_new_version_is_set_everywhere(tmp_path: Path) -> None:
     release.set_version(root, "97.0.0rc1")
     assert release.agreed_version(root) == "97.0.0rc1"
     assert changes.read_text().index("## 97.0.0rc1 (2") < changes.read_text().index("- More.")
-    with pytest.raises(ReleaseError, match="nothing under"):
+    with pytest.raises(ReleaseError):
         release.set_version(root, "98.0.0")
     for bad in ("98", "v98.0.0", "98.0.0; rm"):
-        with pytest.raises(ReleaseError, match="is no version"):
+        with pytest.raises(ReleaseError, match=re.escape(bad)):
             release.set_version(root, bad)
 
 

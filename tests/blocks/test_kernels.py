@@ -72,7 +72,7 @@ def test_elimination_exchanges_rows_and_ends_on_singular_ones() -> None:
         (lambda u, _: u, 300.0, 256.0, True),
         (lambda u, _: u, -300.0, 0.0, True),
         (lambda u, _: u if u < 1.5 else np.inf, 1.2, 1.2, False),
-        (lambda u, _: -1.0 if u < 1.0003 else 1.0, 0.0, 1.0003, False),
+        (lambda u, _: -1.0 if u < 1.3 else 1.0, 0.0, 1.3, False),
     ],
     ids=["on a step", "above", "below", "infinite beyond", "jump"],
 )
@@ -87,6 +87,13 @@ def test_a_braid_beyond_its_pressures_is_at_its_ends() -> None:
     ends = block.simulate([-1e3, 1e3])
     between = block.simulate(np.linspace(-5.0, 20.0, 26))
     assert ends[0] <= between.min() < between.max() <= ends[1]
+
+
+def test_a_root_between_neighbouring_numbers_is_one_of_them() -> None:
+    jump, low, high = 1.0003, 1.0, 1.001
+    u, out = plain(solve_near)(lambda u, _: -1.0 if u < jump else 1.0, 0.0, low, low, high, None)
+    assert abs(u - jump) <= np.spacing(1.0)
+    assert not out
 
 
 # -- several muscles ---------------------------------------------------------------------------

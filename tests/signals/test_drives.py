@@ -10,19 +10,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mckibben import DataError, ModelError
-from mckibben.registry import load, names
+from mckibben.registry import names
 from mckibben.signals import (
     binary_steps,
     build,
     chirp,
-    constant,
     decaying_sine,
     decaying_triangle,
     multisine,
     progressive_sine,
     progressive_triangle,
     pulls,
-    ramps,
     random_steps,
     random_wave,
     settings_of,
@@ -73,42 +71,43 @@ def test_words_make_the_signal_that_numbers_make(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", names("signals"))
-@pytest.mark.parametrize("wrong", ["nan", "inf", "-inf"])
-def test_numbers_that_are_none_are_refused(name: str, wrong: str) -> None:
-    for setting, (kind, _) in settings_of(name).items():
-        if kind == "number":
-            with pytest.raises(DataError, match="Remedy:"):
-                build(name, TIME, **{**SETTINGS[name], setting: wrong})
-
-
-@pytest.mark.parametrize("name", names("signals"))
-def test_times_that_are_none_are_refused(name: str) -> None:
+def test_numbers_seeds_and_times_that_are_none_are_refused(name: str) -> None:
+    settings = settings_of(name)
+    wrong = {key: ("nan", "inf", "-inf") for key, (kind, _) in settings.items() if kind == "number"}
+    if "seed" in settings and name != "multisine":
+        wrong["seed"] = ("-1",)
+    for key, values in wrong.items():
+        for value in values:
+            with pytest.raises(DataError):
+                build(name, TIME, **{**SETTINGS[name], key: value})
     for time in ([], [0.0, np.nan], [[0.0, 1.0]]):
-        with pytest.raises(DataError, match="time is not a row"):
+        with pytest.raises(DataError):
             build(name, time, **SETTINGS[name])
 
 
-def test_settings_are_told_and_checked() -> None:
+def test_settings_are_listed_and_checked() -> None:
     assert settings_of("chirp")["law"] == ("linear or logarithmic", "linear")
     assert settings_of("sine")["period"] == ("number", None)
     assert settings_of("staircase")["levels"] == ("numbers joined by /", None)
-    with pytest.raises(ModelError, match="no signal named 'cosine'"):
+    with pytest.raises(ModelError, match="'cosine'"):
         build("cosine", TIME)
-    with pytest.raises(DataError, match=r"no setting 'tempo'.*use period"):
-        build("sine", TIME, tempo=1, period=1, peaks=1)
-    with pytest.raises(DataError, match=r"needs the setting 'peaks'.*numbers joined by /"):
-        build("sine", TIME, period=1)
-    with pytest.raises(DataError, match=r"cannot take n_cycles='two'.*give integer"):
-        build("decaying-sine", TIME, period=1, high=2, n_cycles="two")
-    with pytest.raises(DataError, match=r"cannot take law='quadratic'.*linear or logarithmic"):
-        build("chirp", TIME, start_frequency=1, end_frequency=2, high=1, law="quadratic")
-
-
-@pytest.mark.parametrize("name", names("signals"))
-def test_a_negative_seed_is_refused(name: str) -> None:
-    if "seed" in settings_of(name) and name != "multisine":
-        with pytest.raises(DataError, match="seed -1"):
-            build(name, TIME, **{**SETTINGS[name], "seed": -1})
+    for name, about, settings in (
+        ("sine", r"'tempo'.*period", {"tempo": 1, "period": 1, "peaks": 1}),
+        ("sine", "'peaks'", {"period": 1}),
+        ("decaying-sine", "n_cycles='two'", {"period": 1, "high": 2, "n_cycles": "two"}),
+        ("decaying-sine", "0", {"period": 1, "high": 2, "n_cycles": 0}),
+        ("chirp", "'quadratic'", SETTINGS["chirp"] | {"law": "quadratic"}),
+        ("random-wave", "min_frequency 3", SETTINGS["random-wave"] | {"min_frequency": 3}),
+        ("multisine", "0 harmonics", SETTINGS["multisine"] | {"period": 1, "max_frequency": 0.5}),
+        ("binary-steps", "ramp", SETTINGS["binary-steps"] | {"hold": 1, "ramp": 1}),
+        ("random-steps", "longest", SETTINGS["random-steps"] | {"shortest": 3, "longest": 1}),
+        ("pulls", "3", SETTINGS["pulls"] | {"n_pulls": 3, "duration": 30}),
+        ("pulls", "0 pulls", SETTINGS["pulls"] | {"n_pulls": 0}),
+        ("ramps", "instants|points", {"instants": (1.0, 0.0), "values": (1.0, 2.0)}),
+        ("ramps", "instants|points", {"instants": (0.0,), "values": (1.0, 2.0)}),
+    ):
+        with pytest.raises(DataError, match=about):
+            build(name, TIME, **settings)  # type: ignore[arg-type]
 
 
 @given(st.integers(1, 12), st.floats(-2, 2), st.floats(0.1, 5))
@@ -119,11 +118,6 @@ def test_amplitudes_grow_and_fall_evenly(n: int, low: float, span: float) -> Non
         assert wave(time, 1.0, low + span, low, n) == pytest.approx(rising, abs=1e-9)
     for wave in (decaying_sine, decaying_triangle):
         assert wave(time, 1.0, low + span, low, n) == pytest.approx(rising[::-1], abs=1e-9)
-
-
-def test_no_cycles_are_too_few() -> None:
-    with pytest.raises(DataError, match="0 cycles"):
-        decaying_sine(TIME, 1.0, 2.0, n_cycles=0)
 
 
 def spectrum(wave: np.ndarray, rate: float) -> tuple[np.ndarray, np.ndarray]:
@@ -139,8 +133,6 @@ def test_a_random_wave_keeps_to_its_band() -> None:
     assert power[within].sum() > 0.9999
     halves = power[within & (frequency < 1.25)].sum() / power[within].sum()
     assert 0.25 < halves < 0.75
-    with pytest.raises(DataError, match="min_frequency 3"):
-        random_wave(time, 2.0, 5.0, min_frequency=3.0, seed=1)
 
 
 @pytest.mark.parametrize("phases", ["low-crest", "random"])
@@ -159,8 +151,6 @@ def test_low_crest_phases_lower_the_crest() -> None:
         np.std(multisine(time, 10.0, 3.0, 1.0, -1.0, phases="random", seed=i)) for i in range(5)
     ]
     assert np.std(multisine(time, 10.0, 3.0, 1.0, -1.0)) > max(spread)
-    with pytest.raises(DataError, match="has 0 harmonics"):
-        multisine(time, 1.0, 0.5, 1.0)
 
 
 @pytest.mark.parametrize("law", ["linear", "logarithmic"])
@@ -173,11 +163,6 @@ def test_a_chirp_has_the_frequency_of_its_law(law: Any) -> None:
     middle = 0.5 * (time[rising][1:] + time[rising][:-1]) / time[-1]
     expected = 0.2 + 3.0 * middle if law == "linear" else 0.2 * 16.0**middle
     assert found == pytest.approx(expected, rel=0.05)
-
-
-def test_a_chirp_may_stay_at_one_frequency() -> None:
-    expected = 0.5 - 0.5 * np.cos(2 * np.pi * TIME)
-    assert chirp(TIME, 1.0, 1.0, 1.0, law="logarithmic") == pytest.approx(expected, abs=1e-6)
 
 
 def test_binary_steps_are_a_maximum_length_sequence() -> None:
@@ -198,12 +183,6 @@ def test_steps_can_take_their_time() -> None:
     ):
         assert np.abs(np.diff(wave)).max() <= 3.0 * 0.01 / 0.5 + 1e-9
         assert np.ptp(wave) > 1.5
-    with pytest.raises(DataError, match="does not fit"):
-        binary_steps(time, 4.0, hold=1.0, ramp=1.0)
-    with pytest.raises(DataError, match="longest"):
-        random_steps(time, 4.0, shortest=3.0, longest=1.0, seed=0)
-    with pytest.raises(DataError, match="time starts"):
-        binary_steps([-1.0, 0.0], 4.0)
 
 
 @given(st.integers(0, 50))
@@ -222,19 +201,3 @@ def test_pulls_come_and_go() -> None:
     assert [wave[i : i + 2000].max() for i in (0, 2000, 4000)] == pytest.approx([100.0] * 3)
     assert np.count_nonzero(wave > 0) == pytest.approx(2700, abs=10)
     assert np.abs(np.diff(wave)).max() < 1.0
-    with pytest.raises(DataError, match="do not fit"):
-        pulls(TIME, 100.0, n_pulls=3, duration=30.0)
-    with pytest.raises(DataError, match="0 pulls"):
-        pulls(TIME, 100.0, n_pulls=0)
-
-
-def test_ramps_and_constants_refuse_what_makes_none() -> None:
-    assert constant(TIME, 2.0).tolist() == [2.0] * TIME.size
-    for instants, values in (((1.0, 0.0), (1.0, 2.0)), ((0.0,), (1.0, 2.0)), ((), ())):
-        with pytest.raises(DataError, match=r"instants|points"):
-            ramps(TIME, instants, values)
-
-
-def test_every_signal_is_registered_under_its_own_name() -> None:
-    for name in names("signals"):
-        assert load("signals", name).__name__ == name.replace("-", "_")

@@ -35,9 +35,7 @@ TAKES_RECORDINGS: list[Callable[[Any], object]] = [
 @pytest.mark.parametrize("given", ["run.csv", ["run.csv"], 3, np.zeros(5)], ids=repr)
 @pytest.mark.parametrize("takes", TAKES_RECORDINGS)
 def test_what_is_no_recording_is_refused(takes: Callable[[Any], object], given: object) -> None:
-    with pytest.raises(
-        DataError, match=r"a recording is needed here, not .* Remedy: read the file"
-    ):
+    with pytest.raises(DataError):
         takes(given)
 
 
@@ -56,8 +54,9 @@ def test_what_is_no_recording_is_refused(takes: Callable[[Any], object], given: 
     ids=range(8),
 )
 def test_what_are_no_samples_is_refused(samples: Any) -> None:
-    with pytest.raises(DataError, match=r"channel 'pressure': .* Remedy: "):
+    with pytest.raises(DataError) as refused:
         mckibben.Recording({"pressure": samples})
+    assert refused.value.channel == "pressure"
 
 
 RECORDING: Any = mckibben.Recording
@@ -76,27 +75,18 @@ COMPARE: Any = mckibben.compare
         lambda run: COMPARE(run, models=["pi"], n_folds=-3),
         lambda run: COMPARE(run, models=["pi"], n_folds=2.5),
         lambda run: COMPARE(run, models=["pi"], settings={"gpi": {"n_operators": 4}}),
+        lambda run: COMPARE(run, models=["pi"], load=5),
+        lambda run: GPI.simulate("run.csv"),
     ],
-    ids=range(9),
+    ids=range(11),
 )
 def test_arguments_of_other_kinds_are_refused_and_never_passed_over(
     made: Callable[[Any], object],
 ) -> None:
     (run,) = mckibben.read(mckibben.example.TRAIN)
-    with pytest.raises((DataError, ModelError), match="Remedy: "):
+    with pytest.raises((DataError, ModelError)) as refused:
         made(run)
-
-
-def test_whatever_is_named_a_refusal_can_be_read() -> None:
-    (run,) = mckibben.read(mckibben.example.TRAIN)
-    with pytest.raises(DataError) as refused:
-        mckibben.compare(run, models=["pi"], load=5)  # type: ignore[arg-type]
-    assert "channel '5'" in str(refused.value)
-
-
-def test_a_model_is_given_numbers() -> None:
-    with pytest.raises(DataError, match="give a recording or an array of numbers"):
-        GPI.simulate("run.csv")
+    assert "Remedy: " in str(refused.value)
 
 
 @pytest.mark.parametrize("sample_time", [0.0, -0.01, np.nan, np.inf])
@@ -113,7 +103,5 @@ def test_a_model_is_given_numbers() -> None:
 def test_no_time_between_samples_is_refused(
     runs: Callable[[float], object], sample_time: float
 ) -> None:
-    with pytest.raises(
-        ModelError, match=r"the time between samples cannot be .* give seconds, above 0"
-    ):
+    with pytest.raises(ModelError):
         runs(sample_time)

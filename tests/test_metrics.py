@@ -28,15 +28,9 @@ def test_scores_agree_with_scikit_learn(pair: tuple[Array, Array]) -> None:
     found = score(y, model)
     assert found.rmse == pytest.approx(math.sqrt(mean_squared_error(y, model)), rel=1e-12)
     assert found.mae == pytest.approx(mean_absolute_error(y, model), rel=1e-12)
+    assert found.mae <= found.rmse * (1 + 1e-12) <= found.max_error * (1 + 2e-12)
     if np.ptp(y) > 0:
         assert found.r2 == pytest.approx(r2_score(y, model), rel=1e-9, abs=1e-9)
-
-
-@given(PAIRS)
-def test_errors_are_ordered(pair: tuple[Array, Array]) -> None:
-    found = score(*pair)
-    assert found.mae <= found.rmse * (1 + 1e-12)
-    assert found.rmse <= found.max_error * (1 + 1e-12)
 
 
 @given(PAIRS, st.floats(0.01, 100.0), st.floats(-10.0, 10.0))
@@ -57,31 +51,29 @@ def test_err_is_that_of_the_paper() -> None:
     assert metrics.nrmse(y, model) == pytest.approx(math.sqrt((0.25 + 1) / 4) / 4)
 
 
-def test_a_perfect_model_has_no_error() -> None:
+def test_nothing_to_explain_and_nothing_missed() -> None:
     assert score([1.0, 2.0], [1.0, 2.0]) == Scores(0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
-
-
-def test_relative_errors_of_a_constant_measurement_are_nan() -> None:
-    found = score([0.1, 0.1, 0.1], [0.0, 0.1, 0.2])
-    assert all(math.isnan(value) for value in (found.r2, found.nrmse, found.err))
-    assert found.max_error == pytest.approx(0.1)
+    constant = score([0.1, 0.1, 0.1], [0.0, 0.1, 0.2])
+    assert all(math.isnan(value) for value in (constant.r2, constant.nrmse, constant.err))
+    assert constant.max_error == pytest.approx(0.1)
 
 
 @pytest.mark.parametrize(
-    ("measured", "modelled", "words"),
+    ("measured", "modelled", "row"),
     [
-        ([1.0, 2.0], [1.0], "cannot be compared"),
-        ([], [], "cannot be compared"),
-        ([[1.0]], [[1.0]], "cannot be compared"),
-        ([1.0, math.nan], [1.0, 2.0], "row 2.*nan"),
-        ([1.0, 2.0], [math.inf, 2.0], "row 1.*inf"),
+        ([1.0, 2.0], [1.0], None),
+        ([], [], None),
+        ([[1.0]], [[1.0]], None),
+        ([1.0, math.nan], [1.0, 2.0], 2),
+        ([1.0, 2.0], [math.inf, 2.0], 1),
     ],
 )
 def test_what_cannot_be_scored_is_refused(
-    measured: list[float], modelled: list[float], words: str
+    measured: list[float], modelled: list[float], row: int | None
 ) -> None:
-    with pytest.raises(DataError, match=words):
+    with pytest.raises(DataError) as refused:
         score(measured, modelled)
+    assert refused.value.row == row
 
 
 @given(st.floats(0.1, 10.0), st.floats(0.05, 0.95), st.integers(20, 200))
@@ -102,10 +94,12 @@ def test_width_of_a_parallelogram(gain: float, share: float, n: int) -> None:
     )
 
 
-def test_a_line_has_no_width_and_no_area() -> None:
+def test_a_line_has_no_width_and_what_is_no_loop_is_refused() -> None:
     u = np.array([0.0, 1.0, 2.0, 1.0, 0.0])
-    assert loop_width(u, 3 * u + 1) == 0
-    assert loop_area(u, 3 * u + 1) == 0
+    assert loop_width(u, 3 * u + 1) == loop_area(u, 3 * u + 1) == 0
+    for x, y in ((u[:3], u[:3]), (0 * u[:3] + 1, u[:3]), ([0.0, 1.0, 0.0], [2.0, 2.0, 2.0])):
+        with pytest.raises(DataError):
+            loop_width(x, y)
 
 
 @given(st.floats(0.1, 5.0), st.floats(0.1, 5.0), st.booleans())
@@ -113,16 +107,3 @@ def test_area_of_an_ellipse(a: float, b: float, clockwise: bool) -> None:
     phase = np.linspace(0, 2 * np.pi, 2001) * (-1 if clockwise else 1)
     area = loop_area(a * np.cos(phase) + 7, b * np.sin(phase) - 3)
     assert area == pytest.approx(np.pi * a * b, rel=1e-5)
-
-
-@pytest.mark.parametrize(
-    ("u", "y", "words"),
-    [
-        ([0.0, 1.0, 2.0], [0.0, 1.0, 2.0], "does not rise and fall"),
-        ([1.0, 1.0, 1.0], [0.0, 1.0, 2.0], "does not rise and fall"),
-        ([0.0, 1.0, 0.0], [2.0, 2.0, 2.0], "constant"),
-    ],
-)
-def test_what_is_no_loop_has_no_width(u: list[float], y: list[float], words: str) -> None:
-    with pytest.raises(DataError, match=words):
-        loop_width(u, y)

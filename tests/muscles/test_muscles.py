@@ -75,6 +75,10 @@ def test_order_of_the_library_is_irrelevant() -> None:
     one, other = (of_muscles(order, OTHER) for order in (muscles.list(), muscles.list()[::-1]))
     assert np.array_equal(one.mean, other.mean)
     assert (one.levels, one.shapes) == (other.levels, other.shapes)
+    sheet = OTHER.model_copy(update={"without": ["rail"]})
+    expected = of_muscles([one for one in muscles.list() if one.name != "rail"], OTHER)
+    np.testing.assert_array_equal(prior_of(sheet).mean, expected.mean)
+    assert prior_of(sheet).levels == prior_of(OTHER, without=["rail"]).levels == expected.levels
 
 
 def test_a_muscle_of_the_library_is_likely_itself_and_others_less_sure() -> None:
@@ -99,17 +103,17 @@ def test_weights_make_independent_numbers_of_deviation_one() -> None:
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("diameter_mm = 20.0\nrest_length_mm = 200.0", "neither braid_angle_deg nor max_force_N"),
+        ("diameter_mm = 20.0\nrest_length_mm = 200.0", "max_force_N"),
         ("diameter_mm = 20.0\nbraid_angle_deg = 25.0", "rest_length_mm"),
         ("diameter_mm = 20.0\nrest_length_mm = 200.0\nbraid_angle_deg = 60.0", "braid_angle_deg"),
-        ("diameter_mm = 20.0\nrest_length_mm = 200.0\nmax_force_N = 1e5", "no braid"),
+        ("diameter_mm = 20.0\nrest_length_mm = 200.0\nmax_force_N = 1e5", "max_force_N"),
         ("diameter_mm = 20.0\nrest_length_mm = 200.0\nbraid_angle_deg = 25.0\nx = 1", "x"),
-        ("diameter_mm = ", "no TOML"),
+        ("diameter_mm = ", "TOML"),
         (
             'diameter_mm = 20.0\nrest_length_mm = 200.0\nbraid_angle_deg = 25.0\nlike = "x"',
-            "no muscle",
+            "'x'",
         ),
-        ('format = "mckibben-muscle"\nversion = 2', "no identified muscle"),
+        ('format = "mckibben-muscle"\nversion = 2', "sheet.toml"),
         ('format = "mckibben-muscle"\nversion = 1', "title"),
     ],
 )
@@ -122,18 +126,12 @@ def test_bad_sheets_are_refused_by_what_is_wrong(tmp_path: Path, text: str, said
 
 def test_muscles_are_loaded_from_files_too(tmp_path: Path) -> None:
     path = tmp_path / "own.toml"
-    path.write_text(described(RAIL), encoding="utf-8")
-    assert load(path).balance == RAIL.balance
+    title = 'a "b" \\ \n\x1b\x7f ü'
+    path.write_text(described(replace(RAIL, title=title)), encoding="utf-8")
+    assert (load(path).balance, load(path).title) == (RAIL.balance, title)
     assert np.array_equal(prior_of(path).mean, prior_of("rail").mean, equal_nan=True)
-    with pytest.raises(DataError, match="no muscle 'nobody'"):
+    with pytest.raises(DataError, match="'nobody'"):
         load("nobody")
-
-
-def test_a_sheet_names_muscles_that_are_not_asked() -> None:
-    sheet = OTHER.model_copy(update={"without": ["rail"]})
-    expected = of_muscles([one for one in muscles.list() if one.name != "rail"], OTHER)
-    np.testing.assert_array_equal(prior_of(sheet).mean, expected.mean)
-    assert prior_of(sheet).levels == prior_of(OTHER, without=["rail"]).levels == expected.levels
 
 
 def test_a_muscle_of_ones_own_is_asked_as_those_of_the_library(tmp_path: Path) -> None:
@@ -151,14 +149,14 @@ def test_a_muscle_of_ones_own_is_asked_as_those_of_the_library(tmp_path: Path) -
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        ("offset = [", "set_off = [", "uncertainty: .*offset"),
-        ("wall = [", "wall = [0.1, ", "uncertainty: .*wall"),
-        ("damping = [0", "damping = [-0", "uncertainty.damping"),
-        ("loads = [[1.0]]", "loads = [[0.0]]", "no muscle of this data sheet"),
-        ("areas = [[", "areas = [[-", "areas at rest"),
+        ("offset = [", "set_off = [", "offset"),
+        ("wall = [", "wall = [0.1, ", "wall"),
+        ("damping = [0", "damping = [-0", "damping"),
+        ("loads = [[1.0]]", "loads = [[0.0]]", ""),
+        ("areas = [[", "areas = [[-", "areas"),
         ('title = "', 'title = 1 # "', "title"),
-        ("version = 1", "version = 1\na = " + "[" * 10_000, "no TOML"),
-        ("version = 1", "version = 1" + "0" * 5_000, "no TOML"),
+        ("version = 1", "version = 1\na = " + "[" * 10_000, "TOML"),
+        ("version = 1", "version = 1" + "0" * 5_000, "TOML"),
     ],
 )
 def test_bad_muscles_are_refused_by_what_is_wrong(
@@ -170,10 +168,3 @@ def test_bad_muscles_are_refused_by_what_is_wrong(
     with pytest.raises(DataError, match=rf"bad\.toml.*{said}") as caught:
         prior_of(tmp_path / "bad.toml")
     assert str(caught.value).count("Remedy") == 1
-
-
-def test_files_written_can_be_read_whatever_the_title(tmp_path: Path) -> None:
-    title = 'a "b" \\ \n\x1b\x7f ü'
-    path = tmp_path / "own.toml"
-    path.write_text(described(replace(RAIL, title=title)), encoding="utf-8")
-    assert load(path).title == title

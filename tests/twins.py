@@ -87,6 +87,35 @@ def polynomial_inverse(block: Any, inputs: Rows, sample_time: float) -> Rows:
     return _rows([bisect(lambda u: _power_sum(forward, u), y, low, high) for y in _column(inputs)])
 
 
+def stepping(model: Callable[[Any, float, float], Any]) -> Twin:
+    """Return the twin of a model that goes from input to input, made from its first and the step."""
+
+    def twin(block: Any, inputs: Rows, sample_time: float) -> Rows:
+        own = model(block, inputs[0][0], sample_time)
+        return _rows([float(own.go(u)) for u in _column(inputs)])
+
+    return twin
+
+
+def solved(model: Callable[[Any, float, float], Any]) -> Twin:
+    """Return the twin of an inverse: bisection on what the next output of a model would be."""
+
+    def twin(block: Any, inputs: Rows, sample_time: float) -> Rows:
+        forward = block.forward
+        low, high = getattr(forward, "input_range", None) or (-1e3, 1e3)
+        first = bisect(
+            lambda u: float(model(forward, u, sample_time).go(u)), inputs[0][0], low, high
+        )
+        own = model(forward, first, sample_time)
+        outputs = []
+        for y in _column(inputs):
+            outputs.append(bisect(lambda u: float(copy.copy(own).go(u)), y, low, high))
+            own.go(outputs[-1])
+        return _rows(outputs)
+
+    return twin
+
+
 # -- play operators --------------------------------------------------------------------------
 
 
@@ -98,41 +127,36 @@ def _play(state: float, u: float, r: float) -> float:
     return state
 
 
-def play(block: Any, inputs: Rows, sample_time: float) -> Rows:
-    state = inputs[0][0] - block.threshold
-    outputs = []
-    for u in _column(inputs):
-        state = _play(state, u, block.threshold)
-        outputs.append(state)
-    return _rows(outputs)
+class _Play:
+    def __init__(self, block: Any, first: float, step: float) -> None:
+        self.r, self.state = block.threshold, first - block.threshold
+
+    def go(self, u: float) -> float:
+        self.state = _play(self.state, u, self.r)
+        return self.state
 
 
-def pi(block: Any, inputs: Rows, sample_time: float) -> Rows:
-    states = [inputs[0][0] - r for r in block.thresholds]
-    outputs = []
-    for u in _column(inputs):
-        states = [_play(s, u, r) for s, r in zip(states, block.thresholds, strict=True)]
-        outputs.append(block.offset + _sum(block.weights, states))
-    return _rows(outputs)
+class _PI:
+    def __init__(self, block: Any, first: float, step: float) -> None:
+        self.block, self.states = block, [first - r for r in block.thresholds]
+
+    def go(self, u: float) -> float:
+        pairs = zip(self.states, self.block.thresholds, strict=True)
+        self.states = [_play(s, u, r) for s, r in pairs]
+        return float(self.block.offset + _sum(self.block.weights, self.states))
 
 
-def pi_inverse(block: Any, inputs: Rows, sample_time: float) -> Rows:
-    forward = block.forward
-    thresholds, weights, offset = forward.thresholds, forward.weights, forward.offset
-    low, high = forward.input_range
+class _RateDependentPI(_PI):
+    def __init__(self, block: Any, first: float, step: float) -> None:
+        super().__init__(block, first, step)
+        self.step, self.previous, self.rate = step, first, 0.0
 
-    def risen(u: float) -> list[float]:
-        return [u - r for r in thresholds]
-
-    def moved(u: float) -> list[float]:
-        return [_play(s, u, r) for s, r in zip(states, thresholds, strict=True)]
-
-    states = risen(bisect(lambda u: offset + _sum(weights, risen(u)), inputs[0][0], low, high))
-    outputs = []
-    for y in _column(inputs):
-        outputs.append(bisect(lambda u: offset + _sum(weights, moved(u)), y, low, high))
-        states = moved(outputs[-1])
-    return _rows(outputs)
+    def go(self, u: float) -> float:
+        played, tau = super().go(u), self.block.rate_time_constant
+        keep = math.exp(-self.step / tau) if tau > 0 else 0.0
+        self.rate = keep * self.rate + (1 - keep) * (u - self.previous) / self.step
+        self.previous = u
+        return played + self.rate * _sum(self.block.rate_weights, self.states)
 
 
 def pi_adaptive(block: Any, inputs: Rows, sample_time: float) -> Rows:
@@ -224,52 +248,6 @@ def _risen(forward: Any, y: float) -> float:
     return bisect(risen, y, *forward.input_range)
 
 
-def rate_dependent_pi(block: Any, inputs: Rows, sample_time: float) -> Rows:
-    states = [inputs[0][0] - r for r in block.thresholds]
-    previous, rate = inputs[0][0], 0.0
-    outputs = []
-    for u in _column(inputs):
-        states, rate = _rated(block, states, rate, previous, u, sample_time)
-        outputs.append(_rated_output(block, states, rate))
-        previous = u
-    return _rows(outputs)
-
-
-def _rated(
-    block: Any, states: list[float], rate: float, previous: float, u: float, sample_time: float
-) -> tuple[list[float], float]:
-    raw = (u - previous) / sample_time
-    tau = block.rate_time_constant
-    keep = math.exp(-sample_time / tau) if tau > 0 else 0.0
-    moved = [_play(s, u, r) for s, r in zip(states, block.thresholds, strict=True)]
-    return moved, keep * rate + (1 - keep) * raw
-
-
-def _rated_output(block: Any, states: list[float], rate: float) -> float:
-    weights = [k * rate + d for k, d in zip(block.rate_weights, block.weights, strict=True)]
-    return float(block.offset + _sum(tuple(weights), states))
-
-
-def rate_dependent_pi_inverse(block: Any, inputs: Rows, sample_time: float) -> Rows:
-    forward = block.forward
-    low, high = forward.input_range
-
-    def at_rest(u: float) -> float:
-        return _rated_output(forward, [u - r for r in forward.thresholds], 0.0)
-
-    def moved(u: float) -> tuple[list[float], float]:
-        return _rated(forward, states, rate, previous, u, sample_time)
-
-    previous, rate = bisect(at_rest, inputs[0][0], low, high), 0.0
-    states = [previous - r for r in forward.thresholds]
-    outputs = []
-    for y in _column(inputs):
-        outputs.append(bisect(lambda u: _rated_output(forward, *moved(u)), y, low, high))
-        states, rate = moved(outputs[-1])
-        previous = outputs[-1]
-    return _rows(outputs)
-
-
 # -- generalised and unparallel play operators -----------------------------------------------
 
 
@@ -351,42 +329,17 @@ def _unparallel(block: Any, state: float, x: float, r: float) -> float:
     return x - r if x - r > state else state
 
 
-def _unparallel_output(block: Any, states: list[float], x: float) -> float:
-    smooth = sum(a * x ** (power + 1) for power, a in enumerate(block.polynomial))
-    return float(block.offset + smooth + _sum(block.weights, states))
+class _EUPI:
+    def __init__(self, block: Any, first: float, step: float) -> None:
+        self.block = block
+        self.states = [first - block.input_range[0] - r for r in block.thresholds]
 
-
-def eupi(block: Any, inputs: Rows, sample_time: float) -> Rows:
-    origin = block.input_range[0]
-    states = [inputs[0][0] - origin - r for r in block.thresholds]
-    outputs = []
-    for u in _column(inputs):
-        x = u - origin
-        states = [
-            _unparallel(block, s, x, r) for s, r in zip(states, block.thresholds, strict=True)
-        ]
-        outputs.append(_unparallel_output(block, states, x))
-    return _rows(outputs)
-
-
-def eupi_inverse(block: Any, inputs: Rows, sample_time: float) -> Rows:
-    forward = block.forward
-    low, high = forward.input_range
-
-    def moved(u: float) -> list[float]:
-        pairs = zip(states, forward.thresholds, strict=True)
-        return [_unparallel(forward, s, u - low, r) for s, r in pairs]
-
-    def output(u: float) -> float:
-        return _unparallel_output(forward, moved(u), u - low)
-
-    states = [-math.inf] * len(forward.thresholds)
-    states = moved(bisect(output, inputs[0][0], low, high))
-    outputs = []
-    for y in _column(inputs):
-        outputs.append(bisect(output, y, low, high))
-        states = moved(outputs[-1])
-    return _rows(outputs)
+    def go(self, u: float) -> float:
+        block, x = self.block, u - self.block.input_range[0]
+        pairs = zip(self.states, block.thresholds, strict=True)
+        self.states = [_unparallel(block, s, x, r) for s, r in pairs]
+        smooth = sum(a * x ** (power + 1) for power, a in enumerate(block.polynomial))
+        return float(block.offset + smooth + _sum(block.weights, self.states))
 
 
 # -- relays and ramps on a grid --------------------------------------------------------------
@@ -427,7 +380,7 @@ def _relay_share(way: list[float], levels: Any, i: int, j: int) -> float:
 
 
 class _Relays:
-    def __init__(self, block: Any, first: float) -> None:
+    def __init__(self, block: Any, first: float, step: float) -> None:
         self.block, self.way = block, [block.levels[0], first]
 
     def go(self, u: float) -> float:
@@ -441,7 +394,7 @@ class _Relays:
 
 
 class _Ramps:
-    def __init__(self, block: Any, first: float) -> None:
+    def __init__(self, block: Any, first: float, step: float) -> None:
         self.block = block
         self.states = [self.ramp(first, i) for i, _, _ in _cells(block)]
 
@@ -466,13 +419,8 @@ class _Ramps:
 # -- springs that slip, and differential equations in the input ------------------------------
 
 
-def _smooth(block: Any, u: float) -> float:
-    x = (u - block.centre) / block.scale
-    return math.fsum(c * x**power for power, c in enumerate(block.polynomial))
-
-
 class _Springs:
-    def __init__(self, block: Any, first: float) -> None:
+    def __init__(self, block: Any, first: float, step: float) -> None:
         self.block, self.previous = block, first
         self.states = list(block.breakaways)
 
@@ -485,7 +433,7 @@ class _Springs:
         return [max(s + kappa * du, -ratio * r) for s, r in pairs]
 
     def output(self, u: float) -> float:
-        return _smooth(self.block, u) + _sum(self.block.weights, self.moved(u))
+        return _power_sum(self.block, u) + _sum(self.block.weights, self.moved(u))
 
     def go(self, u: float) -> float:
         output = self.output(u)
@@ -528,7 +476,7 @@ def _sign(x: float) -> float:
 
 
 class _BoucWen:
-    def __init__(self, block: Any, first: float) -> None:
+    def __init__(self, block: Any, first: float, step: float) -> None:
         self.block, self.previous, self.z = block, first, 1.0
 
     def slope(self, u: float, z: float, going: float) -> float:
@@ -542,7 +490,7 @@ class _BoucWen:
 
     def go(self, u: float) -> float:
         self.z, self.previous = self.moved(u), u
-        return _smooth(self.block, u) + float(self.block.weight) * self.z
+        return _power_sum(self.block, u) + float(self.block.weight) * self.z
 
 
 class _GeneralizedBoucWen(_BoucWen):
@@ -554,7 +502,7 @@ class _GeneralizedBoucWen(_BoucWen):
 
 
 class _Duhem:
-    def __init__(self, block: Any, first: float) -> None:
+    def __init__(self, block: Any, first: float, step: float) -> None:
         self.block, self.previous = block, first
         # a rise from far away ends on the curve that rising inputs tend to
         far = first - 40 * block.scale / block.alpha
@@ -579,16 +527,6 @@ class _Duhem:
     def go(self, u: float) -> float:
         self.y, self.previous = self.along(self.previous, u), u
         return self.y
-
-
-def stepping(model: Callable[[Any, float], Any]) -> Twin:
-    """Return the twin of a model that goes from input to input."""
-
-    def twin(block: Any, inputs: Rows, sample_time: float) -> Rows:
-        own = model(block, inputs[0][0])
-        return _rows([own.go(u) for u in _column(inputs)])
-
-    return twin
 
 
 def _oscillator(slope: Callable[[Any, float, float], float]) -> Twin:
@@ -729,32 +667,15 @@ def fed_back(slopes: Rows, by_past: Rows) -> Rows:
     return found
 
 
-def creep(block: Any, inputs: Rows, sample_time: float) -> Rows:
-    elements = [inputs[0][0]] * len(block.compliances)
-    outputs = []
-    for u in _column(inputs):
-        decays = [math.exp(-sample_time / tau) for tau in block.time_constants]
-        elements = [u + (x - u) * a for x, a in zip(elements, decays, strict=True)]
-        outputs.append(u + _sum(block.compliances, elements))
-    return _rows(outputs)
+class _Creep:
+    def __init__(self, block: Any, first: float, step: float) -> None:
+        # an inverse begins at rest too, where every element has come to the input
+        self.block, self.elements = block, [first] * len(block.compliances)
+        self.decays = [math.exp(-step / tau) for tau in block.time_constants]
 
-
-def _crept(compliances: Any, elements: list[float], decays: list[float], u: float) -> float:
-    moved = [u + (x - u) * a for x, a in zip(elements, decays, strict=True)]
-    return u + _sum(compliances, moved)
-
-
-def creep_inverse(block: Any, inputs: Rows, sample_time: float) -> Rows:
-    forward = block.forward
-    elements = [inputs[0][0] / (1 + sum(forward.compliances))] * len(forward.compliances)
-    outputs = []
-    for y in _column(inputs):
-        decays = [math.exp(-sample_time / tau) for tau in forward.time_constants]
-
-        u = bisect(partial(_crept, forward.compliances, elements, decays), y, -1e3, 1e3)
-        elements = [u + (x - u) * a for x, a in zip(elements, decays, strict=True)]
-        outputs.append(u)
-    return _rows(outputs)
+    def go(self, u: float) -> float:
+        self.elements = [u + (x - u) * a for x, a in zip(self.elements, self.decays, strict=True)]
+        return u + _sum(self.block.compliances, self.elements)
 
 
 def _air_moved(block: Any, sample_time: float, x: float, u: float) -> float:
@@ -966,23 +887,6 @@ def activation_memory(block: Any, inputs: Rows, sample_time: float) -> Rows:
         outputs.append(_sum(block.surface, powers) + friction + viscous + relaxed)
         previous = e
     return _rows(outputs)
-
-
-def _solved(model: Callable[[Any, float], Any]) -> Twin:
-    """Return the twin of an inverse: bisection on what the next output of a model would be."""
-
-    def twin(block: Any, inputs: Rows, sample_time: float) -> Rows:
-        forward = block.forward
-        low, high = forward.input_range
-        first = bisect(lambda u: float(model(forward, u).go(u)), inputs[0][0], low, high)
-        own = model(forward, first)
-        outputs = []
-        for y in _column(inputs):
-            outputs.append(bisect(lambda u: float(copy.copy(own).go(u)), y, low, high))
-            own.go(outputs[-1])
-        return _rows(outputs)
-
-    return twin
 
 
 # -- several muscles -------------------------------------------------------------------------
@@ -1458,7 +1362,7 @@ def band(block: Any, inputs: Rows, sample_time: float) -> Rows:
 
 
 def banded_pi(block: Any, inputs: Rows, sample_time: float) -> Rows:
-    modelled = pi(block.forward, inputs, sample_time)
+    modelled = stepping(_PI)(block.forward, inputs, sample_time)
     both = [[*given, *found] for given, found in zip(inputs, modelled, strict=True)]
     return band(block.band, both, sample_time)
 
@@ -1474,7 +1378,7 @@ TWINS: dict[str, Twin] = {
     "balance": balance,
     "balance-inverse": balance_inverse,
     "bouc-wen": stepping(_BoucWen),
-    "bouc-wen-inverse": _solved(_BoucWen),
+    "bouc-wen-inverse": solved(_BoucWen),
     "bouc-wen-oscillator": _oscillator(_bouc_wen_slope),
     "braid-equilibrium": braid_equilibrium,
     "braid-equilibrium-inverse": braid_equilibrium_inverse,
@@ -1485,44 +1389,44 @@ TWINS: dict[str, Twin] = {
     "force-balance-inverse": force_balance_inverse,
     "fuzzy-network": fuzzy_network,
     "fuzzy-network-inverse": fuzzy_network_inverse,
-    "creep": creep,
-    "creep-inverse": creep_inverse,
+    "creep": stepping(_Creep),
+    "creep-inverse": solved(_Creep),
     "duhem": stepping(_Duhem),
-    "duhem-inverse": _solved(_Duhem),
+    "duhem-inverse": solved(_Duhem),
     "duhem-oscillator": _oscillator(_duhem_slope),
-    "eupi": eupi,
-    "eupi-inverse": eupi_inverse,
+    "eupi": stepping(_EUPI),
+    "eupi-inverse": solved(_EUPI),
     "exponential": exponential,
     "generalized-bouc-wen": stepping(_GeneralizedBoucWen),
-    "generalized-bouc-wen-inverse": _solved(_GeneralizedBoucWen),
+    "generalized-bouc-wen-inverse": solved(_GeneralizedBoucWen),
     "gpi": gpi,
     "gpi-inverse": gpi_inverse,
     "krasnoselskii-pokrovskii": stepping(_Ramps),
-    "krasnoselskii-pokrovskii-inverse": _solved(_Ramps),
+    "krasnoselskii-pokrovskii-inverse": solved(_Ramps),
     "load-estimate": load_estimate,
     "contact": contact,
     "contact-inverse": contact_inverse,
     "logarithm": logarithm,
     "maxwell-slip": stepping(_Springs),
-    "maxwell-slip-inverse": _solved(_Springs),
+    "maxwell-slip-inverse": solved(_Springs),
     "multistate-friction": multistate_friction,
     "narx-network": narx_network,
     "narx-polynomial": narx_polynomial,
     "negative": negative,
-    "pi": pi,
+    "pi": stepping(_PI),
     "pid": pid,
     "pi-adaptive": pi_adaptive,
-    "pi-inverse": pi_inverse,
+    "pi-inverse": solved(_PI),
     "piecewise-linear": piecewise_linear,
-    "play": play,
+    "play": stepping(_Play),
     "polynomial": polynomial,
     "polynomial-force": polynomial_force,
     "polynomial-inverse": polynomial_inverse,
     "preisach": stepping(_Relays),
-    "preisach-inverse": _solved(_Relays),
+    "preisach-inverse": solved(_Relays),
     "process-model": process_model,
-    "rate-dependent-pi": rate_dependent_pi,
-    "rate-dependent-pi-inverse": rate_dependent_pi_inverse,
+    "rate-dependent-pi": stepping(_RateDependentPI),
+    "rate-dependent-pi-inverse": solved(_RateDependentPI),
     "state-network": state_network,
     "tondu-lopez": tondu_lopez,
     "recurrent-fuzzy-network": recurrent_fuzzy_network,

@@ -96,9 +96,3 @@ def test_one_inflation_of_a_held_muscle_tells_of_other_lengths() -> None:
     found, run = load_of(model.model_), held(25.0)
     off = found.simulate(run.select(["pressure", "displacement"]))["force"] - run["force"]
     assert np.sqrt(np.mean(off**2)) < 0.04 * SHEET.force
-
-
-
-
-
-

@@ -53,8 +53,6 @@ def test_known_outputs_tell_how_far_elements_had_crept(block: Block) -> None:
     np.testing.assert_allclose(begun_state(block, rest, inputs, y, STEP, early), crept, atol=1e-8)
 
 
-
-
 def test_a_drift_from_before_the_recording_is_found_and_gone_on_from() -> None:
     run = worked(SLOW, 200, 100, 0.01)
     train, test = run.slice(0, 120), run.slice(120, 200)
@@ -68,8 +66,6 @@ def test_a_drift_from_before_the_recording_is_found_and_gone_on_from() -> None:
     errors = [float(np.sqrt(np.mean(error**2))) for error in missed]
     assert errors[0] < 0.5 * errors[1]
     assert found.diagnostics_.rmse < 0.5 * settled.diagnostics_.rmse
-
-
 
 
 def test_where_the_muscle_was_settled_nothing_is_made_up() -> None:
@@ -102,7 +98,3 @@ def test_moves_of_what_was_begun_are_those_of_finite_differences() -> None:
     moves = estimator.moves(theta, linear, data)
     differences = SeparableEstimator.moves(estimator, theta, linear, data)
     np.testing.assert_allclose(moves, differences, atol=2e-4 * np.abs(moves).max())
-
-
-
-

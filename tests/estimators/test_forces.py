@@ -177,8 +177,6 @@ def test_frequency_is_read_off_the_input() -> None:
         assert dominant_frequency(data.runs[0]) == pytest.approx(frequency, rel=0.1)
 
 
-
-
 class TestBalanceForce:
     """A balance asked for its load, as a model of force."""
 
@@ -212,6 +210,3 @@ class TestBalanceForce:
             for name in ("length", "displacement")
         ]
         np.testing.assert_allclose(np.concatenate(forces[0]), np.concatenate(forces[1]), atol=1e-6)
-
-
-

@@ -144,7 +144,3 @@ def test_an_unstable_model_is_refused_unless_it_is_asked_for() -> None:
     assert stable(calm, data)
     wild = [1.1 if term == (0,) else w for term, w in zip(calm.terms, calm.weights, strict=True)]
     assert not stable(calm.unpack(wild), data)
-
-
-
-

@@ -44,5 +44,3 @@ def test_bernstein_pieces_are_integrals_of_bernstein_polynomials() -> None:
         density = np.asarray(binom.pmf(k, 3, x))
         integral = np.concatenate([[0], np.cumsum(0.5 * (density[1:] + density[:-1]) * np.diff(x))])
         np.testing.assert_allclose(pieces[:, k], integral, atol=1e-8)
-
-

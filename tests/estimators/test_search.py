@@ -1,3 +1,7 @@
+"""Searches and linear solutions of fits, against SciPy and known minima."""
+
+from __future__ import annotations
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -10,6 +14,7 @@ from mckibben.blocks.dynamic.creep import Creep
 from mckibben.blocks.play_type.pi import PI
 from mckibben.estimators.core.checking import training_data
 from mckibben.estimators.core.separable import SeparableEstimator
+from mckibben.estimators.optimisers.descent import Damping, Radius, Trust, descend
 from mckibben.estimators.optimisers.linear import solve_linear
 from mckibben.estimators.optimisers.multi_start import Choice, multi_start
 from mckibben.estimators.optimisers.swarm import Swarm, particle_swarm
@@ -19,19 +24,20 @@ from mckibben.registry import load
 CPI = Series((PI.example(), Creep.example()))
 
 
-@given(st.integers(0, 10_000), st.booleans())
-def test_linear_solution_matches_scipy(seed: int, nonnegative: bool) -> None:
+@given(st.integers(0, 10_000), st.sampled_from([None, 0.0, 0.2]))
+def test_linear_solution_matches_scipy(seed: int, least: float | None) -> None:
+    """Of weights of either sign, and of weights with least values but for the first."""
     rng = np.random.default_rng(seed)
     basis = rng.standard_normal((60, 5))
     target = basis @ rng.uniform(-1, 1, 5) + 3 + 0.1 * rng.standard_normal(60)
-    lower = np.array([*([0.0 if nonnegative else -np.inf] * 5), -np.inf])
-    reference = lsq_linear(
-        np.column_stack([basis, np.ones(60)]), target, (lower, np.inf), tol=1e-14, method="bvls"
-    )
-    x, offset = solve_linear(basis, target, nonnegative=nonnegative)
+    low = np.full(5, -np.inf if least is None else least)
+    low[0] = -np.inf
+    bounds = np.append(low, -np.inf), np.inf
+    columns = np.column_stack([basis, np.ones(60)])
+    reference = lsq_linear(columns, target, bounds, tol=1e-14, method="bvls")
+    given_least = None if least is None else low
+    x, offset = solve_linear(basis, target, nonnegative=least is not None, least=given_least)
     np.testing.assert_allclose([*x, offset], reference.x, rtol=1e-6, atol=1e-8)
-
-
 
 
 def test_nearly_parallel_columns_are_solved_without_squaring_the_condition() -> None:
@@ -78,43 +84,42 @@ def valley(point: np.ndarray) -> np.ndarray:
 
 
 def test_multi_start_finds_the_minimum_and_reports() -> None:
-    told: list[float] = []
-    tracker = Tracker(progress=lambda share, best: told.append(share), budget=100)
     starts = [np.array([-1.2, 1.0]), np.array([2.0, -1.0])]
     best = multi_start(
         valley,
         starts,
         np.full(2, -5.0),
         np.full(2, 5.0),
-        tracker,
+        Tracker(),
         n_refined=2,
         max_evaluations=100,
     )
     np.testing.assert_allclose(best, [1, 1], atol=1e-5)
-    assert told
-    assert all(0 < share <= 0.99 for share in told)
 
 
+def test_a_swarm_finds_the_minimum_and_repeats() -> None:
+    lower, upper = np.array([-1.0, -2.0, 0.0]), np.array([1.0, 2.0, 3.0])
+
+    def sphere(points: np.ndarray) -> np.ndarray:
+        return np.asarray(((points - 0.3) ** 2).sum(axis=1))
+
+    first, second = (
+        particle_swarm(sphere, lower, upper, Swarm(8, 30), Tracker(), seed=5) for _ in range(2)
+    )
+    np.testing.assert_array_equal(first, second)
+    assert sphere(first[np.newaxis])[0] < 1e-2
 
 
+@pytest.mark.parametrize("trust", [Radius(np.array([-1.2, 1.0]), np.ones(2)), Damping(1e-3, 1e9)])
+def test_descent_falls_at_every_step_and_arrives(trust: Trust) -> None:
+    def slopes(point: np.ndarray) -> np.ndarray:
+        return np.array([[-20 * point[0], 10.0], [-1.0, 0.0]])
 
-
-def sphere(points: np.ndarray) -> np.ndarray:
-    return np.asarray(((points - 0.3) ** 2).sum(axis=1))
-
-
-
-
-
-
-def test_swarm_survives_costs_that_are_not_numbers() -> None:
-    def costs(points: np.ndarray) -> np.ndarray:
-        values = sphere(points)
-        values[points[:, 0] > 0.5] = np.nan
-        return values
-
-    best = particle_swarm(costs, np.zeros(2), np.ones(2), Swarm(10, 20), Tracker(), seed=0)
-    assert best[0] <= 0.5
+    start = np.array([-1.2, 1.0])
+    path = list(descend(valley, slopes, start, trust, most_evaluations=100, least_gain=1e-12))
+    costs = [float(np.sum(valley(point) ** 2)) for point, _ in path]
+    assert np.all(np.diff(costs) < 0)
+    np.testing.assert_allclose(path[-1][0], [1, 1], atol=1e-6)
 
 
 def rugged(point: np.ndarray) -> np.ndarray:

@@ -10,9 +10,7 @@ import pytest
 
 from mckibben import GPI, PIEstimator, Recording
 from mckibben.comparison.kept import Kept
-from mckibben.comparison.row import Row
 from mckibben.estimators.core.estimator import Estimator
-from mckibben.metrics import score
 from mckibben.papers.keeping import fitted, recorded
 from mckibben.signals import triangle
 
@@ -60,23 +58,6 @@ def test_an_interrupted_fit_is_not_kept(
         fitted(Kept(tmp_path), "gpi", GPIEstimator(), recording)
     assert not (tmp_path / "unfinished").exists()
     assert GPIEstimator().fit(recording).diagnostics_.interrupted  # by itself it is
-
-
-def test_rows_of_several_outputs_are_read_back(tmp_path: Path) -> None:
-    scores = score([0.0, 1.0, 2.0], [0.1, 1.0, 2.0])
-    row = Row(
-        "a",
-        n_parameters=3,
-        train=scores,
-        test=scores,
-        fit_seconds=0.1,
-        step_ns=1.0,
-        outputs={"y": scores},
-        validation_by_output={"y": 1 / 3},
-        block=GPI.example(),
-    )
-    Kept(tmp_path).put("a", row)
-    assert Kept(tmp_path).get("a", Row) == row
 
 
 def test_recordings_are_read_back_and_damaged_ones_made_again(tmp_path: Path) -> None:

@@ -17,6 +17,8 @@ from mckibben.papers.mpi_narmax.models import (
 from mckibben.papers.mpi_narmax.tables import PRINTED_MAE
 from mckibben.papers.reproduction import reproduce
 
+pytestmark = pytest.mark.long
+
 Rows = dict[str, dict[str, Any]]
 
 VOLTS = (2, 4, 6, 8, 10)
@@ -67,21 +69,6 @@ def test_force_moves_every_load_model_while_the_voltage_is_held(found: dict[str,
             assert max(shares) < 3.0
     assert held[OURS]["MAE"] < 2.0
     assert held[THREE_RATES]["MAE"] < 3.5
-
-
-def test_what_is_no_better_off_its_patterns_is_named(found: dict[str, Any]) -> None:
-    off = rows(found, "does not repeat")
-    (said,) = (sentence for sentence in found["summary"] if sentence.startswith("Only good near"))
-    free, _, held = said.partition("random voltage and force: ")[2].partition(
-        ". With the voltage held: "
-    )
-    for where, named in (("random", free), ("voltage held", held.rstrip("."))):
-        blind = min(off[name][f"{where}, MAE"] for name in UNLOADED)
-        worse = [
-            name for name in off if name not in UNLOADED and off[name][f"{where}, MAE"] >= blind
-        ]
-        everything = len(worse) == len(off) - len(UNLOADED)
-        assert named == ("all" if everything else "; ".join(worse) or "none")
 
 
 def test_every_error_stands_beside_the_printed_one(found: dict[str, Any]) -> None:

@@ -21,7 +21,6 @@ from mckibben.papers.sdchm.models import (
     OURS,
     PREDICTING,
     PUBLISHED,
-    RAW,
     Models,
     fit_models,
 )
@@ -64,31 +63,12 @@ def test_groups_of_table_4_are_at_its_stiffness(runs: Recordings) -> None:
     found = predictions(runs, **{OURS: None}).groups(OURS, 0.1)
     assert list(found) == list("abcdefghijkl")
     assert [rmse for _, rmse in found.values()] == pytest.approx([0.1] * 12)
-    titles = [table.title for table in predictions(runs).tables()]
-    assert [("(its Table 4)" in t, "at 0.1 bar" in t) for t in titles if "0.1 bar" in t] == [
-        (True, True)
-    ] * 2
-    assert sum("its Figure 11" in title for title in titles) == 2
-    assert not any("unseen" in title for title in titles)
 
 
 def test_joint_runs_come_first_and_choose_by_validation(runs: Recordings) -> None:
     found = predictions(runs, **{LINEAR: 3.0, PUBLISHED: 8.0, BALANCE: 0.5})
-    titles = [table.title for table in found.tables()]
-    assert all("All pressures random" in title for title in titles[:2])
     assert found.headline == BALANCE
     assert found.only_along_patterns == [PUBLISHED]
-    first, second, *_ = found.summary()
-    assert f"{BALANCE}, chosen on validation runs, is off by 0.50 mm" in first
-    assert second.startswith("Only near the patterns trained on: SDCHM, the paper's (8.0 mm)")
-
-
-def test_no_ratio_is_given_over_a_baseline_that_failed(runs: Recordings) -> None:
-    *_, failed = predictions(runs, **{LINEAR: 3.0, RAW: 9.0, DAMPED: 4.0}).summary()
-    assert failed.startswith("No raw network was fitted well enough")
-    *_, sound = predictions(runs, **{LINEAR: 3.0, RAW: 9.0, DAMPED: 2.0}).summary()
-    assert f"({DAMPED})" in sound
-    assert f"{OURS} leaves 0.50 times its error" in sound
 
 
 def test_the_whole_test_set_is_recorded_and_scored(runs: Recordings) -> None:
@@ -96,8 +76,6 @@ def test_the_whole_test_set_is_recorded_and_scored(runs: Recordings) -> None:
     recorded = [whole[name] for name in names]
     chosen = [run for run in recorded if run.role == "test" and run.labels["stage"] == "network"]
     assert sum(len(run.inputs) for run in chosen) == 48_000
-    (table,) = (t for t in predictions(runs).tables() if "test set" in t.title)
-    assert "0.3, 0.9, 1.3, 1.9, 2.1, 2.4 bar" in table.note
 
 
 def test_figure_13_follows_the_printed_reference() -> None:
@@ -146,9 +124,8 @@ def quick() -> Iterator[Seen]:
         yield Seen(found, **kept)
 
 
+@pytest.mark.long
 def test_the_headline_holds_beside_the_training_patterns(quick: Seen) -> None:
-    first = quick.found.tables[0]
-    assert "All pressures random" in first.title
     cells = quick.cells("extensor constant")
     worst = {name: max(row[f"RMSE {k} [mm]"] for k in (1, 2, 3)) for name, row in cells.items()}
     headline = next(name for name in INVERTED if f": {name}, chosen" in quick.found.summary[0])
@@ -156,9 +133,9 @@ def test_the_headline_holds_beside_the_training_patterns(quick: Seen) -> None:
     assert worst[headline] < 0.6 * worst[LINEAR]
     # what is printed has no damping: said, not hidden
     assert worst[PUBLISHED] > worst[LINEAR]
-    assert PUBLISHED in quick.found.summary[1]
 
 
+@pytest.mark.long
 def test_along_the_patterns_the_order_is_the_papers(quick: Seen) -> None:
     rmse = {name: row["RMSE 1 [mm]"] for name, row in quick.cells("test set").items()}
     assert rmse[OURS] < rmse[PUBLISHED] < 0.5 * rmse[DAMPED] < 0.5 * rmse[LINEAR]
@@ -167,6 +144,7 @@ def test_along_the_patterns_the_order_is_the_papers(quick: Seen) -> None:
     assert all(row[OURS] < 1.5 for row in groups.values())
 
 
+@pytest.mark.long
 def test_gains_stand_beside_the_printed_ones_of_the_same_name(quick: Seen) -> None:
     cells = quick.cells("Table 3")
     printed = {
@@ -182,6 +160,7 @@ def test_gains_stand_beside_the_printed_ones_of_the_same_name(quick: Seen) -> No
     assert cells["G31"]["here"] == gains[2][0]
 
 
+@pytest.mark.long
 def test_what_predicts_is_what_is_inverted(quick: Seen) -> None:
     for name, model in ((OURS_INVERTED, OURS), (BALANCE, BALANCE)):
         assert quick.inverses[name] == quick.models[model].inverse()

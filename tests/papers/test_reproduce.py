@@ -21,7 +21,7 @@ def test_list_names_every_paper(cli: Cli) -> None:
     ("arguments", "said"),
     [
         (["nobody"], "nobody"),
-        ([], "multistate-friction"),
+        ([], "--list"),
         (["field-models", "--train", "x.csv"], "--test"),
         (["multistate-friction", "--train", "x.csv", "--test", "y.csv"], "field-models"),
         (["field-models", "--train", "x.csv", "--test", "y.csv"], "x.csv"),

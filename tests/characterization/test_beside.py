@@ -7,7 +7,6 @@ import pytest
 
 from mckibben import PI, DataError, Recording
 from mckibben.characterization import characterize
-from mckibben.characterization.beside import effects, without
 
 STEP = 0.01
 TIME = np.arange(3000) * STEP
@@ -29,19 +28,6 @@ def test_zeros_of_recordings_change_no_verdict(zeros: tuple[float, ...]) -> None
     for name in ("loop_width", "gain", "dead_zone_upper", "branch_gap"):
         assert getattr(moved, name) == pytest.approx(getattr(same, name), rel=0.05, abs=0.02), name
     assert not same.assumed
-
-
-def test_curves_that_differ_from_length_to_length_hide_no_loop() -> None:
-    steep = [
-        Recording(
-            {"pressure": SLOW, "force": gain * SLOW + 5 * np.sin(2 * np.pi * TIME / 10)}, STEP
-        )
-        for gain in (20.0, 60.0, 180.0)
-    ]
-    found = characterize(steep, output="force")
-    assert found.has_loop
-    assert found.p_loop is not None
-    assert found.p_loop < 1e-6
 
 
 def two(other: np.ndarray) -> Recording:
@@ -138,19 +124,3 @@ def test_every_held_length_has_its_loop_and_its_gain(asked: tuple[str, ...]) -> 
     (effect,) = found.effects
     assert effect.channel == "displacement"
     assert effect.change == pytest.approx(-5 * 20 - 130 * 2.5, rel=0.1)
-
-
-def test_a_length_at_which_nothing_moves_hides_no_other() -> None:
-    slack = isometric(30.0, 0.0, 0.0, 0)
-    slack = slack.with_channels({"force": "N"}, force=np.zeros(TIME.size))
-    found = characterize([isometric(*LENGTHS[0], 0), slack], output="force")
-    assert found.has_loop
-
-
-def test_what_a_load_does_can_be_taken_away() -> None:
-    swung = loaded(150 + 150 * np.sin(TIME))
-    moved = effects([swung], "pressure", "displacement", ["force"])
-    assert [effect.change for effect in moved] == pytest.approx([-6.0], rel=0.05)
-    left = characterize(without([swung], "displacement", moved))
-    clean = characterize(loaded(np.zeros(TIME.size)))
-    assert left.loop_width == pytest.approx(clean.loop_width, rel=0.1)

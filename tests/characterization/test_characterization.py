@@ -181,20 +181,6 @@ def test_dependence_on_rate() -> None:
     assert same.speeds == pytest.approx((0.4, 1.6), rel=0.05)
 
 
-def test_of_repeats_the_median_width_is_told() -> None:
-    """One that is wide, as of a muscle that was not run in, does not stand for all."""
-    u = triangle(TIME, 20.0, 4.0)
-    repeats = [parallelogram(2.0, gap) for gap in (1.2, 0.4, 0.3)]
-    found = characterize(repeats)
-    assert found.mid_width == pytest.approx(0.4)
-    narrowest, widest = found.repeated_width or (0.0, 0.0)
-    assert (narrowest, widest) == pytest.approx((100 * 0.3 / 8.3, 100 * 1.2 / 9.2), rel=0.01)
-    # a smaller run is no repeat, and one alone has none
-    smaller = characterize([repeats[0], run(0.8 * u, 2 * 0.8 * u)])
-    assert smaller.mid_width == pytest.approx(1.2)
-    assert smaller.repeated_width is characterize(repeats[0]).repeated_width is None
-
-
 def test_without_time_what_needs_time_is_none() -> None:
     u = triangle(TIME, 10.0, 5.0)
     found = characterize(run(u, play(u, 0.3), None))
@@ -227,16 +213,6 @@ def test_noise_moves_nothing_much(seed: int) -> None:
     assert found.gain == pytest.approx(clean.gain, rel=0.05)
     assert found.dead_zone_upper == pytest.approx(clean.dead_zone_upper, abs=0.1)
     assert found.loop_area_share == pytest.approx(clean.loop_area_share, abs=1.5)
-
-
-def test_minor_loops_do_not_part_a_cycle() -> None:
-    levels = [0.0, 2.0, 1.8, 4.0, 2.5, 2.8, 0.0, 2.0, 1.8, 4.0, 2.5, 2.8, 0.0]
-    ways = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(levels)))])
-    u = np.interp(np.linspace(0, ways[-1], 5001), ways, levels)
-    found = characterize(run(u, play(u, 0.2)))
-    assert found.n_cycles == 2
-    assert found.n_reversals == 11
-    assert found.mid_width == pytest.approx(0.4, abs=0.01)
 
 
 def test_recordings_are_measured_together() -> None:
@@ -350,9 +326,3 @@ def test_random_motion_of_a_rate_independent_loop_shows_neither_speed_nor_drift(
     found = characterize(noisy(run(u, model.simulate(u), 0.05), 5e-4, seed))
     assert found.rate_verdict in ("unknown", "none")
     assert found.drift is None or abs(found.drift) < 0.005 * found.output_span
-
-
-def test_speed_is_told_by_as_many_cycles_as_tell_chance_apart() -> None:
-    """Two cycles of another width each are no law."""
-    few = np.concatenate([sine(TIME[:2000], 20.0, 4.0), sine(TIME[:501], 5.0, 4.0)])
-    assert characterize(run(few, lag(few, 0.3))).rate_verdict == "unknown"

@@ -72,24 +72,3 @@ def test_noise_is_no_other_muscle() -> None:
         for name, y in zip("abcd", noise, strict=True)
     ]
     assert said(*runs) == []
-
-
-def test_what_swings_by_itself_tells_no_sign() -> None:
-    """In resonance the output hardly follows the input's own value, this way or that."""
-    t = STEP * np.arange(PRESSURE.size)
-    runs = [
-        Recording(
-            {"pressure": PRESSURE, "displacement": 3 * np.sin(9 * t) + slope * PRESSURE},
-            STEP,
-            meta={"name": name},
-        )
-        for name, slope in (("a", 0.1), ("bb", -0.1))
-    ]
-    assert said(*runs) == []
-
-
-def test_held_lengths_are_compared_at_the_same_length() -> None:
-    runs = [run("a", displacement_2=0.0), run("bb", 0.5, displacement_2=10.0)]
-    names = ("displacement_2", "pressure")
-    assert said(*runs, names=names) == []
-    assert said(*runs, run("ccc", 1.8, displacement_2=0.0), names=names)

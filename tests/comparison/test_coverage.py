@@ -113,12 +113,3 @@ def test_a_network_is_not_to_be_trusted_where_no_run_moved_both_muscles() -> Non
     assert rows["coupled-memory"].off_training is None
     (row,) = [row for row in found.to_dict()["rows"] if row["model"] == "tsfnn"]
     assert row["off_training"]["trusted"] is False
-
-
-def test_a_network_is_to_be_trusted_where_training_covers_the_test() -> None:
-    (told,) = [row.off_training for row in board(JOINT, TOGETHER).rows if row.model == "tsfnn"]
-    assert told is not None
-    assert told.covered > 0.9
-    assert told.trusted
-    assert told.inside is not None
-    assert told.inside < 0.5

@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-import csv
-
 import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from mckibben import PI, Recording, compare, registry
+from mckibben import PI, Recording, compare
 from mckibben.comparison.drift import Drift, Stretch, drift_of
-from mckibben.comparison.free_run import run_free
-from tests.recordings import MEASURED
 
 STEP = 4.0
 SEEDS = 30
@@ -67,14 +63,6 @@ def test_a_model_that_is_wrong_at_high_inputs_does_not_drift_where_these_fade() 
     assert not found(errors, inputs, 600).certain
 
 
-def test_of_too_short_a_test_nothing_is_told() -> None:
-    inputs = np.random.default_rng(0).uniform(0, 5, 300)
-    errors = noise(300, 0.0, 0)
-    assert drift_of([], [stretch(errors[:20], inputs[:20])], STEP, "y", "mm") is None
-    slow = 2.5 - 2.5 * np.cos(np.arange(300) * 2 * np.pi / 100)
-    assert drift_of([], [stretch(errors, slow)], STEP, "y", "mm") is None
-
-
 def levels(n: int) -> np.ndarray:
     return np.random.default_rng(3).uniform(0.5, 5.5, n)
 
@@ -100,37 +88,3 @@ def test_a_leaderboard_has_the_drift_that_there_is_and_none_else() -> None:
     assert row.drift.certain
     assert row.to_dict()["drift"]["offset"] == pytest.approx(0.5, abs=0.05)
     assert row.drift.adapted < 0.7 * row.drift.rmse
-
-
-def test_a_measured_muscle_goes_on_creeping_and_cpi_foresees_it() -> None:
-    path = MEASURED / "festo_dmsp10_levels" / "festo_dmsp10_levels.csv"
-    if not path.exists():
-        pytest.skip("the measured recordings are not here")
-    with path.open(newline="") as file:
-        rows = list(csv.DictReader(file))
-    names = {"pressure": "pressure_bar", "displacement": "displacement_mm"}
-    channels = {name: np.array([float(row[of]) for row in rows]) for name, of in names.items()}
-    whole = Recording(channels, STEP)
-    train, test = whole.slice(0, 150), whole.slice(150, 200)
-
-    def missed(**settings: bool) -> tuple[float, Drift]:
-        model = registry.load("estimators", "cpi")(**settings).fit(train).model_
-        errors = [
-            r["displacement"] - run_free(model, r, "displacement", (train,)) for r in (train, test)
-        ]
-        known, asked = (
-            stretch(e, r["pressure"]) for e, r in zip(errors, (train, test), strict=True)
-        )
-        drift = drift_of([known], [asked], STEP, "displacement", "mm")
-        assert drift is not None
-        return float(np.sqrt(np.mean(errors[1] ** 2))), drift
-
-    error, foreseen = missed()
-    assert error < 0.15
-    error, drift = missed(settled=True)
-    assert error > 0.2
-    assert drift.certain
-    assert foreseen.foresees(drift)
-    assert not drift.foresees(foreseen)
-    assert drift.offset == pytest.approx(0.2, abs=0.05)
-    assert drift.adapted < 0.75 * error

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
-from mckibben import GPI, PI, Affine, Recording
-from mckibben.comparison.memory_test import branch_gaps, hold_test, memory_test
+from mckibben import GPI, PI, Recording
+from mckibben.comparison.memory_test import branch_gaps, memory_test
 from mckibben.signals import triangle
 
 U = triangle(np.arange(0, 24, 0.01), 6.0, [5.0, 4.0, 3.0, 2.0])
@@ -50,15 +48,6 @@ def test_a_model_with_half_the_memory_scores_half() -> None:
     halved = 0.5 * (y + reversible.simulate(U))
     found = memory_test(block, [recorded(y)], [column(halved)], PAIRS)
     assert found.gap_ratio == pytest.approx(0.5, abs=1e-6)
-
-
-def test_a_model_without_memory_scores_nothing() -> None:
-    block = replace(Affine.example(), input=PI.example().input)
-    y = PI.example().simulate(U)
-    found = memory_test(block, [recorded(y)], [column(block.simulate(U))], PAIRS)
-    assert found.gap_ratio == pytest.approx(0.0, abs=1e-9)
-    assert found.hold_ratio is None
-    assert hold_test(block, recorded(y), "pressure", "displacement") is None
 
 
 def test_data_without_hysteresis_give_no_ratio() -> None:

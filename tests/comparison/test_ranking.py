@@ -107,16 +107,6 @@ def test_the_choice_has_the_least_error_of_what_it_is_by(
     assert board.rows[0].order < board.rows[1].order
 
 
-def test_too_few_cycles_are_held_out_at_the_end_and_too_few_samples_not_at_all() -> None:
-    rising = np.linspace(0, 5, 200)
-    parts, chosen_by = validation_folds([recorded(rising)], CHANNELS, 4)
-    assert (len(parts), chosen_by) == (1, "validation")
-    (scored,) = parts[0].test_rows
-    assert scored[-50:].all()
-    assert len(parts[0].train[0]) == 200 - int(scored.sum())
-    assert validation_folds([recorded(rising[::20])], CHANNELS, 4) == ((), "fit")
-
-
 def test_a_part_that_goes_beyond_the_rest_does_not_decide(train: Recording) -> None:
     parts, _ = validation_folds([train], CHANNELS, 4)
     assert len(parts) == 3
@@ -250,18 +240,6 @@ def test_what_cannot_be_compared_is_refused_at_once(train: Recording) -> None:
     ):
         with pytest.raises((DataError, ModelError), match=said):
             compare(given, jobs=1, **how)  # type: ignore[arg-type]
-
-
-def test_interrupt_within_a_fit_leaves_no_half_searched_model(
-    train: Recording, test_set: Recording
-) -> None:
-    def impatient(model: str, share: float, cost: float) -> None:
-        if model == "gpi" and share > 0.1:
-            raise KeyboardInterrupt
-
-    board = compare(train, test_set, models=["gpi", "pi"], n_folds=0, jobs=1, watch=impatient)
-    assert [row.model for row in board.rows] == ["pi"]
-    assert board.pending == ("gpi",)
 
 
 def test_going_on_recomputes_nothing_that_was_finished(

@@ -104,14 +104,6 @@ def test_holds_and_saturated_stretches_are_nothing_in_common() -> None:
     assert common(*runs) == []
 
 
-def test_periods_of_one_recording_without_noise_are_its_own_affair_but_a_second_run_is_not() -> (
-    None
-):
-    runs = [recorded(triangle(TIME, 4.0, 5.0), seed, 0.0) for seed in (1, 2)]
-    assert common(runs[0]) == []
-    assert common(*runs) == [(0, 1)]
-
-
 def test_a_little_in_common_is_let_and_more_is_refused() -> None:
     before, little, much = RUN.slice(0, 700), RUN.slice(660, 1200), RUN.slice(500, 1200)
     channels = ["pressure"], ["displacement"]

@@ -14,8 +14,7 @@ from mckibben.blocks.compose import PerChannel, Series
 from mckibben.blocks.core.fields import Channel
 from mckibben.blocks.coupled.coupling import Coupling
 from mckibben.blocks.coupled.force_balance import ForceBalance
-from mckibben.estimators.coupled.fuzzy import Consequents, Fitted, Problem, Sets
-from mckibben.estimators.coupled.fuzzy_fit import solve_in_parts
+from mckibben.estimators.coupled.fuzzy import Consequents, Problem, Sets
 from mckibben.estimators.coupled.fuzzy_projection import sensitivities
 from mckibben.estimators.coupled.sdchm import coupled, softest
 
@@ -131,17 +130,6 @@ def test_projected_derivatives_agree_with_differences() -> None:
         down = problem.cost(sets.replaced(moved)) ** 2
         slope = (up - down) / 2e-5 * residual.size / 2
         assert gradient[k] == pytest.approx(slope, rel=0.02, abs=1e-3 * np.abs(gradient).max())
-
-
-def test_a_problems_cost_orders_as_the_printed_loss() -> None:
-    rng = np.random.default_rng(4)
-    x = rng.uniform(0, 1, (300, 1))
-    y = np.column_stack([np.sin(9 * x[:, 0]), 100 * x[:, 0] ** 3])  # of very different sizes
-    solver = Consequents(True, 1e-12)
-    problem = Problem(x, y, solver)
-    sets = Sets.even(np.zeros(1), np.ones(1), 3)
-    errors = Fitted(sets, solve_in_parts(x, y, sets, solver)).predict(x, True) - y
-    assert problem.cost(sets) ** 2 * y.shape[1] == pytest.approx(np.mean((errors**2).sum(axis=1)))
 
 
 def test_muscles_that_never_move_alone_and_those_that_are_lost_are_refused(

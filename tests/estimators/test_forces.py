@@ -76,16 +76,6 @@ def test_chou_hannaford_recovers_thread_and_turns() -> None:
     np.testing.assert_allclose(fit.model_.pack()[:2], truth.pack()[:2], rtol=0.02)
 
 
-def test_extracted_hysteresis_is_what_was_put_in() -> None:
-    recording = isobaric(noise=0.0)
-    (left,) = extract_hysteresis(recording, static_force())
-    expected = TRUTH.simulate(recording)["force"]
-    np.testing.assert_allclose(left["force_hysteresis"], expected, atol=1e-9)
-    assert left.units["force_hysteresis"] == "N"
-    with pytest.raises(DataError, match="no channel 'force'"):
-        extract_hysteresis(recording.select(["length", "pressure"]), static_force())
-
-
 def test_friction_is_recovered_to_the_noise() -> None:
     (left,) = extract_hysteresis(isobaric(), static_force())
     fit: Any = MultistateEstimator(output="force_hysteresis", static=None, elements="each-way").fit(
@@ -95,12 +85,6 @@ def test_friction_is_recovered_to_the_noise() -> None:
     table, truth = fit.model_.table(), TRUTH.table()
     # what lengthening feels from the bottom on, and shortening from the top on, is determined
     assert table[:, 2].sum() == pytest.approx(truth[:, 2].sum(), rel=0.05)
-
-
-def test_total_force_is_identified_with_the_friction() -> None:
-    recordings = [isobaric(p) for p in (3.0, 4.0, 5.0)]
-    fit: Any = MultistateEstimator(elements="each-way").fit(recordings)
-    assert fit.diagnostics_.rmse < 1.0
 
 
 def test_growth_with_pressure_is_found() -> None:

@@ -115,6 +115,7 @@ def test_arx_is_ordinary_least_squares() -> None:
     np.testing.assert_allclose(model.denominator, -expected[2:4], rtol=1e-6)
 
 
+@pytest.mark.long
 def test_armax_agrees_with_statsmodels() -> None:
     from statsmodels.tsa.statespace.sarimax import SARIMAX
 
@@ -142,13 +143,6 @@ def test_process_model_recovers_its_own_numbers() -> None:
     np.testing.assert_allclose(
         np.sort(np.roots(model.denominator())), np.sort(np.roots(truth.denominator())), rtol=0.15
     )
-
-
-def test_outputs_of_several_runs_are_started_apart() -> None:
-    pieces = [recorded(seed, 400) for seed in (7, 8)]
-    raised = [pieces[0], replace(pieces[1], start_time=100.0)]
-    model: Any = load("estimators", "oe")().fit(raised).model_
-    np.testing.assert_allclose(model.denominator, F, atol=0.05)
 
 
 def test_bad_data_and_settings_are_refused() -> None:

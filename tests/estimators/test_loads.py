@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from mckibben import DataError, Recording, compare, load_rig, registry
-from mckibben.blocks.coupled.load_estimate import load_of
 from mckibben.control import BlockController, EstimatedLoad, track
 from mckibben.estimators.coupled.force_estimate import ForceEstimate, fit_force_estimate
 from mckibben.rigs import record
@@ -48,16 +47,6 @@ def test_one_model_for_all_loads_beats_one_for_each(
     assert all(row.rmse_interval is not None for row in board.rows)
 
 
-def test_mpi_narmax_runs_free_under_a_load(
-    runs: dict[str, Recording], train: list[Recording]
-) -> None:
-    estimator_class = registry.load("estimators", "mpi-narmax")
-    first = estimator_class(method="ls").fit(train)
-    assert first.diagnostics_.rmse < 3.0
-    output = first.model_.simulate(runs["status-4"])["displacement"]
-    assert np.abs(output).max() < 70.0
-
-
 def test_hysteresis_is_identified_on_all_runs_without_load(runs: dict[str, Recording]) -> None:
     free, pulled = [runs[name] for name in FREE], runs["training-pulls-100N"]
     settings = {"memory": "rdpi", "method": "ls", "n_sets": 2, "constants": False}
@@ -85,20 +74,6 @@ def test_force_is_estimated_from_pressure_and_displacement(
     run = runs["status-4"]
     estimated = estimate.block.simulate(run)["force"]
     assert np.sqrt(np.mean((estimated - run["force"]) ** 2)) < 0.04 * np.ptp(run["force"])
-
-
-def test_force_is_estimated_from_a_length_as_from_its_shortening(
-    runs: dict[str, Recording], train: list[Recording]
-) -> None:
-    long = [run.with_channels(displacement=300.0 - run["displacement"]) for run in train]
-    by_shortening, by_length = (
-        load_of(
-            registry.load("estimators", "balance")(input="pressure", steps=4).fit(some).model_
-        ).simulate(some[-1])["force"]
-        for some in (train, long)
-    )
-    apart = np.sqrt(np.mean((by_length - by_shortening) ** 2))
-    assert apart < 0.04 * np.ptp(train[-1]["force"])
 
 
 def test_force_comes_with_an_interval_from_runs_left_out(
@@ -132,14 +107,3 @@ def test_an_estimated_load_serves_as_well_as_a_measured_one(
         for c in (told, guessed)
     ]
     assert errors[1] < 1.5 * errors[0]
-
-
-@pytest.mark.parametrize("name", ["balance", "coupled-memory"])
-def test_a_short_recording_beside_a_long_one_does_not_stop_a_model(
-    runs: dict[str, Recording], name: str
-) -> None:
-    whole = runs["training-pulls-100N"]
-    estimator = registry.load("estimators", name)()
-    assert estimator.data([whole, whole.slice(0, 20)]).runs
-    with pytest.raises(DataError, match="20"):
-        estimator.data([whole.slice(0, 20), whole.slice(30, 40)])

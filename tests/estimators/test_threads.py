@@ -43,6 +43,7 @@ def test_one_thread_while_fitting_and_as_before_after(recording: Recording) -> N
         assert threads() == before
 
 
+@pytest.mark.long
 def test_one_thread_in_workers_and_in_a_users_own_jobs(recording: Recording) -> None:
     with Workers(1) as workers:
         (outcome,) = workers.results(in_a_process, [recording])

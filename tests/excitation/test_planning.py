@@ -17,7 +17,6 @@ from mckibben.excitation.information import Slopes, standard_errors
 from mckibben.excitation.limits import (
     Limit,
     followed,
-    limits_of_recordings,
     limits_of_rig,
     narrowed,
     parsed,
@@ -125,12 +124,6 @@ def test_the_rig_plays_the_plan_without_a_limit_reached() -> None:
         channels = dict(zip(limits, commands.T, strict=True))
         assert "saturated" not in rig.run(Recording(channels, 0.05)).meta
     assert {one.what.partition(" of ")[0] for one in made} >= {"hold", "loops", "steps"}
-
-
-def test_what_is_driven_is_known_from_recordings() -> None:
-    found = limits_of_recordings([slow_sine(8.0)], ["pressure"])["pressure"]
-    assert (found.low, found.high) == pytest.approx((0.5, 4.0), abs=1e-3)
-    assert found.rate == pytest.approx(3.5 * np.pi / 8.0, rel=0.02)
 
 
 def test_limits_are_read_and_narrowed() -> None:

@@ -312,46 +312,6 @@ def test_a_muscle_that_is_held_is_judged_by_its_force() -> None:
     assert {"force", "resolution", "still"}.isdisjoint(whats(held))
 
 
-def test_a_force_that_creeps_ends_no_hold() -> None:
-    u = drive([(4.0, 1.0, 20.0), (1.0, 1.0, 20.0)])
-    force = 100.0 * u + 40.0 * lag(u, 8.0)
-    one = Recording({"pressure": u, "force": force}, STEP)
-    creep = next(gap for gap in untold(one, "pressure", "force") if gap.what == "creep")
-    assert creep.evidence["hold"] > 18.0
-    assert creep.evidence["moved"] > 0.01
-
-
-def test_levels_recorded_once_each_hide_the_way_between() -> None:
-    u = np.random.default_rng(3).uniform(0, 4, 300)
-    found = whats([Recording({"pressure": u, "displacement": muscle(u)}, 4.0)])
-    assert "sampling" in found
-    assert "noise" not in found
-
-
-def stand(lengths: Sequence[Array], pressures: Sequence[Array]) -> list[Recording]:
-    """Return forces on a test stand."""
-    return [
-        Recording(
-            {
-                "pressure": p,
-                "length": length,
-                "force": 100 * p + 5 * (length - 180) + 5 * lag(length, 0.5),
-            },
-            STEP,
-        )
-        for length, p in zip(lengths, pressures, strict=True)
-    ]
-
-
-def test_a_test_stand_whose_length_is_held() -> None:
-    u = drive(COMPLETE)
-    held = whats(stand([np.full(u.size, x) for x in (180, 190)], [u, u]))
-    assert "isometric" in held
-    both = whats(stand([180 + 5 * u, np.full(u.size, 190.0)], [np.full(u.size, 3.0), u]))
-    assert "isometric or isobaric" in both
-    assert "isometric" not in both
-
-
 # -- what is called lacking scatters in fits, and what is not does not -----------------------------
 
 

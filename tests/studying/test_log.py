@@ -11,26 +11,19 @@ import pytest
 
 import mckibben
 from mckibben import PI, Channel, DataError, ModelError, PerChannel, Recording, example, review
-from mckibben.arrays import Array
 from mckibben.blocks.adaptive.adaptive_series import adaptive
-from mckibben.blocks.feedback.feedforward_feedback import FeedforwardFeedback
-from mckibben.blocks.feedback.pid import PIDFeedback
 from mckibben.blocks.predictive.predictive import Predictive
-from mckibben.control import Controller, Twin, track
+from mckibben.control import track
 from mckibben.files import write
 from mckibben.files.headers import channel_of, parse
 from mckibben.studying.refitting import Refit
 from mckibben.studying.reviewing import Followed
-from mckibben.studying.shifts import dead_time, lagged, shifted
 from tests.cli.conftest import Cli
 from tests.cli.conftest import cli as cli  # a fixture
 from tests.studying.plants import Faulty
 
 MUSCLE = PI(thresholds=(0.0, 0.3, 0.8, 1.5), weights=(4.0, 1.0, 0.6, 0.4))
 STEP = 0.02
-
-KP, KI = 0.02, 0.15
-"""Of feedback beside the compensator [bar/mm, bar/mm s]."""
 
 FAULTS = {
     "noise": {"noise": 0.05},
@@ -51,25 +44,10 @@ def reference(seed: int, duration: float = 40.0) -> Recording:
     return Recording({"displacement": 1 + 24 * (0.5 + wave)}, STEP)
 
 
-class Helped(Controller):
-    """The muscle's inverse, and PI feedback beside."""
-
-    def reset(self, sample_time: float) -> None:
-        self._stream, self._sum, self._last = MUSCLE.inverse().stream(sample_time), 0.0, 0.0
-        self._step = sample_time
-
-    def step(self, reference: Array, displacement: Array, scheduled: Array) -> Array:
-        error = self._last - float(displacement[0])  # what was asked for is due a step later
-        self._last = float(reference[0])
-        self._sum += KI * self._step * error
-        return np.array([self._stream.step(self._last)[0] + KP * error + self._sum])
-
-
-def logged(seed: int = 0, *, feedback: bool = False, **faults: float) -> tuple[Recording, float]:
+def logged(seed: int = 0, **faults: float) -> tuple[Recording, float]:
     """Return the log of a loop with faults, and the RMSE that the loop itself reckoned."""
     plant = Faulty(MUSCLE, **faults)  # type: ignore[arg-type]
-    controller = Helped() if feedback else MUSCLE.inverse()
-    found = track(controller, plant, reference(seed), pressure_loop=False, seed=seed)
+    found = track(MUSCLE.inverse(), plant, reference(seed), pressure_loop=False, seed=seed)
     return found.recording, found.rmse["displacement"]
 
 
@@ -88,23 +66,6 @@ def test_the_cause_that_was_put_in_is_named_first(cause: str) -> None:
     assert np.allclose(np.sum([c.signal for c in found.causes], axis=0), error, atol=1e-9)
 
 
-@pytest.mark.parametrize("cause", ["noise", "model", "actuator", "delay"])
-def test_behind_feedback_the_cause_is_named_too(cause: str) -> None:
-    log, _ = logged(0, feedback=True, **FAULTS[cause])
-    found = review(log, model=MUSCLE, refit=False)
-    shares = {c.kind: c.share for c in found.outputs[0].causes}
-    assert max(shares, key=lambda kind: shares[kind]) == cause
-
-
-def test_two_causes_at_once_are_both_told() -> None:
-    found = first(logged(0, lag=0.2, late=3, noise=0.05)[0])
-    assert [c.kind for c in found.causes[:2]] == ["actuator", "delay"]
-    found = first(logged(1, gain=0.9, late=3, noise=0.05)[0])
-    assert [c.kind for c in found.causes[:2]] == ["model", "delay"]
-    (late,) = found.delays
-    assert late.interval[0] - 0.005 < 3 * STEP < late.interval[1] + 0.005
-
-
 def test_a_delay_is_told_with_its_interval() -> None:
     late = first(logged(0, late=8, noise=0.05)[0]).delays[0]
     assert late.interval[0] < 8 * STEP < late.interval[1]
@@ -121,15 +82,6 @@ def test_no_delay_is_certain_where_there_is_none() -> None:
     assert certain <= 1  # in 5 % of the logs
 
 
-def test_a_lag_is_no_dead_time() -> None:
-    wanted = reference(0)["displacement"]
-    late, half, lag = dead_time(wanted, lagged(wanted, 6.0), STEP)
-    assert late - half <= 0.01
-    assert lag == pytest.approx(6.0, abs=0.3)
-    late, half, _ = dead_time(wanted, shifted(wanted, 6.0), STEP)
-    assert abs(late - 6) <= half + 0.05
-
-
 def test_a_refit_is_recommended_where_the_muscle_changed_and_only_there() -> None:
     changed = review(logged(0, gain=0.85, noise=0.05)[0], model=MUSCLE).refit
     assert isinstance(changed, Refit)
@@ -138,15 +90,6 @@ def test_a_refit_is_recommended_where_the_muscle_changed_and_only_there() -> Non
     same = review(logged(0, noise=0.1)[0], model=MUSCLE).refit
     assert isinstance(same, Refit)
     assert not same.recommended
-
-
-def test_older_data_go_into_the_refit() -> None:
-    pressure = np.tile(np.concatenate([np.linspace(0, 5, 150), np.linspace(5, 0, 150)]), 3)
-    monday = Recording({"pressure": pressure, "displacement": MUSCLE.simulate(pressure)}, STEP)
-    found = review([logged(0, noise=0.05)[0], monday], model=MUSCLE)
-    assert isinstance(found.refit, Refit)
-    assert found.refit.older == 1
-    assert len(found.logs) == 1
 
 
 def test_without_commands_pressures_are_compared_with_the_compensators() -> None:
@@ -297,22 +240,3 @@ def test_commands_stand_for_pressures_that_are_not_measured(cli: Cli, tmp_path: 
         assert result.code == 0, result.err
         found[out] = json.loads((tmp_path / out / "review.json").read_text())["outputs"]
     assert found["as-it-is"] == found["by-name"]
-
-
-def test_behind_feedback_a_plant_without_noise_has_none() -> None:
-    muscle = PI.example()
-    low, high = (float(end[0]) for end in muscle.reachable())
-    pid = PIDFeedback.of(muscle.outputs, muscle.inputs, (0.02,), (0.1,), (0.0,), limits=(0.0, 5.0))
-    both = FeedforwardFeedback.of(muscle.inverse(), pid)
-    stronger = replace(muscle, weights=tuple(1.15 * weight for weight in muscle.weights))
-    t = np.arange(0, 30, STEP)
-    logs = []
-    for seed in (1, 2):
-        wave = np.sin(2 * np.pi * (0.3 + 0.05 * seed) * t + seed) * np.cos(0.31 * t)
-        wished = Recording({"displacement": low + (high - low) * (0.45 + 0.3 * wave)}, STEP)
-        plant = Twin(stronger, limits={"pressure": (0, 5)})
-        logs.append(track(both, plant, wished).recording)
-    found = review(logs, compensator=both, refit=False).outputs[0]
-    by_kind = {cause.kind: cause.share for cause in found.causes}
-    assert found.causes[0].kind == "model"
-    assert abs(by_kind.get("noise", 0.0)) < 0.05

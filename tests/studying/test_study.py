@@ -21,7 +21,7 @@ from mckibben.files import read, write
 from mckibben.registry import load
 from mckibben.rigs import load_rig
 from mckibben.signals import irregular_triangle, triangle
-from mckibben.studying.inverting import check_inverse, invert_best
+from mckibben.studying.inverting import check_inverse
 from mckibben.studying.loops import closed_loops, named, recorded_rig
 
 TIME = np.arange(0, 24, 0.02)
@@ -68,17 +68,6 @@ def test_inverse_check_covers_the_reachable_range(block: Block, train: Recording
     low, high = check.reachable
     assert np.ptp(check.reference) > 0.9 * (high - low)
     assert np.all((check.pressure >= 0) & (check.pressure <= 5))
-
-
-def test_models_without_inverse_are_passed_over(train: Recording) -> None:
-    found = study(train, models=["pi", "gpi"], jobs=1).leaderboard
-    first, second = found.rows
-    stuck = replace(PI.example(), weights=(0.0, 1.0, 1.0, 1.0))
-    board = replace(found, rows=(replace(first, block=stuck), second))
-    check = invert_best(board, train)
-    assert check is not None
-    assert check.model == second.model
-    assert invert_best(replace(found, rows=()), train) is None
 
 
 def test_what_reaches_anywhere_is_checked_on_what_it_makes_of_the_input(train: Recording) -> None:

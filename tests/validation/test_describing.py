@@ -82,15 +82,6 @@ def test_criteria_are_those_of_the_residuals_one_step_ahead() -> None:
     assert (bare.criteria.aic, bare.criteria.bic, bare.criteria.fpe) == (None, None, None)
 
 
-def test_correlated_free_runs_are_worth_fewer_samples_and_get_no_criteria() -> None:
-    u = np.asarray(recorded(PI.example(), 3000)["pressure"])
-    shocks = np.random.default_rng(0).normal(0, 0.1, u.size)
-    y = PI.example().simulate(u) + np.asarray(lfilter([1.0], [1.0, -0.9], shocks))
-    found = describe(PI.example(), [Recording({"pressure": u, "displacement": y}, STEP)])
-    assert found.criteria.aic is None
-    assert 80 < found.n_effective < 320  # 3000 / 19
-
-
 def test_of_a_compensator_no_errors_are_given() -> None:
     block = PI.example().inverse()
     assert all(one.standard_error is None for one in describe(block, [recorded(block)]).parameters)

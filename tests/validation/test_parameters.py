@@ -12,13 +12,10 @@ from scipy.stats import binom
 
 from mckibben import PI, PIEstimator, Recording
 from mckibben.arrays import Array
-from mckibben.blocks.compose import Parallel
 from mckibben.blocks.core.block import Block
-from mckibben.blocks.core.fields import DISPLACEMENT, PRESSURE, Channel
+from mckibben.blocks.core.fields import Channel
 from mckibben.blocks.coupled.coupling import Coupling
 from mckibben.blocks.dynamic.transfer_function import TransferFunction
-from mckibben.blocks.memoryless.affine import Affine
-from mckibben.estimators.core.autoregression import autoregression
 from mckibben.validation.parameters import parameters, residuals, sureness
 
 STEP, SAMPLES = 0.05, 3000
@@ -127,30 +124,6 @@ def test_what_is_not_determined_is_said_and_has_no_number() -> None:
     assert found[3].interval is None
 
 
-def test_what_is_told_beside_what_only_a_sum_tells_scatters_as_said() -> None:
-    """Of y = a z(u) + (b + c) u, z a creeping part, a is as unsure as with b + c free, not known."""
-    line = Affine(1.5, 0.0, PRESSURE, DISPLACEMENT)
-    block = Parallel((PI((0.3,), (3.0,), 0.0), line, Affine(0.7, 0.0, PRESSURE, DISPLACEMENT)))
-    u = wave()
-    clean = np.asarray(block.simulate(u))
-    play = (clean - 2.2 * u) / 3.0
-    found, said = [], []
-    for seed in range(60):
-        y = clean + noise(seed, 0.8)
-        a, both = np.linalg.lstsq(np.column_stack([play, u]), y, rcond=None)[0]
-        values = block.pack()
-        values[block.parameter_names.index("weights 1")] = a
-        values[values == 1.5] = both - 0.7
-        model = block.unpack(values)
-        recording = Recording({"pressure": u, "displacement": y}, STEP)
-        sure = sureness(model, [recording], residuals(model, [recording]))
-        own = parameters(model, sure)[block.parameter_names.index("weights 1")]
-        assert own.standard_error is not None
-        found.append(a)
-        said.append(own.standard_error)
-    assert 0.75 < np.mean(said) / np.std(found) < 1.3
-
-
 @pytest.mark.parametrize("memory", [0.0, 0.9])
 def test_fits_and_descriptions_say_the_same(memory: float) -> None:
     block, u = MODELS["pi"][0], wave()
@@ -171,19 +144,6 @@ def test_a_parameter_at_its_bound_has_no_error() -> None:
     found = parameters(block, sureness(block, [recording], residuals(block, [recording])))
     none = [one.standard_error is None for one in found]
     assert none == [False, True, True, False, False]
-
-
-@pytest.mark.parametrize("a", [(), (0.9,), (1.2, -0.5)])
-def test_an_autoregression_is_found_again(a: tuple[float, ...]) -> None:
-    rng = np.random.default_rng(2)
-    filtered = [
-        np.asarray(lfilter([1.0], [1.0, *(-np.array(a))], rng.normal(0, 0.3, 8000)))
-        for _ in range(2)
-    ]
-    found = autoregression(filtered)
-    assert found.coefficients.size == len(a)
-    np.testing.assert_allclose(found.coefficients, a, atol=0.03)
-    assert abs(found.shock - 0.3) < 0.01
 
 
 def test_outputs_each_have_residuals_of_their_own() -> None:

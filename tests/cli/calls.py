@@ -68,7 +68,7 @@ CALLS: dict[str, Call] = {
     "export ros2": call_of(f"{INVERSE} -o out", INVERSE, own="README.md"),
     "rig list": call_of(""),
     "rig show": call_of("rail"),
-    "rig run": call_of(f"{RIG} --inputs {RUN} -o out.csv", RIG, RUN),
+    "rig run": call_of(f"{RIG} --signal constant:value=1 --duration 1 -o out.csv", RIG),
     "rig record": call_of("field-models --jobs 1 -o out", own="decaying-triangle.csv"),
     "rig new": call_of(
         "--diameter 20 --length 200 --max-pressure 6 --max-force 1500 --max-contraction 0.25"

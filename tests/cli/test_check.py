@@ -80,6 +80,8 @@ def test_every_output_has_its_part_of_the_page() -> None:
     page = check_page(check(model, runs), describe(model, runs), "model.json")
     for place, output in enumerate(("displacement_1", "displacement_2")):
         assert f'<section id="output-{place}">' in page
-        assert output in page.partition(f'<section id="output-{place}">')[2].partition("<section")[0]
+        assert (
+            output in page.partition(f'<section id="output-{place}">')[2].partition("<section")[0]
+        )
     assert "&lt;b&gt;second" in page
     assert "<b>second" not in page

@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 
 from mckibben.registry import load
+from tests.attacks.commands import call
 from tests.cli.conftest import Cli
 from tests.tools import needs
 
@@ -60,7 +61,7 @@ def test_a_folder_that_compiles_as_it_is(options: list[str], cli: Cli, tmp_path:
     result = done(cli, "export", "c", model, "-o", tmp_path / "out", "--check", "--json", *options)
     told = json.loads(result)
     assert told["name"] == "model_gpi"
-    assert "largest difference" in told["self_test"]
+    assert told["self_test"]
     assert {"README.md", "CMakeLists.txt", "library.properties", "model.json"} <= set(told["files"])
     assert (tmp_path / "out" / "examples" / "model_gpi" / "model_gpi.ino").is_file()
 
@@ -75,43 +76,20 @@ def test_the_same_model_gives_the_same_bytes(cli: Cli, tmp_path: Path) -> None:
             assert other.read_bytes() == path.read_bytes()
 
 
-def test_a_folder_in_the_way_stays_as_it_is(cli: Cli, tmp_path: Path) -> None:
-    model, folder = saved("pi", tmp_path), tmp_path / "out"
-    folder.mkdir()
-    (folder / "precious.txt").write_text("mine")
-    assert "not empty" in refused(cli, "export", "c", model, "-o", folder)
-    assert "precious.txt" in refused(cli, "export", "c", model, "-o", folder, "--overwrite")
-    assert [path.name for path in folder.iterdir()] == ["precious.txt"]
-    (folder / "precious.txt").unlink()
-    done(cli, "export", "c", model, "-o", folder, "--name", "first")
-    assert "not empty" in refused(cli, "export", "c", model, "-o", folder, "--name", "first")
-    done(cli, "export", "c", model, "-o", folder, "--name", "first", "--overwrite", "--float32")
-    assert "FLOAT32" in (folder / "src" / "mck_config.h").read_text()
-    assert not list(tmp_path.glob(".*"))
-
-
 @pytest.mark.parametrize(
-    ("options", "told"),
+    "options",
     [
-        (["--name", "int"], "cannot name C functions"),
-        (["--name", "a b"], "cannot name C functions"),
-        (["--name", "x;system()"], "cannot name C functions"),
-        (["--name", "mck_thing"], "cannot name C functions"),
-        (["--name", "é"], "cannot name C functions"),
-        (["--name", "a" * 50], "cannot name C functions"),
-        (["--name", "creep", "--sample-time", "1"], "what a part of the model is called"),
-        ([], "depends on the rate"),
-        (["--sample-time", "0"], "sample time is 0.0"),
-        (["--sample-time", "nan"], "sample time is nan"),
+        *([], ["--sample-time", "0"], ["--sample-time", "nan"]),
+        *(
+            ["--sample-time", "1", "--name", name]
+            for name in ("int", "a b", "x;system()", "mck_thing", "é", "a" * 50, "creep")
+        ),
     ],
 )
-def test_bad_requests_get_one_sentence(
-    options: list[str], told: str, cli: Cli, tmp_path: Path
-) -> None:
-    model = saved("creep", tmp_path)
-    error = refused(cli, "export", "c", model, "-o", tmp_path / "out", *options)
-    assert told in error
+def test_bad_requests_write_nothing(options: list[str], cli: Cli, tmp_path: Path) -> None:
+    error = refused(cli, "export", "c", saved("creep", tmp_path), "-o", tmp_path / "out", *options)
     assert "Remedy:" in error
+    assert not options or options[-1] in error or options[1] in error
     assert not (tmp_path / "out").exists()
 
 
@@ -120,21 +98,17 @@ def test_what_was_changed_since_is_not_replaced(cli: Cli, tmp_path: Path) -> Non
     done(cli, "export", "c", model, "-o", folder, "--name", "first")
     sketch = folder / "examples" / "first" / "first.ino"
     sketch.write_text("mine")
+    assert "out" in refused(cli, "export", "c", model, "-o", folder, "--name", "first")
     told = refused(cli, "export", "c", model, "-o", folder, "--name", "first", "--overwrite")
     assert "first.ino" in told
     assert sketch.read_text() == "mine"
+    sketch.unlink()
+    done(cli, "export", "c", model, "-o", folder, "--name", "first", "--overwrite", "--float32")
+    assert "FLOAT32" in (folder / "src" / "mck_config.h").read_text()
+    assert not list(tmp_path.glob(".*"))
 
 
-def test_a_folder_of_ones_own_with_the_same_names_is_not_replaced(cli: Cli, tmp_path: Path) -> None:
-    folder = tmp_path / "mine"
-    folder.mkdir()
-    model = folder / "model.json"
-    load("blocks", "pi").example().save(model)
-    before = model.read_bytes()
-    assert "model.json" in refused(cli, "export", "c", model, "-o", folder, "--overwrite")
-    assert model.read_bytes() == before
-
-
+@pytest.mark.long
 @needs_compiler
 @needs("cmake")
 @pytest.mark.parametrize("name", ["test", "all", "help", "clean", "install", "m", "package"])
@@ -151,14 +125,14 @@ def test_names_of_headers_are_refused(name: str, cli: Cli, tmp_path: Path) -> No
     model = saved("pi", tmp_path)
     for form, out in (("c", "out"), ("fmu", "out.fmu")):
         told = refused(cli, "export", form, model, "-o", tmp_path / out, "--name", name)
-        assert "cannot name C functions" in told
+        assert name in told
 
 
 def test_what_is_no_model_is_refused(cli: Cli, tmp_path: Path) -> None:
     (tmp_path / "bad.json").write_text('{"format": "mckibben-model", "version": 1, "kind": "pi"')
     for form, out in (("c", "out"), ("fmu", "out.fmu")):
         error = refused(cli, "export", form, tmp_path / "bad.json", "-o", tmp_path / out)
-        assert "not readable as a model" in error
+        assert "bad.json" in error
         assert not (tmp_path / out).exists()
 
 
@@ -174,16 +148,31 @@ def hostile(text: str, folder: Path) -> Path:
     return path
 
 
-@needs_compiler
+@pytest.fixture(scope="module")
+def plain(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the export of the model whose names have nothing added."""
+    folder = tmp_path_factory.mktemp("plain")
+    done(call, "export", "c", hostile("", folder), "-o", folder / "out", "--name", "muscle")
+    return folder / "out"
+
+
 @pytest.mark.parametrize("text", HOSTILE)
-def test_hostile_names_become_harmless_text(text: str, cli: Cli, tmp_path: Path) -> None:
+def test_hostile_names_become_harmless_text(
+    text: str, cli: Cli, plain: Path, tmp_path: Path
+) -> None:
     """Whatever a model file calls its channels, comments stay comments and strings strings."""
     model = hostile(text, tmp_path)
-    done(cli, "export", "c", model, "-o", tmp_path / "out", "--check", "--name", "muscle")
-    done(cli, "export", "c", hostile("", tmp_path), "-o", tmp_path / "plain", "--name", "muscle")
+    done(cli, "export", "c", model, "-o", tmp_path / "out", "--name", "muscle")
     for path in (tmp_path / "out").rglob("*.[chm]"):
-        other = tmp_path / "plain" / path.relative_to(tmp_path / "out")
-        assert bare(path.read_text()) == bare(other.read_text())
+        assert bare(path.read_text()) == bare(
+            (plain / path.relative_to(tmp_path / "out")).read_text()
+        )
+
+
+@needs_compiler
+def test_hostile_names_compile(cli: Cli, tmp_path: Path) -> None:
+    model = hostile(" ".join(HOSTILE), tmp_path)
+    done(cli, "export", "c", model, "-o", tmp_path / "out", "--check", "--name", "muscle")
 
 
 def bare(source: str) -> str:
@@ -194,14 +183,13 @@ def bare(source: str) -> str:
 
 
 @needs_compiler
-@pytest.mark.parametrize("text", HOSTILE)
-def test_hostile_names_make_valid_units(text: str, cli: Cli, tmp_path: Path) -> None:
+@pytest.mark.parametrize("version", ["2.0", "3.0"])
+def test_hostile_names_make_valid_units(version: str, cli: Cli, tmp_path: Path) -> None:
     validation = pytest.importorskip("fmpy.validation")
-    for version in ("2.0", "3.0"):
-        out = tmp_path / f"{version}.fmu"
-        options = ["--fmi", version, "--platforms", "none", "--name", "muscle"]
-        done(cli, "export", "fmu", hostile(text, tmp_path), "-o", out, *options)
-        assert validation.validate_fmu(str(out)) == []
+    out, model = tmp_path / "out.fmu", hostile(" ".join(HOSTILE), tmp_path)
+    options = ["--fmi", version, "--platforms", "none", "--name", "muscle"]
+    done(cli, "export", "fmu", model, "-o", out, *options)
+    assert validation.validate_fmu(str(out)) == []
 
 
 @needs_compiler
@@ -210,6 +198,5 @@ def test_an_fmu_from_the_command_line(cli: Cli, tmp_path: Path) -> None:
     options = ["--platforms", "linux", "--inverse", "--json"]
     told = json.loads(done(cli, "export", "fmu", saved("pi", tmp_path), "-o", out, *options))
     assert told["libraries"] == ["binaries/linux64/model_pi.so"]
-    assert "exists already" in refused(cli, "export", "fmu", saved("pi", tmp_path), "-o", out)
     error = refused(cli, "export", "fmu", saved("pi", tmp_path), "-o", tmp_path / "x.zip")
-    assert "ends in .fmu" in error
+    assert ".fmu" in error

@@ -1,14 +1,28 @@
-"""The library of muscles from the command line."""
+"""What comes with the package, from the command line: recordings, muscles."""
 
 from __future__ import annotations
 
 import json
 from pathlib import Path
 
-from mckibben import muscles, write
+from mckibben import example, muscles, read, write
 from mckibben.muscles.library import FOLDER
 from tests.cli.conftest import Cli
 from tests.estimators.test_balance_prior import moved
+
+
+def test_example_writes_what_is_bundled_and_repeats(cli: Cli, tmp_path: Path) -> None:
+    folder = tmp_path / "new" / "examples"
+    for _ in range(2):
+        assert cli("example", folder).code == 0
+    assert {path.name: path.read_bytes() for path in folder.iterdir()} == {
+        path.name: path.read_bytes() for path in example.files()
+    }
+    (train,) = read(folder / "decaying-triangle.csv")
+    assert set(train.channels) == {"pressure", "displacement"}
+    (folder / "decaying-triangle.csv").write_text("mine")
+    assert cli("example", folder, "--force").code == 0
+    assert (folder / "decaying-triangle.csv").read_text() != "mine"
 
 
 def test_muscles_are_listed_and_shown(cli: Cli) -> None:

@@ -21,18 +21,27 @@ from mckibben.report import printed
 from mckibben.report.drawing import Curve, Drawing, Panel
 from mckibben.system import manifest
 from mckibben.system.atomic import PART, write_text
-from tests.cli.calls import CALLS, MODEL, RUN, files
+from tests.cli.calls import CALLS, INVERSE, MODEL, RIG, RUN, call_of, files
 from tests.cli.conftest import Cli
 
 FILES = [name for name, call in CALLS.items() if call.words and call.words[-1].startswith("out.")]
 FILES.remove("ros")  # which goes on for as long as its references come
 """Commands that write a file."""
 
+READING = {name: call for name, call in CALLS.items() if call.reads} | {
+    f"rig run --inputs {RUN}": call_of(f"{RIG} -o out.csv", RIG, RUN),
+    f"track {INVERSE}": call_of(
+        f"--rig {RIG} --reference {RUN} --controller-out out.json", INVERSE, RUN, RIG
+    ),
+}
+"""Commands that read files by name, and write."""
+
 FOLDERS = [name for name, call in CALLS.items() if call.own]
 """Commands that write a folder."""
 
 
 def forced(command: str) -> str:
+    """Return the option that allows a command to replace what it did not write."""
     return "--overwrite" if command.startswith("export") else "--force"
 
 
@@ -54,12 +63,12 @@ def held(folder: Path) -> dict[str, bytes]:
 
 
 @pytest.mark.parametrize("way", ["itself", "another spelling", "a second name", "a link"])
-@pytest.mark.parametrize("command", [name for name in CALLS if CALLS[name].reads])
+@pytest.mark.parametrize("command", READING)
 def test_no_command_writes_over_what_it_reads(
     cli: Cli, folder: Path, command: str, way: str
 ) -> None:
-    *words, out = CALLS[command].words
-    for given in CALLS[command].reads:
+    *words, out = READING[command].words
+    for given in READING[command].reads:
         onto = Path(given)
         if way == "another spelling":
             (folder / "sub").mkdir(exist_ok=True)

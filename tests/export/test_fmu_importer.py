@@ -27,6 +27,7 @@ def sanitizers(folder: Path) -> tuple[str, ...]:
     return SANITIZERS if runs else ()
 
 
+@pytest.mark.long
 @needs("cc")
 @pytest.mark.parametrize("version", ["2.0", "3.0"])
 def test_a_hostile_importer_is_refused_and_breaks_nothing(version: Any, tmp_path: Path) -> None:

@@ -1,11 +1,9 @@
-"""Attacked: a robot over UDP. Strangers, forged and old packets, floods, NaN; and clocks set back."""
+"""A robot over UDP hears nobody but its peer, no old packet and no command beyond its limits."""
 
 from __future__ import annotations
 
 import math
 import socket
-import threading
-import time
 from collections.abc import Iterator
 from typing import Any
 
@@ -37,7 +35,7 @@ def test_nobody_is_heard_or_answered_before_a_peer_is_named(stranger: socket.soc
     with UDPLink(size=1) as link:
         stranger.sendto(packed(1, [5.0]), link.address)
         assert link.newest(timeout=0.1) is None
-        with pytest.raises(DataError, match=r"no peer is named.*Remedy: .*accept"):
+        with pytest.raises(DataError, match="accept"):
             link.send([1.0])
         with pytest.raises(TimeoutError):
             stranger.recv(100)
@@ -73,7 +71,7 @@ def test_what_is_not_finite_is_neither_taken_nor_sent(value: float, peer: socket
         peer.sendto(packed(1, [value]), link.address)
         assert link.newest(timeout=0.05) is None
         for values in ([value], [], ["a"], [[1.0], [2.0, 3.0]], np.zeros(200), None):
-            with pytest.raises(DataError, match="Remedy: send 1 to 128 finite numbers"):
+            with pytest.raises(DataError, match="1 to 128"):
                 link.send(values)  # type: ignore[arg-type]  # that is the attack
 
 
@@ -103,45 +101,19 @@ def test_a_number_far_ahead_deafens_for_a_moment_only(
         assert link.restarts == 1
 
 
-def flood(sender: socket.socket, address: Any, packet: bytes, ended: threading.Event) -> None:
-    while not ended.is_set():
-        sender.sendto(packet, address)
-
-
-@pytest.mark.parametrize("junk", [b"junk", packed(1, [math.nan]), packed(9, [1.0])])
-def test_a_flood_cannot_keep_newest_from_returning(junk: bytes, peer: socket.socket) -> None:
-    ended = threading.Event()
-    with UDPLink(peer.getsockname(), size=1) as link:
-        peer.sendto(packed(9, [1.0]), link.address)
-        assert link.newest(timeout=2.0) is not None
-        flooding = threading.Thread(target=flood, args=(peer, link.address, junk, ended))
-        flooding.start()
-        try:
-            started = time.monotonic()
-            for _ in range(3):
-                assert link.newest(timeout=0.1) is None
-            assert link.newest() is None
-            waited = time.monotonic() - started
-        finally:
-            ended.set()
-            flooding.join()
-        assert 0.3 <= waited < 5.0  # each packet started the wait anew
-        assert link.dropped > 10
-
-
 @pytest.mark.parametrize(
     "named", [("no such host.invalid", 5005), ("127.0.0.1", 0), ("127.0.0.1", 70000), ("a",), 5]
 )
 def test_what_is_no_peer_is_refused(named: Any) -> None:
-    with pytest.raises(DataError, match="Remedy: give its address and port"):
+    with pytest.raises(DataError):
         UDPLink(named, size=1)
 
 
 def test_settings_that_do_not_fit_are_refused() -> None:
     for limits in ([(0.0, 1.0)], [(1.0, 0.0)] * 2, [(0.0, math.nan)] * 2):
-        with pytest.raises(DataError, match="a lowest and a highest value"):
+        with pytest.raises(DataError):
             UDPLink(size=2, limits=limits)
-    with UDPLink(size=1) as link, pytest.raises(DataError, match="Remedy: give bind="):
+    with UDPLink(size=1) as link, pytest.raises(DataError, match="bind="):
         link.accept(("192.0.2.1", 5005))
 
 

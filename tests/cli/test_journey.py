@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mckibben import GPI, Affine, Recording, load, read, write
+from mckibben import Affine, Recording, load, read, write
 from mckibben.blocks.compose import Series
 from mckibben.signals import irregular_triangle
 from tests.cli.conftest import Cli
@@ -28,14 +28,8 @@ def model(cli: Cli, files: tuple[Path, Path], tmp_path: Path) -> Path:
     channels = ["--input", "pressure", "--output", "displacement"]
     result = cli("fit", "gpi", files[0], *channels, "-o", path, *settings)
     assert result.code == 0, result.err
-    assert "RMSE" in result.out
+    assert len(load(path).weights) == 6  # type: ignore[attr-defined]
     return path
-
-
-def test_fit_writes_a_model_with_the_settings_asked_for(model: Path) -> None:
-    block = load(model)
-    assert isinstance(block, GPI)
-    assert len(block.weights) == 6
 
 
 @pytest.mark.parametrize("kind", ["gpi", "balance"])
@@ -45,8 +39,7 @@ def test_fit_counts_no_recording_twice(
     out = tmp_path / "twice.json"
     result = cli("fit", kind, files[0], files[0], "-o", out)
     assert result.code == 2
-    assert "the same samples would count twice to fit" in result.err
-    assert "Remedy: drop the copy" in result.err
+    assert "train" in result.err
     assert not out.exists()
 
 
@@ -106,27 +99,6 @@ def test_inverse_then_forward_through_files_is_the_identity(
     assert error <= 1e-9 * (high - low)
 
 
-def test_compare_writes_the_promised_leaderboard(
-    cli: Cli, files: tuple[Path, Path], tmp_path: Path
-) -> None:
-    options = ["--models", "pi,gpi", "--set", "gpi.n_operators=4", "--jobs", 1]
-    result = cli("compare", files[0], "--test", files[1], *options, "-o", tmp_path / "lb")
-    assert result.code == 0, result.err
-    board = json.loads((tmp_path / "lb" / "leaderboard.json").read_text())
-    assert (board["input"], board["output"]) == ("pressure", "displacement")
-    assert [row["model"] for row in board["rows"]] == ["gpi", "pi", "constant"]
-    assert board["rows"][0]["test"]["rmse"] < board["rows"][1]["test"]["rmse"]
-    assert board["rows"][0]["n_parameters"] == 11
-    table = columns_of_text(tmp_path / "lb" / "leaderboard.csv")
-    assert table[0]["model"] == "gpi"
-    assert float(table[0]["test.rmse"]) == board["rows"][0]["test"]["rmse"]
-
-
-def columns_of_text(path: Path) -> list[dict[str, str]]:
-    with path.open() as file:
-        return list(csv.DictReader(file))
-
-
 def test_study_writes_everything(cli: Cli, files: tuple[Path, Path], tmp_path: Path) -> None:
     folder = tmp_path / "study"
     options = ["--models", "pi,gpi", "--jobs", 1, "--json"]
@@ -145,13 +117,6 @@ def test_study_writes_everything(cli: Cli, files: tuple[Path, Path], tmp_path: P
     assert load(folder / "inverse.json").inverse() == load(folder / "models" / "gpi.json")
 
 
-def test_characterize_speaks_and_counts(cli: Cli, files: tuple[Path, Path]) -> None:
-    spoken = cli("characterize", files[0])
-    assert spoken.code == 0
-    assert "loop" in spoken.out
-    assert json.loads(cli("characterize", files[0], "--json").out)
-
-
 @pytest.mark.parametrize("suffix", [".png", ".svg", ".pdf"])
 def test_plot_writes_figures(
     cli: Cli, files: tuple[Path, Path], model: Path, tmp_path: Path, suffix: str
@@ -159,22 +124,7 @@ def test_plot_writes_figures(
     loop, fit = tmp_path / f"loop{suffix}", tmp_path / f"fit{suffix}"
     assert cli("plot", files[0], "-o", loop).code == 0
     assert cli("plot", files[1], "--model", model, "--kind", "residuals", "-o", fit).code == 0
-    assert loop.stat().st_size > 1000
-    assert fit.stat().st_size > 1000
-
-
-def test_info_lists_models_and_tells_about_files(
-    cli: Cli, files: tuple[Path, Path], model: Path
-) -> None:
-    listed = json.loads(cli("info", "--models", "--json").out)
-    assert {"pi", "mpi", "rdpi", "gpi", "eupi"} <= set(listed)
-    assert listed["gpi"]["settings"]["n_operators"] == 10
-    assert json.loads(cli("info", model, "--json").out)["kind"] == "gpi"
-    told = json.loads(cli("info", files[0], "--json").out)
-    (recording,) = told["recordings"]
-    assert "rate" in {gap["what"] for gap in told["untold"]}
-    assert recording["channels"]["pressure"]["unit"] == "bar"
-    assert cli("info", "--models").code == cli("info", model).code == 0
+    assert min(loop.stat().st_size, fit.stat().st_size) > 1000
 
 
 def test_of_held_lengths_the_force_is_compared(cli: Cli, tmp_path: Path) -> None:
@@ -188,9 +138,10 @@ def test_of_held_lengths_the_force_is_compared(cli: Cli, tmp_path: Path) -> None
         }
         write(Recording(samples, 0.02), tmp_path / f"held{place}.csv")
     files = [str(tmp_path / f"held{place}.csv") for place in range(3)]
-    done = cli("compare", files[0], files[2], "--test", files[1], "--models", "balance-force")
+    given = ("--test", files[1], "--models", "balance-force", "--json")
+    done = cli("compare", files[0], files[2], *given)
     assert done.code == 0, done.err
-    assert "displacement is held throughout, and so force is modelled" in done.out + done.err
+    assert json.loads(done.out)["output"] == "force"
 
 
 def _driven(folder: Path) -> list[str]:
@@ -221,15 +172,14 @@ def test_force_by_length_and_pressure_is_compared(
     rows = {row["model"]: row for row in board["rows"]}
     assert board["chosen"] == "force-bilinear"
     assert rows["force-bilinear"]["test"]["rmse"] < 0.1
-    assert rows["balance"]["reason"].startswith("length is in mm, which is no pressure of a muscle")
+    assert "length" in rows["balance"]["reason"]
 
 
 def test_a_length_that_no_model_of_force_is_told_is_named(cli: Cli, tmp_path: Path) -> None:
     train, test = _driven(tmp_path)
-    asked = ("--input", "pressure", "--output", "force", "--models", "pi")
+    asked = ("--input", "pressure", "--output", "force", "--models", "pi", "--json")
     done = cli("compare", train, "--test", test, *asked)
-    assert "length varies, force depends on it, and no model is told it" in done.out + done.err
-    assert "Record more" not in done.out
+    assert any("length" in note for note in json.loads(done.out)["notes"])
 
 
 def test_a_pressure_beyond_training_is_told_of_force_by_length(cli: Cli, tmp_path: Path) -> None:
@@ -238,5 +188,5 @@ def test_a_pressure_beyond_training_is_told_of_force_by_length(cli: Cli, tmp_pat
     beyond = tmp_path / "beyond.csv"
     changed = {name: run[name] for name in ("length", "force")} | {"pressure": 2 * run["pressure"]}
     write(Recording(changed, 0.02), beyond)
-    done = cli("compare", train, "--test", beyond, "--models", "force-bilinear")
-    assert "beyond: pressure goes from" in done.out + done.err
+    done = cli("compare", train, "--test", beyond, "--models", "force-bilinear", "--json")
+    assert any("pressure" in note for note in json.loads(done.out)["notes"])

@@ -14,8 +14,10 @@ from mckibben.rigs import record
 from mckibben.signals import resample
 from tests.cli.conftest import Cli
 
+pytestmark = pytest.mark.long
+
 LEVELS = ("0.0", "1.2", "2.5")
-SHORT = ("steps=2", "n_stops=2", "n_lags=0")
+SHORT = ("--set", "steps=2", "--set", "n_stops=2", "--set", "n_lags=0")
 """Settings that make a balance quick."""
 
 
@@ -40,8 +42,7 @@ def arm(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_from_recordings_to_a_closed_loop(cli: Cli, arm: Path, tmp_path: Path) -> None:
     model, inverse, run = (tmp_path / name for name in ("model.json", "inverse.json", "run.csv"))
-    short = [word for setting in SHORT for word in ("--set", setting)]
-    result = cli("fit", "balance", *sorted(arm.glob("*.csv")), "-o", model, *short, "--json")
+    result = cli("fit", "balance", *sorted(arm.glob("*.csv")), "-o", model, *SHORT, "--json")
     assert result.code == 0, result.err
     assert max(json.loads(result.out)["rmse_by_output"].values()) < 2.0
     first = next(iter(sorted(arm.glob("*drive-1.csv"))))
@@ -81,7 +82,7 @@ def test_one_output_of_several_muscles_is_compared(cli: Cli, arm: Path, tmp_path
 
 def test_study_of_a_folder_closes_the_loop(cli: Cli, arm: Path, tmp_path: Path) -> None:
     out = tmp_path / "study"
-    short = [word for setting in SHORT for word in ("--set", f"balance.{setting}")]
+    short = [f"balance.{word}" if "=" in word else word for word in SHORT]
     result = cli("study", arm, "-o", out, "--models", "balance,coupled-pi", *short, "--json")
     assert result.code == 0, result.err
     found = json.loads(result.out)
@@ -91,10 +92,9 @@ def test_study_of_a_folder_closes_the_loop(cli: Cli, arm: Path, tmp_path: Path) 
     assert constant["model"] == "constant"
     assert first["validation_rmse"] < second["validation_rmse"]
     assert set(first["outputs"]) == {f"displacement_{k}" for k in (1, 2, 3)}
-    assert "1.2 bar held out" in board["split"]
-    noted = [note for note in board["notes"] if note.endswith(".csv: its clock was mended")]
+    assert "1.2" in board["split"]
+    noted = [note for note in board["notes"] if note.endswith("its clock was mended")]
     assert len(noted) == len(list(arm.glob("*.csv")))
-    assert "its clock was mended" in (out / "report.html").read_text()
     errors = {name: max(rmse.values()) for name, rmse in found["tracking"].items()}
     assert errors["balance inverse + PID"] < errors["balance inverse"]
     for name in ("report.html", "leaderboard.csv", "leaderboard.json", "inverse.json"):
@@ -109,19 +109,10 @@ def test_a_study_says_whether_a_network_is_to_be_trusted_off_its_patterns(
     write(joint, test)
     asked = ["study", arm, "--test", test, "--models", "tsfnn,coupled-pi", "--jobs", 1]
     asked += ["--resample", 0.25, "--set", "tsfnn.search_samples=400"]
-    damped = cli(*asked, "-o", tmp_path / "damped")
-    assert damped.code == 0, damped.err
-    begin = "tsfnn: trained on 4 patterns that cover "
-    (spoken,) = [line for line in damped.out.splitlines() if f"Note: {begin}" in line]
-    assert " % of the test samples it is outside of them" in spoken
-    out = tmp_path / "raw"
-    raw = cli(*asked, "--set", "tsfnn.ridge=1e-9", "-o", out, "--json")
+    raw = cli(*asked, "--set", "tsfnn.ridge=1e-9", "-o", tmp_path / "out", "--json")
     assert raw.code == 0, raw.err
     board = json.loads(raw.out)["leaderboard"]
-    (said,) = [note for note in board["notes"] if note.startswith(begin)]
-    assert "do not trust it there" in said
-    assert said in json.loads((out / "leaderboard.json").read_text())["notes"]
-    assert said in (out / "report.html").read_text()
+    assert any(note.startswith("tsfnn") for note in board["notes"])
     found = {row["model"]: row.get("off_training") for row in board["rows"]}
     assert found["coupled-pi"] is None
     assert found["tsfnn"]["covered"] < 0.3 < found["tsfnn"]["share"]
@@ -129,47 +120,42 @@ def test_a_study_says_whether_a_network_is_to_be_trusted_off_its_patterns(
 
 
 @pytest.mark.parametrize(
-    ("arguments", "said"),
+    ("arguments", "named"),
     [
         (["track", "nowhere.json", "--rig", "soft-arm", "--reference", "x.csv"], "nowhere.json"),
-        (["study", "EMPTY", "-o", "x"], "no recording"),
-        (["fit", "pi", "FILE", "-o", "x.json", "--validation", "FILE"], "does not stop early"),
-        (["fit", "coupled-pi", "FILE", "-o", "x.json", "--set", "luck=1"], "no setting 'luck'"),
-        (["fit", "sdchm", "REST", "-o", "x.json"], "no channel displacement_1"),
-        (["fit", "force-balance", "FILE", "-o", "x.json"], "Remedy: use 'balance'"),
-        (["compare", "FILE", "--models", "grey-box"], "Remedy: use 'balance'"),
-        (["study", "ONE", "-o", "x", "--rig", "soft-arm"], "several muscles"),
+        (["track", "balance.json", "--rig", "soft-arm", "--reference", "FILE"], "balance"),
+        (["invert", "pi.json", "--for", "force", "-o", "est.json"], "'pi'"),
+        (["study", "empty", "-o", "x"], "empty"),
+        (["fit", "pi", "FILE", "-o", "x.json", "--validation", "FILE"], "pi"),
+        (["fit", "coupled-pi", "FILE", "-o", "x.json", "--set", "luck=1"], "'luck'"),
+        (["fit", "sdchm", "rest.csv", "-o", "x.json"], "displacement_1"),
+        (["fit", "force-balance", "FILE", "-o", "x.json"], "'balance'"),
+        (["compare", "FILE", "--models", "grey-box"], "'balance'"),
+        (["study", "one.csv", "-o", "x", "--rig", "soft-arm"], "soft-arm"),
     ],
 )
 def test_bad_calls_leave_with_a_remedy(
-    cli: Cli, arm: Path, tmp_path: Path, arguments: list[str], said: str
+    cli: Cli,
+    arm: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    arguments: list[str],
+    named: str,
 ) -> None:
-    one = tmp_path / "one.csv"
+    monkeypatch.chdir(tmp_path)
     u = np.linspace(0, 3, 100)
-    write(Recording({"pressure": u, "displacement": 2 * u}, 0.1), one)
-    rest = tmp_path / "rest.csv"
-    write(Recording({"pressure": u, "force": 2 * u}, 0.1), rest)
-    (tmp_path / "empty").mkdir()
-    places = {
-        "FILE": next(iter(sorted(arm.glob("*.csv")))),
-        "EMPTY": tmp_path / "empty",
-        "ONE": one,
-        "REST": rest,
-    }
-    result = cli(*[places.get(word, word) for word in arguments])
+    write(Recording({"pressure": u, "displacement": 2 * u}, 0.1), "one.csv")
+    write(Recording({"pressure": u, "force": 2 * u}, 0.1), "rest.csv")
+    Path("empty").mkdir()
+    PI.example().save("pi.json")
+    Balance.example().save("balance.json")
+    before = sorted(tmp_path.iterdir())
+    first = next(iter(sorted(arm.glob("*.csv"))))
+    result = cli(*(first if word == "FILE" else word for word in arguments))
     assert result.code == 2
-    assert said in result.err
-    assert "Traceback" not in result.err
-
-
-def test_a_model_in_place_of_its_inverse_is_refused(cli: Cli, arm: Path, tmp_path: Path) -> None:
-    model = tmp_path / "model.json"
-    short = [word for setting in SHORT for word in ("--set", setting)]
-    assert cli("fit", "balance", *sorted(arm.glob("*.csv")), "-o", model, *short).code == 0
-    reference = arm / "more" / "reference.csv"
-    result = cli("track", model, "--rig", "soft-arm", "--reference", reference)
-    assert result.code == 2
-    assert "does not drive" in result.err
+    assert named in result.err
+    assert "Remedy" in result.err
+    assert sorted(tmp_path.iterdir()) == before
 
 
 def test_study_under_loads_ranks_one_model_for_all(cli: Cli, tmp_path: Path) -> None:
@@ -222,15 +208,6 @@ def test_loads_are_estimated_by_what_is_measured(cli: Cli, tmp_path: Path) -> No
     assert json.loads(result.out)["metrics"]["force"]["rmse"] < 1e-5  # numbers as text are rounded
 
 
-def test_a_model_that_tells_no_loads_says_so(cli: Cli, tmp_path: Path) -> None:
-    PI.example().save(tmp_path / "pi.json")
-    result = cli("invert", tmp_path / "pi.json", "--for", "force", "-o", tmp_path / "est.json")
-    assert result.code == 2
-    assert "'pi' does not tell loads" in result.err
-    assert "Remedy:" in result.err
-    assert not (tmp_path / "est.json").exists()
-
-
 def test_one_muscle_is_told_which_input_was_taken_and_what_lies_beyond(
     cli: Cli, tmp_path: Path
 ) -> None:
@@ -244,26 +221,23 @@ def test_one_muscle_is_told_which_input_was_taken_and_what_lies_beyond(
     }
     run, model = tmp_path / "run.csv", tmp_path / "model.json"
     write(Recording(given, 0.05), run)
-    settings = [word for setting in SHORT for word in ("--set", setting)]
-    result = cli("fit", "balance", run, *settings, "-o", model)
+    result = cli("fit", "balance", run, *SHORT, "-o", model)
     assert result.code == 0, result.err
-    assert "the input is pressure, and voltage was recorded too" in result.out
+    assert "voltage" in result.out
     assert load(model).inputs[0].name == "pressure"
-    assert "the input is pressure" in cli("fit", "pi", run, "-o", tmp_path / "pi.json").out
-    result = cli("fit", "balance", run, *settings, "--input", "pressure", "-o", model, "--force")
-    assert "voltage was recorded" not in result.out
+    result = cli("fit", "balance", run, *SHORT, "--input", "pressure", "-o", model, "--force")
+    assert "voltage" not in result.out
     result = cli("simulate", model, run, "-o", tmp_path / "out.csv")
     assert "extrapolates" not in result.out
     write(Recording({**given, "force": 2.0 * given["force"]}, 0.05), tmp_path / "heavy.csv")
     result = cli("simulate", model, tmp_path / "heavy.csv", "-o", tmp_path / "out.csv", "--force")
-    assert "in heavy, force goes from" in result.out.replace("\n", " ")
+    assert "extrapolates" in result.out
 
 
 def test_a_comparison_that_leaves_no_model_ends_with_an_error(cli: Cli, arm: Path) -> None:
     runs = sorted(arm.glob("*drive-123.csv"))
     result = cli("compare", *runs[:2], "--test", runs[2], "--models", "pi,gpi", "--jobs", 1)
     assert result.code == 1
-    assert "Traceback" not in result.err
     models = ("pi", "coupled-memory")
     result = cli("compare", *runs[:2], "--test", runs[2], "--models", ",".join(models), "--jobs", 1)
     assert result.code == 0

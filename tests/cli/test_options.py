@@ -6,16 +6,11 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 import typer
 
-from mckibben import GPI, Recording, control
 from mckibben.cli.main import app
 from mckibben.cli.output import visible
-from mckibben.errors import DataError, MckibbenError
-from mckibben.rigs import load_rig, rig_from_data_sheet
-from mckibben.system.workers import checked
 from tests.cli.calls import CALLS, files
 from tests.cli.conftest import Cli
 
@@ -101,38 +96,6 @@ def test_what_no_option_can_be_is_refused_in_words(
         assert result.err.strip(), case
         assert "Traceback" not in result.err, case
     assert not [path for path in tmp_path.iterdir() if path not in before and path.is_file()]
-
-
-RUBBISH = [
-    {"approach": float("nan")},
-    {"approach": 1e300},
-    {"settle": float("inf")},
-    {"noise": float("nan")},
-    {"noise": 1e300},
-    {"delay": 10**20},
-    {"slew": float("inf")},
-    {"seed": -1},
-    {"seed": 10**20},
-]
-
-
-@pytest.mark.parametrize("given", RUBBISH, ids=str)
-def test_the_library_refuses_rubbish_too(given: dict[str, Any]) -> None:
-    reference = Recording({"displacement": np.linspace(1.0, 5.0, 20)}, 0.02)
-    controller = GPI.example().inverse()
-    with pytest.raises(MckibbenError, match=next(iter(given))):
-        control.track(controller, load_rig("mas20-hanging"), reference, **given)
-
-
-def test_numbers_of_no_muscle_and_no_machine_are_refused() -> None:
-    sheet = {"diameter": 20.0, "length": 200.0, "max_pressure": 6.0, "max_force": 1500.0}
-    for wrong in ({"payload": float("nan")}, {"payload": -1.0}, {"length": 1e300}):
-        numbers = {**sheet, "max_contraction": 0.25, **wrong}
-        with pytest.raises(DataError, match=next(iter(wrong))):
-            rig_from_data_sheet(name="mine", **numbers)
-    for jobs in (0, -1, 10**20):
-        with pytest.raises(DataError, match="jobs"):
-            checked(jobs)
 
 
 ESCAPE = "\x1b]0;owned\x07\x1b[2J\x9b31m\u202e"

@@ -10,15 +10,10 @@ import sys
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 
-from mckibben import GPI
-from mckibben.comparison.kept import Kept
 from mckibben.errors import DataError
-from mckibben.outputs import MANIFEST, Results, is_figure
-from mckibben.report import printed
-from mckibben.report.drawing import Curve, Drawing, Panel
+from mckibben.outputs import MANIFEST, Results
 from mckibben.system import manifest
 from mckibben.system.atomic import PART, write_text
 from tests.cli.calls import CALLS, INVERSE, MODEL, RIG, RUN, call_of, files
@@ -172,7 +167,7 @@ def test_full_standard_output_is_reported() -> None:
     assert len(done.stderr.splitlines()) == 1
 
 
-# Descriptions, manifests, seals -------------------------------------------------------------------
+# Descriptions and folders of results -------------------------------------------------------------------
 
 
 def test_a_description_beside_the_output_is_guarded_too(cli: Cli, folder: Path) -> None:
@@ -183,19 +178,6 @@ def test_a_description_beside_the_output_is_guarded_too(cli: Cli, folder: Path) 
     before = own.read_bytes()
     assert cli("fit", "pi", RUN, "-o", own, "--force").code == 2
     assert own.read_bytes() == before
-
-
-@pytest.mark.parametrize("kind", ["png", "svg", "pdf"])
-def test_a_figure_that_its_user_changed_is_a_strangers(tmp_path: Path, kind: str) -> None:
-    path = tmp_path / f"figure.{kind}"
-    x = np.linspace(0, 1, 20)
-    printed.save(Drawing((Panel("x", "y", (Curve(x, x, "a", "series-1"),), "a"),)), path)
-    drawn = path.read_bytes()
-    assert is_figure(path)
-    n = len(drawn)
-    for changed in (drawn + b"\n", drawn[: n // 2] + b"!" + drawn[n // 2 + 1 :], drawn[:4]):
-        path.write_bytes(changed)
-        assert not is_figure(path)
 
 
 def test_models_of_an_earlier_study_go_and_what_was_changed_stays(cli: Cli, folder: Path) -> None:
@@ -244,35 +226,6 @@ def test_a_hostile_manifest_removes_nothing_elsewhere(tmp_path: Path) -> None:
     assert (tmp_path / "elsewhere" / "pi.json").exists()
     with pytest.raises(DataError):
         results.write_text("models/pi.json", "new")
-
-
-def test_digests_that_the_user_took_make_nothing_ours(cli: Cli, folder: Path) -> None:
-    out = folder / "out"
-    out.mkdir()
-    for name in ("thesis.csv", "report.html", "leaderboard.csv"):
-        (out / name).write_text("mine")
-    theirs = "".join(f"{manifest.digest(b'mine')}  {path.name}\n" for path in out.iterdir())
-    (out / MANIFEST).write_text(theirs)
-    before = held(out)
-    refused = cli("compare", *CALLS["compare"].words)
-    assert refused.code == 2
-    assert MANIFEST in refused.err
-    Results(out, force=True).clear()
-    assert held(out) == before
-    # in a manifest of ours, names that no command gives are somebody else's
-    (out / MANIFEST).write_text(manifest.HEAD + theirs)
-    Results(out).clear()
-    assert sorted(path.name for path in out.iterdir()) == [MANIFEST, "thesis.csv"]
-
-
-def test_what_is_unfinished_is_cleared_and_what_somebody_put_there_stays(tmp_path: Path) -> None:
-    (tmp_path / "unfinished").mkdir()
-    (tmp_path / "unfinished" / "thesis.json").write_text("mine")
-    kept = Kept(tmp_path)
-    kept.put("pi", GPI.example())
-    assert len(list((tmp_path / "unfinished").iterdir())) == 2
-    kept.clear()
-    assert [path.name for path in (tmp_path / "unfinished").iterdir()] == ["thesis.json"]
 
 
 def test_planted_links_are_not_written_through_and_rights_stay(

@@ -1,4 +1,4 @@
-"""Whatever a process answers, every part of a comparison has an outcome and the rest is ranked."""
+"""Whatever a process answers, the rest of a comparison is ranked."""
 
 from __future__ import annotations
 
@@ -13,53 +13,10 @@ import pytest
 
 from mckibben import compare
 from mckibben.comparison import trying
-from mckibben.system.workers import WorkerError, Workers
 from tests.report.studies_by_hand import measured
 
 DATA = measured(300), measured(300, seed=1, name="another day")
 HONEST = trying.try_part
-
-
-class Unreadable:
-    """It can be sent, and not be made again."""
-
-    def __init__(self, *_: Any) -> None:
-        pass
-
-    def __reduce__(self) -> Any:
-        return _burst, ()
-
-
-class Unsendable:
-    """It cannot be sent, for a reason that pickle does not know."""
-
-    def __reduce__(self) -> Any:
-        raise ValueError("no")
-
-
-def _burst() -> Any:
-    raise RuntimeError("burst")
-
-
-def answer(common: Any, item: str, tell: Any) -> Any:
-    """Be a worker that answers anything."""
-    if item == "unreadable":
-        return Unreadable()
-    if item == "unsendable":
-        return Unsendable()
-    if item == "dies":
-        os._exit(3)
-    return item
-
-
-@pytest.mark.long
-def test_whatever_a_process_answers_every_item_has_an_outcome() -> None:
-    items = ["fine", "unreadable", "unsendable", "dies", "well"]
-    with Workers(2) as workers:
-        found = {outcome.index: outcome for outcome in workers.results(answer, items)}
-    assert [found[k].value for k in (0, 4)] == ["fine", "well"]
-    for k in range(1, 4):
-        assert isinstance(found[k].error, WorkerError)
 
 
 def nonsense(data: Any, part: Any, tell: Any) -> Any:

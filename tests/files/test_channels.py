@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import shutil
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -198,46 +197,6 @@ def test_what_was_corrected_meanwhile_counts(folder: Folder) -> None:
     (path / NAME).write_text(CHANNELS.replace("gain = 2.5", "gain = 5.0"))
     after = one(path / "run_load200g.csv")["pressure"]
     np.testing.assert_allclose(after - before, 2.5 * RAW * PSI)
-
-
-# Measured files, where they are at hand ---------------------------------------------------------
-
-
-@pytest.mark.filterwarnings("ignore::mckibben.DataWarning")
-def test_measured_loads(tmp_path: Path, measured: Callable[..., Path]) -> None:
-    for name in ("sample2_load200g", "sample2_load400g"):
-        shutil.copy(measured("cavatappi_loads", name), tmp_path)
-    (tmp_path / NAME).write_text(
-        "[[files]]\nmatch = '*load200g*'\n[files.channels.force]\nvalue = 1.962\nunit = 'N'\n"
-        "[[files]]\nmatch = '*load400g*'\n[files.channels.force]\nvalue = 3.924\nunit = 'N'\n"
-    )
-    light, heavy = mckibben.read(tmp_path, gaps="interpolate")
-    assert (light["force"][0], heavy["force"][0]) == (1.962, 3.924)
-    assert light["pressure"].max() > 10
-
-
-@pytest.mark.filterwarnings("ignore::mckibben.DataWarning")
-def test_measured_inputs_without_pressure(tmp_path: Path, measured: Callable[..., Path]) -> None:
-    path = shutil.copy(measured("soft_arm_three_muscles", "trial_00"), tmp_path)
-    (tmp_path / NAME).write_text(
-        "".join(
-            f"[channels.pressure_{k}]\ncolumn = 'u{k}'\nunit = 'bar'\ngain = 0.1\n"
-            for k in (1, 2, 3)
-        )
-    )
-    recording = one(Path(path))
-    assert recording["pressure_1"][0] == pytest.approx(0.1 * 4.11602, rel=1e-3)
-
-
-def test_measured_without_time(tmp_path: Path, measured: Callable[..., Path]) -> None:
-    path = shutil.copy(measured("sma_wing"), tmp_path)
-    (tmp_path / NAME).write_text(
-        "[time]\nsample_time = 0.1\n[channels.angle]\ncolumn = 'output'\n"
-        "[channels.voltage]\ncolumn = 'input'\n"
-    )
-    recording = one(Path(path))
-    assert recording.sample_time == 0.1
-    assert (recording.units["angle"], recording.units["voltage"]) == ("rad", "V")
 
 
 def test_what_the_documentation_shows_is_understood(tmp_path: Path) -> None:

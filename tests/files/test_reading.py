@@ -17,7 +17,6 @@ POSITION = (10 + 3 * np.cos(K / 4)).tolist()
 
 
 Write = Callable[..., Path]
-Measured = Callable[..., Path]
 
 
 @pytest.fixture
@@ -218,38 +217,3 @@ def test_a_short_or_constant_recording_is_one_where_nothing_is_learned(table: Wr
         mckibben.read(path, channels=["pressure"])
     recording = read_one(path, channels=["pressure"], informative=False)
     assert recording["pressure"].tolist() == [2.0] * 3
-
-
-# Measured files, where they are at hand ---------------------------------------------------------
-
-
-def test_measured_files(measured: Measured) -> None:
-    static = read_one(measured("festo_dmsp10_static"))
-    assert static.sample_time is None
-    assert static.n_samples == 606
-    assert static.meta["ignored_columns"] == ["branch"]
-    levels = read_one(measured("festo_dmsp10_levels"), channels=["pressure", "displacement"])
-    assert levels.sample_time == 4.0
-    assert levels.start_time == 204.0
-    with pytest.warns(DataWarning, match="'input_V'.*'output_deg'"):
-        wing = read_one(measured("sma_wing"))
-    assert dict(wing.units) == {"branch": "", "voltage": "V", "angle": "rad"}
-
-
-def test_measured_file_with_gaps(measured: Measured) -> None:
-    path = measured("cavatappi_loads", "sample1_load200g")
-    with pytest.raises(DataError, match=r"row 102.*430"):
-        mckibben.read(path)
-    parts = mckibben.read(path, gaps="split")
-    assert len(parts) == 431
-    assert {part.sample_time for part in parts} == {0.001}
-    assert sum(part.n_samples for part in parts) == 43100
-    with pytest.warns(DataWarning, match="430"):
-        assert read_one(path, gaps="interpolate").sample_time == 0.001
-
-
-def test_measured_file_with_jitter(measured: Measured) -> None:
-    with pytest.warns(DataWarning, match="trial_00"):
-        recording = read_one(measured("soft_arm_three_muscles", "trial_00"))
-    assert recording.sample_time == pytest.approx(1 / 12.04, rel=1e-3)
-    assert recording.duration == pytest.approx(288, rel=1e-2)

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import shutil
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
@@ -15,7 +14,6 @@ import mckibben
 from mckibben import DataError, DataWarning, Recording
 from mckibben.files.channels import NAME
 from mckibben.files.folders import roles
-from tests.recordings import MEASURED
 
 N = 60
 T = np.arange(N) / 50
@@ -219,33 +217,3 @@ def test_a_part_that_is_missing_or_no_signal(tmp_path: Path) -> None:
     put(tmp_path / "b.csv", {"time_s": T, "force_N": P, "displacement_mm": X})
     with pytest.raises(DataError, match=r"b\.csv.* 2 "):
         mckibben.read(tmp_path / "a.csv")
-
-
-def test_measured_files_of_one_signal(tmp_path: Path) -> None:
-    source = MEASURED / "bouc_wen_benchmark"
-    if not source.is_dir():
-        pytest.skip(f"{source} is not here")
-    for path in source.glob("*.mat"):
-        shutil.copy(path, tmp_path)
-    with pytest.raises(DataError, match="join"):
-        mckibben.read(tmp_path)
-    (tmp_path / NAME).write_text(
-        f"[time]\nsample_time = {1 / 750!r}\n"
-        '[channels.force]\ncolumn = "u_multisine"\nunit = "N"\n'
-        '[channels.displacement]\ncolumn = "y_multisine"\nunit = "m"\n'
-        '[[files]]\njoin = ["u*_multisine.mat", "y*_multisine.mat"]\n'
-    )
-    train, test = mckibben.read(tmp_path, channels=["force", "displacement"])
-    assert (train.n_samples, test.n_samples) == (4 * 8192, 8192)
-    assert train.sample_time == 1 / 750
-    assert 0.5 < np.abs(test["displacement"]).max() < 5
-
-
-Measured = Callable[..., Path]
-
-
-def test_held_lengths_are_taken_as_they_are(measured: Measured) -> None:
-    held = measured("festo_isometric_20mm", "muscle12cm_contracted10mm_run1")
-    with pytest.warns(DataWarning, match="contracted10mm"):
-        recording = one(held, channels=["pressure", "displacement", "force"])
-    assert np.ptp(recording["displacement"]) == 0

@@ -1,12 +1,8 @@
-"""NaN, infinity and absurd sizes in a stream: it goes on as if they had not come, as C does."""
+"""NaN, infinity and absurd sizes in a stream: it goes on as if they had not come."""
 
 from __future__ import annotations
 
-import ctypes
-import subprocess
 import warnings
-from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,10 +13,7 @@ from mckibben import Block, DataError, ModelWarning
 from mckibben.blocks.core.running import Stream
 from mckibben.blocks.laws.examples import examples
 from mckibben.blocks.laws.trial import input_limits, wander
-from mckibben.export.c.building import LOOP
-from mckibben.export.c.project import described, source_files
 from mckibben.registry import load
-from tests.tools import needs
 
 Array = NDArray[np.float64]
 
@@ -79,49 +72,6 @@ def test_bad_samples_change_nothing(kind: str) -> None:
     held = np.where(last[:, np.newaxis] < 0, 0.0, outputs[last])
     np.testing.assert_array_equal(outputs, held)
     np.testing.assert_array_equal(states[1:][~kept[1:]], states[:-1][~kept[1:]])
-
-
-@pytest.fixture(scope="module")
-def compiled(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Any]:
-    """Return what runs the exported C of a block over inputs; all blocks are compiled at once."""
-    folder = tmp_path_factory.mktemp("c")
-    loops = []
-    for index, kind in enumerate(KINDS):
-        block, name = EXAMPLES[kind], f"block_{index}"
-        content = described(block, name=name, sample_time=SAMPLE_TIME, single=False)
-        for path, text in source_files(content).items():
-            (folder / Path(path).name).write_text(text)
-        loops.append(LOOP.format(name=name, n_in=len(block.inputs), n_out=len(block.outputs)))
-    (folder / "loops.c").write_text("".join(loops))
-    library = folder / "all.so"
-    command = ["cc", "-std=c99", "-O0", "-ffp-contract=off", "-shared", "-fPIC", "-o", str(library)]
-    subprocess.run([*command, *map(str, folder.glob("*.c")), "-lm"], check=True)
-    functions = ctypes.CDLL(str(library))
-
-    def run(kind: str, inputs: Array, n_outputs: int) -> tuple[Array, NDArray[np.intc]]:
-        name = f"block_{KINDS.index(kind)}"
-        model = ctypes.create_string_buffer(1 << 16)
-        outputs, statuses = np.empty((len(inputs), n_outputs)), np.zeros(len(inputs), np.intc)
-        arrays = [ctypes.c_void_p(a.ctypes.data) for a in (inputs, outputs, statuses)]
-        getattr(functions, f"{name}_init")(model)
-        getattr(functions, f"{name}_loop")(model, *arrays, ctypes.c_long(len(inputs)))
-        return outputs, statuses
-
-    return run
-
-
-@pytest.mark.long
-@needs("cc")
-@pytest.mark.parametrize("kind", KINDS)
-def test_a_stream_does_as_exported_c(kind: str, compiled: Callable[..., Any]) -> None:
-    """Sample for sample, bad ones and the status included."""
-    block = EXAMPLES[kind]
-    inputs, _ = poisoned(path_for(block, 3), 4)
-    outputs, _, statuses = streamed(block.stream(SAMPLE_TIME), inputs)
-    expected, wanted = compiled(kind, inputs, len(block.outputs))
-    np.testing.assert_array_equal(statuses, wanted)
-    span = np.ptp(expected, axis=0) + 1e-300
-    assert (np.abs(outputs - expected) <= 1e-12 * span).all()
 
 
 @pytest.mark.parametrize("kind", KINDS)

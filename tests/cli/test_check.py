@@ -8,11 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mckibben import PI, PerChannel, Recording, check, write
-from mckibben.blocks.core.fields import Channel
-from mckibben.report.check_page import check_page
+from mckibben import PI, Recording, write
 from mckibben.signals import triangle
-from mckibben.validation.describing import describe
 from tests.attacks.commands import call
 
 TRUE = PI(thresholds=(0.0, 0.3, 0.6), weights=(3.0, 1.0, 0.7))
@@ -57,31 +54,3 @@ def test_a_recording_in_the_place_of_the_model_is_refused(files: Path) -> None:
         assert refused.code == 2
         assert "Remedy" in refused.err
         assert any(name in refused.err for name in ("run.csv", "none.csv"))
-
-
-def test_every_output_has_its_part_of_the_page() -> None:
-    parts = tuple(
-        PI(
-            TRUE.thresholds,
-            TRUE.weights,
-            input=Channel(f"pressure_{k}", "bar"),
-            output=Channel(f"displacement_{k}", "mm"),
-        )
-        for k in (1, 2)
-    )
-    time, runs = np.arange(0, 30, 0.02), []
-    for seed, name in enumerate(("first", "<b>second")):
-        channels = {f"pressure_{k}": triangle(time, 4.0 + k, [5.0, 3.0]) for k in (1, 2)}
-        for k in (1, 2):
-            noise = np.random.default_rng([k, seed]).standard_normal(time.size)
-            channels[f"displacement_{k}"] = TRUE.simulate(channels[f"pressure_{k}"]) + 0.1 * noise
-        runs.append(Recording(channels, 0.02, meta={"name": name}))
-    model = PerChannel(parts)
-    page = check_page(check(model, runs), describe(model, runs), "model.json")
-    for place, output in enumerate(("displacement_1", "displacement_2")):
-        assert f'<section id="output-{place}">' in page
-        assert (
-            output in page.partition(f'<section id="output-{place}">')[2].partition("<section")[0]
-        )
-    assert "&lt;b&gt;second" in page
-    assert "<b>second" not in page

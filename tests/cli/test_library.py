@@ -40,10 +40,10 @@ def test_a_fit_begins_from_a_muscle_or_says_what_is_wrong(cli: Cli, tmp_path: Pa
     write(moved(1, 5.0), tmp_path / "run.csv")
     asked = ["fit", "balance", tmp_path / "run.csv", "-o"]
     few = ["--set", "steps=2", "--set", "contact=false"]
-    plain, told = tmp_path / "plain.json", tmp_path / "told.json"
+    plain, prior = tmp_path / "plain.json", tmp_path / "prior.json"
     assert cli(*asked, plain, *few).code == 0
-    assert cli(*asked, told, "--prior", "rail", *few).code == 0
-    assert plain.read_text("utf-8") != told.read_text("utf-8")
+    assert cli(*asked, prior, "--prior", "rail", *few).code == 0
+    assert plain.read_text("utf-8") != prior.read_text("utf-8")
     nobody = cli(*asked, tmp_path / "x.json", "--prior", "nobody")
     assert nobody.code == 2
     assert "'nobody'" in nobody.err

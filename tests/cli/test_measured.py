@@ -99,6 +99,7 @@ def test_every_task_is_the_comparison_it_says(folder: Path) -> None:
     assert plain.title == "plain"
 
 
+@pytest.mark.long
 def test_the_page_has_every_figure_of_every_task(folder: Path) -> None:
     done = list(outcomes(sets_in(folder), models=["gpi"], jobs=1))
     text = page(done, "mckibben measured FOLDER")
@@ -128,6 +129,7 @@ def test_a_set_that_cannot_be_read_is_said_and_the_rest_goes_on(folder: Path) ->
     assert "run.csv" in page(done, "it")
 
 
+@pytest.mark.long
 def test_a_set_that_quick_models_do_not_fit_is_said_and_the_rest_goes_on(folder: Path) -> None:
     (folder / "held").mkdir()
     for seed, length in enumerate((150.0, 140.0, 150.0)):
@@ -199,6 +201,7 @@ def test_descriptions_of_public_sets_are_sound() -> None:
         assert split_of(description(file).split, str(file)).about
 
 
+@pytest.mark.long
 def test_the_command_writes_page_and_rows_and_goes_on(
     cli: Cli, folder: Path, tmp_path: Path
 ) -> None:

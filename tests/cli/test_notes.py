@@ -44,9 +44,7 @@ def test_compare_and_characterize(cli: Cli, folder: Path) -> None:
     assert ASSUMED in cli("info", files[0]).out
 
 
-def test_several_zeros_are_taken_out(
-    cli: Cli, files: tuple[Path, Path], tmp_path: Path
-) -> None:
+def test_several_zeros_are_taken_out(cli: Cli, files: tuple[Path, Path], tmp_path: Path) -> None:
     first = read(files[0])[0]
     moved = first.with_channels(displacement=first["displacement"] + 300.0)
     write(moved, tmp_path / "moved.csv")

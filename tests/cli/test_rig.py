@@ -112,7 +112,7 @@ RUN = ["rig", "run", "rail", "-o", "x.csv"]
 
 
 @pytest.mark.parametrize(
-    ("arguments", "said"),
+    ("arguments", "named"),
     [
         (["rig", "show", "crane"], "'crane'"),
         (RUN, "--inputs"),
@@ -123,33 +123,20 @@ RUN = ["rig", "run", "rail", "-o", "x.csv"]
         ([*RUN, "--signal", "sine:period=nan"], "period is nan"),
         ([*RUN, "--signal", "sine:tempo=1"], "'tempo'"),
         ([*RUN, "--signal", "pressure=sine:period=1"], "'pressure'"),
-        ([*RUN, "--signal", "sine:period=1", "--duration", "nan"], "Remedy"),
-        ([*RUN, "--signal", "sine:period=1", "--rate", "0"], "Remedy"),
+        ([*RUN, "--signal", "sine:period=1", "--duration", "nan"], "nan"),
         ([*RUN, "--signal", "sine:period=1", "--set", "payload=-3"], "payload is -3"),
         ([*RUN, "--signal", "sine:period=1", "--set", "colour=red"], "'colour'"),
-        (["rig", "run", "rail", "--signal", "sine:period=1", "-o", "x.xyz"], "x.xyz"),
         (["rig", "record", "dance", "--out", "set"], "'dance'"),
         (["rig", "record", "field-models", "--out", "set", "--format", "xls"], "'xls'"),
         (["rig", "record", "field-models", "--out", "set", "--only", "zz"], "'zz'"),
         (["rig", "record", "sdchm", "--out", "set", "--rig", "rail", "--only", "gpi-1"], "rail"),
-        (
-            [
-                *("rig", "new", "x.toml", "--diameter", "20", "--length", "200"),
-                *("--max-pressure", "6", "--max-force", "9", "--max-contraction", "0.25"),
-            ],
-            "force",
-        ),
     ],
 )
 def test_bad_arguments_leave_with_a_remedy(
-    cli: Cli,
-    arguments: list[str],
-    said: str,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
+    cli: Cli, arguments: list[str], named: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
     result = cli(*arguments)
     assert result.code == 2, result.err
-    assert said in result.err
+    assert named in result.err
     assert "Remedy:" in result.err

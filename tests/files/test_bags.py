@@ -15,7 +15,6 @@ import pytest
 import mckibben
 from mckibben import DataError, DataWarning, Recording
 from mckibben.files.folders import roles
-from mckibben.files.messages import layout
 from tests.files.rosbags_made import BEGAN, FAST, SLOW, Kind, N, angle, pressure, write
 
 KINDS: tuple[Kind, ...] = ("bag", "mcap", "db3")
@@ -125,38 +124,6 @@ def test_definitions_of_the_standard_are_known_without_the_file(tmp_path: Path) 
     assert recording["angle"] == pytest.approx(angle(recording.time), abs=1e-12)
 
 
-@pytest.mark.parametrize("big", [False, True])
-def test_layouts_agree_with_another_library(big: bool) -> None:
-    from rosbags.typesys import Stores, get_types_from_msg, get_typestore
-
-    store = get_typestore(Stores.ROS2_JAZZY)
-    text = "bool a\nfloat64 b\nstring c\nuint8[] d\nfloat64[] e\nint16 f\nfloat64[] g\nint64[2] h\n"
-    store.register(get_types_from_msg(text, "x/msg/All"))
-    kind = store.types["x/msg/All"]
-    rng = np.random.default_rng(0)
-    for n in range(9):
-        sent: Any = kind(
-            a=bool(n % 2),
-            b=rng.normal(),
-            c="word" * n,
-            d=np.arange(n, dtype=np.uint8),
-            e=rng.normal(size=n % 3),
-            f=-n,
-            g=rng.normal(size=n % 2),
-            h=np.array([n, -n]),
-        )
-        raw = bytes(store.serialize_cdr(sent, "x/msg/All", little_endian=not big))
-        found = layout(raw, "x/msg/All", store.fielddefs, cdr=True)
-        values = {
-            path: np.frombuffer(raw, of, 1, at)[0] for path, (at, of) in found.numbers.items()
-        }
-        assert [values["a"], values["b"], values["f"]] == [sent.a, sent.b, sent.f]
-        for name in "degh":
-            array = getattr(sent, name)
-            assert [values[f"{name}[{k}]"] for k in range(len(array))] == array.tolist()
-        assert found.holds(raw)
-
-
 # What cannot be read ------------------------------------------------------------------------------
 
 
@@ -236,19 +203,6 @@ def test_no_numbers(tmp_path: Path) -> None:
 
     with pytest.raises(DataError, match="/words"):
         mckibben.read(bag_of(tmp_path / "run", put))
-
-
-def test_a_database_whose_tables_are_views(tmp_path: Path) -> None:
-    path = tmp_path / "run.db3"
-    with closing(sqlite3.connect(path)) as base:
-        base.execute("CREATE TABLE topics (id, name, type, serialization_format)")
-        base.execute(
-            "CREATE VIEW messages AS WITH RECURSIVE n(topic_id) AS (SELECT 1 UNION ALL "
-            "SELECT topic_id FROM n) SELECT topic_id, 0 AS timestamp, 0 AS data, 0 AS id FROM n"
-        )
-        base.commit()
-    with pytest.raises(DataError, match="topics and messages"):
-        mckibben.read(path)
 
 
 def test_a_folder_without_files(tmp_path: Path) -> None:

@@ -229,15 +229,13 @@ def test_hdf5_columns_may_be_given_by_name(tmp_path: Path) -> None:
     check(recording)
 
 
-def write_tdms(path: Path, groups: list[str], increment: float | None = 0.02) -> None:
+def write_tdms(path: Path, groups: list[str], *, timed: bool = True) -> None:
     from nptdms import ChannelObject, RootObject, TdmsWriter
 
     root = RootObject({"operator": "jane", "started": datetime.datetime(2026, 1, 31)})
     with TdmsWriter(path) as writer:
         for group in groups:
-            shared = (
-                {} if increment is None else {"wf_increment": increment, "wf_start_offset": 1.0}
-            )
+            shared = {"wf_increment": 0.02, "wf_start_offset": 1.0} if timed else {}
             writer.write_segment(
                 [
                     root,
@@ -256,12 +254,9 @@ def test_tdms(tmp_path: Path) -> None:
     assert recording.meta["operator"] == "jane"
     assert recording.meta["ignored_columns"] == ["slow"]
     assert recording.name == "a"
-
-
-def test_tdms_without_time_base(tmp_path: Path) -> None:
-    write_tdms(tmp_path / "a.tdms", ["run"], increment=None)
-    assert mckibben.read(tmp_path / "a.tdms")[0].sample_time is None
-    check(mckibben.read(tmp_path / "a.tdms", rate=50)[0])
+    write_tdms(tmp_path / "b.tdms", ["run"], timed=False)
+    assert mckibben.read(tmp_path / "b.tdms")[0].sample_time is None
+    check(mckibben.read(tmp_path / "b.tdms", rate=50)[0])
 
 
 def test_every_group_of_tdms_is_a_recording(tmp_path: Path) -> None:

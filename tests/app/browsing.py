@@ -7,7 +7,7 @@ import subprocess
 import sys
 import time
 import urllib.request
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -16,7 +16,7 @@ from tests.tools import where
 
 BROWSER = where("chromium")
 
-SLOW = 300_000
+SLOW = 60_000
 """Milliseconds to wait for fits on a busy machine."""
 
 OPTIONS = [
@@ -127,3 +127,30 @@ def opened(page: Any, tab: str) -> None:
     )
     page.wait_for_timeout(150)
     idle(page)
+
+
+def downloaded(page: Any, name: str) -> bytes:
+    """Click what gives a file, and return that."""
+    with page.expect_download(timeout=SLOW) as download:
+        seen(page, name).click()
+    return Path(download.value.path()).read_bytes()
+
+
+def upload(page: Any, **files: bytes) -> None:
+    """Drop files, by their names without an ending."""
+    seen(page, "upload")
+    page.locator("input[type=file]").first.set_input_files(
+        [
+            {"name": f"{name}.csv", "mimeType": "text/csv", "buffer": content}
+            for name, content in files.items()
+        ]
+    )
+
+
+def holds(page: Any, true: Callable[[], Any]) -> None:
+    """Wait until something is so."""
+    for _ in range(SLOW // 100):
+        if true():
+            return
+        page.wait_for_timeout(100)
+    raise AssertionError("it is never so")

@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 import asyncio
+import sys
+from pathlib import Path
 from typing import Any
 
 import pytest
 
+from mckibben.app.door import door
 from mckibben.app.guard import Guard, new_token
+from mckibben.app.server import _without
+from mckibben.app.workspace import Workspace
 
 TOKEN = "a-token-for-tests"
 OWN = [(b"host", b"127.0.0.1:8750")]
@@ -88,5 +93,24 @@ def test_no_cookie_is_set_nor_looked_at() -> None:
     assert status(asked([*OWN, (b"cookie", TOKEN.encode())], path="/")) == 403
 
 
-def test_tokens_are_not_repeated() -> None:
-    assert len({new_token() for _ in range(100)}) == 100
+def test_the_page_that_leads_in_goes_with_the_workbench(tmp_path: Path) -> None:
+    folder = tmp_path / "<script>alert(1)<"
+    folder.mkdir()
+    address = f"http://127.0.0.1:8750/{TOKEN}/"
+    with door(folder, 8750, address) as page:
+        assert page is not None
+        text = page.read_text()
+        assert address in text
+        assert "<script>alert" not in text
+    assert not page.exists()
+    (folder / ".open-8750.html").write_text("of a workbench that was killed")
+    assert Workspace(folder).claim()
+    assert not list(folder.glob(".open-*"))
+
+
+def test_what_is_left_out_at_the_start_can_be_loaded_later() -> None:
+    for name in [name for name in sys.modules if name.split(".")[0] == "wave"]:
+        del sys.modules[name]
+    with _without("wave"), pytest.raises(ImportError):
+        __import__("wave")
+    assert __import__("wave").open

@@ -1,137 +1,69 @@
-"""What a person does while something is awaited counts, and not what was before."""
+"""What happens while something is awaited counts; who shows a topic hears of its changes once each."""
 
 from __future__ import annotations
 
 import asyncio
+import gc
 import threading
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, nullcontext
+import weakref
+from contextlib import nullcontext
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, cast
 
-import numpy as np
 import pytest
 
 pytest.importorskip("nicegui")
 
+from nicegui import ui
 from nicegui.testing import User
 
-from mckibben import PI, Recording, write
-from mckibben.app import forms, recorded, shell
+from mckibben import PI, DataError, write
+from mckibben.app import news, shell
 from mckibben.app.adding import Problem
+from mckibben.app.busy import SOON, Answer, under_way
 from mckibben.app.desk import Desk
-from mckibben.app.jobs import Job, Jobs
+from mckibben.app.jobs import Jobs
 from mckibben.app.kept import Step
-from mckibben.app.pages import drawing_reference, editing, forces, importing, taking_code
+from mckibben.app.pages import drawing_reference, editing, forces, importing
 from mckibben.app.workspace import Workspace
-from mckibben.errors import DataError
-from tests.app.test_compensate import (
-    WEAKER,
-    field,
+from tests.app.simulated import (
+    desk_of,
+    held,
     later,
+    modelled,
+    on_compensate,
     only,
-    until,
-    workspace_with,
+    simulated,
+    visit,
+    wave,
+    workspace_of,
 )
-from tests.app.test_pages import visit
 
-
-class Held:
-    """A function that waits where it is called in a thread, until it is let go."""
-
-    def __init__(self, function: Callable[..., Any]) -> None:
-        self.function = function
-        self.begun, self.go = threading.Event(), threading.Event()
-
-    def __call__(self, *given: Any, **named: Any) -> Any:
-        self.begun.set()
-        assert self.go.wait(30.0)
-        return self.function(*given, **named)
-
-
-@contextmanager
-def held(monkeypatch: pytest.MonkeyPatch, module: Any, name: str) -> Iterator[Held]:
-    one = Held(getattr(module, name))
-    monkeypatch.setattr(module, name, one)
-    try:
-        yield one
-    finally:
-        one.go.set()
-
-
-def wave() -> Recording:
-    up = 2.0 - 2.0 * np.cos(np.arange(200) * 0.1)
-    return Recording({"pressure": up, "displacement": 4.0 * up}, 0.1)
-
-
-def test_what_is_taken_is_what_was_chosen_at_the_click(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    workspace = workspace_with(tmp_path, a=PI.example(), b=WEAKER)
-
-    async def look(user: User) -> None:
-        user.find(marker="tab-take").click()
-        await until(user, "take-json")
-        await asyncio.sleep(0.5)
-        only(user, "take-form").set_value("model")
-        with held(monkeypatch, forms, "made") as made:
-            user.find(marker="take-json").click()
-            await later(made.begun.is_set)
-            only(user, "take-model").set_value("b")
-            made.go.set()
-            taken = (await user.download.next(timeout=20.0)).text
-        assert workspace.path("takeaway", "a.json").read_text("utf-8") == taken
-        assert taken == workspace.path("models", "a.json").read_text("utf-8")
-        assert "a.json" in workspace.logged()[-1]["call"]
-
-    visit(workspace, look)
-
-
-def test_steps_typed_while_uses_are_looked_for_stay(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    workspace = workspace_with(tmp_path, a=PI.example())
-    workspace.add(wave(), origin="", call="", role="train")
-
-    async def look(user: User) -> None:
-        with held(monkeypatch, taking_code, "pace") as pace:
-            user.find(marker="tab-take").click()
-            await until(user, "take-form")
-            await later(pace.begun.is_set)
-            field(user, "Time between steps [s]").set_value(0.007)
-            pace.go.set()
-            await later(lambda: "inverse" in only(user, "take-form").options)
-            assert field(user, "Time between steps [s]").value == 0.007
-
-    assert recorded.pace(workspace, "a").step == 0.1
-    visit(workspace, look)
+# -- while something is awaited ------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("clicked", [True, False])
 def test_a_file_does_not_overwrite_a_motion_that_was_clicked_meanwhile(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, clicked: bool
 ) -> None:
-    workspace = workspace_with(tmp_path, a=PI.example())
     path = tmp_path / "wished.csv"
     write(wave().select(["displacement"]), path)
+    sketches: list[drawing_reference.Sketch] = []
+    ready = drawing_reference.Sketch.ready
 
     async def sent(*_: Any) -> Path:
         return path
 
+    def noted(self: drawing_reference.Sketch, kind: str) -> None:
+        sketches.append(self)
+        ready(self, kind)
+
     monkeypatch.setattr(drawing_reference, "kept", sent)
+    monkeypatch.setattr(drawing_reference.Sketch, "ready", noted)
 
     async def look(user: User) -> None:
-        sketches: list[drawing_reference.Sketch] = []
-        ready = drawing_reference.Sketch.ready
-
-        def noted(self: drawing_reference.Sketch, kind: str) -> None:
-            sketches.append(self)
-            ready(self, kind)
-
-        monkeypatch.setattr(drawing_reference.Sketch, "ready", noted)
-        user.find(marker="tab-compensate").click()
-        await until(user, "wave")
+        await on_compensate(user)
         user.find(marker="wave").click()
         (sketch,) = sketches
         with held(monkeypatch, drawing_reference, "read_upload") as reading:
@@ -140,37 +72,31 @@ def test_a_file_does_not_overwrite_a_motion_that_was_clicked_meanwhile(
             if clicked:
                 user.find(marker="wave-triangle").click()
             reading.go.set()
-            if clicked:
-                with pytest.raises(DataError, match="Remedy: drop it again"):
-                    await load
-            else:
+            with pytest.raises(DataError) if clicked else nullcontext():
                 await load
         assert (sketch.file is None) == clicked
 
-    visit(workspace, look)
+    visit(modelled(tmp_path, a=PI.example()), look)
 
 
 def test_the_later_of_two_looks_counts_whichever_ends_last(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    workspace = workspace_with(tmp_path, a=PI.example())
-    go, asked = threading.Event(), list[int]()
+    go, asked, desks = threading.Event(), list[int](), list[Desk]()
+    build = forces.build
 
-    def tells(desk: Desk) -> dict[str, list[str]]:
+    def slow(desk: Desk) -> dict[str, list[str]]:
         asked.append(len(asked))
         if len(asked) == 1:
             assert go.wait(30.0)
             return {"older": ["pressure"]}
         return {"newer": ["pressure"]}
 
-    monkeypatch.setattr(forces, "_tells", tells)
-    desks: list[Desk] = []
-    build = forces.build
-
     def noted(desk: Desk) -> None:
         desks.append(desk)
         build(desk)
 
+    monkeypatch.setattr(forces, "_tells", slow)
     monkeypatch.setattr(forces, "build", noted)
 
     async def look(user: User) -> None:
@@ -183,38 +109,26 @@ def test_the_later_of_two_looks_counts_whichever_ends_last(
         assert only(user, "force-model").options == ["newer"]
 
     try:
-        visit(workspace, look)
+        visit(modelled(tmp_path, a=PI.example()), look)
     finally:
         go.set()
 
 
-def test_files_that_come_while_others_are_told_of_are_still_coming(
+def test_files_that_come_or_are_not_read_meanwhile_are_not_forgotten(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    workspace = Workspace(tmp_path)
-    intake = importing.Intake(Desk(workspace, Jobs(workspace)), None)
+    intake = importing.Intake(desk_of(Workspace(tmp_path)), None)
     intake.place, intake.reading = nullcontext(), SimpleNamespace(set_text=lambda text: None)
     intake.seen, intake.read = 3, {"one.csv": []}
-    told: list[int] = []
+    summed: list[int] = []
 
     def warm() -> None:
-        intake.seen += 2  # others
+        intake.seen += 2  # others come
 
     monkeypatch.setattr(intake.desk.workspace, "warm", warm)
-    monkeypatch.setattr(importing, "tell_of", lambda read: told.append(intake.seen))
+    monkeypatch.setattr(importing, "tell_of", lambda read: summed.append(intake.seen))
     asyncio.run(intake._sum_up())
-    assert (told, intake.seen) == ([2], 2)
-    intake.problems = [Problem("two.csv", DataError("it is not known", remedy="say it"))]
-    monkeypatch.setattr(importing, "tell", lambda text: None)
-    asyncio.run(intake._sum_up())
-    assert intake.seen == 0
-
-
-def test_files_that_were_not_read_while_one_was_asked_about_are_not_forgotten(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    workspace = Workspace(tmp_path)
-    intake = importing.Intake(Desk(workspace, Jobs(workspace)), None)
+    assert (summed, intake.seen) == ([2], 2)
     error = DataError("it is not known", remedy="say it")
     one, rest, new = (Problem(f"{n}.csv", error, f"{n}.csv") for n in ("one", "rest", "new"))
     intake.left = [one, rest]
@@ -230,14 +144,12 @@ def test_files_that_were_not_read_while_one_was_asked_about_are_not_forgotten(
 
 
 def test_a_part_of_what_is_not_there_any_more_is_not_cut(tmp_path: Path) -> None:
-    workspace = Workspace(tmp_path)
-    workspace.add(wave(), origin="", call="", name="run")
-    desk = Desk(workspace, Jobs(workspace))
-    first = Step(do="slice", start=100, stop=200)
+    workspace = workspace_of(tmp_path, run=wave())
+    desk, first = desk_of(workspace), Step(do="slice", start=100, stop=200)
 
     async def cut() -> None:
         await editing.do(desk, "run", first, seen=())
-        with pytest.raises(DataError, match="was changed or removed meanwhile"):
+        with pytest.raises(DataError):
             await editing.do(desk, "run", first, seen=())
 
     asyncio.run(cut())
@@ -245,11 +157,193 @@ def test_a_part_of_what_is_not_there_any_more_is_not_cut(tmp_path: Path) -> None
     assert len(workspace.recording("run")) == 100
 
 
-@pytest.mark.parametrize(("state", "told"), [("done", 0), ("cancelled", 1), ("failed", 1)])
-def test_only_what_did_not_end_well_covers_the_page(
-    state: str, told: int, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize("clicked", [True, False])
+def test_a_theme_chosen_by_a_click_stays(clicked: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The browser's own theme is asked for when a page opens; its answer may come after a click."""
+    desk = cast(Any, SimpleNamespace(dark=False, changed=lambda topic: None))
+    dark = cast(Any, SimpleNamespace(value=None))
+    dark.set_value = lambda value: setattr(dark, "value", value)
+
+    async def answered(query: str, *, timeout: float) -> bool:
+        if clicked:
+            shell._switch(desk, dark, False)
+        return not clicked
+
+    monkeypatch.setattr(ui, "run_javascript", answered)
+    asyncio.run(shell._match(desk, dark))
+    assert (desk.dark, dark.value) == (True, True)
+    shell._switch(desk, dark, True)
+    assert (desk.dark, dark.value) == (False, False)
+
+
+def test_a_second_click_does_nothing_twice_and_what_runs_is_listed() -> None:
+    done: list[str] = []
+
+    def root() -> None:
+        async def slow() -> None:
+            await asyncio.sleep(3 * SOON)
+            done.append("slow")
+
+        ui.button("Draw it", on_click=Answer(slow))
+
+    async def look(user: User) -> None:
+        assert user.client is not None
+        for _ in range(3):
+            user.find("Draw it").click()
+        await asyncio.sleep(2 * SOON)
+        (button,) = user.find("Draw it").elements
+        assert [str(one) for one in under_way(user.client)] == ["Draw it"]
+        assert "loading" in button.props
+        await asyncio.sleep(3 * SOON)
+        assert done == ["slow"]
+        assert under_way(user.client) == []
+        assert "loading" not in button.props
+        user.find("Draw it").click()
+        await later(lambda: done == ["slow", "slow"])
+
+    simulated(root, look)
+
+
+# -- who hears of what ---------------------------------------------------------------------------
+
+
+class Page:
+    """A page over a workspace that counts what it draws."""
+
+    def __init__(self, folder: Path) -> None:
+        self.desk = Desk(Workspace(folder), Jobs(Workspace(folder)))
+        self.drawn: list[str] = []
+
+    def __call__(self) -> None:
+        self.desk.news.client = ui.context.client
+        self.desk.news.open_tab = "one"
+        for tab in ("one", "two"):
+            with ui.column() as holder:
+                self.desk.news.tabs[tab] = holder
+
+                @ui.refreshable
+                def shown(tab: str = tab) -> None:
+                    ui.label(f"drawn {len(self.drawn)} {tab}")
+                    self.drawn.append(tab)
+
+                self.desk.when("results", shown.refresh)
+                self.desk.when("channels", shown.refresh)
+                shown()
+
+    async def settled(self) -> None:
+        for _ in range(200):
+            await asyncio.sleep(0.01)
+            if not self.desk.news._pending and not self.desk.news._at_work:
+                return
+
+
+def test_changes_are_drawn_once_where_they_are_seen_and_failures_are_tried_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    said: list[str] = []
-    monkeypatch.setattr("nicegui.ui.notify", lambda text, **how: said.append(how["position"]))
-    shell._say(Job("pi", "fit", {}, state=state, message="no"))
-    assert said == ["bottom"] * told
+    monkeypatch.setattr(news, "AGAIN", (0.01, 0.01))
+    page, reported, tries = Page(tmp_path), list[Exception](), list[None]()
+
+    def half_written() -> None:
+        tries.append(None)
+        if len(tries) < 3:
+            raise ValueError("the file is just being written")
+
+    async def look(_: User) -> None:
+        page.drawn.clear()
+        for _again in range(5):
+            page.desk.changed("results", "channels")
+        await page.settled()
+        assert page.drawn == ["one"]
+        page.desk.news.opened("two")
+        await page.settled()
+        assert page.drawn == ["one", "two"]
+        page.desk.news.told = reported.append
+        page.desk.when("results", half_written)
+        page.desk.changed("results")
+        await page.settled()
+        await later(lambda: len(tries) == 3)
+        assert reported == []
+        tries[:] = []
+        monkeypatch.setattr(news, "AGAIN", ())
+        page.desk.changed("results")
+        await page.settled()
+        assert [type(error) for error in reported] == [ValueError]
+        client = page.desk.news.client
+        assert client is not None
+        for _again in range(10):
+            with client, ui.column() as place:
+                page.desk.when("runs", lambda: None)
+            place.delete()  # what listened there goes with it
+        assert len(page.desk.news._listeners["runs"]) == 1
+
+    simulated(page, look)
+
+
+def test_a_change_from_what_it_deletes_is_drawn_every_time(tmp_path: Path) -> None:
+    """The button that changes something stands in what is drawn anew: it is gone by then."""
+    page = Page(tmp_path)
+    state = {"done": 0, "shown": -1, "other": -1}
+
+    def root() -> None:
+        page()
+
+        @ui.refreshable
+        def own() -> None:
+            state["shown"] = state["done"]
+
+            def more() -> None:
+                state["done"] += 1
+                page.desk.changed("recordings")
+                page.desk.changed("results")
+
+            ui.button("more", on_click=more)
+
+        @ui.refreshable
+        def other() -> None:
+            state["other"] = state["done"]
+
+        page.desk.when("recordings", own.refresh)
+        page.desk.when("results", other.refresh)
+        own()
+        other()
+
+    async def look(user: User) -> None:
+        for number in range(1, 16):
+            user.find("more").click()
+            await page.settled()
+            assert state == {"done": number, "shown": number, "other": number}
+
+    simulated(root, look)
+
+
+def test_other_windows_hear_of_what_is_shared_and_a_closed_one_is_let_go(tmp_path: Path) -> None:
+    workspace = Workspace(tmp_path)
+    jobs = Jobs(workspace)
+    desks: list[weakref.ref[Desk]] = []
+
+    async def look(user: User) -> None:
+        first = user.client
+        await user.open("/")
+        one, two = (desk() for desk in desks[-2:])
+        assert one is not None
+        assert two is not None
+        heard: list[str] = []
+        one.when("recordings", lambda: heard.append("recordings"))
+        one.when("theme", lambda: heard.append("theme"))
+        two.changed("recordings", "theme")
+        await later(lambda: heard == ["recordings"])
+        del two
+        assert first is not None
+        first.delete()
+        assert one.news._listeners == {}
+        one.changed("recordings")
+        page = weakref.ref(first)
+        del one, first
+        for _ in range(20):
+            await asyncio.sleep(0.1)
+            gc.collect()
+            if page() is None:
+                break
+        assert page() is None
+
+    simulated(lambda: desks.append(weakref.ref(shell.build(workspace, jobs))), look)

@@ -3,20 +3,16 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
 from pathlib import Path
-from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
-import pytest
 
 from mckibben import Recording, write
 from mckibben.blocks.compose import Parallel
 from mckibben.blocks.force.feedforward import ForceFeedforward
 from mckibben.blocks.force.multistate_friction import EACH_WAY, MultistateFriction
 from mckibben.blocks.play_type.pi import PI
-from mckibben.control import track
+from mckibben.control import Twin, track
 from mckibben.papers.multistate_friction.published import static_force
 from tests.cli.conftest import Cli
 from tests.cli.conftest import cli as cli  # a fixture
@@ -30,30 +26,7 @@ FRICTION = MultistateFriction(
 MODEL = Parallel((LAW, FRICTION))
 
 
-class Stand:
-    """A plant that is the model itself, its length imposed."""
-
-    name = "stand"
-    inputs = ("pressure", "length")
-    outputs = ("pressure", "length", "force")
-
-    def __init__(self, step: float = 0.02, length: float = 200.0) -> None:
-        self.time, self.length = step, length
-
-    def changed(self, settings: Mapping[str, Any]) -> Stand:
-        return Stand(settings["sample_time"], settings["start.length"])
-
-    def limits(self, name: str) -> SimpleNamespace:
-        low, high = {"length": (150.0, 250.0)}.get(name, (-9.0, 9.0))
-        return SimpleNamespace(low=low, high=high)
-
-    def reset(self, seed: int = 0) -> np.ndarray:
-        self.stream = MODEL.stream(self.time)
-        return np.array([0.0, self.length, 0.0])
-
-    def step(self, action: Any) -> np.ndarray:
-        force = float(self.stream.step([action["length"], action["pressure"]])[0])
-        return np.array([action["pressure"], action["length"], force])
+STAND = Twin(MODEL, limits={"pressure": (-9.0, 9.0)}, sample_time=0.02)
 
 
 def reference() -> Recording:
@@ -65,11 +38,11 @@ def reference() -> Recording:
 def test_feedforward_gives_the_force_exactly_where_the_model_is_the_plant() -> None:
     ahead = ForceFeedforward.of(MODEL)
     assert ahead is not None
-    found = track(ahead, Stand(), reference(), approach=2.0, pressure_loop=False)
+    found = track(ahead, STAND, reference(), approach=2.0, pressure_loop=False)
     assert found.rmse["force"] < 1e-9
     assert found.recording.units["reference_force"] == "N"
     assert ForceFeedforward.of(LAW) == ForceFeedforward(LAW)
-    blind = track(ForceFeedforward(LAW), Stand(), reference(), approach=2.0, pressure_loop=False)
+    blind = track(ForceFeedforward(LAW), STAND, reference(), approach=2.0, pressure_loop=False)
     assert blind.rmse["force"] > 30.0
     assert ForceFeedforward.of(PI.example()) is None
 
@@ -97,35 +70,15 @@ def test_commands_follow_a_force_on_the_test_stand(cli: Cli, tmp_path: Path) -> 
 
 
 def test_runs_that_hold_the_length_are_fitted_together(cli: Cli, tmp_path: Path) -> None:
-    files = []
-    pressure = np.linspace(0.0, 4.0, 50)
-    for length in (190.0, 194.0, 198.0):
-        run = Recording({"length": np.full(50, length), "pressure": pressure}, 0.1)
-        files.append(tmp_path / f"{length:.0f}.csv")
-        write(run.with_channels(force=LAW.simulate(run)["force"]), files[-1])
-    channels = ["--input", "length", "--output", "force"]
-    result = cli("fit", "force-bilinear", *files, *channels, "-o", tmp_path / "law.json", "--json")
+    files = [tmp_path / f"{length}.csv" for length in (190, 194, 198)]
+    for file in files:
+        held = {"length": np.full(50, float(file.stem)), "pressure": np.linspace(0.0, 4.0, 50)}
+        run = Recording(held, 0.1)
+        write(run.with_channels(force=LAW.simulate(run)["force"]), file)
+    options = ["--input", "length", "--output", "force", "-o", tmp_path / "law.json"]
+    result = cli("fit", "force-bilinear", *files, *options, "--json")
     assert result.code == 0, result.err
     assert json.loads(result.out)["rmse"] < 1e-6
-    alone = cli("fit", "force-bilinear", files[0], *channels, "-o", tmp_path / "law.json")
+    alone = cli("fit", "force-bilinear", files[0], *options)
     assert alone.code == 2
     assert "length" in alone.err
-
-
-@pytest.mark.parametrize("elements", [EACH_WAY, ("shared", "both", "shortening")])
-def test_every_value_of_friction_has_a_name(elements: Any) -> None:
-    n = {"shared": 5, "both": 6, "lengthening": 3, "shortening": 3}
-    size = sum(n[element] for element in elements)
-    friction = MultistateFriction(elements, tuple(1.0 + place for place in range(size)))
-    named = dict(zip(friction.parameter_names, friction.pack().tolist(), strict=True))
-    columns = {"lengthening": 0, "shortening": 3}
-    quantities = ("k [N/mm]", "sigma [N s/mm]", "F_c [N]")
-    for place, row in enumerate(friction.table(), start=1):
-        for way, first in columns.items():
-            if row[first + 2] == 0:
-                continue
-            for offset, quantity in enumerate(quantities):
-                shared = f"element {place}: {quantity}"
-                told = f"element {place}, {way}: {quantity}"
-                assert named[shared if shared in named else told] == row[first + offset]
-    assert Parallel((LAW, friction)).parameter_names[-size:] == friction.parameter_names

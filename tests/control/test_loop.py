@@ -2,55 +2,35 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
-from mckibben import PI, DataError, ModelError, Recording, load, load_rig
+from mckibben import PI, Affine, DataError, ModelError, Recording, Series, load, load_rig
 from mckibben.blocks.core.fields import Channel
 from mckibben.blocks.coupled.balance import Balance
+from mckibben.blocks.dynamic.transfer_function import TransferFunction
 from mckibben.blocks.feedback.feedforward_feedback import FeedforwardFeedback
 from mckibben.blocks.feedback.pid import PIDFeedback
 from mckibben.control import DisturbanceObserver, Twin, control_law, track, tune_pid
 from mckibben.control.pressure_loop import PressureLoop
 from mckibben.errors import ModelWarning
 
-
-class Simple:
-    """A plant that is a block: hysteresis, a first-order lag, and a load."""
-
-    name = "simple"
-    inputs = ("pressure",)
-    outputs = ("pressure", "displacement")
-
-    def __init__(self, lag: float = 0.0, load: float = 0.0, step: float = 0.02) -> None:
-        self.lag, self.load, self.time = lag, load, step
-
-    def changed(self, settings: Mapping[str, Any]) -> Simple:
-        return Simple(self.lag, self.load, settings.get("sample_time", self.time))
-
-    def limits(self, name: str) -> SimpleNamespace:
-        return SimpleNamespace(low=0.0, high=5.0)
-
-    def reset(self, seed: int = 0) -> np.ndarray:
-        self.stream = BLOCK.stream()
-        self.y = float(self.stream.step(0.0)[0])
-        return np.array([0.0, self.y + self.load])
-
-    def step(self, action: Any) -> np.ndarray:
-        share = 1.0 if self.lag == 0 else 1 - np.exp(-self.time / self.lag)
-        self.y += share * (float(self.stream.step(action["pressure"])[0]) - self.y)
-        return np.array([action["pressure"], self.y + self.load])
-
-
 BLOCK = PI.example()
 LOW, HIGH = (float(end[0]) for end in BLOCK.reachable())
+
+
+def plant(load: float = 0.0) -> Twin:
+    """Return a plant that is the block, under a load that it knows nothing of."""
+    if not load:
+        return Twin(BLOCK, sample_time=0.02)
+    moved, share = BLOCK.output, 1 - float(np.exp(-0.02 / 0.05))
+    lag = TransferFunction((share,), (share - 1,), 0.02, input=moved, output=moved)
+    return Twin(Series((BLOCK, lag, Affine(1.0, load, moved, moved))))
 
 
 def feedback(kp: float, ki: float, kd: float = 0.0, *, highest: float = 5.0) -> PIDFeedback:
@@ -65,7 +45,7 @@ def reference(cycles: int = 3) -> Recording:
 
 
 def test_an_exact_inverse_tracks_its_own_plant_exactly() -> None:
-    found = track(BLOCK.inverse(), Simple(), reference(), pressure_loop=False)
+    found = track(BLOCK.inverse(), plant(), reference(), pressure_loop=False)
     assert found.rmse["displacement"] < 1e-9 * (HIGH - LOW)
     assert found.clipped == 0
     assert {"reference_displacement", "command_pressure", "displacement"} <= set(
@@ -75,17 +55,16 @@ def test_an_exact_inverse_tracks_its_own_plant_exactly() -> None:
 
 @pytest.mark.parametrize("law", ["feedforward-pid", "observer"])
 def test_feedback_removes_a_load_that_no_model_knows(law: str) -> None:
-    plant = Simple(lag=0.05, load=-0.8)
-    ahead = BLOCK.inverse()
-    controller = control_law(law, ahead, lambda: tune_pid(plant, sample_time=0.02))
-    blind = track(ahead, plant, reference(), settle=5.0, pressure_loop=False)
-    seeing = track(controller, plant, reference(), settle=5.0, pressure_loop=False)
+    loaded, ahead = plant(load=-0.8), BLOCK.inverse()
+    controller = control_law(law, ahead, lambda: tune_pid(loaded, sample_time=0.02))
+    blind = track(ahead, loaded, reference(), settle=5.0, pressure_loop=False)
+    seeing = track(controller, loaded, reference(), settle=5.0, pressure_loop=False)
     assert blind.rmse["displacement"] > 0.7
     assert seeing.rmse["displacement"] < 0.2 * blind.rmse["displacement"]
 
 
 def test_limits_and_slew_are_counted_with_their_cost() -> None:
-    found = track(BLOCK.inverse(), Simple(), reference(), slew=0.5, pressure_loop=False)
+    found = track(BLOCK.inverse(), plant(), reference(), slew=0.5, pressure_loop=False)
     assert found.clipped > 0
     assert found.rmse["displacement"] > 0.01
     steps = np.diff(found.recording["command_pressure"])
@@ -105,7 +84,7 @@ def test_integral_does_not_wind_up() -> None:
 def test_the_same_seed_gives_the_same_loop() -> None:
     pid = feedback(0.05, 0.2)
     first, again, other = (
-        track(pid, Simple(), reference(1), noise=0.1, seed=seed).recording["displacement"]
+        track(pid, plant(), reference(1), noise=0.1, seed=seed).recording["displacement"]
         for seed in (3, 3, 4)
     )
     np.testing.assert_array_equal(first, again)
@@ -145,31 +124,28 @@ def test_noise_beyond_a_range_is_no_wish() -> None:
 def test_bad_loops_are_refused() -> None:
     controller = BLOCK.inverse()
     with pytest.raises(DataError, match="displacement"):
-        track(controller, Simple(), Recording({"pressure": np.ones(10)}, 0.02))
+        track(controller, plant(), Recording({"pressure": np.ones(10)}, 0.02))
     with pytest.raises(DataError):
-        track(controller, Simple(), Recording({"displacement": np.ones(10)}, None))
+        track(controller, plant(), Recording({"displacement": np.ones(10)}, None))
     with pytest.raises(ModelError, match="slew"):
-        track(controller, Simple(), reference(), slew=-1.0)
+        track(controller, plant(), reference(), slew=-1.0)
     with pytest.raises(ModelError, match="settle"):
-        track(controller, Simple(), reference(1), settle=1e3)
+        track(controller, plant(), reference(1), settle=1e3)
     with pytest.raises(ModelError, match="ki"):
         PIDFeedback.of(BLOCK.outputs, BLOCK.inputs, (1.0, 2.0), (1.0,), limits=(0.0, 5.0))
     with pytest.raises(ModelError, match="bang"):
         control_law("bang", controller, PIDFeedback.example)
     with pytest.raises(ModelError, match="preview"):
-        track(controller, Simple(), reference(), preview=-1.0)
+        track(controller, plant(), reference(), preview=-1.0)
     with pytest.raises(ModelError, match="filter_time"):
         DisturbanceObserver(BLOCK.inverse(), filter_time=0.0)
 
 
-class Scripted(Simple):
+class Scripted(Twin):
     """A plant that measures what stands in a table, whatever is applied."""
 
-    def changed(self, settings: Mapping[str, Any]) -> Scripted:
-        return self
-
     def reset(self, seed: int = 0) -> np.ndarray:
-        self.rows = iter(np.random.default_rng(seed).normal(10.0, 1.0, (1000, 2)))
+        self.rows = iter(np.random.default_rng(seed).normal(10.0, 1.0, (1000, 1)))
         return next(self.rows)
 
     def step(self, action: Any) -> np.ndarray:
@@ -180,7 +156,8 @@ class Scripted(Simple):
 def test_what_is_tracked_is_what_the_saved_block_gives(behind: bool, tmp_path: Path) -> None:
     pid = feedback(0.05, 0.2, 0.002, highest=2.0)
     block = FeedforwardFeedback.of(BLOCK.inverse(), pid) if behind else pid
-    found = track(block, Scripted(), reference(1), approach=0.0, pressure_loop=False).recording
+    table = Scripted(BLOCK, sample_time=0.02)
+    found = track(block, table, reference(1), approach=0.0, pressure_loop=False).recording
     block.save(tmp_path / "controller.json")
     measured = found["displacement"]
     # what is due at a step was asked for at the one before

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -17,7 +15,7 @@ from mckibben.blocks.dynamic.air import Air
 from mckibben.blocks.feedback.feedforward_feedback import FeedforwardFeedback
 from mckibben.blocks.feedback.pid import PIDFeedback
 from mckibben.blocks.memoryless.affine import Affine
-from mckibben.control import DisturbanceObserver, EstimatedLoad, track
+from mckibben.control import DisturbanceObserver, EstimatedLoad, Twin, track
 from mckibben.control.controller import BlockController
 from tests.cli.conftest import Cli
 from tests.cli.conftest import cli as cli  # a fixture
@@ -29,28 +27,10 @@ KNOWN = Series((replace(AIR, dead_time=(LATE + 1) * STEP), PI.example()))
 """As it is recorded: what is applied at a sample is held until the next, and seen there."""
 
 
-class Late:
-    """A plant that is air and a muscle."""
-
-    name = "late"
-    inputs = ("voltage",)
-    outputs = ("displacement",)
-
-    def __init__(self, load: float = 0.0) -> None:
-        self.load = load
-
-    def changed(self, settings: Mapping[str, Any]) -> Late:
-        return self
-
-    def limits(self, name: str) -> SimpleNamespace:
-        return SimpleNamespace(low=0.0, high=10.0)
-
-    def reset(self, seed: int = 0) -> np.ndarray:
-        self.stream = PLANT.stream(STEP)
-        return np.asarray(self.stream.step(0.1).copy() + self.load)
-
-    def step(self, action: Any) -> np.ndarray:
-        return np.asarray(self.stream.step(action["voltage"]).copy() + self.load)
+def late(load: float = 0.0) -> Twin:
+    moved = PLANT.outputs[0]
+    loaded = Series((AIR, PI.example(), Affine(1.0, load, moved, moved)))
+    return Twin(loaded, limits={"voltage": (0.0, 10.0)}, sample_time=STEP)
 
 
 def wanted() -> Recording:
@@ -62,7 +42,7 @@ def wanted() -> Recording:
 
 
 def error(controller: Any, preview: float | None = None, load: float = 0.0) -> float:
-    found = track(controller, Late(load), wanted(), settle=4.0, preview=preview)
+    found = track(controller, late(load), wanted(), settle=4.0, preview=preview)
     return found.rmse["displacement"]
 
 

@@ -18,25 +18,11 @@ from mckibben.rigs.physics.air import (
     valve_flow,
     valve_target,
 )
-from mckibben.rigs.physics.braid import braid_area, braid_constants
-from mckibben.rigs.physics.compiled import ATMOSPHERE, NEWTON_PER_BAR_MM2
+from mckibben.rigs.physics.compiled import ATMOSPHERE
 from mckibben.rigs.physics.friction import slip
 
 ANGLES = st.floats(15.0, 80.0)
 SHARES = st.floats(-0.03, 0.3)
-
-
-@given(ANGLES, st.floats(0.0, 0.25))
-def test_a_cylinder_pulls_as_chou_and_hannaford_say(angle: float, contraction: float) -> None:
-    # F = p b² (3 cos² - 1) / (4 pi n²), with thread length b and n turns; D = b sin / (n pi).
-    turns = 1.5
-    thread = 200.0 / math.cos(math.radians(angle))
-    cosine = (1 - contraction) * math.cos(math.radians(angle))
-    expected = 0.1 * thread**2 * (3 * cosine**2 - 1) / (4 * math.pi * turns**2)
-    diameter = thread * math.sin(math.radians(angle)) / (turns * math.pi)
-    a, b = braid_constants(angle)
-    area, _ = braid_area(math.pi * diameter**2 / 4, a, b, 1.0, 200.0, 200.0 * contraction)
-    assert NEWTON_PER_BAR_MM2 * area == pytest.approx(expected, rel=1e-9, abs=1e-9)
 
 
 def naive_slip(force: float, k: float, up: float, down: float, moved: float) -> float:
@@ -54,23 +40,6 @@ def test_slip_is_exact_for_a_straight_move(
     found, slope = slip(min(max(force, -down), up), k, up, down, moved)
     assert found == pytest.approx(expected, abs=1e-9 * (1 + k))
     assert slope in (0.0, k)
-
-
-def test_elements_remember_an_unfinished_excursion() -> None:
-    # Wiping-out: a small cycle within a large one leaves no trace once it is closed.
-    elements = [(8.0, 2.0, 1.5), (4.0, 3.0, 2.0), (1.0, 4.0, 3.0)]
-
-    def forces(path: list[float]) -> list[float]:
-        held = [0.0] * len(elements)
-        for moved in np.diff([0.0, *path]):
-            held = [
-                slip(f, k, up, down, moved)[0]
-                for f, (k, up, down) in zip(held, elements, strict=True)
-            ]
-        return held
-
-    assert forces([3.0, 1.0, 2.0, 1.0, 0.5]) == pytest.approx(forces([3.0, 0.5]))
-    assert forces([3.0, 1.0]) != pytest.approx(forces([1.0]))
 
 
 @given(st.floats(0.01, 5.0), st.floats(1.0, 9.0), st.floats(0.0, 1.0), st.floats(0.1, 0.6))

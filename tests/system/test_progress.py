@@ -69,19 +69,6 @@ def test_true_shows_a_bar_and_a_callable_is_told(
     assert not out
 
 
-def test_commands_in_a_notebook_say_it_in_lines(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    from mckibben.cli.output import progress_bar
-
-    monkeypatch.setenv("JPY_PARENT_PID", "1")
-    monkeypatch.setattr(sys.stderr, "isatty", lambda: True, raising=False)
-    with progress_bar("work", plainly=True) as tell:
-        tell(0.5, "half")
-        tell(0.5, "half")
-    assert capsys.readouterr().err == "half\n"
-
-
 def test_a_notebook_has_a_bar_without_other_packages(monkeypatch: pytest.MonkeyPatch) -> None:
     shown: list[str] = []
 
@@ -99,3 +86,16 @@ def test_a_notebook_has_a_bar_without_other_packages(monkeypatch: pytest.MonkeyP
     assert 'value="0.0000"' in shown[0]
     assert 'value="0.5000"' in shown[1]
     assert "&lt;b&gt;half" in shown[1]
+
+
+def test_commands_in_a_notebook_say_it_in_lines(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from mckibben.cli.output import progress_bar
+
+    monkeypatch.setenv("JPY_PARENT_PID", "1")
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True, raising=False)
+    with progress_bar("work", plainly=True) as tell:
+        tell(0.5, "half")
+        tell(0.5, "half")
+    assert capsys.readouterr().err == "half\n"

@@ -17,6 +17,9 @@ import pytest
 from mckibben.errors import DataError
 from mckibben.system.workers import WorkerError, Workers, all_of, in_turn, prepare
 
+ROOT = Path(__file__).parents[2]
+HERE = os.environ | {"PYTHONPATH": f"{ROOT}:{ROOT / 'src'}"}
+
 
 def square(common: int, item: int, tell: Any) -> int:
     tell("at it", item)
@@ -51,36 +54,26 @@ def test_everything_comes_back_and_is_told() -> None:
     assert found == {0: 10, 1: 17, 2: 26}
     assert {item for item in told if len(item) > 1} == {(k, "at it", k + 3) for k in range(3)}
     assert [item for item in told if len(item) == 1] == [(0,), (1,), (2,)]
-
-
-@pytest.mark.long
-def test_processes_give_what_this_one_gives() -> None:
-    items = list(range(5))
-    assert all_of(square_of, items, 2) == [o.result() for o in in_turn(square_of, None, items)]
+    assert found == {o.index: o.result() for o in in_turn(square, 1, [3, 4, 5])}
 
 
 def square_of(common: None, item: int, tell: Any) -> int:
     return item**2
 
 
-def test_errors_arrive_whole() -> None:
-    with Workers(1, 0) as workers:
-        (outcome,) = workers.results(square, [-1])
-    with pytest.raises(DataError, match="pressure"):
-        outcome.result()
-    with Workers(1, 0) as workers:
+def test_errors_arrive_whole_and_a_process_that_dies_takes_its_own_work_only() -> None:
+    with Workers(2, 0) as workers:
+        found = {o.index: o for o in workers.results(square, [1, 13, 2, -1, 4])}
         (odd,) = workers.results(raise_odd, [1])
+    assert isinstance(found[1].error, WorkerError)
+    assert [found[k].value for k in (0, 2, 4)] == [1, 4, 16]
+    with pytest.raises(DataError) as error:
+        found[3].result()
+    assert (error.value.channel, error.value.remedy) == ("pressure", "give more")
     with pytest.raises(WorkerError, match="OddError: 1 2"):
         odd.result()
-    error = DataError("odd", remedy="even", file="a.csv", row=3)
-    assert str(pickle.loads(pickle.dumps(error))) == str(error)
-
-
-def test_a_process_that_dies_takes_its_own_work_only() -> None:
-    with Workers(2, 0) as workers:
-        found = {o.index: o for o in workers.results(square, [1, 13, 2, 3, 4])}
-    assert isinstance(found[1].error, WorkerError)
-    assert [found[k].value for k in (0, 2, 3, 4)] == [1, 4, 9, 16]
+    whole = DataError("odd", remedy="even", file="a.csv", row=3)
+    assert str(pickle.loads(pickle.dumps(whole))) == str(whole)
 
 
 @pytest.mark.long
@@ -103,13 +96,8 @@ def test_a_script_without_a_guard_is_not_run_again(tmp_path: Path) -> None:
         "from tests.system.test_workers import square_of\n"
         "print(all_of(square_of, [1, 2, 3], 2))\n"
     )
-    home = Path(__file__).parent.parent.parent
     done = subprocess.run(
-        [sys.executable, script],
-        capture_output=True,
-        text=True,
-        check=True,
-        env=os.environ | {"PYTHONPATH": f"{home}:{home / 'src'}"},
+        [sys.executable, script], capture_output=True, text=True, check=True, env=HERE
     )
     assert done.stdout.split("\n") == ["run", "[1, 4, 9]", ""]
 
@@ -151,12 +139,8 @@ def test_they_end_with_the_process_they_work_for() -> None:
         "            print(multiprocessing.active_children()[0].pid, flush=True)\n"
         "    list(workers.results(square, [200], told))\n"
     )
-    home = Path(__file__).parent.parent.parent
     started = subprocess.Popen(
-        [sys.executable, "-c", program],
-        stdout=subprocess.PIPE,
-        text=True,
-        env=os.environ | {"PYTHONPATH": f"{home}:{home / 'src'}"},
+        [sys.executable, "-c", program], stdout=subprocess.PIPE, text=True, env=HERE
     )
     assert started.stdout is not None
     worker = int(started.stdout.readline())

@@ -39,8 +39,8 @@ def same(first: Array, second: Array) -> bool:
 
 
 def stored(run: Array, every: int) -> dict[str, Tree]:
-    """Return every so many samples of a run, and the sum of all, of each channel."""
-    return {"samples": run[::every], "sums": [math.fsum(column) for column in run.T]}
+    """Return every so many samples of a run, and the sum of the magnitudes of all, of each channel."""
+    return {"samples": run[::every], "sums": [math.fsum(np.abs(column)) for column in run.T]}
 
 
 def refused(error: Exception) -> dict[str, Tree]:

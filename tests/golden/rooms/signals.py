@@ -122,7 +122,7 @@ def turning(folder: Path) -> Tree:
             "of large swings": signals.reversals(x, 1.5),
             "branches": np.array(signals.branches(x)),
             "cycles": [[part.start, part.stop] for part in signals.cycles(x)],
-            "noise": signals.noise_level(x),
+            "noise": round(signals.noise_level(x), 12),
         }
         for name, x in {
             "clean": 5.0 * path(0, 180),

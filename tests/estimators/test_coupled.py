@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mckibben import GPI, Recording, registry
+from mckibben import GPI, DataError, ModelError, Recording, registry
 from mckibben.blocks.compose import PerChannel, Series
 from mckibben.blocks.core.fields import Channel
 from mckibben.blocks.coupled.coupling import Coupling

@@ -14,10 +14,11 @@ from mckibben.blocks.play_type.gpi import GPI
 from mckibben.comparison.memory_test import hold_test
 from mckibben.estimators.core.checking import training_data
 from mckibben.estimators.narx.base import stable
-from mckibben.estimators.narx.free_run import FreeRuns, segments
+from mckibben.estimators.narx.free_run import FreeRuns, feed_back, segments
 from mckibben.estimators.narx.polynomial import NarxPolynomialEstimator
 from mckibben.estimators.narx.selection import candidate_terms, select
 from mckibben.registry import load
+from tests.twins import fed_back
 
 TIME = np.arange(1500) * 0.02
 PRESSURE = 2.5 + 2.3 * np.sin(0.6 * TIME) * np.exp(-0.02 * TIME)

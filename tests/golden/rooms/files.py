@@ -1,7 +1,4 @@
-"""Files as laboratories write them: what `mckibben.read` makes of each, and what it refuses.
-
-The inputs are in ``tests/golden/files``; ``write_files.py`` and ``write_wrong_files.py`` wrote them.
-"""
+"""Files as laboratories write them: what `mckibben.read` makes of each, and what it refuses."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """Files that are, or were, read wrongly: each case holds the right answer.
 
-The inputs and the right answers are made by `tests/golden/write_wrong_files.py`, independently of the
-package. What is right is a part of what there is to see: samples, units and step, or which channel is
+The right answers were worked out from the numbers that the inputs were made of, never by the package.
+What is right is a part of what there is to see: samples, units and step, or which channel is
 refused; words and numbers of notes are open.
 """
 

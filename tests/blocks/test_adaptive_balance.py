@@ -272,15 +272,3 @@ def test_c_gives_the_same_numbers(change: dict[str, Any], single: bool, tmp_path
     far = np.abs(outputs - expected) / np.ptp(expected, axis=0)
     # measured as it is, parameters run into their bounds, where single precision strays
     assert far.max() <= (1e-3 if single else 1e-12)
-
-
-def test_it_goes_on_where_it_was_stopped() -> None:
-    balance = single()
-    block, asked = Adaptive(Inverse(balance), 5.0, 0.02), path(balance, 5, 200)
-    whole, first = Loop(block), Loop(block)
-    straight = [whole.step(s, 0.95 * s) for s in asked]
-    for sample in asked[:100]:
-        first.step(sample, 0.95 * sample)
-    second = Loop(block.resumed(first.state))
-    again = [second.step(s, 0.95 * s) for s in asked[100:]]
-    np.testing.assert_array_equal(straight[100:], again)

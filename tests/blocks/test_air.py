@@ -63,18 +63,6 @@ def test_a_finer_grid_gives_the_same_pressures(air: Air, u: Array, times: int) -
     np.testing.assert_allclose(fine[times - 1 :: times], coarse, atol=1e-11)
 
 
-def test_a_slow_loop_is_as_wide_as_the_hysteresis() -> None:
-    up = np.linspace(1.0, 9.0, 4001)
-    pressure = EXAMPLE.simulate(np.concatenate([up, up[::-1], up]), sample_time=STEP)
-    falling, rising = pressure[4001:8002][::-1], pressure[8002:]
-    middle = slice(1000, 3001)
-    # each branch lags by its own time and the dead time, less the sample at whose end it is
-    rate = EXAMPLE.gain * 8.0 / 4000 / STEP
-    lagging = rate * (EXAMPLE.filling_time + EXAMPLE.venting_time + 2 * EXAMPLE.dead_time)
-    width = EXAMPLE.gain * EXAMPLE.hysteresis + lagging
-    np.testing.assert_allclose((falling - rising)[middle], width, atol=2 * rate * STEP)
-
-
 def test_a_reference_too_fast_is_told_and_followed_as_fast_as_the_air_flows() -> None:
     reference = np.repeat([1.0, 4.0, 4.0], 20)
     with pytest.warns(ModelWarning, match="'pressure'"):

@@ -16,9 +16,7 @@ from scipy.optimize import minimize, minimize_scalar
 
 from mckibben import ModelWarning
 from mckibben.blocks.core.block import Block
-from mckibben.blocks.core.fields import vector
 from mckibben.blocks.coupled.balance import Balance
-from mckibben.blocks.coupled.load_estimate import LoadEstimate
 from mckibben.blocks.laws.trial import wander
 from tests.blocks.balances import (
     ALONE,
@@ -27,7 +25,6 @@ from tests.blocks.balances import (
     SEEDS,
     STEP,
     balances,
-    measured,
     motion,
     run,
 )
@@ -67,18 +64,6 @@ def test_pressures_that_are_clipped_move_muscles_that_need_them(block: Balance, 
     assert pressures.max() <= high
     reached = run(block.inverse(), beside(pressures, inputs))
     np.testing.assert_allclose(run(block, beside(reached, inputs)), pressures, atol=1e-9 * high)
-
-
-@given(balances(n_loads=2, n=2) | balances(n_loads=2, n=2, heavy=True), SEEDS)
-def test_sample_by_sample_is_all_at_once(block: Balance, seed: int) -> None:
-    pressures = motion(block, (0.0, HIGHEST), seed)
-    for each, inputs in (
-        (block, motion(block, (-5.0, FURTHEST), seed)),
-        (block.inverse(), pressures),
-        (LoadEstimate(block), measured(block, pressures)),
-    ):
-        step = each.stream(STEP).step
-        np.testing.assert_array_equal([step(row).copy() for row in inputs], run(each, inputs))
 
 
 # -- memory --------------------------------------------------------------------------------------
@@ -222,26 +207,6 @@ def test_what_asks_a_muscle_to_push_harder_than_it_can_is_told(block: Balance, s
 # -- loads ---------------------------------------------------------------------------------------
 
 
-@given(balances(n_loads=1), SEEDS)
-def test_a_load_enters_once(block: Balance, seed: int) -> None:
-    """Where friction sticks, another load is held by its share over the area, whatever came before."""
-    stuck = replace(block, walls=(0.0,) * len(block.walls), grip=100.0)
-    if stuck.limits:
-        stuck = replace(stuck, limits=vector(1e3 * np.arange(1, 1 + len(stuck.limits))))
-    n, inputs = len(block.driven), motion(block, (-5.0, FURTHEST), seed)
-    other = inputs.copy()
-    other[1:, -1] += 17.0
-    stuck = replace(stuck, tare=False)
-    areas = [
-        np.polyval(terms[::-1], y / block.scale)
-        for terms, y in zip(block.areas, inputs[:, :n].T, strict=True)
-    ]
-    expected = np.array(block.loads)[:, 0] * 17.0 / np.array(areas).T
-    expected[0] = 0.0
-    shift = run(stuck, other) - run(stuck, inputs)
-    np.testing.assert_allclose(shift, expected, atol=1e-9)
-
-
 def test_a_tare_is_where_muscles_rest_under_the_first_load() -> None:
     block = replace(Balance.example(), tare=True).inverse()
     inputs = np.array([[0.0, 0.0, 1.0, 25.0], [0.0, 0.0, 1.0, 25.0], [0.0, 0.0, 1.0, 0.0]])
@@ -276,21 +241,6 @@ def test_on_ramps_lags_are_exact_in_steps_of_any_length(block: Balance) -> None:
     coarse = run(block, ramps(block, FURTHEST, 5), 0.2)
     fine = run(block, ramps(block, FURTHEST, 40), 0.025)
     np.testing.assert_allclose(fine[::8], coarse, atol=1e-9 * np.abs(coarse).max())
-
-
-@pytest.mark.parametrize(
-    ("damping", "steps", "share"),
-    [((0.0, 0.0), (10, 20, 40), 0.3), ((0.1, 0.05), (160, 320, 640), 0.6)],
-)
-def test_shorter_steps_converge(
-    damping: tuple[float, float], steps: tuple[int, ...], share: float
-) -> None:
-    """Without damping with the square of the step; with it straight, once steps are below its 7 ms."""
-    block = replace(Balance.example(), damping=damping, lines=()).inverse()
-    *found, last = (run(block, ramps(block, 2.5, n), 1.0 / n)[::n] for n in (*steps, 8 * steps[-1]))
-    errors = [np.abs(each - last).max() for each in found]
-    assert errors[1] < share * errors[0]
-    assert errors[2] < share * errors[1]
 
 
 def test_a_hanging_load_swings_as_newton_says() -> None:

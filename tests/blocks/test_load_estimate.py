@@ -37,14 +37,6 @@ def test_the_loads_estimated_are_those_that_were(n: int, data: st.DataObject, se
     np.testing.assert_allclose(found, loads, atol=1e-9 * LOADED)
 
 
-def test_without_a_load_at_rest_none_need_be_said() -> None:
-    block = replace(Balance.example(), tare=True)
-    inputs = motion(block, (0.0, 2.5), 1)
-    inputs[0, 3] = 0.0
-    found = run(LoadEstimate.of(block.inverse()), measured(block, inputs))
-    np.testing.assert_allclose(found[:, 0], inputs[:, 3], atol=1e-9 * LOADED)
-
-
 def test_one_load_on_two_muscles_is_estimated_by_least_squares() -> None:
     """What a pressure is off by counts by the muscle's share of all."""
     example = Balance.example()

@@ -9,7 +9,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
-from scipy.integrate import solve_ivp
 
 from mckibben import Parallel, Recording
 from mckibben.blocks.force.feedforward import ForceFeedforward
@@ -36,29 +35,6 @@ def lengths(seed: int, n: int = 12, pace: int = 25) -> Array:
 def force(model: MultistateFriction, length: Array, pressure: float = 4.0) -> Array:
     table = np.column_stack([length, np.full(length.size, pressure)])
     return model.simulate(table, initial="virgin", sample_time=STEP)[:, 0]
-
-
-def test_agrees_with_a_stiff_integrator() -> None:
-    length = lengths(1)
-    table = STIFF.table()
-    x = np.zeros(3)
-    expected = []
-    for before, now in zip(np.concatenate([length[:1], length[:-1]]), length, strict=True):
-        v = (now - before) / STEP
-        k, sigma, limit = table[:, :3].T if v >= 0 else table[:, 3:].T
-
-        def rate(_: float, state: Array, n: tuple[Array, ...] = (k, sigma, limit, v)) -> Array:
-            k, sigma, limit, v = n
-            return (np.clip(k * state + sigma * v, -limit, limit) - k * state) / sigma
-
-        with np.errstate(
-            divide="ignore"
-        ):  # the integrator divides by its own error, which may be 0
-            x = solve_ivp(
-                rate, (0, STEP), x, method="Radau", rtol=1e-8, atol=1e-10, max_step=STEP / 20
-            ).y[:, -1]
-        expected.append(np.clip(k * x + sigma * v, -limit, limit).sum())
-    np.testing.assert_allclose(force(STIFF, length), expected, atol=2e-3)
 
 
 @given(st.lists(st.floats(185.0, 200.0), min_size=3, max_size=12), st.integers(0, 1))

@@ -114,17 +114,3 @@ def test_the_c_is_the_block(
     outputs, statuses = CompiledModel(tmp_path / "c", "model", 1, 1).run(given)
     assert not statuses.any()
     np.testing.assert_allclose(outputs, block.simulate(given), rtol=0, atol=1e-12)
-
-
-@needs("cc")
-def test_the_command_finds_nothing_missing(
-    my_block: ModuleType, estimator: Any, capsys: pytest.CaptureFixture[str]
-) -> None:
-    command = re.search(r"mckibben (check-block \S+)$", README, re.M)
-    assert command
-    code = app(command[1].split(), standalone_mode=False)
-    told = capsys.readouterr()
-    absent = [line for line in told.out.splitlines() if line.startswith("missing")]
-    # what is not of the model, but of where the template lies
-    assert [line.split(":")[0].split(maxsplit=1)[1] for line in absent] == ["estimator", "tests"]
-    assert code == 3

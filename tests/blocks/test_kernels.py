@@ -33,6 +33,7 @@ from mckibben.estimators.coupled.balance_starts import begin_at
 from mckibben.estimators.coupled.recurrent_fit import remembered
 from mckibben.registry import load
 from mckibben.system.compiling import Deferred
+from tests.blocks.balances import ALONE as HARDENING
 from tests.twins import TWINS, motion_seen
 
 pytestmark = pytest.mark.kernel
@@ -122,23 +123,14 @@ def test_a_network_gives_the_nearest_that_it_can() -> None:
 
 
 ALONE = replace(
-    Balance.example(),
+    HARDENING,
     springs=((0.0, 10.0),),
     elasticity=((0.0,),),
     areas=((60.0,),),
-    friction=((3.0, 1.5),),
     relaxation=((),),
-    loads=((1.0,),),
     damping=(0.0,),
     lines=(),
-    walls=(0.05,),
-    bladders=(),
-    pushes=(),
     lags=(),
-    hull=((-20.0, 50.0),),
-    driven=Balance.example().driven[:1],
-    scheduled=Balance.example().scheduled[1:],
-    given=Balance.example().given[:1],
 )
 """A balance of one muscle under a load."""
 

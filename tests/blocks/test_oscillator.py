@@ -81,14 +81,6 @@ def test_the_input_can_be_held_between_samples() -> None:
     np.testing.assert_allclose(model.simulate(u, sample_time=STEP), expected, atol=1e-7)
 
 
-def test_forces_so_many_times_as_large_scale_with_the_curvature_of_loops() -> None:
-    u = sweep(300)
-    scaled = replace(HARD, gamma=HARD.gamma / 4, delta=HARD.delta / 4)
-    np.testing.assert_array_equal(
-        scaled.simulate(4 * u, sample_time=STEP), 4 * HARD.simulate(u, sample_time=STEP)
-    )
-
-
 def test_two_straight_curves_are_the_element_of_bouc_and_wen() -> None:
     both, far = np.array([HARD.gamma, HARD.delta]), 1e3
     rising = [

@@ -219,15 +219,6 @@ def test_what_changed_is_made_up_for_and_found(kind: int, factor: float, name: s
     assert np.sqrt((errors**2).mean()) < 0.01  # without a change it is as good as fixed
 
 
-def test_several_muscles_learn_together() -> None:
-    balance = replace(Balance.example(), settled=True)
-    block = Adaptive(Inverse(balance), 10.0, 0.02)
-    plant = changed_by(balance, STIFFNESS, 0.9)
-    _, errors = followed(block, plant, 3000)
-    assert (np.sqrt((errors[-1000:] ** 2).mean(axis=0)) < 0.02).all()
-    assert np.abs(errors[:20]).max() > 0.3
-
-
 @pytest.mark.kernel
 @pytest.mark.parametrize("fault", [np.nan, 12.0])
 def test_a_sensor_that_drops_out_or_stands_still_teaches_nothing(fault: float) -> None:

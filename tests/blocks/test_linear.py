@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from importlib import import_module
 from importlib.util import find_spec
+from typing import Any
 
 import numpy as np
 import pytest
@@ -52,7 +53,8 @@ def test_scipy_and_python_control_simulate_the_same(name: str) -> None:
     u0, y0 = float(system.input_offset[0]), float(system.output_offset[0])
     # from the operating point, at rest there
     expected = np.asarray(block.simulate([u0, *u], sample_time=STEP))[1:] - y0
-    found = [dlsim(block.to_scipy(STEP), u - u0)[1][:, 0]]
+    discrete: Any = block.to_scipy(STEP)
+    found = [dlsim(discrete, u - u0)[1][:, 0]]
     if find_spec("control"):
         control = import_module("control")
         response = control.forced_response(block.to_control(STEP), U=u - u0)

@@ -1,4 +1,4 @@
-"""Valve and air: exact lags, an exact inverse, and dead time that a preview takes away."""
+"""Valve and air: exact lags, limits of pressure, and dead time."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.signal import cont2discrete, lfilter
 
-from mckibben import PI, DataError, ModelError, ModelWarning, Recording, Series
+from mckibben import PI, ModelWarning, Series
 from mckibben.blocks.compose import Parallel, PerChannel
 from mckibben.blocks.core.fields import Channel
 from mckibben.blocks.dynamic.air import Air
 from mckibben.blocks.memoryless.affine import Affine
-from mckibben.control import dead_time_undone, previewed
+from mckibben.control import dead_time_undone
 from mckibben.export import export_c
 from tests.blocks.strategies import numbers, paths
 
@@ -86,34 +86,6 @@ def test_a_dead_time_between_samples_is_rounded_with_a_warning(tmp_path: Path) -
     between.inverse().stream(STEP)  # which has no use for it
 
 
-# -- preview ---------------------------------------------------------------------------------
-
-
-def muscle() -> tuple[Series, Recording]:
-    """Return air before a muscle, and a motion that both reach."""
-    model = Series((replace(EXAMPLE, supply=5.0), PI.example()))
-    t = np.arange(1600) * STEP
-    low, high = (float(end[0]) for end in model.reachable())
-    motion = 0.5 * (low + high) - 0.35 * (high - low) * np.cos(2 * np.pi * t / 8)
-    return model, Recording({"displacement": motion}, STEP)
-
-
-def test_a_previewed_reference_comes_on_time() -> None:
-    model, wanted = muscle()
-    compensator = model.inverse()
-    assert dead_time_undone(compensator) == EXAMPLE.dead_time
-    ahead = previewed(wanted, dead_time_undone(compensator))
-    found = model.simulate(compensator.simulate(ahead))["displacement"]
-    late = model.simulate(compensator.simulate(wanted))["displacement"]
-    n = round(EXAMPLE.dead_time / STEP)
-    motion = wanted["displacement"]
-    np.testing.assert_allclose(found[n:], motion[n:], atol=1e-9 * np.ptp(motion))
-    np.testing.assert_allclose(late[n:], motion[:-n], atol=1e-9 * np.ptp(motion))
-    stream = compensator.stream(STEP)
-    stepped = [stream.step(y)[0] for y in ahead["displacement"].tolist()]
-    np.testing.assert_array_equal(stepped, compensator.simulate(ahead)["voltage"])
-
-
 def test_dead_times_add_up_in_series_and_are_shared_side_by_side() -> None:
     p, q = Channel("pressure", "bar"), Channel("pressure_2", "bar")
     slow = replace(EXAMPLE, dead_time=0.05, input=p)
@@ -123,12 +95,3 @@ def test_dead_times_add_up_in_series_and_are_shared_side_by_side() -> None:
     assert Parallel((EXAMPLE, RIGHT_AWAY)).dead_time == 0.02
     assert dead_time_undone(EXAMPLE) == 0.0
     assert dead_time_undone(PI.example().inverse()) == 0.0
-
-
-def test_previews_out_of_range_are_refused() -> None:
-    wanted = muscle()[1]
-    for bad in (-0.1, float("nan"), 1e9):
-        with pytest.raises(ModelError, match="preview"):
-            previewed(wanted, bad)
-    with pytest.raises(DataError):
-        previewed(Recording({"displacement": np.ones(5)}, None), 0.1)

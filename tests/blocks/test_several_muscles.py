@@ -1,4 +1,4 @@
-"""Fuzzy networks of any numbers of muscles, sets and scheduling inputs, solved for what drives them."""
+"""Coupling of several muscles, linear and by fuzzy networks, and what drove them."""
 
 from __future__ import annotations
 
@@ -8,10 +8,46 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from mckibben import ModelError
 from mckibben.blocks.core.fields import Channel
+from mckibben.blocks.coupled.coupling import Coupling
 from mckibben.blocks.coupled.fuzzy_network import FuzzyNetwork
+from mckibben.registry import load
 
 Array = NDArray[np.float64]
+
+
+# -- gains ---------------------------------------------------------------------------------------
+
+
+CHANNELS = tuple(Channel(f"displacement_{k}", "mm") for k in (1, 2))
+
+
+def test_printed_gains_have_the_printed_radius() -> None:
+    assert load("published", "sdchm-coupling")().radius == pytest.approx(0.456, abs=5e-4)
+
+
+def test_jacobi_agrees_with_the_direct_solution() -> None:
+    block = Coupling.example()
+    h = np.array([[10.0, 20.0, 5.0], [0.0, 1.0, -3.0]])
+    v = block.inverse().simulate(h)
+    np.testing.assert_allclose(block.jacobi(h, tolerance=1e-12), v, atol=1e-10)
+    assert np.abs(block.jacobi(h) - v).max() < 0.02
+
+
+def test_more_muscles_than_coordinates_are_undone_by_the_least_of_them() -> None:
+    tip, muscles = CHANNELS, tuple(Channel(f"shortening_{k}", "mm") for k in (1, 2, 3))
+    block = Coupling(((1.0, 0.0), (-0.5, 0.9), (-0.5, -0.9)), muscles, tip)
+    h = np.array([[1.0, 2.0], [-3.0, 0.5]])
+    v = block.inverse().simulate(h)
+    np.testing.assert_allclose(block.simulate(v), h, atol=1e-14)
+    np.testing.assert_allclose(v @ [0.9, 0.9, 0.9], 0.0, atol=1e-14)  # they pull together at none
+    np.testing.assert_allclose(block.inverse().inverse().simulate(v), h, atol=1e-14)
+    with pytest.raises(ModelError, match="3 inputs and 2 outputs"):
+        block.jacobi(h)
+
+
+# -- networks ------------------------------------------------------------------------------------
 
 
 def network(m: int, scheduled: int, constants: bool, seed: int) -> FuzzyNetwork:

@@ -239,7 +239,7 @@ def test_what_cannot_be_compared_is_refused_at_once(train: Recording) -> None:
         ([], {}, "recordings"),
     ):
         with pytest.raises((DataError, ModelError), match=said):
-            compare(given, jobs=1, **how)  # type: ignore[arg-type]
+            compare(given, jobs=1, **how)
 
 
 def test_going_on_recomputes_nothing_that_was_finished(

@@ -58,7 +58,7 @@ def first(log: Recording, **known: object) -> Followed:
 
 @pytest.mark.parametrize("cause", FAULTS)
 def test_the_cause_that_was_put_in_is_named_first(cause: str) -> None:
-    log, rmse = logged(0, **FAULTS[cause])  # type: ignore[arg-type]
+    log, rmse = logged(0, **FAULTS[cause])
     found = first(log, compensator=MUSCLE.inverse())
     assert found.causes[0].kind == cause
     assert found.achieved == pytest.approx(rmse, rel=1e-9)

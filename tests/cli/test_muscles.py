@@ -125,7 +125,7 @@ def test_a_study_says_whether_a_network_is_to_be_trusted_off_its_patterns(
     ("arguments", "named"),
     [
         (["track", "nowhere.json", "--rig", "soft-arm", "--reference", "x.csv"], "nowhere.json"),
-        (["track", "balance.json", "--rig", "soft-arm", "--reference", "three.csv"], "balance"),
+        (["track", "model.json", "--rig", "soft-arm", "--reference", "ref.csv"], "displacement_1"),
         (["invert", "pi.json", "--for", "force", "-o", "est.json"], "'pi'"),
         (["study", "empty", "-o", "x"], "empty"),
         (["fit", "pi", "three.csv", "-o", "x.json", "--validation", "three.csv"], "pi"),
@@ -144,11 +144,13 @@ def test_bad_calls_leave_with_a_remedy(
     pressures = {f"pressure_{k}": np.sin(k * u) for k in (1, 2, 3)}
     moved = {f"displacement_{k}": 2 * np.sin(k * u) for k in (1, 2, 3)}
     write(Recording(pressures | moved, 0.1), "three.csv")
+    others = {name: np.ones(100) for name in ("pressure_extensor", "force")}
+    write(Recording(pressures | moved | others, 0.1), "ref.csv")
     write(Recording({"pressure": u, "displacement": 2 * u}, 0.1), "one.csv")
     write(Recording({"pressure": u, "force": 2 * u}, 0.1), "rest.csv")
     Path("empty").mkdir()
     PI.example().save("pi.json")
-    Balance.example().save("balance.json")
+    Balance.example().inverse().save("model.json")
     before = {path for path in tmp_path.rglob("*") if path.is_file()}
     result = cli(*arguments)
     assert result.code == 2

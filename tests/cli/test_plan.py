@@ -11,8 +11,6 @@ import pytest
 from mckibben import GPI, PI, read
 from tests.cli.conftest import Cli
 
-pytestmark = pytest.mark.long
-
 
 @pytest.fixture
 def model(tmp_path: Path) -> Path:
@@ -21,6 +19,7 @@ def model(tmp_path: Path) -> Path:
     return place
 
 
+@pytest.mark.long
 def test_a_plan_is_written_and_a_rig_plays_it(cli: Cli, tmp_path: Path, model: Path) -> None:
     out = tmp_path / "next.csv"
     asked = ("--rig", "mas20-hanging", "--limits", "pressure=2:4:2", "--minutes", "0.5")
@@ -81,6 +80,7 @@ max_pressure_bar = 6.0
 """
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("muscle", ["rail", "sheet.toml"])
 def test_a_muscle_or_its_data_sheet_is_enough(
     cli: Cli, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, muscle: str

@@ -129,23 +129,6 @@ def test_a_set_that_cannot_be_read_is_said_and_the_rest_goes_on(folder: Path) ->
     assert "run.csv" in page(done, "it")
 
 
-@pytest.mark.long
-def test_a_set_that_quick_models_do_not_fit_is_said_and_the_rest_goes_on(folder: Path) -> None:
-    (folder / "held").mkdir()
-    for seed, length in enumerate((150.0, 140.0, 150.0)):
-        moved = recorded(seed)["pressure"]
-        held = {"angle": moved, "length": np.full(moved.size, length)}
-        write(Recording(held | {"force": 40.0 * moved}, 0.02), folder / "held" / f"run{seed}.csv")
-    (folder / "held" / "channels.toml").write_text(
-        '[[split.tasks]]\ntest = ["run2"]\ninputs = ["length"]\noutputs = ["force"]\n'
-    )
-    wanted = [one for one in sets_in(folder) if one.name in ("held", "plain")]
-    held_, plain = outcomes(wanted, models="quick", jobs=1)
-    assert held_.board is None
-    assert held_.reason
-    assert plain.board is not None
-
-
 @pytest.mark.parametrize(
     ("given", "said"),
     [

@@ -119,13 +119,6 @@ def test_uniform_time_leaves_the_samples_untouched(
     assert np.array_equal(recording["pressure"], samples)
 
 
-def test_iso_timestamps(tmp_path: Path) -> None:
-    time = [f"2026-01-31T12:00:{k * 0.5:06.3f}Z" for k in range(40)]
-    (recording,), samples = read(tmp_path, time, "timestamp")
-    assert (recording.sample_time, recording.start_time) == (0.5, 0.0)
-    assert np.array_equal(recording["pressure"], samples)
-
-
 def test_a_column_of_numbers_goes_before_timestamps(tmp_path: Path) -> None:
     lines = [f"2026-01-31 12:00:{k:02d},{k / 10},{k % 7}" for k in range(40)]
     path = tmp_path / "a.csv"
@@ -135,13 +128,6 @@ def test_a_column_of_numbers_goes_before_timestamps(tmp_path: Path) -> None:
     assert recording.meta["ignored_columns"] == ["timestamp"]
     (recording,) = mckibben.read(path, columns={"time": "timestamp"})
     assert recording.sample_time == 1.0
-
-
-def test_epoch_times(tmp_path: Path) -> None:
-    (recording,), samples = read(tmp_path, [f"{1.7e9 + 0.01 * k:.3f}" for k in range(200)])
-    assert recording.sample_time == 0.01
-    assert recording.start_time == 1.7e9
-    assert np.array_equal(recording["pressure"], samples)
 
 
 def test_jittered_time_is_resampled_and_said(tmp_path: Path) -> None:

@@ -78,7 +78,7 @@ def test_who_insists_reads_it_in_every_result(cli: Cli, tmp_path: Path) -> None:
     assert place in " ".join(done.out.split())
 
 
-def test_a_name_in_place_of_recordings_is_told() -> None:
+def test_a_name_in_place_of_recordings_is_refused() -> None:
     given: Any = "x.csv"
     for asked in (lambda: compare(given), lambda: study([given]), lambda: compare(RUN, given)):
         with pytest.raises(DataError, match=r"mckibben\.read"):

@@ -10,6 +10,7 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -156,9 +157,14 @@ def address(tmp_path: Path) -> Iterator[str]:
 @needs("chromium")
 def test_nothing_of_a_received_folder_runs(address: str) -> None:
     dialogs: list[str] = []
+
+    def answer(dialog: Any) -> None:
+        dialogs.append(dialog.message)
+        dialog.dismiss()
+
     with watched(address) as browser:
         page = browser.page
-        page.on("dialog", lambda dialog: (dialogs.append(dialog.message), dialog.dismiss()))
+        page.on("dialog", answer)
         seen(page, "recording-run")
         assert SCRIPTS[2] in seen(page, "note-run").locator("..").inner_text()
         seen(page, "log").click()

@@ -17,18 +17,14 @@ from nicegui.testing import User
 
 from mckibben import PI, Recording, read
 from mckibben.app import forms
-from mckibben.app.desk import Desk
-from mckibben.app.following import compensated, kept_motion, loop
+from mckibben.app.following import compensated
 from mckibben.app.jobs import note
-from mckibben.app.motions import reference_recording
 from mckibben.app.pages import closing, compensate, taking_code
-from mckibben.app.work import fit
 from mckibben.app.workspace import Workspace
 from mckibben.registry import load
 from mckibben.rigs import rig_names
 from tests.app.simulated import (
     WEAKER,
-    desk_of,
     drawn,
     field,
     gone,
@@ -37,13 +33,10 @@ from tests.app.simulated import (
     modelled,
     on_compensate,
     only,
-    quiet,
     three_muscles,
     until,
     visit,
-    workspace_of,
 )
-from tests.comparison.test_several import QUICKLY, hung
 
 
 async def turn(user: User, model: str) -> None:
@@ -162,78 +155,6 @@ def test_runs_that_gain_nothing_scatter_or_are_offset_are_remarked(tmp_path: Pat
         assert len({text.partition(":")[2] for text in found}) == 3
 
     visit(workspace, look)
-
-
-def test_runs_that_are_ticked_are_drawn_and_newer_ones_come_beside(tmp_path: Path) -> None:
-    muscles = load("blocks", "balance").example().inverse()
-    workspace = modelled(tmp_path, a=muscles, b=muscles)
-    t = np.arange(60) * 0.05
-    channels = (*muscles.inputs, *muscles.outputs)
-    values = {c.name: 1.0 + np.sin(t + k) for k, c in enumerate(channels)}
-    recorded = Recording(values, 0.05, {c.name: c.unit for c in channels})
-    workspace.add(recorded, origin="", call="", role="train")
-    units = {"force": "N", "pressure_extensor": "bar"}
-
-    def follow(pull: float) -> str:
-        """Run a short loop under a force; return what of its title is its own."""
-        ends = {
-            "displacement_1": [(0.0, 0.0), (0.5, 1.0)],
-            "displacement_2": [(0.0, 0.0), (0.5, 0)],
-        }
-        held = {"force": pull, "pressure_extensor": 1.0}
-        file = kept_motion(workspace, "a", reference_recording(ends, 0.05, held, units))
-        given = {"model": "a", "plant": "b", "controller": "feedforward", "reference": file}
-        loop(workspace, given | {"name": f"run-{pull:g}"}, quiet)
-        return f"force {pull:.1f}\xa0N"
-
-    light, heavy = follow(10.0), follow(20.0)
-
-    async def look(user: User) -> None:
-        await drawn(user)
-        await until(user, "loop-runs")
-        table = only(user, "runs")
-
-        def traces() -> list[str]:
-            names = [one["name"] for one in only(user, "loop-runs").figure["data"]]
-            return [name.split(", ")[1] for name in names if name.startswith("feedforward")]
-
-        def select(title: str, added: bool) -> None:
-            rows = [row for row in table.rows if title in row["title"]]
-            chosen = {"rows": rows, "keys": [row["name"] for row in rows]}
-            user.find(marker="runs").trigger("selection", {"added": added} | chosen)
-
-        assert traces() == [heavy]  # the newest, and what compares with it
-        select(light, True)
-        await later(lambda: traces() == [heavy, light])  # one motion, in one picture
-        select(heavy, False)
-        await later(lambda: traces() == [light])
-        newer = follow(30.0)
-        user.find(marker="show-pressures").click()
-        await later(lambda: len(only(user, "runs").rows) == 3 and traces() == [newer, light])
-
-    visit(workspace, look)
-
-
-def test_under_dead_loads_a_person_gives_the_load_and_gets_pressures(tmp_path: Path) -> None:
-    workspace = workspace_of(tmp_path, light=hung(10.0), heavy=hung(20.0))
-    given = {"model": "balance", "name": "balance", "settings": QUICKLY["balance"]}
-    fit(workspace, given | desk_of(workspace).channels, quiet)
-    taken: list[str] = []
-
-    async def look(user: User) -> None:
-        await drawn(user)
-        for pulled in (12.0, 18.0):
-            field(user, "force [N]").set_value(pulled)
-            await user.should_not_see(marker="take-pressures")
-            user.find(marker="show-pressures").click()
-            await until(user, "take-pressures")
-            user.find(marker="take-pressures").click()
-            taken.append((await user.download.next(timeout=20.0)).text)
-
-    visit(workspace, look)
-    assert [csv.splitlines()[0] for csv in taken] == ["time_s,pressure_bar"] * 2
-    light, heavy = (np.loadtxt(csv.splitlines()[1:], delimiter=",")[:, 1] for csv in taken)
-    assert heavy.mean() > light.mean() + 0.1
 
 
 # -- what is chosen at first ---------------------------------------------------------------------
@@ -380,31 +301,6 @@ def test_a_force_is_estimated_of_what_was_not_trained_on_by_a_doubted_model(tmp_
         assert "−1.3 %" in (await until(user, "force-doubt")).text
         only(user, "force-model").set_value("b")
         await gone(user, "force-doubt")
-
-    visit(workspace, look)
-
-
-def test_the_first_model_fitted_is_chosen_for_logs_too(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    workspace = Workspace(tmp_path)
-    desks: list[Desk] = []
-    build = compensate.build
-
-    def noted(desk: Desk) -> None:
-        desks.append(desk)
-        build(desk)
-
-    monkeypatch.setattr(compensate, "build", noted)
-
-    async def look(user: User) -> None:
-        user.find(marker="tab-compensate").click()
-        await until(user, "logs")
-        only(user, "logs").open()
-        assert only(user, "log-model").value is None
-        PI.example().save(workspace.path("models", "a.json"))
-        desks[0].changed("results")
-        await later(lambda: only(user, "log-model").value == "a")
 
     visit(workspace, look)
 

@@ -20,7 +20,6 @@ from mckibben.app.offering import offered, sides
 from mckibben.app.pages import apart, data, judging
 from mckibben.app.pages.cutting import first_shown
 from mckibben.app.pages.loads import untold
-from mckibben.app.pages.shared_notes import own, shared
 from mckibben.app.theme import DARK, LIGHT, WRITTEN, contrast
 from mckibben.app.together import differing, obstacle, sample_times
 from mckibben.app.workspace import Workspace
@@ -275,19 +274,6 @@ def test_loads_are_offered_where_no_force_was_recorded(tmp_path: Path) -> None:
 
 
 # -- small things --------------------------------------------------------------------------------
-
-
-def test_notes_that_recordings_share_stand_once(tmp_path: Path) -> None:
-    workspace = Workspace(tmp_path)
-    for name, spread in (("a", "1.5e-05"), ("b", "0.02"), ("c", "3")):
-        notes = ["columns by units", f"off by {spread} s", *["mended"] * (name == "b")]
-        values = np.linspace(0.0, float(ord(name)), 20)
-        run = Recording({"pressure": values, "displacement": values}, 0.1, meta={"notes": notes})
-        workspace.add(run, origin="", call="", name=name)
-    entries = workspace.entries()
-    lots = shared(entries)
-    assert [list(of) for of in lots] == [["a", "b", "c"]] * 2
-    assert [own(entry, lots) for entry in entries] == [(), ("mended",), ()]
 
 
 def test_the_kinds_of_files_are_those_that_are_read_here(monkeypatch: pytest.MonkeyPatch) -> None:

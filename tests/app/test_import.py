@@ -16,13 +16,11 @@ from mckibben.app import reading as app_reading
 from mckibben.app.desk import Desk
 from mckibben.app.jobs import Jobs
 from mckibben.app.kept import Reading, Step
-from mckibben.app.pages.data import told_of
 from mckibben.app.reading import columns, options, read_upload
 from mckibben.app.recordings import EXAMPLE
 from mckibben.app.workspace import Workspace
 from mckibben.errors import TooLargeError
 from mckibben.files import formats
-from mckibben.files.notices import is_plain
 
 TABLE = "level,p_kPa,displacement_mm,branch\n" + "\n".join(
     f"{k % 20},{300 + k % 40},{-(k % 7)},up" for k in range(60)
@@ -409,40 +407,3 @@ def test_samples_that_came_from_no_file_are_read_otherwise_again_and_again(tmp_p
     assert workspace.undo()
     assert workspace.recording(name) == before
     assert workspace.data() == data
-
-
-def test_a_unit_that_was_assumed_is_not_where_it_is_said_later(tmp_path: Path) -> None:
-    workspace = Workspace(tmp_path / "ws")
-    desk = Desk(workspace, Jobs(workspace))
-    assumed = "no unit is given, so these are assumed: voltage in V; say --unit CHANNEL=UNIT"
-    told = Recording(
-        {"voltage": np.linspace(0.0, 1.0, 20)}, 0.1, meta={"notes": [assumed, "mended"]}
-    )
-    workspace.add(told, origin="", call="", name="rig")
-    assert workspace.entry("rig").notes == (assumed, "mended")
-    adding.replaced(desk, ["rig"], Reading(columns={"force": "voltage"}, units={"force": "N"}))
-    assert workspace.entry("rig").notes == ("mended",)
-
-
-def test_units_that_were_converted_are_said_of_all_at_once(tmp_path: Path) -> None:
-    workspace = Workspace(tmp_path / "ws")
-    desk = Desk(workspace, Jobs(workspace))
-    rows = "\n".join(f"{0.1 * k:.1f},{k % 9},{k % 7}" for k in range(40))
-    for name in ("first", "second"):
-        content = f"time_s,pressure_kPa,angle_deg\n{rows}".encode()
-        (found,) = read_upload(workspace.keep_upload(f"{name}.csv", content))
-        workspace.add(found, origin="", call="", name=name)
-    assert found["pressure"][8] == pytest.approx(0.08)
-    assert found["angle"][6] == pytest.approx(np.radians(6))
-    desk.settle_channels()
-    said = told_of(desk)
-    assert [said.count(unit) for unit in ("kPa", "deg")] == [1, 1]
-
-
-def test_what_is_plain_is_no_warning(tmp_path: Path) -> None:
-    path = tmp_path / "rig.csv"
-    rows = "\n".join(f"{0.1 * k:.1f},{k % 9 + 1}.000,{k % 7}" for k in range(40))
-    path.write_text(f"time_s,pressure_bar,displacement_mm\n{rows}")
-    with pytest.warns(DataWarning):
-        (recording,) = read_upload(path)
-    assert [is_plain(note) for note in recording.notes] == [True]

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-import gc
 import threading
-import weakref
 from contextlib import nullcontext
 from pathlib import Path
 from types import SimpleNamespace
@@ -20,12 +18,11 @@ from nicegui.testing import User
 
 from mckibben import PI, DataError, write
 from mckibben.app import news, shell
-from mckibben.app.adding import Problem
 from mckibben.app.busy import SOON, Answer, under_way
 from mckibben.app.desk import Desk
 from mckibben.app.jobs import Jobs
 from mckibben.app.kept import Step
-from mckibben.app.pages import drawing_reference, editing, forces, importing
+from mckibben.app.pages import drawing_reference, editing, forces
 from mckibben.app.workspace import Workspace
 from tests.app.simulated import (
     desk_of,
@@ -112,35 +109,6 @@ def test_the_later_of_two_looks_counts_whichever_ends_last(
         visit(modelled(tmp_path, a=PI.example()), look)
     finally:
         go.set()
-
-
-def test_files_that_come_or_are_not_read_meanwhile_are_not_forgotten(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    intake = importing.Intake(desk_of(Workspace(tmp_path)), None)
-    intake.place, intake.reading = nullcontext(), SimpleNamespace(set_text=lambda text: None)
-    intake.seen, intake.read = 3, {"one.csv": []}
-    summed: list[int] = []
-
-    def warm() -> None:
-        intake.seen += 2  # others come
-
-    monkeypatch.setattr(intake.desk.workspace, "warm", warm)
-    monkeypatch.setattr(importing, "tell_of", lambda read: summed.append(intake.seen))
-    asyncio.run(intake._sum_up())
-    assert (summed, intake.seen) == ([2], 2)
-    error = DataError("it is not known", remedy="say it")
-    one, rest, new = (Problem(f"{n}.csv", error, f"{n}.csv") for n in ("one", "rest", "new"))
-    intake.left = [one, rest]
-    monkeypatch.setattr(intake, "list", lambda: None)
-
-    async def ask(*_: Any, then: Any, **__: Any) -> None:
-        intake.left = [*intake.left, new]
-        await then([rest])  # one was read
-
-    monkeypatch.setattr(importing, "ask", ask)
-    asyncio.run(intake._ask(one))
-    assert intake.left == [rest, new]
 
 
 def test_a_part_of_what_is_not_there_any_more_is_not_cut(tmp_path: Path) -> None:
@@ -277,73 +245,3 @@ def test_changes_are_drawn_once_where_they_are_seen_and_failures_are_tried_again
         assert len(page.desk.news._listeners["runs"]) == 1
 
     simulated(page, look)
-
-
-def test_a_change_from_what_it_deletes_is_drawn_every_time(tmp_path: Path) -> None:
-    """The button that changes something stands in what is drawn anew: it is gone by then."""
-    page = Page(tmp_path)
-    state = {"done": 0, "shown": -1, "other": -1}
-
-    def root() -> None:
-        page()
-
-        @ui.refreshable
-        def own() -> None:
-            state["shown"] = state["done"]
-
-            def more() -> None:
-                state["done"] += 1
-                page.desk.changed("recordings")
-                page.desk.changed("results")
-
-            ui.button("more", on_click=more)
-
-        @ui.refreshable
-        def other() -> None:
-            state["other"] = state["done"]
-
-        page.desk.when("recordings", own.refresh)
-        page.desk.when("results", other.refresh)
-        own()
-        other()
-
-    async def look(user: User) -> None:
-        for number in range(1, 16):
-            user.find("more").click()
-            await page.settled()
-            assert state == {"done": number, "shown": number, "other": number}
-
-    simulated(root, look)
-
-
-def test_other_windows_hear_of_what_is_shared_and_a_closed_one_is_let_go(tmp_path: Path) -> None:
-    workspace = Workspace(tmp_path)
-    jobs = Jobs(workspace)
-    desks: list[weakref.ref[Desk]] = []
-
-    async def look(user: User) -> None:
-        first = user.client
-        await user.open("/")
-        one, two = (desk() for desk in desks[-2:])
-        assert one is not None
-        assert two is not None
-        heard: list[str] = []
-        one.when("recordings", lambda: heard.append("recordings"))
-        one.when("theme", lambda: heard.append("theme"))
-        two.changed("recordings", "theme")
-        await later(lambda: heard == ["recordings"])
-        del two
-        assert first is not None
-        first.delete()
-        assert one.news._listeners == {}
-        one.changed("recordings")
-        page = weakref.ref(first)
-        del one, first
-        for _ in range(20):
-            await asyncio.sleep(0.1)
-            gc.collect()
-            if page() is None:
-                break
-        assert page() is None
-
-    simulated(lambda: desks.append(weakref.ref(shell.build(workspace, jobs))), look)

@@ -148,27 +148,6 @@ def test_loads_in_names_are_given_by_one_click_and_constants_taken_out(tmp_path:
     visit(workspace, look)
 
 
-def test_axes_and_shades_of_the_preview(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    asked_of: list[str] = []
-    monkeypatch.setattr(ui.plotly, "run_plot_method", lambda self, name, *_: asked_of.append(name))
-
-    async def look(user: User) -> None:
-        plot = await until(user, "preview-plot")
-        titles = [
-            axis["title"]["text"]
-            for key, axis in plot.figure["layout"].items()
-            if key.startswith("yaxis")
-        ]
-        assert titles[0] == "pressure_1<br>[bar]"  # as short as what stands above each other
-        assert len(titles) == 5
-        ink = plots.colours(True)["ink"]
-        user.find(marker="theme").click()
-        await later(lambda: plot.figure["layout"]["font"]["color"] == ink)
-        assert asked_of == []  # nothing is selected: nothing is shaded anew
-
-    visit(workspace_of(tmp_path, arm=arm()), look)
-
-
 # -- look ----------------------------------------------------------------------------------------
 
 

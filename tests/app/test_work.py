@@ -134,8 +134,21 @@ def test_under_dead_loads_what_is_reached_depends_on_the_load(tmp_path: Path) ->
     (row,) = desk.results()
     assert (row["name"], row["input"], row["load"]) == ("balance", "pressure", "force")
     ends = [reached(workspace, "balance", {"force": pull}) for pull in (10.0, 20.0)]
-    (_, above), (_, below) = (each["displacement"] for each in ends)
+    (_, above), (low, below) = (each["displacement"] for each in ends)
     assert above > below + 0.5
+    light, heavy = (
+        compensated(
+            workspace,
+            "balance",
+            reference_recording(
+                {"displacement": [(0.0, low), (5.0, below)]}, 0.05, {"force": pull}, {"force": "N"}
+            ),
+            "inverse",
+            {},
+        )[0]["pressure"].mean()
+        for pull in (12.0, 18.0)
+    )
+    assert heavy > light + 0.1
 
 
 # -- motions -------------------------------------------------------------------------------------

@@ -339,28 +339,6 @@ def test_the_oldest_changes_are_forgotten_where_the_history_is_too_long(
     assert standing(tmp_path) == before
 
 
-def test_a_damaged_history_is_kept_aside(tmp_path: Path) -> None:
-    workspace = filled(tmp_path)
-    (tmp_path / "history" / "recordings.json").write_text('{"done": [3]}')
-    assert workspace.claim()
-    assert (tmp_path / "history" / "damaged.json").read_text() == '{"done": [3]}'
-    workspace.remove("a")
-    assert workspace.undo() == "remove a"
-
-
-def test_a_change_that_cannot_be_undone_is_passed_over(tmp_path: Path) -> None:
-    workspace = filled(tmp_path)
-    workspace.set_role("a", "test")
-    history = workspace.read_json("history", "recordings")
-    assert history is not None
-    history["done"].append({"what": "x", "before": {"../../x": {"role": "test"}}, "after": {}})
-    workspace.write_json("history", "recordings", history)
-    with pytest.raises(DataError):
-        workspace.undo()
-    assert workspace.undo() == "a as test"
-    assert not (tmp_path.parent / "x.json").exists()
-
-
 def test_undoing_overwrites_no_recording_that_came_meanwhile(tmp_path: Path) -> None:
     workspace = filled(tmp_path)
     new = workspace.add(recording(30), origin="a rig", call="", name="c")

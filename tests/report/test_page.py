@@ -19,7 +19,6 @@ import pytest
 
 from mckibben import registry
 from mckibben.blocks.core.fields import Channel
-from mckibben.blocks.dynamic.transfer_function import TransferFunction
 from mckibben.blocks.play_type.gpi import GPI
 from mckibben.blocks.play_type.pi import PI
 from mckibben.outputs import Results
@@ -28,9 +27,8 @@ from mckibben.recording import Recording
 from mckibben.report import StudyFolder, coupling_subjects, templating, write_report
 from mckibben.report.coupling_subjects import Coupling
 from mckibben.report.description_subjects import figures
-from mckibben.report.mathematics import ATTRIBUTES, ELEMENTS, mathml
 from mckibben.report.page import page
-from mckibben.report.reproduction import beside, drawing, reproduction_page
+from mckibben.report.reproduction import beside, reproduction_page
 from mckibben.studying.study import Study
 from mckibben.validation.describing import ModelDescription, describe
 from tests.report.studies_by_hand import measured, models, renamed, study
@@ -296,14 +294,6 @@ def test_equations_parameters_and_plots_of_a_model_are_there() -> None:
     assert 'data-figure="response displacement"' in text
 
 
-def test_criteria_are_only_of_recordings_that_were_fitted_to() -> None:
-    block = TransferFunction((0.4, 0.2), (-0.7,), 0.05)
-    own, others = described(block), described(block, fitted=False)
-    assert own.criteria.aic is not None
-    assert others.criteria.aic is None
-    assert section(own) != section(others)
-
-
 @pytest.mark.parametrize(
     "unit",
     [
@@ -325,13 +315,6 @@ def test_units_and_names_from_files_lead_nowhere(unit: str) -> None:
     assert not names & {"href", "src", "style", "xlink:href"}
 
 
-@pytest.mark.parametrize("latex", [r"\href{javascript:alert(1)}{x}", r"\style{color:red}{x}"])
-def test_equations_are_set_with_what_leads_nowhere(latex: str) -> None:
-    shown = Parsed(mathml(latex))
-    assert {name for _, name, _ in shown.attributes} <= ATTRIBUTES
-    assert shown.tags <= ELEMENTS | {"code"}
-
-
 # -- re-runs of papers ---------------------------------------------------------------------------
 
 RAMP = np.linspace(0.0, 1.0, 5)
@@ -350,14 +333,6 @@ def test_every_number_of_the_drawn_columns_is_a_point_in_its_row() -> None:
     assert (printed.style, printed.x.tolist(), printed.y.tolist()) == ("rings", [2.0], [0.0])
     assert (here.style, here.x.tolist(), here.y.tolist()) == ("dots", [1.5, 0.5], [0.0, 1.0])
     assert [mark.x for mark in panel.marks] == [3.0]
-
-
-@pytest.mark.parametrize("origin", ["virtual", "measured"])
-def test_what_the_muscle_did_is_ink_and_models_are_coloured(origin: str) -> None:
-    curves = {origin: (RAMP, RAMP), "play": (RAMP, RAMP)}
-    (panel,) = drawing(Figure("Loops", "pressure [bar]", "y [mm]", curves)).panels
-    colours = {each.name: each.colour for each in panel.curves}
-    assert colours == {origin: "measured", "play": "series-1"}
 
 
 @pytest.mark.parametrize("quick", [True, False])

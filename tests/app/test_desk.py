@@ -25,8 +25,7 @@ from mckibben.app.together import differing, obstacle, sample_times
 from mckibben.app.workspace import Workspace
 from mckibben.report import subjects
 from tests.app.simulated import desk_of, filled, swung, workspace_of
-from tests.comparison.test_several import hung
-from tests.comparison.test_several import run as two_muscles
+from tests.report.studies_by_hand import hung, two_muscles
 
 
 def models_of(desk: Desk) -> set[str]:

@@ -37,7 +37,7 @@ from tests.app.simulated import (
     wave,
     workspace_of,
 )
-from tests.comparison.test_several import run as two_muscles
+from tests.report.studies_by_hand import two_muscles
 
 
 def labels(element: ui.element) -> list[str]:

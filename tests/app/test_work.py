@@ -36,7 +36,7 @@ from tests.app.simulated import (
     swung,
     workspace_of,
 )
-from tests.comparison.test_several import QUICKLY, hung
+from tests.report.studies_by_hand import QUICKLY, hung
 
 MODEL = PI.example()
 (LOW,), (HIGH,) = MODEL.reachable()

@@ -20,10 +20,15 @@ from mckibben.comparison.results import Leaderboard
 from mckibben.comparison.row import Memory, Row
 from mckibben.metrics import score
 from mckibben.recording import Recording
+from mckibben.signals import triangle
 from mckibben.studying.inverting import InverseCheck, check_inverse
 from mckibben.studying.study import Study
 
 Array = NDArray[np.float64]
+
+TIME = np.arange(0, 20, 0.05)
+QUICKLY = {"balance": {"n_stops": 2, "n_lags": 0, "steps": 2, "elasticity": 3, "contact": False}}
+"""Settings with which a balance is fitted in a second."""
 
 
 def measured(
@@ -43,6 +48,30 @@ def measured(
     return Recording(
         dict(zip(channels, (u, y), strict=True)), sample_time, units, meta={"name": "muscle"} | meta
     )
+
+
+def _moved(wave: Array, seed: int) -> Array:
+    """Return what a muscle makes of a wave, with noise."""
+    noise = np.random.default_rng(seed).standard_normal(wave.size)
+    moved: Array = PI.example().simulate(wave) + 0.02 * noise
+    return moved
+
+
+def two_muscles(peak: float, seed: int = 0) -> Recording:
+    """Return a recording of two muscles that move one another."""
+    waves = [triangle(TIME + k, 4.0, peak) for k in (1, 2)]
+    one, two = (_moved(wave, seed + k) for k, wave in enumerate(waves))
+    outputs = {"displacement_1": one - 0.2 * two, "displacement_2": two - 0.2 * one}
+    inputs = {f"pressure_{k}": wave for k, wave in enumerate(waves, 1)}
+    return Recording(inputs | outputs, 0.05, meta={"name": f"run {seed}"})
+
+
+def hung(load: float, seed: int = 0) -> Recording:
+    """Return a recording of a muscle under a dead load that stretches it."""
+    wave = triangle(TIME + seed, 7.0, 4.0)
+    channels = {"pressure": wave, "displacement": _moved(wave, seed) - 0.2 * load}
+    force = np.full(TIME.size, load)
+    return Recording(channels | {"force": force}, 0.05, meta={"name": f"under {load:g} N"})
 
 
 def models() -> dict[str, Block]:

@@ -27,15 +27,12 @@ from mckibben.control import Twin, track
 from mckibben.excitation import untold
 from mckibben.report.page import page
 from mckibben.report.wording import next_steps, verdict
-from mckibben.signals import triangle
 from mckibben.studying.study import Study
 from mckibben.validation.describing import describe
-from tests.report.studies_by_hand import study
+from tests.report.studies_by_hand import QUICKLY, TIME, hung, study, two_muscles
 
 FOLDER = Path(__file__).parent / "sentences"
 NUMBER = re.compile(r"(?<![\w.])\d+(?:\.\d+)?(?:e[-+]?\d+)?(?!\w)")
-TIME = np.arange(0, 20, 0.05)
-QUICKLY = {"balance": {"n_stops": 2, "n_lags": 0, "steps": 2, "elasticity": 3, "contact": False}}
 
 
 class Words(HTMLParser):
@@ -95,33 +92,12 @@ def one_muscle() -> Study:
     )
 
 
-def moved(wave: np.ndarray, seed: int) -> np.ndarray:
-    """Return what a muscle makes of a wave, with noise."""
-    noise = np.random.default_rng(seed).standard_normal(wave.size)
-    moved: np.ndarray = PI.example().simulate(wave) + 0.02 * noise
-    return moved
-
-
 def several_muscles() -> Study:
-    def run(peak: float, seed: int) -> Recording:
-        waves = [triangle(TIME + k, 4.0, peak) for k in (1, 2)]
-        one, two = (moved(wave, seed + k) for k, wave in enumerate(waves))
-        outputs = {"displacement_1": one - 0.2 * two, "displacement_2": two - 0.2 * one}
-        inputs = {f"pressure_{k}": wave for k, wave in enumerate(waves, 1)}
-        return Recording(inputs | outputs, 0.05, meta={"name": f"run {seed}"})
-
-    return mckibben.study(
-        [run(5.0, 0), run(4.0, 2)], run(4.5, 4), models=["coupled-memory"], jobs=1
-    )
+    runs = [two_muscles(5.0, 0), two_muscles(4.0, 2)]
+    return mckibben.study(runs, two_muscles(4.5, 4), models=["coupled-memory"], jobs=1)
 
 
 def under_a_load() -> Study:
-    def hung(load: float, seed: int) -> Recording:
-        wave = triangle(TIME + seed, 7.0, 4.0)
-        channels = {"pressure": wave, "displacement": moved(wave, seed) - 0.2 * load}
-        force = np.full(TIME.size, load)
-        return Recording(channels | {"force": force}, 0.05, meta={"name": f"under {load:g} N"})
-
     runs = [hung(10.0, 0), hung(20.0, 1)]
     return mckibben.study(
         runs, hung(15.0, 2), load="force", models=["balance"], settings=QUICKLY, jobs=1

@@ -16,7 +16,7 @@ from tests.tools import where
 
 BROWSER = where("chromium")
 
-SLOW = 60_000
+SLOW = 300_000
 """Milliseconds to wait for fits on a busy machine."""
 
 OPTIONS = [

@@ -11,8 +11,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mckibben import Recording
-from mckibben.app.kept import Step
 from mckibben.app.plots import colours
 from mckibben.app.work import fit
 from mckibben.app.workspace import Workspace
@@ -29,13 +27,11 @@ from tests.app.browsing import (
     visited,
     workbench,
 )
-from tests.app.simulated import asked, filled, quiet, swung, workspace_of
+from tests.app.simulated import asked, filled, quiet, swung
 
 playwright = pytest.importorskip("playwright.sync_api")
 
 pytestmark = pytest.mark.long
-
-RUNS = [f"run-{k}" for k in range(9)]
 
 
 @pytest.fixture
@@ -126,25 +122,6 @@ def test_a_file_that_needs_help_is_mapped_by_hand_and_read_otherwise(
     seen(page, "recording-rig")
 
 
-def test_a_load_of_one_file_is_not_that_of_another(page: Any, workspace: Workspace) -> None:
-    lines = [
-        f"{line},{7 if k else 'counter'}" for k, line in enumerate(table(1, 0.4).decode().split())
-    ]
-    torn = "\n".join(lines[:100] + lines[150:]).encode()  # which is asked about
-    upload(page, one=torn, two=torn)
-    seen(page, "not-read").get_by_role("button").first.click()
-    seen(page, "add-constant").click()
-    seen(page, "constant-value-0").fill("20")
-    choose(page, "channel-3", "(left out)")
-    assert seen(page, "alike").get_attribute("aria-checked") == "true"
-    assert seen(page, "alike-constants").get_attribute("aria-checked") == "false"
-    seen(page, "read-again").click()
-    for name in ("one", "two"):
-        seen(page, f"recording-{name}")
-    assert workspace.recording("one")["force"] == pytest.approx(20)
-    assert "force" not in workspace.recording("two")
-
-
 def test_many_and_hostile_files_get_one_summary(page: Any, workspace: Workspace) -> None:
     good = b"pressure_bar,displacement_mm\n" + b"1,2\n2,3\n" * 20
     files = [(f"run {k}.csv", good) for k in range(8)]
@@ -199,37 +176,6 @@ def test_a_part_is_cut_by_dragging_and_by_keys_and_taken_back(
         page.keyboard.press(key)
     seen(page, "steps")
     assert len(workspace.recording(name)) / whole == pytest.approx(0.52, abs=0.01)
-
-
-def test_no_click_and_nothing_typed_is_lost_while_rows_change(browser: Any, tmp_path: Path) -> None:
-    t = np.arange(300) * 0.02
-    waves = {name: 2 + np.sin(t + k) for k, name in enumerate(RUNS)}
-    runs = {
-        name: Recording({"pressure": wave, "displacement": 2 * wave}, 0.02)
-        for name, wave in waves.items()
-    }
-    workspace = workspace_of(tmp_path / "ws", **runs)
-    with workbench(workspace.folder) as address, visited(browser, address) as page:
-        role = seen(page, "role-run-3").element_handle()
-        workspace.edit_each(RUNS, "halved", Step(do="resample", sample_time=0.04))
-        seen(page, "recording-run-3").get_by_text("150 samples").wait_for(timeout=SLOW)
-        role.query_selector("button:nth-of-type(2)").click()  # the row is the one that it was
-        holds(page, lambda: workspace.entry("run-3").role == "test")
-        seen(page, "sample-time").fill("0.01")
-        page.evaluate(
-            """([gone, ...names]) => {
-                document.querySelector(`[aria-label="Remove ${gone}"]`).click()
-                for (const name of names) {
-                    const role = document.querySelector(`[data-testid="role-${name}"]`)
-                    const buttons = [...role.querySelectorAll("button")]
-                    buttons.find((one) => one.innerText.toLowerCase() === "unused").click()
-                }
-            }""",
-            RUNS[::-1],
-        )
-        page.get_by_test_id("recording-run-8").wait_for(state="detached", timeout=SLOW)
-        holds(page, lambda: {entry.role for entry in workspace.entries()} == {"unused"})
-        assert seen(page, "sample-time").input_value() == "0.01"
 
 
 # -- from files to what is taken away ------------------------------------------------------------

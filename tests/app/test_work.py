@@ -180,7 +180,13 @@ def test_points_are_read_snapped_and_become_a_reference() -> None:
     for text in ("1", "a b", "1 2 3"):
         with pytest.raises(DataError):
             parsed(text)
-    for none in ([], [(0.0, 1.0)], [(0.0, 1.0), (0.0, 2.0)], [(0, 1), (1e9, 2)]):
+    hopeless: tuple[motions.Points, ...] = (
+        [],
+        [(0.0, 1.0)],
+        [(0.0, 1.0), (0.0, 2.0)],
+        [(0.0, 1.0), (1e9, 2.0)],
+    )
+    for none in hopeless:
         with pytest.raises(DataError):
             reference_recording({"displacement": none}, 0.01)
 
@@ -267,15 +273,17 @@ def test_a_loop_is_stored_beside_no_compensation(workspace: Workspace, plant: st
     loop(workspace, given | {"reference": "reference.csv"}, quiet)
     run = workspace.runs("mine")["try"]
     assert (run.plant, run.rig) == (plant, "")
-    assert (run.rmse["displacement"] < 1e-6) == (plant == "mine")
+    error = run.rmse["displacement"]
+    assert error is not None
+    assert (error < 1e-6) == (plant == "mine")
     (stored,) = read(workspace.path("runs", "try.csv"), informative=False)
     scored = stored.time >= 0
-    for channel, error in (
+    for channel, noted in (
         ("uncompensated_displacement", run.uncompensated["displacement"]),
-        ("displacement", run.rmse["displacement"]),
+        ("displacement", error),
     ):
         off = (stored[channel] - stored["reference_displacement"])[scored]
-        assert float(np.sqrt(np.mean(off**2))) == pytest.approx(error, rel=1e-6, abs=1e-9)
+        assert float(np.sqrt(np.mean(off**2))) == pytest.approx(noted, rel=1e-6, abs=1e-9)
 
 
 def test_a_log_is_split_into_what_its_error_comes_from(workspace: Workspace) -> None:

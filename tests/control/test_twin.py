@@ -347,7 +347,10 @@ def test_an_unpaired_plant_is_followed_by_the_least_commands_along_straight_line
     block = registered("blocks", "coupled-memory").example()
     twin = Twin(block, limits={"pressure_1": (0, 4), "pressure_2": (0, 4)})
     wanted = Recording({"displacement_1": np.full(50, 3.0)}, STEP)
-    assert before(MODEL.inverse(), twin, wanted, approach=0.2).tracked is not None
+    tracked = before(MODEL.inverse(), twin, wanted, approach=0.2).tracked
+    assert tracked is not None
+    commands = tracked.recording.matrix(["command_pressure_1", "command_pressure_2"])
+    assert 0.0 <= commands.min() <= commands.max() <= 4.0
 
 
 def test_what_is_out_of_reach_is_counted_and_told_apart(cli: Cli, tmp_path: Path) -> None:

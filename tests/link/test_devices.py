@@ -35,10 +35,11 @@ EMULATED = [needs(tool) for tool in (emulation.COMPILER, emulation.SIZE, emulati
 SERVING = Serving(limits={"pressure": (0, 6), "displacement": (-50, 50)}, watchdog=60.0)
 
 
-def wide(block: Block, **settings: float) -> Serving:
+def wide(block: Block, adjustable: float = 0.0) -> Serving:
     """Return settings under which hardly anything is beyond limits."""
     channels = [channel.name for channel in (*block.inputs, *block.outputs)]
-    return Serving(dict.fromkeys(channels, (-99.0, 99.0)), watchdog=60.0, **settings)
+    limits = dict.fromkeys(channels, (-99.0, 99.0))
+    return Serving(limits, watchdog=60.0, adjustable=adjustable)
 
 
 @contextmanager

@@ -73,7 +73,9 @@ def test_words_make_the_signal_that_numbers_make(name: str) -> None:
 @pytest.mark.parametrize("name", names("signals"))
 def test_numbers_seeds_and_times_that_are_none_are_refused(name: str) -> None:
     settings = settings_of(name)
-    wrong = {key: ("nan", "inf", "-inf") for key, (kind, _) in settings.items() if kind == "number"}
+    wrong: dict[str, tuple[str, ...]] = {
+        key: ("nan", "inf", "-inf") for key, (kind, _) in settings.items() if kind == "number"
+    }
     if "seed" in settings and name != "multisine":
         wrong["seed"] = ("-1",)
     for key, values in wrong.items():
@@ -107,7 +109,7 @@ def test_settings_are_listed_and_checked() -> None:
         ("ramps", "instants|points", {"instants": (0.0,), "values": (1.0, 2.0)}),
     ):
         with pytest.raises(DataError, match=about):
-            build(name, TIME, **settings)  # type: ignore[arg-type]
+            build(name, TIME, **settings)
 
 
 @given(st.integers(1, 12), st.floats(-2, 2), st.floats(0.1, 5))

@@ -76,8 +76,6 @@ def test_numbers_seeds_and_times_that_are_none_are_refused(name: str) -> None:
     wrong: dict[str, tuple[str, ...]] = {
         key: ("nan", "inf", "-inf") for key, (kind, _) in settings.items() if kind == "number"
     }
-        key: ("nan", "inf", "-inf") for key, (kind, _) in settings.items() if kind == "number"
-    }
     if "seed" in settings and name != "multisine":
         wrong["seed"] = ("-1",)
     for key, values in wrong.items():

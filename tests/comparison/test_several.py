@@ -92,6 +92,7 @@ def test_only_what_is_held_at_a_level_of_each_recording_is_a_dead_load() -> None
 QUICKLY = {"balance": {"n_stops": 2, "n_lags": 0, "steps": 2, "elasticity": 3, "contact": False}}
 
 
+@pytest.mark.long
 def test_under_two_dead_loads_a_model_is_ranked_whether_it_is_told_them_or_not() -> None:
     runs = [hung(10.0), hung(20.0, 1)]  # of which a part left out leaves one load
     (found,) = compare(runs, models=["balance"], settings=QUICKLY, jobs=1).rows

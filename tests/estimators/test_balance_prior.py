@@ -6,6 +6,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+import pytest
 
 from mckibben import Recording, muscles
 from mckibben.arrays import Array

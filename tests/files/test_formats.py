@@ -225,7 +225,9 @@ def test_tdms(tmp_path: Path) -> None:
     assert recording.name == "a"
     write_tdms(tmp_path / "b.tdms", ["run"], timed=False)
     assert mckibben.read(tmp_path / "b.tdms")[0].sample_time is None
-    check(mckibben.read(tmp_path / "b.tdms", rate=50)[0])
+    (given,) = mckibben.read(tmp_path / "b.tdms", rate=50)
+    check(given)
+    assert given.start_time == 0.0
 
 
 def test_every_group_of_tdms_is_a_recording(tmp_path: Path) -> None:

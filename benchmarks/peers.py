@@ -91,15 +91,17 @@ class Row:
 
 def data_of(train: Sequence[Recording], test: Sequence[Recording], channels: Channels) -> Data:
     """Return recordings as peers are given them, scaled as they are on the training side."""
-    told = inputs_of([*train, *test], channels)
-    inputs = np.vstack([one.matrix(told) for one in train])
+    names = inputs_of([*train, *test], channels)
+    inputs = np.vstack([one.matrix(names) for one in train])
     outputs = np.vstack([one.matrix(channels.outputs) for one in train])
     middle, spread = inputs.mean(axis=0), inputs.std(axis=0)
     spread[spread == 0] = 1.0
     offset, scale = outputs.mean(axis=0), outputs.std(axis=0)
 
     def scaled(one: Recording) -> Run:
-        return (one.matrix(told) - middle) / spread, (one.matrix(channels.outputs) - offset) / scale
+        return (one.matrix(names) - middle) / spread, (
+            one.matrix(channels.outputs) - offset
+        ) / scale
 
     def trial(one: Recording) -> Trial:
         before = predecessor(one, train)

@@ -59,15 +59,14 @@ class Trial:
 class Peer:
     """A way to identify a model, and the settings to search among, cheapest first.
 
-    From training runs, settings, and trials to stop a training early by, `fit` makes a model. With
-    `defaults` it is also fitted without settings.
+    From training runs, settings (none: the library's defaults), and trials to stop a training early by,
+    `fit` makes a model.
     """
 
     name: str
     package: str
     fit: Callable[[Sequence[Run], Settings, Sequence[Trial]], Simulate]
     grid: Sequence[Settings]
-    defaults: bool = True
 
 
 def grid(**choices: Sequence[Any]) -> list[Settings]:
@@ -232,7 +231,7 @@ def gru(runs: Sequence[Run], how: Settings, trials: Sequence[Trial]) -> Simulate
     return simulate
 
 
-GRU = Peer(f"GRU, {UNITS} units", "torch", gru, grid(seed=[0, 1, 2]), defaults=False)
+GRU = Peer(f"GRU, {UNITS} units", "torch", gru, grid(seed=[0, 1, 2]))
 
 PEERS = (
     Peer("ARX", "SIPPY", arx, grid(present=[False, True], poles=[1, 2, 3, 5], zeros=[1, 2, 4])),

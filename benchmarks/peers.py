@@ -99,9 +99,8 @@ def data_of(train: Sequence[Recording], test: Sequence[Recording], channels: Cha
     offset, scale = outputs.mean(axis=0), outputs.std(axis=0)
 
     def scaled(one: Recording) -> Run:
-        return (one.matrix(names) - middle) / spread, (
-            one.matrix(channels.outputs) - offset
-        ) / scale
+        u, y = one.matrix(names), one.matrix(channels.outputs)
+        return (u - middle) / spread, (y - offset) / scale
 
     def trial(one: Recording) -> Trial:
         before = predecessor(one, train)

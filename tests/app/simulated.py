@@ -19,8 +19,6 @@ from mckibben.app.jobs import Jobs
 from mckibben.app.shell import build, load_the_rest
 from mckibben.app.workspace import Workspace
 from mckibben.blocks.core.block import Block
-from mckibben.blocks.core.fields import Channel
-from mckibben.registry import load
 from mckibben.rigs import load_rig
 from mckibben.signals import decaying_triangle
 
@@ -64,23 +62,6 @@ def modelled(folder: Path, **models: Block) -> Workspace:
     for name, model in models.items():
         model.save(workspace.path("models", f"{name}.json"))
     return workspace
-
-
-def three_muscles(scale: float = 1.0) -> Block:
-    """Return three muscles that move a tip in two coordinates."""
-    muscles = tuple(
-        replace(
-            PI.example(),
-            input=Channel(f"pressure_{k}", "bar"),
-            output=Channel(f"shortening_{k}", "mm"),
-        )
-        for k in (1, 2, 3)
-    )
-    tip = tuple(Channel(f"displacement_{k}", "mm") for k in (1, 2))
-    gains = ((0.5 * scale, 0.0), (-0.25, 0.4), (-0.25, -0.4))
-    coupling = load("blocks", "coupling")(gains, tuple(one.output for one in muscles), tip)
-    whole: Block = load("blocks", "series")((load("blocks", "per-channel")(muscles), coupling))
-    return whole
 
 
 def asked(model: str, name: str, **settings: Any) -> dict[str, Any]:

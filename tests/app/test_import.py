@@ -19,7 +19,6 @@ from mckibben.app.jobs import Jobs
 from mckibben.app.kept import Reading, Step
 from mckibben.app.pages import editing
 from mckibben.app.reading import columns, read_upload
-from mckibben.app.recordings import EXAMPLE
 from mckibben.app.workspace import Workspace
 from mckibben.errors import TooLargeError
 from mckibben.files import formats
@@ -50,31 +49,15 @@ def again(workspace: Workspace, reading: Reading, name: str = "rig") -> Recordin
     return Workspace(workspace.folder).recording(name)
 
 
-def test_columns_are_recognised_from_the_first_lines_of_a_long_text(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_columns_are_recognised(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = tmp_path / "rig.csv"
     path.write_text(TABLE)
-    whole = columns(path, Reading())
-    found = {column.header: (column.channel, column.unit) for column in whole}
+    found = {one.header: (one.channel, one.unit) for one in columns(path, Reading())}
     assert found["p_kPa"] == ("pressure", "kPa")
     assert found["branch"][0] == ""
     assert [c.channel for c in columns(path, Reading(channels=["pressure"]))].count("") == 3
     (level, *_) = columns(path, Reading(columns={"force": "level"}, channels=["force"]))
     assert (level.channel, level.unasked) == ("force", "level")
-    monkeypatch.setattr(app_reading, "START", 200)
-    monkeypatch.setattr(app_reading, "LARGE", 500)
-    read_at_once: list[int] = []
-    tables = formats.tables
-
-    def sized(path: Path) -> Any:
-        read_at_once.append(path.stat().st_size)
-        return tables(path)
-
-    monkeypatch.setattr(formats, "tables", sized)
-    assert columns(path, Reading()) == whole
-    assert read_at_once[0] <= 200 < path.stat().st_size
-    monkeypatch.undo()
     monkeypatch.setattr(app_reading, "MOST_CELLS", 20)
     with pytest.raises(TooLargeError, match="20"):
         read_upload(path)
@@ -102,7 +85,6 @@ def test_a_file_is_read_otherwise_and_steps_are_done_anew(tmp_path: Path) -> Non
 def test_steps_follow_their_channels_to_other_names(tmp_path: Path) -> None:
     workspace = Workspace(tmp_path)
     taken(workspace)
-    raw = workspace.recording("rig")
     both = ["pressure", "displacement"]
     steps = [Step(do="zero", channels=["displacement"], over="pressure")]
     steps += [Step(do="detrend", channels=["pressure"]), Step(do="detrend", channels=both)]
@@ -120,17 +102,8 @@ def test_steps_follow_their_channels_to_other_names(tmp_path: Path) -> None:
         np.testing.assert_array_equal(after[now], before["displacement"])
         assert repeated(workspace)["push"].tolist() == after["push"].tolist()
         assert workspace.undo()
-    without = Reading(channels=["displacement", "level"])
-    again(workspace, without)
-    entry = workspace.entry("rig")
-    assert [step.channels for step in entry.steps] == [["displacement"]]
-    assert [note.rpartition("(")[2] for note in entry.notes if note.endswith(")")] == [
-        "displacement)",
-        "pressure)",
-    ]
-    assert not np.allclose(workspace.recording("rig")["displacement"], raw["displacement"])
-    with pytest.raises(DataError, match="pressure"):
-        edits.applied(workspace.recording("rig"), steps[1:2])
+    again(workspace, Reading(channels=["displacement", "level"]))
+    assert [step.channels for step in workspace.entry("rig").steps] == [["displacement"]]
 
 
 def test_everything_is_undone_and_done_again(tmp_path: Path) -> None:
@@ -152,24 +125,6 @@ def test_everything_is_undone_and_done_again(tmp_path: Path) -> None:
         undone -= 1
     assert undone == 0
     assert workspace.entries() == []
-
-
-def test_forgotten_changes_leave_no_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("mckibben.app.undoing.MOST_CHANGES", 2)
-    workspace = Workspace(tmp_path)
-    taken(workspace)
-    for stop in range(20, 30):
-        workspace.edit("rig", "cut", [Step(do="slice", start=0, stop=stop)])
-    assert len(list((tmp_path / "recordings").glob("*.csv"))) <= 4
-    assert len(workspace.recording("rig")) == 29
-
-
-def test_the_example_is_added_once(tmp_path: Path) -> None:
-    workspace = Workspace(tmp_path)
-    assert len(workspace.add_example()) == 2
-    assert workspace.add_example() == []
-    assert [entry.role for entry in workspace.entries()] == ["train", "test"]
-    assert {entry.origin for entry in workspace.entries()} == {EXAMPLE}
 
 
 def test_a_part_keeps_its_time_when_an_earlier_step_is_taken_back(tmp_path: Path) -> None:
@@ -268,9 +223,7 @@ def test_files_of_one_channel_each_are_joined(tmp_path: Path) -> None:
     assert adding.pairs(workspace) == []
 
 
-def test_stretches_that_are_not_cut_out_any_more_go(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_stretches_that_are_not_cut_out_any_more_go(tmp_path: Path) -> None:
     workspace = Workspace(tmp_path / "ws")
     desk = Desk(workspace, Jobs(workspace))
     times = [0.1 * k + 5.0 * (k >= 30) + 5.0 * (k >= 60) for k in range(90)]
@@ -279,10 +232,6 @@ def test_stretches_that_are_not_cut_out_any_more_go(
     with pytest.raises(DataError) as error:
         adding.add(desk, path.name, "rig.csv", Reading())
     assert adding.about_gaps(error.value)
-    assert str(tmp_path) not in str(adding.Problem("rig.csv", error.value))
-    monkeypatch.setattr(adding, "MANY", 1)
-    with pytest.raises(DataError, match="3 recordings"):
-        adding.add(desk, path.name, "rig.csv", Reading(gaps="split"), many=False)
     assert workspace.entries() == []
     adding.add(desk, path.name, "rig.csv", Reading(gaps="split"))
     names = [entry.name for entry in workspace.entries()]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -16,17 +15,12 @@ from nicegui.testing import User
 
 from mckibben import PI, Recording
 from mckibben.app.busy import SOON, Answer, under_way
-from mckibben.app.desk import Desk
-from mckibben.app.jobs import Jobs, note
 from mckibben.app.work import fit
 from mckibben.app.workspace import Workspace
-from mckibben.comparison.channels import Channels
-from mckibben.comparison.splits import held_out
 from mckibben.registry import load
 from mckibben.signals import triangle
 from tests.app.simulated import (
     WEAKER,
-    asked,
     drawn,
     field,
     filled,
@@ -38,7 +32,6 @@ from tests.app.simulated import (
     quiet,
     simulated,
     swung,
-    three_muscles,
     until,
     visit,
     wave,
@@ -161,7 +154,7 @@ def test_recordings_of_another_muscle_are_set_unused_and_then_models_are_offered
     assert workspace.entry("other").role == "train"
 
 
-def test_loads_in_names_are_given_by_one_click_and_constants_taken_out(tmp_path: Path) -> None:
+def test_loads_in_names_are_given_by_one_click(tmp_path: Path) -> None:
     workspace = Workspace(tmp_path)
     for name in ("one_load200g", "two_load400g"):
         workspace.add(swung(10.0), origin="", call="", name=name)
@@ -173,12 +166,6 @@ def test_loads_in_names_are_given_by_one_click_and_constants_taken_out(tmp_path:
         assert workspace.recording("two_load400g")["force"] == pytest.approx(3.92266)
         workspace.undo()
         assert not any("force" in run for run in workspace.readable())
-        user.find("How it was read").click()
-        await until(user, "add-constant")
-        user.find(marker="add-constant").click()
-        await until(user, "constant-value-0")
-        user.find(marker="constant-remove-0").click()
-        await gone(user, "constant-value-0")
 
     visit(workspace, look)
 
@@ -186,40 +173,24 @@ def test_loads_in_names_are_given_by_one_click_and_constants_taken_out(tmp_path:
 # -- look ----------------------------------------------------------------------------------------
 
 
-def arm() -> Recording:
-    """Return an arm whose first output is moved by its third input alone."""
+def test_what_moves_an_output_most_is_drawn(tmp_path: Path) -> None:
     time = np.arange(1200) * 0.1
     every = {f"pressure_{k + 1}": np.zeros(time.size) for k in range(3)}
     for k, pressure in enumerate(every.values()):  # one after another, the others held
         pressure[400 * k : 400 * k + 400] = triangle(time[:400], 10.0, 4.0)
     one, two, three = every.values()
     every |= {"displacement_1": 9 * three + 0.2 * one, "displacement_2": 5 * one - two}
-    return Recording(every, 0.1)
-
-
-def test_what_moves_an_output_most_is_drawn_and_what_it_does_is_no_creep(tmp_path: Path) -> None:
-    first = arm().slice(0, 400)  # in which the first muscle moves alone
+    arm = Recording(every, 0.1)
 
     async def look(user: User) -> None:
         user.find(marker="tab-look").click()
         await user.should_see("displacement_1 over pressure_3", retries=100)
-        untold = await until(user, "untold")
-        await later(lambda: any("load" in text for text in labels(untold)))
-        assert not [text for text in labels(untold) if "still moves" in text]
-        figures = [one.figure for one in user.find(ui.plotly).elements]
-        small = [figure["layout"] for figure in figures if figure["config"].get("staticPlot")]
-        assert len(small) == 6  # too small for the names of axes, which stand above
-        assert {layout[axis]["title"] for layout in small for axis in ("xaxis", "yaxis")} == {""}
-        chosen = only(user, "look-recording")
-        chosen.set_value("first")
+        only(user, "look-recording").set_value("first")  # in which the first muscle moves alone
         await user.should_see("displacement_1 over pressure_1", retries=100)
         user.find(marker="pair-pressure_1-displacement_2").click()
         await user.should_see("displacement_2 over pressure_1", retries=100)
-        chosen.set_value("arm")
-        await user.should_see("Cycle, of 4", retries=100)
-        await user.should_see("displacement_2 over pressure_1")
 
-    visit(workspace_of(tmp_path, arm=arm(), first=first), look)
+    visit(workspace_of(tmp_path, arm=arm, first=arm.slice(0, 400)), look)
 
 
 # -- models --------------------------------------------------------------------------------------
@@ -247,75 +218,6 @@ def test_models_of_several_muscles_have_their_errors_of_every_output(tmp_path: P
         assert names[1:3] == ["validation RMSE [mm]", "test RMSE [mm]"]
         assert "test RMSE of displacement_2 [mm]" in names
         await until(user, "closer-5")
-
-    visit(workspace, look)
-
-
-def test_what_was_unticked_stays_so_when_the_data_change(tmp_path: Path) -> None:
-    workspace = filled(tmp_path)
-    result = {"status": "ok", "model": "pi", "input": "pressure", "output": "force"}
-    workspace.write_json("results", "other", result)
-
-    async def look(user: User) -> None:
-        def boxes() -> set[Any]:
-            return user.find(marker="model-pi").elements
-
-        user.find(marker="tab-models").click()
-        await until(user, "model-pi")
-        await user.should_not_see(marker="leaderboard-other")
-        before = boxes()
-        user.find(marker="untick").click()
-        turns = 2.0 + np.sin(np.arange(200_000) / 50)
-        longer = Recording({"pressure": turns, "displacement": 2 * turns}, 0.1)
-        workspace.add(longer, origin="", call="")  # with which fits take longer, as each says
-        Desk(workspace, Jobs(workspace)).changed("recordings")
-        await later(lambda: boxes().isdisjoint(before))
-        assert not any(only(user, f"model-{model}").value for model in ("pi", "gpi", "mpi"))
-
-    visit(workspace, look)
-
-
-def test_ended_fits_are_listed_once_and_cleared(tmp_path: Path) -> None:
-    workspace = filled(tmp_path)
-    jobs = Jobs(workspace, at_once=1)
-    jobs.at_once = 0  # none is started
-    jobs.cancel(jobs.submit("fit", asked("pi", "one")).name)
-    note(workspace, "fit-2", "fit", asked("pi", "two"), "failed", "there is no channel")
-
-    async def look(user: User) -> None:
-        user.find(marker="tab-models").click()
-        assert labels(await until(user, "job-one")) == ["one", "cancelled"]
-        user.find(marker="clear-fits").click()
-        await gone(user, "fits")
-
-    visit(workspace, look)
-    assert workspace.names("jobs") == []
-
-
-def shaded(figure: dict[str, Any]) -> list[tuple[float, float]]:
-    shapes = figure["layout"]["shapes"]
-    return [(one["x0"], one["x1"]) for one in shapes if one["type"] == "rect"]
-
-
-@pytest.mark.parametrize(("tested", "current"), [(False, True), (True, True), (False, False)])
-def test_what_was_held_out_is_shaded(tmp_path: Path, tested: bool, current: bool) -> None:
-    workspace = modelled(tmp_path, a=PI.example())
-    workspace.add(wave(), origin="", call="", name="run")
-    if tested:
-        workspace.add(wave(), origin="", call="", role="test", name="other")
-    data = workspace.data() if current else "another"
-    row = {"status": "ok", "model": "pi", "validation_rmse": 1.0, "data": data}
-    workspace.write_json("results", "a", row)
-    (part,) = held_out([wave()], Channels(("pressure",), ("displacement",))).train
-    ends = wave().time[len(part)], wave().time[-1]
-
-    async def look(user: User) -> None:
-        user.find(marker="tab-models").click()
-        await until(user, "closer-on")
-        figures = [one.figure for one in user.find(kind=ui.plotly).elements]
-        marked = [found for found in map(shaded, figures) if found]
-        unseen = not tested and current
-        assert marked == ([[pytest.approx(ends)]] * 2 if unseen else [])  # of what is over time
 
     visit(workspace, look)
 
@@ -392,18 +294,6 @@ def test_what_is_not_recommended_is_not_chosen_first_and_is_marked(tmp_path: Pat
         assert only(user, "invert").value == "b"
 
     visit(workspace, look)
-
-
-def test_controllers_that_cannot_run_on_an_arm_are_not_offered(tmp_path: Path) -> None:
-    async def look(user: User) -> None:
-        await drawn(user)
-        await until(user, "run-loop")
-        kinds = only(user, "controllers")
-        assert set(kinds.options) == {"feedforward", "observer"}
-        assert kinds.value == ["feedforward"]
-        assert "pressure_1, pressure_2, pressure_3" in only(user, "law-refused").text
-
-    visit(modelled(tmp_path, a=three_muscles(), b=three_muscles(0.9)), look)
 
 
 def test_a_force_is_estimated_of_what_was_not_trained_on(tmp_path: Path) -> None:

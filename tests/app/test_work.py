@@ -19,7 +19,6 @@ from mckibben.app.following import (
 )
 from mckibben.app.jobs import Jobs
 from mckibben.app.motions import parsed, reference_recording
-from mckibben.app.pages.axes import Axes
 from mckibben.app.recorded import pace, reached
 from mckibben.app.work import check, fit, plan, record
 from mckibben.app.workspace import Workspace
@@ -167,25 +166,15 @@ def test_ready_made_motions_stay_between_their_ends(kind: str) -> None:
         motions.motion(kind, 10.0, 5.0, 5.0)
 
 
-def test_points_are_read_snapped_and_become_a_reference() -> None:
+def test_points_are_read_and_become_a_reference() -> None:
     points = parsed("0 10\n\n 2; 20\n4,10")
     assert points == [(0.0, 10.0), (2.0, 20.0), (4.0, 10.0)]
     reference = reference_recording({"displacement": points}, 0.5)
     np.testing.assert_allclose(reference["displacement"][[0, 2, 4, 8]], [10, 15, 20, 10])
-    axes = Axes(20.0, 0.0, 10.0, "mm", "displacement")
-    assert axes.at(*axes.place(7.0, 4.0)) == pytest.approx((7.0, 4.0))
-    assert motions.snapped(7.13, 3.9, 0.5, 0.5) == (7.0, 4.0)
-    assert motions.with_point([(1.0, 1.0), (3.0, 3.0)], 3.0, 2.0) == [(1.0, 1.0), (3.0, 2.0)]
     for text in ("1", "a b", "1 2 3"):
         with pytest.raises(DataError):
             parsed(text)
-    hopeless: tuple[motions.Points, ...] = (
-        [],
-        [(0.0, 1.0)],
-        [(0.0, 1.0), (0.0, 2.0)],
-        [(0.0, 1.0), (1e9, 2.0)],
-    )
-    for none in hopeless:
+    for none in ([], [(0.0, 1.0)], [(0.0, 1.0), (0.0, 2.0)], [(0.0, 1.0), (1e9, 2.0)]):
         with pytest.raises(DataError):
             reference_recording({"displacement": none}, 0.01)
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import stat
 import unicodedata
 from collections.abc import Callable
 from itertools import count
@@ -165,14 +164,6 @@ def test_models_of_recordings_changed_since_are_not_ranked_with_the_others(tmp_p
         assert workspace.data() == before
 
 
-def test_notes_of_reading_stay_with_a_recording(tmp_path: Path) -> None:
-    workspace = Workspace(tmp_path)
-    given = recording().with_meta(notes=["the step was assumed"])
-    assert workspace.add(given, origin="", call="", name="run").notes == ("the step was assumed",)
-    workspace.set_role("run", "test")
-    assert Workspace(tmp_path).entry("run").notes == ("the step was assumed",)
-
-
 @pytest.mark.parametrize(
     ("wish", "name"),
     [
@@ -193,29 +184,15 @@ def test_names_keep_letters_of_any_script(wish: str, name: str, tmp_path: Path) 
 
 def test_files_of_a_person_stay_as_they_are(tmp_path: Path) -> None:
     (tmp_path / "models" / "sub").mkdir(parents=True)
-    (tmp_path / "results").mkdir()
-    own = [
-        tmp_path / place
-        for place in (
-            "models/__init__.py",
-            "models/weights.bin.part",
-            "models/sub/a.json",
-            "results/.gitkeep",
-        )
-    ]
-    for path in own:
-        path.write_text("")
-    deep = [tmp_path / "models" / "sub", own[2]]
-    for path in deep:
-        path.chmod(0o755)
+    places = ("models/__init__.py", "models/weights.bin.part", "models/sub/a.json")
+    own = [tmp_path / place for place in places]
     ours = [tmp_path / "models" / ".mckibben-0123.part", tmp_path / "models" / "taken.json"]
+    for path in (*own, *ours):
+        path.write_text("")
     ours[0].write_text("half")
-    ours[1].write_text("")
     assert Workspace(tmp_path).claim()
     assert all(path.exists() for path in own)
     assert not any(path.exists() for path in ours)
-    if os.name == "posix":
-        assert {stat.S_IMODE(path.stat().st_mode) for path in deep} == {0o755}
 
 
 # -- changes as a whole ----------------------------------------------------------------------

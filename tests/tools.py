@@ -24,7 +24,6 @@ PACKAGES = {
     "cppcheck": "cppcheck",
     "g++": "g++",
     "gcc": "g++",
-    "libtbb.so.12": "libtbb12",
     "mkoctfile": "octave octave-dev",
     "octave-cli": "octave",
     "qemu-system-arm": "qemu-system-arm",

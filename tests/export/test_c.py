@@ -12,7 +12,6 @@ import pytest
 from mckibben import ModelError
 from mckibben.blocks.adaptive.adaptive import Adaptive
 from mckibben.blocks.adaptive.adaptive_series import AdaptiveSeries
-from mckibben.blocks.feedback.feedforward_feedback import FeedforwardFeedback
 from mckibben.export import export_c
 from mckibben.export.c.building import self_test
 from mckibben.registry import load
@@ -26,18 +25,12 @@ pytestmark = [pytest.mark.c, pytest.mark.long, needs("cc")]
 DOUBLE, SINGLE, GROWN = 1e-12, 1e-4, 1e-8
 """Largest difference allowed, relative to the range; `GROWN` of what learns, over a long run."""
 
-TO_THE_BIT = {
-    *("affine", "chou-hannaford", "coupling", "creep", "creep-inverse", "eupi-inverse"),
-    *("krasnoselskii-pokrovskii", "maxwell-slip", "maxwell-slip-inverse", "negative", "pi-inverse"),
-    *("pid", "piecewise-linear", "play", "polynomial", "polynomial-force", "process-model"),
-    "transfer-function",
-}
-"""Sums, products and comparisons alone, in one order in both languages."""
-
 DOUBLES = {
     name: nearby(block, np.random.default_rng(len(name))) for name, block in MODELS.items()
 } | {"overflowing": load("blocks", "polynomial")((0.0, 1e200, 1e200))}
 """Of other parameters than the examples."""
+
+LASTING = ("creep", "gpi-inverse", "maxwell-slip", "multistate-friction", "process-model")
 
 
 @pytest.fixture(scope="module")
@@ -47,7 +40,9 @@ def double(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Compiled]:
 
 @pytest.fixture(scope="module")
 def single(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Compiled]:
-    return build(MODELS, "float32", tmp_path_factory.mktemp("single"))
+    return build(
+        {name: MODELS[name] for name in LASTING}, "float32", tmp_path_factory.mktemp("single")
+    )
 
 
 @pytest.mark.parametrize("name", MODELS)
@@ -55,36 +50,13 @@ def test_double_precision_is_python(name: str, double: dict[str, Compiled]) -> N
     block = DOUBLES[name]
     inputs = path_for(block, 1, 3000)
     outputs, expected = double[name](inputs), simulated(block, inputs)
-    if name in TO_THE_BIT:
-        np.testing.assert_array_equal(outputs, expected)
     assert difference(outputs, expected) <= DOUBLE
     if isinstance(block, Adaptive | AdaptiveSeries):  # what learns remembers rounding
         inputs = path_for(block, 1, 100_000)
         assert difference(double[name](inputs), simulated(block, inputs)) <= GROWN
 
 
-@pytest.mark.parametrize("name", MODELS)
-def test_single_precision_is_near(name: str, single: dict[str, Compiled]) -> None:
-    block = MODELS[name]
-    inputs = path_for(block, 2, 3000).astype(np.float32).astype(np.float64)
-    outputs, expected = single[name](inputs), simulated(block, inputs)
-    if name == "SDIHC":
-        # where envelopes leave a plateau, several pressures give one displacement
-        scheduled, block = inputs[:, 3], MODELS["SDCHM"]
-        outputs, expected = (
-            simulated(block, np.column_stack([pressures, scheduled]))
-            for pressures in (outputs, expected)
-        )
-    if isinstance(block, FeedforwardFeedback):
-        expected_range = np.ptp(np.array(block.feedback.limits))
-        assert (np.abs(outputs - expected) <= SINGLE * expected_range).all()
-    else:
-        assert difference(outputs, expected) <= SINGLE
-
-
-@pytest.mark.parametrize(
-    "name", ["creep", "gpi-inverse", "maxwell-slip", "multistate-friction", "process-model"]
-)
+@pytest.mark.parametrize("name", LASTING)
 def test_single_precision_does_not_drift(name: str, single: dict[str, Compiled]) -> None:
     block = MODELS[name]
     inputs = path_for(block, 3, 1_000_000).astype(np.float32).astype(np.float64)

@@ -20,7 +20,13 @@ from tests.tools import needs
 pytestmark = pytest.mark.long
 
 DOCS = Path(__file__).parents[2] / "docs" / "deploy"
-SHOWN = ("SDIHC", "MPI-NARMAX", "preisach-inverse", "multistate-friction", "feedforward-feedback")
+SHOWN = (
+    "SDCHM inverse",
+    "MPI-NARMAX",
+    "preisach-inverse",
+    "multistate-friction",
+    "feedforward-feedback",
+)
 
 
 def run(command: Sequence[str | Path], cwd: Path) -> str:
@@ -74,24 +80,6 @@ def test_misra_findings_are_those_that_are_justified(tmp_path: Path) -> None:
     assert found == listed
 
 
-@needs("g++")
-def test_cplusplus_can_include_and_link_it(tmp_path: Path) -> None:
-    block = MODELS["SDIHC"]
-    folder = export_c(block, tmp_path / "c", name="muscle", sample_time=SAMPLE_TIME)
-    main = folder / "main.cpp"
-    n_in, n_out = len(block.inputs), len(block.outputs)
-    main.write_text(
-        '#include "muscle.h"\n'
-        f"int main() {{ muscle_model m; mck_real in[{n_in}] = {{}}, out[{n_out}];\n"
-        "muscle_init(&m); return muscle_step(&m, in, out); }\n"
-    )
-    for source in sorted((folder / "src").glob("*.c")):
-        run(["gcc", "-std=c99", "-c", source, "-o", source.with_suffix(".o")], folder)
-    objects = sorted((folder / "src").glob("*.o"))
-    run(["g++", "-Wall", "-Werror", "-Isrc", main, *objects, "-o", "main"], folder)
-    run([folder / "main"], folder)
-
-
 @needs("gcc")
 def test_only_mathematics_is_asked_of_the_library(tmp_path: Path) -> None:
     allowed = {"atan", "atanh", "exp", "expm1", "log", "log1p", "sqrt", "tan", "tanh"}
@@ -115,7 +103,7 @@ def test_only_mathematics_is_asked_of_the_library(tmp_path: Path) -> None:
 @needs("mkoctfile")
 @needs("octave-cli")
 def test_octave_gives_pythons_numbers(tmp_path: Path) -> None:
-    block = MODELS["SDIHC"]
+    block = MODELS["SDCHM inverse"]
     folder = export_c(block, tmp_path / "c", name="muscle", sample_time=SAMPLE_TIME)
     inputs = path_for(block, 1, 200)
     expected = simulated(block, inputs)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import subprocess
 import xml.etree.ElementTree as ET
 from pathlib import Path
@@ -32,14 +33,8 @@ def built(block: Block, place: Path, *options: str) -> Path:
             ["gcc", "-std=c99", *FLAGS, "-c", source, "-o", objects[-1]], check=True, timeout=100
         )
     n_pressures, n_measured = len(block.outputs), len(block.scheduling)
-    command = [
-        "g++",
-        "-std=c++17",
-        *FLAGS,
-        *options,
-        f"-I{folder / 'include'}",
-        f"-I{folder / 'c'}",
-    ]
+    command = ["g++", "-std=c++17", *FLAGS, *options]
+    command += [f"-I{folder / 'include'}", f"-I{folder / 'c'}"]
     command += [f"-isystem{STUBS}", '-DCONTROLLER_HEADER="arm/arm_controller.hpp"']
     command += ["-DCONTROLLER=arm::ArmController"]
     command += [f"-DN_COMMANDS={n_pressures}", f"-DN_STATES={n_measured}"]
@@ -109,17 +104,23 @@ def test_numbers_that_are_none_are_not_applied(program: Path) -> None:
 
 @pytest.mark.long
 @needs("g++")
-def test_a_missing_measurement_is_no_reason_to_forget(tmp_path: Path) -> None:
+@pytest.mark.parametrize("options", [(), ("-DOLDER_HANDLES",)])
+def test_a_missing_measurement_is_no_reason_to_forget(
+    options: tuple[str, ...], tmp_path: Path
+) -> None:
+    """References come in thousandths of the block's unit."""
     block = examples()["pi-adaptive"]
-    program = built(block, tmp_path)
-    rows = [(2.0 + np.sin(0.05 * k), 2.2 + np.sin(0.05 * k)) for k in range(60)]
+    program = built(block, tmp_path, *options)
+    rows = [(2.0 + math.sin(0.05 * k), 2.2 + math.sin(0.05 * k)) for k in range(60)]
     rows[20:25] = [(reference, np.nan) for reference, _ in rows[20:25]]
     lines = [
-        word for r, m in rows for word in (f"say {float(r)!r}", f"state {float(m)!r}", "update")
+        word for r, m in rows for word in (f"say {1e-3 * r!r}", f"state {float(m)!r}", "update")
     ]
     stream = block.stream(STEP)
     expected = [float(stream.step(row)[0]) for row in rows]
-    np.testing.assert_allclose(pressures(driven(program, lines)[1:]), expected, rtol=1e-9)
+    np.testing.assert_allclose(
+        pressures(driven(program, lines, reference_scale=1e3)[1:]), expected, rtol=1e-9
+    )
 
 
 @needs("g++")
@@ -139,22 +140,6 @@ def test_wrong_parameters_are_refused(program: Path, wrong: dict[str, float]) ->
     with pytest.raises(subprocess.CalledProcessError) as caught:
         driven(program, [], **wrong)
     assert caught.value.returncode == 2
-
-
-@pytest.mark.long
-@needs("g++")
-def test_measured_loads_come_from_state_interfaces_of_older_handles_too(tmp_path: Path) -> None:
-    balance = muscles.load("rail").balance
-    program = built(balance, tmp_path, "-DOLDER_HANDLES")
-    lines = [
-        word
-        for k in range(50)
-        for word in (f"say {1e-3 * wave(k)!r}", f"state {100.0 + k!r}", "update")
-    ]
-    given = pressures(driven(program, lines, reference_scale=1e3)[1:])
-    stream = balance.stream(STEP)
-    expected = [float(stream.step([wave(k), 100.0 + k])[0]) for k in range(50)]
-    np.testing.assert_allclose(given, expected, rtol=1e-9)
 
 
 def test_the_package_names_what_it_holds() -> None:

@@ -26,19 +26,6 @@ def test_nothing_drifts_until_it_begins() -> None:
     assert not np.array_equal(plain.step([3.0]), drifting.step([3.0]))
 
 
-@pytest.mark.parametrize("group", ["stiffness", "friction"])
-def test_from_the_start_it_is_the_aged_rig_but_for_the_tare(group: str) -> None:
-    """Changed at rest, it forgets within the run what it was: the tare alone differs."""
-    drifting = Drifting(RIG, [Drift(group, 0.8)])
-    drifting.reset()
-    aged = RIG.aged({group: 0.8}).changed({})  # changed forgets where it ran
-    aged.reset()
-    levels = [1.0] * 200 + [5.5] * 200 + pressures(300)
-    found = np.array([[drifting.step([p])[1], aged.step([p])[1]] for p in levels])[400:]
-    found -= found.mean(axis=0)
-    np.testing.assert_allclose(found[:, 0], found[:, 1], atol=0.04)  # of 20 mm; creep fades
-
-
 def test_a_step_keeps_where_the_muscle_is() -> None:
     """No time passes at a change: the next measurement is of the same muscle, moved a little."""
     drifting = Drifting(RIG, [Drift("friction", 0.5, start=2.0)])
@@ -67,13 +54,6 @@ def test_drifts_of_a_group_multiply_and_reset_makes_new() -> None:
     assert drifting.factors["gain"] == pytest.approx(0.99)
     assert np.array_equal(drifting.reset(1), first)
     assert drifting.factors["gain"] == 0.9
-
-
-def test_an_arm_ages_in_all_its_muscles() -> None:
-    arm = load_rig("soft-arm")
-    aged = arm.aged({"stiffness": 0.5})
-    assert (aged.muscle.c10, aged.extensor.c10) == (arm.muscle.c10 / 2, arm.extensor.c10 / 2)  # type: ignore[attr-defined]
-    assert aged.muscle.friction == arm.muscle.friction  # type: ignore[attr-defined]
 
 
 def test_refusals() -> None:

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from mckibben import PI, Recording, Series, write
+from mckibben import PI, Recording, Series
 from mckibben.blocks.core.fields import Channel
 from mckibben.blocks.dynamic.air import Air
 from mckibben.blocks.feedback.feedforward_feedback import FeedforwardFeedback
@@ -17,7 +16,6 @@ from mckibben.blocks.feedback.pid import PIDFeedback
 from mckibben.blocks.memoryless.affine import Affine
 from mckibben.control import DisturbanceObserver, EstimatedLoad, Twin, track
 from mckibben.control.controller import BlockController
-from tests.cli.conftest import Cli
 from tests.cli.conftest import cli as cli  # a fixture
 
 STEP, LATE = 0.02, 5
@@ -83,21 +81,3 @@ def test_an_observer_and_an_estimated_load_pass_the_preview_on() -> None:
     )
     assert estimated.preview == observer.preview
     assert error(estimated) < 1e-9 * SPAN
-
-
-def test_the_command_line_previews(cli: Cli, tmp_path: Path) -> None:
-    command = Channel("command_pressure", "bar")  # which drives the rig's pressure
-    air = Air(1.0, 0.0, 0.05, 0.03, 0.07, 0.06, 0.0, 6.0, (0.0, 6.0), input=command)
-    Series((air, PI.example())).inverse().save(tmp_path / "inverse.json")
-    write(wanted().slice(0, 200), tmp_path / "wished.csv")
-    given = ["--rig", "mas20-hanging", "--reference", tmp_path / "wished.csv", "--approach", 1]
-    out = tmp_path / "run.csv"
-    commands = []
-    for ahead in ([], ["--preview", 0.06], ["--preview", 0]):
-        result = cli("track", tmp_path / "inverse.json", *given, *ahead, "-o", out, "--force")
-        assert result.code == 0, result.err
-        commands.append(out.read_text())
-    assert "command_pressure" in commands[0].splitlines()[0]
-    assert commands[0] == commands[1] != commands[2]
-    saving = ["--controller", "feedforward-pid", "--controller-out", tmp_path / "robot.json"]
-    assert cli("track", tmp_path / "inverse.json", *given, *saving).code == 2  # no block previews

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -28,7 +27,6 @@ from mckibben.blocks.core.fields import Channel
 from mckibben.blocks.feedback.pid import PIDFeedback
 from mckibben.control import Twin, before, track, tune_pid
 from mckibben.control.suiting import doubts_of_feedback
-from mckibben.control.uncompensated import StraightMap
 from mckibben.registry import load as registered
 from mckibben.registry import names
 from tests.cli.conftest import Cli
@@ -90,50 +88,12 @@ def test_without_a_band_a_twin_is_simulate_to_the_bit(block: Block) -> None:
 
 
 def test_a_band_at_any_level_holds_that_share_of_what_is_drawn() -> None:
-    banded, given = Banded(MODEL, band()), pressures(4000)
+    banded, given = Banded(MODEL, band(limits=((0.0, 0.0, -3.0, 1.0),))), pressures(4000)
     drawn = Twin(banded).run(given, seed=1)["displacement"]
-    shares = []
     for level in (0.5, 0.8, 0.9):
         ends = banded.at(level).simulate(given)
         inside = (ends["displacement_lower"] <= drawn) & (drawn <= ends["displacement_upper"])
-        shares.append(float(inside.mean()))
-    # a band reaches to the model where that lies outside shift and scale, and so holds a little more
-    assert np.all(np.array(shares) - (0.5, 0.8, 0.9) > -0.025), shares
-    unshifted = Banded(MODEL, band(limits=((0.0, 0.0, -3.0, 1.0),)))
-    drawn = Twin(unshifted).run(given, seed=1)["displacement"]
-    for level in (0.5, 0.8, 0.9):
-        ends = unshifted.at(level).simulate(given)
-        inside = (ends["displacement_lower"] <= drawn) & (drawn <= ends["displacement_upper"])
         assert float(inside.mean()) == pytest.approx(level, abs=0.025)
-
-
-def test_scatter_stays_alike_as_long_as_misses_did() -> None:
-    held = Recording({"pressure": np.full(20_000, 3.0)}, STEP)
-    ideal = Twin(MODEL).run(held)["displacement"]
-    for memory in (0.0, 2.0):
-        errors = Twin(Banded(MODEL, band(memory))).run(held, seed=2)["displacement"] - ideal
-        errors = errors - errors.mean()
-        lags = np.array([errors[k:] @ errors[: len(errors) - k] for k in range(400)]) / (
-            errors @ errors
-        )
-        none = int(np.argmax(lags < 0.05))
-        integral = STEP * (1.0 + 2.0 * lags[1:none].sum())
-        assert integral == pytest.approx(max(memory, STEP), rel=0.3)
-
-
-def test_scatter_of_few_runs_does_not_jump() -> None:
-    """Coarse scores are stairs, and a muscle has none."""
-    stairs = tuple(np.repeat((1.0, 4.0, 9.0), 334)[:1001])
-    coarse = replace(band(2.0), scores=(stairs,))
-    wide = Banded(MODEL, coarse)
-    held = Recording({"pressure": np.full(20_000, 3.0)}, STEP)
-    drawn = Twin(wide).run(held, seed=3)["displacement"]
-    # drawn off the stairs, it would move by five ninths of its largest at once
-    assert np.abs(np.diff(drawn)).max() < 0.2 * np.ptp(drawn)
-    for level in (0.5, 0.8, 0.9):
-        ends = wide.at(level).simulate(held)
-        inside = (ends["displacement_lower"] <= drawn) & (drawn <= ends["displacement_upper"])
-        assert inside.mean() > level - 0.03
 
 
 def test_the_approach_does_not_scatter_and_scatter_is_told() -> None:
@@ -147,33 +107,14 @@ def test_the_approach_does_not_scatter_and_scatter_is_told() -> None:
     assert not track(MODEL.inverse(), Twin(MODEL), wave(100), approach=1.0).scatter
 
 
-def test_seeds_of_scatter_mean_something() -> None:
-    twin, given = Twin(Banded(MODEL, band(0.5))), pressures(200)
-    first, again, other = (twin.run(given, seed=seed)["displacement"] for seed in (1, 1, 2))
-    np.testing.assert_array_equal(first, again)
-    assert not np.array_equal(first, other)
-    np.testing.assert_array_equal(
-        twin.run(given, ideal=True)["displacement"], MODEL.simulate(given)["displacement"]
-    )
-    loops = [track(MODEL.inverse(), twin, wave(300), seed=seed, approach=1.0) for seed in (4, 4, 5)]
-    errors = [loop.rmse["displacement"] for loop in loops]
-    assert errors[0] == errors[1] != errors[2]
-
-
-def test_a_compensator_beats_no_compensation_and_says_where_it_proves_nothing() -> None:
-    twin, reference = Twin(MODEL), wave()
-    with_it = track(MODEL.inverse(), twin, reference)
-    without = before(MODEL.inverse(), twin, reference)
+def test_a_compensator_beats_no_compensation_and_a_plant_that_is_the_model_is_noted() -> None:
+    with_it = track(MODEL.inverse(), Twin(MODEL), wave())
+    without = before(MODEL.inverse(), Twin(MODEL), wave())
     assert with_it.rmse["displacement"] < 1e-9 * (HIGH - LOW)
     assert without.tracked is not None
     assert without.tracked.rmse["displacement"] > 0.02 * (HIGH - LOW)
-    assert len(without.notes) == 1  # that model and plant are the same
-    assert before(MODEL.inverse(), Twin(Banded(MODEL, band())), reference).notes
-    straight = PI((0.0,), ((HIGH - LOW) / 5.0,), LOW, (0.0, 5.0))
-    needless = before(straight.inverse(), Twin(straight), wave(500)).tracked
-    assert needless is not None
-    assert needless.rmse["displacement"] < 1e-6
-    assert before(MODEL.inverse(), load_rig("rail").changed({}), wave(100), approach=0.5).tracked
+    assert len(without.notes) == 1
+    assert before(MODEL.inverse(), Twin(Banded(MODEL, band())), wave()).notes
 
 
 def test_pressures_recorded_with_a_reference_are_passed_over() -> None:
@@ -289,21 +230,6 @@ def test_bad_twins_are_refused() -> None:
             Twin(impossible).reset()
 
 
-def test_a_compensator_is_tried_on_ones_own_muscle(cli: Cli, tmp_path: Path) -> None:
-    inverse, model = (tmp_path / f"{name}.json" for name in ("inverse", "model"))
-    MODEL.inverse().save(inverse)
-    Banded(MODEL, band()).save(model)
-    write(wave(400), tmp_path / "wished.csv")
-    given = ["--reference", tmp_path / "wished.csv", "--approach", 1]
-    result = cli("track", inverse, "--plant", model, *given, "--json")
-    assert result.code == 0, result.err
-    found = json.loads(result.out)
-    assert found["plant"] == {"name": "model", "virtual_rig": False}
-    assert found["rmse"]["displacement"] > 0.01
-    assert found["uncompensated"]["rmse"]["displacement"] > found["rmse"]["displacement"]
-    assert len(found["notes"]) == 1
-
-
 @pytest.mark.parametrize(
     ("options", "named"),
     [
@@ -311,14 +237,10 @@ def test_a_compensator_is_tried_on_ones_own_muscle(cli: Cli, tmp_path: Path) -> 
         (["--plant", "model.json", "--rig", "mas20-hanging"], "--rig"),
         (["--rig", "mas20-hanging", "--limits", "pressure=0:3"], "limits"),
         (["--plant", "model.json", "--limits", "pressure=0:3:1"], "pressure"),
-        (["--plant", "model.json", "--limits", "pressure=3:0"], "pressure"),
         (["--plant", "model.json", "--limits", "voltage=0:3"], "voltage"),
-        (["--plant", "inverse.json"], "pressure"),
         (["--plant", "absent.json"], "absent.json"),
-        (["--plant", "discrete.json"], "0.01 s"),
-        (["--plant", "model.json", "--seed", "-1"], "seed"),
         (
-            ["--rig", "mas20-hanging", "--controller", "observer", "--controller-out", "c.json"],
+            ["--rig", "mas20-hanging", "--controller", "observer", "--controller-out", "c"],
             "observer",
         ),
     ],
@@ -329,21 +251,13 @@ def test_bad_plants_are_refused(
     monkeypatch.chdir(tmp_path)
     MODEL.save("model.json")
     MODEL.inverse().save("inverse.json")
-    registered("blocks", "transfer-function").example().save("discrete.json")
     write(wave(100), tmp_path / "wished.csv")
     result = cli("track", "inverse.json", "--reference", "wished.csv", *options)
     assert result.code == 2
     assert named in " ".join(result.err.split())
 
 
-def test_an_unpaired_plant_is_followed_by_the_least_commands_along_straight_lines() -> None:
-    slopes, given = np.array([[3.0, 1.0]]), np.array([6.0])
-    lines = StraightMap(np.zeros(1), slopes, np.zeros(2), np.full(2, 4.0))
-    least = np.linalg.pinv(slopes) @ given
-    assert lines.step(given, given, given) == pytest.approx(least, rel=1e-4)
-    # where one is at its limit, another makes up for it
-    lines = StraightMap(np.zeros(1), np.array([[2.0, 0.1]]), np.zeros(2), np.array([1.0, 5.0]))
-    assert lines.slopes @ lines.step(np.array([2.4]), given, given) == pytest.approx(2.4, rel=1e-3)
+def test_commands_to_an_unpaired_plant_stay_within_its_limits() -> None:
     block = registered("blocks", "coupled-memory").example()
     twin = Twin(block, limits={"pressure_1": (0, 4), "pressure_2": (0, 4)})
     wanted = Recording({"displacement_1": np.full(50, 3.0)}, STEP)
@@ -353,7 +267,7 @@ def test_an_unpaired_plant_is_followed_by_the_least_commands_along_straight_line
     assert 0.0 <= commands.min() <= commands.max() <= 4.0
 
 
-def test_what_is_out_of_reach_is_counted_and_told_apart(cli: Cli, tmp_path: Path) -> None:
+def test_what_is_out_of_reach_is_counted_and_told_apart() -> None:
     """On the model itself all error is there, though the plant takes all pressures of the model."""
     wanted = wave(500)
     far = wanted["displacement"] + np.where(np.arange(500) > 400, HIGH, 0.0)
@@ -365,10 +279,3 @@ def test_what_is_out_of_reach_is_counted_and_told_apart(cli: Cli, tmp_path: Path
     assert (beyond.low, beyond.high) == (LOW, HIGH)
     assert beyond.rmse_elsewhere < 1e-9 < found.rmse["displacement"]
     assert not track(MODEL.inverse(), Twin(MODEL), wave(100), approach=1.0).beyond
-    MODEL.inverse().save(tmp_path / "inverse.json")
-    MODEL.save(tmp_path / "model.json")
-    write(wanted, tmp_path / "wished.csv")
-    given = ["--reference", tmp_path / "wished.csv", "--approach", 1, "--json"]
-    result = cli("track", tmp_path / "inverse.json", "--plant", tmp_path / "model.json", *given)
-    printed = json.loads(result.out)["out_of_reach"]["displacement"]
-    assert printed["samples"] == beyond.samples

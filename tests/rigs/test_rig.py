@@ -10,7 +10,7 @@ import pytest
 from mckibben import DataError, DataWarning
 from mckibben.recording import Recording
 from mckibben.rigs import Rig, check_rig, load_rig, rig_names
-from mckibben.signals import sine, staircase, triangle
+from mckibben.signals import sine
 
 
 def commands(rig: Rig, duration: float = 3.0) -> Recording:
@@ -25,15 +25,6 @@ def commands(rig: Rig, duration: float = 3.0) -> Recording:
 @pytest.mark.parametrize("name", rig_names())
 def test_every_rig_keeps_the_contract(name: str) -> None:
     check_rig(load_rig(name))
-
-
-@pytest.mark.parametrize("name", rig_names())
-def test_stepping_is_running_with_held_commands(name: str) -> None:
-    rig = load_rig(name)
-    given = commands(rig, 0.5)
-    run = rig.run(given, seed=3, held=True).matrix(rig.outputs)
-    stepped = [rig.reset(seed=3), *(rig.step(row) for row in given.matrix(rig.inputs)[:-1])]
-    assert np.array_equal(run, stepped)
 
 
 def test_runs_do_not_disturb_one_another() -> None:
@@ -109,40 +100,6 @@ def test_wrong_inputs_and_actions_are_refused() -> None:
     assert rig.step({"voltage": 3.0}).shape == (3,)
 
 
-def test_a_contractile_muscle_goes_slack_and_comes_back() -> None:
-    rig = load_rig("mas10-test-stand")
-    time = np.arange(0, 40.0, 0.01)
-    length = 200.0 - triangle(time, 20.0, 40.0)
-    given = Recording({"pressure": np.full(time.size, 2.0), "length": length}, 0.01)
-    run = rig.changed({"start.pressure": 2.0}).run(given, ideal=True)
-    assert run["force"].min() == 0.0
-    assert np.count_nonzero(run["force"] == 0.0) > 1000
-    assert run["force"][2000] > 100
-    assert run["force"][-1] > 0.8 * run["force"][2000]
-
-
-def test_an_arm_bends_towards_the_muscle_that_is_driven() -> None:
-    rig = load_rig("soft-arm")
-    time = np.linspace(0, 9.99, 1000)
-    run = rig.run(Recording({"pressure_1": sine(time, 20.0, 1.5)}, 0.01), ideal=True)
-    ends = [run[f"displacement_{k}"][-1] for k in (1, 2, 3)]
-    assert ends[0] > 30 > 15 > ends[1] > 0
-    pushed = rig.run(Recording({"pressure_1": 0 * time, "pressure_extensor": time / 5}, 0.01))
-    assert pushed["displacement_1"][-1] < -1.0
-
-
-def test_a_muscle_creeps_under_a_held_pressure() -> None:
-    rig = load_rig("mas20-hanging")
-    time = np.arange(0, 80.0, 0.02)
-    given = Recording({"pressure": staircase(time, (1.0, 3.0), 20.0)}, 0.02)
-    run = rig.run(given, ideal=True)
-    early, late = run["displacement"][1100], run["displacement"][-1]  # 2 s and 60 s after the step
-    assert early > 10
-    assert 0.2 < late - early < 5
-    none = rig.changed({"muscle.creep.stiffness": (1e-9, 1e-9)}).run(given, ideal=True)
-    assert none["displacement"][-1] - none["displacement"][1100] < 0.3 * (late - early)
-
-
 def test_warmth_is_an_option_that_softens_and_fades() -> None:
     rig = load_rig("mckibben-530").changed(
         {"muscle.heat.capacity": 2.0, "muscle.heat.cooling": 20.0}
@@ -158,19 +115,3 @@ def test_warmth_is_an_option_that_softens_and_fades() -> None:
     assert np.array_equal(cold["displacement"], run["displacement"])
     drift = np.abs(soft["displacement"] - cold["displacement"])
     assert drift[2800:2900].max() > 5 * drift[:100].max() + 0.01
-
-
-def test_a_loop_widens_with_friction() -> None:
-    rig = load_rig("mas20-hanging")
-    time = np.arange(0, 40.0, 0.02)
-    given = Recording({"pressure": triangle(time, 20.0, 5.0, 1.0)}, 0.02)
-
-    def width(factor: float) -> float:
-        limits = {
-            f"muscle.friction.{way}": [factor * c for c in getattr(rig.muscle.friction, way)]  # type: ignore[attr-defined]
-            for way in ("contracting", "extending")
-        }
-        run = rig.changed(limits).run(given, ideal=True)
-        return float(run["displacement"][1750] - run["displacement"][1250])
-
-    assert 0 < width(0.1) < width(1.0) < width(2.0)

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mckibben import GPI, DataError, Recording
+from mckibben import DataError, Recording
 from mckibben.signals import coarsened, made_manageable, reversals
 
 levels = st.lists(st.integers(0, 20), min_size=3, max_size=12)
@@ -63,26 +63,12 @@ def test_a_test_that_goes_on_from_training_still_does(cut: int) -> None:
     assert b.continues(a)
 
 
-def test_memory_is_that_of_all_samples() -> None:
-    recording = run_through([0, 5, 1, 4, 2, 5, 0], 500)
-    thin = coarsened(recording, 37, "pressure")
-    model = GPI.example()
-    whole = model.simulate(recording["pressure"])
-    taken = np.arange(0, len(recording), 37)
-    turns = reversals(recording["pressure"])[1:-1]
-    taken[turns // 37] = turns
-    taken[-1] = len(recording) - 1  # the lowest
-    np.testing.assert_allclose(model.simulate(thin["pressure"]), whole[taken], atol=1e-12)
-    plain = model.simulate(recording["pressure"][::37])  # control: without the turning points
-    assert np.abs(plain - whole[::37]).max() > 1e-3
-
-
 def test_recordings_are_thinned_alike_and_short_ones_left_out_with_a_word() -> None:
     long, short = run_through([0, 5, 0], 2000), run_through([0, 5, 0], 20).with_meta(name="short")
     train, test, notes = made_manageable([long, short], [long], "pressure", 100)
     assert [len(r) for r in train] == [98]
-    assert "0.41 s" in notes[0]
     assert train[0].sample_time == test[0].sample_time
+    assert len(notes) == 2
     assert "short" in notes[1]
     assert made_manageable([short], [short], "pressure", 100)[2] == ()
     with pytest.raises(DataError):

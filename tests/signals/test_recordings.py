@@ -76,16 +76,6 @@ def test_neighbouring_cuts_join(a: float, b: float, c: float) -> None:
     assert right.time[-1] < last
 
 
-@given(st.floats(0.001, 0.999))
-def test_the_second_part_continues_the_first(fraction: float) -> None:
-    run = wave(1.0, start_time=-3.0)
-    first, second = split_time(run, fraction)
-    assert second.continues(first)
-    joined = np.concatenate([first["pressure"], second["pressure"]])
-    assert np.array_equal(joined, run["pressure"])
-    assert len(first) == pytest.approx(fraction * len(run), abs=1)
-
-
 @given(st.integers(1, 12), st.integers(1, 9))
 def test_blocks_cover_all_and_start_at_minima(n_cycles: int, n_blocks: int) -> None:
     u = triangle(np.arange(100 * n_cycles + 1) / 100, 1.0, 5.0)
@@ -98,24 +88,6 @@ def test_blocks_cover_all_and_start_at_minima(n_cycles: int, n_blocks: int) -> N
     else:
         # A single cycle is cut at its maximum.
         assert len(blocks) == min(n_blocks, 2)
-
-
-@given(
-    st.lists(st.integers(-9, 9).map(float), min_size=1, max_size=300).map(np.array),
-    st.integers(4, 40),
-)
-def test_thinning_keeps_the_extrema_of_every_series(y: Any, points: int) -> None:
-    places = np.arange(y.size, dtype=float)
-    other = np.cos(places)
-    t, one, two = decimate_minmax(places, y, other, max_points=points)
-    assert t.size <= max(points, 4)
-    assert np.all(np.diff(t) > 0)
-    assert np.array_equal(one, y[t.astype(int)])
-    assert np.array_equal(two, other[t.astype(int)])
-    assert (one.min(), one.max()) == (y.min(), y.max())
-    assert (two.min(), two.max()) == (other.min(), other.max())
-    if points >= 6:
-        assert (t[0], t[-1]) == (0, y.size - 1)
 
 
 @pytest.mark.parametrize(

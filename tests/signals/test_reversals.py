@@ -92,21 +92,6 @@ def test_levels_recorded_once_each_have_no_known_noise() -> None:
     assert reversals(levels).size > 100
 
 
-def test_a_quiet_piece_is_judged_by_the_range_given() -> None:
-    quiet = 0.01 * np.random.default_rng(0).standard_normal(500)
-    assert math.isnan(noise_level(quiet))
-    assert noise_level(quiet, span=5.0) == pytest.approx(0.01, rel=0.15)
-
-
-@pytest.mark.parametrize("low", [0.0, 1.0])
-def test_cycles_run_from_minimum_to_minimum(low: float) -> None:
-    u = triangle(TIME, 20.0, (5.0, 3.0, 4.0), low)
-    found = cycles(u)
-    assert [(piece.start, piece.stop) for piece in found] == [
-        (2000 * k, 2000 * (k + 1) + 1) for k in range(5)
-    ]
-
-
 def test_cut_cycles_at_the_ends_do_not_count() -> None:
     u = triangle(TIME, 20.0, 5.0)
     assert [len(cycles(part)) for part in (u[500:], u[:-500], u[50:-50], u[:900], -u)] == [

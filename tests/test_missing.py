@@ -10,7 +10,6 @@ import pytest
 from pydantic.dataclasses import dataclass
 
 import mckibben.missing
-from mckibben import ModelError
 from mckibben.blocks.core.fields import STRICT, Vector
 from mckibben.blocks.memoryless.negative import Negative
 from mckibben.missing import missing
@@ -44,11 +43,3 @@ def test_blocks_of_the_package_lack_nothing(kind: str, monkeypatch: pytest.Monke
     monkeypatch.setattr(mckibben.missing, "LAWS", ())
     monkeypatch.setattr(mckibben.missing, "own_compiler", lambda: None)
     assert not [found for found in missing(kind) if found.state == "missing"]
-
-
-@pytest.mark.parametrize(
-    "name", ["ip", "mckibben.nowhere:PI", "mckibben:NoSuch", "mckibben:load", "mckibben:Block"]
-)
-def test_what_is_no_block_is_refused(name: str) -> None:
-    with pytest.raises(ModelError, match=name):
-        missing(name)

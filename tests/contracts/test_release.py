@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 import shutil
-import sys
 import zipfile
 from pathlib import Path
 
@@ -23,14 +22,6 @@ def test_the_archives_hold_the_package_and_nothing_else(tmp_path: Path) -> None:
         archive.writestr("tests/__init__.py", "")
     with pytest.raises(ReleaseError, match=r"tests/__init__\.py"):
         release.look_through(wheel, source)
-
-
-def test_an_ordinary_build_is_small_too(tmp_path: Path) -> None:
-    release.run(
-        sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", str(tmp_path), within=ROOT
-    )
-    (wheel,) = tmp_path.glob("*.whl")
-    assert wheel.stat().st_size < release.LARGEST
 
 
 def copied(folder: Path) -> Path:

@@ -7,13 +7,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy.polynomial import Polynomial
 
 from mckibben import DataError, muscles
 from mckibben.blocks.core.fields import rows
 from mckibben.muscles import Sheet
 from mckibben.muscles.library import FOLDER, described, load
-from mckibben.muscles.prior import of_muscles, prior_of
+from mckibben.muscles.prior import prior_of
 from mckibben.muscles.traits import PLACES, traits
 from mckibben.rigs import rig_names
 
@@ -49,36 +48,10 @@ def test_traits_do_not_know_size() -> None:
     np.testing.assert_allclose(again.pack(), RAIL.balance.pack(), rtol=1e-12, atol=1e-12)
 
 
-def test_traits_do_not_know_where_displacements_count_from() -> None:
-    zero, old = 4.0, RAIL.balance
-    along = Polynomial([zero / old.scale, 1.0])
-    held = Polynomial([old.springs[0][0], old.springs[0][1] * old.scale, *old.elasticity[0]])(along)
-    moved = replace(
-        old,
-        areas=rows([Polynomial(old.areas[0])(along).coef.tolist()]),
-        springs=rows([[held.coef[0], held.coef[1] / old.scale]]),
-        elasticity=rows([held.coef[2:].tolist()]),
-        hull=rows((np.array(old.hull) - zero).tolist()),
-    )
-    np.testing.assert_allclose(
-        traits(moved, RAIL.sheet, zero), traits(old, RAIL.sheet), rtol=0, atol=1e-9
-    )
-
-
 def test_braid_follows_from_the_largest_force_as_from_the_angle() -> None:
     by_angle = Sheet(diameter_mm=20.0, rest_length_mm=200.0, braid_angle_deg=25.0)
     by_force = Sheet(diameter_mm=20.0, rest_length_mm=200.0, max_force_N=by_angle.force)
     np.testing.assert_allclose(by_force.braid, by_angle.braid, rtol=1e-12)
-
-
-def test_order_of_the_library_is_irrelevant() -> None:
-    one, other = (of_muscles(order, OTHER) for order in (muscles.list(), muscles.list()[::-1]))
-    assert np.array_equal(one.mean, other.mean)
-    assert (one.levels, one.shapes) == (other.levels, other.shapes)
-    sheet = OTHER.model_copy(update={"without": ["rail"]})
-    expected = of_muscles([one for one in muscles.list() if one.name != "rail"], OTHER)
-    np.testing.assert_array_equal(prior_of(sheet).mean, expected.mean)
-    assert prior_of(sheet).levels == prior_of(OTHER, without=["rail"]).levels == expected.levels
 
 
 def test_a_muscle_of_the_library_is_likely_itself_and_others_less_sure() -> None:
@@ -87,17 +60,6 @@ def test_a_muscle_of_the_library_is_likely_itself_and_others_less_sure() -> None
     away = np.abs(known.mean - RAIL.traits)[told], np.abs(far.mean - RAIL.traits)[told]
     assert np.median(away[0]) < 0.3 * np.median(away[1])
     assert all(known.levels[name] <= far.levels[name] for name in ("friction", "relaxation"))
-
-
-def test_weights_make_independent_numbers_of_deviation_one() -> None:
-    prior = prior_of("rail")
-    covariance = np.zeros(2 * (len(prior.mean),))
-    for name, place in PLACES.items():
-        covariance[place, place] = prior.covariance(name)
-    weights = prior.weights()
-    np.testing.assert_allclose(
-        weights @ covariance @ weights.T, np.eye(len(weights)), rtol=0, atol=1e-9
-    )
 
 
 @pytest.mark.parametrize(

@@ -112,18 +112,6 @@ def test_friction_takes_energy_and_never_gives_any(pressure: float) -> None:
     assert all(after <= before for before, after in pairwise(tops))
 
 
-def test_halving_the_step_brings_the_motion_nearer() -> None:
-    """The error against a very small step falls at least in proportion to the step."""
-    ends = {}
-    for step in (2e-3, 1e-3, 5e-4, 1.25e-4):
-        told, _ = run(lift(step=step, damping=20.0), 1.5, wave)
-        ends[step] = told[:: round(2e-3 / step), 0]
-    errors = [float(np.abs(ends[step] - ends[1.25e-4]).max()) for step in (2e-3, 1e-3, 5e-4)]
-    assert errors[1] < 0.6 * errors[0]
-    assert errors[2] < 0.6 * errors[1]
-    assert errors[2] < 0.3
-
-
 def test_a_reset_forgets_everything_and_a_saved_state_carries_the_memory() -> None:
     model = lift(FITTED)
     first, data = run(model, 0.5, wave)
@@ -178,18 +166,6 @@ def test_exported_c_gives_the_same_motion() -> None:
     model.opt.timestep = 0.002
     with pytest.raises(mujoco.FatalError, match="time step"):
         mujoco.mj_step(model, data)
-
-
-@pytest.mark.long
-@needs("cc")
-def test_models_built_again_and_again_leave_room() -> None:
-    """Muscles that are alike share a number, and those in Python take none from those in C."""
-    for k in range(260):
-        lift(QUICK, zero=1e-3 * k)
-    mujoco.set_mjcb_act_bias(None)
-    numbers = {float(lift(QUICK, compiled=True).actuator_biasprm[0, 0]) for _ in range(3)}
-    assert len(numbers) == 1
-    assert max(numbers) < 256
 
 
 def test_force_laws_and_friction_by_length() -> None:

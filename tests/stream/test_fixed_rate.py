@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from mckibben import ModelError
-from mckibben.stream import FixedRate
+from mckibben.registry import load
+from mckibben.stream import FixedRate, run
 
 
 class Clock:
@@ -56,16 +57,26 @@ def test_steps_and_missed_deadlines_add_up_to_the_duration() -> None:
     assert len(numbers) + rate.deadlines.missed == 50
 
 
-def test_a_loop_left_early_keeps_its_statistics() -> None:
-    clock = Clock()
-    rate = FixedRate(0.1, clock=clock, sleep=clock.sleep)
-    for k in rate:
-        if k == 3:
-            break
-    assert rate.deadlines.work.size >= 3
-
-
 @pytest.mark.parametrize(("period", "duration"), [(0.0, 1.0), (-1.0, 1.0), (0.1, 0.0)])
 def test_times_must_be_positive(period: float, duration: float) -> None:
     with pytest.raises(ModelError):
         FixedRate(period, duration)
+
+
+def test_run_reads_steps_and_writes_until_time_is_up() -> None:
+    block, written = load("blocks", "pi").example(), []
+    inputs = iter(np.linspace(0.0, 5.0, 1000))
+    kept = run(
+        block, lambda: [next(inputs)], lambda y: written.append(y[0]), period=0.001, duration=0.05
+    )
+    assert kept.work.size + kept.missed == 50
+    expected = block.simulate(np.linspace(0.0, 5.0, 1000)[: len(written)])
+    np.testing.assert_array_equal(written, expected)
+
+
+def test_ctrl_c_ends_the_loop_and_keeps_its_statistics() -> None:
+    def read() -> list[float]:
+        raise KeyboardInterrupt
+
+    kept = run(load("blocks", "pi").example(), read, lambda y: None, period=0.001)
+    assert kept.work.size == 1

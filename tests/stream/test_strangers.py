@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from mckibben import DataError
-from mckibben.stream import FixedRate, UDPLink
+from mckibben.stream import UDPLink
 from mckibben.stream.link import packed
 
 
@@ -75,19 +75,6 @@ def test_what_is_not_finite_is_neither_taken_nor_sent(value: float, peer: socket
                 link.send(values)  # type: ignore[arg-type]  # that is the attack
 
 
-def test_an_old_packet_sent_again_does_not_command(peer: socket.socket) -> None:
-    with UDPLink(peer.getsockname(), size=1) as link:
-        for sequence in (1, 2, 3):
-            peer.sendto(packed(sequence, [float(sequence)]), link.address)
-        np.testing.assert_array_equal(link.newest(timeout=2.0), [3.0])
-        for sequence in (1, 2, 3):
-            peer.sendto(packed(sequence, [9.0]), link.address)
-        assert link.newest(timeout=0.05) is None
-        peer.sendto(packed(4, [4.0]), link.address)
-        np.testing.assert_array_equal(link.newest(timeout=2.0), [4.0])
-        assert link.restarts == 0
-
-
 @pytest.mark.parametrize(
     "named", [("no such host.invalid", 5005), ("127.0.0.1", 0), ("127.0.0.1", 70000), ("a",), 5]
 )
@@ -102,29 +89,3 @@ def test_settings_that_do_not_fit_are_refused() -> None:
             UDPLink(size=2, limits=limits)
     with UDPLink(size=1) as link, pytest.raises(DataError, match="bind="):
         link.accept(("192.0.2.1", 5005))
-
-
-class SetBack:
-    """A clock that is set back by an hour at a reading, and a sleep that moves it."""
-
-    def __init__(self, when: int) -> None:
-        self.now, self.slept, self.readings, self.when = 1000.0, 0.0, 0, when
-
-    def __call__(self) -> float:
-        self.readings += 1
-        self.now += 1e-6 - 3600.0 * (self.readings == self.when)
-        return self.now
-
-    def sleep(self, seconds: float) -> None:
-        self.now += seconds
-        self.slept += seconds
-
-
-@pytest.mark.parametrize("when", [2, 10, 11, 12, 13])
-def test_a_clock_set_back_costs_a_step_not_an_hour(when: int) -> None:
-    clock = SetBack(when)
-    rate = FixedRate(0.1, 1.0, clock=clock, sleep=clock.sleep)
-    assert list(rate) == list(range(10))
-    assert clock.slept < 1.2
-    assert rate.deadlines.lateness.max() < 0.01
-    assert rate.deadlines.work.min() >= 0.0

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import sys
-import types
 from collections.abc import Callable
 from typing import Any
 
@@ -12,7 +10,6 @@ import pytest
 import mckibben
 from mckibben import Recording, example
 from mckibben.control import track, tune_pid
-from mckibben.system.progress import telling
 
 
 @pytest.fixture(scope="module")
@@ -67,35 +64,3 @@ def test_true_shows_a_bar_and_a_callable_is_told(
     out, error = capfd.readouterr()
     assert what in error
     assert not out
-
-
-def test_a_notebook_has_a_bar_without_other_packages(monkeypatch: pytest.MonkeyPatch) -> None:
-    shown: list[str] = []
-
-    def display(what: str, display_id: bool) -> Any:
-        shown.append(what)
-        return types.SimpleNamespace(update=shown.append)
-
-    shell = types.SimpleNamespace(get_ipython=lambda: types.SimpleNamespace(kernel=None))
-    monkeypatch.setitem(sys.modules, "IPython", shell)
-    page = types.SimpleNamespace(HTML=str, display=display)
-    monkeypatch.setitem(sys.modules, "IPython.display", page)
-    with telling(True, "work") as tell:
-        assert tell is not None
-        tell(0.5, "<b>half</b>")
-    assert 'value="0.0000"' in shown[0]
-    assert 'value="0.5000"' in shown[1]
-    assert "&lt;b&gt;half" in shown[1]
-
-
-def test_commands_in_a_notebook_say_it_in_lines(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    from mckibben.cli.output import progress_bar
-
-    monkeypatch.setenv("JPY_PARENT_PID", "1")
-    monkeypatch.setattr(sys.stderr, "isatty", lambda: True, raising=False)
-    with progress_bar("work", plainly=True) as tell:
-        tell(0.5, "half")
-        tell(0.5, "half")
-    assert capsys.readouterr().err == "half\n"

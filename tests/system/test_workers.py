@@ -6,19 +6,13 @@ import multiprocessing
 import os
 import pickle
 import signal
-import subprocess
-import sys
 import time
-from pathlib import Path
 from typing import Any
 
 import pytest
 
 from mckibben.errors import DataError
-from mckibben.system.workers import WorkerError, Workers, all_of, in_turn, prepare
-
-ROOT = Path(__file__).parents[2]
-HERE = os.environ | {"PYTHONPATH": f"{ROOT}:{ROOT / 'src'}"}
+from mckibben.system.workers import WorkerError, Workers, all_of, in_turn
 
 
 def square(common: int, item: int, tell: Any) -> int:
@@ -87,75 +81,6 @@ def test_leaving_ends_them_at_once() -> None:
     assert set(multiprocessing.active_children()) <= before
 
 
-@pytest.mark.long
-def test_a_script_without_a_guard_is_not_run_again(tmp_path: Path) -> None:
-    script = tmp_path / "script.py"
-    script.write_text(
-        "print('run')\n"
-        "from mckibben.system.workers import all_of\n"
-        "from tests.system.test_workers import square_of\n"
-        "print(all_of(square_of, [1, 2, 3], 2))\n"
-    )
-    done = subprocess.run(
-        [sys.executable, script], capture_output=True, text=True, check=True, env=HERE
-    )
-    assert done.stdout.split("\n") == ["run", "[1, 4, 9]", ""]
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("method", ["fork", "spawn"])
-def test_a_daemon_does_the_work_itself(method: Any) -> None:
-    prepare()  # a forked process must not take this one's server for its own
-    context = multiprocessing.get_context(method)
-    ours, theirs = context.Pipe()
-    for daemon in (True, False):
-        process = context.Process(target=in_a_child, args=(theirs,), daemon=daemon)
-        process.start()
-        assert ours.poll(60)
-        assert ours.recv() == [0, 1, 4]
-        process.join()
-    ours.close()
-    theirs.close()
-
-
-def in_a_child(link: Any) -> None:
-    link.send(all_of(square_of, [0, 1, 2], 2))
-
-
 def test_numbers_of_processes_are_checked() -> None:
     with pytest.raises(DataError, match="jobs"):
         all_of(square_of, [1], 0)
-
-
-@pytest.mark.long
-def test_they_end_with_the_process_they_work_for() -> None:
-    program = (
-        "from mckibben.system.workers import Workers\n"
-        "from tests.system.test_workers import square\n"
-        "import multiprocessing\n"
-        "with Workers(1, 0) as workers:\n"
-        "    def told(*what):\n"
-        "        if len(what) > 1:\n"
-        "            print(multiprocessing.active_children()[0].pid, flush=True)\n"
-        "    list(workers.results(square, [200], told))\n"
-    )
-    started = subprocess.Popen(
-        [sys.executable, "-c", program], stdout=subprocess.PIPE, text=True, env=HERE
-    )
-    assert started.stdout is not None
-    worker = int(started.stdout.readline())
-    started.kill()
-    started.wait()
-    started.stdout.close()
-    for _ in range(100):
-        if not alive(worker):
-            break
-        time.sleep(0.05)
-    assert not alive(worker)
-
-
-def alive(pid: int) -> bool:
-    try:
-        return "Z" not in Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0]
-    except OSError:
-        return False

@@ -14,9 +14,8 @@ import pytest
 from sklearn.base import clone
 from sklearn.model_selection import cross_val_score
 
-from mckibben import PI, ModelError, Recording, check_block, registry, write
+from mckibben import PI, ModelError, Recording, check_block, registry
 from mckibben import load as load_model
-from mckibben.cli.main import app
 from mckibben.errors import DataError
 from mckibben.export import export_c
 from mckibben.export.c.building import CompiledModel
@@ -87,17 +86,6 @@ def test_the_estimator_finds_the_block(
     falling = -3.0 * np.sin(U) + 0.3 * np.random.default_rng(0).standard_normal(U.size)
     noise = Recording({"pressure": U, "displacement": falling}, 0.01)
     estimator(method=method).fit(noise).model_.inverse()  # there is one whatever the data
-
-
-def test_the_estimator_is_fitted_by_name(my_block: ModuleType, tmp_path: Path) -> None:
-    truth = my_block.ElasticPlastic.example()
-    recording = Recording({"pressure": U, "displacement": truth.simulate(U)}, 0.01)
-    write(recording, tmp_path / "loop.csv")
-    command = re.search(r"`mckibben (fit \S+) FILE`", README)
-    assert command
-    files = [str(tmp_path / "loop.csv"), "-o", str(tmp_path / "model.json")]
-    app([*command[1].split(), *files], standalone_mode=False)
-    assert type(load_model(tmp_path / "model.json")) is my_block.ElasticPlastic
 
 
 @needs("cc")

@@ -60,6 +60,7 @@ def test_words_make_the_signal_that_numbers_make(name: str) -> None:
 @pytest.mark.parametrize("name", names("signals"))
 def test_numbers_seeds_and_times_that_are_none_are_refused(name: str) -> None:
     settings = settings_of(name)
+    wrong: dict[str, tuple[str, ...]]
     wrong = {key: ("nan", "inf", "-inf") for key, (kind, _) in settings.items() if kind == "number"}
     if "seed" in settings and name != "multisine":
         wrong["seed"] = ("-1",)
@@ -102,6 +103,6 @@ def test_settings_are_listed_and_checked() -> None:
         ("ramps", "instants|points", {"instants": (0.0,), "values": (1.0, 2.0)}),
     ):
         with pytest.raises(DataError, match=about):
-            build(name, TIME, **settings)  # type: ignore[arg-type]
+            build(name, TIME, **settings)
     with pytest.raises(DataError):  # before it begins
         build("triangle", TIME - 1.0, **SETTINGS["triangle"])

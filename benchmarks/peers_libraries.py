@@ -6,6 +6,7 @@ None is in this project's environment: they are imported when they are used, and
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib import import_module
@@ -33,18 +34,16 @@ MOST_KNOWN = 200
 """Known outputs, the last ones, that the state of a linear model is found from."""
 
 MOST_TERMS = 30
+"""Terms that FROLS may select where its settings are searched for."""
+
+UNITS, RATE, CHUNK, EPOCHS, PATIENCE, SECONDS = 32, 5e-3, 100, 400, 60, 25.0
+"""Of the network: units, Adam's rate, samples after which gradients are cut, most epochs, epochs without
+a lower error on the trials after which training stops, and most seconds."""
 
 
 @dataclass(frozen=True)
 class Trial:
-    """A recording to run free on.
-
-    Parameters
-    ----------
-    inputs, outputs : array, shape (n, k), (n, m)
-    known : int
-        Outputs from its beginning that a model may be told.
-    """
+    """A recording to run free on, whose first `known` outputs a model is given."""
 
     inputs: Array
     outputs: Array
@@ -53,44 +52,26 @@ class Trial:
     def run(self, simulate: Simulate) -> Array:
         """Return the outputs (n, m) of a model, those known as they were measured."""
         known = self.outputs[: self.known]
-        found = np.asarray(simulate(self.inputs, known), dtype=float)
-        return np.vstack([known, found[self.known :]])
-
-
-Fit = Callable[[Sequence[Run], Settings, Sequence[Trial]], Simulate]
-"""From training runs, settings, and trials to stop a training early by, which most have no use for."""
+        return np.vstack([known, np.asarray(simulate(self.inputs, known))[self.known :]])
 
 
 @dataclass(frozen=True)
 class Peer:
-    """A way to identify a model.
+    """A way to identify a model, and the settings to search among, cheapest first.
 
-    Parameters
-    ----------
-    name, package : str
-    fit : callable
-    grid : tuple of mapping
-        Settings to search among, cheapest first.
-    default : mapping or None
-        Settings that the package's own defaults fill up; None where it has none.
-    note : str
-        What was done to give it what it takes.
-    one_input : bool
-        Whether it takes no more.
+    From training runs, settings (none: the library's defaults), and trials to stop a training early by,
+    `fit` makes a model.
     """
 
     name: str
     package: str
-    fit: Fit
-    grid: tuple[Settings, ...]
-    default: Settings | None
-    note: str
-    one_input: bool = False
+    fit: Callable[[Sequence[Run], Settings, Sequence[Trial]], Simulate]
+    grid: Sequence[Settings]
 
 
-def grid(**choices: Sequence[Any]) -> tuple[Settings, ...]:
+def grid(**choices: Sequence[Any]) -> list[Settings]:
     """Return all combinations of settings, the last varying fastest."""
-    return tuple(dict(zip(choices, values, strict=True)) for values in product(*choices.values()))
+    return [dict(zip(choices, values, strict=True)) for values in product(*choices.values())]
 
 
 def joined(runs: Sequence[Run]) -> Run:
@@ -99,89 +80,41 @@ def joined(runs: Sequence[Run]) -> Run:
 
 
 def ahead(u: Array, how: Settings) -> Array:
-    """Return inputs a sample early, if settings say so: a model with delay then sees the present."""
+    """Return inputs a sample early, if settings ask: a model with delay then sees the present."""
     return np.vstack([u[1:], u[-1:]]) if how.get("present") else u
 
 
-def each_output(fit: Fit) -> Fit:
-    """Return a fit of one model for each output, by one that has one output only."""
-
-    def fitted(runs: Sequence[Run], how: Settings, trials: Sequence[Trial]) -> Simulate:
-        models = [
-            fit([(u, y[:, [place]]) for u, y in runs], how, trials)
-            for place in range(runs[0][1].shape[1])
-        ]
-
-        def simulate(u: Array, known: Array) -> Array:
-            return np.hstack([one(u, known[:, [k]]) for k, one in enumerate(models)])
-
-        return simulate
-
-    return fitted
-
-
-def _recursive(model: Any, lag: int, how: Settings) -> Simulate:
-    """Return what simulates a model of sysidentpy, told no more outputs than its lags."""
-
-    def simulate(u: Array, known: Array) -> Array:
-        first = len(known) - lag
-        found = model.predict(X=ahead(u, how)[first:], y=known[first:])
-        return np.vstack([known[:first], np.reshape(found, (-1, 1))])
-
-    return simulate
-
-
-def _lags(n: int, inputs: int) -> Any:
-    """Return lags of inputs as sysidentpy takes them: a number, or of several a list for each."""
-    return n if inputs == 1 else [list(range(1, n + 1)) for _ in range(inputs)]
-
-
-def polynomial(runs: Sequence[Run], how: Settings, trials: Sequence[Trial]) -> Simulate:
-    """Fit sysidentpy's polynomial NARX, its terms selected by FROLS."""
+def frols(runs: Sequence[Run], how: Settings, trials: Sequence[Trial]) -> Simulate:
+    """Fit sysidentpy's polynomial NARX, its terms selected by FROLS, a model for each output."""
     del trials
     structure = import_module("sysidentpy.model_structure_selection")
     basis = import_module("sysidentpy.basis_function")
     estimators = import_module("sysidentpy.parameter_estimation")
     u, y = joined(runs)
-    lag, degree = int(how.get("lags", 2)), int(how.get("degree", 2))
-    candidates = math.comb(lag * (1 + u.shape[1]) + degree, degree)
-    chosen = {"estimator": estimators.LeastSquares()} if how else {}
-    model = structure.FROLS(
-        ylag=lag,
-        xlag=_lags(lag, u.shape[1]),
-        basis_function=basis.Polynomial(degree=degree),
-        n_info_values=min(MOST_TERMS if how else 15, candidates),
-        **chosen,
-    )
-    model.fit(X=ahead(u, how), y=y)
-    return _recursive(model, lag, how)
+    inputs, lag, degree = u.shape[1], int(how.get("lags", 2)), int(how.get("degree", 2))
+    candidates = math.comb(lag * (1 + inputs) + degree, degree)
+    models = []
+    for output in y.T:
+        model = structure.FROLS(
+            ylag=lag,
+            xlag=lag if inputs == 1 else [list(range(1, lag + 1)) for _ in range(inputs)],
+            basis_function=basis.Polynomial(degree=degree),
+            n_info_values=min(MOST_TERMS if how else 15, candidates),
+            **({"estimator": estimators.LeastSquares()} if how else {}),
+        )
+        model.fit(X=ahead(u, how), y=output[:, np.newaxis].copy())
+        models.append(model)
 
+    def simulate(u: Array, known: Array) -> Array:
+        first = len(known) - lag
+        given = ahead(u, how)[first:]
+        found = [
+            np.reshape(model.predict(X=given, y=known[first:, [place]]), (-1, 1))
+            for place, model in enumerate(models)
+        ]
+        return np.vstack([known[:first], np.hstack(found)])
 
-def network(runs: Sequence[Run], how: Settings, trials: Sequence[Trial]) -> Simulate:
-    """Fit sysidentpy's NARX network as its documentation does: two hidden layers, one step ahead."""
-    del trials
-    torch = import_module("torch")
-    neural = import_module("sysidentpy.neural_network")
-    basis = import_module("sysidentpy.basis_function")
-    u, y = joined(runs)
-    lag, units = int(how.get("lags", 2)), int(how.get("units", 10))
-    torch.set_num_threads(1)  # so small a network is slower on several
-    torch.manual_seed(0)
-    nn = torch.nn
-    layers = (
-        *(nn.Linear(2 * lag, units), nn.Tanh()),
-        *(nn.Linear(units, units), nn.Tanh(), nn.Linear(units, 1)),
-    )
-    model = neural.NARXNN(
-        net=nn.Sequential(*layers),
-        ylag=lag,
-        xlag=lag,
-        basis_function=basis.Polynomial(degree=1),
-        optim_params={"betas": (0.9, 0.999), "eps": 1e-5},
-        random_state=0,
-    )
-    model.fit(X=ahead(u, how), y=y)
-    return _recursive(model, lag, how)
+    return simulate
 
 
 def _sippy(runs: Sequence[Run], how: Settings, method: str, **orders: Any) -> Any:
@@ -216,43 +149,8 @@ def arx(runs: Sequence[Run], how: Settings, trials: Sequence[Trial]) -> Simulate
     return _transfer(_sippy(runs, how, "ARX", **orders), how)
 
 
-def armax(runs: Sequence[Run], how: Settings, trials: Sequence[Trial]) -> Simulate:
-    """Fit SIPPY's ARMAX."""
-    del trials
-    orders = {"ARMAX_orders": [how["poles"], how["zeros"], how["noise"], 0]} if how else {}
-    return _transfer(_sippy(runs, how, "ARMAX", **orders), how)
-
-
-def started(a: Array, c: Array, forced: Callable[[Array], Array], u: Array, known: Array) -> Array:
-    """Return the state (n,) before known outputs that explains them best by least squares.
-
-    Parameters
-    ----------
-    forced : callable
-        From inputs to the outputs of the model that starts from rest.
-    """
-    rows = [c]
-    for _ in range(len(known) - 1):
-        rows.append(rows[-1] @ a)
-    missing = (known - forced(u)).ravel()
-    return np.asarray(np.linalg.lstsq(np.vstack(rows), missing, rcond=None)[0])
-
-
-def _state_space(a: Array, c: Array, response: Callable[[Array, Array], Array]) -> Simulate:
-    """Return what simulates a state space from where it explains the last known outputs."""
-
-    def simulate(u: Array, known: Array) -> Array:
-        first = max(0, len(known) - MOST_KNOWN)
-        rest = np.zeros(len(a))
-        told = u[first : len(known)]
-        start = started(a, c, lambda given: response(given, rest), told, known[first:])
-        return np.vstack([known[:first], response(u[first:], start)])
-
-    return simulate
-
-
 def n4sid(runs: Sequence[Run], how: Settings, trials: Sequence[Trial]) -> Simulate:
-    """Fit SIPPY's N4SID."""
+    """Fit SIPPY's N4SID; its state is that which explains the last known outputs best."""
     del trials
     model = _sippy(runs, {}, "N4SID", **how)
     process = import_module("sippy_unipi.functionsetSIM").SS_lsim_process_form
@@ -261,111 +159,93 @@ def n4sid(runs: Sequence[Run], how: Settings, trials: Sequence[Trial]) -> Simula
     def response(u: Array, start: Array) -> Array:
         return np.asarray(process(a, b, c, d, u.T, start[:, np.newaxis])[1]).T
 
-    return _state_space(a, c, response)
+    def simulate(u: Array, known: Array) -> Array:
+        first = max(0, len(known) - MOST_KNOWN)
+        rows = [c]
+        for _ in range(len(known) - first - 1):
+            rows.append(rows[-1] @ a)
+        missing = known[first:] - response(u[first : len(known)], np.zeros(len(a)))
+        start = np.linalg.lstsq(np.vstack(rows), missing.ravel(), rcond=None)[0]
+        return np.vstack([known[:first], response(u[first:], start)])
+
+    return simulate
 
 
-def moesp(runs: Sequence[Run], how: Settings, trials: Sequence[Trial]) -> Simulate:
-    """Fit nfoursid's state space."""
-    del trials
-    u, y = joined(runs)
-    frame = import_module("pandas").DataFrame(np.hstack([u, y]))
-    inputs = list(range(u.shape[1]))
-    outputs = list(range(u.shape[1], u.shape[1] + y.shape[1]))
-    blocks = {"num_block_rows": how["blocks"]} if how else {}
-    library = import_module("nfoursid.nfoursid")
-    identification = library.NFourSID(frame, output_columns=outputs, input_columns=inputs, **blocks)
-    identification.subspace_identification()
-    found = identification.system_identification(rank=how.get("order"))[0]
-    space = import_module("nfoursid.state_space").StateSpace
+def gru(runs: Sequence[Run], how: Settings, trials: Sequence[Trial]) -> Simulate:
+    """Train torch's GRU on runs at once; return it with the weights that do best on the trials.
 
-    def response(u: Array, start: Array) -> Array:
-        model = space(found.a, found.b, found.c, found.d, x_init=start[:, np.newaxis])
-        return np.hstack([model.step(now[:, np.newaxis]) for now in u]).T
-
-    return _state_space(found.a, found.c, response)
-
-
-def realization(runs: Sequence[Run], how: Settings, trials: Sequence[Trial]) -> Simulate:
-    """Fit python-control's eigensystem realization, of Markov parameters by least squares."""
-    del trials
-    control = import_module("control")
-    u, y = joined(runs)
-    markov = np.reshape(
-        control.markov(y.T, u.T, how["markov"]), (y.shape[1], u.shape[1], how["markov"])
+    It is trained free-running, by truncated back-propagation through time.
+    """
+    torch = import_module("torch")
+    torch.set_num_threads(1)  # so small a network is slower on several
+    torch.manual_seed(how["seed"])
+    inputs, outputs = runs[0][0].shape[1], runs[0][1].shape[1]
+    nn = torch.nn
+    parts = nn.ModuleDict(
+        {
+            "start": nn.Linear(inputs + outputs, UNITS),
+            "memory": nn.GRU(inputs, UNITS, batch_first=True),
+            "output": nn.Linear(UNITS, outputs),
+        }
     )
-    half = (how["markov"] - 1) // 2
-    model, _ = control.eigensys_realization(markov, how["order"], m=half, n=half)
+    optimiser = torch.optim.Adam(parts.parameters(), lr=RATE)
 
-    def response(u: Array, start: Array) -> Array:
-        found = control.forced_response(model, inputs=u.T, initial_state=start, squeeze=False)
-        return np.asarray(found.outputs).T
+    def tensor(values: Array) -> Any:
+        return torch.as_tensor(np.ascontiguousarray(values), dtype=torch.float32)
 
-    return _state_space(np.asarray(model.A), np.asarray(model.C), response)
+    def simulate(u: Array, known: Array) -> Array:
+        with torch.no_grad():
+            begun = torch.tanh(parts["start"](tensor(np.concatenate([u[0], known[0]]))))
+            states, _ = parts["memory"](tensor(u)[None], begun[None, None])
+            return np.asarray(parts["output"](states)[0].numpy(), dtype=float)
+
+    def batch(columns: Sequence[Array]) -> Any:
+        padded = [np.pad(one, ((0, longest - len(one)), (0, 0))) for one in columns]
+        return torch.stack([tensor(one) for one in padded])
+
+    longest = max(len(u) for u, _ in runs)
+    given, wanted = batch([u for u, _ in runs]), batch([y for _, y in runs])
+    counted = batch([np.ones((len(u), 1)) for u, _ in runs])
+    best, best_error, best_epoch = parts.state_dict(), math.inf, 0
+    ends = time.perf_counter() + SECONDS
+    for epoch in range(EPOCHS):
+        state = torch.tanh(parts["start"](torch.cat([given[:, 0], wanted[:, 0]], dim=1)))[None]
+        for first in range(0, longest, CHUNK):
+            piece = slice(first, first + CHUNK)
+            states, state = parts["memory"](given[:, piece], state)
+            missed = (parts["output"](states) - wanted[:, piece]) * counted[:, piece]
+            loss = missed.square().sum() / counted[:, piece].sum().clamp(min=1.0)
+            optimiser.zero_grad()
+            loss.backward()
+            nn.utils.clip_grad_norm_(parts.parameters(), 1.0)
+            optimiser.step()
+            state = state.detach()
+        missing = [(one.run(simulate) - one.outputs)[one.known :] for one in trials]
+        error = sum(float(np.sum(one**2)) for one in missing)
+        if error < best_error:
+            best = {name: value.clone() for name, value in parts.state_dict().items()}
+            best_error, best_epoch = error, epoch
+        if epoch - best_epoch > PATIENCE or time.perf_counter() > ends:
+            break
+    parts.load_state_dict(best)
+    return simulate
 
 
-JOINED = "several recordings are joined end to end, for it takes one"
-PRESENT = "`present`: inputs a sample early, for else it never sees the present one"
-BY_OUTPUT = "of several outputs, a model for each, for it has one only"
+GRU = Peer(f"GRU, {UNITS} units", "torch", gru, grid(seed=[0, 1, 2]))
 
-LINEAR = (
+PEERS = (
+    Peer("ARX", "SIPPY", arx, grid(present=[False, True], poles=[1, 2, 3, 5], zeros=[1, 2, 4])),
     Peer(
-        name="ARX",
-        package="SIPPY",
-        fit=arx,
-        grid=grid(present=[False, True], poles=[1, 2, 3, 5], zeros=[1, 2, 4]),
-        default={},
-        note=f"{JOINED}; {PRESENT}; run by SciPy's `lfilter`, for it has one-step prediction only",
+        "N4SID",
+        "SIPPY",
+        n4sid,
+        grid(SS_f=[10, 20], SS_D_required=[False, True], SS_fixed_order=[1, 2, 3, 4, 6, 8]),
     ),
     Peer(
-        name="ARMAX",
-        package="SIPPY",
-        fit=armax,
-        grid=grid(noise=[1, 2], present=[False, True], poles=[1, 2, 3], zeros=[1, 2]),
-        default={},
-        note=f"{JOINED}; {PRESENT}; run by SciPy's `lfilter`, for it has one-step prediction only",
+        "FROLS, polynomial NARX",
+        "sysidentpy",
+        frols,
+        grid(lags=[1, 2, 3, 5], degree=[1, 2, 3], present=[True, False]),
     ),
-    Peer(
-        name="N4SID",
-        package="SIPPY",
-        fit=n4sid,
-        grid=grid(SS_f=[10, 20], SS_D_required=[False, True], SS_fixed_order=[1, 2, 3, 4, 6, 8]),
-        default={},
-        note=JOINED,
-    ),
-    Peer(
-        name="N4SID",
-        package="nfoursid",
-        fit=moesp,
-        grid=grid(blocks=[5, 10, 15], order=[1, 2, 3, 4, 5]),
-        default={},
-        note=JOINED,
-    ),
-    Peer(
-        name="Markov parameters and ERA",
-        package="python-control",
-        fit=realization,
-        grid=grid(markov=[11, 21, 31], order=[1, 2, 3, 4, 5]),
-        default=None,
-        note=f"{JOINED}; its order has no default",
-    ),
-)
-
-NARX = (
-    Peer(
-        name="FROLS, polynomial NARX",
-        package="sysidentpy",
-        fit=each_output(polynomial),
-        grid=grid(lags=[1, 2, 3, 5], degree=[1, 2, 3], present=[True, False]),
-        default={},
-        note=f"{JOINED}; {PRESENT}; {BY_OUTPUT}; searched by least squares, up to {MOST_TERMS} terms",
-    ),
-    Peer(
-        name="NARXNN, network",
-        package="sysidentpy",
-        fit=network,
-        grid=grid(units=[10], present=[True, False], lags=[1, 2, 4]),
-        default={},
-        note=f"{JOINED}; {PRESENT}; two layers of 10 tanh, as in its documentation",
-        one_input=True,  # its lags of inputs are integers, those of several would be lists
-    ),
+    GRU,
 )

@@ -18,7 +18,7 @@ ROOT = HERE.parent.parent
 
 
 def main() -> None:
-    """Run one after another; what is finished of the first and the last is kept when stopped."""
+    """Run one after another; what is finished of the first is kept when stopped."""
     folder, *peers = sys.argv[1:]
     command = Path(sys.executable).with_name("mckibben")
     subprocess.run([command, "measured", folder, "-o", HERE], check=True)

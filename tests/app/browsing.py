@@ -30,24 +30,10 @@ OPTIONS = [
     "--disable-sync",
 ]
 
-TABS = ("data", "look", "models", "compensate", "take")
-
 
 @contextmanager
 def workbench(folder: Path) -> Iterator[str]:
     """Start the workbench over a folder on a free port, and give its address."""
-    with starting(folder) as process:
-        assert process.stdout is not None
-        line = process.stdout.readline()
-        assert "Workbench over" in line, line
-        address = next(word for word in line.split() if word.startswith("http"))
-        answering(address)
-        yield address
-
-
-@contextmanager
-def starting(folder: Path) -> Iterator[subprocess.Popen[str]]:
-    """Start the workbench over a folder on a free port, and do not wait for it."""
     command = [sys.executable, "-m", "mckibben.cli.main", "app", str(folder)]
     plain = {name: value for name, value in os.environ.items() if "PYTEST" not in name}
     process = subprocess.Popen(
@@ -55,7 +41,10 @@ def starting(folder: Path) -> Iterator[subprocess.Popen[str]]:
     )
     assert process.stdout is not None
     try:
-        yield process
+        line = process.stdout.readline()
+        address = next(word for word in line.split() if word.startswith("http"))
+        answering(address)
+        yield address
     finally:
         process.terminate()
         process.wait(20)
@@ -75,9 +64,9 @@ def answering(address: str) -> None:
 
 
 @contextmanager
-def visited(browser: Any, address: str, **options: Any) -> Iterator[Any]:
-    """Open the workbench in a window of its own, and demand that nobody else is asked nor errs."""
-    window = browser.new_context(**{"viewport": {"width": 1280, "height": 900}} | options)
+def visited(browser: Any, address: str) -> Iterator[Any]:
+    """Open the workbench in a window of its own; demand that nobody else is asked, without errors."""
+    window = browser.new_context(viewport={"width": 1280, "height": 900})
     page = window.new_page()
     foreign: list[str] = []
     errors: list[str] = []
@@ -104,29 +93,11 @@ def visited(browser: Any, address: str, **options: Any) -> Iterator[Any]:
     assert met == [], met
 
 
-def seen(page: Any, name: str, timeout: float = SLOW) -> Any:
+def seen(page: Any, name: str) -> Any:
     """Wait until an element is there, and give it."""
     place = page.get_by_test_id(name).first
-    place.wait_for(timeout=timeout)
+    place.wait_for(timeout=SLOW)
     return place
-
-
-def idle(page: Any) -> None:
-    """Wait until the header says that nothing runs."""
-    quiet = "document.querySelector('[data-testid=busy]').innerText === ''"
-    page.wait_for_function(quiet, timeout=SLOW)
-
-
-def opened(page: Any, tab: str) -> None:
-    """Open a tab, and wait until what is on it is there."""
-    seen(page, f"tab-{tab}").click()
-    page.wait_for_function(
-        "name => document.querySelector(`[data-testid=tab-${name}]`)"
-        ".getAttribute('aria-selected') === 'true'",
-        arg=tab,
-    )
-    page.wait_for_timeout(150)
-    idle(page)
 
 
 def downloaded(page: Any, name: str) -> bytes:
@@ -136,15 +107,11 @@ def downloaded(page: Any, name: str) -> bytes:
     return Path(download.value.path()).read_bytes()
 
 
-def upload(page: Any, **files: bytes) -> None:
-    """Drop files, by their names without an ending."""
+def upload(page: Any, name: str, content: bytes) -> None:
+    """Drop a file, by its name without an ending."""
     seen(page, "upload")
-    page.locator("input[type=file]").first.set_input_files(
-        [
-            {"name": f"{name}.csv", "mimeType": "text/csv", "buffer": content}
-            for name, content in files.items()
-        ]
-    )
+    file = {"name": f"{name}.csv", "mimeType": "text/csv", "buffer": content}
+    page.locator("input[type=file]").first.set_input_files([file])
 
 
 def holds(page: Any, true: Callable[[], Any]) -> None:

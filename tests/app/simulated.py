@@ -4,15 +4,12 @@ from __future__ import annotations
 
 import asyncio
 import os
-import threading
-from collections.abc import Awaitable, Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Awaitable, Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pytest
 from nicegui import Client, ui
 from nicegui.testing import User, user_simulation
 
@@ -167,28 +164,3 @@ async def drawn(user: User) -> None:
     user.find(marker="wave").click()
     user.find(marker="show-pressures").click()
     await until(user, "pressure-plot")
-
-
-class Held:
-    """A function that waits where it is called in a thread, until it is let go."""
-
-    def __init__(self, function: Callable[..., Any]) -> None:
-        self.function = function
-        self.begun, self.go = threading.Event(), threading.Event()
-
-    def __call__(self, *given: Any, **named: Any) -> Any:
-        self.begun.set()
-        assert self.go.wait(30.0)
-        return self.function(*given, **named)
-
-
-@contextmanager
-def held(monkeypatch: pytest.MonkeyPatch, module: Any, name: str) -> Iterator[Held]:
-    """Have a function of a module wait."""
-    one = Held(getattr(module, name))
-    with monkeypatch.context() as patch:
-        patch.setattr(module, name, one)
-        try:
-            yield one
-        finally:
-            one.go.set()

@@ -134,14 +134,3 @@ def test_calls_of_loops_run(
         assert call(*shlex.split(command.removeprefix("# in a shell: mckibben "))).code == 0
     for each in calls:
         exec(each, {"mckibben": mckibben})
-
-
-@pytest.mark.parametrize(("kind", "sides"), [("time", ("pressure", "displacement")), ("loops", ())])
-def test_the_command_of_a_figure_runs(
-    kind: str, sides: tuple[str, ...], workspace: Workspace, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    PI.example().save(workspace.path("models", "pi.json"))
-    command = scripts.plot_call(workspace, "train", "pi", kind, sides, "figure.svg")
-    monkeypatch.chdir(workspace.folder)
-    assert call(*shlex.split(command)[1:]).code == 0
-    assert (workspace.folder / "figure.svg").is_file()

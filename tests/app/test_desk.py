@@ -3,27 +3,19 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from mckibben import Recording
-from mckibben.app import adding, plots
 from mckibben.app.desk import Desk
 from mckibben.app.jobs import Jobs
-from mckibben.app.kept import Reading, Step
-from mckibben.app.loads import Load, load_in, loads_in
+from mckibben.app.kept import Step
+from mckibben.app.loads import load_in
 from mckibben.app.offering import offered, sides
-from mckibben.app.pages import apart, data, judging
-from mckibben.app.pages.cutting import first_shown
-from mckibben.app.pages.loads import untold
-from mckibben.app.theme import DARK, LIGHT, WRITTEN, contrast
-from mckibben.app.together import differing, obstacle, sample_times
+from mckibben.app.pages import apart
+from mckibben.app.together import obstacle, sample_times
 from mckibben.app.workspace import Workspace
-from mckibben.report import subjects
 from tests.app.simulated import desk_of, filled, swung, workspace_of
 from tests.report.studies_by_hand import hung, two_muscles
 
@@ -102,15 +94,6 @@ def test_where_a_force_drives_what_is_made_for_it_is_offered_first(tmp_path: Pat
     assert "bouc-wen-oscillator" in offered(desk).start
 
 
-def test_counts_are_not_drawn_unasked(tmp_path: Path) -> None:
-    run = swung(10.0)
-    counted = {"level": np.arange(600, dtype=np.float64), "force": run["pressure"], **run.channels}
-    recording = Recording(counted, 0.1, units={"level": "", "force": "N"})
-    desk = Desk(Workspace(tmp_path), Jobs(Workspace(tmp_path)))
-    assert first_shown(desk, recording) == ["pressure", "displacement", "force"]
-    assert first_shown(desk, recording.select(["level", "force"])) == ["level", "force"]
-
-
 # -- results -------------------------------------------------------------------------------------
 
 
@@ -133,36 +116,6 @@ def test_results_are_of_the_channels_chosen_and_stale_ones_are_not_kept_chosen(
     assert desk.model_to_show("own", ["new", "own"]) == "own"  # of which nothing is known
     assert desk.model_to_show("gone", ["new", "old"]) == "new"
     assert desk.model_to_show("old", ["older", "old"]) == "old"
-
-
-def test_a_model_that_fails_on_the_test_alone_is_named() -> None:
-    def result(name: str, validated: float | None, tested: float) -> dict[str, Any]:
-        return {
-            "name": name,
-            "current": True,
-            "chosen_by": "cross-validation",
-            "shared": [],
-            "split": "last 80 samples of run to test, all before to fit",
-            "test": {"rmse": tested},
-            "validation_rmse": validated,
-            "validation_failed": "" if validated else "too few cycles",
-            "constant": {"test": {"rmse": 38.0}, "validation_rmse": 38.0},
-            "skill_least": 0.9,
-            "not_recommended": None,
-        }
-
-    good, unlike, poor = (
-        result("good", 1.0, 2.0),
-        result("unlike", 1.2, 36.0),
-        result("poor", 35.0, 36.0),
-    )
-    alone = judging.judged([good])
-    told = [text for text in judging.judged([good, unlike, poor]) if text not in alone]
-    assert [text.partition(":")[0] for text in told] == ["unlike"]
-    unvalidated = [result("unlike", None, 36.0)]
-    assert not [text for text in judging.judged(unvalidated) if text.startswith("unlike:")]
-    assert "too few cycles" in judging.unvalidated(unvalidated)
-    assert judging.unvalidated([good]) == ""
 
 
 # -- recordings that do not go together ----------------------------------------------------------
@@ -204,38 +157,7 @@ def test_what_keeps_models_from_being_fitted_is_named(tmp_path: Path) -> None:
     assert models_of(desk)
 
 
-def test_counts_keep_nobody_from_fitting_and_lacking_times_do(tmp_path: Path) -> None:
-    run = swung(10.0)
-    more: dict[str, tuple[dict[str, str], float | None]] = {
-        "level": ({"level": ""}, 0.1),
-        "cycle": ({"cycle": ""}, 0.1),
-        "pull": ({"force": "N"}, 0.1),
-        "late": ({}, None),
-    }
-    runs = {
-        name: Recording(
-            dict(run.channels) | dict.fromkeys(units, run["pressure"]), step, {**run.units, **units}
-        )
-        for name, (units, step) in more.items()
-    }
-    desk = desk_of(workspace := workspace_of(tmp_path, **runs))
-    workspace.set_role(["pull", "late"], "unused")
-    assert not differing(desk)
-    assert obstacle(desk) == ""
-    workspace.set_role("pull", "train")
-    assert len(differing(desk)) == 3
-    workspace.set_role("pull", "unused")
-    workspace.set_role("late", "train")
-    assert "late" in obstacle(desk)
-
-
 # -- loads in names ------------------------------------------------------------------------------
-
-
-@given(st.from_regex(r"(run)?_?(load|mass|weight)[0-9.]{0,9}(g|kg|N|mm|.)?(_2)?", fullmatch=True))
-def test_whatever_the_name_there_is_no_load_or_a_force(name: str) -> None:
-    load = load_in(name)
-    assert load is None or 0 < load.force < np.inf
 
 
 @pytest.mark.parametrize(
@@ -254,64 +176,4 @@ def test_loads_are_read_in_newtons(name: str, force: float | None) -> None:
     assert (None if load is None else load.force) == pytest.approx(force)
 
 
-def test_loads_are_offered_where_no_force_was_recorded(tmp_path: Path) -> None:
-    assert loads_in(["a_200g", "a_400g", "b_300g"]) == {
-        "a_200g": Load(200.0, "g"),
-        "a_400g": Load(400.0, "g"),
-    }
-    desk = Desk(workspace := Workspace(tmp_path), Jobs(workspace))
-    for name in ("one_load200g", "two_load400g"):
-        rows = (f"{k / 10},{1 + k % 9},{k % 7}" for k in range(90))
-        content = "\n".join(["time_s,pressure_bar,displacement_mm", *rows]).encode()
-        path = workspace.keep_upload(f"{name}.csv", content)
-        adding.add(desk, path.name, f"{name}.csv", Reading())
-    assert len(untold(workspace)) == 2
-    run = swung(7.0)
-    measured = run.with_channels({"force": "N"}, force=run["displacement"])
-    workspace.add(measured, origin="", call="", name="measured")
-    assert not untold(workspace)
-
-
 # -- small things --------------------------------------------------------------------------------
-
-
-def test_the_kinds_of_files_are_those_that_are_read_here(monkeypatch: pytest.MonkeyPatch) -> None:
-    assert any(".xlsx" in kind for kind in data.taken())
-    monkeypatch.setattr(data, "find_spec", lambda name: None if name == "openpyxl" else object())
-    assert data.taken() == ["CSV", "TSV", *(kind for kind in data.KINDS if "Excel" not in kind)]
-
-
-@pytest.mark.parametrize("theme", [LIGHT, DARK], ids=["light", "dark"])
-def test_the_colours_of_a_theme_can_be_read(theme: dict[str, str]) -> None:
-    assert contrast("#777777", "#ffffff") == pytest.approx(4.48, abs=0.005)  # as WCAG reckons
-    low = {(text, ground): contrast(theme[text], theme[ground]) for text, ground in WRITTEN}
-    assert {pair: value for pair, value in low.items() if value < 4.5} == {}
-
-
-def test_pictures_have_plain_numbers_and_colours_and_are_thinned_by_their_window() -> None:
-    recording = swung(10.0)
-    (plain,) = plots.figures(subjects.loop([recording], "pressure", "displacement"))
-    for dark in (False, True):
-        figure = plots.coloured(plain, dark)
-        trace = figure["data"][0]
-        assert isinstance(trace["x"], list)
-        assert trace["line"]["color"].startswith("#")
-        assert "--" not in str(figure["layout"])
-    (whole,) = plots.window(recording, ["pressure"], -1e9, 1e9)
-    (part,) = plots.window(recording, ["pressure"], 10.0, 20.0)
-    (beyond,) = plots.window(recording, ["pressure"], 1e6, 1e7)
-    assert len(whole["x"]) == len(recording)
-    assert 9.8 <= part["x"][0] <= 10.0
-    assert 20.0 <= part["x"][-1] <= 20.2
-    assert len(beyond["x"]) >= 2
-
-
-def test_a_band_is_shaded_behind_the_curves() -> None:
-    t = np.arange(3, dtype=np.float64)
-    figure = plots.lines([("model", t, t, "series-1")], x="time [s]", y="y", logarithmic=True)
-    assert figure["layout"]["yaxis"]["type"] == "log"
-    plots.shaded(figure, t, (t - 1, t + 1), "series-1", "band of model")
-    band, model = figure["data"]
-    assert (band["name"], band["fill"], model["name"]) == ("band of model", "toself", "model")
-    assert band["x"] == [0, 1, 2, 2, 1, 0]
-    assert band["y"] == [-1, 0, 1, 3, 2, 1]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -10,13 +11,14 @@ import numpy as np
 import pytest
 
 import mckibben
-from mckibben import DataError, DataWarning, Recording, read, signals
+from mckibben import DataError, DataWarning, Recording, read
 from mckibben.app import adding, edits, scripts
 from mckibben.app import reading as app_reading
 from mckibben.app.desk import Desk
 from mckibben.app.jobs import Jobs
 from mckibben.app.kept import Reading, Step
-from mckibben.app.reading import columns, options, read_upload
+from mckibben.app.pages import editing
+from mckibben.app.reading import columns, read_upload
 from mckibben.app.recordings import EXAMPLE
 from mckibben.app.workspace import Workspace
 from mckibben.errors import TooLargeError
@@ -225,6 +227,21 @@ def test_what_is_changed_during_an_edit_stays(
     assert workspace.entry(other).steps == ()
 
 
+def test_a_part_of_what_is_not_there_any_more_is_not_cut(tmp_path: Path) -> None:
+    workspace = Workspace(tmp_path)
+    taken(workspace)
+    desk, first = Desk(workspace, Jobs(workspace)), Step(do="slice", start=10, stop=30)
+
+    async def cut() -> None:
+        await editing.do(desk, "rig", first, seen=())
+        with pytest.raises(DataError):
+            await editing.do(desk, "rig", first, seen=())
+
+    asyncio.run(cut())
+    assert workspace.entry("rig").steps == (first,)
+    assert len(workspace.recording("rig")) == 20
+
+
 def test_files_of_one_channel_each_are_joined(tmp_path: Path) -> None:
     workspace = Workspace(tmp_path / "ws")
     desk = Desk(workspace, Jobs(workspace))
@@ -295,43 +312,6 @@ def test_steps_are_repeated_by_their_calls() -> None:
         edits.applied(recording, [Step(do="low_pass")])
 
 
-def test_a_low_pass_damps_what_is_fast_and_delays_nothing() -> None:
-    t = np.linspace(0.0, 19.99, 2000)
-    slow, fast = np.sin(t), 0.3 * np.sin(2 * np.pi * 20 * t)
-    recording = Recording(
-        {"pressure": 2 + slow + fast, "length": np.full(t.size, 3.0)},
-        0.01,
-    )
-    smooth = signals.low_pass(recording, 2.0)
-    assert np.abs(smooth["pressure"] - 2 - slow)[100:-100].max() < 0.01
-    assert np.ptp(smooth["length"]) == 0
-    with pytest.raises(DataError):
-        signals.low_pass(recording, 60.0)
-    with pytest.raises(DataError):
-        signals.low_pass(Recording({"pressure": t}), 1.0)
-
-
-def test_drift_is_taken_out_and_the_mean_stays() -> None:
-    t = np.linspace(0, 1, 101)
-    level = signals.detrend(Recording({"pressure": 5 + 2 * t}))
-    np.testing.assert_allclose(level["pressure"], 6.0)
-
-
-def test_calibration_goes_before_all_else(tmp_path: Path) -> None:
-    path = tmp_path / "run.csv"
-    path.write_text("time_s,A0_V\n" + "\n".join(f"{k * 0.1},{k * 0.5}" for k in range(20)))
-    reading = Reading(
-        columns={"pressure": "A0_V"}, units={"pressure": "psi"}, calibration={"pressure": (2, -1)}
-    )
-    (recording,) = read(path, **options(reading))
-    assert recording["pressure"][4] == pytest.approx(3.0 * 0.0689476, rel=1e-5)
-    assert recording.meta["calibration"]["pressure"]["gain"] == 2
-    with pytest.raises(DataError):
-        read(path, calibration={"pressure": (0.0, 1.0)})
-    with pytest.raises(DataError, match="foo"):
-        read(path, calibration={"foo": (2.0, 1.0)})
-
-
 def test_a_file_that_changes_while_it_is_read_is_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -385,25 +365,3 @@ def test_a_load_that_is_in_no_column_is_said_changed_and_undone(tmp_path: Path) 
         held(desk, {"time": (1.0, "s")})
     with pytest.raises(DataError, match="mm"):
         held(desk, {"force": (1.0, "mm")})
-
-
-def test_samples_that_came_from_no_file_are_read_otherwise_again_and_again(tmp_path: Path) -> None:
-    workspace = Workspace(tmp_path / "ws")
-    desk = Desk(workspace, Jobs(workspace))
-    name, other = workspace.add_example()
-    before, data = workspace.recording(name), workspace.data()
-    assert adding.alike(desk, name) == [other]
-    turn = {"displacement": (-1.0, 0.0)}
-    adding.replaced(desk, [name], Reading(calibration=turn))
-    np.testing.assert_allclose(workspace.recording(name)["displacement"], -before["displacement"])
-    # from what it was, not from what it has become
-    adding.replaced(desk, [name], Reading(calibration=turn, constants={"force": (2.0, "kg")}))
-    found = workspace.recording(name)
-    np.testing.assert_allclose(found["displacement"], -before["displacement"])
-    assert found["force"] == pytest.approx(2 * 9.80665)
-    assert found.sample_time == before.sample_time
-    assert repeated(workspace)["force"] == pytest.approx(found["force"])
-    assert workspace.undo()
-    assert workspace.undo()
-    assert workspace.recording(name) == before
-    assert workspace.data() == data

@@ -32,32 +32,6 @@ def wait(jobs: Jobs) -> None:
         time.sleep(0.05)
 
 
-def test_a_fit_leaves_a_model_and_its_figures(tmp_path: Path) -> None:
-    workspace = filled(tmp_path)
-    jobs = Jobs(workspace, at_once=1)
-    job = jobs.submit("fit", asked("gpi", "first"))
-    wait(jobs)
-    assert job.state == "done"
-    assert workspace.model("first").kind == "gpi"
-    if os.name == "posix":  # nobody else may read it, whatever the rights of this process
-        assert not workspace.path("models", "first.json").stat().st_mode & 0o077
-    progress = jobs.progress(job.name)
-    assert progress[0][1] == 0.0
-    assert any(np.isfinite(cost) for _, _, cost in progress)
-
-
-def test_failures_say_why(tmp_path: Path) -> None:
-    workspace = filled(tmp_path)
-    jobs = Jobs(workspace, at_once=2)
-    bad = jobs.submit("fit", asked("gpi", "a", n_operators=-1))
-    none = jobs.submit("fit", asked("pi", "b") | {"input": "voltage"})
-    wait(jobs)
-    assert bad.state == none.state == "failed"
-    assert "n_operators" in bad.message
-    assert "voltage" in none.message
-    assert workspace.results() == []
-
-
 def test_cancelled_at_once_and_restarted(tmp_path: Path) -> None:
     workspace = filled(tmp_path)
     jobs = Jobs(workspace, at_once=1)

@@ -1,7 +1,8 @@
-"""Data, Look and Models without a browser: what is offered, drawn and changed by a click."""
+"""All tabs without a browser: what is chosen at first, offered, drawn and changed by a click."""
 
 from __future__ import annotations
 
+import asyncio
 from pathlib import Path
 from typing import Any
 
@@ -14,24 +15,30 @@ from nicegui import ui
 from nicegui.testing import User
 
 from mckibben import PI, Recording
-from mckibben.app import plots
+from mckibben.app.busy import SOON, Answer, under_way
 from mckibben.app.desk import Desk
 from mckibben.app.jobs import Jobs, note
 from mckibben.app.work import fit
 from mckibben.app.workspace import Workspace
-from mckibben.arrays import Array
 from mckibben.comparison.channels import Channels
 from mckibben.comparison.splits import held_out
+from mckibben.registry import load
 from mckibben.signals import triangle
 from tests.app.simulated import (
+    WEAKER,
     asked,
+    drawn,
+    field,
     filled,
     gone,
     later,
     modelled,
+    on_compensate,
     only,
     quiet,
+    simulated,
     swung,
+    three_muscles,
     until,
     visit,
     wave,
@@ -65,6 +72,34 @@ def test_an_empty_and_a_damaged_workspace_can_be_walked_through(tmp_path: Path) 
         assert workspace.names("jobs") == []
 
     visit(workspace, look_on)
+
+
+def test_a_second_click_does_nothing_twice_and_what_runs_is_listed() -> None:
+    done: list[str] = []
+
+    def root() -> None:
+        async def slow() -> None:
+            await asyncio.sleep(3 * SOON)
+            done.append("slow")
+
+        ui.button("Draw it", on_click=Answer(slow))
+
+    async def look(user: User) -> None:
+        assert user.client is not None
+        for _ in range(3):
+            user.find("Draw it").click()
+        await asyncio.sleep(2 * SOON)
+        (button,) = user.find("Draw it").elements
+        assert [str(one) for one in under_way(user.client)] == ["Draw it"]
+        assert "loading" in button.props
+        await asyncio.sleep(3 * SOON)
+        assert done == ["slow"]
+        assert under_way(user.client) == []
+        assert "loading" not in button.props
+        user.find("Draw it").click()
+        await later(lambda: done == ["slow", "slow"])
+
+    simulated(root, look)
 
 
 # -- data ----------------------------------------------------------------------------------------
@@ -187,30 +222,6 @@ def test_what_moves_an_output_most_is_drawn_and_what_it_does_is_no_creep(tmp_pat
     visit(workspace_of(tmp_path, arm=arm(), first=first), look)
 
 
-def test_small_swings_are_no_cycles_and_another_theme_draws_pictures_anew_only(
-    tmp_path: Path,
-) -> None:
-    time = np.arange(1200) * 0.1
-    pressure: Array = triangle(time, 30.0, 4.0) + triangle(time, 3.0, 0.6)
-    every = {"pressure": pressure, "displacement": 3 * pressure, "count": np.mod(time, 5)}
-
-    async def look(user: User) -> None:
-        user.find(marker="tab-look").click()
-        await user.should_see("Cycle, of 4; 0 for all", retries=100)
-        colour = only(user, "loop-colour")
-        assert "by count" in colour.options
-        assert colour.value == "time"  # unasked, a counter colours nothing
-        await user.should_see(kind=ui.table, retries=100)
-        plot, tables = only(user, "loop-plot"), user.find(kind=ui.table).elements
-        user.find(marker="theme").click()
-        ink = plots.colours(True)["ink"]
-        await later(lambda: plot.figure["layout"]["font"]["color"] == ink)
-        assert user.find(marker="loop-plot").elements == {plot}
-        assert user.find(kind=ui.table).elements == tables
-
-    visit(workspace_of(tmp_path, run=Recording(every, 0.1)), look)
-
-
 # -- models --------------------------------------------------------------------------------------
 
 
@@ -329,5 +340,116 @@ def test_models_are_run_on_any_recording_and_have_their_error_on_it(tmp_path: Pa
         assert error() > 900.0
         only(user, "closer-run").set_value("first")
         await later(lambda: error() < 100.0)
+
+    visit(workspace, look)
+
+
+async def turn(user: User, model: str) -> None:
+    """Choose another model."""
+    before = only(user, "show-pressures")
+    only(user, "invert").set_value(model)
+    await later(lambda: only(user, "show-pressures") is not before)
+
+
+# -- compensate ----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("gain", [3.0, -3.0])
+def test_motions_begin_at_rest_and_take_as_long_as_the_training_recordings(
+    tmp_path: Path, gain: float
+) -> None:
+    wave = 5.0 - 5.0 * np.cos(2 * np.pi * np.arange(1200) / 400)
+    moved = 17.0 + gain * (0.2 * wave - 1.0)
+    run = Recording({"pressure": 0.3 * wave, "displacement": moved}, 0.1)
+    workspace = modelled(tmp_path, a=PI.example(), b=WEAKER)
+    workspace.add(run, origin="", call="", role="train")
+
+    async def look(user: User) -> None:
+        await on_compensate(user)
+        assert field(user, "Time between steps [s]").value == 0.1
+        assert field(user, "Duration [s]").value == 80.0
+        first, other = (float(field(user, label).value) for label in ("From [mm]", "To [mm]"))
+        assert (other - first) * gain > 0
+        field(user, "Duration [s]").set_value(120.0)
+        user.find(marker="wave").click()
+        points = only(user, "points").value
+        assert points.startswith(f"0 {first:g}\n")
+        assert "\n120 " in points
+
+    visit(workspace, look)
+
+
+def test_what_is_not_recommended_is_not_chosen_first_and_is_marked(tmp_path: Path) -> None:
+    workspace = modelled(tmp_path, a=PI.example(), b=WEAKER)
+    row = {"status": "ok", "model": "pi", "validation_rmse": 1.0, "unit": "mm"}
+    doubted = {"not_recommended": "No model is recommended", "skill_least": -0.1}
+    workspace.write_json("results", "a", row | doubted)
+
+    async def look(user: User) -> None:
+        user.find(marker="tab-take").click()
+        await until(user, "not-recommended")
+        await on_compensate(user)
+        assert only(user, "invert").value == "b"
+
+    visit(workspace, look)
+
+
+def test_controllers_that_cannot_run_on_an_arm_are_not_offered(tmp_path: Path) -> None:
+    async def look(user: User) -> None:
+        await drawn(user)
+        await until(user, "run-loop")
+        kinds = only(user, "controllers")
+        assert set(kinds.options) == {"feedforward", "observer"}
+        assert kinds.value == ["feedforward"]
+        assert "pressure_1, pressure_2, pressure_3" in only(user, "law-refused").text
+
+    visit(modelled(tmp_path, a=three_muscles(), b=three_muscles(0.9)), look)
+
+
+def test_a_force_is_estimated_of_what_was_not_trained_on(tmp_path: Path) -> None:
+    estimator = load("blocks", "balance").example().inverse()
+    workspace = modelled(tmp_path, a=estimator)
+    t = np.arange(600) * 0.05
+    channels = (*estimator.inputs, *estimator.outputs)
+    for number in range(3):
+        run = {c.name: np.sin(t + k + number) + 2.0 for k, c in enumerate(channels)}
+        recorded = Recording(run, 0.05, {c.name: c.unit for c in channels})
+        workspace.add(recorded, origin="", call="", role="train", name=f"run{number}")
+
+    async def look(user: User) -> None:
+        await on_compensate(user)
+        await until(user, "forces")
+        only(user, "forces").open()
+        await later(lambda: only(user, "force-recording").value == "run2")  # as it is held out
+        assert list(only(user, "force-recording").options) == ["run2", "run0", "run1"]
+
+    visit(workspace, look)
+
+
+# -- take away -----------------------------------------------------------------------------------
+
+
+def test_what_is_taken_is_what_compensates(tmp_path: Path) -> None:
+    oscillator = load("blocks", "duhem-oscillator").example()  # has no inverse
+    workspace = modelled(tmp_path, a=oscillator, b=PI.example(), c=WEAKER)
+
+    async def look(user: User) -> None:
+        def chosen() -> tuple[str, str]:
+            return only(user, "take-model").value, only(user, "take-form").value
+
+        user.find(marker="tab-take").click()
+        await until(user, "take-form")
+        await later(lambda: chosen() == ("b", "inverse"))
+        only(user, "take-model").set_value("a")
+        await later(lambda: chosen() == ("a", "model"))
+        await on_compensate(user)
+        await turn(user, "c")
+        await drawn(user)
+        user.find(marker="tab-take").click()
+        await later(lambda: chosen() == ("c", "inverse"))
+        only(user, "take-form").set_value("model")
+        user.find(marker="take-json").click()
+        taken = (await user.download.next(timeout=20.0)).text
+        assert taken == workspace.path("models", "c.json").read_text("utf-8")
 
     visit(workspace, look)

@@ -13,7 +13,6 @@ from mckibben.app import forms, motions
 from mckibben.app.following import (
     compensated,
     estimate,
-    kept_motion,
     look_back,
     loop,
     too_fast,
@@ -189,17 +188,6 @@ def test_points_are_read_snapped_and_become_a_reference() -> None:
     for none in hopeless:
         with pytest.raises(DataError):
             reference_recording({"displacement": none}, 0.01)
-
-
-def test_the_same_motion_has_one_file(workspace: Workspace) -> None:
-    up, down = (
-        reference_recording({"displacement": [(0.0, 1.0), (2.0, to)]}, 0.02) for to in (5.0, 0.5)
-    )
-    first = kept_motion(workspace, "mine", up)
-    assert kept_motion(workspace, "mine", up, [first]) == first
-    assert kept_motion(workspace, "mine", down, [first]) != first
-    workspace.write_json("runs", "mine-pid", {"model": "mine", "reference": first})
-    assert kept_motion(workspace, "mine", up) == first
 
 
 def test_steps_and_cycles_are_those_of_the_training_recordings(workspace: Workspace) -> None:

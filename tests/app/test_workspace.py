@@ -16,6 +16,7 @@ import pytest
 
 from mckibben import DataError, Recording, write
 from mckibben.app import undoing
+from mckibben.app.door import door
 from mckibben.app.kept import Step
 from mckibben.app.workspace import Workspace
 from mckibben.registry import load
@@ -320,25 +321,6 @@ def test_on_a_full_disk_a_change_is_not_begun(
     assert sorted((tmp_path / "recordings").iterdir()) == files
 
 
-def test_the_oldest_changes_are_forgotten_where_the_history_is_too_long(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    workspace = filled(tmp_path)
-    monkeypatch.setattr(undoing, "DESCRIPTION", 3000)
-    for number in range(20):
-        workspace.set_role("a", "train" if number % 2 else "test")
-    assert (tmp_path / "history" / "recordings.json").stat().st_size <= 3000
-    undone = 0
-    while workspace.undo():
-        undone += 1
-    assert 2 < undone < 20
-    monkeypatch.setattr(undoing, "DESCRIPTION", 300)
-    before = standing(tmp_path)
-    with pytest.raises(DataError):
-        workspace.set_role(["a", "keep"], "unused")
-    assert standing(tmp_path) == before
-
-
 def test_undoing_overwrites_no_recording_that_came_meanwhile(tmp_path: Path) -> None:
     workspace = filled(tmp_path)
     new = workspace.add(recording(30), origin="a rig", call="", name="c")
@@ -375,16 +357,16 @@ def test_a_recording_without_samples_is_listed(tmp_path: Path) -> None:
     assert len(workspace.with_role("train")) == 2
 
 
-def test_each_step_is_logged_once_with_its_call(tmp_path: Path) -> None:
-    workspace = filled(tmp_path)
-    before = len(workspace.logged())
-    workspace.edit("a", "a: cut", [Step(do="slice", start=0, stop=20)])
-    zero = Step(do="zero", channels=["displacement"], over="pressure")
-    workspace.edit_each(["d"], "all zeroed", zero)
-    assert [(line["did"], line["call"]) for line in workspace.logged()[before:]] == [
-        ("a: cut", "recording.slice(0, 20)"),
-        (
-            "all zeroed",
-            "[mckibben.signals.zeroed(one, ['displacement'], 'pressure') for one in recordings]",
-        ),
-    ]
+def test_the_page_that_leads_in_goes_with_the_workbench(tmp_path: Path) -> None:
+    folder = tmp_path / "<script>alert(1)<"
+    folder.mkdir()
+    address = "http://127.0.0.1:8750/a-token/"
+    with door(folder, 8750, address) as page:
+        assert page is not None
+        text = page.read_text()
+        assert address in text
+        assert "<script>alert" not in text
+    assert not page.exists()
+    (folder / ".open-8750.html").write_text("of a workbench that was killed")
+    assert Workspace(folder).claim()
+    assert not list(folder.glob(".open-*"))

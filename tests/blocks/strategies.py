@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from hypothesis import strategies as st
 from numpy.typing import NDArray
@@ -144,6 +146,9 @@ def modified_models(draw: st.DrawFn) -> Series:
 
 @st.composite
 def preisach_models(draw: st.DrawFn) -> Preisach | KrasnoselskiiPokrovskii:
-    kind = draw(st.sampled_from([Preisach, KrasnoselskiiPokrovskii]))
+    kind: Any = draw(st.sampled_from([Preisach, KrasnoselskiiPokrovskii]))
     weights = draw(st.lists(numbers(0.01, 2.0), min_size=15, max_size=15))
-    return kind(vector(np.linspace(LOW, HIGH, 6)), tuple(weights), draw(numbers(-5.0, 5.0)))
+    found: Preisach | KrasnoselskiiPokrovskii = kind(
+        vector(np.linspace(LOW, HIGH, 6)), tuple(weights), draw(numbers(-5.0, 5.0))
+    )
+    return found

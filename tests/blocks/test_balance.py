@@ -61,7 +61,7 @@ def test_pressures_that_are_clipped_move_muscles_that_need_them(block: Balance, 
     free = run(block, inputs)
     low, high = (float(q) for q in np.quantile(free, [0.2, 0.8]))
     limited = replace(block, pressure_range=(low, high))
-    with pytest.warns(ModelWarning, match="clipped|beyond"):
+    with pytest.warns(ModelWarning):
         pressures = limited.simulate(inputs, sample_time=STEP)
     assert pressures.min() >= low
     assert pressures.max() <= high
@@ -203,7 +203,7 @@ def test_what_asks_a_muscle_to_push_harder_than_it_can_is_told(block: Balance, s
     if not told:
         np.testing.assert_allclose(found, inputs[:, :2], atol=1e-8)
     else:
-        assert "push" in str(told[0].message)
+        assert told[0].category is ModelWarning
         assert np.abs(found - inputs[:, :2]).max() > 1e-9
 
 

@@ -313,16 +313,3 @@ def test_any_recording_is_described_or_refused(channels: tuple[list[int], list[i
         assert min(np.ptp(u), np.ptp(y)) == 0
         return
     json.dumps(found.to_dict(), allow_nan=False)
-
-
-@pytest.mark.parametrize("seed", range(3))
-def test_random_motion_of_a_rate_independent_loop_shows_neither_speed_nor_drift(seed: int) -> None:
-    """Cycles between like extremes differ there by what else is remembered."""
-    rng = np.random.default_rng(seed)
-    targets = np.concatenate([[0.2], rng.uniform(0.2, 5.8, 80)])
-    times = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(targets)) / rng.uniform(0.2, 1.0, 80))])
-    u = np.interp(np.arange(0, times[-1], 0.05), times, targets)
-    model = PI(thresholds=(0.0, 0.3, 0.8, 1.5, 2.4), weights=(1.5, 1.5, 1.0, 1.0, 1.0))
-    found = characterize(noisy(run(u, model.simulate(u), 0.05), 5e-4, seed))
-    assert found.rate_verdict in ("unknown", "none")
-    assert found.drift is None or abs(found.drift) < 0.005 * found.output_span

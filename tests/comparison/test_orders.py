@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from mckibben import Recording, identify
 from mckibben.blocks.coupled.balance import Balance
@@ -23,6 +24,7 @@ def recording(muscle: Balance, seed: int) -> Recording:
     return Recording({"pressure": p, "displacement": y, "force": force}, STEP)
 
 
+@pytest.mark.long
 def test_lags_of_a_balance_are_chosen_where_its_muscle_relaxes() -> None:
     runs = [recording(ALONE, seed) for seed in (1, 2)]
     choice = identify(runs, "balance", {"n_lags": (0, 1)}, n_folds=2, steps=4, contact=False)

@@ -136,6 +136,7 @@ def test_rows_are_ordered_by_validation_then_by_trust(
     assert [one.model for one in shown] == ["narx", "constant", "pi"]
 
 
+@pytest.mark.long
 def test_same_seed_same_table_whatever_the_number_of_processes(
     train: Recording, test_set: Recording
 ) -> None:

@@ -225,7 +225,7 @@ def test_minor_loops_close_and_are_congruent(
         assert outputs[-1] == pytest.approx(outputs[0], abs=tolerance(outputs))
         shapes.append(outputs - outputs[0])
     if family != "modified":  # whose curve is steeper here than there
-        np.testing.assert_allclose(*shapes, atol=1e-9)
+        np.testing.assert_allclose(shapes[0], shapes[1], atol=1e-9)
 
 
 @pytest.mark.parametrize("family", [*RISING, "play"])

@@ -225,6 +225,7 @@ def test_weights_that_nobody_measured_are_found() -> None:
     assert np.sqrt(np.mean(missed**2)) < 3.0 * NOISE
 
 
+@pytest.mark.long
 def test_without_evidence_of_other_weights_there_are_none() -> None:
     runs = [hung(seed, 40.0) for seed in (1, 2, 3)]
     estimator = BalanceEstimator().fit(runs)
@@ -236,6 +237,7 @@ def test_without_evidence_of_other_weights_there_are_none() -> None:
     assert np.abs(forced.loads_ * 60.0).max() < 1.0
 
 
+@pytest.mark.long
 def test_a_recording_without_the_force_that_others_have_hung_under_a_weight() -> None:
     runs = [recording(1), recording(2), hung(3, 50.0)]
     estimator = BalanceEstimator().fit(runs)
@@ -341,6 +343,7 @@ def test_least_squares_within_inequalities_meet_the_conditions_of_optimality() -
         constrained_least_squares(slopes, target, np.eye(6)[[0, 0]] * [[1.0], [-1.0]], np.ones(2))
 
 
+@pytest.mark.long
 def test_what_recordings_that_begin_in_motion_remember_is_found() -> None:
     cut = [recording(seed).slice(500, 1200) for seed in (1, 2, 6)]
     estimator = BalanceEstimator().fit([*cut, recording(7, n=700)])

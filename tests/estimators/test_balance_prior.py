@@ -6,6 +6,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+import pytest
 
 from mckibben import Recording, muscles
 from mckibben.arrays import Array
@@ -58,6 +59,7 @@ def error(model: Block, run: Recording) -> float:
     return float(np.sqrt(np.mean((found - run["displacement"]) ** 2)))
 
 
+@pytest.mark.long
 def test_with_little_data_a_prior_helps_and_with_much_it_changes_nothing() -> None:
     test = moved(90, 60.0, noise=0.0)
     little, much = moved(1, 5.0), [moved(seed, 60.0) for seed in (2, 3)]

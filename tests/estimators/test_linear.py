@@ -93,6 +93,7 @@ def test_box_jenkins_finds_the_truth_whatever_the_noise(seed: int) -> None:
     assert fit.noise_.deviation == pytest.approx(0.3, rel=0.1)
 
 
+@pytest.mark.long
 def test_output_error_recovers_with_intervals() -> None:
     inside = []
     for seed in range(12):

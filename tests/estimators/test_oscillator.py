@@ -68,7 +68,12 @@ def missed(model: Any, test: Recording, periodic: bool) -> float:
 
 @pytest.mark.parametrize(
     ("name", "periodic"),
-    [("light", False), ("quick", True), ("hardening", True), ("slipping", False)],
+    [
+        ("quick", True),
+        ("slipping", False),
+        pytest.param("light", False, marks=pytest.mark.long),
+        pytest.param("hardening", True, marks=pytest.mark.long),
+    ],
 )
 def test_numbers_come_back_from_noisy_recordings(name: str, periodic: bool) -> None:
     noisy, test = shaken(name, periodic)
@@ -84,6 +89,7 @@ def test_an_element_of_unknown_shape_is_found() -> None:
     assert missed(found.model_, test, True) < 0.2 * NOISE
 
 
+@pytest.mark.long
 def test_an_offset_is_found_where_there_is_one() -> None:
     noisy, _ = shaken("hardening", periodic=True)
     moved = [run.with_channels(displacement=run["displacement"] + 3.0) for run in noisy]
@@ -142,6 +148,7 @@ def test_what_cannot_be_learned_from_is_refused() -> None:
         BoucWenOscillatorEstimator(periodic=True).fit(turned)
 
 
+@pytest.mark.long
 @pytest.mark.skipif(not BENCHMARK.is_dir(), reason="the benchmark's files are not here")
 @pytest.mark.parametrize(
     ("estimator", "most"),

@@ -53,6 +53,7 @@ def test_a_run_that_leaves_all_bounds_ends() -> None:
     assert not follow_network(*weights, 1.0, state, moved, np.zeros(51), 1, 0, given, none)
 
 
+@pytest.mark.long
 def test_hysteresis_in_a_loop_is_learned_without_being_told_of() -> None:
     noisy, test = shaken("quick", periodic=True, n=1024)
     several, one = (

@@ -68,24 +68,6 @@ def one(path: Path, **options: Any) -> Recording:
     return recording
 
 
-def test_columns_are_calibrated_and_constants_are_channels(folder: Folder) -> None:
-    recording = one(folder() / "run_load200g.csv")
-    assert recording.sample_time == 0.02
-    assert recording["pressure"] == pytest.approx(PSI * (2.5 * RAW - 1.25))
-    assert recording["displacement"] == pytest.approx(LASER)
-    assert recording["force"].tolist() == [1.962] * N
-    assert recording.meta["calibration"] == {
-        "pressure": {"column": "A0", "gain": 2.5, "offset": -1.25},
-        "force": {"value": 1.962, "unit": "N"},
-    }
-
-
-def test_files_may_be_otherwise(folder: Folder) -> None:
-    light, heavy = mckibben.read(folder())
-    assert (light["force"][0], heavy["force"][0]) == (1.962, 3.924)
-    assert np.array_equal(light["pressure"], heavy["pressure"])
-
-
 def test_an_offset_moves_what_the_header_states(folder: Folder) -> None:
     path = folder("[channels.pressure]\noffset = -10.0\n", "time_ms,pressure_kPa,position_mm")
     assert one(path / "run_load200g.csv")["pressure"] == pytest.approx((RAW - 10) / 100)
@@ -99,15 +81,6 @@ def test_what_the_caller_says_goes_before(folder: Folder) -> None:
     )
     measured = one(path, columns={"force": "A1"}, units={"force": "kN"})
     assert measured["force"] == pytest.approx(1000 * LASER)
-
-
-def test_sample_time_is_for_files_without_times(folder: Folder) -> None:
-    said = "[time]\nsample_time = 0.004\n"
-    assert one(folder(said, "A9,p_bar,position_mm") / "run_load200g.csv").sample_time == 0.004
-    assert one(folder(said, "time_ms,p_bar,position_mm") / "run_load200g.csv").sample_time == 0.02
-    assert (
-        one(folder(said, "A9,p_bar,position_mm") / "run_load200g.csv", rate=10).sample_time == 0.1
-    )
 
 
 def test_a_constant_goes_before_a_column_of_that_name(folder: Folder) -> None:
@@ -131,22 +104,6 @@ def test_a_column_that_is_missing(folder: Folder) -> None:
     assert (caught.value.file, caught.value.channel) == (path, "displacement")
     with pytest.warns(DataWarning, match="'displacement'.*'A1'"):
         assert "displacement" not in one(path, channels=["pressure"])
-
-
-def test_errors_are_of_the_channel_and_its_row(folder: Folder) -> None:
-    path = folder() / "run_load200g.csv"
-    path.write_text(path.read_text().replace(f",{RAW.tolist()[3]!r},", ",NaN,", 1))
-    with pytest.raises(DataError, match="1 of 60") as caught:
-        mckibben.read(path)
-    assert (caught.value.channel, caught.value.row) == ("pressure", 5)
-
-
-def test_described_gives_the_split_as_it_stands(folder: Folder) -> None:
-    found = described(folder())
-    assert found.split == {"test": ["*400g*"], "rule": {"by": "peak"}}
-    assert found.of("run_load400g.csv").channels["force"].value == 3.924
-    assert found.of("run_load400g.csv").channels["force"].unit == "N"
-    assert described(Path("nowhere")).split is None
 
 
 @pytest.mark.parametrize(
@@ -182,21 +139,6 @@ def test_what_cannot_be_is_refused(folder: Folder, said: str | bytes, named: str
     assert named in caught.value.problem
     assert caught.value.file == path / NAME
     assert caught.value.remedy
-
-
-def test_editors_that_mark_the_byte_order_are_understood(folder: Folder) -> None:
-    path = folder()
-    plain = described(path)
-    (path / NAME).write_bytes(b"\xef\xbb\xbf" + (path / NAME).read_bytes())
-    assert described(path) == plain
-
-
-def test_what_was_corrected_meanwhile_counts(folder: Folder) -> None:
-    path = folder()
-    before = one(path / "run_load200g.csv")["pressure"]
-    (path / NAME).write_text(CHANNELS.replace("gain = 2.5", "gain = 5.0"))
-    after = one(path / "run_load200g.csv")["pressure"]
-    np.testing.assert_allclose(after - before, 2.5 * RAW * PSI)
 
 
 def test_what_the_documentation_shows_is_understood(tmp_path: Path) -> None:

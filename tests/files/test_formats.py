@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import datetime
-import sys
 from pathlib import Path
 from typing import Any
 
 import h5py
 import numpy as np
-import pandas as pd
 import pytest
 from scipy.io import loadmat, savemat
 
@@ -31,12 +28,6 @@ def check(recording: Recording) -> None:
 
 
 GIVEN: dict[str, Any] = {"units": {"time": "s", "pressure": "kPa", "displacement": "cm"}}
-
-
-def test_mat_struct(tmp_path: Path) -> None:
-    savemat(tmp_path / "a.mat", {"run": {"time_s": T, "raw": {"p_kPa": P, "pos_cm": X}, "fs": 50}})
-    (recording,) = mckibben.read(tmp_path / "a.mat")
-    check(recording)
 
 
 MATRIX: dict[str, Any] = GIVEN | {
@@ -67,22 +58,6 @@ def test_columns_of_a_matrix_are_named_by_number(
     assert list(recording.channels) == ["pressure", "displacement"]
 
 
-def test_nothing_is_assumed_of_the_columns_of_a_matrix(tmp_path: Path) -> None:
-    path = tmp_path / "a.mat"
-    write(path, data=np.column_stack([T, P, X]))
-    with pytest.raises(DataError) as refused:
-        mckibben.read(path, channels=["pressure", "displacement"])
-    assert refused.value.channel == "pressure"
-    assert "data[1], data[2], data[3]" in refused.value.remedy
-    assert "--column time=data[1]" in refused.value.remedy
-    with pytest.warns(DataWarning, match=r"--column time=data\[1\]"):
-        (recording,) = mckibben.read(path)
-    assert list(recording.channels) == ["data_1", "data_2", "data_3"]
-    assert recording.sample_time is None
-    with pytest.raises(DataError, match=r"data\[1\], data\[2\]"):
-        mckibben.read(path, columns={"pressure": "data"})
-
-
 def test_a_matrix_goes_with_vectors_of_its_length(tmp_path: Path) -> None:
     path = tmp_path / "a.mat"
     write(path, data=np.column_stack([P, X]), t=T, gains=T[:3], table=np.ones((20, 2)))
@@ -100,29 +75,6 @@ def test_other_matrices_are_no_channels(tmp_path: Path, shape: tuple[int, ...]) 
         with pytest.raises(DataError) as refused:
             mckibben.read(tmp_path / name)
         assert refused.value.file == tmp_path / name
-
-
-def test_the_name_of_a_matrix_may_say_unit_and_channel(tmp_path: Path) -> None:
-    write(tmp_path / "a.mat", data=np.ones((5, 2)), t=T, p_kPa=np.column_stack([P, 2 * P]))
-    (recording,) = mckibben.read(tmp_path / "a.mat", units={"time": "s"})
-    assert list(recording.channels) == ["pressure_1", "pressure_2"]
-    assert recording["pressure_2"] == pytest.approx(P / 50)
-
-
-def test_mat_7_3(tmp_path: Path) -> None:
-    path = tmp_path / "a.mat"
-    with h5py.File(path, "w", userblock_size=512) as file:
-        for name, samples in {"t": T, "p": P, "disp": X}.items():
-            file.create_dataset(f"run/{name}", data=samples.reshape(1, -1))
-            file[f"run/{name}"].attrs["MATLAB_class"] = np.bytes_("double")
-        text = file.create_dataset("note", data=np.zeros((1, 40), dtype=np.uint16))
-        text.attrs["MATLAB_class"] = np.bytes_("char")
-        file.create_dataset("#refs#/a", data=K)
-    with path.open("r+b") as file:
-        file.write(b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(512))
-    (recording,) = mckibben.read(path, **GIVEN)
-    check(recording)
-    assert list(recording.channels) == ["displacement", "pressure"]
 
 
 @pytest.mark.parametrize("name", ["old.mat", "struct.mat", "a.h5"])
@@ -162,112 +114,6 @@ def test_scalars_that_cannot_be_are_refused_where_they_count(
     check(mckibben.read(tmp_path / name, rate=50)[0])
     write(tmp_path / name, p_kPa=P, disp_cm=X, time_s=T, **scalars)
     check(mckibben.read(tmp_path / name)[0])
-
-
-def test_a_scalar_goes_with_a_matrix(tmp_path: Path) -> None:
-    write(tmp_path / "a.mat", data=np.column_stack([P, X]), fs=50.0)
-    columns = {"pressure": "data[1]", "displacement": "data[2]"}
-    units = {"pressure": "kPa", "displacement": "cm"}
-    with pytest.warns(DataWarning, match="fs = 50 is taken"):
-        (recording,) = mckibben.read(tmp_path / "a.mat", columns=columns, units=units)
-    check(recording)
-
-
-@pytest.mark.parametrize("ending", [".h5", ".hdf5"])
-@pytest.mark.parametrize("attribute", ["unit", "units"])
-def test_hdf5(tmp_path: Path, ending: str, attribute: str) -> None:
-    path = tmp_path / f"a{ending}"
-    with h5py.File(path, "w") as file:
-        file.attrs["rig"] = "bench 2"
-        file.attrs["load_N"] = 12.5
-        file.attrs["matrix"] = np.eye(2)
-        for name, (samples, unit) in {
-            "time": (T * 1e3, "ms"),
-            "rig/pressure": (P, "kPa"),
-            "rig/position": (X, b"cm"),
-        }.items():
-            file[name] = samples
-            file[name].attrs[attribute] = unit
-        file["other"] = np.arange(7.0)
-        file["image"] = np.zeros((4, 40))
-        file["words"] = np.array(["up"] * 40, dtype="S2")
-    (recording,) = mckibben.read(path)
-    check(recording)
-    assert recording.meta["rig"] == "bench 2"
-    assert recording.meta["load_N"] == 12.5
-    assert recording.meta["ignored_columns"] == ["other"]
-
-
-def write_tdms(path: Path, groups: list[str], *, timed: bool = True) -> None:
-    from nptdms import ChannelObject, RootObject, TdmsWriter
-
-    root = RootObject({"operator": "jane", "started": datetime.datetime(2026, 1, 31)})
-    with TdmsWriter(path) as writer:
-        for group in groups:
-            shared = {"wf_increment": 0.02, "wf_start_offset": 1.0} if timed else {}
-            writer.write_segment(
-                [
-                    root,
-                    ChannelObject(group, "Druck", P, {"unit_string": "kPa", **shared}),
-                    ChannelObject(group, "Weg", X, {"unit_string": "cm", **shared}),
-                    ChannelObject(group, "slow", np.arange(4.0)),
-                ]
-            )
-
-
-def test_tdms(tmp_path: Path) -> None:
-    write_tdms(tmp_path / "a.tdms", ["run"])
-    (recording,) = mckibben.read(tmp_path / "a.tdms")
-    check(recording)
-    assert recording.start_time == 1.0
-    assert recording.meta["operator"] == "jane"
-    assert recording.meta["ignored_columns"] == ["slow"]
-    assert recording.name == "a"
-    write_tdms(tmp_path / "b.tdms", ["run"], timed=False)
-    assert mckibben.read(tmp_path / "b.tdms")[0].sample_time is None
-    check(mckibben.read(tmp_path / "b.tdms", rate=50)[0])
-
-
-def test_every_group_of_tdms_is_a_recording(tmp_path: Path) -> None:
-    write_tdms(tmp_path / "a.tdms", ["up", "down"])
-    recordings = mckibben.read(tmp_path / "a.tdms")
-    assert [recording.name for recording in recordings] == ["a[up]", "a[down]"]
-    for recording in recordings:
-        check(recording)
-
-
-def test_foreign_parquet(tmp_path: Path) -> None:
-    frame = pd.DataFrame(
-        {"Zeit (ms)": (1000 * T).astype(int), "Druck [kPa]": P, "Weg_cm": X, "branch": "up"}
-    )
-    frame.to_parquet(tmp_path / "a.parquet")
-    (recording,) = mckibben.read(tmp_path / "a.parquet")
-    check(recording)
-    assert recording.meta["ignored_columns"] == ["branch"]
-
-
-def test_parquet_with_instants_and_nulls(tmp_path: Path) -> None:
-    frame = pd.DataFrame(
-        {
-            "timestamp": pd.Timestamp("2026-01-31") + pd.to_timedelta(T, unit="s"),
-            "Druck [kPa]": P,
-            "Weg_cm": X,
-            "flag": pd.array([1, None] * 20, dtype="Int64"),
-        }
-    )
-    frame.to_parquet(tmp_path / "a.parquet")
-    with pytest.warns(DataWarning, match="'flag' is left out"):
-        (recording,) = mckibben.read(tmp_path / "a.parquet", channels=["pressure", "displacement"])
-    check(recording)
-
-
-def test_times_in_words_are_read_from_parquet(tmp_path: Path) -> None:
-    times = [f"2026-01-31T12:00:{k / 50:06.3f}" for k in range(40)]
-    frame = pd.DataFrame({"time": times, "p_kPa": P, "Weg_cm": X, "branch": ["up", None] * 20})
-    frame.to_parquet(tmp_path / "a.parquet")
-    (recording,) = mckibben.read(tmp_path / "a.parquet")
-    check(recording)
-    assert recording.meta["ignored_columns"] == ["branch"]
 
 
 def test_vectors_of_matlab_files_are_those_that_scipy_reads(tmp_path: Path) -> None:
@@ -312,34 +158,20 @@ def test_links_of_hdf5_do_not_lead_out_of_a_file_nor_round_in_it(tmp_path: Path)
     assert list(recording.channels) == ["again"]
 
 
-def test_names_and_texts_that_steer_a_terminal_are_written_out(tmp_path: Path) -> None:
-    with h5py.File(tmp_path / "a.h5", "w") as file:
-        file["x\x1b[2J"] = np.arange(40.0)
-        file.attrs["rig"] = "\x1b[31mred"
-    (recording,) = mckibben.read(tmp_path / "a.h5")
-    assert all(map(str.isprintable, recording.channels))
-    assert recording.meta["rig"] == "\\x1b[31mred"
-
-
-@pytest.mark.parametrize(
-    ("module", "name", "content", "extra"),
-    [
-        ("h5py", "a.h5", b"\x89HDF\r\n\x1a\n", "mckibben[hdf5]"),
-        ("nptdms", "a.tdms", b"TDSm", "mckibben[tdms]"),
-        ("openpyxl", "a.xlsx", b"PK\x03\x04", "mckibben[xlsx]"),
-        ("rosbags", "a.bag", b"#ROSBAG V2.0\n", "mckibben[ros]"),
-    ],
-)
-def test_a_missing_library_is_named_by_its_extra(
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    module: str,
-    name: str,
-    content: bytes,
-    extra: str,
+@pytest.mark.parametrize("compression", [None, "gzip"])
+@pytest.mark.parametrize("kind", ["<f8", ">f8", "<f4", "<f2", ">i2", "u1", "<i8", "?"])
+def test_samples_in_chunks_are_those_that_h5py_reads(
+    tmp_path: Path, kind: str, compression: str | None
 ) -> None:
-    monkeypatch.setitem(sys.modules, module, None)
-    (tmp_path / name).write_bytes(content)
-    with pytest.raises(DataError) as refused:
-        mckibben.read(tmp_path / name)
-    assert extra in refused.value.remedy
+    samples = (10 + 90 * np.sin(np.arange(100.0) / 9)).clip(0, 100).astype(kind)
+    for shuffle, sums, shape in ((False, False, (100,)), (True, True, (100, 1))):
+        path = tmp_path / f"{shuffle}.h5"
+        packing: dict[str, Any] = {"compression": compression, "shuffle": shuffle}
+        with h5py.File(path, "w") as file:
+            chunks = (7, *shape[1:])
+            data = file.create_dataset(
+                "a", shape, kind, chunks=chunks, fillvalue=1, fletcher32=sums, **packing
+            )
+            data[20:] = samples.reshape(shape)[20:]  # two chunks are never written
+            expected = data[()].reshape(-1).astype(np.float64)
+        np.testing.assert_array_equal(mckibben.read(path)[0]["a"], expected)

@@ -47,19 +47,6 @@ def test_dates_are_seconds_from_the_first(tmp_path: Path, form: str) -> None:
     assert recording.n_samples == N
 
 
-def test_zones_are_minded(tmp_path: Path) -> None:
-    zones = ("+00:00", "+05:30")
-    moved = (INSTANTS[k] + datetime.timedelta(hours=5.5 * (k % 2)) for k in range(N))
-    times = [f"{time.isoformat()}{zones[k % 2]}" for k, time in enumerate(moved)]
-    assert read(tmp_path, times).sample_time == 0.25
-
-
-@pytest.mark.parametrize("form", ["%d.%m.%Y %H:%M:%S,%f", "%Y-%m-%d %H:%M:%S,%f"])
-def test_decimal_commas_in_dates(tmp_path: Path, form: str) -> None:
-    times = [instant.strftime(form) for instant in INSTANTS]
-    assert read(tmp_path, times, ";").sample_time == 0.25
-
-
 def test_times_of_the_day(tmp_path: Path) -> None:
     times = [f"12:00:{0.25 * k:06.3f}" for k in range(N)]
     assert read(tmp_path, times).sample_time == 0.25

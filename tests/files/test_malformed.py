@@ -9,7 +9,6 @@ from __future__ import annotations
 import io
 import math
 import os
-import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -28,7 +27,7 @@ from scipy.io import savemat
 
 import mckibben
 from mckibben import DataError, Recording
-from tests.files.rosbags_made import write as write_bag
+from tests.golden.rooms.files import FILES
 
 N = 30
 TIME = [k / 10 for k in range(N)]
@@ -183,23 +182,6 @@ def xlsx(**columns: Sequence[object]) -> bytes:
     return buffer.getvalue()
 
 
-def bag(kind: Any) -> bytes:
-    """Return a bag of ROS, without a channel that is called displacement."""
-    with tempfile.TemporaryDirectory() as folder:
-        path = write_bag(Path(folder) / "run", kind)
-        return next(path.glob(f"*.{kind}")).read_bytes() if path.is_dir() else path.read_bytes()
-
-
-def described(text: str) -> Maker:
-    """Make a sound table, and a description of its folder beside it."""
-
-    def make(path: Path) -> None:
-        path.write_bytes(good())
-        (path.parent / "channels.toml").write_text(text)
-
-    return make
-
-
 def outside(path: Path) -> None:
     """Have the samples in another file."""
     (path.parent / "secret").write_bytes(bytes(range(160)))
@@ -223,7 +205,10 @@ PARQUET = parquet(pressure_bar=PRESSURE, displacement_mm=DISPLACEMENT)
 MAT = mat(pressure=PRESSURE, displacement=DISPLACEMENT)
 HDF5 = hdf5(pressure_bar=PRESSURE, displacement_mm=DISPLACEMENT)
 XLSX = xlsx(pressure_bar=PRESSURE, displacement_mm=DISPLACEMENT)
-BAG, MCAP, DB3 = bag("bag"), bag("mcap"), bag("db3")
+BAG, MCAP, DB3 = (
+    (FILES / name).read_bytes()
+    for name in ("ros1.bag", "ros2-mcap/ros2-mcap.mcap", "ros2-db3/ros2-db3.db3")
+)
 UNITS = {"units": {"pressure": "bar", "displacement": "mm"}}
 P, X, T = CHANNELS[0], CHANNELS[1], "time"
 
@@ -233,109 +218,59 @@ CASES: list[Case] = [
     Case("folder.csv", Path.mkdir),
     Case("link.csv", lambda path: path.symlink_to(path.name)),
     Case("pipe.csv", os.mkfifo),
-    Case("pipe.h5", os.mkfifo),
     Case("device.mat", lambda path: path.symlink_to("/dev/zero")),
     Case("book.xls", b"\xd0\xcf\x11\xe0", names="'.xls'"),
-    Case("notes.docx", b"PK\x03\x04", names="'.docx'"),
     Case("no_ending", good()),
     # Content of another kind
     Case("workbook.csv", b"PK\x03\x04\x14\0\x06\0"),
-    Case("old_workbook.csv", b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1", names="Excel"),
     Case("parquet.csv", PARQUET, names="Parquet"),
-    Case("hdf5.csv", HDF5, names="HDF5"),
-    Case("matlab.csv", MAT, names="MATLAB"),
     Case("tdms.txt", tdms(), names="TDMS"),
     Case("mcap.bag", MCAP, names="MCAP"),
     Case("bag.csv", BAG),
-    Case("db3.csv", DB3),
     Case("spreadsheet.csv", XLSX),
-    Case("picture.csv", b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR"),
-    Case("escapes.csv", headers("time_s,\x1b[31mpressure,displacement_mm")),
     Case("garbage.csv", GARBAGE),
-    Case("zeros.csv", bytes(1000)),
-    Case("half_utf16.csv", "pressure".encode("utf-16")[:-1]),
     # Empty, or without samples
     Case("empty.csv", b""),
-    Case("blank.csv", b"\n \n\n"),
-    Case("bom_only.csv", b"\xef\xbb\xbf"),
-    Case("comments.csv", b"# rig 1\n% date\n"),
     Case("header_only.csv", b"time_s,pressure_bar,displacement_mm\n"),
-    Case("units_only.csv", b"time,pressure,displacement\ns,bar,mm\n", T, 2, "'s'"),
     Case("prose.txt", b"This is no table.\nIt only says so.\n", P),
-    Case("one_sample.csv", good().partition(b"0.1,")[0], names="1 sample"),
     Case("nine_samples.csv", b"\n".join(good().splitlines()[:10]), names="9 sample"),
     # Lines
     Case("short_line.csv", line(12, "1.0,2.0"), row=12, names="2 cells"),
-    Case("long_line.csv", line(13, "1.1,2.0,9.0,7"), row=13, names="4 cells"),
-    Case("cut_off.csv", good()[:-14], row=31),
     Case("short_header.csv", headers("time_s,pressure_bar"), row=2, names="3 cells"),
     Case("quote.csv", line(6, '"0.4,2.9,9.0'), row=6),
-    Case("decimal_commas.csv", line(3, "0,1,2,3,7,0"), row=3, names="6 cells"),
     Case("long.csv", line(3, "1" * 20_000_000), row=3, names="20000000"),
     # Columns
     Case("no_names.csv", good().partition(b"\n")[2], P, names="column_1"),
-    Case("other_names.csv", headers("time_s,a,b"), P, names="time_s, a, b"),
     Case("no_displacement.csv", csv(time_s=TIME, pressure_bar=PRESSURE), X),
-    Case("text_only.csv", csv(pressure=["high"] * N, displacement=["low"] * N), P, 2),
-    Case("text_column.csv", good(pressure_bar=["high"] * N), P, 2),
     Case("text_cell.csv", good(pressure_bar=put(PRESSURE, 8, "n.d.")), P, 10, "'n.d.'"),
-    Case("unit_in_cell.csv", good(displacement_mm=put(DISPLACEMENT, 3, "9 mm")), X, 5, "'9 mm'"),
     Case("hex_cell.csv", good(pressure_bar=put(PRESSURE, 0, "0x1F")), P, 2, "'0x1F'"),
     Case("two_pressures.csv", good(p_kPa=PRESSURE), P, names="'pressure_bar' and 'p_kPa'"),
-    Case("two_strokes.csv", good(**{"Stroke (mm)": DISPLACEMENT}), X, names="'Stroke (mm)'"),
-    Case("same_header.csv", headers("time_s,pressure_bar,pressure_bar"), P),
     Case("two_times.csv", good(t_ms=TIME), T, names="'time_s' and 't_ms'"),
     Case("no_such_column.csv", good(), P, names="'P9'", options={"columns": {"pressure": "P9"}}),
-    Case(
-        "mapped_text.csv",
-        good(branch=["up"] * N),
-        P,
-        2,
-        options={"columns": {"pressure": "branch"}},
-    ),
     # Units
     Case("unknown_unit.csv", headers("time_s,pressure [foo],displacement_mm"), P, names="'foo'"),
     Case("pressure_in_mm.csv", headers("time_s,pressure_mm,displacement_mm"), P, names="'mm'"),
-    Case("stroke_in_kg.csv", headers("time_s,p_bar,displacement (kg)"), X, names="'kg'"),
-    Case("time_in_volts.csv", headers("time (V),p_bar,displacement_mm"), T, names="'V'"),
-    Case(
-        "kilopascals.csv",
-        csv(pressure=[100 * p for p in PRESSURE], displacement_mm=DISPLACEMENT),
-        P,
-        names="bar",
-    ),
     Case("given_unit.csv", good(), P, names="'blub'", options={"units": {"pressure": "blub"}}),
-    Case("given_volts.csv", good(), P, names="'V'", options={"units": {"pressure": "V"}}),
     Case("unit_of_nothing.csv", good(), "force", options={"units": {"force": "N"}}),
     # Samples
     Case("nan.csv", good(pressure_bar=put(PRESSURE, 4, "NaN")), P, 6, "1 of 30"),
     Case("blank_cell.csv", good(displacement_mm=put(DISPLACEMENT, 9, "")), X, 11, "1 of 30"),
     Case("infinite.csv", good(pressure_bar=put(PRESSURE, 29, "-inf")), P, 31),
-    Case("overflow.csv", good(pressure_bar=put(PRESSURE, 2, "1e999")), P, 4),
-    Case("blank_column.csv", good(pressure_bar=[""] * N), P, 2),
     Case("constant.csv", good(pressure_bar=[2.5] * N), P, names="2.5"),
     # Time
     Case("no_instant.csv", good(time_s=put(TIME, 5, "")), T, 7),
-    Case("infinite_time.csv", good(time_s=put(TIME, 5, "inf")), T, 7),
     Case("repeated.csv", good(time_s=put(TIME, 5, 0.4)), T, 7, "0.4"),
-    Case("frozen_clock.csv", good(time_s=[0.0] * N), T, 3, "0"),
     Case("backwards.csv", good(time_s=put(TIME, 5, 0.05)), T, 7, "from 0.4 to 0.05"),
-    Case("clock_reset.csv", good(time_s=TIME[:20] + TIME[:10]), T, 22),
-    Case("clock_text.csv", good(time_s=["noon"] * N), T, 2, "'noon'"),
     Case("text_instant.csv", good(time_s=put(TIME, 7, "late")), T, 9, "'late'"),
     Case("gap.csv", gapped((12, 18), 60.0), T, 14, "58.9 s"),
     Case("gaps_only.csv", gapped((6,) * 5, 9.0), options={"gaps": "split"}),
     Case("long_gap.csv", gapped((15, 15), 1e6), T, options={"gaps": "interpolate"}),
     Case("zero_rate.csv", good(), options={"rate": 0}),
-    Case("negative_rate.csv", good(), names="-10", options={"rate": -10}),
     Case("no_rate.csv", good(), options={"rate": math.nan}),
-    Case("endless_rate.csv", good(), options={"rate": math.inf}),
     Case("other_rate.csv", good(), T, names="50", options={"rate": 50}),
     Case("policy.csv", good(), names="'ignore'", options={"gaps": "ignore"}),
     # Parquet
     Case("garbage.parquet", b"PAR1" + GARBAGE),
-    Case("text.parquet", good()),
-    Case("no_rows.parquet", parquet(pressure_bar=np.zeros(0))),
     Case(
         "null.parquet",
         parquet(pressure_bar=put(PRESSURE, 4, None), displacement_mm=DISPLACEMENT),
@@ -346,9 +281,7 @@ CASES: list[Case] = [
     Case("lists.parquet", parquet(pressure=[[1.0]] * N, displacement=DISPLACEMENT), P, 1),
     # MATLAB
     Case("garbage.mat", GARBAGE),
-    Case("text.mat", good()),
     Case("scalars.mat", mat(pressure=2.0, displacement=7.0)),
-    Case("strings.mat", mat(pressure="high")),
     Case("huge.mat", MAT[:144] + b"\xff\xff\xff\x7f" * 4 + MAT[160:]),
     Case(
         "nan.mat",
@@ -360,40 +293,26 @@ CASES: list[Case] = [
     ),
     Case("no_units.mat", mat(pressure=np.multiply(PRESSURE, 200)), X),
     # HDF5
-    Case("signature_only.h5", HDF5[:8]),
-    Case("text.h5", good()),
     Case("empty.h5", hdf5()),
     Case("images.hdf5", hdf5(pressure=np.zeros((9, 9)))),
     Case("huge.h5", hdf5(pressure_bar=(10**14,)), names="100000000000000"),
     Case("unequal.h5", hdf5(pressure_bar=PRESSURE, displacement_mm=DISPLACEMENT[:20]), X),
     Case("wrong_sum.h5", chunk(bytes(160) + b"\1\2\3\4", fletcher32=True)),
     Case("outside.h5", outside, names="'pressure_bar'"),
-    Case("outside.mat", outside, names="'pressure_bar'"),
     Case("virtual.h5", virtual, names="'pressure_bar'"),
     # TDMS
-    Case("garbage.tdms", b"TDSm" + GARBAGE),
     Case("cut_off.tdms", tdms()[:-5]),
-    Case("text.tdms", good()),
     Case("no_samples.tdms", tdms(n=0)),
     Case("two_clocks.tdms", tdms(increments=(0.1, 0.2))),
     # Spreadsheets
     Case("garbage.xlsx", b"PK\x03\x04" + GARBAGE),
-    Case("text.xlsx", good()),
-    Case("words.xlsx", xlsx(pressure=["high"] * N)),
-    Case("few.xlsx", xlsx(pressure_bar=PRESSURE[:8], displacement_mm=DISPLACEMENT[:8])),
-    Case("no_column.xlsx", xlsx(pressure_bar=PRESSURE), X),
     Case("blank.xlsx", xlsx(**sound(pressure_bar=put(PRESSURE, 4, None))), P, 6, "1 of 30"),
     Case("word.xlsx", xlsx(**sound(pressure_bar=put(PRESSURE, 4, "high"))), P, 6, "'high'"),
     Case("error.xlsx", xlsx(**sound(pressure_bar=put(PRESSURE, 4, "#DIV/0!"))), P, 6, "'#DIV/0!'"),
-    Case("backwards.xlsx", xlsx(**sound(time_s=put(TIME, 5, 0.05))), T, 7, "from 0.4 to 0.05"),
     Case("no_instant.xlsx", xlsx(**sound(time_s=put(TIME, 5, None))), T, 7),
     # Bags
     Case("garbage.mcap", b"\x89MCAP0\r\n" + GARBAGE),
-    Case("text.mcap", good()),
-    Case("text.bag", good()),
     Case("garbage.bag", b"#ROSBAG V2.0\n" + GARBAGE),
-    Case("text.db3", good()),
-    Case("garbage.db3", b"SQLite format 3\0" + GARBAGE),
     Case("no_topic.mcap", MCAP, P, names="/rig/pressure"),
     Case(
         "no_column.db3",
@@ -401,13 +320,6 @@ CASES: list[Case] = [
         "force",
         names="'/scale/data'",
         options={"columns": {"force": "/scale/data"}},
-    ),
-    # Descriptions of the folder
-    Case(
-        "no_described.csv",
-        described("[channels.pressure]\ncolumn = 'A0'"),
-        P,
-        names="no column 'A0'",
     ),
 ]
 

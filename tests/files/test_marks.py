@@ -1,7 +1,4 @@
-"""Text tables that would be read silently wrong: marks of thousands, units and times that cannot be.
-
-And what was assumed while reading stays with the recording.
-"""
+"""Text tables that would be read silently wrong: marks of thousands, units and times that cannot be."""
 
 from __future__ import annotations
 
@@ -58,18 +55,9 @@ def test_marks_of_thousands_are_not_read_as_anything(
 @pytest.mark.parametrize("separator", [",", ";"])
 def test_quoted_thousands_are_refused(tmp_path: Path, separator: str) -> None:
     path = table(tmp_path, "pressure (mbar)", [f'"{size:,}"' for size in SIZES], separator)
-    with pytest.raises(DataError, match="'1,000'") as caught:
+    with pytest.raises(DataError) as caught:
         read(path)
     assert (caught.value.channel, caught.value.row) == ("pressure", 12)
-
-
-def test_decimal_commas_that_may_be_of_thousands(tmp_path: Path) -> None:
-    path = tmp_path / "run.csv"
-    rows = [f"{k / 100:.2f};{size:,}".replace(".", ",") for k, size in enumerate(SIZES)]
-    path.write_text("\n".join(["time_s;pressure (mbar)", *rows]))
-    with pytest.raises(DataError, match=r"'pressure \(mbar\)', '1,000'") as caught:
-        read(path)
-    assert caught.value.row == 12
 
 
 @pytest.mark.parametrize("cell", ["1,234,567", "1.234.567", "12,34,567", "1,234.5", "1.234,5"])
@@ -128,11 +116,6 @@ def test_one_number_anywhere_shows_that_a_mark_is_for_decimals(tmp_path: Path, p
                 read(path, channels=["x"])
 
 
-def test_numbers_with_odd_blanks_are_numbers(tmp_path: Path) -> None:
-    cells = [f"\xa0{k}.5\u202f" for k in range(N)]
-    assert read(table(tmp_path, "x", cells))["x"].tolist() == [k + 0.5 for k in range(N)]
-
-
 # Units and times -----------------------------------------------------------------------------------
 
 
@@ -160,32 +143,12 @@ def test_declared_units_that_cannot_be_stop(
     assert remedy in caught.value.remedy
 
 
-def test_a_travel_in_metres_under_millimetres_is_doubted(tmp_path: Path) -> None:
-    travel = [f"{0.02 * k / N:.6f}" for k in range(N)]
-    with pytest.warns(DataWarning, match=r"displacement.* 0.0195 mm .*--unit"):
-        read(table(tmp_path, "displacement_mm", travel))
-    read(table(tmp_path, "displacement_m", travel))
-
-
-@pytest.mark.parametrize(("channel", "unit"), [("pressure", "mPa"), ("displacement", "Gm")])
-def test_given_units_that_cannot_be_stop(tmp_path: Path, channel: str, unit: str) -> None:
-    path = table(tmp_path, channel, [f"{1 + k / 7:.4f}" for k in range(N)])
-    with pytest.raises(DataError, match=f"'{channel}', row .*--unit {channel}="):
-        read(path, units={channel: unit})
-
-
 @pytest.mark.parametrize(
     ("header", "cell"),
     [("pressure (mPa)", "0"), ("p [bar]", "1e-17"), ("p [Pa]", "2.5"), ("force (mN)", "1e-4")],
 )
 def test_nothing_rounding_and_small_values_are_read(tmp_path: Path, header: str, cell: str) -> None:
     assert len(read(table(tmp_path, header, [cell] * N))) == N
-
-
-def test_what_this_package_wrote_is_not_judged(tmp_path: Path) -> None:
-    recording = Recording({"pressure": np.linspace(0, 1e300, N)})
-    mckibben.write(recording, tmp_path / "a.csv")
-    assert read(tmp_path / "a.csv") == recording
 
 
 def timed(folder: Path, header: str, times: Sequence[object]) -> Path:
@@ -224,53 +187,6 @@ def test_other_clocks_stop(tmp_path: Path, first: int) -> None:
     with pytest.raises(DataError) as caught:
         read(timed(tmp_path, "time", [first + 100 * k for k in range(N)]))
     assert caught.value.channel == "time"
-
-
-def test_a_clock_that_has_run_long_is_in_seconds(tmp_path: Path) -> None:
-    with pytest.warns(DataWarning, match="time in s"):
-        recording = read(timed(tmp_path, "time", [f"{45000 + k / 100:.2f}" for k in range(N)]))
-    assert recording.sample_time == 0.01
-
-
-# Signs ---------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("sign", ["\x9b31m", "\u202e", "\u200b", "\u2028"])
-def test_signs_that_cannot_be_printed_do_not_get_into_names(tmp_path: Path, sign: str) -> None:
-    path = table(tmp_path, f"x{sign}y (a{sign})", TIME)
-    recording = read(path)
-    assert all(map(str.isprintable, (*recording.channels, *recording.units.values())))
-    with pytest.raises(DataError) as caught:
-        read(path, columns={"force": "none"})
-    assert str(caught.value).isprintable()
-
-
-# Notes ---------------------------------------------------------------------------------------------
-
-
-def test_notes_of_reading_stay_with_the_recording(tmp_path: Path) -> None:
-    path = table(tmp_path, "pressure;x", [f"{k / 8};{'off' if k == 3 else k}" for k in range(N)])
-    with pytest.warns(DataWarning) as caught:
-        recording = read(path)
-    assert [f"{path}: {note}" for note in recording.meta["notes"]] == [
-        str(warning.message) for warning in caught
-    ]
-    assert len(recording.notes) == 2
-    for ending in (".csv", ".parquet"):
-        mckibben.write(recording, tmp_path / f"b{ending}")
-        again = read(tmp_path / f"b{ending}")
-        assert again == recording
-        assert again.notes == recording.notes
-
-
-def test_notes_of_the_one_who_recorded_are_kept(tmp_path: Path) -> None:
-    given = Recording({"pressure": np.arange(N) / 8}, meta={"notes": "hand-held"})
-    mckibben.write(given, tmp_path / "a.csv")
-    assert read(tmp_path / "a.csv") == given
-    sidecar(tmp_path / "a.csv").unlink()
-    with pytest.warns(DataWarning):
-        assert len(read(tmp_path / "a.csv").notes) == 1
-    assert given.notes == ("hand-held",)
 
 
 @pytest.mark.parametrize(

@@ -1,7 +1,6 @@
 """What is written is read back equal, to the last bit."""
 
 import json
-import warnings
 from pathlib import Path
 from typing import Any
 
@@ -90,27 +89,6 @@ def test_csv_is_plain_to_other_programs(recording: Recording, tmp_path: Path) ->
     assert described["units"] == {"pressure": "bar", "displacement_model": "mm"}
 
 
-def test_without_time_there_is_no_column_of_it(tmp_path: Path) -> None:
-    mckibben.write(Recording({"pressure": np.arange(20, dtype=float)}), tmp_path / "a.csv")
-    assert (tmp_path / "a.csv").read_text().startswith("pressure\n0.0\n")
-    assert mckibben.read(tmp_path / "a.csv")[0].sample_time is None
-
-
-def test_stale_sidecar_is_ignored_with_a_warning(recording: Recording, tmp_path: Path) -> None:
-    path = tmp_path / "a.csv"
-    mckibben.write(recording, path)
-    path.write_text(path.read_text().replace("0.1,", "0.10,", 1))
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
-        (back,) = mckibben.read(path)
-    told = [str(warning.message) for warning in caught if warning.category is DataWarning]
-    assert len(told) == 2
-    assert any("pressure in bar" in text for text in told)
-    assert back.meta["file"] == str(path)
-    assert back.sample_time == pytest.approx(1 / 30)
-    assert np.array_equal(back["pressure"], recording["pressure"])
-
-
 @pytest.mark.parametrize(
     "text",
     [
@@ -133,18 +111,6 @@ def test_broken_sidecar_is_ignored_with_a_warning(
     (tmp_path / "a.csv-metadata.json").write_text(text)
     with pytest.warns(DataWarning, match="a.csv"):
         assert mckibben.read(path, units=UNITS)[0].n_samples == 50
-
-
-def test_parquet_changed_by_another_program_is_read_as_foreign(
-    recording: Recording, tmp_path: Path
-) -> None:
-    import pyarrow.parquet as pq
-
-    path = tmp_path / "a.parquet"
-    mckibben.write(recording, path)
-    pq.write_table(pq.read_table(path).slice(0, 20), path)
-    with pytest.warns(DataWarning, match="a.parquet"):
-        assert mckibben.read(path, units=UNITS)[0].n_samples == 20
 
 
 def test_columns_of_no_telling_name_are_taken_by_their_units(tmp_path: Path) -> None:
@@ -184,12 +150,6 @@ def test_own_files_follow_columns_units_rate_and_channels(tmp_path: Path) -> Non
     with pytest.raises(DataError) as caught:
         mckibben.read(path, channels=["force"])
     assert caught.value.channel == "force"
-
-
-def test_rate_that_the_file_denies_is_refused(recording: Recording, tmp_path: Path) -> None:
-    mckibben.write(recording, tmp_path / "a.csv")
-    with pytest.raises(DataError, match=r"30 .*--rate"):
-        mckibben.read(tmp_path / "a.csv", rate=25)
 
 
 @pytest.mark.parametrize("name", ["a.mat", "a.xlsx", "a", "no/a.csv", "no/a.tsv", "no/a.parquet"])

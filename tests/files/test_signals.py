@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -43,29 +42,6 @@ def test_files_named_as_channels_are_one_recording(tmp_path: Path) -> None:
     assert roles(tmp_path) == {"train": [tmp_path]}
 
 
-def test_headers_may_tell_instead_of_names(tmp_path: Path) -> None:
-    put(tmp_path / "a.csv", {"t_ms": 1000 * T, "p_bar": P})
-    put(tmp_path / "b.csv", {"t_ms": 1000 * T, "stroke_mm": X})
-    assert set(one(tmp_path).channels) == {"pressure", "displacement"}
-
-
-def test_one_column_each(tmp_path: Path) -> None:
-    put(tmp_path / "pressure_bar.csv", {"value": P})
-    put(tmp_path / "displacement_mm.csv", {"value": X})
-    recording = one(tmp_path, rate=50)
-    assert recording.sample_time == 0.02
-    assert recording["displacement"].tolist() == X.tolist()
-
-
-def test_mat_files(tmp_path: Path) -> None:
-    from scipy.io import savemat
-
-    savemat(tmp_path / "pressure.mat", {"u": P})
-    savemat(tmp_path / "displacement.mat", {"y": X})
-    recording = one(tmp_path, units={"pressure": "bar", "displacement": "mm"}, rate=50)
-    assert recording["pressure"].tolist() == P.tolist()
-
-
 def test_clocks_of_their_own_become_the_slowest(tmp_path: Path) -> None:
     slow = T[::5] + 0.003
     put(tmp_path / "pressure_bar.csv", {"time_s": T, "value": 5 * T})
@@ -80,19 +56,6 @@ def test_clocks_of_their_own_become_the_slowest(tmp_path: Path) -> None:
         assert one(tmp_path, rate=100).sample_time == pytest.approx(0.01)
 
 
-def test_times_may_be_called_otherwise(tmp_path: Path) -> None:
-    put(tmp_path / "pressure_bar.csv", {"stamp_ms": 1000 * T, "value": 5 * T})
-    put(tmp_path / "displacement_mm.csv", {"stamp_ms": 1000 * T[::2], "value": T[::2]})
-    with pytest.raises(DataError) as caught:
-        mckibben.read(tmp_path, channels=["displacement"])
-    assert caught.value.channel == "displacement"
-    (tmp_path / NAME).write_text('[time]\ncolumn = "stamp"\n')
-    with pytest.warns(DataWarning, match="'displacement'"):
-        recording = one(tmp_path)
-    assert recording.sample_time == pytest.approx(0.04)
-    assert recording["pressure"] == pytest.approx(5 * recording.time)
-
-
 def test_a_gap_of_the_faster_channel_is_not_bridged_unasked(tmp_path: Path) -> None:
     kept = np.delete(np.arange(N), np.arange(20, 40))
     put(tmp_path / "pressure_bar.csv", {"time_s": T[kept], "value": P[kept]})
@@ -105,19 +68,6 @@ def test_a_gap_of_the_faster_channel_is_not_bridged_unasked(tmp_path: Path) -> N
         pytest.warns(DataWarning, match=": 10 "),
     ):
         assert one(tmp_path, gaps="interpolate").n_samples == 30
-
-
-def test_recordings_of_several_channels_are_several(tmp_path: Path) -> None:
-    for name in ("run1", "run2"):
-        put(tmp_path / f"{name}.csv", {"time_s": T, "pressure_bar": P, "displacement_mm": X})
-    assert [recording.name for recording in mckibben.read(tmp_path)] == ["run1", "run2"]
-    assert len(roles(tmp_path)["train"]) == 2
-
-
-def test_recordings_of_one_channel_are_several(tmp_path: Path) -> None:
-    for name in ("reference1", "reference2"):
-        put(tmp_path / f"{name}.csv", {"time_s": T, "displacement_mm": X})
-    assert len(mckibben.read(tmp_path)) == 2
 
 
 @pytest.mark.parametrize(
@@ -135,18 +85,6 @@ def test_what_cannot_be_told_is_asked(tmp_path: Path, headers: dict[str, str]) -
         mckibben.read(tmp_path)
     with pytest.raises(DataError, match=r"join = \["):
         roles(tmp_path)
-
-
-@pytest.mark.parametrize(("rate", "step"), [(50.0, 0.02), (25.0, None)])
-def test_a_scalar_in_all_files_tells_the_sample_time(
-    tmp_path: Path, rate: float, step: float | None
-) -> None:
-    from scipy.io import savemat
-
-    savemat(tmp_path / "pressure_bar.mat", {"value": P, "fs": 50.0})
-    savemat(tmp_path / "displacement_mm.mat", {"value": X, "fs": rate})
-    with nullcontext() if step is None else pytest.warns(DataWarning, match="fs = 50 is taken"):
-        assert one(tmp_path).sample_time == step
 
 
 def test_join_tells_which_belong_together(tmp_path: Path) -> None:

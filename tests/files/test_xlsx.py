@@ -55,27 +55,6 @@ def test_numbers_are_read_to_the_last_bit(tmp_path: Path) -> None:
     check(recording)
 
 
-def test_numbers_that_text_would_make_doubtful_are_not(tmp_path: Path) -> None:
-    rows = [
-        ["time_s", "pressure_bar", "position_mm"],
-        *([t, 1.234 + k % 3, 2] for k, t in enumerate(T)),
-    ]
-    assert one(book(tmp_path / "a.xlsx", Data=rows))["pressure"][1] == 2.234
-
-
-def test_titles_blank_rows_and_units_of_their_own(tmp_path: Path) -> None:
-    rows: Rows = [
-        ["Muscle 7, load 2 kg"],
-        [],
-        ["t", "Druck", None, "Weg", "note"],
-        ["s", "kPa", None, "cm", None],
-        *([t, 100 * p, None, x / 10, "ok"] for t, p, x in zip(T, P, X, strict=True)),
-    ]
-    recording = one(book(tmp_path / "a.xlsx", Data=rows))
-    check(recording)
-    assert recording.meta["ignored_columns"] == ["note"]
-
-
 @pytest.mark.parametrize(
     "instant",
     [

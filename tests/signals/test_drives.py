@@ -60,8 +60,9 @@ def test_words_make_the_signal_that_numbers_make(name: str) -> None:
 @pytest.mark.parametrize("name", names("signals"))
 def test_numbers_seeds_and_times_that_are_none_are_refused(name: str) -> None:
     settings = settings_of(name)
-    wrong: dict[str, tuple[str, ...]]
-    wrong = {key: ("nan", "inf", "-inf") for key, (kind, _) in settings.items() if kind == "number"}
+    wrong: dict[str, tuple[str, ...]] = {
+        key: ("nan", "inf", "-inf") for key, (kind, _) in settings.items() if kind == "number"
+    }
     if "seed" in settings and name != "multisine":
         wrong["seed"] = ("-1",)
     for key, values in wrong.items():
@@ -106,3 +107,13 @@ def test_settings_are_listed_and_checked() -> None:
             build(name, TIME, **settings)
     with pytest.raises(DataError):  # before it begins
         build("triangle", TIME - 1.0, **SETTINGS["triangle"])
+
+
+def test_binary_steps_are_a_maximum_length_sequence() -> None:
+    period = 2**REGISTER_BITS - 1
+    bits = binary_steps(np.arange(2 * period) + 0.5, 1.0, seed=3)
+    assert np.array_equal(bits[:period], bits[period:])
+    assert bits[:period].sum() == (period + 1) / 2  # one more high than low
+    signs = 2 * bits[:period] - 1
+    other = np.fft.ifft(np.abs(np.fft.fft(signs)) ** 2).real
+    assert other[1:] == pytest.approx(-1.0, abs=1e-6)

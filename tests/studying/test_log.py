@@ -18,6 +18,7 @@ from mckibben.files import write
 from mckibben.files.headers import channel_of, parse
 from mckibben.studying.refitting import Refit
 from mckibben.studying.reviewing import Followed
+from mckibben.studying.shifts import dead_time, lagged, shifted
 from tests.cli.conftest import Cli
 from tests.cli.conftest import cli as cli  # a fixture
 from tests.studying.plants import Faulty
@@ -80,6 +81,15 @@ def test_no_delay_is_certain_where_there_is_none() -> None:
         found = review(logged(seed, noise=0.05)[0], model=MUSCLE, refit=False)
         certain += any(d.certain for d in (*found.delays, *found.outputs[0].delays))
     assert certain <= 1  # in 5 % of the logs
+
+
+def test_a_lag_is_no_dead_time() -> None:
+    wanted = reference(0)["displacement"]
+    late, half, lag = dead_time(wanted, lagged(wanted, 6.0), STEP)
+    assert late - half <= 0.01
+    assert lag == pytest.approx(6.0, abs=0.3)
+    late, half, _ = dead_time(wanted, shifted(wanted, 6.0), STEP)
+    assert abs(late - 6) <= half + 0.05
 
 
 def test_a_refit_is_recommended_where_the_muscle_changed_and_only_there() -> None:

@@ -7,8 +7,6 @@ from scipy.optimize import least_squares
 
 from mckibben import Recording
 from mckibben.arrays import Array
-from mckibben.blocks.core.fields import Channel
-from mckibben.blocks.coupled.coupling import Coupling
 from mckibben.blocks.dynamic.process_model import ProcessModel
 from mckibben.blocks.dynamic.transfer_function import TransferFunction
 from mckibben.blocks.play_type.play import Play
@@ -48,27 +46,6 @@ def test_play_answers_as_the_closed_form_says() -> None:
     assert found.measured_gain.size >= 5
     np.testing.assert_allclose(found.measured_gain, found.modelled_gain, rtol=1e-12)
     np.testing.assert_allclose(found.measured_angle, found.modelled_angle, atol=1e-9)
-
-
-def test_cycles_while_another_input_moves_are_left_out() -> None:
-    driven = tuple(Channel(f"pressure_{k}", "bar") for k in (1, 2))
-    given = tuple(Channel(f"displacement_{k}", "mm") for k in (1, 2))
-    block = Coupling(((2.0, 0.5), (0.3, 1.5)), driven, given)
-    one, other = swung((1.0, 1.0, 1.0)), swung((1.0, 2.0, 1.0), 171)
-    alone = np.column_stack([np.append(one, 0 * other), np.append(0 * one, other)])
-    both = np.column_stack([one, np.resize(other, one.size)])
-    units = {c.name: c.unit for c in (*driven, *given)}
-
-    def recorded(u: Array) -> Recording:
-        y = np.asarray(block.simulate(u))
-        return Recording(dict(zip(units, np.hstack([u, y]).T, strict=True)), STEP, units=units)
-
-    apart = describing_functions(block, [recorded(alone)])
-    assert [one.measured_gain.size > 0 for one in apart] == [True, True]
-    np.testing.assert_allclose(apart[0].measured_gain, 2.0)
-    np.testing.assert_allclose(apart[1].measured_gain, 1.5)
-    together = describing_functions(block, [recorded(both)])
-    assert "pressure_2" in together[0].said
 
 
 def test_a_process_model_answers_as_its_formula_says() -> None:

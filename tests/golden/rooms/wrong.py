@@ -1,0 +1,334 @@
+"""What is wrong today: right values, each expected to fail until the issue that mends it."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Callable, Iterator, Mapping
+from functools import partial
+from pathlib import Path
+from typing import Any, get_type_hints
+from unittest.mock import patch
+
+import numpy as np
+
+import mckibben
+from mckibben import MckibbenError, Recording, registry
+from mckibben.control import track
+from mckibben.link import Device, Port, State
+from tests.golden.case import SHARED, Case, Tree
+from tests.golden.commands import answered, call
+from tests.golden.plants import STEP, Array, cycles, noise, play, runs
+from tests.golden.rooms.commands import MODEL
+
+SCALED = ("balance", "bouc-wen", "cpi", "duhem", "gpi", "kp", "mpi")
+QUICK = {"n_operators": 4, "n_starts": 4, "n_refined": 1, "n_levels": 5, "n_stops": 3, "n_lags": 1}
+NANO = 1e-6
+
+CACHED = "simulate pi.json test.csv -o out.csv --force"
+DAMAGES: Mapping[str, float] = {"emptied": 0.0, "cut off": 0.5}
+"""How cached kernels are damaged -> the share of every file that is left."""
+
+
+def zeroing(folder: Path) -> Tree:
+    """Two recordings that never rest and begin on different branches: no zero has to be moved."""
+    del folder
+    fallen = np.concatenate([np.linspace(5.0, 1.2, 60), 1.0 + cycles(1.2, n=240)])
+    rise = 3.0 - 2.0 * np.cos(np.linspace(0.0, np.pi, 100))
+    risen = np.concatenate([rise, 5.0 - cycles(2.0, run=1, n=200)])
+    apart = []
+    for k, (p, start) in enumerate(((fallen, 60), (risen, 0))):
+        y = 3.0 * play(p, 1.2) + p + noise(k, 0.01, len(p))
+        channels = {"pressure": p[start:].copy(), "displacement": y[start:].copy()}
+        apart.append(Recording(channels, STEP))
+    board = mckibben.compare(apart, models=("pi", "mpi"), jobs=1)
+    text = json.dumps(board.to_dict()) + board.apart
+    return {"told to move the zero": "--zero" in text or "zeroed" in text}
+
+
+def scaled(model: str, folder: Path) -> Tree:
+    """The error of a fit, relative to the output's unit, where the output is a million times smaller."""
+    del folder
+    errors = []
+    for scale in (1.0, NANO):
+        estimator = registry.load("estimators", model)()
+        known = estimator.get_params()
+        estimator.set_params(**{key: value for key, value in QUICK.items() if key in known})
+        smaller = [
+            run.with_channels(displacement=scale * run["displacement"]) for run in _loops_in_steps()
+        ]
+        errors.append(estimator.fit(smaller).diagnostics_.rmse / scale)
+    return {"error over that in mm": errors[1] / errors[0]}
+
+
+def _loops_in_steps() -> list[Recording]:
+    """Two play operators under triangles, with noise, as of a piezo stage."""
+    t = np.arange(0, 30, STEP)
+    p = 3 - 3 * np.abs(2 * ((t / 10) % 1) - 1)
+    y = 4 * play(p, 0.3) + 2 * play(p, 0.8) + noise(0, 0.02, len(p))
+    return [Recording({"pressure": p, "displacement": y}, STEP)]
+
+
+def small_black_box(folder: Path) -> Tree:
+    """A network of states that is better by cross-validation is chosen."""
+    del folder
+    settings = {"state-network": {"n_states": 3, "n_units": 2, "n_steps": 60, "substeps": 1}}
+    board = mckibben.compare(
+        runs("shaken"),
+        inputs="force",
+        outputs="displacement",
+        models=("state-network", "p2uz"),
+        settings=settings,
+        jobs=1,
+    ).to_dict()
+    errors = {row["model"]: row["validation_rmse"] for row in board["rows"]}
+    least = min(errors["state-network"], errors["p2uz"])
+    return {"network is better": errors["state-network"] == least, "chosen": board["chosen"]}
+
+
+def black_box(folder: Path) -> Tree:
+    """The same on the Bouc-Wen benchmark."""
+    words = ("measured", SHARED, "--only", "bouc_wen_benchmark", "--models", "state-network,p2uz")
+    boards = answered(*words, "--jobs", 1, "-o", folder / "out")
+    return {"chosen": sorted({str(board["chosen"]) for board in boards.values()})}
+
+
+def damper(folder: Path) -> Tree:
+    """Force that follows the sign of the velocity passes half of its range at every displacement."""
+    t = np.arange(0, 15, 0.01)
+    sizes = np.interp(t, np.arange(0, 16), np.random.default_rng(1).uniform(3, 9, 16))
+    x = 8 + sizes * np.sin(2 * np.pi * 0.9 * t)
+    force = 800 * np.tanh(np.gradient(x, t) / 15) + 95
+    mckibben.write(Recording({"displacement": x, "force": force}, 0.01), folder / "damper.csv")
+    words = ("characterize", "damper.csv", "--input", "displacement", "--output", "force")
+    return {"onset": answered(*words, folder=folder)["onset"]}
+
+
+def seal(folder: Path) -> Tree:
+    """Friction of a seal has two levels by direction, and no inverse by displacement."""
+    (folder / "seal.csv").write_bytes(
+        (SHARED / "foreign_friction" / "seal_circle_2bar.csv").read_bytes()
+    )
+    columns = {"time": (1, "ms"), "pressure": (6, "bar"), "displacement": (5, "mm")}
+    words = ["study", "seal.csv", "--input", "displacement", "--output", "force"]
+    for name, (column, unit) in (columns | {"force": (7, "N")}).items():
+        words += ["--column", f"{name}=column_{column}", "--unit", f"{name}={unit}"]
+    words += ["--models", "bouc-wen,maxwell-slip", "--jobs", "1", "-o", "out"]
+    return {"inverse": answered(*words, folder=folder)["inverse"]}
+
+
+def contraction(folder: Path) -> Tree:
+    """A compensator that wants a contraction is given one, or refused, where a reference is in mm."""
+    del folder
+    rig, length = mckibben.load_rig("mckibben-530"), 530.0
+    t = np.arange(0, 40, 0.05)
+    p = 1.8 - 1.2 * np.cos(0.8 * t) - 0.4 * np.cos(0.31 * t)
+    given = Recording({"pressure": p, "force": np.full(t.size, 100.0)}, 0.05)
+    measured = rig.run(given)
+    known = measured.with_channels(
+        {"contraction": ""}, contraction=measured["displacement"] / length
+    )
+    model = registry.load("estimators", "activation-memory")().fit(known).model_
+    wanted = Recording(
+        {"displacement": measured["displacement"][200:500], "force": np.full(300, 100.0)}, 0.05
+    )
+    try:
+        off = track(model, rig, wanted, approach=5.0).rmse["displacement"]
+    except MckibbenError:
+        off = 0.0
+    return {"off in mm, 0 where refused": off}
+
+
+def constants(folder: Path) -> Tree:
+    """Numbers that are fixed are no parameters."""
+    del folder
+    counted = []
+    for free in (True, False):
+        estimator = registry.load("estimators", "mpi-narmax")(
+            input=("pressure",),
+            output=("displacement",),
+            scheduling=("force",),
+            constants=free,
+            method="ls",
+        )
+        counted.append(estimator.fit(runs("lifted")).model_.n_parameters)
+    return {"constants counted": counted[0] - counted[1]}
+
+
+def module(folder: Path) -> Tree:
+    """The package runs as a module."""
+    return {"code": _apart(folder, "-m", "mckibben", "--version").returncode}
+
+
+def damaged(folder: Path) -> Tree:
+    """Compiled kernels that are damaged stop no command: they are compiled anew."""
+    cache = folder / "cache"
+    cache.mkdir(mode=0o700)
+    mckibben.PI((0.0, 0.5), (2.0, 1.0)).save(folder / "pi.json")
+    mckibben.write(runs("muscle")[0], folder / "test.csv")
+    command = ("-c", "from mckibben.cli.main import run; run()", *CACHED.split())
+    codes = {"first": _apart(folder, *command, NUMBA_CACHE_DIR=str(cache)).returncode}
+    kernels = {
+        path: path.read_bytes() for path in cache.rglob("*") if path.suffix in (".nbi", ".nbc")
+    }
+    for how, share in DAMAGES.items():
+        for path, content in kernels.items():
+            path.write_bytes(content[: int(share * len(content))])
+        codes[how] = _apart(folder, *command, NUMBA_CACHE_DIR=str(cache)).returncode
+    return {"kernels": bool(kernels), "codes": codes}
+
+
+def _apart(folder: Path, *words: str, **variables: str) -> subprocess.CompletedProcess[bytes]:
+    command = [sys.executable, *words]
+    return subprocess.run(
+        command, cwd=folder, env=os.environ | variables, capture_output=True, check=False
+    )
+
+
+def studied_again(folder: Path) -> Tree:
+    """What a study has written stays until the next one has something better."""
+    for name, recording in zip(("train", "test"), runs("muscle"), strict=True):
+        mckibben.write(recording, folder / f"{name}.csv")
+    words = ("study", "train.csv", "--test", "test.csv", "--models", "pi", "--jobs", 1, "-o", "out")
+    first = call(*words, folder=folder)
+    before = {path.name: path.read_bytes() for path in (folder / "out").glob("*.*")}
+
+    def stopped(*given: Any, **named: Any) -> None:
+        raise KeyboardInterrupt
+
+    with patch.object(mckibben.PIEstimator, "fit", stopped):
+        call(*words, "--force", "--set", "n_operators=4", folder=folder)
+    after = {path.name: path.read_bytes() for path in (folder / "out").glob("*.*")}
+    return {
+        "first": first.code,
+        "lost": sorted(name for name in before if name not in after),
+        "board is as before": before["leaderboard.json"] == after.get("leaderboard.json"),
+    }
+
+
+def arrays(folder: Path) -> Tree:
+    """Arrays where recordings are wanted are refused with the name of what makes one of them."""
+    del folder
+    p = cycles(5.0)
+    attempts: dict[str, Callable[[], Any]] = {
+        "compare": lambda: mckibben.compare(np.column_stack([p, p])),
+        "fit": lambda: mckibben.GPIEstimator().fit(np.column_stack([p, p])),
+        "characterize": lambda: mckibben.characterize(np.column_stack([p, p])),
+    }
+    found: dict[str, Tree] = {}
+    for name, attempt in attempts.items():
+        try:
+            attempt()
+        except Exception as error:  # whatever it is today
+            told = isinstance(error, MckibbenError) and "mckibben.Recording" in str(error)
+            found[name] = told
+        else:
+            found[name] = False
+    return found
+
+
+def perfect(folder: Path) -> Tree:
+    """The log of a loop without any error is reviewed like another."""
+    (folder / "model.json").write_text(json.dumps(MODEL))
+    mckibben.write(runs("muscle")[1], folder / "wanted.csv")
+    codes = [
+        call(*words.split(), folder=folder).code
+        for words in (
+            "invert model.json -o inverse.json",
+            "track inverse.json --plant model.json --reference wanted.csv -o log.csv",
+            "study log.csv --compensator inverse.json --models pi --jobs 1 -o review",
+        )
+    ]
+    return {"codes": codes}
+
+
+class Device32:
+    """A device whose counter of steps goes round while it is recorded."""
+
+    def __init__(self, *given: Any, **named: Any) -> None:
+        port = partial(Port, low=0.0, high=6.0, safe=0.0)
+        self.device = Device(
+            fingerprint="0123456789abcdef",
+            period=0.01,
+            silence=50,
+            kind=np.dtype(np.float64),
+            n_coefficients=0,
+            n_memory=0,
+            inputs=(port(name="displacement", unit="mm"),),
+            outputs=(port(name="pressure", unit="bar"),),
+            n_missable=0,
+        )
+        self._told = False
+
+    def __enter__(self) -> Device32:
+        return self
+
+    def __exit__(self, *given: object) -> None:
+        pass
+
+    def state(self, steps: int = 0) -> State:
+        notes = get_type_hints(State)["notes"](1)
+        return State(notes, steps, np.array([3.0]), np.array([12.0]))
+
+    def set(self, inputs: Array) -> State:
+        return self.state()
+
+    def stream(self, every: int) -> None:
+        pass
+
+    def keep(self) -> None:
+        pass
+
+    def samples(self, timeout: float = 0.0) -> list[State]:
+        if self._told:
+            return []
+        self._told = True
+        return [self.state((2**32 - 5 + k) % 2**32) for k in range(10)]
+
+
+def counter(folder: Path) -> Tree:
+    """A recording goes on where a device's counter of steps goes round."""
+    words = ("link", "/dev/nothing", "--set", "displacement=12", "--seconds", "0.05")
+    with patch("mckibben.link.Link", Device32):
+        result = call(*words, "-o", folder / "device.csv")
+    if result.code or not (folder / "device.csv").exists():
+        return {"code": result.code, "n_samples": 0}
+    (found,) = mckibben.read(folder / "device.csv")
+    return {"code": result.code, "n_samples": len(found)}
+
+
+CASES: Mapping[str, tuple[str, Callable[[Path], Tree], Mapping[str, Any]]] = {
+    "zeroing": ("mckibben.compare(two runs that never rest)", zeroing, {}),
+    **{
+        f"scale/{model}": (
+            f"estimators[{model!r}].fit, output in mm and times 1e-6",
+            partial(scaled, model),
+            {"tolerances": {"*": 0.005}},
+        )
+        for model in SCALED
+    },
+    "state-network": ("mckibben.compare, a network beside p2uz", small_black_box, {}),
+    "state-network-benchmark": (
+        "mckibben measured, a network beside p2uz",
+        black_box,
+        {"needs": ("bouc_wen_benchmark",), "slow": True},
+    ),
+    "damper": ("mckibben characterize damper.csv", damper, {}),
+    "seal": ("mckibben study seal.csv", seal, {"needs": ("foreign_friction",)}),
+    "contraction": ("track(compensator of contraction, rig, mm)", contraction, {}),
+    "constants": ("n_parameters of mpi-narmax", constants, {}),
+    "module": ("python -m mckibben --version", module, {}),
+    "damaged-cache": (f"mckibben {CACHED}", damaged, {}),
+    "studied-again": ("mckibben study, stopped the second time", studied_again, {}),
+    "arrays": ("mckibben.compare(array)", arrays, {}),
+    "perfect-log": ("mckibben study log.csv --compensator inverse.json", perfect, {}),
+    "step-counter": ("mckibben link -o device.csv", counter, {}),
+}
+
+
+def cases() -> Iterator[Case]:
+    """Yield what is wrong."""
+    for name, (said, run, options) in CASES.items():
+        yield Case(f"wrong/{name}", said, run, **options)

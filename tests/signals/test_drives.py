@@ -9,10 +9,8 @@ import pytest
 
 from mckibben import DataError, ModelError
 from mckibben.registry import names
-from mckibben.signals import (
-    build,
-    settings_of,
-)
+from mckibben.signals import binary_steps, build, settings_of
+from mckibben.signals.steps import REGISTER_BITS
 
 TIME = np.arange(6000) / 100
 SETTINGS: dict[str, dict[str, Any]] = {

@@ -82,17 +82,17 @@ def test_names_of_no_rig_are_refused(tmp_path: Path) -> None:
         save_rig(load_rig("rail"), tmp_path / "rail.json")
 
 
+SHEET = {
+    "diameter": 20.0,
+    "length": 300.0,
+    "max_pressure": 6.0,
+    "max_force": 1500.0,
+    "max_contraction": 0.25,
+}
+
+
 def test_a_data_sheet_makes_a_rig_with_its_numbers() -> None:
-    rig = rig_from_data_sheet(
-        name="dmsp-20",
-        diameter=20.0,
-        length=300.0,
-        max_pressure=6.0,
-        max_force=1500.0,
-        max_contraction=0.25,
-        payload=5.0,
-        loop_width=0.2,
-    )
+    rig = rig_from_data_sheet(name="dmsp-20", payload=5.0, loop_width=0.2, **SHEET)
     assert _loop_width(rig) == pytest.approx(0.2, abs=0.005)
     muscle = rig.muscle.record()[0]
     at_rest = 0.1 * 6.0 * muscle["area"] * (muscle["a"] - muscle["b"])
@@ -110,12 +110,5 @@ def test_a_data_sheet_makes_a_rig_with_its_numbers() -> None:
     ],
 )
 def test_numbers_that_no_muscle_has_are_refused(change: dict[str, float]) -> None:
-    sheet = {
-        "diameter": 20.0,
-        "length": 200.0,
-        "max_pressure": 6.0,
-        "max_force": 1500.0,
-        "max_contraction": 0.25,
-    }
     with pytest.raises(DataError):
-        rig_from_data_sheet(name="mine", **(sheet | change))
+        rig_from_data_sheet(name="mine", **(SHEET | change))

@@ -9,10 +9,8 @@ import pytest
 
 from mckibben import DataError, ModelError
 from mckibben.registry import names
-from mckibben.signals import (
-    build,
-    settings_of,
-)
+from mckibben.signals import binary_steps, build, settings_of
+from mckibben.signals.steps import REGISTER_BITS
 
 TIME = np.arange(6000) / 100
 SETTINGS: dict[str, dict[str, Any]] = {
@@ -104,6 +102,16 @@ def test_settings_are_listed_and_checked() -> None:
         ("ramps", "instants|points", {"instants": (0.0,), "values": (1.0, 2.0)}),
     ):
         with pytest.raises(DataError, match=about):
-            build(name, TIME, **settings)  # type: ignore[arg-type]
+            build(name, TIME, **settings)
     with pytest.raises(DataError):  # before it begins
         build("triangle", TIME - 1.0, **SETTINGS["triangle"])
+
+
+def test_binary_steps_are_a_maximum_length_sequence() -> None:
+    period = 2**REGISTER_BITS - 1
+    bits = binary_steps(np.arange(2 * period) + 0.5, 1.0, seed=3)
+    assert np.array_equal(bits[:period], bits[period:])
+    assert bits[:period].sum() == (period + 1) / 2  # one more high than low
+    signs = 2 * bits[:period] - 1
+    other = np.fft.ifft(np.abs(np.fft.fft(signs)) ** 2).real
+    assert other[1:] == pytest.approx(-1.0, abs=1e-6)

@@ -18,9 +18,6 @@ from mckibben import DataError
 from mckibben.stream import UDPLink
 from mckibben.stream.link import packed, unpacked
 
-LATE = 5000.0
-"""Lateness of a step that has no part in the law [us]."""
-
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
 
@@ -99,7 +96,6 @@ def test_a_controller_follows_a_robot_in_another_process() -> None:
     for _ in range(3):  # again only where other work kept it from its deadlines
         said = subprocess.run(command, capture_output=True, text=True, check=True).stdout
         missed = int(said.split(" deadlines missed")[0].split()[-1])
-        latest = float(said.split("at most ")[1].split(" us")[0])
-        if missed == 0 and latest < LATE:
+        if missed == 0:
             break
     assert float(said.split("within ")[1].split(" mm")[0]) < 1.0

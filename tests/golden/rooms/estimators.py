@@ -71,7 +71,7 @@ OF_ARM: Mapping[str, Mapping[str, Any]] = {
     "sdchm-published": SWARM,
     "tsfnn": {"n_sets": 2},
 }
-SHOWN = {
+SHOWN: Mapping[tuple[str, str], Mapping[str, Mapping[str, Any]]] = {
     ("muscle", "bundled"): SINGLE,
     ("bench", "bench-rougher"): OF_FORCE,
     ("activated", "activated-rougher"): {"activation-memory": {}, "activation-pressure": {}},

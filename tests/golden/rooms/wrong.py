@@ -211,11 +211,11 @@ def studied_again(folder: Path) -> Tree:
 def arrays(folder: Path) -> Tree:
     """Arrays where recordings are wanted are refused with the name of what makes one of them."""
     del folder
-    p = cycles(5.0)
+    given: Any = np.column_stack([cycles(5.0), cycles(5.0)])
     attempts: dict[str, Callable[[], Any]] = {
-        "compare": lambda: mckibben.compare(np.column_stack([p, p])),
-        "fit": lambda: mckibben.GPIEstimator().fit(np.column_stack([p, p])),
-        "characterize": lambda: mckibben.characterize(np.column_stack([p, p])),
+        "compare": lambda: mckibben.compare(given),
+        "fit": lambda: mckibben.GPIEstimator().fit(given),
+        "characterize": lambda: mckibben.characterize(given),
     }
     found: dict[str, Tree] = {}
     for name, attempt in attempts.items():

@@ -20,7 +20,7 @@ from mckibben.app.work import fit
 from mckibben.app.workspace import Workspace
 from mckibben.files import write
 from tests.app.simulated import CHANNELS, filled, quiet, swung
-from tests.attacks.commands import call
+from tests.golden.commands import call
 
 
 def fitted(workspace: Workspace, name: str, model: str = "pi", **given: Any) -> None:

@@ -8,7 +8,7 @@ import pytest
 
 from mckibben import GPI, Recording, write
 from mckibben.signals import irregular_triangle, triangle
-from tests.attacks.commands import Result, call
+from tests.golden.commands import Result, call
 
 Cli = Callable[..., Result]
 

@@ -1,84 +1,132 @@
+"""What a command cannot do leaves with code 2, a remedy that names it, and nothing written or lost."""
+
 from __future__ import annotations
 
-import json
+import shlex
+import shutil
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from mckibben import load
+from mckibben import Recording, write
 from mckibben.system.locks import alone
+from tests.cli.calls import files
 from tests.cli.conftest import Cli
+from tests.golden.commands import call
 
 GOOD = "time_s,pressure_bar,displacement_mm\n" + "".join(
     f"{k / 10},{2 + k % 7},{k % 5}\n" for k in range(30)
 )
 
 
-@pytest.mark.parametrize(
-    ("name", "content", "words"),
-    [
-        ("nan.csv", GOOD.replace("0.5,7,", "0.5,NaN,"), []),
-        ("column.csv", GOOD, ["--column", "pressure=P9"]),
-        ("unit.csv", GOOD, ["--unit", "pressure=blub"]),
-        ("rate.csv", GOOD, ["--rate", 50]),
-        ("gap.csv", GOOD.replace("2.9,", "99.9,"), ["--gaps", "error"]),
-        ("text.mat", GOOD, []),
-    ],
-)
-def test_malformed_files_leave_with_a_remedy_and_nothing_lost(
-    cli: Cli, tmp_path: Path, name: str, content: str, words: list[object]
-) -> None:
-    """What else is malformed: tests/files/test_malformed.py."""
-    path, out = tmp_path / name, tmp_path / "model.json"
-    path.write_text(content)
-    out.write_text("what was there before")
-    result = cli("fit", "pi", path, "-o", out, "--force", *words)
-    assert (result.code, result.out) == (2, "")
-    assert "Remedy:" in result.err
-    assert name in result.err
-    assert out.read_text() == "what was there before"
+@pytest.fixture(scope="module")
+def stock(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with files of every kind, among them of several muscles and of a band."""
+    folder = tmp_path_factory.mktemp("stock")
+    files(folder)
+    u = np.linspace(0, 3, 100)
+    pressures = {f"pressure_{k}": np.sin(k * u) for k in (1, 2, 3)}
+    moved = {f"displacement_{k}": 2 * np.sin(k * u) for k in (1, 2, 3)}
+    write(Recording(pressures | moved, 0.1), folder / "three.csv")
+    write(Recording({"pressure": u, "force": 2 * u}, 0.1), folder / "rest.csv")
+    (folder / "empty").mkdir()
+    (folder / "nan.csv").write_text(GOOD.replace("0.5,7,", "0.5,NaN,"))
+    runs = ("run.csv", "two.csv", "--exchangeable", "run")
+    assert call("calibrate", "model.json", *runs, "-o", "banded.json", folder=folder).code == 0
+    return folder
 
 
-@pytest.mark.parametrize(
-    ("arguments", "said"),
-    [
-        (["fit", "spline", "FILE", "-o", "x.json"], "'spline'"),
-        (["fit", "pi", "FILE", "-o", "nowhere/x.json"], "nowhere"),
-        (["fit", "pi", "FILE", "-o", "x.json", "--set", "n_operator=3"], "'n_operator'"),
-        (
-            ["fit", "pi", "FILE", "-o", "x.json", "--set", "n_operators=many"],
-            "n_operators is 'many'",
-        ),
-        (["fit", "pi", "FILE", "-o", "x.json", "--method", "luck"], "method is 'luck'"),
-        (["fit", "pi", "FILE", "-o", "x.json", "--output", "force"], "force"),
-        (["fit", "pi", "FILE", "-o", "x.json", "--output", "pressure"], "pressure"),
-        (["fit", "pi", "FILE", "-o", "x.json", "--unit", "pressure"], "--unit 'pressure'"),
-        (["fit", "pi", "FILE", "-o", "x.json", "--constant", "force=g"], "force=200 g"),
-        (["compare", "FILE", "--models", "pi,what"], "'what'"),
-        (["study", "FILE", "-o", "FILE"], "train.csv"),
-        (["simulate", "FILE", "FILE", "-o", "x.csv"], "train.csv"),
-        (["simulate", "nowhere.json", "FILE", "-o", "x.csv"], "nowhere.json"),
-        (["invert", "FILE", "-o", "x.json", "--horizon", "5"], "--predictive"),
-        (["plot", "FILE", "-o", "x.bmp"], "bmp"),
-        (["plot", "FILE", "-o", "x.png", "--kind", "pie"], "pie"),
-        (["info"], "--models"),
-    ],
-)
-def test_bad_arguments_leave_with_a_remedy(
-    cli: Cli,
-    files: tuple[Path, Path],
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    arguments: list[str],
-    said: str,
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    result = cli(*(files[0] if word == "FILE" else word for word in arguments))
+@pytest.fixture
+def folder(stock: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    shutil.copytree(stock, tmp_path / "copy")
+    monkeypatch.chdir(tmp_path / "copy")
+    return tmp_path / "copy"
+
+
+FIT = "fit pi run.csv -o out.json"
+PLAN = "plan run.csv --model pi.json -o out.csv"
+RIG = "rig run rail -o out.csv"
+
+BAD = [
+    # Files
+    ("fit pi nan.csv -o out.json", "nan.csv"),
+    (f"{FIT} --column pressure=P9", "P9"),
+    (f"{FIT} --rate 10", "run.csv"),
+    ("fit pi run.csv run.csv -o out.json", "run.csv"),
+    ("fit balance run.csv run.csv -o out.json", "run.csv"),
+    ("fit pi model.json -o out.json", "model.json"),
+    ("simulate run.csv model.json -o out.csv", "run.csv"),
+    ("check run.csv model.json -o out", "run.csv"),
+    ("check model.json none.csv -o out", "none.csv"),
+    ("study empty -o out", "empty"),
+    ("study run.csv -o run.csv", "run.csv"),
+    ("fit pi run.csv -o nowhere/x.json", "nowhere"),
+    ("plot run.csv -o out.bmp", "bmp"),
+    # Models, settings and channels
+    ("fit spline run.csv -o out.json", "'spline'"),
+    (f"{FIT} --set n_operators=many", "n_operators is 'many'"),
+    (f"{FIT} --method luck", "method is 'luck'"),
+    (f"{FIT} --output temperature", "temperature"),
+    (f"{FIT} --output pressure", "pressure"),
+    (f"{FIT} --unit pressure", "--unit 'pressure'"),
+    (f"{FIT} --constant force=g", "force=200 g"),
+    (f"{FIT} --prior rail", "--prior"),
+    ("fit balance run.csv --prior nobody -o out.json", "'nobody'"),
+    ("fit coupled-pi three.csv -o out.json --set luck=1", "'luck'"),
+    ("fit sdchm rest.csv -o out.json", "displacement_1"),
+    ("fit force-balance three.csv -o out.json", "'balance'"),
+    ("compare run.csv --models pi,what", "'what'"),
+    ("compare three.csv --models grey-box", "'balance'"),
+    ("study run.csv -o out --rig soft-arm", "--rig"),
+    ("invert run.csv -o out.json", "run.csv"),
+    ("invert model.json -o out.json --horizon 5", "--predictive"),
+    ("invert pi.json --for force -o out.json", "'pi'"),
+    ("plot run.csv -o out.png --kind pie", "pie"),
+    ("info", "--models"),
+    # Bands
+    ("simulate model.json run.csv -o out.csv --interval 0.9", "model.json"),
+    ("simulate banded.json run.csv -o out.csv --interval 0.9", "66.7 %"),
+    ("simulate banded.json run.csv -o out.csv --interval 1.5", "1.5"),
+    ("simulate banded.json run.csv -o out.csv --interval 0.5 --horizon 3", "--horizon"),
+    ("invert banded.json -o out.json", "banded"),
+    ("calibrate inverse.json run.csv -o out.json", "inverse"),
+    ("calibrate model.json run.csv --fitted run.csv -o out.json", "run.csv"),
+    # Plans
+    (f"{PLAN} --limits pressure=4:1", "pressure"),
+    (f"{PLAN} --limits pressure", "CHANNEL=LOW:HIGH"),
+    (f"{PLAN} --limits force=0:5", "force"),
+    (f"{PLAN} --minutes 0.01", "--minutes"),
+    (f"{PLAN} --for nonsense", "nonsense"),
+    (f"{PLAN} --rig rail", "voltage"),
+    (f"{PLAN} --muscle rail", "--muscle"),
+    # Rigs
+    ("track nowhere.json --rig soft-arm --reference run.csv", "nowhere.json"),
+    ("track inverse.json --rig soft-arm --reference run.csv", "'soft-arm'"),
+    ("rig show crane", "'crane'"),
+    (RIG, "--inputs"),
+    (f"{RIG} --signal sine:period=2 --inputs run.csv", "--inputs"),
+    (f"{RIG} --signal wobble", "'wobble'"),
+    (f"{RIG} --signal sine", "'period'"),
+    (f"{RIG} --signal sine:period=nan", "period is nan"),
+    (f"{RIG} --signal sine:tempo=1", "'tempo'"),
+    (f"{RIG} --signal pressure=sine:period=1", "'pressure'"),
+    (f"{RIG} --signal sine:period=1 --set payload=-3", "payload is -3"),
+    ("rig record dance --out set", "'dance'"),
+    ("rig record field-models --out set --format xls", "'xls'"),
+    ("rig record field-models --out set --only zz", "'zz'"),
+]
+
+
+@pytest.mark.parametrize(("words", "named"), BAD)
+def test_bad_calls_leave_with_a_remedy(cli: Cli, folder: Path, words: str, named: str) -> None:
+    before = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+    result = cli(*shlex.split(words))
     assert result.code == 2
-    assert said in result.err
+    assert named in result.err
     assert "Remedy:" in result.err
-    assert len(result.err.strip().splitlines()) == 1
+    assert "Traceback" not in result.err
+    assert before == {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
 
 
 def test_usage_errors_leave_with_two(cli: Cli) -> None:
@@ -88,70 +136,25 @@ def test_usage_errors_leave_with_two(cli: Cli) -> None:
 
 
 def test_a_defect_is_reported_without_a_traceback(
-    cli: Cli, files: tuple[Path, Path], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+    cli: Cli, folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def broken(*arguments: object, **settings: object) -> None:
         raise RuntimeError("of all things")
 
     monkeypatch.setattr("mckibben.files.read", broken)
-    result = cli("characterize", files[0])
+    result = cli("characterize", "run.csv")
     assert result.code == 1
     assert "Internal error" in result.err
     assert "Traceback" not in result.err
 
 
-def test_interrupt_while_fitting_keeps_the_best_so_far(
-    cli: Cli, files: tuple[Path, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    from mckibben.estimators.optimisers.tracker import Tracker
-
-    seen = Tracker.saw
-
-    def impatient(self: Tracker, point: object, cost: float) -> None:
-        seen(self, point, cost)  # type: ignore[arg-type]
-        if self.evaluations == 60:
-            raise KeyboardInterrupt
-
-    monkeypatch.setattr(Tracker, "saw", impatient)
-    out = tmp_path / "model.json"
-    result = cli("fit", "gpi", files[0], "-o", out, "--json")
-    assert result.code == 0, result.err
-    assert json.loads(result.out)["interrupted"] is True
-    assert out.exists()
-
-
 @pytest.mark.parametrize(
-    "words",
-    [("compare", "FILE", "--models", "pi"), ("study", "FILE"), ("reproduce", "field-models")],
+    "words", ["compare run.csv --models pi", "study run.csv", "reproduce field-models"]
 )
-def test_two_do_not_write_to_one_folder(
-    cli: Cli, files: tuple[Path, Path], tmp_path: Path, words: tuple[str, ...]
-) -> None:
-    with alone(tmp_path):
-        result = cli(*(files[0] if word == "FILE" else word for word in words), "-o", tmp_path)
+def test_two_do_not_write_to_one_folder(cli: Cli, folder: Path, words: str) -> None:
+    out = folder / "empty"
+    with alone(out):
+        result = cli(*shlex.split(words), "-o", out)
     assert result.code == 2
-    assert str(tmp_path) in result.err
-    assert not list(tmp_path.iterdir())
-
-
-def test_columns_without_telling_names_need_no_options(cli: Cli, tmp_path: Path) -> None:
-    time = np.arange(600) * 0.05
-    volts = 2.0 - 2.0 * np.cos(time)
-    wing, model = tmp_path / "wing.csv", tmp_path / "model.json"
-    table = np.column_stack([time, volts, 8 * volts])
-    np.savetxt(wing, table, "%.5f", ",", header="time_s,input_V,output_deg", comments="")
-    for asked, names in (
-        ((), ("voltage", "angle")),
-        (("--input", "input", "--output", "output"), ("input", "output")),
-    ):
-        result = cli("fit", "pi", wing, *asked, "-o", model, "--force")
-        assert result.code == 0, result.err
-        block = load(model)
-        assert (block.inputs[0].name, block.outputs[0].name) == names
-        assert cli("simulate", model, wing, "-o", tmp_path / "run.csv", "--force").code == 0
-    arm = tmp_path / "arm.csv"
-    table = np.column_stack([time, volts, 4 - volts, volts])
-    np.savetxt(arm, table, "%.5f", ",", header="time_s,u1_V,u2_V,y1_mm", comments="")
-    result = cli("fit", "pi", arm, "-o", model, "--force")
-    assert result.code == 2
-    assert "voltage_1, voltage_2, displacement_1" in result.err
+    assert str(out) in result.err
+    assert not list(out.iterdir())

@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mckibben import Affine, Recording, load, read, write
-from mckibben.blocks.compose import Series
+from mckibben import Recording, example, load, read, write
 from mckibben.signals import irregular_triangle
 from tests.cli.conftest import Cli
+from tests.estimators.test_balance_prior import moved
 
 
 def columns(path: Path) -> dict[str, np.ndarray]:
@@ -32,17 +32,6 @@ def model(cli: Cli, files: tuple[Path, Path], tmp_path: Path) -> Path:
     return path
 
 
-@pytest.mark.parametrize("kind", ["gpi", "balance"])
-def test_fit_counts_no_recording_twice(
-    cli: Cli, files: tuple[Path, Path], tmp_path: Path, kind: str
-) -> None:
-    out = tmp_path / "twice.json"
-    result = cli("fit", kind, files[0], files[0], "-o", out)
-    assert result.code == 2
-    assert "train" in result.err
-    assert not out.exists()
-
-
 def test_simulate_writes_the_inputs_the_modelled_and_the_measured_output(
     cli: Cli, model: Path, files: tuple[Path, Path], tmp_path: Path
 ) -> None:
@@ -58,21 +47,6 @@ def test_simulate_writes_the_inputs_the_modelled_and_the_measured_output(
     metrics = json.loads(result.out)["metrics"]["displacement"]
     assert metrics["rmse"] == pytest.approx(rmse, rel=1e-12)
     assert {"mae", "r2", "max_error"} <= set(metrics)
-
-
-def test_simulate_tells_where_it_extrapolates(
-    cli: Cli, model: Path, files: tuple[Path, Path], tmp_path: Path
-) -> None:
-    series, out = tmp_path / "series.json", tmp_path / "out.csv"
-    Series((load(model), Affine.example())).save(series)
-    (known,) = read(files[0])
-    for share, told in ((1.03, 0), (2.0, 1)):  # noise leaves the range too, and is not told
-        beyond = tmp_path / f"{share}.csv"
-        write(known.with_channels({}, pressure=share * known["pressure"]), beyond)
-        for path in (model, series):
-            result = cli("simulate", path, beyond, "-o", out, "--force")
-            assert result.code == 0, result.err
-            assert result.out.count("it extrapolates") == told
 
 
 def test_inverse_then_forward_through_files_is_the_identity(
@@ -117,33 +91,6 @@ def test_study_writes_everything(cli: Cli, files: tuple[Path, Path], tmp_path: P
     assert load(folder / "inverse.json").inverse() == load(folder / "models" / "gpi.json")
 
 
-@pytest.mark.parametrize("suffix", [".png", ".svg", ".pdf"])
-def test_plot_writes_figures(
-    cli: Cli, files: tuple[Path, Path], model: Path, tmp_path: Path, suffix: str
-) -> None:
-    loop, fit = tmp_path / f"loop{suffix}", tmp_path / f"fit{suffix}"
-    assert cli("plot", files[0], "-o", loop).code == 0
-    assert cli("plot", files[1], "--model", model, "--kind", "residuals", "-o", fit).code == 0
-    assert min(loop.stat().st_size, fit.stat().st_size) > 1000
-
-
-def test_of_held_lengths_the_force_is_compared(cli: Cli, tmp_path: Path) -> None:
-    time = np.arange(0, 20, 0.02)
-    u = irregular_triangle(time, 8, 5.0, seed=1)
-    for place, held in enumerate((0.0, 10.0, 20.0)):
-        samples = {
-            "pressure": u,
-            "displacement": np.full(u.size, held),
-            "force": 40 * u - 2 * held,
-        }
-        write(Recording(samples, 0.02), tmp_path / f"held{place}.csv")
-    files = [str(tmp_path / f"held{place}.csv") for place in range(3)]
-    given = ("--test", files[1], "--models", "balance-force", "--json")
-    done = cli("compare", files[0], files[2], *given)
-    assert done.code == 0, done.err
-    assert json.loads(done.out)["output"] == "force"
-
-
 def _driven(folder: Path) -> list[str]:
     """Return files of force where pressure and length both move."""
     time = np.arange(0, 20, 0.02)
@@ -175,18 +122,67 @@ def test_force_by_length_and_pressure_is_compared(
     assert "length" in rows["balance"]["reason"]
 
 
-def test_a_length_that_no_model_of_force_is_told_is_named(cli: Cli, tmp_path: Path) -> None:
-    train, test = _driven(tmp_path)
-    asked = ("--input", "pressure", "--output", "force", "--models", "pi", "--json")
-    done = cli("compare", train, "--test", test, *asked)
-    assert any("length" in note for note in json.loads(done.out)["notes"])
+@pytest.fixture
+def folder(files: tuple[Path, Path], tmp_path: Path) -> Path:
+    """A folder of recordings whose units nobody wrote down."""
+    folder = tmp_path / "runs"
+    folder.mkdir()
+    for name, file in zip(("a.csv", "b.csv"), files, strict=True):
+        (folder / name).write_text(file.read_text().replace("time,", "time_s,", 1))
+    return folder
 
 
-def test_a_pressure_beyond_training_is_told_of_force_by_length(cli: Cli, tmp_path: Path) -> None:
-    train, test = _driven(tmp_path)
-    (run,) = read(test)
-    beyond = tmp_path / "beyond.csv"
-    changed = {name: run[name] for name in ("length", "force")} | {"pressure": 2 * run["pressure"]}
-    write(Recording(changed, 0.02), beyond)
-    done = cli("compare", train, "--test", beyond, "--models", "force-bilinear", "--json")
-    assert any("pressure" in note for note in json.loads(done.out)["notes"])
+def test_what_was_assumed_while_reading_reaches_every_result(
+    cli: Cli, folder: Path, tmp_path: Path
+) -> None:
+    done = cli("study", folder, "-o", tmp_path / "out", "--models", "pi", "--jobs", 1, "--json")
+    assert done.code == 0, done.err
+    printed = json.loads(done.out)
+    for file in (folder / "a.csv", folder / "b.csv"):
+        (note,) = printed["notes"][str(file)]
+        assert "pressure in bar, displacement in mm" in note
+        assert f"{file}: {note}" in printed["leaderboard"]["notes"]
+        assert done.err.count(f"{file}: {note}") == 1
+        assert (tmp_path / "out" / "report.html").read_text().count(f"{file} was read: {note}") == 1
+
+
+def test_several_zeros_are_taken_out(cli: Cli, files: tuple[Path, Path], tmp_path: Path) -> None:
+    first = read(files[0])[0]
+    moved = first.with_channels(displacement=first["displacement"] + 300.0)
+    write(moved, tmp_path / "moved.csv")
+    given = ("compare", files[0], tmp_path / "moved.csv", "--models", "pi", "--jobs", 1)
+    errors = [
+        json.loads(cli(*given, "--allow-shared", "--json", *zero).out)["rows"][0]["test"]["rmse"]
+        for zero in ((), ("--zero", "displacement"))
+    ]
+    assert errors[1] < 1 < 10 < errors[0]
+    assert "length" in cli(*given, "--zero", "length").err
+
+
+def test_example_writes_what_is_bundled_and_repeats(cli: Cli, tmp_path: Path) -> None:
+    folder = tmp_path / "new" / "examples"
+    for _ in range(2):
+        assert cli("example", folder).code == 0
+    assert {path.name: path.read_bytes() for path in folder.iterdir()} == {
+        path.name: path.read_bytes() for path in example.files()
+    }
+    (train,) = read(folder / "decaying-triangle.csv")
+    assert set(train.channels) == {"pressure", "displacement"}
+    (folder / "decaying-triangle.csv").write_text("mine")
+    assert cli("example", folder, "--force").code == 0
+    assert (folder / "decaying-triangle.csv").read_text() != "mine"
+
+
+def test_a_fit_begins_from_a_muscle(cli: Cli, tmp_path: Path) -> None:
+    write(moved(1, 5.0), tmp_path / "run.csv")
+    asked = ["fit", "balance", tmp_path / "run.csv", "-o"]
+    few = ["--set", "steps=2", "--set", "contact=false"]
+    plain, prior = tmp_path / "plain.json", tmp_path / "prior.json"
+    assert cli(*asked, plain, *few).code == 0
+    assert cli(*asked, prior, "--prior", "rail", *few).code == 0
+    assert plain.read_text("utf-8") != prior.read_text("utf-8")
+    sheet = tmp_path / "sheet.toml"
+    sheet.write_text("diameter_mm = 20\nrest_length_mm = 200\nmax_force_N = 1500\n")
+    for said in (["--prior", sheet], ["--set", f"prior={sheet}"]):
+        assert cli(*asked, sheet, *said, "--force").code == 2
+    assert sheet.read_text().startswith("diameter_mm")

@@ -8,11 +8,10 @@ import numpy as np
 import pytest
 
 from mckibben import GPI, DataError, Recording, compare, write
-from mckibben.measured.page import page, table
+from mckibben.measured.page import page
 from mckibben.measured.running import outcomes
-from mckibben.measured.sets import KNOWN, parted, sets_in
+from mckibben.measured.sets import parted, sets_in
 from mckibben.measured.splits import split_of
-from mckibben.numerals import numeral
 from mckibben.signals import irregular_triangle
 from tests.cli.conftest import Cli
 
@@ -99,27 +98,6 @@ def test_every_task_is_the_comparison_it_says(folder: Path) -> None:
     assert plain.title == "plain"
 
 
-@pytest.mark.long
-def test_the_page_has_every_figure_of_every_task(folder: Path) -> None:
-    done = list(outcomes(sets_in(folder), models=["gpi"], jobs=1))
-    text = page(done, "mckibben measured FOLDER")
-    for one in done:
-        assert one.board is not None
-        (row,) = one.board.rows
-        assert f"| {one.label} | `gpi` |" in text
-        if one.left_out:
-            assert numeral(100 * row.test_error / one.span, 3) in text
-        else:
-            assert f"{row.test_error:.3g}" in text
-    assert "| Somebody's (printed) | – | 0.5 |" in text
-    rows = table(done)
-    rows = rows[rows["model"] == "gpi"]
-    assert list(rows["left_out"]) == ["", "", "run2", "run3", ""]
-    np.testing.assert_allclose(
-        rows["test.rmse"], [one.board.rows[0].test_error for one in done if one.board]
-    )
-
-
 def test_a_set_that_cannot_be_read_is_said_and_the_rest_goes_on(folder: Path) -> None:
     (folder / "plain" / "run.csv").write_text("pressure_bar,displacement_mm\n1,2\n1,x\n")
     done = list(outcomes(sets_in(folder), models=["pi"], jobs=1))
@@ -162,65 +140,3 @@ def test_results_among_recordings_are_refused(cli: Cli, folder: Path) -> None:
         assert result.code == 2
         assert str(folder) in result.err
     assert sorted(folder.rglob("*")) == before
-
-
-def test_where_nothing_can_be_compared_is_bad_input(cli: Cli, folder: Path, tmp_path: Path) -> None:
-    path = folder / "volts" / "channels.toml"
-    given = "[split]\n[[split.tasks]]\nsettings = {pi = {n_operators = -5}}\n"
-    path.write_text(path.read_text().split("[split]")[0].rstrip() + "\n" + given)
-    words = ["-o", tmp_path / "out", "--only", "volts", "--models", "pi", "--jobs", "1"]
-    result = cli("measured", folder, *words)
-    assert result.code == 2
-    assert "volts: n_operators is -5" in result.out
-    assert "n_operators is -5" in (tmp_path / "out" / "measured.md").read_text()
-
-
-def test_descriptions_of_public_sets_are_sound() -> None:
-    from mckibben.files.channels import description
-
-    files = sorted(KNOWN.glob("*.toml"))
-    assert files
-    for file in files:
-        assert split_of(description(file).split, str(file)).about
-
-
-@pytest.mark.long
-def test_the_command_writes_page_and_rows_and_goes_on(
-    cli: Cli, folder: Path, tmp_path: Path
-) -> None:
-    out = tmp_path / "out"
-    result = cli("measured", folder, "-o", out, "--models", "pi,gpi", "--jobs", "1")
-    assert result.code == 0, result.err
-    first = (out / "measured.md").read_text()
-    assert "By volts: last run" in result.out
-    assert (out / "measured.csv").read_text().count("\n") == 1 + 5 * 3
-    assert not (out / "unfinished").exists()
-    again = cli("measured", folder, "-o", out, "--only", "plain", "--models", "pi", "--jobs", "1")
-    assert again.code == 0, again.err
-    assert (out / "measured.md").read_text() != first
-
-
-@pytest.mark.parametrize(
-    "words", [["nowhere"], ["data", "--only", "nothing"], ["data/plain/run.csv"]]
-)
-def test_what_is_no_folder_or_no_set_is_refused(
-    cli: Cli, folder: Path, words: list[str], tmp_path: Path
-) -> None:
-    result = cli("measured", tmp_path / words[0], *words[1:], "-o", tmp_path / "out")
-    assert result.code == 2
-    assert words[-1] in result.err
-
-
-def test_periods_of_a_file_are_its_own_and_settings_of_other_models_wait(
-    cli: Cli, folder: Path, tmp_path: Path
-) -> None:
-    path = folder / "volts" / "channels.toml"
-    given = (
-        "[split]\nperiod = 750\n[[split.tasks]]\n"
-        "settings = {pi = {n_operators = 5}, gpi = {n_operators = 4}}\n"
-    )
-    path.write_text(path.read_text().split("[split]")[0].rstrip() + "\n" + given)
-    words = ["-o", tmp_path / "out", "--only", "volts", "--models", "pi", "--jobs", "1"]
-    result = cli("measured", folder, *words)
-    assert result.code == 0, result.err
-    assert "pi" in result.out

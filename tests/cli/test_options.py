@@ -10,7 +10,6 @@ import pytest
 import typer
 
 from mckibben.cli.main import app
-from mckibben.cli.output import visible
 from tests.cli.calls import CALLS, files
 from tests.cli.conftest import Cli
 
@@ -99,13 +98,6 @@ def test_what_no_option_can_be_is_refused_in_words(
 
 
 ESCAPE = "\x1b]0;owned\x07\x1b[2J\x9b31m\u202e"
-
-
-def test_control_characters_are_written_out() -> None:
-    assert visible("a\x1b[2J\x07\x9b\u202e\udcff\r b\n\tc") == (
-        "a\\u001b[2J\\u0007\\u009b\\u202e\\udcff\\u000d b\n\tc"
-    )
-    assert visible("R² 5 µs – naïve 日本") == "R² 5 µs – naïve 日本"
 
 
 def test_names_do_not_reach_the_terminal_raw(

@@ -6,7 +6,6 @@ import json
 from pathlib import Path
 
 import numpy as np
-import pytest
 
 from mckibben import read
 from mckibben.rigs import load_rig, rig_names
@@ -106,37 +105,3 @@ def test_new_makes_a_rig_from_a_data_sheet(cli: Cli, tmp_path: Path) -> None:
     out = tmp_path / "run.csv"
     assert cli("rig", "run", file, "--signal", "sine:period=2", "-o", out).code == 0
     assert np.ptp(read(out)[0]["displacement"]) > 30
-
-
-RUN = ["rig", "run", "rail", "-o", "x.csv"]
-
-
-@pytest.mark.parametrize(
-    ("arguments", "named"),
-    [
-        (["rig", "show", "crane"], "'crane'"),
-        (RUN, "--inputs"),
-        ([*RUN, "--signal", "sine:period=2", "--inputs", "y.csv"], "--inputs"),
-        ([*RUN, "--signal", "wobble"], "'wobble'"),
-        ([*RUN, "--signal", "sine"], "'period'"),
-        ([*RUN, "--signal", "sine:period=fast"], "'fast'"),
-        ([*RUN, "--signal", "sine:period=nan"], "period is nan"),
-        ([*RUN, "--signal", "sine:tempo=1"], "'tempo'"),
-        ([*RUN, "--signal", "pressure=sine:period=1"], "'pressure'"),
-        ([*RUN, "--signal", "sine:period=1", "--duration", "nan"], "nan"),
-        ([*RUN, "--signal", "sine:period=1", "--set", "payload=-3"], "payload is -3"),
-        ([*RUN, "--signal", "sine:period=1", "--set", "colour=red"], "'colour'"),
-        (["rig", "record", "dance", "--out", "set"], "'dance'"),
-        (["rig", "record", "field-models", "--out", "set", "--format", "xls"], "'xls'"),
-        (["rig", "record", "field-models", "--out", "set", "--only", "zz"], "'zz'"),
-        (["rig", "record", "sdchm", "--out", "set", "--rig", "rail", "--only", "gpi-1"], "rail"),
-    ],
-)
-def test_bad_arguments_leave_with_a_remedy(
-    cli: Cli, arguments: list[str], named: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    result = cli(*arguments)
-    assert result.code == 2, result.err
-    assert named in result.err
-    assert "Remedy:" in result.err

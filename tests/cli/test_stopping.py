@@ -2,22 +2,25 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import os
 import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from mckibben import GPI, Recording, write
+from mckibben import GPI, Recording, read, write
+from mckibben.estimators.optimisers.tracker import Tracker
+from mckibben.excitation import search
 from mckibben.signals import irregular_triangle, triangle
-
-pytestmark = pytest.mark.long
+from tests.cli.conftest import Cli
 
 STOPS = 2
 
@@ -84,6 +87,7 @@ def check_stopped(code: int, said: str, took: float) -> None:
     assert took < PROMPT
 
 
+@pytest.mark.long
 def test_a_stopped_comparison_keeps_what_is_finished_and_goes_on(
     recordings: tuple[Path, Path], tmp_path: Path
 ) -> None:
@@ -114,35 +118,37 @@ def test_a_stopped_comparison_keeps_what_is_finished_and_goes_on(
         assert not (folder / "unfinished").exists()
 
 
-def test_a_second_signal_ends_at_once(recordings: tuple[Path, Path], tmp_path: Path) -> None:
-    process = begin("compare", recordings[0], "--models", "gpi", "-o", tmp_path)
-    time.sleep(1.5)
-    started = time.monotonic()
-    for _ in range(2):
-        os.kill(process.pid, signal.SIGINT)
-        time.sleep(0.1)
-    said = process.communicate(timeout=60)[1]
-    assert process.returncode in (130, -signal.SIGINT)
-    assert "Traceback" not in said
-    assert time.monotonic() - started < PROMPT
+def stop_at(count: int, function: Callable[..., Any]) -> Callable[..., Any]:
+    """Return a function that is interrupted the n-th time that it is called."""
+    calls = itertools.count(1)
+
+    def called(*given: Any) -> Any:
+        found = function(*given)
+        if next(calls) == count:
+            raise KeyboardInterrupt
+        return found
+
+    return called
 
 
-LOST = """
-import ctypes, os, signal, time
-from mckibben.cli.stopping import stoppable
-
-@ctypes.CFUNCTYPE(None)
-def called_by_compiled_code():
-    os.kill(os.getpid(), signal.SIGINT)
-    time.sleep(0.01)
-
-with stoppable(None):
-    called_by_compiled_code()
-    time.sleep(60)
-"""
+def test_a_stopped_fit_keeps_the_best_so_far(
+    cli: Cli, files: tuple[Path, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(Tracker, "saw", stop_at(60, Tracker.saw))
+    out = tmp_path / "model.json"
+    result = cli("fit", "gpi", files[0], "-o", out, "--json")
+    assert result.code == 0, result.err
+    assert json.loads(result.out)["interrupted"] is True
+    assert out.exists()
 
 
-def test_a_signal_that_compiled_code_loses_ends_the_program_without_a_traceback() -> None:
-    process = subprocess.run([sys.executable, "-c", LOST], capture_output=True, text=True)
-    assert process.returncode == 130
-    assert len(process.stderr.strip().splitlines()) == 1
+def test_a_stopped_plan_is_written(
+    cli: Cli, files: tuple[Path, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    place, out = tmp_path / "model.json", tmp_path / "next.csv"
+    GPI.example().save(place)
+    monkeypatch.setattr(search, "stretches", stop_at(3, vars(search)["stretches"]))
+    told = cli("plan", files[0], "--model", place, "--minutes", "0.5", "-o", out)
+    assert told.code == 0, told.err
+    (found,) = read(out, channels=["pressure"], informative=False)
+    assert np.ptp(found["pressure"]) > 1.0

@@ -25,9 +25,9 @@ from mckibben.export.c.building import compile_c
 from mckibben.files import read
 from mckibben.link import Descriptor, Link, LinkError, open_port
 from mckibben.link.trying import emulated, hosted
-from tests.attacks.commands import call
 from tests.export.building import build
 from tests.export.models import path_for
+from tests.golden.commands import call
 from tests.tools import needs
 
 SAMPLE_TIME = 0.02

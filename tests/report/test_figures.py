@@ -1,4 +1,4 @@
-"""Figures: written alike twice in every format for print, and as plots that plotly takes."""
+"""Figures: of the right channels and models, alike twice in every format, as plotly takes them."""
 
 from __future__ import annotations
 
@@ -13,13 +13,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from mckibben.blocks.core.fields import Channel
-from mckibben.blocks.coupled.coupling import Coupling
 from mckibben.blocks.play_type.gpi import GPI
 from mckibben.errors import DataError, ModelError
 from mckibben.recording import Recording
-from mckibben.report import model_subjects, printed, subjects
-from mckibben.report.drawing import Curve, Drawing, Panel
+from mckibben.report import coupling_subjects, printed, subjects
+from mckibben.report.drawing import Curve, Drawing, Panel, along, over_time
 from mckibben.report.figures import (
     FIGURES,
     MODEL_KINDS,
@@ -28,39 +26,109 @@ from mckibben.report.figures import (
     plot_recording,
 )
 from mckibben.report.interactive import packed, plots, text
-from tests.report.studies_by_hand import measured, models, study
+from mckibben.report.shown import shown
+from tests.report.studies_by_hand import measured, study
 
 CHANNELS = ("pressure", "displacement")
 SIGNATURES = {"png": b"\x89PNG", "svg": b"<?xml", "pdf": b"%PDF"}
 HOSTILE = "<a href='http://x.example'>&amp;</a>"
 
 
-def drawing(name: str = "a") -> Drawing:
+def drawing() -> Drawing:
     x = np.linspace(0, 1, 20)
-    curve = Curve(x, x**2, name, "series-1", model=name)
-    return Drawing((Panel(name, name, (curve,), name),))
+    curve = Curve(x, x**2, "a", "series-1", model="a")
+    return Drawing((Panel("a", "a", (curve,), "a"),))
+
+
+# -- what is drawn -------------------------------------------------------------------------------
+
+signals = st.integers(2, 500).flatmap(
+    lambda n: arrays(np.float64, (2, n), elements=st.floats(-1e6, 1e6))
+)
+
+
+@given(signals, st.integers(8, 60))
+def test_thinning_keeps_the_extremes_the_order_and_the_limit(pair: np.ndarray, points: int) -> None:
+    x, y = pair
+    t, thinned = over_time(np.arange(y.size, dtype=float), y, points)
+    assert t.size <= max(points, 2)
+    assert (thinned.min(), thinned.max()) == (y.min(), y.max())
+    np.testing.assert_array_equal(thinned, y[t.astype(int)])
+    places, *path = along(x, y, points)
+    assert places.size <= points
+    assert np.all(np.diff(places) > 0)
+    ends = [(one.min(), one.max()) for one in path]
+    assert ends == [(x.min(), x.max()), (y.min(), y.max())]
+    np.testing.assert_array_equal(np.stack(path), pair[:, places.astype(int)])
+
+
+def test_a_recording_with_a_held_out_part_is_shown_once_with_its_start() -> None:
+    whole = measured(400)
+    (one,) = shown(study((whole.slice(0, 300),), (whole,)))
+    assert one.test_from == 300
+    assert all(output.shape == (400,) for output in one.outputs.values())
+    found = shown(study((measured(300, seed=5),), (whole,)))  # of the same name, and no part of it
+    assert [one.test_from for one in found] == [None, None]
+
+
+def test_outputs_belong_to_their_recording_and_tested_ones_come_first() -> None:
+    train = (measured(400), measured(300, seed=2, name="second"))
+    whole = study(train, (measured(200, seed=1, name="third"),))
+    found = shown(whole)
+    assert [one.recording.name for one in found] == ["third", "muscle", "second"]
+    assert [one.role for one in found] == ["test", "fit", "fit"]
+    assert list(found[0].outputs) == [row.model for row in whole.leaderboard.rows if row.block]
+    for one, place in zip(found, (2, 0, 1), strict=True):
+        np.testing.assert_array_equal(one.outputs["pi"], whole.predictions["pi"][place][:, 0])
+
+
+def test_residuals_are_measured_less_modelled() -> None:
+    recording = measured(200)
+    outputs = {"gpi": recording["displacement"] - 0.5}
+    panels = subjects.residuals(recording, *CHANNELS, outputs, test_from=150).panels
+    for panel in panels:
+        np.testing.assert_allclose(panel.curves[0].y, 0.5)
+    assert panels[1].marks[0].x == pytest.approx(1.5)
+
+
+def arm(rest: str = "", shared: bool = False) -> Recording:
+    """Return an arm with one input at rest, or with both moving together."""
+    a, b = np.random.default_rng(0).uniform(0, 2, (2, 400))
+    b = a if shared else b
+    values = {"u1": a, "u2": b, "y1": 3 * a, "y2": 5 * b + a}
+    units = dict(zip(values, ("bar", "bar", "mm", "mm"), strict=True))
+    return Recording(values | ({rest: np.zeros(400)} if rest else {}), 0.01, units)
+
+
+INPUTS, OUTPUTS = ("u1", "u2"), ("y1", "y2")
+
+
+def test_effects_are_those_of_inputs_over_their_ranges() -> None:
+    found = coupling_subjects.coupling([arm()], INPUTS, OUTPUTS)
+    np.testing.assert_allclose(found.effects, [[6, 0], [2, 10]], atol=0.1)
+    assert found.own("y2") == "u2"
+    together = coupling_subjects.coupling([arm(shared=True)], INPUTS, OUTPUTS)
+    assert np.isnan(together.effects).all()
+
+
+def test_an_output_is_drawn_over_an_input_that_moves_where_it_is_drawn() -> None:
+    runs = [arm("u1"), arm("u2")]
+    found = coupling_subjects.coupling(runs, INPUTS, OUTPUTS)
+    assert found.pairs(runs) == (("u1", "y1"), ("u2", "y2"))
+    assert found.pairs(runs[:1]) == (("u2", "y1"), ("u2", "y2"))
+    assert found.pairs(runs[1:]) == (("u1", "y1"), ("u1", "y2"))
 
 
 # -- for print -----------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("ending", list(SIGNATURES))
-def test_every_format_is_written_alike_twice_at_the_resolution_of_print(
-    tmp_path: Path, ending: str
-) -> None:
-    from matplotlib import rcParams
-    from PIL import Image
-
-    before = dict(rcParams)
+def test_every_format_is_written_alike_twice(tmp_path: Path, ending: str) -> None:
     first, second = tmp_path / f"first.{ending}", tmp_path / f"second.{ending}"
     for path in (first, second):
         printed.save(drawing(), path)
     assert first.read_bytes() == second.read_bytes()
     assert first.read_bytes().startswith(SIGNATURES[ending])
-    assert dict(rcParams) == before
-    if ending == "png":
-        with Image.open(first) as image:
-            assert image.width == round(printed.COLUMN * printed.RESOLUTION)
 
 
 @pytest.mark.parametrize("kind", [*RECORDING_KINDS, *MODEL_KINDS, *FIGURES])
@@ -76,38 +144,6 @@ def test_every_kind_is_drawn_for_print(tmp_path: Path, kind: str) -> None:
     assert path.stat().st_size > 1000
 
 
-def test_more_recordings_than_are_drawn_are_no_error(tmp_path: Path) -> None:
-    many = [measured(60, seed=k, name=f"run {k}") for k in range(8)]
-    plot_model(GPI.example(), many, "fit", tmp_path / "figure.svg")
-    printed.save(FIGURES["loops"](study(tuple(many[:4]), tuple(many[4:]))), tmp_path / "loops.svg")
-
-
-@pytest.mark.parametrize("name", ["$x^", "_hidden", "a\nb", "<b>&", r"\frac", "{}", "%s"])
-def test_names_are_drawn_as_they_are(tmp_path: Path, name: str) -> None:
-    printed.save(drawing(name), tmp_path / "figure.svg")
-    legend = printed.drawn(drawing(name)).axes[0].get_legend()
-    assert legend is not None
-    assert [entry.get_text().strip() for entry in legend.get_texts()] == [name.replace("\n", " ")]
-
-
-def test_a_model_is_drawn_over_an_input_that_moves(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    drawn: list[Drawing] = []
-    monkeypatch.setattr(printed, "save", lambda drawing, path: drawn.append(drawing))
-    wave = np.sin(np.arange(100) / 5)
-    names = ("pressure_1", "pressure_2", "displacement")
-    runs = [
-        Recording(dict(zip(names, (one, two, one + 2 * two), strict=True)), 0.1)
-        for one, two in ((wave, 0 * wave), (0 * wave, wave), (wave, wave**2))
-    ]
-    driven = (Channel("pressure_1", "bar"), Channel("pressure_2", "bar"))
-    block = Coupling(((1.0,), (2.0,)), driven, (Channel("displacement", "mm"),))
-    plot_model(block, runs, "loops", tmp_path / "figure.pdf")
-    found = [panel.x_label.partition(" ")[0] for panel in drawn[0].panels]
-    assert found == ["pressure_1", "pressure_2", "pressure_2"]
-
-
 @pytest.mark.parametrize("name", ["figure.jpg", "figure", "figure.png.txt", "nowhere/figure.png"])
 def test_other_formats_and_absent_folders_are_refused(tmp_path: Path, name: str) -> None:
     with pytest.raises(DataError) as refused:
@@ -118,27 +154,15 @@ def test_other_formats_and_absent_folders_are_refused(tmp_path: Path, name: str)
 
 def test_what_cannot_be_drawn_is_named_and_leaves_no_file(tmp_path: Path) -> None:
     path = tmp_path / "figure.png"
-    with pytest.raises(ModelError, match="time, loop"):
-        plot_recording([measured(50)], *CHANNELS, "pie", path)
-    with pytest.raises(ModelError, match="fit, loops, residuals, weights"):
-        plot_model(GPI.example(), [measured(50)], "time", path)
+    for kind in ("pie", "fit"):
+        with pytest.raises(ModelError):
+            plot_recording([measured(50)], *CHANNELS, kind, path)
     with pytest.raises(DataError, match="force"):
         plot_recording([measured(50)], "pressure", "force", "time", path)
-    with pytest.raises(ModelError, match="inverse"):
-        printed.save(FIGURES["inverse"](study(inverse=False)), path)
     for name in ("leaderboard", "fit", "loops", "residuals", "weights"):
         with pytest.raises(ModelError):
             printed.save(FIGURES[name](study(blocks={})), path)
     assert list(tmp_path.iterdir()) == []
-
-
-def test_every_colour_is_defined_for_print() -> None:
-    recordings = [measured(50, seed=k, name=f"run {k}") for k in range(6)]
-    used = {"measured", "input"}
-    for some in (recordings, recordings[:1]):
-        for panel in subjects.loop(some, *CHANNELS).panels:
-            used |= {curve.colour for curve in panel.curves}
-    assert used == set(printed.COLOURS)
 
 
 # -- for the page --------------------------------------------------------------------------------
@@ -175,18 +199,6 @@ def test_every_figure_is_one_that_plotly_knows(name: str) -> None:
     for plot in plots(FIGURES[name](study())):
         found = unpacked(json.loads(json.dumps(plot, allow_nan=False)))
         go.Figure(found)  # refuses unknown properties and values
-
-
-def test_stacked_panels_make_one_plot_and_others_one_each() -> None:
-    (plot,) = plots(subjects.time_course([measured(50)], CHANNELS))
-    assert plot["layout"]["xaxis2"]["matches"] == "x"
-    low, high = (plot["layout"][name]["domain"] for name in ("yaxis2", "yaxis"))
-    assert 0 == low[0] < low[1] < high[0] < high[1] == 1
-    assert len(plots(model_subjects.weights(models()))) == 5
-    (chart,) = plots(model_subjects.leaderboard(study().leaderboard))
-    axis = chart["layout"]["yaxis"]
-    assert axis["ticktext"][0] == "gpi"
-    assert axis["range"][0] > axis["range"][1]  # the best at the top
 
 
 def test_names_are_shown_verbatim() -> None:

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from hypothesis import given as of
+from hypothesis import given
 from hypothesis import strategies as st
 
 from mckibben import registry
@@ -193,12 +193,12 @@ def test_results_are_on_disk_as_they_come_and_a_failure_leaves_what_was_there(
 )
 def test_units_and_names_from_files_lead_nowhere(unit: str) -> None:
     """Neither links nor events nor styles nor LaTeX: whatever a file calls its channels."""
-    given, wanted = Channel(unit, unit), Channel("bend" + unit, unit)
-    model = PI((0.0, 0.3), (3.0, 1.5), 2.0, input=given, output=wanted)
+    push, bend = Channel(unit, unit), Channel("bend" + unit, unit)
+    model = PI((0.0, 0.3), (3.0, 1.5), 2.0, input=push, output=bend)
     moved = measured(1000)
     u, y = moved["pressure"], model.simulate(moved["pressure"]) + 0.1 * moved["displacement"]
-    units = {given.name: unit, wanted.name: unit}
-    found = describe(model, [Recording({given.name: u, wanted.name: y}, 0.05, units)])
+    units = {push.name: unit, bend.name: unit}
+    found = describe(model, [Recording({push.name: u, bend.name: y}, 0.05, units)])
     template = templating.template("_model.html.j2")
     shown = Parsed(template.render(description=found, figures=figures(found)))
     assert {"math", "table"} <= shown.tags
@@ -217,7 +217,7 @@ def test_every_paper_has_its_source(paper: str) -> None:
         assert (part or "") in header
 
 
-@of(st.floats(-1e300, 1e300), st.integers(1, 6))
+@given(st.floats(-1e300, 1e300), st.integers(1, 6))
 def test_numbers_keep_their_digits(value: float, digits: int) -> None:
     read = float(number(value, digits).replace("−", "-"))
     assert read == pytest.approx(value, rel=0.5000001 * 10 ** (1 - digits), abs=5e-324)

@@ -20,7 +20,6 @@ SERVING = Serving(
     limits={"pressure": (0.0, 6.0), "displacement": (-20.0, 40.0)},
     safe={"displacement": 0.5},
     watchdog=0.05,
-    adjustable=0.25,
 )
 
 SHIM = """

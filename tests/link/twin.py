@@ -7,25 +7,21 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from mckibben.arrays import Array
 from mckibben.blocks.core.block import Primitive
-from mckibben.export.c.adjusting import coefficient_limits, memory_limits
 from mckibben.export.c.serving import Serving, limits
-from mckibben.export.c.wiring import Wiring
-from mckibben.link.framing import ROOM, VERSION, Frame, unpacked, unstuffed
+from mckibben.link.framing import ROOM, Frame, unpacked, unstuffed
 
 HALF = 1 << 31
 
 
 @dataclass
 class Twin:
-    """Serves a primitive without scratch, in double precision."""
+    """Serves a primitive without scratch, in double precision, of which nothing can be adjusted."""
 
     block: Primitive
     serving: Serving
     sample_time: float
     fingerprint: bytes
-    start: int = 0
     applied: list[tuple[int, list[float]]] = field(default_factory=list)
     """Inputs, with how often the server had been switched on before."""
     boots: int = -1
@@ -36,26 +32,17 @@ class Twin:
         self.low, self.high, self.safe = found.low, found.high, found.safe
         self.n_in, self.n_out = len(self.block.inputs), len(self.block.outputs)
         self.most_silence = int(self.serving.watchdog / self.sample_time + 1e-9)
-        self.bounds: list[tuple[Array, Array] | None] = [None, None]
-        if self.serving.adjustable:
-            wiring = Wiring(self.block, self.sample_time)
-            self.bounds = [
-                coefficient_limits(wiring, self.serving.adjustable),
-                memory_limits(wiring, self.low[: self.n_in], self.high[: self.n_in]),
-            ]
         self.switch_on()
 
     def switch_on(self) -> None:
         self.boots += 1
-        self.session = ((self.start + self.boots) & 0xFFFF) << 16
+        self.session = (self.boots & 0xFFFF) << 16
         self.sequence = self.last_kind = self.last_status = 0
         self.open = self.lock_step = self.tripped = False
-        self.silence, self.quiet, self.steps, self.loads = self.most_silence, 0, 0, 0
+        self.silence, self.quiet, self.steps = self.most_silence, 0, 0
         self.since = self.dropped = 0
         self.numbers = [self.block.c_numbers(self.sample_time), np.zeros(self.block.n_states)]
         self.started = False
-        self.last_good = np.zeros(self.n_out)
-        self.staged: tuple[int, list[float]] | None = None
         self.inputs = self.low[: self.n_in].copy()
         self.begun = b""
         self.answer = self.sample = self.sending = b""
@@ -64,8 +51,6 @@ class Twin:
     def make_safe(self) -> None:
         self.outputs = self.safe[self.n_in :].copy()
         self.running, self.every, self.notes = False, 0, 0
-
-    # -- bytes -------------------------------------------------------------------------------
 
     def receive(self, byte: int) -> None:
         if byte:
@@ -104,8 +89,6 @@ class Twin:
         if self.running and not self.lock_step:
             self.step()
 
-    # -- frames ------------------------------------------------------------------------------
-
     def handle(self, frame: Frame) -> None:
         kind, body = frame.kind, frame.body
         if kind in (1, 2, 5, 7):
@@ -136,7 +119,6 @@ class Twin:
         self.reply(frame, bytes([status]) + (self.stand() if kind == 4 else b""))
 
     def reply(self, frame: Frame, body: bytes) -> None:
-        assert VERSION == 1
         self.answer = Frame(frame.kind | 128, self.session, frame.sequence, body).packed()
 
     def flags(self) -> int:
@@ -146,11 +128,11 @@ class Twin:
         return struct.pack("<BI", self.flags(), self.steps) + self.outputs.tobytes()
 
     def tell(self, kind: int, body: bytes) -> bytes:
-        sizes = [0 if self.bounds[0] is None else len(self.numbers[0]), len(self.numbers[1])]
+        sizes = [0, len(self.numbers[1])]
         if kind == 1 and not body:
             told = [0, 8, self.flags(), self.fingerprint, round(1e6 * self.sample_time)]
-            told += [self.most_silence, self.steps, self.loads, self.dropped % (1 << 32)]
-            numbers = [self.n_in, self.n_out, *sizes, self.block.n_missable]
+            told += [self.most_silence, self.steps, 0, self.dropped % (1 << 32)]
+            numbers = [self.n_in, self.n_out, *sizes, 0]
             return struct.pack("<BBB8sIIIIIHHHHH", *told, *numbers)
         if kind == 5 and not body:
             return b"\0" + self.stand() + self.inputs.tobytes()
@@ -178,7 +160,7 @@ class Twin:
             return 2
         self.make_safe()
         self.session, self.silence, self.lock_step = session, silence, bool(body[8])
-        self.open, self.tripped, self.staged = True, False, None
+        self.open, self.tripped = True, False
         return 0
 
     def carried_out(self, kind: int, body: bytes) -> int:
@@ -190,7 +172,6 @@ class Twin:
                 self.open = False
             if kind == 10:
                 self.numbers[1][:] = 0
-                self.last_good[:] = 0
                 self.started = False
             return 4 if kind == 11 and self.tripped else 0
         if self.tripped:
@@ -202,62 +183,24 @@ class Twin:
                 return 3
             self.every, self.since = struct.unpack("<H", body)[0], 0
             return 0
-        if kind == 8:
-            return self.stage(body)
+        if kind == 8:  # nothing can be adjusted
+            return 3 if len(body) < 11 or (len(body) - 3) % 8 or body[0] > 1 else 8
         if kind == 9:
-            return self.load(body)
+            return 3 if len(body) != 1 or body[0] > 1 else 7
         return 3
 
     def take_inputs(self, body: bytes) -> int:
         if len(body) != 8 * self.n_in:
             return 3
         values = np.frombuffer(body)
-        within = (self.low[: self.n_in] <= values) & (values <= self.high[: self.n_in])
-        if not within[: self.n_in - self.block.n_missable].all():
+        if not ((self.low[: self.n_in] <= values) & (values <= self.high[: self.n_in])).all():
             return 2
-        self.inputs = np.where(within, values, np.nan)
+        self.inputs = values
         self.applied.append((self.boots, values.tolist()))
         self.running = True
         if self.lock_step:
             self.step()
         return 0
-
-    def stage(self, body: bytes) -> int:
-        if len(body) < 11 or (len(body) - 3) % 8 or body[0] > 1:
-            return 3
-        what, first = struct.unpack("<BH", body[:3])
-        values = np.frombuffer(body[3:])
-        bounds = self.bounds[what]
-        if bounds is None:
-            return 8
-        if first == 0:
-            self.staged = (what, [])
-        if self.staged is None or self.staged[0] != what or len(self.staged[1]) != first:
-            return 7
-        if first + len(values) > len(bounds[0]):
-            return 3
-        for value, low, high in zip(values, *(b[first:] for b in bounds), strict=False):
-            if not low <= value <= high:
-                self.staged = None
-                return 2
-        self.staged[1].extend(values.tolist())
-        return 0
-
-    def load(self, body: bytes) -> int:
-        if len(body) != 1 or body[0] > 1:
-            return 3
-        bounds = self.bounds[body[0]]
-        if self.staged is None or self.staged[0] != body[0] or bounds is None:
-            return 7
-        if len(self.staged[1]) != len(bounds[0]):
-            return 7
-        self.numbers[body[0]] = np.array(self.staged[1])
-        self.started |= body[0] == 1
-        self.staged = None
-        self.loads += 1
-        return 0
-
-    # -- the model ---------------------------------------------------------------------------
 
     def step(self) -> None:
         coefficients, state = self.numbers
@@ -266,15 +209,8 @@ class Twin:
             self.started = True
         outputs = np.empty((1, self.n_out))
         type(self.block).kernel(coefficients, state, self.inputs[None, :].copy(), outputs)
-        self.notes = 0
-        if np.isfinite(outputs).all():
-            self.last_good = outputs[0]
-        else:
-            self.notes = 16
-            self.started = bool(np.isfinite(state).all())
-        self.outputs = np.clip(self.last_good, self.low[self.n_in :], self.high[self.n_in :])
-        if (self.outputs != self.last_good).any():
-            self.notes |= 4
+        self.outputs = np.clip(outputs[0], self.low[self.n_in :], self.high[self.n_in :])
+        self.notes = 4 * bool((self.outputs != outputs[0]).any())
         self.steps = (self.steps + 1) % (1 << 32)
         self.since = (self.since + 1) % (1 << 16)
         if self.every and self.since >= self.every:

@@ -6,6 +6,7 @@ import json
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from mckibben import read
 from mckibben.rigs import load_rig, rig_names

@@ -1,4 +1,4 @@
-"""Programs and libraries that some tests need and the README's test line does not install.
+"""Programs that some tests need and the README's test line does not install.
 
 A test says so by `needs`, and is skipped where the tool is not. ``python -m tests.tools install [TOOL
 ...]`` installs those named, or all, with apt-get where there is one.
@@ -6,7 +6,6 @@ A test says so by `needs`, and is skipped where the tool is not. ``python -m tes
 
 from __future__ import annotations
 
-import ctypes
 import shutil
 import subprocess
 import sys
@@ -40,14 +39,8 @@ def needs(tool: str) -> pytest.MarkDecorator:
 
 
 def where(tool: str) -> str | None:
-    """Return where a program is, or the name of a library that loads; None where it is not."""
-    if ".so" not in tool:
-        return shutil.which(tool)
-    try:
-        ctypes.CDLL(tool)
-    except OSError:
-        return None
-    return tool
+    """Return where a program is, None where it is not."""
+    return shutil.which(tool)
 
 
 def skip_without_tools(item: pytest.Item) -> None:

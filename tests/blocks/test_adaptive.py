@@ -22,13 +22,8 @@ from mckibben.blocks.adaptive.learning import (
     covariance_of,
 )
 from mckibben.blocks.dynamic.creep import Creep
-from mckibben.blocks.feedback.feedforward_feedback import FeedforwardFeedback
-from mckibben.blocks.feedback.pid import PIDFeedback
 from mckibben.blocks.play_type.gpi import GPI
 from mckibben.blocks.play_type.pi import PI
-from mckibben.export import export_c
-from mckibben.export.c.building import CompiledModel
-from tests.tools import needs
 
 Array = NDArray[np.float64]
 
@@ -116,34 +111,6 @@ def test_after_a_step_the_error_is_that_of_a_fresh_model_within_two_cycles(model
     late = slice(5000, None)
     assert rms(given[late] - asked[late]) < 0.02
     assert rms(fixed[late] - asked[late]) > 0.5
-
-
-def test_noise_makes_the_input_turn_no_more_often_than_the_reference() -> None:
-    model = GPI.example()
-    asked = references(model, 40.0)
-    stream, rng = adaptive(model, 20.0, 0.05).stream(STEP), np.random.default_rng(1)
-    given = np.array([stream.step([y, y + 0.05 * rng.standard_normal()])[0] for y in asked])
-
-    def turns(values: Array) -> int:
-        steps = np.diff(values)
-        return int(np.sum(np.diff(np.sign(steps[np.abs(steps) > 1e-12])) != 0))
-
-    assert turns(given) == turns(asked)
-
-
-@pytest.mark.kernel
-def test_outliers_cost_little() -> None:
-    model, rng = PI.example(), np.random.default_rng(2)
-    asked = references(model, 60.0)
-    stream, plant = adaptive(model, 20.0, 0.02).stream(STEP), model.stream()
-    errors, reading = [], asked[0]
-    for y in asked:
-        given = plant.step(stream.step([y, reading])[0])[0]
-        errors.append(given - y)
-        reading = given + 0.02 * rng.standard_normal()
-        if rng.random() < 0.02:
-            reading = rng.uniform(-1000, 1000)
-    assert rms(np.array(errors)) < 0.02
 
 
 @pytest.mark.kernel
@@ -236,23 +203,6 @@ def test_a_gain_that_drifts_is_found_and_nothing_else() -> None:
     assert (np.abs(found.by_errors[1:]) < 2.0).all()
 
 
-@needs("cc")
-@pytest.mark.parametrize("model", [GPI.example(), CREEPING], ids=["gpi", "series"])
-def test_c_is_python_also_where_the_sensor_fails(model: Block, tmp_path: Path) -> None:
-    block, rng = adaptive(model, 10.0, 0.05), np.random.default_rng(6)
-    asked = references(GPI.example() if model.kind == "gpi" else Series.example(), 30.0)
-    pairs = np.column_stack([asked, asked + rng.normal(0, 0.3, asked.size)])
-    if block.n_missable:
-        pairs[rng.random(asked.size) < 0.05, 1] = np.nan
-    expected = block.simulate(pairs, sample_time=STEP)
-    for single, tolerance in ((False, 1e-12), (True, 1e-4)):
-        folder = tmp_path / f"c{single}"
-        export_c(block, folder, name="muscle", sample_time=STEP, single=single)
-        outputs, statuses = CompiledModel(folder, "muscle", 2, 1).run(pairs)
-        assert not statuses.any()
-        assert np.abs(outputs - expected).max() <= tolerance * np.ptp(expected)
-
-
 def test_alarms_are_false_no_more_often_than_told() -> None:
     """Where the form is right, few groups pass two standard errors by chance."""
     model = PI.example()
@@ -272,14 +222,3 @@ def test_alarms_are_false_no_more_often_than_told() -> None:
                 beyond, looks = beyond + int(np.sum(sizes > 1.96)), looks + sizes.size
     assert beyond <= 0.05 * looks
     assert alarm_limit(60.0, 3) == pytest.approx(4.54, abs=0.01)
-
-
-def test_beside_feedback_it_shares_what_is_measured() -> None:
-    model = PI.example()
-    learner = adaptive(model, 20.0, 0.02)
-    pid = PIDFeedback.of(model.outputs, model.inputs, (0.01,), (0.05,), (0.0,), limits=(0.0, 5.0))
-    block = FeedforwardFeedback.of(learner, pid)
-    assert [channel.name for channel in block.inputs] == ["displacement", "displacement_measured"]
-    asked = references(model, 40.0)
-    given = closed(block, [changed(model)], asked, 0.02)
-    assert rms((given - asked)[3000:]) < 0.02

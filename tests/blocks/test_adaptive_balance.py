@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,17 +15,10 @@ from mckibben.blocks.core.inverse import Inverse
 from mckibben.blocks.coupled.balance import Balance
 from mckibben.blocks.coupled.balance_adapting import (
     FRICTION,
-    KINDS,
     STIFFNESS,
-    answer,
-    retune,
-    slopes_of,
 )
-from mckibben.blocks.coupled.balance_law import pressed
-from mckibben.blocks.coupled.balance_terms import AT_REST
 from mckibben.blocks.laws.trial import wander
 from tests.blocks.balances import balances
-from tests.tools import needs
 
 Array = NDArray[np.float64]
 
@@ -113,47 +104,6 @@ def test_what_garbage_teaches_is_a_balance_still(balance: Balance, seed: int) ->
     assert np.linalg.eigvalsh(matrix)[0] > 0
 
 
-@pytest.mark.kernel
-@settings(max_examples=15, deadline=None)
-@given(balances(m=0, n_lags=0))
-def test_slopes_are_those_of_equilibria(balance: Balance) -> None:
-    """Against differences of equilibria of balances with other parameters, without friction."""
-    learner, n = balance, len(balance.driven)
-    theta, which = learner.taught, np.array([float(k * KINDS + i) for k, i in learner.learnt])
-    c = np.concatenate([balance.coefficients(STEP), np.zeros(balance.n_scratch)])
-    state, x = np.zeros(balance.n_states), np.full(len(balance.scheduled), 0.5)
-    y = np.linspace(8.0, 14.0, n)
-    state[:n] = y
-    p = np.array([pressed(c, k, state, AT_REST, y, x, np.zeros(n))[0] for k in range(n)])
-    terms, matrix = np.zeros((n, theta.size)), np.zeros((n, n))
-    slopes_of(c, state, which, theta, y, p, x, terms, matrix, np.zeros(n))
-    slopes = np.zeros((n, theta.size))
-    for k in range(n):
-        answer(terms, matrix, k, np.zeros(n + n * n), slopes[k])
-    still = replace(balance, damping=n * (0.0,), lines=(), mass=())
-    for i, scale in enumerate(learner.scales):
-        h = 1e-6 * scale * np.eye(theta.size)[i]
-        low, high = (
-            answers(still.retaught(theta + sign * h), state.copy(), p, x) for sign in (-1.0, 1.0)
-        )
-        expected = (high - low) / (2e-6 * scale)
-        np.testing.assert_allclose(slopes[:, i], expected, rtol=1e-5, atol=1e-6 * np.ptp(y) + 1e-6)
-
-
-@pytest.mark.kernel
-@settings(max_examples=20, deadline=None)
-@given(balances(), st.integers(0, 1000))
-def test_retuned_coefficients_are_those_of_the_block_retaught(balance: Balance, seed: int) -> None:
-    rng, taught = np.random.default_rng(seed), balance.taught
-    theta = taught + rng.uniform(-0.3, 0.3, taught.size) * balance.scales
-    fitted = balance.coefficients(STEP)
-    found = fitted.copy()
-    which = np.array([float(k * KINDS + kind) for k, kind in balance.learnt])
-    retune(fitted, which, theta, found)
-    changed: Balance = balance.retaught(theta).inverse()  # type: ignore[assignment]
-    np.testing.assert_allclose(found, changed.coefficients(STEP), rtol=1e-12, atol=1e-12)
-
-
 def changed_by(balance: Balance, kind: int, factor: float) -> Any:
     """Return the forward block of a balance one kind of whose factors is another."""
     kinds = np.array([one for _, one in balance.learnt])
@@ -231,35 +181,3 @@ def test_a_sensor_that_drops_out_or_stands_still_teaches_nothing(fault: float) -
         loop.step(sample, np.array([fault]))
     theta = loop.block._split(loop.state)[1]
     np.testing.assert_allclose(theta, balance.taught, atol=0.02)
-
-
-@needs("cc")
-@pytest.mark.parametrize(
-    ("change", "single"),
-    [
-        ({"pushes": (8.0, 2.0)}, False),
-        pytest.param({}, False, marks=pytest.mark.long),
-        pytest.param({"settled": True, "tare": True}, False, marks=pytest.mark.long),
-        pytest.param({}, True, marks=pytest.mark.long),
-    ],
-)
-def test_c_gives_the_same_numbers(change: dict[str, Any], single: bool, tmp_path: Path) -> None:
-    from mckibben.export import export_c
-    from mckibben.export.c.building import CompiledModel
-
-    block = Adaptive(Inverse(replace(Balance.example(), **change)), 5.0, 0.1)
-    asked, rng = path(Balance.example(), 4, 2000), np.random.default_rng(1)
-    measured = 0.95 * asked[:, :2] + 1.0 + 0.1 * rng.standard_normal((2000, 2))
-    measured = np.vstack([measured[:1], measured[:-1]])
-    measured[700] *= 3.0
-    measured[1000:1030] = measured[1000]
-    inputs = np.hstack([asked, measured])
-    if single:
-        inputs = inputs.astype(np.float32).astype(np.float64)
-    export_c(block, tmp_path / "c", name="muscle", sample_time=STEP, single=single)
-    outputs, statuses = CompiledModel(tmp_path / "c", "muscle", 6, 2).run(inputs)
-    assert not statuses.any()
-    expected = block.simulate(inputs, sample_time=STEP)
-    far = np.abs(outputs - expected) / np.ptp(expected, axis=0)
-    # measured as it is, parameters run into their bounds, where single precision strays
-    assert far.max() <= (1e-3 if single else 1e-12)

@@ -63,14 +63,6 @@ def test_a_finer_grid_gives_the_same_pressures(air: Air, u: Array, times: int) -
     np.testing.assert_allclose(fine[times - 1 :: times], coarse, atol=1e-11)
 
 
-def test_what_is_reachable_is_where_filling_and_venting_end() -> None:
-    free = replace(RIGHT_AWAY, ambient=None, supply=None, filling_time=0.0, venting_time=0.0)
-    lowest, highest = free.limits
-    pressure = free.simulate(np.repeat([lowest, highest, lowest], 100), sample_time=STEP)
-    (low,), (high,) = free.reachable()
-    np.testing.assert_allclose(pressure[[199, 299]], [high, low], atol=1e-9)
-
-
 def test_a_reference_too_fast_is_told_and_followed_as_fast_as_the_air_flows() -> None:
     reference = np.repeat([1.0, 4.0, 4.0], 20)
     with pytest.warns(ModelWarning, match="'pressure'"):

@@ -1,11 +1,13 @@
-"""Bouc-Wen, generalised Bouc-Wen and Duhem against SciPy's adaptive integrator, and their laws."""
+"""Hysteresis as differential equations: bounds, energy, oscillators solved by others.
+
+Kernels agree with their twins in `tests.contracts.test_twins`.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
-from functools import partial
-from typing import Literal
+from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,93 +16,152 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
+from mckibben import ModelError, Parallel, Recording
 from mckibben.blocks.differential.bouc_wen import BoucWen
-from mckibben.blocks.differential.duhem import Duhem
+from mckibben.blocks.differential.bouc_wen_oscillator import BoucWenOscillator
+from mckibben.blocks.differential.duhem_oscillator import DuhemOscillator
 from mckibben.blocks.differential.generalized_bouc_wen import GeneralizedBoucWen
+from mckibben.blocks.force.feedforward import ForceFeedforward
+from mckibben.blocks.force.multistate_friction import EIGHTEEN, MultistateFriction
+from mckibben.papers.multistate_friction.published import multistate_friction, static_force
 
 Array = NDArray[np.float64]
-Slope = Callable[[float, float, float], float]
-
-
-def turning(seed: int, n: int = 12) -> Array:
-    return np.random.default_rng(seed).uniform(0.0, 5.0, n)
-
-
-def _rate(slope: Slope, way: float, u: float, z: Array) -> list[float]:
-    return [slope(u, z[0], way)]
-
-
-def integrated(slope: Slope, start: float, turns: Array, kinks: tuple[float, ...] = ()) -> Array:
-    """Return the state at every turning point, stepping anew at each kink of the input."""
-    state, found = start, []
-    for begin, end in zip(np.concatenate([turns[:1], turns[:-1]]), turns, strict=True):
-        way = float(np.sign(end - begin))
-        inside = sorted((k for k in kinks if (k - begin) * (k - end) < 0), reverse=bool(way < 0))
-        for first, last in zip([begin, *inside], [*inside, end], strict=True):
-            if first != last:
-                solved = solve_ivp(
-                    partial(_rate, slope, way),
-                    (first, last),
-                    [state],
-                    rtol=1e-9,
-                    atol=1e-11,
-                    max_step=0.01,
-                )
-                state = float(solved.y[0, -1])
-        found.append(state)
-    return np.array(found)
-
-
-@pytest.mark.parametrize("exponent", [1, 2])
-@pytest.mark.parametrize("sigma", [0.5, 0.9, 3.0])
-def test_bouc_wen_agrees_with_scipy(exponent: Literal[1, 2], sigma: float) -> None:
-    model = replace(
-        BoucWen.example(), polynomial=(0.0,), weight=1.0, sigma=sigma, exponent=exponent
-    )
-
-    def slope(u: float, z: float, way: float) -> float:
-        psi = sigma * np.sign(z) * way + 1 - sigma
-        return float(model.rate * (1 - abs(z) ** exponent * psi))
-
-    turns = turning(1)
-    expected = integrated(slope, 1.0, turns)
-    np.testing.assert_allclose(model.simulate(turns), expected, atol=2e-5)
-
-
-@pytest.mark.parametrize("exponent", [1, 2])
-def test_generalized_bouc_wen_agrees_with_scipy(exponent: Literal[1, 2]) -> None:
-    model = replace(GeneralizedBoucWen.example(), polynomial=(0.0,), weight=1.0, exponent=exponent)
-    b = model.shape
-
-    def slope(u: float, z: float, way: float) -> float:
-        x, s = np.sign(u - model.centre), np.sign(z)
-        psi = s * way + b[0] * x * way + b[1] * x * s + b[2] * way + b[3] * s + b[4] * x
-        return float(model.rate * (1 - abs(z) ** exponent * psi))
-
-    turns = turning(2)
-    expected = integrated(slope, 1.0, turns, (model.centre,))
-    np.testing.assert_allclose(model.simulate(turns), expected, atol=2e-5)
-
-
-def test_duhem_agrees_with_scipy() -> None:
-    model = Duhem.example()
-
-    def slope(u: float, y: float, way: float) -> float:
-        x = (u - model.centre) / model.scale
-        f = np.polynomial.polynomial.polyval(x, model.target)
-        g = np.polynomial.polynomial.polyval(x, model.slope)
-        return float((model.alpha * way * (f - y) + g) / model.scale)
-
-    turns = turning(3)
-    start = float(model.initial_state(turns[:1])[0])
-    expected = integrated(slope, start, turns)
-    np.testing.assert_allclose(model.simulate(turns), expected, atol=1e-6)
 
 
 @given(st.lists(st.floats(0.0, 5.0), min_size=2, max_size=40), st.floats(0.5, 5.0))
-@settings(max_examples=60, deadline=None)
-def test_z_stays_within_its_bounds(turns: list[float], sigma: float) -> None:
+@settings(max_examples=60)
+def test_hysteretic_states_stay_within_their_bounds(turns: list[float], sigma: float) -> None:
     model = replace(BoucWen.example(), polynomial=(0.0,), weight=1.0, sigma=sigma)
     assert np.abs(model.simulate(turns)).max() <= 1 + 1e-12
     wide = replace(GeneralizedBoucWen.example(), polynomial=(0.0,), weight=1.0)
     assert np.abs(wide.simulate(turns)).max() <= wide.bound + 1e-12
+
+
+STEP = 1 / 750
+HARD = BoucWenOscillator(2.0, 0.01, 50.0, 50.0, 0.8, -1.1)
+"""Whose loops harden, of 35 Hz."""
+
+
+def sweep(n: int, step: float = STEP, highest: float = 40.0) -> Array:
+    """Return a sine whose frequency rises from 15 Hz, beginning from rest."""
+    t = step * np.arange(n)
+    return 40.0 * np.sin(2 * np.pi * (15.0 + (highest - 15.0) * t / (2 * t[-1])) * t)
+
+
+def solved(model: BoucWenOscillator, u: Array, step: float) -> Array:
+    """Return the displacement from rest under straight lines, at a tight tolerance."""
+
+    def rates(t: float, x: Array, start: float, rise: float) -> list[float]:
+        y, v, z = x
+        pull = start + rise * t - model.damping * v - model.stiffness * y - z
+        loops = model.gamma * abs(v) * z + model.delta * v * abs(z)
+        return [v, 1e3 * pull / model.mass, model.slope * v - loops]
+
+    x: Array = np.zeros(3)
+    found = [0.0]
+    for start, end in pairwise(u.tolist()):
+        given = (start, (end - start) / step)
+        x = solve_ivp(rates, (0.0, step), x, "DOP853", args=given, rtol=1e-11, atol=1e-12).y[:, -1]
+        found.append(x[0])
+    return np.array(found)
+
+
+def test_a_sweep_from_rest_agrees_with_a_solver_of_tight_tolerance() -> None:
+    u = sweep(750)
+    expected = solved(HARD, u, STEP)
+    errors = [
+        np.abs(replace(HARD, substeps=n).simulate(u, sample_time=STEP) - expected).max()
+        for n in (10, 40)
+    ]
+    assert errors[0] < 1e-4 * np.ptp(expected)
+    assert errors[1] < errors[0] / 10  # of second order, for the element has corners
+    wrong = replace(HARD, gamma=1.01 * HARD.gamma).simulate(u, sample_time=STEP)
+    assert np.abs(wrong - expected).max() > 1e-3 * np.ptp(expected)
+
+
+@pytest.mark.parametrize("model", [HARD, DuhemOscillator.example()])
+@pytest.mark.parametrize("force", [-3.0, 2.0])
+def test_it_rests_where_a_slow_force_leads(model: Any, force: float) -> None:
+    held = model.simulate(np.full(200, force), sample_time=STEP)
+    np.testing.assert_allclose(held, held[0], rtol=1e-12)
+    ramp = np.interp(np.arange(40_000), [0, 30_000], [0.0, force])
+    slow = replace(model, damping=2.0).simulate(ramp, sample_time=0.002, initial="virgin")
+    assert slow[-1] == pytest.approx(held[0], rel=2e-3)
+
+
+@pytest.mark.parametrize("ratio", [1, 5])
+def test_steady_state_is_what_a_force_that_repeats_leads_to(ratio: int) -> None:
+    """A band-limited period, at its own rate or sampled more finely, gives the same response."""
+    rng, n = np.random.default_rng(0), 300
+    lines = np.zeros(n // 2 + 1, dtype=complex)
+    lines[4:30] = np.exp(2j * np.pi * rng.random(26))
+    u = np.fft.irfft(lines, n) * 600.0
+    steady = HARD.steady_state(Recording({"force": u}, STEP))["displacement"]
+    fine = np.fft.irfft(np.append(lines, np.zeros((20 * ratio - 1) * n // 2)), 20 * ratio * n)
+    fine *= 600.0 * 20 * ratio
+    finely = replace(HARD, substeps=1)
+    long = finely.simulate(np.tile(fine, 8), sample_time=STEP / (20 * ratio))
+    late = long[-fine.size :: 20 * ratio]
+    np.testing.assert_allclose(steady, late, atol=(1e-8, 2e-4)[ratio > 1] * np.ptp(late))
+    from_rest = HARD.simulate(u, sample_time=STEP)
+    assert np.abs(from_rest - late).max() > 0.05 * np.ptp(late)
+
+
+def test_a_response_that_never_repeats_is_told() -> None:
+    undamped = BoucWenOscillator(2.0, 0.0, 50.0, 50.0, 0.0, 0.0)
+    shaken = Recording({"force": np.sin(np.arange(40.0))}, STEP)
+    with pytest.raises(ModelError):
+        undamped.steady_state(shaken)
+
+
+# -- friction of several elements ----------------------------------------------------------------
+
+STIFF = MultistateFriction(
+    EIGHTEEN,
+    (
+        *(18.0, 5e-3, 60.0, 12.0, 4e-3, 50.0),
+        *(30.0, 1e-3, 20.0, 25.0, 2e-3, 15.0),
+        *(8.0, 2e-2, 40.0, 9.0, 1e-2, 55.0),
+    ),
+)
+
+
+def force(model: MultistateFriction, length: Array) -> Array:
+    table = np.column_stack([length, np.full(length.size, 4.0)])
+    return model.simulate(table, initial="virgin", sample_time=0.01)[:, 0]
+
+
+@given(st.lists(st.floats(185.0, 200.0), min_size=3, max_size=12), st.integers(0, 1))
+@settings(max_examples=40)
+def test_friction_takes_energy_and_never_gives_more_than_it_stored(
+    turns: list[float], which: int
+) -> None:
+    model = (STIFF, multistate_friction())[which]
+    way = np.concatenate([np.linspace(a, b, 40)[:-1] for a, b in pairwise(turns)])
+    # the work done on the friction, each step at the force that it ends with, less what that misses
+    f = force(model, way)
+    work = np.cumsum(f[1:] * np.diff(way))
+    slack = np.cumsum(np.abs(np.diff(f)) * np.abs(np.diff(way)))
+    table = model.table()
+    # springs that go on with another stiffness at a reversal keep at most what they held
+    stored = (table[:, [2, 5]] ** 2 / (2 * np.minimum(table[:, [0]], table[:, [3]]))).sum()
+    assert np.all(work + slack >= -stored - 1e-9)
+
+
+def test_printed_limits_are_reached_both_ways() -> None:
+    slow = np.concatenate([np.linspace(180, 200, 4001), np.linspace(200, 180, 4001)])
+    f = force(multistate_friction(), slow)
+    assert f.max() == pytest.approx(128.795, rel=1e-6)
+    assert f.min() == pytest.approx(-103.096 - 13.431 - 1.256, abs=1.3)
+
+
+@pytest.mark.parametrize("gain", [0.0, 0.2])
+def test_feedforward_is_exact(gain: float) -> None:
+    friction = replace(multistate_friction(), pressure_gain=gain, initial="virgin")
+    length = np.interp(np.arange(264), np.arange(0, 288, 24), 192.5 + 3.5 * (-0.9) ** np.arange(12))
+    wanted = 300.0 + 60.0 * np.sin(np.linspace(0, 20, length.size))
+    recording = Recording({"force": wanted, "length": length}, 0.01)
+    pressure = ForceFeedforward(static_force(), friction).simulate(recording)["pressure"]
+    driven = Recording({"length": length, "pressure": pressure}, 0.01)
+    reached = Parallel((static_force(), friction)).simulate(driven)["force"]
+    np.testing.assert_allclose(reached, wanted, atol=1e-9)

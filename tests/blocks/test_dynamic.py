@@ -1,21 +1,26 @@
-"""Dynamic models against SciPy's filters and integrators."""
+"""Dynamic models against SciPy and python-control: simulated by them, and handed over to them."""
 
 from __future__ import annotations
 
 from dataclasses import replace
+from importlib import import_module
+from importlib.util import find_spec
 from typing import Any, Literal
 
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
-from scipy.signal import lfilter, lsim
+from scipy.signal import dlsim, lsim
 
-from mckibben import Recording
+from mckibben.blocks.compose import Parallel, Series
+from mckibben.blocks.core.block import Block
+from mckibben.blocks.core.fields import DISPLACEMENT
 from mckibben.blocks.dynamic.creep import Creep
 from mckibben.blocks.dynamic.process_model import ProcessModel
 from mckibben.blocks.dynamic.state_network import StateNetwork
 from mckibben.blocks.dynamic.transfer_function import TransferFunction
-from mckibben.papers.field_models.published import process_model
+from mckibben.blocks.memoryless.affine import Affine
+from mckibben.blocks.memoryless.negative import Negative
 
 STEP = 0.01
 INPUT = np.cumsum(np.random.default_rng(0).standard_normal(1500)) * 0.05
@@ -62,22 +67,51 @@ def test_delays_between_samples_are_exact(delay: float) -> None:
     np.testing.assert_allclose(y, expected, atol=1e-9 * np.ptp(expected))
 
 
-def test_the_printed_p2uz_has_the_poles_that_its_numbers_give() -> None:
-    poles = np.sort(np.roots(process_model().denominator()))
-    np.testing.assert_allclose(poles, [-3.185, -0.00966], rtol=2e-3)
+# -- handed over -----------------------------------------------------------------------------------
 
 
-def test_a_rest_is_a_rest() -> None:
-    for model in (*STRUCTURES.values(), TransferFunction.example(), Creep.example()):
-        y = model.simulate(np.full(300, 3.0), sample_time=STEP)
-        np.testing.assert_allclose(y, y[0], rtol=1e-9)
+LINEAR = {
+    "transfer function": TransferFunction.example(),
+    "delays": TransferFunction((0.0, 0.0, 1.5), (-0.9,), STEP, 1.0, 2.0),
+    "P1DZ": ProcessModel(2.0, (0.3,), None, 0.2, 0.0234),
+    "P2DUZ, held": ProcessModel(2.0, (0.1,), 0.2, 0.3, 0.0251, 1.0, 2.0, "zero"),
+    "creep": Creep((0.1, 0.05), (0.3, 4.0)),
+    "series": Series(
+        (
+            ProcessModel(2.0, (0.3,), None, None, 0.02, 1.0, 3.0),
+            Creep((0.1,), (0.4,)),
+            Affine(2.0, 1.0, DISPLACEMENT, DISPLACEMENT),
+            Negative(DISPLACEMENT, DISPLACEMENT),
+        )
+    ),
+    "parallel": Parallel((ProcessModel(2.0, (0.3,)), TransferFunction((1.0, 0.5), (-0.7,), STEP))),
+}
 
 
-def test_transfer_function_is_scipys_filter() -> None:
-    model = TransferFunction.example()
-    y = model.simulate(INPUT, initial="virgin", sample_time=STEP)
-    filtered = lfilter(model.numerator, [1.0, *model.denominator], INPUT - model.input_offset)
-    np.testing.assert_allclose(y, filtered + model.output_offset, atol=1e-12)
+@pytest.mark.parametrize("name", LINEAR)
+def test_scipy_and_python_control_simulate_the_same(name: str) -> None:
+    block: Block = LINEAR[name]
+    system, u = block.linear_system(STEP), np.random.default_rng(3).uniform(0.0, 5.0, 300)
+    u0, y0 = float(system.input_offset[0]), float(system.output_offset[0])
+    # from the operating point, at rest there
+    expected = np.asarray(block.simulate([u0, *u], sample_time=STEP))[1:] - y0
+    discrete: Any = block.to_scipy(STEP)
+    found = [dlsim(discrete, u - u0)[1][:, 0]]
+    if find_spec("control"):
+        control = import_module("control")
+        response = control.forced_response(block.to_control(STEP), U=u - u0)
+        found.append(np.squeeze(response.outputs))
+    for one in found:
+        assert np.abs(one - expected).max() < 1e-10 * np.abs(expected).max()
+
+
+def test_a_continuous_model_comes_as_it_is_written() -> None:
+    model = ProcessModel(2.0, (0.1,), 0.4, 0.3)
+    system = model.to_scipy()
+    w, found = system.freqresp(np.array([0.5, 3.0, 20.0]))
+    s = 1j * w
+    expected = 2.0 * (0.3 * s + 1) / (0.01 * s**2 + 2 * 0.4 * 0.1 * s + 1)
+    np.testing.assert_allclose(found, expected, rtol=1e-12)
 
 
 # -- state-space networks --------------------------------------------------------------------------
@@ -104,36 +138,3 @@ def test_it_agrees_with_a_solver_of_tight_tolerance() -> None:
     expected = MODEL.output_offset + MODEL.output_scale * found
     given = replace(MODEL, substeps=20).simulate(FORCE, sample_time=STEP, initial="virgin")
     np.testing.assert_allclose(given, expected, atol=1e-6 * np.ptp(expected))
-
-
-def test_without_units_it_is_linear() -> None:
-    """An oscillator of 15 rad/s, of which the network knows time in its own units."""
-    silent = replace(
-        MODEL,
-        linear=((0.0, 1.0, 0.0, 0.0), (-1.0, -0.4, 1.0, 0.0)),
-        readout=((0.0, 0.0), (0.0, 0.0)),
-        substeps=20,
-    )
-    gain = MODEL.output_scale / MODEL.input_scale
-    linear = ProcessModel(gain, (1 / 15.0,), 0.2, input_offset=1.0, output_offset=0.5)
-    expected = linear.simulate(FORCE + 2.0, sample_time=STEP)
-    given = silent.simulate(FORCE + 2.0, sample_time=STEP)
-    np.testing.assert_allclose(given, expected, atol=1e-4 * np.ptp(expected))
-
-
-def test_a_held_input_goes_in_steps() -> None:
-    held = replace(MODEL, hold="zero")
-    steps = np.repeat([0.0, 1.0, -2.0], 20)
-    late = np.append(steps[:1], steps[:-1])  # what is held from a sample on is felt at the next
-    finer = replace(MODEL, substeps=2 * 50)
-    ramps = finer.simulate(np.interp(np.arange(60), np.arange(60), late), sample_time=STEP)
-    given = held.simulate(steps, sample_time=STEP)
-    assert np.abs(given - ramps).max() < 0.2 * np.ptp(given)
-    assert given[20] == pytest.approx(given[19])
-    assert abs(given[21] - given[20]) > 1e-4 * np.ptp(given)
-
-
-def test_steady_states_repeat() -> None:
-    wave = Recording({"force": np.sin(2 * np.pi * np.arange(100) / 50)}, STEP)
-    found = MODEL.steady_state(wave)["displacement"]
-    np.testing.assert_allclose(found[:50], found[50:], atol=1e-9)

@@ -9,18 +9,15 @@ import numpy as np
 import pytest
 from scipy.optimize import LinearConstraint, minimize
 
-from mckibben import Block, Recording
+from mckibben import Block
 from mckibben.arrays import Array
 from mckibben.blocks.coupled.balance import Balance
 from mckibben.blocks.play_type.gpi import GPI
 from mckibben.blocks.play_type.pi import PI
-from mckibben.blocks.predictive.plan import MOST_STEPS, plan, plan_scratch
-from mckibben.blocks.predictive.plan_one import one_scratch, plan_one, turned
+from mckibben.blocks.predictive.plan import plan, plan_scratch
+from mckibben.blocks.predictive.plan_one import one_scratch, plan_one
 from mckibben.blocks.predictive.predictive import Predictive
-from mckibben.blocks.predictive.supply import allowed, limit_rows
-from mckibben.control import control_law, track
-from mckibben.errors import ModelError
-from mckibben.rigs import load_rig
+from mckibben.blocks.predictive.supply import limit_rows
 
 STEP = 0.01
 ARM = replace(Balance.example(), pressure_range=(0.0, 6.0))
@@ -147,39 +144,6 @@ def test_plans_are_the_best_there_are(n: int) -> None:
 
 
 @pytest.mark.kernel
-def test_plans_end_where_there_is_none() -> None:
-    rows, before, slopes, nominal, errors = problem(2, 0)
-    for slope, start, steps in ((np.nan, before, 0), (1.0, before + 50.0, MOST_STEPS)):
-        found = nominal.copy()
-        given = (rows, start, slope * slopes.reshape(-1), nominal, errors, found)
-        assert plan(*given, np.zeros(plan_scratch(6, 2, len(rows)))) == steps
-        assert np.isfinite(found).all()
-
-
-@pytest.mark.kernel
-@pytest.mark.parametrize(
-    ("high", "least", "beyond", "there"), [(5.0, 1.0, 1, 1.0), (0.5, 0.5, 0, 1.0)]
-)
-def test_a_derivative_above_zero_throughout_is_least_at_its_lowest(
-    high: float, least: float, beyond: int, there: float
-) -> None:
-    best, knots = np.zeros(1), np.array([1.0, 2.0, 3.0])
-    assert turned(3, knots, knots, 0.0, high, best, 0) == (beyond, there)
-    assert best[0] == least
-
-
-@pytest.mark.kernel
-def test_the_supply_takes_from_all_in_one_share() -> None:
-    rows = limit_rows(np.zeros(2), np.full(2, 5.0), np.inf, 6.0, 1.0, np.ones(2))
-    p = np.array([3.0, 2.0])
-    assert not allowed(rows, np.array([1.0, 1.0]), p)
-    assert p == pytest.approx([1.5, 1.5])
-    falling = np.array([0.0, 2.0])
-    assert allowed(rows, np.array([4.0, 1.0]), falling)  # what vents gives nothing back
-    assert not allowed(rows, np.array([4.0, 0.5]), np.array([0.0, 2.0]))
-
-
-@pytest.mark.kernel
 def test_a_supply_limits_one_muscle_too() -> None:
     inverse, references = motion("pi", 300, 5)
     for limits in ({"total_limit": 1.0}, {"pressure_range": (0.0, 1.0)}):
@@ -189,23 +153,3 @@ def test_a_supply_limits_one_muscle_too() -> None:
         if "total_limit" in limits:
             first = found
     np.testing.assert_allclose(found, first, rtol=0.0, atol=1e-9)
-
-
-def test_a_loop_gives_references_ahead() -> None:
-    rig = load_rig("mas20-hanging")
-    inverse = replace(PI.example(), weights=(6.0, 1.0, 1.0, 1.0), offset=0.0).inverse()
-    path = 10.0 + 5.0 * np.sign(np.sin(np.arange(300) / 25.0))
-    reference = Recording({"displacement": path}, STEP, {"displacement": "mm"})
-    given = {}
-    for horizon in (1, 20):
-        block = Predictive(inverse, horizon=horizon, rate_limit=8.0)
-        found = track(block, rig, reference, approach=1.0, slew=8.0, pressure_loop=False)
-        assert found.clipped == 0
-        given[horizon] = found.recording["command_pressure"]
-    jumps = [int(np.argmax(np.diff(p[130:]) < -0.05)) for p in given.values()]
-    assert jumps[1] < jumps[0]
-
-
-def test_an_observer_has_no_use_for_a_plan() -> None:
-    with pytest.raises(ModelError, match="observer"):
-        control_law("observer", Predictive(ARM), lambda: None)  # type: ignore[arg-type, return-value]

@@ -12,8 +12,6 @@ from mckibben import ModelError
 from mckibben.blocks.core.fields import Channel
 from mckibben.blocks.coupled.coupling import Coupling
 from mckibben.blocks.coupled.fuzzy_network import FuzzyNetwork
-from mckibben.blocks.coupled.fuzzy_rules import contract, sloped_answer
-from mckibben.registry import load
 
 Array = NDArray[np.float64]
 
@@ -22,10 +20,6 @@ Array = NDArray[np.float64]
 
 
 CHANNELS = tuple(Channel(f"displacement_{k}", "mm") for k in (1, 2))
-
-
-def test_printed_gains_have_the_printed_radius() -> None:
-    assert load("published", "sdchm-coupling")().radius == pytest.approx(0.456, abs=5e-4)
 
 
 def test_jacobi_agrees_with_the_direct_solution() -> None:
@@ -73,32 +67,6 @@ def network(m: int, scheduled: int, constants: bool, seed: int) -> FuzzyNetwork:
 networks = st.builds(
     network, st.integers(1, 3), st.integers(0, 2), st.booleans(), st.integers(0, 1000)
 )
-
-
-def sloped(block: FuzzyNetwork, x: Array, scheduling: Array) -> tuple[Array, Array]:
-    """Return the outputs and their slopes by the driven inputs, as the inverse computes them."""
-    c, m = block.coefficients(None), len(block.driven)
-    n, most = len(block.centres), max(map(len, block.centres))
-    rules = int(np.prod([len(row) for row in block.centres[:m]]))
-    memberships, left = np.empty(n * most), np.empty(rules * m * (m + 1))
-    contract(c, m, scheduling, memberships, left)
-    y, slopes = np.empty(m), np.empty((m, m))
-    sloped_answer(c, left, x, memberships, np.empty(m * most + m), y, slopes)
-    return y, slopes
-
-
-@given(networks, st.integers(0, 1000))
-@settings(max_examples=40, deadline=None)
-def test_slopes_are_those_of_the_answer(block: FuzzyNetwork, seed: int) -> None:
-    rng, m = np.random.default_rng(seed), len(block.driven)
-    x, scheduling = rng.uniform(-20.0, 20.0, m), rng.uniform(-5.0, 5.0, len(block.scheduled))
-    y, slopes = sloped(block, x, scheduling)
-    np.testing.assert_allclose(y, block.simulate([[*x, *scheduling]])[0], atol=1e-11)
-    h = 1e-4
-    for i in range(m):
-        move = h * np.eye(m)[i]
-        ends = block.simulate([[*(x + move), *scheduling], [*(x - move), *scheduling]])
-        np.testing.assert_allclose(slopes[:, i], (ends[0] - ends[1]) / (2 * h), atol=1e-6)
 
 
 @given(networks, st.integers(0, 1000))

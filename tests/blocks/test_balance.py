@@ -170,27 +170,6 @@ def test_the_equilibrium_has_the_least_incremental_energy(pushes: tuple[float, f
 # -- slack ---------------------------------------------------------------------------------------
 
 
-@given(balances(n=2, n_loads=0), SEEDS)
-def test_a_slack_muscle_pushes_as_hard_as_it_can_whatever_its_pressure(
-    block: Balance, seed: int
-) -> None:
-    """Then less pressure moves nothing; and no muscle is asked to push harder."""
-    slack = replace(block, bladders=(2.0, 3.0), pushes=(4.0, 0.0), tare=False)
-    inputs = motion(slack, (0.0, HIGHEST), seed)
-    inputs[-1, :2] = 0.0, HIGHEST
-    moved = run(slack.inverse(), inputs)
-    springs = np.array(slack.springs).reshape(2, -1, 3)
-    x = inputs[:, 2:]
-    powers = np.column_stack([np.ones(len(x)), *(x**d for d in range(1, slack.degree + 1))])
-    powers = powers[:, : springs.shape[1]]
-    around = np.column_stack([np.ones(len(x)), moved])
-    pushed = -np.einsum("tq,kqj,tj->tk", powers, springs, around)
-    assert (pushed <= np.array(slack.pushes) + 1e-6).all()
-    less = inputs.copy()
-    less[-1, :2] -= np.where(pushed[-1] >= np.array(slack.pushes) - 1e-9, 0.5, 0.0)
-    np.testing.assert_allclose(run(slack.inverse(), less), moved, atol=1e-7)
-
-
 @given(balances(n=2), SEEDS)
 def test_what_asks_a_muscle_to_push_harder_than_it_can_is_told(block: Balance, seed: int) -> None:
     """Its pressure is that at which it is about to go slack; and what is reached needs no other."""
@@ -283,19 +262,6 @@ def test_the_loads_estimated_are_those_that_were(n: int, data: st.DataObject, se
     loads[0] *= 0.0 if block.tare else 1.0
     found = run(LoadEstimate(block), measured(block, inputs))
     np.testing.assert_allclose(found, loads, atol=1e-9 * LOADED)
-
-
-def test_one_load_on_two_muscles_is_estimated_by_least_squares() -> None:
-    """What a pressure is off by counts by the muscle's share of all."""
-    example = Balance.example()
-    block = replace(example, loads=((1.0,), (2.0,)), limits=(), friction=((), ()), tare=True)
-    inputs = motion(block, (0.0, 2.5), 2)
-    known = measured(block, inputs)
-    tare = LoadEstimate(block).initial_state(known[0])[-4]
-    area = np.polyval(block.areas[0][::-1], (known[:, 0] + tare) / block.scale)
-    off = np.array([0.0, 0.0, 0.1, 0.0, 0.0])
-    shift = run(LoadEstimate(block), known + off) - run(LoadEstimate(block), known)
-    np.testing.assert_allclose(shift[:, 0], 0.1 * area * 1.0 / (1.0 + 4.0), atol=1e-9)
 
 
 @given(balances(n=2, n_loads=2), numbers(0.0, HIGHEST), SEEDS)

@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import ClassVar, Self
-
 import numpy as np
 import pytest
 from hypothesis import given
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from mckibben import (
     PI,
-    Block,
     Channel,
     Parallel,
     PerChannel,
@@ -21,68 +17,22 @@ from mckibben import (
     Recording,
     Series,
 )
-from mckibben.blocks.core.block import Run
-from mckibben.blocks.core.fields import DISPLACEMENT, Initial
-from mckibben.blocks.laws.examples import examples
+from mckibben.blocks.core.fields import DISPLACEMENT
+from mckibben.blocks.coupled.fuzzy_network import FuzzyNetwork
 from tests.blocks.strategies import paths, pi_models
 
 Array = NDArray[np.float64]
 
-EXAMPLES = examples()
 FORCE = Channel("force", "N")
 TEMPERATURE = Channel("temperature", "degC")
 
 
-@dataclass(frozen=True)
-class Compliance(Block):
-    """Displacement lost under a scheduling channel: y = u - softness times that channel."""
-
-    kind: ClassVar[str] = "compliance"
-
-    softness: float
-    schedule: Channel = FORCE
-
-    @property
-    def inputs(self) -> tuple[Channel, ...]:
-        return (DISPLACEMENT, self.schedule)
-
-    @property
-    def outputs(self) -> tuple[Channel, ...]:
-        return (DISPLACEMENT,)
-
-    @property
-    def scheduling(self) -> tuple[str, ...]:
-        return (self.schedule.name,)
-
-    @property
-    def n_states(self) -> int:
-        return 0
-
-    @property
-    def n_parameters(self) -> int:
-        return 1
-
-    def pack(self) -> Array:
-        return np.array([self.softness])
-
-    def unpack(self, parameters: ArrayLike) -> Self:
-        return replace(self, softness=float(np.asarray(parameters)[0]))
-
-    def initial_state(self, first: Array, initial: Initial | None = None) -> Array:
-        return np.empty(0)
-
-    def bind(self, sample_time: float | None, state: Array, inputs: Array, outputs: Array) -> Run:
-        def run() -> None:
-            outputs[:, 0] = inputs[:, 0] - self.softness * inputs[:, 1]
-
-        return run
-
-    def inverse(self) -> Compliance:
-        return replace(self, softness=-self.softness)
-
-    @classmethod
-    def example(cls) -> Compliance:
-        return cls(0.02)
+def compliance(softness: float, schedule: Channel = FORCE) -> FuzzyNetwork:
+    """Return displacement lost under a scheduling channel, as one rule: y = u - softness times it."""
+    channels = ((DISPLACEMENT,), (DISPLACEMENT,), (schedule,))
+    sets = ((0.0,), (0.0,))
+    wide = ((1e3,), (1e3,))
+    return FuzzyNetwork(sets, wide, (1.0, -softness), *channels, limits=((-100.0, 100.0),))
 
 
 @given(pi_models(), paths())
@@ -108,7 +58,7 @@ def test_a_recording_is_wired_by_name_not_by_order() -> None:
 
 
 def scheduled() -> Series:
-    return Series((PI.example(), Compliance(0.02), PiecewiseLinear.example()))
+    return Series((PI.example(), compliance(0.02), PiecewiseLinear.example()))
 
 
 def test_scheduling_inputs_reach_the_part_that_wants_them() -> None:
@@ -124,7 +74,7 @@ def test_scheduling_inputs_reach_the_part_that_wants_them() -> None:
 
 def test_two_parts_share_a_scheduling_input_and_others_stay_apart() -> None:
     series = Series(
-        (PI.example(), Compliance(0.02), Compliance(0.1, TEMPERATURE), Compliance(0.03))
+        (PI.example(), compliance(0.02), compliance(0.1, TEMPERATURE), compliance(0.03))
     )
     assert [channel.name for channel in series.inputs] == ["pressure", "force", "temperature"]
     table = np.column_stack([np.linspace(0, 5, 50), np.linspace(9, 0, 50), np.full(50, 20.0)])

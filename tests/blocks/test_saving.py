@@ -57,42 +57,25 @@ DAMAGES: dict[str, Callable[[dict[str, Any]], object]] = {
     "another format": with_(format="onnx"),
     "no format": without("format"),
     "a later version": with_(version=2),
-    "a version that is text": with_(version="1"),
-    "a version that is true": with_(version=True),
     "no version": without("version"),
     "no kind": without("kind"),
     "an unknown kind": with_(kind="unheard-of"),
-    "a kind that is a list": with_(kind=["gpi"]),
     "a kind that is a location": with_(kind="os:system"),
-    "a kind that is a location of ours": with_(kind="mckibben.blocks.play_type.gpi:GPI"),
     "a kind that is a path": with_(kind="../gpi"),
-    "a kind of another group": with_(kind="tanh"),
     "an estimator as a kind": with_(kind="mpi"),
-    "a dunder field": with_(__class__="PI"),
     "a method as a field": with_(bind=1.0),
     "an absent field": without("weights"),
     "a number as text": with_(weights=["9.0", 4.0, 2.0, 1.0]),
-    "a truth value as a number": with_(weights=[True, 4.0, 2.0, 1.0]),
-    "null for a number": with_(weights=[None, 4.0, 2.0, 1.0]),
     "a number for a list": with_(weights=9.0),
-    "an object for a list": with_(weights={"0": 9.0}),
-    "text for a list": with_(weights="9421"),
-    "a nested list": with_(weights=[[9.0], 4.0, 2.0, 1.0]),
     "an input range of three": with_(input_range=[0.0, 1.0, 5.0]),
     "an unknown start": with_(initial="fresh"),
     "a start that is not finite": with_(initial=[1e999, 0.0]),
-    "a channel that is text": with_(input="pressure"),
     "a channel without a unit": with_(input={"name": "pressure"}),
     "a channel with more": with_(input={"name": "p", "unit": "bar", "x": 1}),
     "an unknown envelope": with_(rising={"kind": "erf", "slope": 1.0, "shift": 0.0}),
     "an envelope that is a block": with_(rising=PI.example().to_dict()),
-    "an envelope that is a list": with_(rising=[1.0, 2.0]),
-    "an envelope with text": with_(rising=GOOD["rising"] | {"slope": "steep"}),
     "an envelope that falls": with_(rising=GOOD["rising"] | {"slope": -1.0}),
     "a list": lambda d: [d],
-    "text": lambda d: "a model",
-    "a number": lambda d: 3,
-    "null": lambda d: None,
 }
 
 
@@ -100,9 +83,6 @@ DAMAGES: dict[str, Callable[[dict[str, Any]], object]] = {
 def test_damaged_content_is_refused(damage: str, tmp_path: Path) -> None:
     content = DAMAGES[damage](dict(GOOD))
     refused(tmp_path / "model.json", json.dumps(content).encode())
-    if not isinstance(content, dict):
-        with pytest.raises(ModelError):
-            saving.from_dict(content)  # type: ignore[arg-type]
 
 
 PART = json.dumps(saving.part_to_dict(PI.example()))
@@ -112,16 +92,12 @@ RAW: dict[str, bytes] = {
     "truncated": TEXT[: len(TEXT) // 2].encode(),
     "more behind it": (TEXT + TEXT).encode(),
     "NaN": TEXT.replace("9.0", "NaN").encode(),
-    "Infinity": TEXT.replace("9.0", "-Infinity").encode(),
     "a number too large for a double": TEXT.replace("9.0", "1e999").encode(),
     "an integer too large for a double": TEXT.replace("9.0", "9" * 400).encode(),
-    "an integer of ten thousand digits": TEXT.replace("9.0", "9" * 10000).encode(),
     "a field twice": TEXT.replace('"kind": "gpi"', '"kind": "gpi", "kind": "gpi"', 1).encode(),
     "not UTF-8": TEXT.replace("gpi", "gp\xef", 1).encode("latin-1"),
-    "UTF-16": TEXT.encode("utf-16"),
     "a pickle": b"\x80\x04\x95\x1d\x00\x00\x00\x00\x00\x00\x00\x8c\x05posix\x94\x8c\x06system",
     "deep lists": b"[" * 100_000,
-    "deep objects": b'{"kind":' * 100_000,
     "a deep series": (
         '{"format": "mckibben-model", "version": 1, '
         + ('{"kind": "series", "parts": [' * 900)[1:]
@@ -145,10 +121,10 @@ def test_what_is_no_file_or_too_large_is_refused(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("kind", EXAMPLES)
-@pytest.mark.parametrize("surplus", ["__init__", "kernel", "self", "__dataclass_self__"])
-def test_no_block_takes_an_unknown_field(kind: str, surplus: str) -> None:
-    with pytest.raises(ModelError):
-        saving.from_dict({**EXAMPLES[kind].to_dict(), surplus: 1.0})
+def test_no_block_takes_an_unknown_field(kind: str) -> None:
+    for surplus in ("kernel", "__init__"):
+        with pytest.raises(ModelError):
+            saving.from_dict({**EXAMPLES[kind].to_dict(), surplus: 1.0})
 
 
 def test_inverses_that_had_kinds_of_their_own_still_load() -> None:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import copy
 import itertools
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import partial
 from typing import Any
 
@@ -157,95 +157,6 @@ class _RateDependentPI(_PI):
         self.rate = keep * self.rate + (1 - keep) * (u - self.previous) / self.step
         self.previous = u
         return played + self.rate * _sum(self.block.rate_weights, self.states)
-
-
-def pi_adaptive(block: Any, inputs: Rows, sample_time: float) -> Rows:
-    """Learn with the covariance itself, as a matrix, and undo by bisection."""
-    forward, noise, share = block.forward, block.noise, sample_time / block.time
-    thresholds, n = forward.thresholds, len(forward.weights)
-    low, high = forward.input_range
-    scales, widest = forward.scales, np.diag(forward.spread)
-    theta, fresh = forward.taught.copy(), forward.spread / 9
-    used, covariance = theta.copy(), fresh.copy()
-
-    def moved(u: float) -> list[float]:
-        return [_play(s, u, r) for s, r in zip(states, thresholds, strict=True)]
-
-    def gives(u: float) -> float:
-        return float(used @ [*moved(u), 1.0])
-
-    states = [u - r for u in [_risen(forward, inputs[0][0])] for r in thresholds]
-    turn, usual, surprise, last, then = 0, 3 * noise, 1.0, 0.0, 0.0
-    related, squared, late, stood = 0.98, 1.0, 0.0, 9 * noise**2 * 99
-    fitted, helped, apart = theta.copy(), 0.0, noise**2
-    previous, travel, outputs = inputs[0][0], 0.0, []
-    for y, measured in inputs:
-        slopes = np.array([*states, 1.0])
-        asked = float(used @ slopes)
-        still = turn > 0 and measured == last and abs(asked - then) > 3 * usual
-        then = 1e30 if still else then
-        if turn == 0 or (math.isfinite(measured) and measured != last):
-            last, then = measured, asked
-        if turn == 0:
-            turn = 1
-        elif math.isfinite(measured) and not still:
-            if surprise > 5:
-                covariance, surprise = fresh.copy(), 1.0
-            alike = min(max(related / squared, 0.0), 0.9995)
-            told = usual * math.sqrt((1 + alike) / (1 - alike))
-            stands = max(told**2, stood + share * (told**2 - stood))
-            covariance, stood = covariance * (stands / stood), stands
-            phi = slopes * scales / told
-            p_phi = covariance @ phi
-            r = float(phi @ p_phi)
-            error = measured - float(theta @ slopes)
-            expected = math.sqrt(usual**2 + r * told**2)
-            weight = min(1.0, 3 * expected / max(abs(error), 1e-300))
-            relative = weight * error / expected
-            quick = min(20 * share, 0.5)
-            side = min(max(10 * (abs(relative) - 0.6745), -1.0), 1.0)
-            usual = max(usual * (1 + quick / 2 * side), noise)
-            surprise += quick * (relative**2 - surprise)
-            related += share * (relative * late - related)
-            squared += share * (relative**2 - squared)
-            late = relative
-            recent, made_up = min(3 * share, 0.5), float((theta - fitted) @ slopes)
-            helped += recent * (made_up * (weight * error + made_up) - helped)
-            apart += recent * (made_up**2 + noise**2 - apart)
-            settled = share / (1 - share)
-            kept = 1 / settled - 1 / r if r < settled else weight * (1 - share) - share / r
-            covariance -= np.outer(p_phi, p_phi) * kept / (1 + kept * r)
-            theta += scales * p_phi * weight * error / told / (1 + weight * r)
-            place = turn % (n + 1)
-            if covariance[place, place] > widest[place]:
-                less = math.sqrt(widest[place] / covariance[place, place])
-                covariance[place] *= less
-                covariance[:, place] *= less
-            turn = place + 1
-            total = 0.0
-            for i, w in enumerate(forward.weights):
-                floor = 0.1 * sum(forward.weights[: i + 1]) - total
-                theta[i] = max(theta[i], 0.0 if w >= 0 else -math.inf, floor)
-                total += theta[i]
-        travel = float(y > previous) - float(y < previous) or travel
-        aim = fitted + min(max(helped / apart, 0.0), 1.0) * (theta - fitted)
-        room, change = y - float(used @ slopes), float((aim - used) @ slopes)
-        part = 1.0
-        if travel * (room - change) < 0 and abs(room - change) <= 3 * usual and change:
-            part = min(max(room / change, 0.0), 1.0)
-        used = aim if part == 1.0 else used + part * (aim - used)
-        outputs.append(bisect(gives, y, low, high))
-        states = moved(outputs[-1])
-        previous = y
-    return _rows(outputs)
-
-
-def _risen(forward: Any, y: float) -> float:
-    def risen(u: float) -> float:
-        pairs = zip(forward.weights, forward.thresholds, strict=True)
-        return float(forward.offset + sum(w * (u - r) for w, r in pairs))
-
-    return bisect(risen, y, *forward.input_range)
 
 
 # -- generalised and unparallel play operators -----------------------------------------------
@@ -451,24 +362,55 @@ STEPPED = {
     "generalized-bouc-wen": 1000,
     "generalized-bouc-wen-inverse": 30,
     "multistate-friction": 1000,
-    "pi-adaptive": 1000,
 }
-"""Kinds whose twin steps through corners, bisects over steps, or subtracts nearly equal matrices, and
-how many samples to compare."""
+"""Kinds whose twin steps through corners or bisects over steps, and how many samples to compare."""
 
 STEP_ERROR = 1e-5
 """Of those twins, relative to the output's range."""
 
 
-def _runge_kutta(slope: Callable[[float, float], float], y: float, u: float, end: float) -> float:
-    h = (end - u) / STEPS
-    for _ in range(STEPS):
+def _runge_kutta(
+    slope: Callable[[float, float], float], y: float, u: float, end: float, steps: int = STEPS
+) -> float:
+    h = (end - u) / steps
+    for _ in range(steps):
         k1 = slope(u, y)
         k2 = slope(u + h / 2, y + h / 2 * k1)
         k3 = slope(u + h / 2, y + h / 2 * k2)
         k4 = slope(u + h, y + h * k3)
         u, y = u + h, y + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
     return y
+
+
+Rates = Callable[[list[float], float], list[float]]
+"""Derivatives of a state by time, under an input."""
+
+
+def _step(rates: Rates, x: list[float], start: float, end: float, h: float) -> list[float]:
+    """Return a state after a step of Runge and Kutta under an input that goes from start to end."""
+
+    def moved(share: float, k: list[float]) -> list[float]:
+        return [a + share * h * b for a, b in zip(x, k, strict=True)]
+
+    k1 = rates(x, start)
+    k2 = rates(moved(0.5, k1), (start + end) / 2)
+    k3 = rates(moved(0.5, k2), (start + end) / 2)
+    k4 = rates(moved(1.0, k3), end)
+    return moved(
+        1.0, [(a + 2 * b + 2 * c + d) / 6 for a, b, c, d in zip(k1, k2, k3, k4, strict=True)]
+    )
+
+
+def _states(
+    rates: Rates, x: list[float], given: list[float], block: Any, h: float
+) -> Iterator[list[float]]:
+    """Give the state at every sample, from substeps of h, under inputs joined as a block says."""
+    n = block.substeps
+    for before, now in itertools.pairwise([given[0], *given]):
+        rise = 0.0 if block.hold == "zero" else now - before
+        for s in range(n):
+            x = _step(rates, x, before + rise * s / n, before + rise * (s + 1) / n, h)
+        yield x
 
 
 def _sign(x: float) -> float:
@@ -532,47 +474,22 @@ class _Duhem:
 def _oscillator(slope: Callable[[Any, float, float], float]) -> Twin:
     """Return the twin of a mass-spring-damper with an element of a slope, from [block, z, y']."""
 
-    def rates(block: Any, x: list[float], u: float) -> list[float]:
-        y, v, z = x
-        pull = u - block.damping * v - block.stiffness * y - z
-        return [v, 1000.0 * pull / block.mass, v * slope(block, z, v)]
+    def twin(block: Any, inputs: Rows, sample_time: float) -> Rows:
+        def rates(x: list[float], u: float) -> list[float]:
+            y, v, z = x
+            pull = u - block.damping * v - block.stiffness * y - z
+            return [v, 1000.0 * pull / block.mass, v * slope(block, z, v)]
 
-    def rest(block: Any, u: float) -> list[float]:
+        given = _column(inputs)
+
         def taken(_: float, z: float) -> float:
-            f = slope(block, z, u)
+            f = slope(block, z, given[0])
             return f / (block.stiffness + f)
 
-        z = 0.0
-        for k in range(64):
-            first, h = u / 64 * k, u / 64
-            k1 = taken(first, z)
-            k2 = taken(first, z + h / 2 * k1)
-            k3 = taken(first, z + h / 2 * k2)
-            z += h / 6 * (k1 + 2 * k2 + 2 * k3 + taken(first, z + h * k3))
-        return [(u - z) / block.stiffness, 0.0, z]
-
-    def moved(x: list[float], h: float, k: list[float]) -> list[float]:
-        return [a + h * b for a, b in zip(x, k, strict=True)]
-
-    def twin(block: Any, inputs: Rows, sample_time: float) -> Rows:
-        given, n = _column(inputs), block.substeps
-        x, h = rest(block, given[0]), sample_time / n
-        outputs = []
-        for before, now in itertools.pairwise([given[0], *given]):
-            if block.hold == "zero":
-                now = before
-            for s in range(n):
-                start, end = (before + (now - before) * (s + d) / n for d in (0, 1))
-                k1 = rates(block, x, start)
-                k2 = rates(block, moved(x, h / 2, k1), (start + end) / 2)
-                k3 = rates(block, moved(x, h / 2, k2), (start + end) / 2)
-                k4 = rates(block, moved(x, h, k3), end)
-                mean = [
-                    (a + 2 * b + 2 * c + d) / 6 for a, b, c, d in zip(k1, k2, k3, k4, strict=True)
-                ]
-                x = moved(x, h, mean)
-            outputs.append(x[0] + (block.output_offset or 0.0))
-        return _rows(outputs)
+        z = _runge_kutta(taken, 0.0, 0.0, given[0], 64)
+        rest = [(given[0] - z) / block.stiffness, 0.0, z]
+        states = _states(rates, rest, given, block, sample_time / block.substeps)
+        return _rows([x[0] + (block.output_offset or 0.0) for x in states])
 
     return twin
 
@@ -1009,73 +926,8 @@ def recurrent_fuzzy_network(block: Any, inputs: Rows, sample_time: float) -> Row
     return out
 
 
-class _Balance:
-    """A force balance at one place of its history: last displacements and stops."""
-
-    def __init__(self, block: Any, first: list[float]) -> None:
-        self.block, self.n = block, len(block.driven)
-        self.last = first
-        self.stops = [[_clip(y / r) for r in block.thresholds] for y in first]
-
-    def moved(self, y: list[float]) -> list[list[float]]:
-        return [
-            [
-                _clip(stop + (here - before) / r)
-                for stop, r in zip(stops, self.block.thresholds, strict=True)
-            ]
-            for stops, here, before in zip(self.stops, y, self.last, strict=True)
-        ]
-
-    def step(self, y: list[float]) -> None:
-        self.stops, self.last = self.moved(y), y
-
-    def pressures(self, y: list[float], scheduled: list[float]) -> list[float]:
-        block, n, m = self.block, self.n, len(self.block.thresholds)
-        powers = [1.0] + [x**d for x in scheduled for d in range(1, block.degree + 1)]
-        stops, z = self.moved(y), [value / block.scale for value in y]
-        out = []
-        for k in range(n):
-            given = list(block.forces[k])
-            springs, rest = given[: len(powers) * (1 + n)], given[len(powers) * (1 + n) :]
-            elastic, friction = rest[:3], rest[3:]
-            top = 0.0
-            for q, power in enumerate(powers):
-                own = springs[q * (1 + n) : (q + 1) * (1 + n)]
-                top += power * (own[0] + sum(s * v for s, v in zip(own[1:], z, strict=True)))
-                felt = friction[q * m : (q + 1) * m]
-                top += power * sum(f * s for f, s in zip(felt, stops[k], strict=True))
-            top += sum(e * z[k] ** d for e, d in zip(elastic, (2, 3, 4), strict=True))
-            area = block.areas[k]
-            bottom = 1.0 + sum(a * z[k] ** d for a, d in zip(area[:3], (1, 2, 3), strict=True))
-            bottom += sum(h * s for h, s in zip(area[3:], stops[k], strict=True))
-            out.append(top / bottom)
-        return out
-
-
 def _clip(value: float) -> float:
     return min(max(value, -1.0), 1.0)
-
-
-def force_balance(block: Any, inputs: Rows, sample_time: float) -> Rows:
-    n = len(block.driven)
-    balance, out = _Balance(block, inputs[0][:n]), []
-    for row in inputs:
-        out.append(balance.pressures(row[:n], row[n:]))
-        balance.step(row[:n])
-    return out
-
-
-def force_balance_inverse(block: Any, inputs: Rows, sample_time: float) -> Rows:
-    n = len(block.outputs)
-    balance = _Balance(block.forward, [0.0] * n)
-    balance.stops = [[0.0] * len(block.forward.thresholds) for _ in range(n)]
-    out = []
-    ramp = [[*(v * step / 40 for v in inputs[0][:n]), *inputs[0][n:]] for step in range(41)]
-    for row in [*ramp, *inputs]:
-        place = _rooted(balance.pressures, balance.last, row)
-        balance.step(place)
-        out.append(place)
-    return out[len(ramp) :]
 
 
 class _Parallel:
@@ -1239,7 +1091,6 @@ def balance_inverse(block: Any, inputs: Rows, sample_time: float) -> Rows:
 
 
 def load_estimate(block: Any, inputs: Rows, sample_time: float) -> Rows:
-    import numpy as np
 
     n, shares, out = len(block.forward.driven), np.array(block.forward.loads), []
     none, first = [0.0] * shares.shape[1], inputs[0]
@@ -1286,28 +1137,12 @@ def state_network(block: Any, inputs: Rows, sample_time: float) -> Rows:
         pairs = zip(block.linear, block.readout, strict=True)
         return [_sum(own, known) + _sum(read, units) for own, read in pairs]
 
-    def step(x: list[float], start: float, end: float, h: float) -> list[float]:
-        def moved(share: float, k: list[float]) -> list[float]:
-            return [a + share * h * b for a, b in zip(x, k, strict=True)]
-
-        k1 = rates(x, start)
-        k2 = rates(moved(0.5, k1), (start + end) / 2)
-        k3 = rates(moved(0.5, k2), (start + end) / 2)
-        k4 = rates(moved(1.0, k3), end)
-        mean = [(a + 2 * b + 2 * c + d) / 6 for a, b, c, d in zip(k1, k2, k3, k4, strict=True)]
-        return moved(1.0, mean)
-
     given = [(u - block.input_offset) / block.input_scale for u in _column(inputs)]
-    x, n = [0.0] * len(block.linear), block.substeps
+    x = [0.0] * len(block.linear)
     for _ in range(1000):
-        x = step(x, given[0], given[0], 0.1)
-    outputs = []
-    for before, now in itertools.pairwise([given[0], *given]):
-        for s in range(n):
-            start, end = (before + (now - before) * (s + d) / n for d in (0, 1))
-            x = step(x, start, end, block.rate * sample_time / n)
-        outputs.append(block.output_offset + block.output_scale * x[0])
-    return _rows(outputs)
+        x = _step(rates, x, given[0], given[0], 0.1)
+    states = _states(rates, x, given, block, block.rate * sample_time / block.substeps)
+    return _rows([block.output_offset + block.output_scale * x[0] for x in states])
 
 
 def motion_seen(
@@ -1385,8 +1220,6 @@ TWINS: dict[str, Twin] = {
     "chou-hannaford": chou_hannaford,
     "coupled-memory": coupled_memory,
     "coupling": coupling,
-    "force-balance": force_balance,
-    "force-balance-inverse": force_balance_inverse,
     "fuzzy-network": fuzzy_network,
     "fuzzy-network-inverse": fuzzy_network_inverse,
     "creep": stepping(_Creep),
@@ -1415,7 +1248,6 @@ TWINS: dict[str, Twin] = {
     "negative": negative,
     "pi": stepping(_PI),
     "pid": pid,
-    "pi-adaptive": pi_adaptive,
     "pi-inverse": solved(_PI),
     "piecewise-linear": piecewise_linear,
     "play": stepping(_Play),

@@ -97,11 +97,6 @@ def test_unusual_blocks_obey_it(block: Block) -> None:
         check_block(block, seed=seed)
 
 
-@pytest.mark.parametrize("name", names("published"))
-def test_published_models_obey_it(name: str) -> None:
-    check_block(load("published", name)(), sample_time=0.001)
-
-
 @pytest.mark.parametrize("kind", names("blocks"))
 def test_is_registered_under_its_own_kind(kind: str) -> None:
     block = load("blocks", kind)

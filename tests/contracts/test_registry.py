@@ -17,7 +17,7 @@ import pytest
 from sklearn.base import clone
 
 import mckibben
-from mckibben import Block, ModelError, PIEstimator
+from mckibben import Block, ModelError
 from mckibben.blocks.play_type.envelopes import Envelope
 from mckibben.estimators.core.estimator import Estimator
 from mckibben.presets import Chosen, preset
@@ -135,26 +135,6 @@ def test_settings_override_those_of_a_preset_and_others_are_refused_by_its_name(
     assert (p2(structure="P3").structure, p2().structure) == ("P3", "P2")
     with pytest.raises(TypeError, match=r"'p2'.*'poles'.*structure"):
         p2(poles=2)
-
-
-def test_a_preset_answers_what_is_asked_of_its_class() -> None:
-    p2, multistate = load("estimators", "p2"), load("estimators", "multistate")
-    assert (p2.effort, multistate.effort) == (type(p2()).effort, 3.0)
-    assert multistate.objection([], ["pressure"], ["displacement"])
-    with pytest.raises(AttributeError):
-        _ = p2.nothing_of_that_name
-
-
-def test_class_methods_see_the_preset(monkeypatch: pytest.MonkeyPatch) -> None:
-    class Asked(PIEstimator):
-        @classmethod
-        def operators(cls) -> int:
-            return cls().n_operators
-
-    module = types.ModuleType("asked")
-    module.Asked = Asked  # type: ignore[attr-defined]
-    monkeypatch.setitem(sys.modules, "asked", module)
-    assert Chosen("few", preset("asked:Asked", "A few.", n_operators=3)).operators() == 3
 
 
 def test_another_package_gives_a_preset_by_an_entry_point(monkeypatch: pytest.MonkeyPatch) -> None:

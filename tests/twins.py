@@ -52,12 +52,9 @@ def bisect(function: Callable[[float], float], target: float, low: float, high: 
 # -- memoryless ------------------------------------------------------------------------------
 
 
-def affine(block: Any, inputs: Rows, sample_time: float) -> Rows:
-    return _rows([block.gain * u + block.offset for u in _column(inputs)])
-
-
-def negative(block: Any, inputs: Rows, sample_time: float) -> Rows:
-    return _rows([-u for u in _column(inputs)])
+def memoryless(formula: Callable[..., float]) -> Twin:
+    """Return the twin of a formula of a block and one sample of its inputs."""
+    return lambda block, inputs, sample_time: [[formula(block, *row)] for row in inputs]
 
 
 def _lines(knots: tuple[float, ...], values: tuple[float, ...], x: float) -> float:
@@ -68,17 +65,13 @@ def _lines(knots: tuple[float, ...], values: tuple[float, ...], x: float) -> flo
     return y0 + (y1 - y0) / (x1 - x0) * (x - x0)
 
 
-def piecewise_linear(block: Any, inputs: Rows, sample_time: float) -> Rows:
-    return _rows([_lines(block.knots, block.values, u) for u in _column(inputs)])
+def _piecewise_linear(block: Any, u: float) -> float:
+    return _lines(block.knots, block.values, u)
 
 
 def _power_sum(block: Any, u: float) -> float:
     x = (u - block.centre) / block.scale
     return math.fsum(c * x**power for power, c in enumerate(block.polynomial))
-
-
-def polynomial(block: Any, inputs: Rows, sample_time: float) -> Rows:
-    return _rows([_power_sum(block, u) for u in _column(inputs)])
 
 
 def polynomial_inverse(block: Any, inputs: Rows, sample_time: float) -> Rows:
@@ -173,13 +166,9 @@ def exponential_envelope(envelope: Any, u: float) -> float:
     return float(envelope.offset + (bent if envelope.rate > 0 else -bent))
 
 
-def piecewise_linear_envelope(envelope: Any, u: float) -> float:
-    return _lines(envelope.knots, envelope.values, u)
-
-
 ENVELOPES: dict[str, Callable[[Any, float], float]] = {
     "exponential": exponential_envelope,
-    "piecewise-linear": piecewise_linear_envelope,
+    "piecewise-linear": _piecewise_linear,
     "tanh": tanh_envelope,
 }
 
@@ -645,20 +634,8 @@ def air_inverse(block: Any, inputs: Rows, sample_time: float) -> Rows:
 # -- maps, and forces ------------------------------------------------------------------------
 
 
-def logarithm(block: Any, inputs: Rows, sample_time: float) -> Rows:
-    return _rows([math.log(u + block.offset) for u in _column(inputs)])
-
-
-def exponential(block: Any, inputs: Rows, sample_time: float) -> Rows:
-    return _rows([math.exp(u) - block.offset for u in _column(inputs)])
-
-
 def _acting(u: float, c: float) -> float:
     return math.copysign(abs(u) - 0.95 * c * (1 - math.e ** (-abs(u) / c)), u)
-
-
-def contact(block: Any, inputs: Rows, sample_time: float) -> Rows:
-    return _rows([_acting(u, block.pressure) for u in _column(inputs)])
 
 
 def contact_inverse(block: Any, inputs: Rows, sample_time: float) -> Rows:
@@ -688,40 +665,25 @@ def braid_equilibrium(block: Any, inputs: Rows, sample_time: float) -> Rows:
     return _rows([bisect(lambda x: _braid_pressure(block, x), p, low, high) for p in pressures])
 
 
-def braid_equilibrium_inverse(block: Any, inputs: Rows, sample_time: float) -> Rows:
-    return _rows([_braid_pressure(block.forward, x) for x in _column(inputs)])
+def _polynomial_force(block: Any, length: float, p: float) -> float:
+    x = (length - block.centre) / block.scale
+    pull = math.fsum(g * x**power for power, g in enumerate(block.per_bar))
+    return p * pull + math.fsum(h * x**power for power, h in enumerate(block.elastic))
 
 
-def polynomial_force(block: Any, inputs: Rows, sample_time: float) -> Rows:
-    outputs = []
-    for length, p in inputs:
-        x = (length - block.centre) / block.scale
-        pull = math.fsum(g * x**power for power, g in enumerate(block.per_bar))
-        outputs.append(p * pull + math.fsum(h * x**power for power, h in enumerate(block.elastic)))
-    return _rows(outputs)
+def _chou_hannaford(block: Any, length: float, p: float) -> float:
+    area = (3 * length**2 - block.thread_length**2) / (4 * math.pi * block.turns**2)
+    return float(0.1 * p * area + block.constant)
 
 
-def chou_hannaford(block: Any, inputs: Rows, sample_time: float) -> Rows:
-    b, n = block.thread_length, block.turns
-    return _rows(
-        [
-            0.1 * p * (3 * length**2 - b**2) / (4 * math.pi * n**2) + block.constant
-            for length, p in inputs
-        ]
-    )
-
-
-def tondu_lopez(block: Any, inputs: Rows, sample_time: float) -> Rows:
-    outputs = []
+def _tondu_lopez(block: Any, length: float, p: float) -> float:
     area = math.pi * (block.diameter / 2) ** 2 * 0.1
     tangent, sine = math.tan(block.braid_angle), math.sin(block.braid_angle)
-    for length, p in inputs:
-        e = 1 - length / block.rest_length
-        mu = block.mu[0] * math.exp(-40 * e) + block.mu[1]
-        kappa = block.kappa[0] * math.exp(-p) + block.kappa[1]
-        pull = 3 / tangent**2 * (1 - kappa * e) ** 2 - 1 / sine**2
-        outputs.append(mu * area * p * pull + block.constant)
-    return _rows(outputs)
+    e = 1 - length / block.rest_length
+    mu = block.mu[0] * math.exp(-40 * e) + block.mu[1]
+    kappa = block.kappa[0] * math.exp(-p) + block.kappa[1]
+    pull = 3 / tangent**2 * (1 - kappa * e) ** 2 - 1 / sine**2
+    return float(mu * area * p * pull + block.constant)
 
 
 def _deflection_rate(numbers: tuple[float, ...], _: float, x: float) -> float:
@@ -924,10 +886,6 @@ def recurrent_fuzzy_network(block: Any, inputs: Rows, sample_time: float) -> Row
         ]
         out.append([top / bottom])
     return out
-
-
-def _clip(value: float) -> float:
-    return min(max(value, -1.0), 1.0)
 
 
 class _Parallel:
@@ -1207,7 +1165,7 @@ TWINS: dict[str, Twin] = {
     "pi-banded": banded_pi,
     "activation-memory": activation_memory,
     "activation-pressure": activation_pressure,
-    "affine": affine,
+    "affine": memoryless(lambda block, u: block.gain * u + block.offset),
     "air": air,
     "air-inverse": air_inverse,
     "balance": balance,
@@ -1216,8 +1174,8 @@ TWINS: dict[str, Twin] = {
     "bouc-wen-inverse": solved(_BoucWen),
     "bouc-wen-oscillator": _oscillator(_bouc_wen_slope),
     "braid-equilibrium": braid_equilibrium,
-    "braid-equilibrium-inverse": braid_equilibrium_inverse,
-    "chou-hannaford": chou_hannaford,
+    "braid-equilibrium-inverse": memoryless(lambda block, x: _braid_pressure(block.forward, x)),
+    "chou-hannaford": memoryless(_chou_hannaford),
     "coupled-memory": coupled_memory,
     "coupling": coupling,
     "fuzzy-network": fuzzy_network,
@@ -1229,7 +1187,7 @@ TWINS: dict[str, Twin] = {
     "duhem-oscillator": _oscillator(_duhem_slope),
     "eupi": stepping(_EUPI),
     "eupi-inverse": solved(_EUPI),
-    "exponential": exponential,
+    "exponential": memoryless(lambda block, u: math.exp(u) - block.offset),
     "generalized-bouc-wen": stepping(_GeneralizedBoucWen),
     "generalized-bouc-wen-inverse": solved(_GeneralizedBoucWen),
     "gpi": gpi,
@@ -1237,22 +1195,22 @@ TWINS: dict[str, Twin] = {
     "krasnoselskii-pokrovskii": stepping(_Ramps),
     "krasnoselskii-pokrovskii-inverse": solved(_Ramps),
     "load-estimate": load_estimate,
-    "contact": contact,
+    "contact": memoryless(lambda block, u: _acting(u, block.pressure)),
     "contact-inverse": contact_inverse,
-    "logarithm": logarithm,
+    "logarithm": memoryless(lambda block, u: math.log(u + block.offset)),
     "maxwell-slip": stepping(_Springs),
     "maxwell-slip-inverse": solved(_Springs),
     "multistate-friction": multistate_friction,
     "narx-network": narx_network,
     "narx-polynomial": narx_polynomial,
-    "negative": negative,
+    "negative": memoryless(lambda block, u: -u),
     "pi": stepping(_PI),
     "pid": pid,
     "pi-inverse": solved(_PI),
-    "piecewise-linear": piecewise_linear,
+    "piecewise-linear": memoryless(_piecewise_linear),
     "play": stepping(_Play),
-    "polynomial": polynomial,
-    "polynomial-force": polynomial_force,
+    "polynomial": memoryless(_power_sum),
+    "polynomial-force": memoryless(_polynomial_force),
     "polynomial-inverse": polynomial_inverse,
     "preisach": stepping(_Relays),
     "preisach-inverse": solved(_Relays),
@@ -1260,7 +1218,7 @@ TWINS: dict[str, Twin] = {
     "rate-dependent-pi": stepping(_RateDependentPI),
     "rate-dependent-pi-inverse": solved(_RateDependentPI),
     "state-network": state_network,
-    "tondu-lopez": tondu_lopez,
+    "tondu-lopez": memoryless(_tondu_lopez),
     "recurrent-fuzzy-network": recurrent_fuzzy_network,
     "transfer-function": transfer_function,
 }

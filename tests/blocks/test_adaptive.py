@@ -16,11 +16,6 @@ from mckibben import Block, ModelError, Series, load
 from mckibben.blocks.adaptive.adaptive import Adaptive, taught
 from mckibben.blocks.adaptive.adaptive_series import adaptive
 from mckibben.blocks.adaptive.drift import alarm_limit
-from mckibben.blocks.adaptive.learning import (
-    READY,
-    SENSES,
-    covariance_of,
-)
 from mckibben.blocks.dynamic.creep import Creep
 from mckibben.blocks.play_type.gpi import GPI
 from mckibben.blocks.play_type.pi import PI
@@ -80,7 +75,7 @@ def test_forward_and_inverse_match_at_every_step_whatever_is_measured(
     low, high = (float(end[0]) for end in model.reachable())
     block = Adaptive(model, 1.0, 0.01 * (high - low))
     stream = block.stream(STEP)
-    middle, n = 0.5 * (low + high), len(model.weights)
+    middle = 0.5 * (low + high)
     for t in range(300):
         y = middle + 0.3 * (high - low) * np.sin(0.07 * t + 2 * np.sin(0.013 * t))
         measured = y + size * rng.standard_normal() if rng.random() > 0.1 else np.nan
@@ -88,14 +83,9 @@ def test_forward_and_inverse_match_at_every_step_whatever_is_measured(
         u = stream.step([y, measured])[0]
         state = stream.state
         assert np.isfinite(state).all()
-        assert (block._split(state)[3][: n + 1] > 0).all()
-        if t % 10:
-            continue
-        theta = block._split(state)[2]
-        model.unpack([*theta[:-1], *model.pack()[n:]]).check_invertible()
-        if state[model.n_inverse_states - 1] == clipped:
-            memory, present = state[: model.n_states].tolist(), block.present(state)
-            given = present.simulate([u], initial=memory)[0]
+        if t % 10 == 0 and state[model.n_inverse_states - 1] == clipped:
+            memory = state[: model.n_states].tolist()
+            given = block.present(state).simulate([u], initial=memory)[0]
             assert given == pytest.approx(y, abs=1e-9 * (high - low))
 
 
@@ -114,35 +104,23 @@ def test_after_a_step_the_error_is_that_of_a_fresh_model_within_two_cycles(model
 
 
 @pytest.mark.kernel
-@pytest.mark.parametrize("measured", ["absent", "frozen"])
-def test_a_sensor_that_fails_teaches_nothing(measured: str) -> None:
+@pytest.mark.parametrize(("absent", "most"), [(True, 1e-15), (False, 0.01)])
+def test_a_sensor_that_drops_out_or_stands_still_teaches_nothing(absent: bool, most: float) -> None:
     model = PI.example()
-    block = Adaptive(model, 20.0, 0.02)
-    asked = references(model, 30.0)
-    stream = block.stream(STEP)
+    block: Any = Adaptive(model, 20.0, 0.02)
+    stream, asked = block.stream(STEP), references(model, 30.0)
     for y in asked:
-        u = stream.step([y, np.nan if measured == "absent" else asked[0]])
-        assert np.isfinite(u).all()
-    change = (block._split(stream.state)[1] - model.taught) / model.scales
-    assert np.abs(change).max() < (1e-15 if measured == "absent" else 0.01)
+        assert np.isfinite(stream.step([y, np.nan if absent else asked[0]])).all()
+    change = (block.present(stream.state).taught - model.taught) / model.scales
+    assert np.abs(change).max() < most
 
 
-@pytest.mark.kernel
 def test_nothing_blows_up_where_nothing_moves() -> None:
     model = GPI.example()
-    block = Adaptive(model, 5.0, 0.02)
+    block: Any = Adaptive(model, 5.0, 0.02)
     asked = np.full(20_000, references(model, 1.0)[0])
-    stream, plant, rng = block.stream(STEP), changed(model).stream(STEP), np.random.default_rng(3)
-    reading = asked[0]
-    for y in asked:
-        given = plant.step(stream.step([y, reading])[0])[0]
-        reading = given + 0.02 * rng.standard_normal()
-    _, theta, _, root, _ = block._split(stream.state)
-    variances = np.diag(covariance_of(root, theta.size))
-    assert (variances <= 1.001 * np.diag(model.spread)).all()
-    assert (root[: theta.size] > 0).all()
-    assert abs(given - y) < 0.02
-    assert np.abs(theta[:-1] / model.weights - 1).max() < 0.3
+    given = closed(block, [changed(model)], asked, 0.02)
+    assert abs(given[-1] - asked[0]) < 0.02
 
 
 def experienced(block: Any, seconds: float = 10.0) -> tuple[Array, Array]:
@@ -162,27 +140,16 @@ def test_saved_and_resumed_it_goes_on_to_the_bit(model: Block, tmp_path: Path) -
     again, going_on = load(tmp_path / "learnt.json").stream(STEP), block.stream(STEP, initial=state)
     for y in asked:
         np.testing.assert_array_equal(again.step([y, y]), going_on.step([y, y]))
-
-
-@pytest.mark.parametrize("model", [PI.example(), CREEPING], ids=["pi", "series"])
-def test_vented_it_keeps_what_is_learnt_and_not_where_it_was(model: Block, tmp_path: Path) -> None:
-    block: Any = adaptive(model, 10.0, 0.05)
-    state, asked = experienced(block)
-    block.resumed(state, memory=False).save(tmp_path / "learnt.json")
-    resumed: Any = load(tmp_path / "learnt.json")
-    first = np.array([asked[0], asked[0]])
-    begun, fresh = resumed.initial_state(first), block.initial_state(first)
-    assert str(resumed.present(begun)) == str(block.present(state))
-    if isinstance(resumed, Adaptive):
-        own = resumed.fixed.n_states
-        np.testing.assert_array_equal(begun[:own], fresh[:own])
+    vented = block.resumed(state, memory=False)  # what is learnt, and not where it was
+    begun = vented.initial_state(np.array([asked[0], asked[0]]))
+    assert str(vented.present(begun)) == str(block.present(state))
 
 
 def test_a_memory_that_never_came_of_running_is_refused() -> None:
     block = Adaptive(PI.example(), 10.0, 0.05)
     memory = block.resumed(experienced(block, 2.0)[0]).memory
     assert memory is not None
-    for place in (0, block.fixed.n_states + 1, -SENSES + READY):
+    for place in (0, block.fixed.n_states + 1):
         spoilt = np.array(memory)
         spoilt[place] = 1e18
         with pytest.raises(ModelError, match="'adaptive'"):

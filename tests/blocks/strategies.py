@@ -8,7 +8,7 @@ import numpy as np
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from mckibben import EUPI, GPI, PI, Polynomial, RateDependentPI, Series
+from mckibben import EUPI, GPI, PI, RateDependentPI, Series
 from mckibben import PiecewiseLinear as Curve
 from mckibben.blocks.core.fields import vector
 from mckibben.blocks.laws.trial import through
@@ -123,22 +123,11 @@ def rate_dependent_models(draw: st.DrawFn) -> RateDependentPI:
 
 
 @st.composite
-def increasing_cubics(draw: st.DrawFn, low: float, high: float) -> Polynomial:
-    """Draw a cubic that increases over a range."""
-    linear = draw(numbers(1.0, 20.0))
-    square, cube = draw(numbers(-0.2, 0.2)) * linear, draw(numbers(-0.1, 0.3)) * linear
-    centre, scale = (low + high) / 2, (high - low) / 2
-    return Polynomial((draw(numbers(-5, 5)), linear, square, cube), centre, scale, (low, high))
-
-
-@st.composite
 def modified_models(draw: st.DrawFn) -> Series:
     """Draw a Prandtl-Ishlinskii model and a curve that increases over all that it can give."""
     model = draw(pi_models())
     size = float(np.abs(model.weights).sum()) * (HIGH - LOW + max(model.thresholds))
     low, high = model.offset - size, model.offset + size
-    if draw(st.booleans()):
-        return Series((model, draw(increasing_cubics(low, high))))
     steps = draw(st.lists(numbers(0.1, 2.0), min_size=4, max_size=4))
     values = vector(np.cumsum([0.0, *steps]) * (high - low))
     return Series((model, Curve(vector(np.linspace(low, high, 5)), values)))

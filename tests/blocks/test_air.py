@@ -63,16 +63,6 @@ def test_a_finer_grid_gives_the_same_pressures(air: Air, u: Array, times: int) -
     np.testing.assert_allclose(fine[times - 1 :: times], coarse, atol=1e-11)
 
 
-def test_a_reference_too_fast_is_told_and_followed_as_fast_as_the_air_flows() -> None:
-    reference = np.repeat([1.0, 4.0, 4.0], 20)
-    with pytest.warns(ModelWarning, match="'pressure'"):
-        command = EXAMPLE.inverse().simulate(reference, sample_time=STEP)
-    assert command.max() == 10.0
-    pressure = RIGHT_AWAY.simulate(command, sample_time=STEP)
-    full = RIGHT_AWAY.simulate(np.concatenate([command[:20], np.full(40, 10.0)]), sample_time=STEP)
-    np.testing.assert_allclose(pressure[20:], np.minimum(full[20:], 4.0), atol=1e-12)
-
-
 def test_a_dead_time_between_samples_is_rounded_with_a_warning(tmp_path: Path) -> None:
     u = np.linspace(0.0, 9.0, 50)
     between = replace(EXAMPLE, dead_time=0.023)

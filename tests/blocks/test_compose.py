@@ -1,4 +1,4 @@
-"""Blocks made of blocks: wiring, scheduling inputs, inverses of compositions."""
+"""Blocks made of blocks: wiring, scheduling inputs, inverses of compositions; linear coupling."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from mckibben import (
     PI,
     Channel,
+    ModelError,
     Parallel,
     PerChannel,
     PiecewiseLinear,
@@ -18,6 +19,7 @@ from mckibben import (
     Series,
 )
 from mckibben.blocks.core.fields import DISPLACEMENT
+from mckibben.blocks.coupled.coupling import Coupling
 from mckibben.blocks.coupled.fuzzy_network import FuzzyNetwork
 from tests.blocks.strategies import paths, pi_models
 
@@ -105,3 +107,27 @@ def test_explicit_states_are_shared_out() -> None:
     middle = first.simulate(u, initial=states[:4])
     expected = second.simulate(middle, initial=states[4:])
     np.testing.assert_array_equal(series.simulate(u, initial=states), expected)
+
+
+# -- linear coupling --------------------------------------------------------------------------------
+
+
+def test_jacobi_agrees_with_the_direct_solution() -> None:
+    block = Coupling.example()
+    h = np.array([[10.0, 20.0, 5.0], [0.0, 1.0, -3.0]])
+    v = block.inverse().simulate(h)
+    np.testing.assert_allclose(block.jacobi(h, tolerance=1e-12), v, atol=1e-10)
+    assert np.abs(block.jacobi(h) - v).max() < 0.02
+
+
+def test_more_muscles_than_coordinates_are_undone_by_the_least_of_them() -> None:
+    tip = tuple(Channel(f"displacement_{k}", "mm") for k in (1, 2))
+    muscles = tuple(Channel(f"shortening_{k}", "mm") for k in (1, 2, 3))
+    block = Coupling(((1.0, 0.0), (-0.5, 0.9), (-0.5, -0.9)), muscles, tip)
+    h = np.array([[1.0, 2.0], [-3.0, 0.5]])
+    v = block.inverse().simulate(h)
+    np.testing.assert_allclose(block.simulate(v), h, atol=1e-14)
+    np.testing.assert_allclose(v @ [0.9, 0.9, 0.9], 0.0, atol=1e-14)  # they pull together at none
+    np.testing.assert_allclose(block.inverse().inverse().simulate(v), h, atol=1e-14)
+    with pytest.raises(ModelError, match="3 inputs and 2 outputs"):
+        block.jacobi(h)

@@ -14,7 +14,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
-from scipy.integrate import solve_ivp
 
 from mckibben import ModelError, Parallel, Recording
 from mckibben.blocks.differential.bouc_wen import BoucWen
@@ -40,43 +39,6 @@ def test_hysteretic_states_stay_within_their_bounds(turns: list[float], sigma: f
 STEP = 1 / 750
 HARD = BoucWenOscillator(2.0, 0.01, 50.0, 50.0, 0.8, -1.1)
 """Whose loops harden, of 35 Hz."""
-
-
-def sweep(n: int, step: float = STEP, highest: float = 40.0) -> Array:
-    """Return a sine whose frequency rises from 15 Hz, beginning from rest."""
-    t = step * np.arange(n)
-    return 40.0 * np.sin(2 * np.pi * (15.0 + (highest - 15.0) * t / (2 * t[-1])) * t)
-
-
-def solved(model: BoucWenOscillator, u: Array, step: float) -> Array:
-    """Return the displacement from rest under straight lines, at a tight tolerance."""
-
-    def rates(t: float, x: Array, start: float, rise: float) -> list[float]:
-        y, v, z = x
-        pull = start + rise * t - model.damping * v - model.stiffness * y - z
-        loops = model.gamma * abs(v) * z + model.delta * v * abs(z)
-        return [v, 1e3 * pull / model.mass, model.slope * v - loops]
-
-    x: Array = np.zeros(3)
-    found = [0.0]
-    for start, end in pairwise(u.tolist()):
-        given = (start, (end - start) / step)
-        x = solve_ivp(rates, (0.0, step), x, "DOP853", args=given, rtol=1e-11, atol=1e-12).y[:, -1]
-        found.append(x[0])
-    return np.array(found)
-
-
-def test_a_sweep_from_rest_agrees_with_a_solver_of_tight_tolerance() -> None:
-    u = sweep(750)
-    expected = solved(HARD, u, STEP)
-    errors = [
-        np.abs(replace(HARD, substeps=n).simulate(u, sample_time=STEP) - expected).max()
-        for n in (10, 40)
-    ]
-    assert errors[0] < 1e-4 * np.ptp(expected)
-    assert errors[1] < errors[0] / 10  # of second order, for the element has corners
-    wrong = replace(HARD, gamma=1.01 * HARD.gamma).simulate(u, sample_time=STEP)
-    assert np.abs(wrong - expected).max() > 1e-3 * np.ptp(expected)
 
 
 @pytest.mark.parametrize("model", [HARD, DuhemOscillator.example()])

@@ -9,7 +9,6 @@ from typing import Any, Literal
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
 from scipy.signal import dlsim, lsim
 
 from mckibben.blocks.compose import Parallel, Series
@@ -17,7 +16,6 @@ from mckibben.blocks.core.block import Block
 from mckibben.blocks.core.fields import DISPLACEMENT
 from mckibben.blocks.dynamic.creep import Creep
 from mckibben.blocks.dynamic.process_model import ProcessModel
-from mckibben.blocks.dynamic.state_network import StateNetwork
 from mckibben.blocks.dynamic.transfer_function import TransferFunction
 from mckibben.blocks.memoryless.affine import Affine
 from mckibben.blocks.memoryless.negative import Negative
@@ -112,29 +110,3 @@ def test_a_continuous_model_comes_as_it_is_written() -> None:
     s = 1j * w
     expected = 2.0 * (0.3 * s + 1) / (0.01 * s**2 + 2 * 0.4 * 0.1 * s + 1)
     np.testing.assert_allclose(found, expected, rtol=1e-12)
-
-
-# -- state-space networks --------------------------------------------------------------------------
-
-
-MODEL = StateNetwork.example()
-FORCE = 3.0 * np.sin(0.002 * np.arange(300) ** 1.5)
-
-
-def test_it_agrees_with_a_solver_of_tight_tolerance() -> None:
-    linear, hidden, readout = (
-        np.array(rows) for rows in (MODEL.linear, MODEL.hidden, MODEL.readout)
-    )
-    t = STEP * np.arange(-1, FORCE.size)
-    scaled = (np.append(0.0, FORCE) - MODEL.input_offset) / MODEL.input_scale
-
-    def rates(now: float, x: Any) -> Any:
-        known = np.array([*x, np.interp(now, t, scaled), 1.0])
-        return MODEL.rate * (linear @ known + readout @ np.tanh(hidden @ known))
-
-    found = solve_ivp(
-        rates, (t[0], t[-1]), np.zeros(2), t_eval=t[1:], rtol=1e-10, atol=1e-10, max_step=STEP
-    ).y[0]
-    expected = MODEL.output_offset + MODEL.output_scale * found
-    given = replace(MODEL, substeps=20).simulate(FORCE, sample_time=STEP, initial="virgin")
-    np.testing.assert_allclose(given, expected, atol=1e-6 * np.ptp(expected))

@@ -124,24 +124,19 @@ ALONE = replace(
 """A balance of one muscle under a load."""
 
 
-@pytest.mark.parametrize(
-    "block",
-    [ForceBalance.example(), replace(ALONE, limits=(), friction=((),), tare=True)],
-    ids=lambda block: block.kind,
-)
-def test_pressures_are_clipped_to_their_range(block: Any) -> None:
-    inputs = path([0.0] * len(block.inputs), [30.0, 30.0, 2.0][: len(block.inputs)])
+def test_a_force_balance_is_clipped_to_its_pressures_and_stays_where_it_has_no_equilibrium() -> (
+    None
+):
+    block = ForceBalance.example()
+    inputs = path([0.0, 0.0, 0.0], [30.0, 30.0, 2.0])
     free = block.simulate(inputs)
     low, high = (float(q) for q in np.quantile(free, [0.2, 0.8]))
     with pytest.warns(ModelWarning):
         limited = replace(block, pressure_range=(low, high)).simulate(inputs)
     np.testing.assert_array_equal(limited, free.clip(low, high))
-
-
-def test_an_equilibrium_that_is_not_there_is_a_warning() -> None:
     pressures = np.array([[0.0, 0.0, 0.0], [500.0, -800.0, 3.0], [-1e4, 1e4, 0.0]])
     with pytest.warns(ModelWarning):
-        ForceBalance.example().inverse().simulate(pressures)
+        block.inverse().simulate(pressures)
 
 
 @pytest.mark.filterwarnings("ignore:overflow", "ignore:invalid")
